@@ -1,0 +1,94 @@
+"""A serial line in simulated time: when each character of a command has arrived, and each of a reply.
+
+A character takes 11 bit times and the next one waits for it; both directions work at once (khepera-protocol.md 2.1).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+from kiks.units import character_ns
+
+OUTPUT_LIMIT = 1 << 20
+"""Characters that wait for a reader [bytes]; what the robot says beyond them is lost, as in any serial driver."""
+
+
+class SerialLine:
+    """Both directions of one robot's line."""
+
+    def __init__(self, baud: int) -> None:
+        self.baud = baud
+        self.character_ns = character_ns(baud)
+        self.sending_until_ns = 0
+        self.lost_count = 0
+        self._answering_until_ns = 0
+        self._waiting = bytearray()
+        # Pieces of `_waiting`, oldest first: when their first character set out [ns], time of one [ns], characters left.
+        self._pieces: deque[list[int]] = deque()
+
+    def set_baud(self, baud: int) -> None:
+        """Change the speed for everything that sets out from now on."""
+        self.baud = baud
+        self.character_ns = character_ns(baud)
+
+    def send(self, count: int, at_ns: int) -> int:
+        """Put characters on the way to the robot; return when the first one sets out [ns]."""
+        start_ns = max(at_ns, self.sending_until_ns)
+        self.sending_until_ns = start_ns + count * self.character_ns
+        return start_ns
+
+    def answer(self, data: bytes, at_ns: int) -> None:
+        """Put a reply on the way to the host."""
+        if not data:
+            return
+        if len(self._waiting) + len(data) > OUTPUT_LIMIT:
+            self.lost_count += len(data)
+            return
+        start_ns = max(at_ns, self._answering_until_ns)
+        self._answering_until_ns = start_ns + len(data) * self.character_ns
+        self._waiting += data
+        self._pieces.append([start_ns, self.character_ns, len(data)])
+
+    @property
+    def waiting(self) -> bytearray:
+        """Characters that nobody has read, arrived or not."""
+        return self._waiting
+
+    def arrived_count(self, now_ns: int) -> int:
+        """Return how many of the waiting characters have arrived."""
+        count = 0
+        for start_ns, character, length in self._pieces:
+            if start_ns + length * character <= now_ns:
+                count += length
+                continue
+            return count + max((now_ns - start_ns) // character, 0)
+        return count
+
+    def arrival_ns(self, count: int) -> int | None:
+        """Return when the first `count` waiting characters have all arrived [ns], None if they were never sent."""
+        for start_ns, character, length in self._pieces:
+            if count <= length:
+                return start_ns + count * character
+            count -= length
+        return None
+
+    def take(self, count: int) -> bytes:
+        """Remove and return the first `count` waiting characters."""
+        taken = bytes(self._waiting[:count])
+        del self._waiting[:count]
+        left = len(taken)
+        while left:
+            piece = self._pieces[0]
+            if piece[2] <= left:
+                left -= piece[2]
+                self._pieces.popleft()
+            else:
+                piece[0] += left * piece[1]
+                piece[2] -= left
+                break
+        return taken
+
+    def forget(self) -> None:
+        """Drop every character that nobody has read."""
+        self._waiting.clear()
+        self._pieces.clear()

@@ -1,0 +1,137 @@
+"""Thinking time: how long the user's program needs between a reply and its next command, and who says so.
+
+`none` and `fixed` are repeatable; `live` measures the program on this computer and is not; `replay` repeats, to the
+nanosecond, what an earlier `live` run measured.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from pathlib import Path
+from typing import Protocol
+
+from kiks.errors import ParameterError, nearest
+from kiks.units import NS_PER_S
+
+FORMS = "'none', 'fixed:MS', 'live', 'live:FACTOR' or 'replay:FILE'"
+
+
+class Thinking(Protocol):
+    """A policy: asked whenever the program calls the port, told whenever the port gives control back."""
+
+    is_repeatable: bool
+
+    def enter(self, *, is_command: bool) -> int:
+        """Return the time to charge [ns] as a port is called; `is_command`: to send, for the first time since a reply."""
+
+    def leave(self) -> None:
+        """Note that the program goes on now."""
+
+
+class ThinkingFixed:
+    """The same time before every command; 0 is `none`."""
+
+    is_repeatable = True
+
+    def __init__(self, time_ns: int) -> None:
+        self.time_ns = time_ns
+
+    def enter(self, *, is_command: bool) -> int:
+        """Return the fixed time before a command, nothing otherwise."""
+        return self.time_ns if is_command else 0
+
+    def leave(self) -> None:
+        """Do nothing."""
+
+
+class ThinkingLive:
+    """The time that really passed, times a factor that stands for another computer (2: half as fast as this one)."""
+
+    is_repeatable = False
+
+    def __init__(self, factor: float) -> None:
+        self.factor = factor
+        self.measured_ns: list[int] = []
+        self._left_ns: int | None = None
+
+    def enter(self, *, is_command: bool) -> int:
+        """Return the time since control was given back."""
+        passed_ns = 0 if self._left_ns is None else round((time.perf_counter_ns() - self._left_ns) * self.factor)
+        self.measured_ns.append(passed_ns)
+        return passed_ns
+
+    def leave(self) -> None:
+        """Start the stop-watch."""
+        self._left_ns = time.perf_counter_ns()
+
+
+class ThinkingReplay:
+    """The times of an earlier run, in their order; nothing when they are used up."""
+
+    is_repeatable = True
+
+    def __init__(self, measured_ns: list[int]) -> None:
+        self._times = iter(measured_ns)
+
+    def enter(self, *, is_command: bool) -> int:
+        """Return the next recorded time."""
+        return next(self._times, 0)
+
+    def leave(self) -> None:
+        """Do nothing."""
+
+
+def parse_thinking(text: str) -> Thinking:
+    """Return the policy that a text names.
+
+    Args:
+        text: 'none', 'fixed:2.5' (ms before each command), 'live', 'live:0.5' (measured, times a factor) or
+            'replay:FILE' (one time [ns] a line, written by `save_thinking`).
+
+    Raises:
+        ParameterError: If the text names no policy or its number is out of range.
+
+    Example:
+        >>> parse_thinking("fixed:2.5").enter(is_command=True)
+        2500000
+    """
+    name, _, value = text.partition(":")
+    if name == "none" and not value:
+        return ThinkingFixed(0)
+    if name == "fixed":
+        return ThinkingFixed(round(_number(text, value, "milliseconds", 3600e3) * 1e6))
+    if name == "live":
+        return ThinkingLive(_number(text, value, "a factor", 1e6) if value else 1.0)
+    if name == "replay" and value:
+        return ThinkingReplay(_read_times(Path(value)))
+    raise ParameterError(f"thinking must be {FORMS}, but it was {text!r}.{nearest(name, ['none', 'fixed', 'live', 'replay'])}")
+
+
+def _number(text: str, value: str, meaning: str, most: float) -> float:
+    try:
+        number = float(value)
+    except ValueError:
+        number = math.nan
+    if not 0 <= number <= most:
+        raise ParameterError(f"thinking must give {meaning} from 0 to {most:g} after the colon, but it was {text!r}.")
+    return number
+
+
+def save_thinking(measured_ns: list[int], path: str | Path) -> None:
+    """Write the times that a live run measured [ns], one a line, for 'replay:FILE'."""
+    Path(path).write_text("".join(f"{time_ns}\n" for time_ns in measured_ns), encoding="ascii")
+
+
+def _read_times(path: Path) -> list[int]:
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise ParameterError(f"a replay file must be readable text, but {str(path)!r} is not ({error}).") from None
+    for number, line in enumerate(lines, 1):
+        if not (line.isascii() and line.isdigit() and len(line) < 19):
+            raise ParameterError(
+                f"replay file {str(path)!r}, line {number}, must be a whole number of at most {3600 * NS_PER_S} ns, "
+                f"but it was {line!r}. Record a run again with thinking 'live'."
+            )
+    return [int(line) for line in lines]

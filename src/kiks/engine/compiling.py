@@ -1,0 +1,48 @@
+"""How kernels are compiled: the same bits on every machine, and from the disk cache at the second start.
+
+Need: `fastmath` would let the compiler reorder sums, and then the bits depend on the width of the processor's vectors.
+Need: Numba's cache notices changes in the file of the cached function alone, but an entry point is made of functions
+from all files of the engine.
+Method: the cache folder carries a digest of the whole engine's source, so that any change starts a fresh one.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from numba import config, njit
+
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "nogil": True}
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile a function that only other kernels call."""
+    return njit(**_OPTIONS)(function)
+
+
+def entry(function: Callable[..., Any]) -> Any:
+    """Compile a function that Python calls, and keep the machine code on disk."""
+    folder_before = config.CACHE_DIR
+    config.CACHE_DIR = str(cache_folder())
+    try:
+        return njit(cache=True, **_OPTIONS)(function)
+    finally:
+        config.CACHE_DIR = folder_before
+
+
+def cache_folder() -> Path:
+    """Return the folder that holds the compiled engine: under `NUMBA_CACHE_DIR`, else the user's cache folder."""
+    digest = hashlib.sha256()
+    for source in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(source.read_bytes())
+    root = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(root) / "kiks" / digest.hexdigest()[:16]
+
+
+def is_compiled() -> bool:
+    """Say whether the machine code of this engine lies in the cache, so that the first call is quick."""
+    return any(cache_folder().rglob("*.nbc"))

@@ -1,0 +1,98 @@
+"""From the paths of two wheels to a pose: the exact arc, cut into short pieces where a wall is near.
+
+Derivation: with wheel paths l and r [mm] the centre moves s = (l + r)/2 along an arc that turns by q = (r - l)/b. Its
+chord has the length s sinc(q/2) and the direction heading + q/2 (khepera-protocol.md 7.3).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from kiks.engine.compiling import kernel
+from kiks.engine.contact import PIECE_MM, clearance_mm, resolve
+from kiks.engine.numbers import sin_cos, sinc
+
+
+@kernel
+def remember_pose(robot: Any) -> Any:
+    """Phase: keep the pose at this tick boundary, for sensors that were sampled a little while ago."""
+    for k in range(robot.trail.shape[0] - 1, 0, -1):
+        for axis in range(3):
+            robot.trail[k, axis] = robot.trail[k - 1, axis]
+    robot.trail[0, 0] = robot.x_mm
+    robot.trail[0, 1] = robot.y_mm
+    robot.trail[0, 2] = robot.heading_rad
+
+
+@kernel
+def move(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, left: Any, right: Any, slip_ratio: Any) -> Any:
+    """Phase: drive along the arc that the wheels ask for, as far as the walls let it; count what the rims did.
+
+    Args:
+        field: Distance of cells to the nearest wall [mm], shape [rows, columns].
+        cell: Edge of a cell [mm].
+        pad: Cells of the border around the arena.
+        robot: Record of the robot.
+        parameters: Record of its constants.
+        left: Path that the left wheel would make without a wall [pulses].
+        right: The same of the right wheel.
+        slip_ratio: Share of its command at which a blocked wheel turns.
+    """
+    pulse = parameters.pulse_mm
+    base = parameters.wheel_base_mm
+    travel = max(abs(left), abs(right)) * pulse
+    pieces = 1
+    if clearance_mm(field, cell, pad, robot.x_mm, robot.y_mm) < parameters.radius_mm + travel + 2.0 * cell:
+        pieces = int(math.ceil(travel / PIECE_MM)) if travel > PIECE_MM else 1
+    arc = 0.5 * (left + right) * pulse / pieces
+    turn = (right - left) * pulse / base / pieces
+    is_touching = False
+    rim_left, rim_right = 0.0, 0.0
+    for _ in range(pieces):
+        sine, cosine = sin_cos(robot.heading_rad + 0.5 * turn)
+        chord = arc * sinc(0.5 * turn)
+        u, v, q, touched = resolve(field, cell, pad, robot, parameters, chord * cosine, chord * sine, turn)
+        robot.heading_rad += q
+        if touched:
+            is_touching = True
+            # The rim goes with the floor, but for the slip ratio of what it wanted more.
+            along = u * cosine + v * sine
+            rim_left += slip(along - 0.5 * q * base, left * pulse / pieces, slip_ratio) / pulse
+            rim_right += slip(along + 0.5 * q * base, right * pulse / pieces, slip_ratio) / pulse
+            robot.travelled_mm += math.sqrt(u * u + v * v)
+        else:
+            rim_left += left / pieces
+            rim_right += right / pieces
+            robot.travelled_mm += abs(arc)
+    robot.slip_pulses[0] += left - rim_left
+    robot.slip_pulses[1] += right - rim_right
+    robot.wheel_pulses[0] += rim_left
+    robot.wheel_pulses[1] += rim_right
+    if is_touching and robot.is_touching == 0:
+        robot.contact_count += 1
+    robot.is_touching = 1 if is_touching else 0
+
+
+@kernel
+def slip(floor_path: Any, wanted_path: Any, slip_ratio: Any) -> Any:
+    """Return the path of a rim that wants more than the floor under it gives."""
+    return floor_path + slip_ratio * (wanted_path - floor_path)
+
+
+@kernel
+def pose_between(robot: Any, ticks_ago: Any, share: Any) -> Any:
+    """Return x, y and heading within the tick that ended `ticks_ago` ticks ago, after a share of it, on its arc."""
+    x0, y0, heading = robot.trail[ticks_ago, 0], robot.trail[ticks_ago, 1], robot.trail[ticks_ago, 2]
+    if ticks_ago == 0:
+        dx, dy, turn = robot.x_mm - x0, robot.y_mm - y0, robot.heading_rad - heading
+    else:
+        dx = robot.trail[ticks_ago - 1, 0] - x0
+        dy = robot.trail[ticks_ago - 1, 1] - y0
+        turn = robot.trail[ticks_ago - 1, 2] - heading
+    # The chord to a point on the arc is shorter by the ratio of the sines and turned back by the rest of the half angle.
+    length = share * sinc(0.5 * share * turn) / sinc(0.5 * turn)
+    sine, cosine = sin_cos(0.5 * (share - 1.0) * turn)
+    x = x0 + length * (dx * cosine - dy * sine)
+    y = y0 + length * (dx * sine + dy * cosine)
+    return x, y, heading + share * turn

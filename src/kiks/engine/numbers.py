@@ -1,0 +1,119 @@
+"""Sine, power, tanh and random numbers that give the same bits on every machine.
+
+Need: the mathematical library differs between systems in the last bit, and a run must not.
+Method: additions, multiplications, divisions, square roots and roundings alone, which IEEE 754 fixes to the bit.
+Random numbers are counter-based: a pure function of who asks and when, so that neither order nor threads matter.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from kiks.engine.compiling import kernel
+
+# Pi/2 and ln 2 in two parts: the first has 33 bits, so that its product with a count below 2^20 is exact.
+_HALF_PI_HIGH = 1.5707963267341256
+_HALF_PI_LOW = 6.077100506506192e-11
+_LN2_HIGH = 0.6931471804855391
+_LN2_LOW = 7.440617110012397e-11
+
+
+@kernel
+def sin_cos(angle_rad: Any) -> Any:
+    """Return sine and cosine, each within 2e-16 for angles up to a million radians (Taylor series on +-pi/4)."""
+    turns = math.floor(angle_rad * 0.6366197723675814 + 0.5)
+    r = (angle_rad - turns * _HALF_PI_HIGH) - turns * _HALF_PI_LOW
+    q = r * r
+    sine = 1.0 / 355687428096000.0
+    sine = sine * q - 1.0 / 1307674368000.0
+    sine = sine * q + 1.0 / 6227020800.0
+    sine = sine * q - 1.0 / 39916800.0
+    sine = sine * q + 1.0 / 362880.0
+    sine = sine * q - 1.0 / 5040.0
+    sine = sine * q + 1.0 / 120.0
+    sine = sine * q - 1.0 / 6.0
+    sine = r + r * q * sine
+    cosine = 1.0 / 20922789888000.0
+    cosine = cosine * q - 1.0 / 87178291200.0
+    cosine = cosine * q + 1.0 / 479001600.0
+    cosine = cosine * q - 1.0 / 3628800.0
+    cosine = cosine * q + 1.0 / 40320.0
+    cosine = cosine * q - 1.0 / 720.0
+    cosine = cosine * q + 1.0 / 24.0
+    cosine = 1.0 - q * 0.5 + q * q * cosine
+    quarter = np.int64(turns) & 3
+    if quarter == 0:
+        return sine, cosine
+    if quarter == 1:
+        return cosine, -sine
+    if quarter == 2:
+        return -sine, -cosine
+    return -cosine, sine
+
+
+@kernel
+def sinc(angle_rad: Any) -> Any:
+    """Return sin(a)/a: how much shorter a chord is than its arc of twice that angle."""
+    if abs(angle_rad) < 1e-4:
+        return 1.0 - angle_rad * angle_rad / 6.0
+    return sin_cos(angle_rad)[0] / angle_rad
+
+
+@kernel
+def exponential(x: Any) -> Any:
+    """Return e to the power of x, 0 below -700."""
+    if x < -700.0:
+        return 0.0
+    shift = math.floor(x * 1.4426950408889634 + 0.5)
+    r = (x - shift * _LN2_HIGH) - shift * _LN2_LOW
+    total = 1.0
+    for k in range(14, 0, -1):
+        total = 1.0 + total * r / k
+    return math.ldexp(total, np.int32(shift))
+
+
+@kernel
+def logarithm(x: Any) -> Any:
+    """Return the natural logarithm of a positive number (series of 2 artanh((m-1)/(m+1)))."""
+    mantissa, shift = math.frexp(x)
+    if mantissa < 0.7071067811865476:
+        mantissa *= 2.0
+        shift -= 1
+    s = (mantissa - 1.0) / (mantissa + 1.0)
+    q = s * s
+    total = 0.0
+    for k in range(21, 0, -2):
+        total = total * q + 1.0 / k
+    return 2.0 * s * total + shift * _LN2_LOW + shift * _LN2_HIGH
+
+
+@kernel
+def power(base: Any, exponent: Any) -> Any:
+    """Return a non-negative base to a positive exponent."""
+    if base <= 0.0:
+        return 0.0
+    return exponential(exponent * logarithm(base))
+
+
+@kernel
+def mix(value: Any) -> Any:
+    """Scramble 64 bits so that every bit of the input flips half of the output (the finalizer of SplitMix64)."""
+    z = np.uint64(value) + np.uint64(0x9E3779B97F4A7C15)
+    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return z ^ (z >> np.uint64(31))
+
+
+@kernel
+def uniform(seed: Any, world: Any, robot: Any, stream: Any, instant: Any, index: Any) -> Any:
+    """Return the random number in [0, 1) that belongs to this seed, world, robot, stream, instant and index."""
+    z = mix(np.uint64(seed))
+    z = mix(z ^ np.uint64(world))
+    z = mix(z ^ np.uint64(robot))
+    z = mix(z ^ np.uint64(stream))
+    z = mix(z ^ np.uint64(instant))
+    z = mix(z ^ np.uint64(index))
+    return np.float64(z >> np.uint64(11)) * (1.0 / 9007199254740992.0)

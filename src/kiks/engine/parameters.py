@@ -1,0 +1,84 @@
+"""A robot's constants as one record that kernels read: derived once from the robot's data file."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.engine.numbers import exponential, sin_cos
+from kiks.model.robot import SENSOR_COUNT, RobotSpec
+from kiks.units import TICK_NS
+
+RAY_COUNT = 7
+"""Rays of a proximity sensor (thesis 3.3, "Proximity sensors")."""
+
+PARAMETERS = np.dtype(
+    [
+        ("radius_mm", "f8"),
+        ("wheel_base_mm", "f8"),
+        ("pulse_mm", "f8"),
+        ("wall_friction", "f8"),
+        ("slip_ratio_min", "f8"),
+        ("slip_ratio_max", "f8"),
+        ("free_speed_pulses", "f8"),
+        ("dead_band_pwm", "f8"),
+        ("motor_gain", "f8", (2,)),
+        ("lag_decay", "f8"),  # share of a speed difference that is left after a tick
+        ("lag_ticks", "f8"),  # what that decay adds to the path: the integral of the difference over a tick
+        ("gain_scale", "i8"),
+        ("mount_x_mm", "f8", (SENSOR_COUNT,)),
+        ("mount_y_mm", "f8", (SENSOR_COUNT,)),
+        ("ray_cos", "f8", (SENSOR_COUNT, RAY_COUNT)),
+        ("ray_sin", "f8", (SENSOR_COUNT, RAY_COUNT)),
+        ("range_mm", "f8"),
+        ("baseline_counts", "f8", (SENSOR_COUNT,)),
+        ("maximum_counts", "f8"),
+        ("step_counts", "f8"),
+        ("noise_small", "f8"),
+        ("noise_large", "f8"),
+        ("noise_exponent", "i8"),
+        ("noise_counts", "f8"),
+        ("dark_counts", "f8"),
+        ("dark_noise_counts", "f8"),
+    ],
+    align=True,
+)
+
+
+def pack(spec: RobotSpec) -> NDArray[np.void]:
+    """Return the robot's constants as an array of one `PARAMETERS` record, shape [1]."""
+    packed = np.zeros(1, PARAMETERS)
+    robot: Any = packed[0]
+    body, motor, proximity = spec.body, spec.motor, spec.proximity
+    robot["radius_mm"] = body.radius_mm
+    for name in ("wheel_base_mm", "pulse_mm", "wall_friction", "slip_ratio_min", "slip_ratio_max"):
+        robot[name] = getattr(body, name)
+    robot["free_speed_pulses"] = motor.free_speed_pulses
+    robot["dead_band_pwm"] = motor.dead_band_pwm
+    robot["motor_gain"] = (motor.left_gain, motor.right_gain)
+    # dw/dt = (u - w)/T has the solution w(t) = u + (w0 - u) exp(-t/T); its integral over a tick of length 1 is
+    # u + (w0 - u) T (1 - exp(-1/T)), with T in ticks.
+    lag_ticks = motor.time_constant_ms * 1e6 / TICK_NS
+    robot["lag_decay"] = exponential(-1.0 / lag_ticks)
+    robot["lag_ticks"] = lag_ticks * (1.0 - robot["lag_decay"])
+    robot["gain_scale"] = motor.gain_scale
+    for sensor in range(SENSOR_COUNT):
+        sine, cosine = sin_cos(math.radians(proximity.mount_angle_deg[sensor]))
+        robot["mount_x_mm"][sensor] = proximity.mount_radius_mm[sensor] * cosine
+        robot["mount_y_mm"][sensor] = proximity.mount_radius_mm[sensor] * sine
+        for ray in range(RAY_COUNT):
+            # The leftmost ray comes first, as in the thesis.
+            offset_deg = proximity.field_of_view_deg * (0.5 - ray / (RAY_COUNT - 1))
+            sine, cosine = sin_cos(math.radians(proximity.direction_deg[sensor] + offset_deg))
+            robot["ray_cos"][sensor, ray] = cosine
+            robot["ray_sin"][sensor, ray] = sine
+    for name in ("range_mm", "baseline_counts", "maximum_counts", "step_counts"):
+        robot[name] = getattr(proximity, name)
+    for name in ("noise_small", "noise_large", "noise_exponent", "noise_counts"):
+        robot[name] = getattr(proximity, name)
+    robot["dark_counts"] = spec.ambient.dark_counts
+    robot["dark_noise_counts"] = spec.ambient.noise_counts
+    return packed

@@ -1,0 +1,147 @@
+"""The eight proximity sensors: when each was sampled, its seven rays, the response to them, and the noise.
+
+Source: thesis section 3.3 ("Proximity sensors", "noise model"), khepera-protocol.md 8.1 (sampling) and
+kiks-behaviour.md 3.1 (rays, colour) and 3.1.1 (the response: a compact stand-in for the measured one).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from kiks.engine.compiling import entry, kernel
+from kiks.engine.motion import pose_between
+from kiks.engine.numbers import exponential, power, sin_cos, uniform
+from kiks.engine.parameters import RAY_COUNT
+from kiks.engine.rays import cast
+from kiks.units import SENSOR_ROUND_NS, SENSOR_SLOT_NS, TICK_NS
+
+STREAM_SLIP, STREAM_PROXIMITY, STREAM_AMBIENT = 1, 2, 3
+"""Random streams: whoever draws has a number of his own."""
+
+_WEIGHTS = (0.35, 0.33, 0.69, 0.43, 0.69, 0.33, 0.35)  # kiks-behaviour.md 3.1.1
+
+
+@kernel
+def sample_instant(time_ns: Any, sensor: Any) -> Any:
+    """Return the number of the round in which a sensor was last sampled, and when that was [ns]."""
+    slot_ns = sensor * SENSOR_SLOT_NS
+    if time_ns < slot_ns:
+        return np.int64(0), np.int64(0)
+    turn = (time_ns - slot_ns) // SENSOR_ROUND_NS
+    return np.int64(turn + 1), np.int64(turn * SENSOR_ROUND_NS + slot_ns)
+
+
+@kernel
+def pose_at(robot: Any, tick_count: Any, time_ns: Any) -> Any:
+    """Return x, y and heading at a time at most 20 ms before the end of the last tick."""
+    age_ns = max(tick_count * TICK_NS - time_ns, 0)
+    ticks_ago = min(age_ns // TICK_NS, robot.trail.shape[0] - 1)
+    share = 1.0 - (age_ns - ticks_ago * TICK_NS) / TICK_NS
+    return pose_between(robot, ticks_ago, max(share, 0.0))
+
+
+@kernel
+def nearness(length_mm: Any, brightness: Any, range_mm: Any) -> Any:
+    """Return what the response makes of a ray: 50 at the sensor, 0 out of range, less for a dark surface.
+
+    Length is inverted and scaled to the 50 mm of the Khepera; black counts half of white (thesis 3.4, "Proximity sensor
+    colour sensitivity").
+    """
+    if brightness == 0:
+        return 0.0
+    inverted = 50.0 * min(max(1.06 - length_mm / range_mm, 0.0), 0.98)
+    return inverted * (1.0 - 0.5 * (255.0 - brightness) / 255.0)
+
+
+@kernel
+def respond(nearnesses: Any) -> Any:
+    """Return the expected count for seven nearnesses (kiks-behaviour.md 3.1.1)."""
+    total = 0.0
+    for ray in range(RAY_COUNT):
+        total += _WEIGHTS[ray] * power(nearnesses[ray] / 50.0, 1.75)
+    return 1023.0 * (1.0 - exponential(-power(total, 1.61)))
+
+
+@kernel
+def expected_count(field: Any, surface: Any, cell: Any, pad: Any, parameters: Any, x: Any, y: Any, heading: Any, sensor: Any) -> Any:
+    """Return the count that a sensor of a robot at this pose gives on average."""
+    sine, cosine = sin_cos(heading)
+    mount_x, mount_y = parameters.mount_x_mm[sensor], parameters.mount_y_mm[sensor]
+    eye_x = x + mount_x * cosine - mount_y * sine
+    eye_y = y + mount_x * sine + mount_y * cosine
+    reach = parameters.range_mm * 1.06
+    seen = np.empty(RAY_COUNT, np.float64)
+    for ray in range(RAY_COUNT):
+        ray_x, ray_y = parameters.ray_cos[sensor, ray], parameters.ray_sin[sensor, ray]
+        direction_x = ray_x * cosine - ray_y * sine
+        direction_y = ray_x * sine + ray_y * cosine
+        length, brightness = cast(field, surface, cell, pad, eye_x, eye_y, direction_x, direction_y, reach)
+        seen[ray] = nearness(length, brightness, parameters.range_mm)
+    return parameters.baseline_counts[sensor] + respond(seen)
+
+
+@kernel
+def integer_power(base: Any, exponent: Any) -> Any:
+    """Return a number to a whole, positive power by multiplication alone."""
+    result = 1.0
+    for _ in range(exponent):
+        result *= base
+    return result
+
+
+@kernel
+def add_noise(parameters: Any, count: Any, sign: Any, size: Any, jitter: Any) -> Any:
+    """Return a count with noise: at most 25 % of small and 10 % of large readings, and seldom that much."""
+    largest = parameters.noise_small - count / 1000.0 * (parameters.noise_small - parameters.noise_large)
+    deviation = largest * integer_power(size, parameters.noise_exponent)
+    noisy = count * (1.0 + deviation) if sign < 0.5 else count * (1.0 - deviation)
+    return noisy + parameters.noise_counts * (2.0 * jitter - 1.0)
+
+
+@kernel
+def quantize(parameters: Any, count: Any) -> Any:
+    """Return a count as the converter gives it: whole steps, within its range."""
+    steps = np.floor(count / parameters.step_counts + 0.5)
+    return np.int64(min(max(steps * parameters.step_counts, 0.0), parameters.maximum_counts))
+
+
+@entry
+def read_proximity(
+    robots: Any, kinds: Any, field: Any, surface: Any, cell: Any, pad: Any, tick_count: Any, time_ns: Any, seed: Any, robot: Any, out: Any
+) -> Any:
+    """Write the eight counts that command N returns at a time into `out`, each sampled at its own instant."""
+    state, parameters = robots[0, robot], kinds[robot]
+    for sensor in range(out.shape[0]):
+        turn, instant_ns = sample_instant(time_ns, sensor)
+        x, y, heading = pose_at(state, tick_count, instant_ns)
+        count = expected_count(field, surface, cell, pad, parameters, x, y, heading, sensor)
+        sign = uniform(seed, 0, robot, STREAM_PROXIMITY, turn, sensor * 3)
+        size = uniform(seed, 0, robot, STREAM_PROXIMITY, turn, sensor * 3 + 1)
+        jitter = uniform(seed, 0, robot, STREAM_PROXIMITY, turn, sensor * 3 + 2)
+        out[sensor] = quantize(parameters, add_noise(parameters, count, sign, size, jitter))
+
+
+@entry
+def expect_proximity(robots: Any, kinds: Any, field: Any, surface: Any, cell: Any, pad: Any, tick_count: Any, time_ns: Any, robot: Any, out: Any) -> Any:
+    """Write the eight expected counts at the pose of this very time into `out`, without noise or rounding."""
+    x, y, heading = pose_at(robots[0, robot], tick_count, time_ns)
+    for sensor in range(out.shape[0]):
+        out[sensor] = expected_count(field, surface, cell, pad, kinds[robot], x, y, heading, sensor)
+
+
+@entry
+def read_ambient(robots: Any, kinds: Any, time_ns: Any, seed: Any, robot: Any, out: Any) -> Any:
+    """Write the eight counts that command O returns at a time into `out`: the dark value and its noise."""
+    parameters = kinds[robot]
+    for sensor in range(out.shape[0]):
+        turn, _ = sample_instant(time_ns, sensor)
+        jitter = uniform(seed, 0, robot, STREAM_AMBIENT, turn, sensor)
+        out[sensor] = quantize(parameters, parameters.dark_counts + parameters.dark_noise_counts * (2.0 * jitter - 1.0))
+
+
+@entry
+def pose_of(robots: Any, tick_count: Any, time_ns: Any, robot: Any) -> Any:
+    """Return x [mm], y [mm] and heading [rad] of a robot at a time."""
+    return pose_at(robots[0, robot], tick_count, time_ns)

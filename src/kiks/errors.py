@@ -1,0 +1,34 @@
+"""What can go wrong, for a user's eyes: every message says what must hold, what was given and what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+
+class KiksError(Exception):
+    """Base of all errors that KiKS raises on purpose."""
+
+
+class ParameterError(KiksError, ValueError):
+    """A value does not keep the rule that its name states."""
+
+
+class ArenaError(KiksError):
+    """A picture or a file is no arena."""
+
+
+class LinkError(KiksError, OSError):
+    """A port is unknown, busy or closed, or the robot's answer is not the one expected."""
+
+
+def nearest(given: str, known: Iterable[str]) -> str:
+    """Return ' Did you mean X?' for the known name nearest to a mistyped one, or nothing.
+
+    Example:
+        >>> nearest("proximty", ["proximity", "ambient"])
+        " Did you mean 'proximity'?"
+    """
+    import difflib
+
+    matches = difflib.get_close_matches(given, list(known), n=1)
+    return f" Did you mean {matches[0]!r}?" if matches else ""

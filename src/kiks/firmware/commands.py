@@ -1,0 +1,194 @@
+"""The command table: one function a letter, whose first line is the command's entry in the reference.
+
+Source: khepera-protocol.md section 4. A function gets as many whole numbers as the table says and returns the values
+of its reply; the letter in lower case, the commas and the line end are put around them in one place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kiks.engine import motor
+
+if TYPE_CHECKING:
+    from kiks.firmware.khepera import Firmware
+
+Reply = tuple[object, ...]
+
+
+class ProtocolError(Exception):
+    """The parameters are not what the command takes: the robot answers `z,Protocol error`."""
+
+
+@dataclass(frozen=True)
+class Command:
+    """A row of the table."""
+
+    letter: str
+    name: str
+    parameters: tuple[str, ...]
+    reply: tuple[str, ...]
+    limits: str
+    act: Callable[..., Reply]
+
+
+def _clamp(value: int, low: int, high: int) -> int:
+    return min(max(value, low), high)
+
+
+def _limit(value: int) -> int:
+    """Fit a number of any length into the kernels' 64 bits; every command clamps to much less."""
+    return _clamp(value, -(2**62), 2**62)
+
+
+def _in_range(value: int, low: int, high: int) -> int:
+    if not low <= value <= high:
+        raise ProtocolError
+    return value
+
+
+def set_speed_gains(robot: Firmware, kp: int, ki: int, kd: int) -> Reply:
+    """Set the gains of the speed controllers of both motors."""
+    robot.view.speed_gains[:] = [_in_range(gain, 0, 32767) for gain in (kp, ki, kd)]
+    return ()
+
+
+def version(robot: Firmware) -> Reply:
+    """Report the versions of the BIOS and of the protocol."""
+    return (robot.spec.firmware.bios_version, robot.spec.firmware.protocol_version)
+
+
+def go_to_position(robot: Firmware, left: int, right: int) -> Reply:
+    """Move each wheel to a counter reading along a trapezoid of speed; the reply does not wait for the arrival."""
+    motor.set_position(robot.robots, robot.world, robot.number, _limit(left), _limit(right))
+    return ()
+
+
+def set_speed(robot: Firmware, left: int, right: int) -> Reply:
+    """Turn the wheels at these speeds until the next command that moves them."""
+    motor.set_speed(robot.robots, robot.world, robot.number, _limit(left), _limit(right))
+    return ()
+
+
+def read_speed(robot: Firmware) -> Reply:
+    """Report the speeds measured in the last 10 ms."""
+    return tuple(robot.view.measured_speed.tolist())
+
+
+def set_position_gains(robot: Firmware, kp: int, ki: int, kd: int) -> Reply:
+    """Set the gains of the position controllers of both motors."""
+    robot.view.position_gains[:] = [_in_range(gain, 0, 32767) for gain in (kp, ki, kd)]
+    return ()
+
+
+def set_counters(robot: Firmware, left: int, right: int) -> Reply:
+    """Set the position counters; nothing moves."""
+    # Beyond 32 bits the low ones count (khepera-protocol.md 4.8).
+    motor.set_counters(robot.robots, robot.world, robot.number, left & 0xFFFFFFFF, right & 0xFFFFFFFF)
+    return ()
+
+
+def read_counters(robot: Firmware) -> Reply:
+    """Report the position counters."""
+    view = robot.view
+    return tuple(((view.pulse_count + view.counter_offset + 2**31) % 2**32 - 2**31).tolist())
+
+
+def read_analog(robot: Firmware, channel: int) -> Reply:
+    """Report an analogue input: 0 charger, 1 reflected and 2 ambient light of the sensor being scanned, 3 to 5 free, 6 current [mA]."""
+    _in_range(channel, 0, 6)
+    if channel in (1, 2):
+        readings = robot.sense_proximity() if channel == 1 else robot.sense_ambient()
+        return (readings[robot.scanned_sensor()],)
+    if channel == 6:
+        power = sum(abs(pwm) for pwm in robot.view.pwm.tolist()) / (2 * motor.PWM_MAX)
+        return (100 + round(300 * power),)
+    return (0,)
+
+
+def set_profile(robot: Firmware, max_left: int, acc_left: int, max_right: int, acc_right: int) -> Reply:
+    """Set the largest speed and the acceleration of position moves; applies at once, to a move in progress too."""
+    robot.view.profile_speed[:] = _clamp(max_left, 1, 127), _clamp(max_right, 1, 127)
+    robot.view.profile_acceleration[:] = _clamp(acc_left, 1, 255), _clamp(acc_right, 1, 255)
+    return ()
+
+
+def read_status(robot: Firmware) -> Reply:
+    """Report for each motor: T on target, M mode (0 speed, 1 position, 2 PWM), E error (command minus measurement)."""
+    view = robot.view
+    on_target, mode = view.on_target.tolist(), view.motor_mode.tolist()
+    error = [motor.controller_error(robot.robots, robot.world, robot.number, wheel) for wheel in (0, 1)]
+    return (on_target[0], mode[0], error[0], on_target[1], mode[1], error[1])
+
+
+def set_led(robot: Firmware, led: int, action: int) -> Reply:
+    """Switch the lateral (0) or the frontal (1) LED: 0 off, 1 on, 2 toggle."""
+    _in_range(led, 0, 1)
+    _in_range(action, 0, 2)
+    robot.view.led[led] = 1 - robot.view.led[led] if action == 2 else action
+    return ()
+
+
+def read_proximity(robot: Firmware) -> Reply:
+    """Report the reflected light of the eight sensors, clockwise from the left; more is nearer."""
+    return tuple(robot.sense_proximity())
+
+
+def read_ambient(robot: Firmware) -> Reply:
+    """Report the ambient light of the eight sensors, clockwise from the left; less is brighter."""
+    return tuple(robot.sense_ambient())
+
+
+def set_pwm(robot: Firmware, left: int, right: int) -> Reply:
+    """Feed the motors without control."""
+    motor.set_pwm(robot.robots, robot.world, robot.number, _limit(left), _limit(right))
+    return ()
+
+
+def read_bus(robot: Firmware, address: int) -> Reply:
+    """Read a byte from the extension bus; where nothing is fitted it is 0."""
+    _in_range(address, 0, 63)
+    return (0,)
+
+
+def write_bus(robot: Firmware, data: int, address: int) -> Reply:
+    """Write the low 8 bits of a number to the extension bus: data first, then the address."""
+    _in_range(address, 0, 63)
+    robot.view.bus[address] = np.uint8(data & 0xFF)
+    return ()
+
+
+_PWM = "-255..255, clamped"
+_GAINS = "0..32767"
+
+COMMANDS: tuple[Command, ...] = (
+    Command("A", "speed controller gains", ("Kp", "Ki", "Kd"), (), _GAINS, set_speed_gains),
+    Command("B", "version", (), ("bios", "protocol"), "", version),
+    Command("C", "go to position", ("left", "right"), (), "pulses, magnitude at most 8388606, clamped", go_to_position),
+    Command("D", "set speed", ("left", "right"), (), "pulses/10 ms, -127..127, clamped", set_speed),
+    Command("E", "read speed", (), ("left", "right"), "pulses/10 ms", read_speed),
+    Command("F", "position controller gains", ("Kp", "Ki", "Kd"), (), _GAINS, set_position_gains),
+    Command("G", "set position counters", ("left", "right"), (), "pulses, low 32 bits", set_counters),
+    Command("H", "read position counters", (), ("left", "right"), "pulses, signed 32 bits", read_counters),
+    Command("I", "read analogue input", ("channel",), ("value",), "channel 0..6, value 0..1023", read_analog),
+    Command(
+        "J",
+        "speed profile",
+        ("max_left", "acc_left", "max_right", "acc_right"),
+        (),
+        "1..127 pulses/10 ms and 1..255 pulses/256 per (10 ms)^2, clamped",
+        set_profile,
+    ),
+    Command("K", "controller status", (), ("T_left", "M_left", "E_left", "T_right", "M_right", "E_right"), "", read_status),
+    Command("L", "LED", ("led", "action"), (), "led 0..1, action 0..2", set_led),
+    Command("N", "proximity sensors", (), tuple(f"s{i}" for i in range(8)), "0..1023", read_proximity),
+    Command("O", "ambient light sensors", (), tuple(f"s{i}" for i in range(8)), "0..1023", read_ambient),
+    Command("P", "set PWM", ("left", "right"), (), _PWM, set_pwm),
+    Command("R", "read extension bus", ("address",), ("data",), "address 0..63, data 0..255", read_bus),
+    Command("W", "write extension bus", ("data", "address"), (), "address 0..63, low 8 bits of data", write_bus),
+)
+"""All commands but T, whose parameters are another command: `Firmware` passes it to a turret."""

@@ -1,0 +1,193 @@
+"""The robot's program: a line comes in, a reply goes out; never an exception (khepera-protocol.md 3.2 to 3.4)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+from kiks.engine.state import MODE_SPEED, ROBOT, State
+from kiks.firmware import tools
+from kiks.firmware.commands import COMMANDS, ProtocolError, Reply
+from kiks.firmware.receiver import Receiver
+from kiks.firmware.turret import Turret
+from kiks.model.robot import RobotSpec
+from kiks.units import SENSOR_SLOT_NS, ns_from_s
+
+UNKNOWN = b"Command not found\r\n"
+PROTOCOL_ERROR = b"z,Protocol error\r\n"
+NO_TURRET = b"z,Turret order not supported\r\n"
+
+DEMO_PERIOD_NS = 20_000_000
+"""How often the demonstration of mode 0 reads its sensors [ns]: once in a sensor round."""
+
+_NUMBER = re.compile(rb"[ \t]*([+-]?[0-9]+)[ \t]*")
+
+
+class Firmware:
+    """The program of one robot.
+
+    Args:
+        spec: What kind of robot it is.
+        state: The world's state, of which the robot owns one record.
+        number: Which record, counted from 0.
+        sense_proximity: Returns the eight counts latched at this time.
+        sense_ambient: The same for light.
+        turrets: What is fitted.
+    """
+
+    def __init__(
+        self,
+        spec: RobotSpec,
+        state: State,
+        number: int,
+        *,
+        sense_proximity: Callable[[], list[int]],
+        sense_ambient: Callable[[], list[int]],
+        turrets: tuple[Turret, ...] = (),
+    ) -> None:
+        self.spec = spec
+        self.robots = state.robots
+        self.world = 0
+        self.number = number
+        self.sense_proximity = sense_proximity
+        self.sense_ambient = sense_ambient
+        self.turrets = {turret.number: turret for turret in turrets}
+        self.receiver = Receiver()
+        self.now_ns = 0
+        self.baud = spec.firmware.baud
+        self.demo_wakes_ns: int | None = None
+        # Writable views of this robot's fields: a field of one number has shape [1], the others keep their own.
+        fields: dict[str, Any] = {}
+        for name in ROBOT.names or ():
+            column = state.robots[name][self.world]
+            fields[name] = column[number] if column.ndim > 1 else column[number : number + 1]
+        self.view = SimpleNamespace(**fields)
+        self._commands = {command.letter.encode(): (command.act, len(command.parameters)) for command in COMMANDS}
+        self.reset()
+
+    # ---- power --------------------------------------------------------------------------------------------------------
+
+    def reset(self) -> None:
+        """Put everything that the firmware holds to its default; the body stays where it is (khepera-protocol.md 6.7)."""
+        view, reset = self.view, self.spec.reset
+        for name in ("target_pulses", "trajectory_pulses", "trajectory_speed", "error_sum", "last_error", "pwm"):
+            getattr(view, name)[:] = 0
+        for name in ("speed_setpoint", "pwm_setpoint", "on_target", "led", "bus", "slip_pulses", "slip_count"):
+            getattr(view, name)[:] = 0
+        view.motor_mode[:] = MODE_SPEED
+        view.counter_offset[:] = -view.pulse_count
+        view.speed_gains[:] = reset.speed_gains
+        view.position_gains[:] = reset.position_gains
+        view.profile_speed[:] = reset.profile_speed_pulses
+        view.profile_acceleration[:] = reset.profile_acceleration
+        self.baud = self.spec.firmware.baud
+        self.demo_wakes_ns = None
+
+    def banner(self) -> bytes:
+        """Return what the robot prints when it starts in protocol mode (khepera-protocol.md 2.4)."""
+        firmware = self.spec.firmware
+        lines = (f"KiKS, {self.spec.name}", f"{firmware.banner}, Rev. {firmware.bios_version}", tools.PROTOCOL_MODE)
+        return tools.text(*lines)
+
+    # ---- a line -------------------------------------------------------------------------------------------------------
+
+    def execute(self, line: bytes, now_ns: int) -> bytes:
+        """Carry out a line without its terminator, at a time; return the reply with CR LF, or nothing.
+
+        Example:
+            >>> from kiks.engine.state import State
+            >>> from kiks.model.robot import RobotSpec
+            >>> state = State.empty(world_count=1, robot_count=1)
+            >>> robot = Firmware(RobotSpec.load("khepera"), state, 0, sense_proximity=list, sense_ambient=list)
+            >>> robot.execute(b"D,5,5", 0), robot.execute(b"D,5", 0), robot.execute(b"M", 0)
+            (b'd\\r\\n', b'z,Protocol error\\r\\n', b'Command not found\\r\\n')
+        """
+        self.now_ns = now_ns
+        quirks = self.spec.quirks
+        if not line:
+            return self._unknown() if quirks.answer_empty_lines else b""
+        words = line.split(b",")
+        letter = words[0]
+        if quirks.accept_lower_case and len(letter) == 1:
+            letter = letter.upper()
+        try:
+            if letter in self._commands:
+                act, count = self._commands[letter]
+                # Commands without parameters ignore what follows the comma; for the others the count must fit.
+                values = act(self, *numbers(words[1:], count)) if count else act(self)
+                return self._reply(letter.lower(), values)
+            if letter == b"T":
+                return self._turret(words[1:])
+        except ProtocolError:
+            return PROTOCOL_ERROR
+        answer = tools.run(self, line)
+        return self._unknown() if answer is None else answer
+
+    def _reply(self, letter: bytes, values: Reply) -> bytes:
+        if values:
+            return letter + b"," + ",".join(map(str, values)).encode() + b"\r\n"
+        if letter == b"d" and self.spec.quirks.d_reply_trailing_comma:
+            return b"d,\r\n"
+        return letter + b"\r\n"
+
+    def _turret(self, words: list[bytes]) -> bytes:
+        """Command T: pass an order to a turret; its number comes before its answer (khepera-protocol.md 4.18)."""
+        if len(words) < 2:
+            raise ProtocolError
+        (number,) = numbers(words[:1], 1)
+        turret = self.turrets.get(number)
+        if turret is None:
+            return NO_TURRET
+        letter = words[1].strip(b" \t")
+        if len(letter) != 1 or not b"A" <= letter <= b"Z":
+            raise ProtocolError
+        parameters = tuple(numbers(words[2:], len(words) - 2))
+        values = turret.revision if letter == b"B" else turret.order(letter.decode(), parameters)
+        if values is None:
+            raise ProtocolError
+        return self._reply(b"t,%d,%s" % (number, letter.lower()), values)
+
+    def _unknown(self) -> bytes:
+        return b"z," + UNKNOWN if self.spec.quirks.unknown_command_with_z else UNKNOWN
+
+    def scanned_sensor(self) -> int:
+        """Return the sensor that is being sampled now."""
+        return self.now_ns // SENSOR_SLOT_NS % 8
+
+    # ---- the demonstration of mode 0 ------------------------------------------------------------------------------------
+
+    def start_demo(self) -> None:
+        """Begin to avoid obstacles without a host (khepera-protocol.md 6.9)."""
+        self.demo_wakes_ns = self.now_ns + ns_from_s(0.0)
+
+    def run_demo(self, now_ns: int) -> None:
+        """Take one step of the demonstration: Braitenberg's vehicle 3 with K-Team's weights (khepera-protocol.md 6.9)."""
+        self.now_ns = now_ns
+        s = self.sense_proximity()
+        first = (-5 * s[0] - 15 * s[1] - 18 * s[2] + 6 * s[3] + 4 * s[4] + 4 * s[5] + 3 * s[6] + 5 * s[7]) / 400
+        second = (4 * s[0] + 4 * s[1] + 6 * s[2] - 18 * s[3] - 15 * s[4] - 5 * s[5] + 5 * s[6] + 3 * s[7]) / 400
+        left, right = round(0.7 * (20 + second)), round(0.7 * (20 + first))
+        self.execute(b"D,%d,%d" % (left, right), now_ns)
+        self.demo_wakes_ns = now_ns + DEMO_PERIOD_NS
+
+
+def numbers(words: list[bytes], count: int) -> list[int]:
+    """Return decimal integers, blanks around them allowed, as many as a command takes.
+
+    Raises:
+        ProtocolError: If there are more or fewer, or one is no decimal integer.
+    """
+    if len(words) != count:
+        raise ProtocolError
+    values = []
+    for word in words:
+        if word.isdigit():
+            values.append(int(word))
+            continue
+        match = _NUMBER.fullmatch(word)
+        if match is None:
+            raise ProtocolError
+        values.append(int(match[1]))
+    return values

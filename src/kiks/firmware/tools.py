@@ -1,0 +1,132 @@
+"""The tool words: lower-case commands for a person at a terminal (khepera-protocol.md section 5). The texts are ours."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from kiks.firmware.commands import COMMANDS
+
+if TYPE_CHECKING:
+    from kiks.firmware.khepera import Firmware
+
+PROTOCOL_MODE = "Serial Communication Protocol"
+LOADER_MODE = "S format Motorola loader mode"
+
+BAUDS = (9600, 19200, 38400, 57600, 115200)
+"""Line speeds that the robots know [bit/s] (khepera-protocol.md section 1)."""
+
+SUMMARY = {
+    "help": "help [name]: this list, or a line on one tool or command letter",
+    "list": "list: the modules in ROM",
+    "net": "net: the intelligent turrets that are fitted",
+    "process": "process: what is running",
+    "memory": "memory: use of ROM and RAM",
+    "k-team": "k-team: who made the robot",
+    "serial": "serial <baud>: change the speed of the line at once",
+    "restart": "restart: the same as the reset button",
+    "run": "run <function>: start a function in ROM: demo, sloader, user-flash",
+    "sfill": "sfill: load S-records without starting them",
+    "flash": "flash E | flash W: erase or write the user's flash memory",
+}
+
+
+def text(*lines: str) -> bytes:
+    """Return lines as the robot prints them."""
+    return "".join(f"{line}\r\n" for line in lines).encode()
+
+
+def run(robot: Firmware, line: bytes) -> bytes | None:
+    """Carry out a tool; return what it prints, or None if the first word names none."""
+    words = line.decode("ascii", errors="replace").split()
+    if not words or words[0] not in SUMMARY or (words[0] == "flash" and not robot.spec.firmware.has_user_flash):
+        return None
+    return _TOOLS[words[0]](robot, words[1:])
+
+
+def _help(robot: Firmware, words: list[str]) -> bytes:
+    if not words:
+        return text(*SUMMARY.values())
+    if words[0] in SUMMARY:
+        return text(SUMMARY[words[0]])
+    for command in COMMANDS:
+        if command.letter == words[0]:
+            return text(f"{','.join((command.letter, *command.parameters))}: {command.name}")
+    return text(f"No help on {words[0][:20]}")
+
+
+def _list(robot: Firmware, words: list[str]) -> bytes:
+    revision = robot.spec.firmware.bios_version
+    rows = [f"PR_{c.letter}  {c.name}, {revision}" for c in COMMANDS]
+    rows += [f"TO{number:02d}  {name}, {revision}" for number, name in enumerate(SUMMARY)]
+    return text("ID    description, version", *rows, f"FU00  demo, {revision}", f"BI00  BIOS, {revision}")
+
+
+def _net(robot: Firmware, words: list[str]) -> bytes:
+    rows = [f"{t.name}, ID {t.number}, revision {t.revision[0]}.{t.revision[1]}" for t in robot.turrets.values()]
+    return text(*(rows or ["No intelligent turret"]))
+
+
+def _process(robot: Firmware, words: list[str]) -> bytes:
+    revision = robot.spec.firmware.bios_version
+    running = ["Idle", "Motor control", "Sensor scan", PROTOCOL_MODE]
+    if robot.demo_wakes_ns is not None:
+        running.append("Demonstration")
+    return text(*(f"Process {n}. {n * 1024:08d}  {name}, Rev. {revision}" for n, name in enumerate(running)))
+
+
+def _memory(robot: Firmware, words: list[str]) -> bytes:
+    return text("ROM   16'0001C000, used 87%", "RAM 1 16'00102400, used 14%", "RAM 2 16'00200800, used 02%")
+
+
+def _k_team(robot: Firmware, words: list[str]) -> bytes:
+    return text("The Khepera was made by K-Team, Switzerland; this one is simulated by KiKS")
+
+
+def _serial(robot: Firmware, words: list[str]) -> bytes:
+    if len(words) != 1 or words[0] not in map(str, BAUDS):
+        return text(f"serial: one of {', '.join(map(str, BAUDS))}")
+    robot.baud = int(words[0])
+    return text(f"Line at {robot.baud} baud")
+
+
+def _restart(robot: Firmware, words: list[str]) -> bytes:
+    robot.reset()
+    return robot.banner()
+
+
+def _run(robot: Firmware, words: list[str]) -> bytes:
+    if words == ["demo"]:
+        robot.start_demo()
+        return text("Demonstration: obstacle avoidance; restart ends it")
+    if words == ["sloader"]:
+        return text(LOADER_MODE, "S: this robot loads no code; download terminated")
+    if words == ["user-flash"]:
+        return text("No user application in flash")
+    return text("run: one of demo, sloader, user-flash")
+
+
+def _sfill(robot: Firmware, words: list[str]) -> bytes:
+    return text(LOADER_MODE, "S: this robot loads no code; download terminated")
+
+
+def _flash(robot: Firmware, words: list[str]) -> bytes:
+    if words == ["E"]:
+        return text("Flash erased")
+    if words == ["W"]:
+        return text("Flash written")
+    return text("flash: E or W")
+
+
+_TOOLS = {
+    "help": _help,
+    "list": _list,
+    "net": _net,
+    "process": _process,
+    "memory": _memory,
+    "k-team": _k_team,
+    "serial": _serial,
+    "restart": _restart,
+    "run": _run,
+    "sfill": _sfill,
+    "flash": _flash,
+}

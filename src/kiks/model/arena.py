@@ -1,0 +1,292 @@
+"""What an arena is: a raster of brightness, how far every place is from a wall, and what stands in it.
+
+x points right, y up, and (0, 0) is the lower left corner of the raster. Pictures and arrays come with row 0 on top;
+`Arena.from_array` turns them over, and nobody else does.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from kiks.errors import ArenaError, ParameterError
+from kiks.model.places import Ball, Cylinder, Lamp, Pose, checked_places
+from kiks.model.raster import MAX_CELLS, PAD, SIZE_MIN_MM, between, box_raster, cells_per_pixel, clearance_mm
+
+__all__ = ["MAX_CELLS", "PAD", "SIZE_MIN_MM", "Arena", "Ball", "Cylinder", "Lamp", "Pose"]
+
+_KINDS = (
+    ("starts", "start", Pose),
+    ("lamps", "lamp", Lamp),
+    ("balls", "ball", Ball),
+    ("cylinders", "cylinder", Cylinder),
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Arena:
+    """A checked arena that never changes; `dataclasses.replace` makes a changed copy.
+
+    Args:
+        brightness: uint8 [row, column], row 0 at the bottom: 0 is floor, 1..255 a wall from black to white. Kept
+            read-only; copied unless it already is.
+        mm_per_cell: Edge of a cell [mm], at most 1.
+        name: What people call it.
+        starts: Where robots start, each on floor.
+        lamps: Lamps, each inside the raster.
+        balls: Balls, each centre on floor.
+        cylinders: Cylinders, each centre on floor.
+
+    Raises:
+        ParameterError: If `brightness` is no uint8 [row, column], `mm_per_cell` is out of range or an entry's
+            number is none.
+        ArenaError: If the raster is too small, too large or has no floor, or an entry stands where it cannot.
+
+    Example:
+        >>> arena = Arena.box(400, 300)
+        >>> arena.clearance_at_mm(200, 150)
+        140.0
+        >>> arena.free_for(30, 30, radius_mm=27.5)
+        False
+    """
+
+    brightness: npt.NDArray[np.uint8] = field(repr=False)
+    mm_per_cell: float
+    name: str
+    starts: tuple[Pose, ...] = ()
+    lamps: tuple[Lamp, ...] = ()
+    balls: tuple[Ball, ...] = ()
+    cylinders: tuple[Cylinder, ...] = ()
+    _surface: npt.NDArray[np.uint8] | None = field(default=None, init=False, repr=False)
+    _clearance: npt.NDArray[np.float32] | None = field(default=None, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        given = self.brightness
+        if not isinstance(given, np.ndarray) or given.dtype != np.uint8 or given.ndim != 2:
+            raise ParameterError(
+                f"brightness must be a uint8 array [row, column], but it was {_described(given)}. "
+                "Arena.from_array accepts other integers."
+            )
+        cells_per_pixel(given.shape[0], given.shape[1], self.mm_per_cell)
+        if self.mm_per_cell > 1:
+            raise ParameterError(
+                f"mm_per_cell must be at most 1, but it was {self.mm_per_cell!r}. "
+                "Arena.from_array cuts coarser pixels into cells."
+            )
+        if given.all():
+            raise ArenaError(
+                "An arena must have floor, but every cell is wall. Black (0) is floor and any other value wall: "
+                "invert the picture if it was drawn the other way round."
+            )
+        if given.flags.writeable or given.base is not None or not given.flags.c_contiguous:
+            given = given.copy(order="C")
+            given.setflags(write=False)
+        object.__setattr__(self, "brightness", given)
+        object.__setattr__(self, "mm_per_cell", float(self.mm_per_cell))
+        for name, label, kind in _KINDS:
+            entries = checked_places(label, kind, getattr(self, name), given, self.mm_per_cell)
+            object.__setattr__(self, name, entries)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Through the constructor: a plain pickle would bring the raster back writable and carry the caches along.
+        parts = (self.brightness, self.mm_per_cell, self.name, self.starts, self.lamps, self.balls, self.cylinders)
+        return Arena, parts
+
+    @classmethod
+    def from_array(cls, brightness: npt.NDArray[Any], *, mm_per_pixel: float = 1.0, name: str = "array") -> Arena:
+        """Make an arena of an array that looks like a picture.
+
+        Args:
+            brightness: Integers 0..255 [row, column] with row 0 on top, 0 = floor; or booleans, True = wall of 255.
+            mm_per_pixel: Edge of a pixel [mm]. A pixel above 1 mm becomes k x k cells, k = ceil(mm_per_pixel).
+            name: What people call it.
+
+        Raises:
+            ParameterError: If the array is not of that kind or `mm_per_pixel` is out of range.
+            ArenaError: If the arena would be too small, too large or without floor.
+        """
+        if not isinstance(brightness, np.ndarray) or brightness.ndim != 2 or brightness.dtype.kind not in "bui":
+            raise ParameterError(
+                f"brightness must be an array [row, column] of integers 0..255 or booleans, but it was "
+                f"{_described(brightness)}. Convert it, for instance with array.astype(np.uint8)."
+            )
+        cells = cells_per_pixel(brightness.shape[0], brightness.shape[1], mm_per_pixel)
+        if brightness.dtype == np.bool_:
+            brightness = np.where(brightness, np.uint8(255), np.uint8(0))
+        low, high = int(brightness.min()), int(brightness.max())
+        if low < 0 or high > 255:
+            raise ParameterError(
+                f"brightness must lie within 0..255, but it spans {low}..{high}. Scale it, keeping 0 for floor."
+            )
+        upright = np.flipud(brightness).astype(np.uint8, order="C")
+        if cells > 1:
+            upright = upright.repeat(cells, axis=0).repeat(cells, axis=1)
+        upright.setflags(write=False)
+        return cls(upright, mm_per_pixel / cells, name)
+
+    @classmethod
+    def from_image(cls, path: str | Path, mm_per_pixel: float = 1.0) -> Arena:
+        """Read a picture: black is floor, any other grey a wall of that brightness (see docs/arenas.md).
+
+        Args:
+            path: A PNG, TIF, PGM or BMP file.
+            mm_per_pixel: Edge of a pixel [mm].
+
+        Raises:
+            ParameterError: If `mm_per_pixel` is out of range.
+            ArenaError: If the file is missing, damaged, of another type or no arena.
+        """
+        from kiks.model.picture import read_picture
+
+        path = Path(path)
+        return cls.from_array(read_picture(path, mm_per_pixel), mm_per_pixel=mm_per_pixel, name=path.stem)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Arena:
+        """Read an arena file (.toml), or a picture at 1 mm per pixel.
+
+        Raises:
+            ArenaError: If the file is missing, damaged or no arena.
+        """
+        from kiks.model.arena_file import load_arena
+
+        path = Path(path)
+        return load_arena(path) if path.suffix.lower() == ".toml" else cls.from_image(path)
+
+    @classmethod
+    def default(cls) -> Arena:
+        """Return the classic arena: 500 x 650 mm, white walls, round corners (kiks-behaviour.md, section 1.1)."""
+        box = cls.box(500, 650, rounded_mm=100)
+        return cls(box.brightness, box.mm_per_cell, "default", starts=(Pose(250.0, 325.0, math.pi / 2),))
+
+    @classmethod
+    def box(
+        cls, width_mm: int, height_mm: int, *, wall_mm: int = 10, rounded_mm: int = 0, brightness: int = 255
+    ) -> Arena:
+        """Return an empty arena with a wall around it, in whole millimetres.
+
+        Args:
+            width_mm: Outer width [mm].
+            height_mm: Outer height [mm].
+            wall_mm: Thickness of the wall [mm]; 0 leaves the border of the world alone.
+            rounded_mm: Radius of the corners of the floor [mm].
+            brightness: Brightness of the wall, 1..255.
+
+        Raises:
+            ParameterError: If a number is not whole or out of range.
+            ArenaError: If the box is too small or too large.
+        """
+        raster = box_raster(width_mm, height_mm, wall_mm, rounded_mm, brightness)
+        return cls.from_array(raster, name="box")
+
+    @property
+    def width_mm(self) -> float:
+        """Width of the raster [mm]."""
+        return float(self.brightness.shape[1] * self.mm_per_cell)
+
+    @property
+    def height_mm(self) -> float:
+        """Height of the raster [mm]."""
+        return float(self.brightness.shape[0] * self.mm_per_cell)
+
+    @property
+    def surface(self) -> npt.NDArray[np.uint8]:
+        """Brightness with the border of the world around it: uint8 [row + 2 PAD, column + 2 PAD], border 255."""
+        # Computed on first use. Threads that race here compute the same array twice, and one of the two is kept.
+        if self._surface is None:
+            surface = np.pad(self.brightness, PAD, constant_values=255)
+            surface.setflags(write=False)
+            object.__setattr__(self, "_surface", surface)
+        assert self._surface is not None
+        return self._surface
+
+    @property
+    def clearance(self) -> npt.NDArray[np.float32]:
+        """Distance from each cell's centre to that of the nearest wall cell [mm].
+
+        float32 [row + 2 PAD, column + 2 PAD], exact (Euclidean), 0 in wall cells; the border of the world is wall.
+        """
+        if self._clearance is None:
+            clearance = clearance_mm(self.surface, self.mm_per_cell)
+            clearance.setflags(write=False)
+            object.__setattr__(self, "_clearance", clearance)
+        assert self._clearance is not None
+        return self._clearance
+
+    def clearance_at_mm(self, x_mm: float, y_mm: float) -> float:
+        """Return how far a point is from the surface of the nearest wall [mm].
+
+        Interpolates `clearance` between cell centres and takes off half a cell, which is exact before a straight
+        wall along the raster and at most 0.21 cells too much before a corner. In walls and outside it is negative.
+
+        Raises:
+            ParameterError: If a coordinate is not finite.
+        """
+        if not (math.isfinite(x_mm) and math.isfinite(y_mm)):
+            raise ParameterError(
+                f"x_mm and y_mm must be finite, but they were {x_mm!r} and {y_mm!r}. Give a place [mm]."
+            )
+        column, column_share = between(x_mm / self.mm_per_cell + PAD - 0.5, self.clearance.shape[1])
+        row, row_share = between(y_mm / self.mm_per_cell + PAD - 0.5, self.clearance.shape[0])
+        square = self.clearance[row : row + 2, column : column + 2].astype(np.float64)
+        upright = square[0] + row_share * (square[1] - square[0])
+        return float(upright[0] + column_share * (upright[1] - upright[0]) - 0.5 * self.mm_per_cell)
+
+    def free_for(self, x_mm: float, y_mm: float, radius_mm: float) -> bool:
+        """Tell whether a disc of `radius_mm` [mm] at a place [mm] touches no wall.
+
+        Raises:
+            ParameterError: If a coordinate is not finite or `radius_mm` is not positive and finite.
+        """
+        if not 0 < radius_mm < math.inf:
+            raise ParameterError(
+                f"radius_mm must be positive and finite, but it was {radius_mm!r}. A Khepera has 27.5."
+            )
+        return self.clearance_at_mm(x_mm, y_mm) >= radius_mm
+
+    def find_start(self, radius_mm: float) -> Pose:
+        """Return where a robot of `radius_mm` [mm] starts.
+
+        That is the first of `starts`. Without any it is the cell with most room, among equals the one nearest to
+        the middle, heading up: the same one every time.
+
+        Raises:
+            ParameterError: If `radius_mm` is not positive and finite.
+            ArenaError: If the start pose, or every place, is too narrow for the robot.
+        """
+        pose = self.starts[0] if self.starts else self._widest_place()
+        if not self.free_for(pose.x_mm, pose.y_mm, radius_mm):
+            room_mm = 2 * self.clearance_at_mm(pose.x_mm, pose.y_mm)
+            where, advice = (
+                (
+                    f"start 1 at ({pose.x_mm:g}, {pose.y_mm:g}) mm has room for",
+                    "Move the start pose away from the wall.",
+                )
+                if self.starts
+                else ("its widest place has room for", "Draw wider passages or give a larger mm_per_pixel.")
+            )
+            raise ArenaError(
+                f"Arena {self.name!r} must have room for a robot {2 * radius_mm:g} mm across, but {where} "
+                f"{room_mm:.1f} mm only. {advice}"
+            )
+        return pose
+
+    def _widest_place(self) -> Pose:
+        inside = self.clearance[PAD:-PAD, PAD:-PAD]
+        rows, columns = np.nonzero(inside == inside.max())
+        # Twice the offset from the middle, in cells, stays a whole number: no rounding decides between equals.
+        offset = (2 * rows + 1 - inside.shape[0]) ** 2 + (2 * columns + 1 - inside.shape[1]) ** 2
+        best = int(offset.argmin())
+        x_mm, y_mm = ((int(index[best]) + 0.5) * self.mm_per_cell for index in (columns, rows))
+        return Pose(x_mm, y_mm, math.pi / 2)
+
+
+def _described(value: object) -> str:
+    if isinstance(value, np.ndarray):
+        return f"an array of {value.dtype} with {value.ndim} dimensions"
+    return f"of type {type(value).__name__}"

@@ -1,0 +1,201 @@
+"""The arena file: a picture or a box, and what stands in it, in a few lines of TOML (docs/arenas.md)."""
+
+from __future__ import annotations
+
+import json
+import math
+import tomllib
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kiks.errors import ArenaError, KiksError, ParameterError, nearest
+from kiks.model.arena import Arena
+from kiks.model.picture import check_is_file, read_picture
+from kiks.model.places import Ball, Cylinder, Lamp, Pose
+from kiks.model.raster import is_number
+
+_PICTURE_KEYS = ("picture", "mm_per_pixel")
+_BOX_KEYS = ("size_mm", "wall_mm", "rounded_mm", "brightness")
+_ENTRY_KEYS = {
+    "start": ("at_mm", "heading_deg"),
+    "lamp": ("at_mm", "power_w", "is_on"),
+    "ball": ("at_mm",),
+    "cylinder": ("at_mm",),
+}
+_TOP_KEYS = (*_PICTURE_KEYS, *_BOX_KEYS, "name", *_ENTRY_KEYS)
+
+
+def load_arena(path: Path) -> Arena:
+    """Read an arena file.
+
+    Args:
+        path: The TOML file; its picture lies in the same folder or below.
+
+    Raises:
+        ArenaError: If the file or its picture is missing, damaged, or no arena. The message names file and entry.
+    """
+    what = f"Arena file {str(path)!r}"
+    check_is_file(path, what)
+    try:
+        # Undecodable bytes and endless numbers are ValueErrors too; deep nesting ends in a RecursionError.
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError, OSError) as error:
+        raise ArenaError(f"{what} must be TOML in UTF-8, but: {error}. Correct the file at that place.") from None
+    try:
+        return _arena_of(table, path)
+    except KiksError as error:
+        raise ArenaError(f"{what}: {error}") from None
+
+
+def save_arena(arena: Arena, path: str | Path) -> None:
+    """Write an arena as a TOML file and, beside it, a PNG of the same name; existing files are replaced.
+
+    Args:
+        arena: The arena.
+        path: The TOML file.
+
+    Raises:
+        ParameterError: If the name does not end in .toml.
+        ArenaError: If the files cannot be written.
+    """
+    from PIL import Image
+
+    path = Path(path)
+    if path.suffix.lower() != ".toml":
+        raise ParameterError(f"path must end in '.toml', but it was {str(path)!r}. The picture goes beside it as .png.")
+    picture = path.with_suffix(".png")
+    try:
+        Image.fromarray(np.flipud(arena.brightness)).save(picture)
+        path.write_text(_toml_of(arena, picture.name), encoding="utf-8")
+    except OSError as error:
+        raise ArenaError(
+            f"Arena {arena.name!r} must be written to {str(path)!r}, but: {error}. Check the folder."
+        ) from None
+
+
+def _arena_of(table: dict[str, Any], path: Path) -> Arena:
+    _check_keys(table, _TOP_KEYS, "the file")
+    for keys, rival in ((_PICTURE_KEYS, "size_mm"), (_BOX_KEYS, "picture")):
+        if rival in table and (given := [key for key in keys if key in table]):
+            raise ArenaError(
+                f"an arena must be either a picture or a box, but {rival} came with {given[0]}. Remove one of them."
+            )
+    if "picture" in table:
+        arena = _picture_arena(table, path)
+    elif "size_mm" in table:
+        width_mm, height_mm = _pair(table, "size_mm", "the box")
+        box_keys = {key: table[key] for key in _BOX_KEYS[1:] if key in table}
+        arena = Arena.box(width_mm, height_mm, **box_keys)
+    else:
+        raise ArenaError(
+            "an arena must have a picture or a size, but it has neither. "
+            'Give picture = "name.png" or size_mm = [width, height].'
+        )
+    return replace(
+        arena,
+        name=_typed(table, "name", str, path.stem, "the file"),
+        starts=tuple(_starts(table)),
+        lamps=tuple(_lamps(table)),
+        balls=tuple(Ball(*_pair(entry, "at_mm", who)) for who, entry in _entries(table, "ball")),
+        cylinders=tuple(Cylinder(*_pair(entry, "at_mm", who)) for who, entry in _entries(table, "cylinder")),
+    )
+
+
+def _picture_arena(table: dict[str, Any], path: Path) -> Arena:
+    given = _typed(table, "picture", str, "", "the file")
+    folder = path.parent.resolve()
+    try:
+        picture = (folder / given).resolve()
+    except (ValueError, OSError, RuntimeError):
+        # A NUL character, or links that lead in a circle.
+        picture = folder.parent
+    if not picture.is_relative_to(folder) or Path(given).is_absolute():
+        raise ArenaError(
+            f"picture must lie in the arena file's folder or below it, but it was {given!r}. "
+            "Copy the picture beside the file and give its name."
+        )
+    mm_per_pixel = table.get("mm_per_pixel", 1.0)
+    return Arena.from_array(read_picture(path.parent / given, mm_per_pixel), mm_per_pixel=mm_per_pixel)
+
+
+def _starts(table: dict[str, Any]) -> Iterable[Pose]:
+    for who, entry in _entries(table, "start"):
+        heading_deg = entry.get("heading_deg", 90)
+        if not is_number(heading_deg):
+            raise ArenaError(f"{who}: heading_deg must be a number, but it was {heading_deg!r}. 0 looks right, 90 up.")
+        x_mm, y_mm = _pair(entry, "at_mm", who)
+        yield Pose(x_mm, y_mm, math.radians(heading_deg))
+
+
+def _lamps(table: dict[str, Any]) -> Iterable[Lamp]:
+    for who, entry in _entries(table, "lamp"):
+        power_w = entry.get("power_w", 1.0)
+        if not is_number(power_w):
+            raise ArenaError(f"{who}: power_w must be a number, but it was {power_w!r}. A Khepera lamp has 1 W.")
+        x_mm, y_mm = _pair(entry, "at_mm", who)
+        yield Lamp(x_mm, y_mm, power_w, _typed(entry, "is_on", bool, True, who))
+
+
+def _entries(table: dict[str, Any], label: str) -> Iterable[tuple[str, dict[str, Any]]]:
+    entries = table.get(label, [])
+    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
+        raise ArenaError(f"{label} must be a list of tables, but it was {entries!r}. Head each with [[{label}]].")
+    for number, entry in enumerate(entries, start=1):
+        who = f"{label} {number}"
+        _check_keys(entry, _ENTRY_KEYS[label], who)
+        yield who, entry
+
+
+def _check_keys(table: dict[str, Any], known: tuple[str, ...], who: str) -> None:
+    for key in table:
+        if key not in known:
+            raise ArenaError(
+                f"{who} must have known keys only, but has {key!r}.{nearest(key, known)} Known are {', '.join(known)}."
+            )
+
+
+def _pair(table: dict[str, Any], key: str, who: str) -> Any:
+    """Return the two numbers of a key, unconverted: whole numbers stay whole."""
+    if key not in table:
+        raise ArenaError(f"{who} must have {key}, but has none. Give {key} = [x, y].")
+    pair = table[key]
+    if not isinstance(pair, list) or len(pair) != 2 or not all(is_number(value) for value in pair):
+        raise ArenaError(f"{who}: {key} must be two numbers in mm, but it was {pair!r}. Give {key} = [x, y].")
+    return pair
+
+
+def _typed(table: dict[str, Any], key: str, kind: type, default: Any, who: str) -> Any:
+    value = table.get(key, default)
+    if not isinstance(value, kind):
+        form = "true or false" if kind is bool else 'a text in "quotes"'
+        raise ArenaError(f"{who}: {key} must be {form}, but it was {value!r}. Write it that way.")
+    return value
+
+
+def _toml_of(arena: Arena, picture: str) -> str:
+    lines = [
+        f"picture = {_quoted(picture)}",
+        f"mm_per_pixel = {arena.mm_per_cell!r}",
+        f"name = {_quoted(arena.name)}",
+    ]
+    for start in arena.starts:
+        lines += ["", "[[start]]", _at(start), f"heading_deg = {math.degrees(start.heading_rad)!r}"]
+    for lamp in arena.lamps:
+        lines += ["", "[[lamp]]", _at(lamp), f"power_w = {lamp.power_w!r}", f"is_on = {str(lamp.is_on).lower()}"]
+    for label, bodies in (("ball", arena.balls), ("cylinder", arena.cylinders)):
+        for body in bodies:
+            lines += ["", f"[[{label}]]", _at(body)]
+    return "\n".join(lines) + "\n"
+
+
+def _at(place: Pose | Lamp | Ball | Cylinder) -> str:
+    return f"at_mm = [{place.x_mm!r}, {place.y_mm!r}]"
+
+
+def _quoted(text: str) -> str:
+    # TOML quotes as JSON does, save for one control character that JSON leaves bare.
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

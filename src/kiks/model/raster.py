@@ -1,0 +1,134 @@
+"""The raster below an arena: how large it may be, how a box is drawn into it, how far its cells are from a wall."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from kiks.errors import ArenaError, ParameterError
+
+PAD = 2
+"""Wall cells that stand around the raster in `Arena.surface` and `Arena.clearance`: the world outside is wall.
+
+Two of them, so that interpolating between neighbours never needs a test at the raster's edge.
+"""
+
+MAX_CELLS = 64_000_000
+"""Most cells of a raster: 8 m x 8 m at 1 mm. Squared distances then stay below 2**24, exact in float32."""
+
+SIZE_MIN_MM = 100
+"""Least width and height of an arena [mm]: less leaves a Khepera of 55 mm no room (kiks-behaviour.md, section 1.1)."""
+
+MM_PER_PIXEL_MIN, MM_PER_PIXEL_MAX = 0.1, 100.0
+"""Finest and coarsest picture [mm per pixel]; beyond them the number is more likely a slip than a wish."""
+
+_NUMBER_MAX = 1e9
+_BLOCK_ROWS = 64
+
+
+def cells_per_pixel(row_count: int, column_count: int, mm_per_pixel: float) -> int:
+    """Return into how many cells each edge of a pixel is cut so that no cell is larger than 1 mm.
+
+    Args:
+        row_count: Rows of the picture.
+        column_count: Columns of the picture.
+        mm_per_pixel: Edge of a pixel [mm].
+
+    Raises:
+        ParameterError: If `mm_per_pixel` is out of range.
+        ArenaError: If the arena would be smaller than `SIZE_MIN_MM` or have more than `MAX_CELLS` cells.
+    """
+    if not is_number(mm_per_pixel) or not MM_PER_PIXEL_MIN <= mm_per_pixel <= MM_PER_PIXEL_MAX:
+        raise ParameterError(
+            f"mm_per_pixel must be a number from {MM_PER_PIXEL_MIN:g} to {MM_PER_PIXEL_MAX:g}, but it was "
+            f"{mm_per_pixel!r}. Most arenas are drawn with 1 mm per pixel."
+        )
+    shape = f"{column_count} x {row_count} pixels of {mm_per_pixel:g} mm"
+    # The tiny allowance is for products such as 1429 * 0.07 that fall a rounding error short.
+    if min(row_count, column_count) * mm_per_pixel < SIZE_MIN_MM - 1e-9:
+        raise ArenaError(
+            f"An arena must be at least {SIZE_MIN_MM} x {SIZE_MIN_MM} mm, but this one has {shape}. "
+            "Draw it larger or give a larger mm_per_pixel."
+        )
+    cells = math.ceil(mm_per_pixel)
+    if row_count * column_count * cells**2 > MAX_CELLS:
+        raise ArenaError(
+            f"An arena must have at most {MAX_CELLS // 1_000_000} million cells, none larger than 1 mm, but this one "
+            f"has {shape}, which makes {row_count * column_count * cells**2 / 1e6:.1f} million. Draw a smaller one."
+        )
+    return cells
+
+
+def is_number(value: Any) -> bool:
+    """Tell whether a value is a real number of a size that a coordinate may have; booleans and NaN are none."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+        return False
+    return bool(-_NUMBER_MAX <= value <= _NUMBER_MAX)
+
+
+def box_raster(width_mm: int, height_mm: int, wall_mm: int, rounded_mm: int, brightness: int) -> npt.NDArray[np.uint8]:
+    """Draw an empty box at 1 mm per cell: uint8 [row, column]. See `Arena.box`.
+
+    Args:
+        width_mm: Outer width [mm].
+        height_mm: Outer height [mm].
+        wall_mm: Thickness of the wall [mm].
+        rounded_mm: Radius of the corners of the floor [mm].
+        brightness: Brightness of the wall, 1..255.
+
+    Raises:
+        ParameterError: If a number is not whole or out of range.
+        ArenaError: If the box is too small or too large.
+    """
+    _check_whole("width_mm", width_mm, 1, int(_NUMBER_MAX), "Boxes are drawn in whole millimetres.")
+    _check_whole("height_mm", height_mm, 1, int(_NUMBER_MAX), "Boxes are drawn in whole millimetres.")
+    width, height = int(width_mm), int(height_mm)
+    cells_per_pixel(height, width, 1.0)
+    _check_whole("wall_mm", wall_mm, 0, (min(width, height) - 1) // 2, "Floor must remain between the walls.")
+    wall = int(wall_mm)
+    _check_whole("rounded_mm", rounded_mm, 0, min(width, height) // 2 - wall, "A corner ends where the next begins.")
+    _check_whole("brightness", brightness, 1, 255, "0 would be floor.")
+
+    radius = int(rounded_mm)
+    raster = np.full((height, width), brightness, np.uint8)
+    floor = raster[wall : height - wall, wall : width - wall]
+    floor[...] = 0
+    from_centre_mm = radius - np.arange(radius) - 0.5
+    outside_circle = from_centre_mm[:, None] ** 2 + from_centre_mm**2 > radius**2
+    for corner in (floor, floor[::-1], floor[:, ::-1], floor[::-1, ::-1]):
+        corner[:radius, :radius][outside_circle] = brightness
+    return raster
+
+
+def clearance_mm(surface: npt.NDArray[np.uint8], mm_per_cell: float) -> npt.NDArray[np.float32]:
+    """Return the distance to the nearest wall cell, between centres [mm].
+
+    SciPy tells which wall cell is nearest; the distances are ours, in blocks that stay in the processor's cache,
+    because SciPy's own come in float64 and take three times as long.
+    """
+    from scipy.ndimage import distance_transform_edt
+
+    nearest = distance_transform_edt(surface == 0, return_distances=False, return_indices=True)
+    rows, columns = (np.arange(count, dtype=np.int32) for count in surface.shape)
+    clearance = np.empty(surface.shape, np.float32)
+    for first in range(0, len(rows), _BLOCK_ROWS):
+        block = slice(first, first + _BLOCK_ROWS)
+        up, right = nearest[0, block] - rows[block, None], nearest[1, block] - columns
+        np.sqrt((up * up + right * right).astype(np.float32), out=clearance[block])
+    clearance *= np.float32(mm_per_cell)
+    return clearance
+
+
+def between(position: float, count: int) -> tuple[int, float]:
+    """Return the lower neighbour of a position among `count` cell centres, and the upper one's share 0..1."""
+    position = min(max(position, 0.0), count - 1.0)
+    lower = min(int(position), count - 2)
+    return lower, position - lower
+
+
+def _check_whole(name: str, value: object, low: int, high: int, advice: str) -> None:
+    if not is_number(value) or value != int(value) or not low <= value <= high:  # type: ignore[call-overload, operator]
+        raise ParameterError(f"{name} must be a whole number from {low} to {high}, but it was {value!r}. {advice}")

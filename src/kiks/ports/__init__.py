@@ -1,0 +1,1 @@
+"""Ways to a simulated robot: bytes and nothing else."""

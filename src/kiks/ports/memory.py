@@ -1,0 +1,207 @@
+"""The port in memory: a serial port without a wire, in the program's own process, whose waits cost no time.
+
+It has the methods of a pyserial port, so that a program cannot tell the difference. A program that reads waits in
+simulated time: up to the instant at which the characters have arrived, or its time-out.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from kiks.clock.thinking import Thinking, ThinkingFixed, ThinkingLive, parse_thinking
+from kiks.clock.waiting import Waiting
+from kiks.errors import LinkError, ParameterError
+from kiks.sim.wire import BACKLOG_LIMIT
+from kiks.units import ns_from_s, s_from_ns
+
+if TYPE_CHECKING:
+    from kiks.sim.simulation import Simulation
+
+
+class SimPort:
+    """The computer's end of a simulated robot's line.
+
+    Attributes:
+        timeout: Longest time a read waits [s] of simulated time; None waits for ever.
+        waiting: Cost of asking again and again; a program's clock shares it.
+    """
+
+    def __init__(self, sim: Simulation, robot: int) -> None:
+        self.sim = sim
+        self.robot = robot
+        self.timeout: float | None = None
+        self.waiting = Waiting()
+        self.is_open = True
+        self._wire = sim.wires[robot - 1]
+        self._thinking: Thinking | None = parse_thinking(sim.thinking)
+        if isinstance(self._thinking, ThinkingFixed) and self._thinking.time_ns == 0:
+            self._thinking = None
+        self._has_read = True
+
+    # ---- what pyserial's ports have -------------------------------------------------------------------------------------
+
+    @property
+    def baudrate(self) -> int:
+        """Speed of the line [bit/s]; setting it sets the robot's end too, as its mode selector would."""
+        return self._wire.line.baud
+
+    @baudrate.setter
+    def baudrate(self, baud: int) -> None:
+        if not isinstance(baud, int) or not 75 <= baud <= 4_000_000:
+            raise ParameterError(f"baudrate must be a whole number from 75 to 4000000 bit/s, but it was {baud!r}. Usual: 9600.")
+        with self.sim.lock:
+            self._wire.set_baud(baud)
+
+    def write(self, data: bytes) -> int:
+        """Send characters; return how many. They leave one after the other while the program goes on."""
+        sim, wire = self.sim, self._wire
+        with sim.lock:
+            self._enter(is_command=self._has_read)
+            self._has_read = False
+            self.waiting.act()
+            for begin in range(0, len(data), BACKLOG_LIMIT):
+                part = data[begin : begin + BACKLOG_LIMIT]
+                room_ns = wire.line.sending_until_ns - BACKLOG_LIMIT * wire.line.character_ns
+                if room_ns > sim.now_ns:
+                    sim.advance_to(room_ns)
+                wire.send(part, sim.now_ns)
+            self._leave()
+        return len(data)
+
+    def read(self, size: int = 1) -> bytes:
+        """Return `size` characters, fewer if the time-out is over first.
+
+        Raises:
+            LinkError: If there is no time-out and no reply can come any more.
+        """
+        return self._read(size, None)
+
+    def read_until(self, expected: bytes = b"\n", size: int | None = None) -> bytes:
+        """Return everything up to and including a terminator, less if the time-out is over first.
+
+        Raises:
+            LinkError: If there is no time-out and no reply can come any more.
+        """
+        return self._read(size, expected)
+
+    def readline(self, size: int | None = -1) -> bytes:
+        """Return a line with its end, or what came of it before the time-out.
+
+        Raises:
+            LinkError: If there is no time-out and no reply can come any more.
+        """
+        return self._read(None if size is None or size < 0 else size, b"\n")
+
+    @property
+    def in_waiting(self) -> int:
+        """Characters that have arrived and were not read. Asking in vain lets a little time pass."""
+        sim = self.sim
+        with sim.lock:
+            self._enter(is_command=False)
+            count = self._wire.line.arrived_count(sim.now_ns)
+            if not count:
+                self._pass(self.waiting.ask())
+                count = self._wire.line.arrived_count(sim.now_ns)
+            self._leave()
+        return count
+
+    def flush(self) -> None:
+        """Wait until everything has been sent."""
+        with self.sim.lock:
+            self.sim.advance_to(self._wire.line.sending_until_ns)
+
+    def reset_input_buffer(self) -> None:
+        """Drop the characters that have arrived and were not read."""
+        with self.sim.lock:
+            self.sim.advance_to(self.sim.now_ns)
+            self._wire.line.take(self._wire.line.arrived_count(self.sim.now_ns))
+
+    def reset_output_buffer(self) -> None:
+        """Do nothing: what was written is on the line already."""
+
+    def close(self) -> None:
+        """Hang up: forget what nobody read. The robot drives on, and the port may be used again."""
+        with self.sim.lock:
+            self._wire.hang_up()
+
+    # ---- time, as the program lives it ----------------------------------------------------------------------------------
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time [s]; asking again and again lets time pass, so that a loop may wait for it."""
+        with self.sim.lock:
+            self._enter(is_command=False)
+            self._pass(self.waiting.ask())
+            self._leave()
+            return s_from_ns(self.sim.now_ns)
+
+    def sleep(self, seconds: float) -> None:
+        """Let simulated time pass [s] without waiting for it.
+
+        Raises:
+            ParameterError: If it is negative or not finite.
+        """
+        with self.sim.lock:
+            self._enter(is_command=False)
+            self.waiting.act()
+            self.sim.run(seconds)
+            self._leave()
+
+    @property
+    def measured_thinking_ns(self) -> list[int]:
+        """What thinking 'live' has measured so far [ns]; `save_thinking` keeps it for 'replay'."""
+        return self._thinking.measured_ns if isinstance(self._thinking, ThinkingLive) else []
+
+    # ---- inside -----------------------------------------------------------------------------------------------------------
+
+    def _enter(self, *, is_command: bool) -> None:
+        if self._thinking is not None:
+            self._pass(self._thinking.enter(is_command=is_command))
+
+    def _leave(self) -> None:
+        if self._thinking is not None:
+            self._thinking.leave()
+
+    def _pass(self, time_ns: int) -> None:
+        if time_ns:
+            self.sim.advance_to(self.sim.now_ns + time_ns)
+
+    def _read(self, size: int | None, terminator: bytes | None) -> bytes:
+        sim, wire, line = self.sim, self._wire, self._wire.line
+        with sim.lock:
+            self._enter(is_command=False)
+            self._has_read = True
+            deadline_ns = None if self.timeout is None else sim.now_ns + ns_from_s(self.timeout)
+            searched = 0
+            while True:
+                # How many characters complete the read: known as soon as the robot has answered, before they arrive.
+                count = size if size is not None and size <= len(line.waiting) else None
+                if terminator is not None:
+                    found = line.waiting.find(terminator, searched)
+                    if found >= 0:
+                        count = found + len(terminator) if size is None else min(found + len(terminator), size)
+                    searched = max(len(line.waiting) - len(terminator) + 1, 0)
+                if count is not None:
+                    arrival_ns = line.arrival_ns(count) if count else sim.now_ns
+                    break
+                event_ns = wire.next_ns if wire.has_command else None
+                if event_ns is None or (deadline_ns is not None and event_ns > deadline_ns):
+                    arrival_ns = None
+                    break
+                sim.advance_to(event_ns)
+            if arrival_ns is not None and (deadline_ns is None or arrival_ns <= deadline_ns):
+                self.waiting.act()
+                sim.advance_to(arrival_ns)
+                data = line.take(count or 0)
+            elif deadline_ns is None:
+                raise LinkError(
+                    f"robot {self.robot} must have been asked something before its answer is read, but no command is on the "
+                    f"line, so the read would never end. Send a command that ends in a line feed, or set a timeout."
+                )
+            else:
+                # A read that does not wait (timeout 0) is a question like any other.
+                sim.advance_to(max(deadline_ns, sim.now_ns + (self.waiting.ask() if self.timeout == 0 else 0)))
+                arrived = line.arrived_count(sim.now_ns)
+                data = line.take(arrived if size is None else min(arrived, size))
+            self._leave()
+        return data

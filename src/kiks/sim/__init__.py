@@ -1,0 +1,1 @@
+"""The simulation: one object that joins arena, engine, firmware and clock."""

@@ -1,0 +1,304 @@
+"""Simulation: owns the state, the loop and the random streams, and lets time pass."""
+
+from __future__ import annotations
+
+import math
+import threading
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kiks.clock.thinking import parse_thinking
+from kiks.engine import contact, proximity, step
+from kiks.engine.numbers import uniform
+from kiks.engine.parameters import pack
+from kiks.engine.state import State
+from kiks.errors import ParameterError
+from kiks.firmware.khepera import Firmware
+from kiks.firmware.turret import Turret
+from kiks.model.arena import PAD, Arena
+from kiks.model.robot import SENSOR_COUNT, RobotSpec
+from kiks.sim.wire import Wire
+from kiks.units import NS_PER_S, TICK_NS, ns_from_s, s_from_ns
+
+if TYPE_CHECKING:
+    from kiks.ports.memory import SimPort
+
+STREAM_PLACE = 4
+"""Random stream of the places of robots for which the arena gives no start pose."""
+
+
+class Simulation:
+    """Robots in an arena, each at the end of a serial line.
+
+    Time passes only when somebody lets it: a program that waits for a reply on a port, or `run`. Robots in one world
+    do not see or touch each other yet.
+
+    Args:
+        arena: Where the robots drive; the classic 500 x 650 mm box if left out.
+        robots: How many there are.
+        seed: Seed of all random numbers; the same seed gives the same run, to the bit.
+        thinking: What the program's own computing costs: 'none', 'fixed:MS', 'live', 'live:FACTOR' or 'replay:FILE'.
+        robot: Kind of all robots: a name that `RobotSpec.load` knows, a file, or a `RobotSpec`.
+
+    Raises:
+        ParameterError: If a number is out of range or a name unknown.
+        ArenaError: If the arena has no free place for a robot.
+
+    Example:
+        >>> sim = Simulation(Arena.box(500, 500), seed=1)
+        >>> port = sim.port(1)
+        >>> port.write(b"D,10,10\\n"); port.readline()
+        8
+        b'd\\r\\n'
+        >>> sim.run(1.0)
+        >>> round(sim.time_s, 3)
+        1.014
+    """
+
+    def __init__(
+        self,
+        arena: Arena | None = None,
+        *,
+        robots: int = 1,
+        seed: int = 0,
+        thinking: str = "none",
+        robot: str | RobotSpec = "khepera",
+    ) -> None:
+        if not isinstance(robots, int) or not 1 <= robots <= 1000:
+            raise ParameterError(f"robots must be a whole number from 1 to 1000, but it was {robots!r}. Say how many you need.")
+        if not isinstance(seed, int) or not 0 <= seed < 2**63:
+            raise ParameterError(f"seed must be a whole number from 0 to 2^63 - 1, but it was {seed!r}. Any small number will do.")
+        parse_thinking(thinking)
+        self.arena = Arena.default() if arena is None else arena
+        self.seed = seed
+        self.thinking = thinking
+        self.spec = robot if isinstance(robot, RobotSpec) else RobotSpec.load(robot)
+        self.robot_count = robots
+        self.lock = threading.RLock()
+        self.now_ns = 0
+        self.state = State.empty(world_count=1, robot_count=robots)
+        self._kinds = np.repeat(pack(self.spec), robots)
+        self._ground = (self.arena.clearance, float(self.arena.mm_per_cell), PAD)
+        self._sight = (self.arena.clearance, self.arena.surface, float(self.arena.mm_per_cell), PAD)
+        self._counts = np.zeros(SENSOR_COUNT, np.int64)
+        self._expected = np.zeros(SENSOR_COUNT, np.float64)
+        self.wires = [Wire(self._firmware(index)) for index in range(robots)]
+        self._ports: dict[int, SimPort] = {}
+        for index in range(robots):
+            self._put(index, *self._start(index))
+
+    def _firmware(self, index: int) -> Firmware:
+        def sense_proximity() -> list[int]:
+            proximity.read_proximity(
+                self.state.robots, self._kinds, *self._sight, self.state.tick_count, self.now_ns, self.seed, index, self._counts
+            )
+            return self._counts.tolist()
+
+        def sense_ambient() -> list[int]:
+            proximity.read_ambient(self.state.robots, self._kinds, self.now_ns, self.seed, index, self._counts)
+            return self._counts.tolist()
+
+        return Firmware(self.spec, self.state, index, sense_proximity=sense_proximity, sense_ambient=sense_ambient)
+
+    def _start(self, index: int) -> tuple[float, float, float]:
+        """Return the arena's start pose for a robot, else a free place: the roomiest for the first, random for others."""
+        if index < len(self.arena.starts):
+            return self.arena.starts[index]
+        roomiest = self.arena.find_start(self.spec.body.radius_mm)
+        if index == 0:
+            return roomiest
+        for attempt in range(1000):
+            x, y, turn = (uniform(self.seed, 0, index, STREAM_PLACE, attempt, axis) for axis in range(3))
+            x, y = x * self.arena.width_mm, y * self.arena.height_mm
+            if self.arena.free_for(x, y, self.spec.body.radius_mm):
+                return x, y, 2 * math.pi * turn
+        return roomiest
+
+    # ---- time ---------------------------------------------------------------------------------------------------------
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time since the start [s]."""
+        return s_from_ns(self.now_ns)
+
+    def run(self, seconds: float) -> None:
+        """Let simulated time pass: robots drive on, and commands on the line act when they are due.
+
+        Args:
+            seconds: How long [s].
+
+        Raises:
+            ParameterError: If it is negative or not finite.
+        """
+        if not (isinstance(seconds, int | float) and math.isfinite(seconds) and seconds >= 0):
+            raise ParameterError(f"seconds must be a finite number of at least 0, but it was {seconds!r}. Time never runs backwards.")
+        with self.lock:
+            self.advance_to(self.now_ns + ns_from_s(seconds))
+
+    def advance_to(self, time_ns: int) -> None:
+        """Let time pass up to a time [ns]; nothing happens if it is over already."""
+        while True:
+            wire = self._next_wire()
+            due_ns = wire.next_ns if wire is not None else None
+            if wire is None or due_ns is None or due_ns > time_ns:
+                break
+            if due_ns > self.now_ns:
+                self.now_ns = due_ns
+            self.sync()
+            wire.act(self.now_ns)
+        if time_ns > self.now_ns:
+            self.now_ns = time_ns
+
+    def next_event_ns(self) -> int | None:
+        """Return when a robot does something next [ns], None while all of them wait for characters."""
+        wire = self._next_wire()
+        return None if wire is None else wire.next_ns
+
+    def _next_wire(self) -> Wire | None:
+        if self.robot_count == 1:
+            return self.wires[0]
+        busy = [wire for wire in self.wires if wire.next_ns is not None]
+        # Of two that act at the same instant the one with the lower number is first.
+        return min(busy, key=lambda wire: wire.next_ns or 0) if busy else None
+
+    def sync(self) -> None:
+        """Do the ticks that have begun: the engine is behind the clock until somebody looks."""
+        ticks = -(-self.now_ns // TICK_NS) - self.state.tick_count
+        if ticks > 0:
+            step.advance(self.state.robots, self._kinds, *self._ground, self.seed, self.state.tick_count, ticks)
+            self.state.tick_count += ticks
+
+    # ---- robots -------------------------------------------------------------------------------------------------------
+
+    def _index(self, robot: int) -> int:
+        if not isinstance(robot, int) or not 1 <= robot <= self.robot_count:
+            numbers = "robot 1" if self.robot_count == 1 else f"robots 1 to {self.robot_count}"
+            raise ParameterError(f"robot must be the number of one there is, but it was {robot!r}. This simulation has {numbers}.")
+        return robot - 1
+
+    def port(self, robot: int) -> SimPort:
+        """Return the computer's end of a robot's line: one object, always the same.
+
+        Args:
+            robot: Number of the robot, from 1.
+
+        Raises:
+            ParameterError: If there is no such robot.
+        """
+        from kiks.ports.memory import SimPort
+
+        index = self._index(robot)
+        if index not in self._ports:
+            self._ports[index] = SimPort(self, robot)
+        return self._ports[index]
+
+    def fit(self, robot: int, turret: Turret) -> None:
+        """Put a turret on a robot; it answers to `T,<its number>,...` from now on.
+
+        Raises:
+            ParameterError: If there is no such robot.
+        """
+        self.wires[self._index(robot)].firmware.turrets[turret.number] = turret
+
+    def pose(self, robot: int) -> tuple[float, float, float]:
+        """Return where a robot is at this very instant: x_mm, y_mm, heading_rad (not wrapped).
+
+        Raises:
+            ParameterError: If there is no such robot.
+        """
+        index = self._index(robot)
+        with self.lock:
+            self.sync()
+            x_mm, y_mm, heading_rad = proximity.pose_of(self.state.robots, self.state.tick_count, self.now_ns, index)
+        return x_mm, y_mm, heading_rad
+
+    def place(self, robot: int, x_mm: float, y_mm: float, heading_rad: float) -> None:
+        """Lift a robot and put it down somewhere else; its wheels and counters do not notice.
+
+        Args:
+            robot: Number of the robot, from 1.
+            x_mm: From the arena's lower left corner to the right.
+            y_mm: From the arena's lower left corner upwards.
+            heading_rad: Counter-clockwise from the x axis.
+
+        Raises:
+            ParameterError: If there is no such robot, a number is not finite, or a wall is in the way.
+        """
+        index = self._index(robot)
+        for name, value in (("x_mm", x_mm), ("y_mm", y_mm), ("heading_rad", heading_rad)):
+            if not math.isfinite(value):
+                raise ParameterError(f"{name} must be finite, but it was {value!r}.")
+        gap_mm = contact.clearance_of_disc(*self._ground, float(x_mm), float(y_mm), self.spec.body.radius_mm)
+        inside = 0 <= x_mm <= self.arena.width_mm and 0 <= y_mm <= self.arena.height_mm
+        if gap_mm < -0.01 or not inside:
+            raise ParameterError(
+                f"the place of robot {robot} must be free, but at ({x_mm:g}, {y_mm:g}) mm a wall is {-gap_mm:.1f} mm inside it. "
+                f"The arena is {self.arena.width_mm:g} x {self.arena.height_mm:g} mm; the robot needs a radius of "
+                f"{self.spec.body.radius_mm:g} mm."
+            )
+        with self.lock:
+            self.sync()
+            self._put(index, float(x_mm), float(y_mm), float(heading_rad))
+
+    def _put(self, index: int, x_mm: float, y_mm: float, heading_rad: float) -> None:
+        robot: Any = self.state.robots[0, index]
+        robot["x_mm"], robot["y_mm"], robot["heading_rad"] = x_mm, y_mm, heading_rad
+        robot["trail"][:] = (x_mm, y_mm, heading_rad)
+
+    def proximity(self, robot: int, *, noise: bool = False) -> list[float]:
+        """Return what the eight proximity sensors would read at this instant and pose, without waiting for their round.
+
+        Args:
+            robot: Number of the robot, from 1.
+            noise: True for the counts that command `N` would report now, with noise and rounding.
+
+        Raises:
+            ParameterError: If there is no such robot.
+        """
+        index = self._index(robot)
+        with self.lock:
+            self.sync()
+            if noise:
+                return [float(count) for count in self.wires[index].firmware.sense_proximity()]
+            proximity.expect_proximity(
+                self.state.robots, self._kinds, *self._sight, self.state.tick_count, self.now_ns, index, self._expected
+            )
+            return [float(count) for count in self._expected]
+
+    def travelled_mm(self, robot: int) -> float:
+        """Return the length of a robot's path so far [mm].
+
+        Raises:
+            ParameterError: If there is no such robot.
+        """
+        index = self._index(robot)
+        self.sync()
+        return float(self.state.robots["travelled_mm"][0, index])
+
+    def contacts(self, robot: int) -> int:
+        """Return how often a robot has met a wall so far.
+
+        Raises:
+            ParameterError: If there is no such robot.
+        """
+        index = self._index(robot)
+        self.sync()
+        return int(self.state.robots["contact_count"][0, index])
+
+    def state_hash(self) -> str:
+        """Return 16 hexadecimal digits that any two equal runs agree on."""
+        with self.lock:
+            self.sync()
+            return self.state.hash()
+
+
+def minutes(time_ns: int) -> str:
+    """Return a time [ns] as a person writes it.
+
+    Example:
+        >>> minutes(61_500_000_000)
+        '1:01.5'
+    """
+    whole, rest = divmod(time_ns, 60 * NS_PER_S)
+    return f"{whole}:{rest / NS_PER_S:04.1f}"

@@ -1,0 +1,71 @@
+"""A robot's end of the serial line: characters become commands, commands act when they are due, replies set out."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from kiks.clock.line import SerialLine
+from kiks.firmware.khepera import Firmware
+from kiks.units import ns_from_s
+
+BACKLOG_LIMIT = 4096
+"""Characters on the way to the robot beyond which a sender has to wait [bytes], as a serial driver's buffer makes it."""
+
+
+class Wire:
+    """One robot's line, its firmware, and the commands that have been sent but have not acted yet.
+
+    Attributes:
+        holder: Who has opened the robot's port, in words for the next one who tries; None while nobody has.
+    """
+
+    def __init__(self, firmware: Firmware) -> None:
+        self.firmware = firmware
+        self.line = SerialLine(firmware.baud)
+        self.holder: str | None = None
+        self._processing_ns = ns_from_s(firmware.spec.firmware.processing_ms * 1e-3)
+        self._pending: deque[tuple[int, bytes]] = deque()
+        self._last_act_ns = 0
+
+    def set_baud(self, baud: int) -> None:
+        """Set both ends of the line to a speed [bit/s], as the person does who turns the robot's mode selector."""
+        self.firmware.baud = baud
+        self.line.set_baud(baud)
+
+    def send(self, data: bytes, at_ns: int) -> None:
+        """Put characters on the line; each command acts when its terminator has arrived and been processed."""
+        start_ns = self.line.send(len(data), at_ns)
+        character_ns = self.line.character_ns
+        for index, line in self.firmware.receiver.feed(data):
+            arrival_ns = start_ns + (index + 1) * character_ns
+            self._last_act_ns = max(arrival_ns, self._last_act_ns) + self._processing_ns
+            self._pending.append((self._last_act_ns, line))
+
+    @property
+    def next_ns(self) -> int | None:
+        """When the robot does something next [ns], or None while it only waits for characters."""
+        command_ns = self._pending[0][0] if self._pending else None
+        demo_ns = self.firmware.demo_wakes_ns
+        if demo_ns is None or command_ns is None:
+            return command_ns if demo_ns is None else demo_ns
+        return min(command_ns, demo_ns)
+
+    @property
+    def has_command(self) -> bool:
+        """Say whether a command is on its way, so that a reply may come."""
+        return bool(self._pending)
+
+    def act(self, now_ns: int) -> None:
+        """Do what is due."""
+        if self._pending and self._pending[0][0] <= now_ns:
+            _, line = self._pending.popleft()
+            self.line.answer(self.firmware.execute(line, now_ns), now_ns)
+            if self.firmware.baud != self.line.baud:
+                self.line.set_baud(self.firmware.baud)
+        else:
+            self.firmware.run_demo(now_ns)
+
+    def hang_up(self) -> None:
+        """Forget what the host left behind: an unfinished command and replies that nobody read. The robot drives on."""
+        self.firmware.receiver.clear()
+        self.line.forget()

@@ -1,0 +1,43 @@
+"""Every conversion between the robot's units and ours: here, and nowhere else.
+
+Inside KiKS lengths are mm, times s (or whole ns on the clock), angles rad, wheel paths encoder pulses.
+"""
+
+from __future__ import annotations
+
+TICK_NS = 10_000_000
+"""Period of the robot's own control loop [ns]: 10 ms (Khepera2 Programming Manual; khepera-protocol.md 6.1)."""
+
+SENSOR_SLOT_NS = 2_500_000
+"""Time between the sampling of one sensor and the next [ns] (khepera-protocol.md 8.1)."""
+
+SENSOR_ROUND_NS = 20_000_000
+"""Period in which all eight sensors are sampled once [ns] (khepera-protocol.md 8.1)."""
+
+BITS_PER_CHARACTER = 11
+"""Start bit, 8 data bits, 2 stop bits (KiKS thesis, section 3.3: the factor 11)."""
+
+NS_PER_S = 1_000_000_000
+
+
+def ns_from_s(time_s: float) -> int:
+    """Return a time [s] as whole nanoseconds, rounded to the nearest."""
+    return round(time_s * NS_PER_S)
+
+
+def s_from_ns(time_ns: int) -> float:
+    """Return a time [ns] in seconds."""
+    return time_ns / NS_PER_S
+
+
+def character_ns(baud: int) -> int:
+    """Return how long one character occupies the line [ns].
+
+    Args:
+        baud: Line speed [bit/s].
+
+    Example:
+        >>> character_ns(9600)
+        1145833
+    """
+    return BITS_PER_CHARACTER * NS_PER_S // baud

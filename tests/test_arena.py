@@ -1,0 +1,276 @@
+"""Laws of the arena: its raster, its distance field and the places in it."""
+
+import copy
+import math
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from kiks.errors import ArenaError, ParameterError
+from kiks.model.arena import PAD, Arena, Ball, Cylinder, Lamp, Pose
+
+ROBOT_MM = 27.5
+
+
+def random_picture(seed: int, shape: tuple[int, int] = (104, 101), share: float = 0.01) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    walls = rng.random(shape) < share
+    return np.where(walls, rng.integers(1, 256, shape), 0).astype(np.uint8)
+
+
+def test_row_zero_of_a_picture_is_on_top():
+    picture = random_picture(1)
+    arena = Arena.from_array(picture)
+    assert np.array_equal(arena.brightness, picture[::-1])
+    assert (arena.width_mm, arena.height_mm, arena.mm_per_cell) == (101, 104, 1)
+
+
+@pytest.mark.parametrize("dtype", [np.int8, np.uint16, np.int64])
+def test_other_integers_are_taken(dtype):
+    picture = random_picture(2) % 128
+    assert np.array_equal(Arena.from_array(picture.astype(dtype)).brightness, picture[::-1])
+
+
+def test_true_is_a_white_wall():
+    walls = random_picture(3) > 0
+    assert np.array_equal(Arena.from_array(walls).brightness, walls[::-1] * 255)
+
+
+@pytest.mark.parametrize(("mm_per_pixel", "cells"), [(0.5, 1), (1, 1), (1.01, 2), (2, 2), (2.5, 3), (7, 7)])
+def test_coarse_pixels_are_cut_without_moving_a_wall(mm_per_pixel, cells):
+    picture = random_picture(4, (220, 230))
+    arena = Arena.from_array(picture, mm_per_pixel=mm_per_pixel)
+    assert arena.mm_per_cell <= 1
+    assert arena.mm_per_cell * cells == pytest.approx(mm_per_pixel)
+    assert arena.width_mm == pytest.approx(230 * mm_per_pixel)
+    assert arena.height_mm == pytest.approx(220 * mm_per_pixel)
+    for row in range(cells):
+        for column in range(cells):
+            assert np.array_equal(arena.brightness[row::cells, column::cells], picture[::-1])
+
+
+def test_clearance_to_a_straight_wall_does_not_depend_on_the_cells():
+    picture = np.zeros((60, 60), np.uint8)
+    picture[:, :20] = 255
+    arena = Arena.from_array(picture, mm_per_pixel=2.5)
+    # The wall ends at x = 50 mm; the opposite border begins at 150 mm.
+    for x_mm in (51.0, 60.0, 83.3):
+        assert arena.clearance_at_mm(x_mm, 75) == pytest.approx(x_mm - 50, abs=1e-4)
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 2**32), share=st.sampled_from([0.0, 0.0005, 0.01, 0.3, 0.98]))
+def test_clearance_is_the_exact_distance_to_the_nearest_wall_cell(seed, share):
+    arena = Arena.from_array(random_picture(seed, share=share), mm_per_pixel=1.0)
+    rows, columns = np.nonzero(arena.surface)
+    rng = np.random.default_rng(seed)
+    for _ in range(50):
+        row, column = rng.integers(arena.clearance.shape[0]), rng.integers(arena.clearance.shape[1])
+        expected = math.sqrt(((rows - row) ** 2 + (columns - column) ** 2).min())
+        assert arena.clearance[row, column] == np.float32(expected)
+
+
+@settings(max_examples=10, deadline=None)
+@given(seed=st.integers(0, 2**32))
+def test_clearance_never_changes_faster_than_the_place(seed):
+    arena = Arena.from_array(random_picture(seed, (60, 70), 0.005), mm_per_pixel=1.75)
+    rng = np.random.default_rng(seed)
+    for _ in range(100):
+        x, y, dx, dy = rng.uniform(-20, 140), rng.uniform(-20, 120), *rng.normal(0, 3, 2)
+        change = arena.clearance_at_mm(x + dx, y + dy) - arena.clearance_at_mm(x, y)
+        # Bilinear interpolation of a field that is steady in that sense may be steeper by the diagonal of a cell.
+        assert abs(change) <= math.sqrt(2) * math.hypot(dx, dy) + 1e-4
+    field, cell = arena.clearance.astype(float), arena.mm_per_cell
+    for down, right in ((0, 1), (1, 0), (1, 1), (5, 3)):
+        here, there = field[: field.shape[0] - down, : field.shape[1] - right], field[down:, right:]
+        assert (abs(there - here) <= math.hypot(down, right) * cell + 1e-4).all()
+
+
+def test_clearance_mirrors_with_the_picture():
+    picture = random_picture(7)
+    arena = Arena.from_array(picture)
+    assert np.array_equal(Arena.from_array(picture[::-1]).clearance, arena.clearance[::-1])
+    assert np.array_equal(Arena.from_array(picture.T).clearance[::-1], arena.clearance[::-1].T[::-1, ::-1][::-1])
+
+
+def test_the_world_outside_is_wall():
+    arena = Arena.from_array(np.zeros((100, 120), np.uint8))
+    assert arena.surface.shape == arena.clearance.shape == (100 + 2 * PAD, 120 + 2 * PAD)
+    assert (arena.surface == 255).sum() == (100 + 2 * PAD) * (120 + 2 * PAD) - 100 * 120
+    assert arena.clearance_at_mm(10, 50) == 10
+    for place in ((-1, 50), (121, 50), (60, -1e6), (60, 1e6)):
+        assert arena.clearance_at_mm(*place) < 0
+        assert not arena.free_for(*place, ROBOT_MM)
+
+
+def test_arrays_are_read_only_shared_and_computed_once():
+    picture = random_picture(8)
+    arena = Arena(picture, 1.0, "mine")
+    picture[:] = 255
+    assert not arena.brightness.all()
+    for array in (arena.brightness, arena.surface, arena.clearance):
+        assert array.flags.writeable is False
+    assert arena.clearance is arena.clearance
+    assert arena.surface is arena.surface
+    assert replace(arena, name="other").brightness is arena.brightness
+
+
+def test_copies_are_equal_and_read_only():
+    arena = replace(Arena.default(), lamps=(Lamp(100, 200, 2.0, False),))
+    assert arena == arena
+    assert arena != Arena.default()
+    for other in (pickle.loads(pickle.dumps(arena)), copy.deepcopy(arena)):
+        assert np.array_equal(other.brightness, arena.brightness)
+        assert (other.name, other.starts, other.lamps) == (arena.name, arena.starts, arena.lamps)
+        assert other.brightness.flags.writeable is False
+
+
+def test_the_default_arena_is_the_classic_one():
+    arena = Arena.default()
+    assert (arena.width_mm, arena.height_mm) == (500, 650)
+    assert arena.starts == (Pose(250, 325, math.pi / 2),)
+    assert set(np.unique(arena.brightness)) == {0, 255}
+    assert arena.clearance_at_mm(250, 325) == 240 - 0.5 or arena.clearance_at_mm(250, 325) == 240
+    for picture in (arena.brightness[::-1], arena.brightness[:, ::-1]):
+        assert np.array_equal(picture, arena.brightness)
+    # The floor of a corner is a quarter disc of radius 100 mm.
+    corner = arena.brightness[10:110, 10:110]
+    assert (corner == 0).sum() == pytest.approx(math.pi * 100**2 / 4, rel=0.005)
+
+
+def test_a_box_has_its_walls():
+    arena = Arena.box(300, 200, wall_mm=20, brightness=7)
+    assert (arena.brightness[20:-20, 20:-20] == 0).all()
+    assert (arena.brightness == 7).sum() == 300 * 200 - 260 * 160
+    assert not Arena.box(300, 200, wall_mm=0).brightness.any()
+    assert Arena.box(300, 200, rounded_mm=90).brightness.any(axis=1).all()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"width_mm": 300.5}, "width_mm must be a whole number .* but it was 300.5"),
+        ({"height_mm": "1"}, "height_mm must be a whole number .* but it was '1'"),
+        ({"wall_mm": 100}, "wall_mm must be a whole number from 0 to 99, but it was 100"),
+        ({"rounded_mm": 91}, "rounded_mm must be a whole number from 0 to 90, but it was 91"),
+        ({"brightness": 0}, "brightness must be a whole number from 1 to 255, but it was 0. 0 would be floor"),
+        ({"brightness": True}, "brightness must be a whole number from 1 to 255, but it was True"),
+    ],
+)
+def test_a_box_keeps_its_rules(change, words):
+    with pytest.raises(ParameterError, match=words):
+        Arena.box(**({"width_mm": 300, "height_mm": 200} | change))
+
+
+def test_a_robot_starts_at_the_first_start_pose():
+    starts = (Pose(100, 100, 1.0), Pose(200, 200, 2.0))
+    assert replace(Arena.box(400, 400), starts=starts).find_start(ROBOT_MM) == starts[0]
+
+
+def test_a_robot_starts_in_the_middle_of_the_widest_place():
+    arena = Arena.box(401, 301)
+    assert arena.find_start(ROBOT_MM) == Pose(200.5, 150.5, math.pi / 2)
+    raster = arena.brightness.copy()
+    raster[:, 130] = 255
+    pose = replace(arena, brightness=raster).find_start(ROBOT_MM)
+    assert pose.x_mm == pytest.approx(261, abs=10)
+    assert pose.y_mm == 150.5
+
+
+def test_find_start_names_the_robot_that_does_not_fit():
+    narrow = np.zeros((200, 200), np.uint8)
+    narrow[:, ::40] = 255
+    with pytest.raises(
+        ArenaError, match=r"'array' must have room for a robot 55 mm across, but its widest place has room for \d+"
+    ):
+        Arena.from_array(narrow).find_start(ROBOT_MM)
+    with pytest.raises(ArenaError, match=r"but start 1 at \(20, 50\) mm has room for 20.0 mm only. Move the start"):
+        replace(Arena.box(300, 300), starts=(Pose(20, 50, 0),)).find_start(ROBOT_MM)
+
+
+@pytest.mark.parametrize(
+    "brightness",
+    [np.zeros((200, 200)), np.zeros(200, np.uint8), np.zeros((200, 200, 3), np.uint8), [[0, 1]], "maze.png", None],
+)
+def test_from_array_takes_integers_only(brightness):
+    with pytest.raises(ParameterError, match=r"brightness must be an array .* but it was .* Convert it"):
+        Arena.from_array(brightness)
+
+
+def test_from_array_takes_bytes_only():
+    picture = np.zeros((200, 200), int)
+    picture[3, 3] = 256
+    with pytest.raises(ParameterError, match=r"must lie within 0..255, but it spans 0..256. Scale it"):
+        Arena.from_array(picture)
+    with pytest.raises(ParameterError, match=r"spans -256..0"):
+        Arena.from_array(-picture)
+
+
+@pytest.mark.parametrize("mm_per_pixel", [0, -1, 0.05, 101, math.nan, math.inf, "1", None, True, 10**400])
+def test_mm_per_pixel_is_sensible(mm_per_pixel):
+    with pytest.raises(ParameterError, match=r"mm_per_pixel must be a number from 0.1 to 100, but it was"):
+        Arena.from_array(np.zeros((200, 200), np.uint8), mm_per_pixel=mm_per_pixel)
+
+
+def test_the_constructor_keeps_its_rules():
+    with pytest.raises(ParameterError, match=r"must be a uint8 array \[row, column\], but it was an array of int64"):
+        Arena(np.zeros((200, 200), np.int64), 1.0, "x")
+    with pytest.raises(ParameterError, match=r"mm_per_cell must be at most 1, but it was 2"):
+        Arena(np.zeros((200, 200), np.uint8), 2.0, "x")
+    with pytest.raises(ParameterError, match=r"x_mm and y_mm must be finite"):
+        Arena.default().clearance_at_mm(math.nan, 0)
+    with pytest.raises(ParameterError, match=r"radius_mm must be positive and finite, but it was 0"):
+        Arena.default().free_for(100, 100, 0)
+
+
+@pytest.mark.parametrize(
+    ("shape", "mm_per_pixel", "words"),
+    [
+        ((99, 100), 1, r"at least 100 x 100 mm, but this one has 100 x 99 pixels of 1 mm. Draw it larger"),
+        ((0, 100), 1, r"at least 100 x 100 mm, but this one has 100 x 0 pixels"),
+        ((100, 199), 0.5, r"at least 100 x 100 mm"),
+        ((1001, 1000), 8, r"at most 64 million cells, .* which makes 64.1 million. Draw a smaller one"),
+    ],
+)
+def test_the_size_of_an_arena_is_limited(shape, mm_per_pixel, words):
+    with pytest.raises(ArenaError, match=words):
+        Arena.from_array(np.zeros(shape, np.uint8), mm_per_pixel=mm_per_pixel)
+
+
+def test_an_arena_has_floor():
+    with pytest.raises(ArenaError, match="must have floor, but every cell is wall. Black"):
+        Arena.from_array(np.ones((200, 200), bool))
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "words"),
+    [
+        (
+            {"starts": [(50, 50, 0), (5, 50, 0)]},
+            ArenaError,
+            r"start 2 must stand on floor, but at \(5, 50\) mm is a wall",
+        ),
+        ({"starts": [(50, 300, 0)]}, ArenaError, r"start 1 must lie inside the arena, .*\(0, 0\) is its lower left"),
+        ({"lamps": [(-1, 50)]}, ArenaError, r"lamp 1 must lie inside the arena"),
+        ({"lamps": [(50, 50, 0.0)]}, ArenaError, r"lamp 1: power_w must be positive, but it was 0. Switch"),
+        ({"balls": [(1, 1)]}, ArenaError, r"ball 1 must stand on floor"),
+        ({"cylinders": [(50, 50), (1, 1)]}, ArenaError, r"cylinder 2 must stand on floor"),
+        ({"starts": [(math.nan, 50, 0)]}, ParameterError, r"start 1 must be made of finite numbers, but it was \[nan"),
+        ({"balls": [("a", 50)]}, ParameterError, r"ball 1 must be made of finite numbers"),
+    ],
+)
+def test_entries_stand_where_they_can(changes, error, words):
+    with pytest.raises(error, match=words):
+        replace(Arena.box(200, 300), **changes)
+
+
+def test_entries_become_places():
+    arena = replace(Arena.box(200, 300), lamps=[(5, 5)], balls=[(50, 60)], cylinders=[(50, 70)], starts=[(50, 80, 1)])
+    assert arena.lamps == (Lamp(5.0, 5.0, 1.0, True),)
+    assert arena.balls == (Ball(50.0, 60.0),)
+    assert arena.cylinders == (Cylinder(50.0, 70.0),)
+    assert arena.starts == (Pose(50.0, 80.0, 1.0),)
