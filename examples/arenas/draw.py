@@ -55,7 +55,7 @@ def office() -> Picture:
         fill(picture, x_mm, top_mm, WALL_MM, bottom_mm - top_mm, 220)
     # A doorway between the two lower rooms, so that there is more than one way about.
     fill(picture, 520, 660, WALL_MM, 110, 0)
-    for desk in ((10, 10, 120, 60), (560, 10, 130, 60), (1030, 90, 60, 140), (110, 780, 150, 60), (960, 770, 130, 70)):
+    for desk in ((10, 10, 120, 60), (600, 10, 130, 60), (1030, 90, 60, 140), (110, 780, 150, 60), (960, 770, 130, 70)):
         fill(picture, *desk, 90)
     fill(picture, 660, 640, 160, 80, 140)
     disc(picture, 240, 110, 22, 40)

@@ -23,7 +23,7 @@ class SerialLine:
         self.lost_count = 0
         self._answering_until_ns = 0
         self._waiting = bytearray()
-        # Pieces of `_waiting`, oldest first: when their first character set out [ns], time of one [ns], characters left.
+        # Pieces of `_waiting`, oldest first: when the first character set out [ns], time of one [ns], their count.
         self._pieces: deque[list[int]] = deque()
 
     def set_baud(self, baud: int) -> None:

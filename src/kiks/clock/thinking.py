@@ -7,8 +7,10 @@ nanosecond, what an earlier `live` run measured.
 from __future__ import annotations
 
 import math
-import time
 from pathlib import Path
+
+# Bound here once: a program under `kiks run` lives with a `time` module that is simulated.
+from time import perf_counter_ns
 from typing import Protocol
 
 from kiks.errors import ParameterError, nearest
@@ -23,7 +25,7 @@ class Thinking(Protocol):
     is_repeatable: bool
 
     def enter(self, *, is_command: bool) -> int:
-        """Return the time to charge [ns] as a port is called; `is_command`: to send, for the first time since a reply."""
+        """Return the time to charge [ns] as a port is called; `is_command`: to send, first since a reply."""
 
     def leave(self) -> None:
         """Note that the program goes on now."""
@@ -57,13 +59,13 @@ class ThinkingLive:
 
     def enter(self, *, is_command: bool) -> int:
         """Return the time since control was given back."""
-        passed_ns = 0 if self._left_ns is None else round((time.perf_counter_ns() - self._left_ns) * self.factor)
+        passed_ns = 0 if self._left_ns is None else round((perf_counter_ns() - self._left_ns) * self.factor)
         self.measured_ns.append(passed_ns)
         return passed_ns
 
     def leave(self) -> None:
         """Start the stop-watch."""
-        self._left_ns = time.perf_counter_ns()
+        self._left_ns = perf_counter_ns()
 
 
 class ThinkingReplay:
@@ -105,7 +107,9 @@ def parse_thinking(text: str) -> Thinking:
         return ThinkingLive(_number(text, value, "a factor", 1e6) if value else 1.0)
     if name == "replay" and value:
         return ThinkingReplay(_read_times(Path(value)))
-    raise ParameterError(f"thinking must be {FORMS}, but it was {text!r}.{nearest(name, ['none', 'fixed', 'live', 'replay'])}")
+    raise ParameterError(
+        f"thinking must be {FORMS}, but it was {text!r}.{nearest(name, ['none', 'fixed', 'live', 'replay'])}"
+    )
 
 
 def _number(text: str, value: str, meaning: str, most: float) -> float:

@@ -26,12 +26,13 @@ def kernel(function: Callable[..., Any]) -> Any:
 
 def entry(function: Callable[..., Any]) -> Any:
     """Compile a function that Python calls, and keep the machine code on disk."""
-    folder_before = config.CACHE_DIR
-    config.CACHE_DIR = str(cache_folder())
+    settings: Any = config
+    folder_before = settings.CACHE_DIR
+    settings.CACHE_DIR = str(cache_folder())
     try:
         return njit(cache=True, **_OPTIONS)(function)
     finally:
-        config.CACHE_DIR = folder_before
+        settings.CACHE_DIR = folder_before
 
 
 def cache_folder() -> Path:

@@ -135,7 +135,7 @@ def controller_error(robots: Any, world: Any, robot: Any, wheel: Any) -> Any:
     return np.int64(0)
 
 
-# ---- phases of a tick -------------------------------------------------------------------------------------------------
+# ---- phases of a tick ----
 
 
 @kernel

@@ -6,6 +6,7 @@ kiks-behaviour.md 3.1 (rays, colour) and 3.1.1 (the response: a compact stand-in
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -60,12 +61,18 @@ def respond(nearnesses: Any) -> Any:
     """Return the expected count for seven nearnesses (kiks-behaviour.md 3.1.1)."""
     total = 0.0
     for ray in range(RAY_COUNT):
-        total += _WEIGHTS[ray] * power(nearnesses[ray] / 50.0, 1.75)
+        share = nearnesses[ray] / 50.0
+        root = math.sqrt(share)
+        total += _WEIGHTS[ray] * share * root * math.sqrt(root)  # to the power of 1.75
+    if total == 0.0:
+        return 0.0
     return 1023.0 * (1.0 - exponential(-power(total, 1.61)))
 
 
 @kernel
-def expected_count(field: Any, surface: Any, cell: Any, pad: Any, parameters: Any, x: Any, y: Any, heading: Any, sensor: Any) -> Any:
+def expected_count(
+    field: Any, surface: Any, cell: Any, pad: Any, parameters: Any, x: Any, y: Any, heading: Any, sensor: Any
+) -> Any:
     """Return the count that a sensor of a robot at this pose gives on average."""
     sine, cosine = sin_cos(heading)
     mount_x, mount_y = parameters.mount_x_mm[sensor], parameters.mount_y_mm[sensor]
@@ -109,7 +116,17 @@ def quantize(parameters: Any, count: Any) -> Any:
 
 @entry
 def read_proximity(
-    robots: Any, kinds: Any, field: Any, surface: Any, cell: Any, pad: Any, tick_count: Any, time_ns: Any, seed: Any, robot: Any, out: Any
+    robots: Any,
+    kinds: Any,
+    field: Any,
+    surface: Any,
+    cell: Any,
+    pad: Any,
+    tick_count: Any,
+    time_ns: Any,
+    seed: Any,
+    robot: Any,
+    out: Any,
 ) -> Any:
     """Write the eight counts that command N returns at a time into `out`, each sampled at its own instant."""
     state, parameters = robots[0, robot], kinds[robot]
@@ -124,7 +141,18 @@ def read_proximity(
 
 
 @entry
-def expect_proximity(robots: Any, kinds: Any, field: Any, surface: Any, cell: Any, pad: Any, tick_count: Any, time_ns: Any, robot: Any, out: Any) -> Any:
+def expect_proximity(
+    robots: Any,
+    kinds: Any,
+    field: Any,
+    surface: Any,
+    cell: Any,
+    pad: Any,
+    tick_count: Any,
+    time_ns: Any,
+    robot: Any,
+    out: Any,
+) -> Any:
     """Write the eight expected counts at the pose of this very time into `out`, without noise or rounding."""
     x, y, heading = pose_at(robots[0, robot], tick_count, time_ns)
     for sensor in range(out.shape[0]):

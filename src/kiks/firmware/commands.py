@@ -24,9 +24,22 @@ class ProtocolError(Exception):
     """The parameters are not what the command takes: the robot answers `z,Protocol error`."""
 
 
+class NoTurretError(Exception):
+    """No turret of that number is fitted: the robot answers `z,Turret order not supported`."""
+
+
 @dataclass(frozen=True)
 class Command:
-    """A row of the table."""
+    """A row of the table.
+
+    Attributes:
+        letter: What the request begins with; the reply begins with the same in lower case.
+        name: What the command does, in two or three words.
+        parameters: Names of the numbers that the request takes.
+        reply: Names of the values in the reply.
+        limits: Units and ranges of both, and what becomes of a number outside.
+        act: Carries the command out: takes the firmware and the numbers, returns the values of the reply.
+    """
 
     letter: str
     name: str
@@ -51,9 +64,15 @@ def _in_range(value: int, low: int, high: int) -> int:
     return value
 
 
+def _gains(*values: int) -> list[int]:
+    if min(values) < 0:
+        raise ProtocolError
+    return [min(value, 32767) for value in values]
+
+
 def set_speed_gains(robot: Firmware, kp: int, ki: int, kd: int) -> Reply:
     """Set the gains of the speed controllers of both motors."""
-    robot.view.speed_gains[:] = [_in_range(gain, 0, 32767) for gain in (kp, ki, kd)]
+    robot.view.speed_gains[:] = _gains(kp, ki, kd)
     return ()
 
 
@@ -81,7 +100,7 @@ def read_speed(robot: Firmware) -> Reply:
 
 def set_position_gains(robot: Firmware, kp: int, ki: int, kd: int) -> Reply:
     """Set the gains of the position controllers of both motors."""
-    robot.view.position_gains[:] = [_in_range(gain, 0, 32767) for gain in (kp, ki, kd)]
+    robot.view.position_gains[:] = _gains(kp, ki, kd)
     return ()
 
 
@@ -99,7 +118,11 @@ def read_counters(robot: Firmware) -> Reply:
 
 
 def read_analog(robot: Firmware, channel: int) -> Reply:
-    """Report an analogue input: 0 charger, 1 reflected and 2 ambient light of the sensor being scanned, 3 to 5 free, 6 current [mA]."""
+    """Report an analogue input.
+
+    Channel 0 is the charger, 1 the reflected and 2 the ambient light of the sensor being scanned, 3 to 5 are free, and
+    6 is the current [mA].
+    """
     _in_range(channel, 0, 6)
     if channel in (1, 2):
         readings = robot.sense_proximity() if channel == 1 else robot.sense_ambient()
@@ -155,6 +178,17 @@ def read_bus(robot: Firmware, address: int) -> Reply:
     return (0,)
 
 
+def send_to_turret(robot: Firmware, turret: int, order: str, *values: int) -> Reply:
+    """Pass an order to a turret, whose number comes before its answer; order B asks for its version and revision."""
+    fitted = robot.turrets.get(turret)
+    if fitted is None:
+        raise NoTurretError
+    answer = fitted.revision if order == "B" else fitted.order(order, tuple(map(_limit, values)))
+    if answer is None:
+        raise ProtocolError
+    return (turret, order.lower(), *answer)
+
+
 def write_bus(robot: Firmware, data: int, address: int) -> Reply:
     """Write the low 8 bits of a number to the extension bus: data first, then the address."""
     _in_range(address, 0, 63)
@@ -163,7 +197,7 @@ def write_bus(robot: Firmware, data: int, address: int) -> Reply:
 
 
 _PWM = "-255..255, clamped"
-_GAINS = "0..32767"
+_GAINS = "0..32767, more is clamped, a negative number is an error"
 
 COMMANDS: tuple[Command, ...] = (
     Command("A", "speed controller gains", ("Kp", "Ki", "Kd"), (), _GAINS, set_speed_gains),
@@ -183,12 +217,27 @@ COMMANDS: tuple[Command, ...] = (
         "1..127 pulses/10 ms and 1..255 pulses/256 per (10 ms)^2, clamped",
         set_profile,
     ),
-    Command("K", "controller status", (), ("T_left", "M_left", "E_left", "T_right", "M_right", "E_right"), "", read_status),
+    Command(
+        "K",
+        "controller status",
+        (),
+        ("T_left", "M_left", "E_left", "T_right", "M_right", "E_right"),
+        "T 0 or 1, M 0..2, E in pulses or pulses/10 ms",
+        read_status,
+    ),
     Command("L", "LED", ("led", "action"), (), "led 0..1, action 0..2", set_led),
     Command("N", "proximity sensors", (), tuple(f"s{i}" for i in range(8)), "0..1023", read_proximity),
     Command("O", "ambient light sensors", (), tuple(f"s{i}" for i in range(8)), "0..1023", read_ambient),
     Command("P", "set PWM", ("left", "right"), (), _PWM, set_pwm),
     Command("R", "read extension bus", ("address",), ("data",), "address 0..63, data 0..255", read_bus),
+    Command(
+        "T",
+        "message to a turret",
+        ("turret", "order", "..."),
+        ("turret", "order", "..."),
+        "turret: a number, order: a capital letter, then the numbers that the turret takes",
+        send_to_turret,
+    ),
     Command("W", "write extension bus", ("data", "address"), (), "address 0..63, low 8 bits of data", write_bus),
 )
-"""All commands but T, whose parameters are another command: `Firmware` passes it to a turret."""
+"""All commands. The parameters of T are a command in themselves; `Firmware` takes them apart."""

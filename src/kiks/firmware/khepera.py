@@ -9,11 +9,11 @@ from typing import Any
 
 from kiks.engine.state import MODE_SPEED, ROBOT, State
 from kiks.firmware import tools
-from kiks.firmware.commands import COMMANDS, ProtocolError, Reply
-from kiks.firmware.receiver import Receiver
+from kiks.firmware.commands import COMMANDS, NoTurretError, ProtocolError, Reply, set_speed
+from kiks.firmware.receiver import LINE_LIMIT, Receiver
 from kiks.firmware.turret import Turret
 from kiks.model.robot import RobotSpec
-from kiks.units import SENSOR_SLOT_NS, ns_from_s
+from kiks.units import SENSOR_SLOT_NS
 
 UNKNOWN = b"Command not found\r\n"
 PROTOCOL_ERROR = b"z,Protocol error\r\n"
@@ -35,6 +35,10 @@ class Firmware:
         sense_proximity: Returns the eight counts latched at this time.
         sense_ambient: The same for light.
         turrets: What is fitted.
+
+    Attributes:
+        baud: Speed of the line now [bit/s]; the tool `serial` changes it.
+        selected_baud: Speed that the mode selector asks for [bit/s]: the robot reads it at a reset.
     """
 
     def __init__(
@@ -54,9 +58,9 @@ class Firmware:
         self.sense_proximity = sense_proximity
         self.sense_ambient = sense_ambient
         self.turrets = {turret.number: turret for turret in turrets}
-        self.receiver = Receiver()
+        self.receiver = Receiver(keeps_empty_lines=spec.quirks.answer_empty_lines)
         self.now_ns = 0
-        self.baud = spec.firmware.baud
+        self.selected_baud = spec.firmware.baud
         self.demo_wakes_ns: int | None = None
         # Writable views of this robot's fields: a field of one number has shape [1], the others keep their own.
         fields: dict[str, Any] = {}
@@ -67,10 +71,10 @@ class Firmware:
         self._commands = {command.letter.encode(): (command.act, len(command.parameters)) for command in COMMANDS}
         self.reset()
 
-    # ---- power --------------------------------------------------------------------------------------------------------
+    # ---- power ----
 
     def reset(self) -> None:
-        """Put everything that the firmware holds to its default; the body stays where it is (khepera-protocol.md 6.7)."""
+        """Put all that the firmware holds to its default (khepera-protocol.md 6.7); the body stays where it is."""
         view, reset = self.view, self.spec.reset
         for name in ("target_pulses", "trajectory_pulses", "trajectory_speed", "error_sum", "last_error", "pwm"):
             getattr(view, name)[:] = 0
@@ -82,7 +86,7 @@ class Firmware:
         view.position_gains[:] = reset.position_gains
         view.profile_speed[:] = reset.profile_speed_pulses
         view.profile_acceleration[:] = reset.profile_acceleration
-        self.baud = self.spec.firmware.baud
+        self.baud = self.selected_baud
         self.demo_wakes_ns = None
 
     def banner(self) -> bytes:
@@ -91,10 +95,10 @@ class Firmware:
         lines = (f"KiKS, {self.spec.name}", f"{firmware.banner}, Rev. {firmware.bios_version}", tools.PROTOCOL_MODE)
         return tools.text(*lines)
 
-    # ---- a line -------------------------------------------------------------------------------------------------------
+    # ---- a line ----
 
     def execute(self, line: bytes, now_ns: int) -> bytes:
-        """Carry out a line without its terminator, at a time; return the reply with CR LF, or nothing.
+        r"""Carry out a line without its terminator, at a time; return the reply with CR LF, or nothing.
 
         Example:
             >>> from kiks.engine.state import State
@@ -102,26 +106,31 @@ class Firmware:
             >>> state = State.empty(world_count=1, robot_count=1)
             >>> robot = Firmware(RobotSpec.load("khepera"), state, 0, sense_proximity=list, sense_ambient=list)
             >>> robot.execute(b"D,5,5", 0), robot.execute(b"D,5", 0), robot.execute(b"M", 0)
-            (b'd\\r\\n', b'z,Protocol error\\r\\n', b'Command not found\\r\\n')
+            (b'd\r\n', b'z,Protocol error\r\n', b'Command not found\r\n')
         """
         self.now_ns = now_ns
         quirks = self.spec.quirks
         if not line:
             return self._unknown() if quirks.answer_empty_lines else b""
+        if len(line) > LINE_LIMIT:
+            return self._unknown()
         words = line.split(b",")
         letter = words[0]
-        if quirks.accept_lower_case and len(letter) == 1:
+        if quirks.accept_lower_case:
             letter = letter.upper()
         try:
             if letter in self._commands:
                 act, count = self._commands[letter]
-                # Commands without parameters ignore what follows the comma; for the others the count must fit.
-                values = act(self, *numbers(words[1:], count)) if count else act(self)
+                if letter == b"T":
+                    values = act(self, *self._message(words[1:]))
+                else:
+                    # Commands without parameters ignore what follows the comma; for the others the count must fit.
+                    values = act(self, *numbers(words[1:], count)) if count else act(self)
                 return self._reply(letter.lower(), values)
-            if letter == b"T":
-                return self._turret(words[1:])
         except ProtocolError:
             return PROTOCOL_ERROR
+        except NoTurretError:
+            return NO_TURRET
         answer = tools.run(self, line)
         return self._unknown() if answer is None else answer
 
@@ -132,22 +141,16 @@ class Firmware:
             return b"d,\r\n"
         return letter + b"\r\n"
 
-    def _turret(self, words: list[bytes]) -> bytes:
-        """Command T: pass an order to a turret; its number comes before its answer (khepera-protocol.md 4.18)."""
+    def _message(self, words: list[bytes]) -> tuple[int | str, ...]:
+        """Return a turret's number, an order for it and the order's numbers (khepera-protocol.md 4.18)."""
         if len(words) < 2:
             raise ProtocolError
-        (number,) = numbers(words[:1], 1)
-        turret = self.turrets.get(number)
-        if turret is None:
-            return NO_TURRET
-        letter = words[1].strip(b" \t")
-        if len(letter) != 1 or not b"A" <= letter <= b"Z":
+        order = words[1].strip(b" \t")
+        if self.spec.quirks.accept_lower_case:
+            order = order.upper()
+        if len(order) != 1 or not b"A" <= order <= b"Z":
             raise ProtocolError
-        parameters = tuple(numbers(words[2:], len(words) - 2))
-        values = turret.revision if letter == b"B" else turret.order(letter.decode(), parameters)
-        if values is None:
-            raise ProtocolError
-        return self._reply(b"t,%d,%s" % (number, letter.lower()), values)
+        return (*numbers(words[:1], 1), order.decode(), *numbers(words[2:], len(words) - 2))
 
     def _unknown(self) -> bytes:
         return b"z," + UNKNOWN if self.spec.quirks.unknown_command_with_z else UNKNOWN
@@ -156,20 +159,19 @@ class Firmware:
         """Return the sensor that is being sampled now."""
         return self.now_ns // SENSOR_SLOT_NS % 8
 
-    # ---- the demonstration of mode 0 ------------------------------------------------------------------------------------
+    # ---- the demonstration of mode 0 ----
 
     def start_demo(self) -> None:
         """Begin to avoid obstacles without a host (khepera-protocol.md 6.9)."""
-        self.demo_wakes_ns = self.now_ns + ns_from_s(0.0)
+        self.demo_wakes_ns = self.now_ns
 
     def run_demo(self, now_ns: int) -> None:
-        """Take one step of the demonstration: Braitenberg's vehicle 3 with K-Team's weights (khepera-protocol.md 6.9)."""
+        """Take one step: Braitenberg's vehicle 3 with K-Team's weights (khepera-protocol.md 6.9)."""
         self.now_ns = now_ns
         s = self.sense_proximity()
         first = (-5 * s[0] - 15 * s[1] - 18 * s[2] + 6 * s[3] + 4 * s[4] + 4 * s[5] + 3 * s[6] + 5 * s[7]) / 400
         second = (4 * s[0] + 4 * s[1] + 6 * s[2] - 18 * s[3] - 15 * s[4] - 5 * s[5] + 5 * s[6] + 3 * s[7]) / 400
-        left, right = round(0.7 * (20 + second)), round(0.7 * (20 + first))
-        self.execute(b"D,%d,%d" % (left, right), now_ns)
+        set_speed(self, round(0.7 * (20 + second)), round(0.7 * (20 + first)))
         self.demo_wakes_ns = now_ns + DEMO_PERIOD_NS
 
 

@@ -5,10 +5,7 @@ from __future__ import annotations
 import re
 
 LINE_LIMIT = 256
-"""Longest line kept [bytes]; a longer one is dropped up to its end and answered as unknown (khepera-protocol.md 3.1)."""
-
-OVERFLOW = b"?"
-"""What stands for a line that was too long: no command, no tool."""
+"""Longest line that may be a command [bytes]; a longer one is answered as unknown (khepera-protocol.md 3.1)."""
 
 _TERMINATOR = re.compile(rb"[\r\n]")
 
@@ -16,17 +13,22 @@ _TERMINATOR = re.compile(rb"[\r\n]")
 class Receiver:
     r"""The robot's input buffer.
 
+    Of a line that is too long one character more than the limit is kept: enough to see that it is too long.
+
+    Args:
+        keeps_empty_lines: False: an empty line vanishes here and costs no time, so that CR LF is one line end.
+
     Example:
         >>> receiver = Receiver()
         >>> receiver.feed(b"D,5")
         []
         >>> receiver.feed(b",5\r\nN\n")
-        [(2, b'D,5,5'), (3, b''), (5, b'N')]
+        [(2, b'D,5,5'), (5, b'N')]
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, keeps_empty_lines: bool = False) -> None:
+        self._keeps_empty_lines = keeps_empty_lines
         self._partial = bytearray()
-        self._is_overflowing = False
 
     def feed(self, data: bytes) -> list[tuple[int, bytes]]:
         """Take characters; return each line that they complete with the index of its terminator in `data`."""
@@ -35,20 +37,16 @@ class Receiver:
         for match in _TERMINATOR.finditer(data):
             end = match.start()
             self._keep(data[begin:end])
-            lines.append((end, OVERFLOW if self._is_overflowing else bytes(self._partial)))
+            if self._partial or self._keeps_empty_lines:
+                lines.append((end, bytes(self._partial)))
             self.clear()
             begin = end + 1
         self._keep(data[begin:])
         return lines
 
     def _keep(self, part: bytes) -> None:
-        if len(self._partial) + len(part) > LINE_LIMIT:
-            self._is_overflowing = True
-            self._partial.clear()
-        elif not self._is_overflowing:
-            self._partial += part
+        self._partial += part[: LINE_LIMIT + 1 - len(self._partial)]
 
     def clear(self) -> None:
         """Forget a line that is not complete."""
         self._partial.clear()
-        self._is_overflowing = False

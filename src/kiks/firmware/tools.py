@@ -1,7 +1,8 @@
-"""The tool words: lower-case commands for a person at a terminal (khepera-protocol.md section 5). The texts are ours."""
+"""The tool words: lower-case commands for a person at a terminal (khepera-protocol.md 5). The texts are ours."""
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 from kiks.firmware.commands import COMMANDS
@@ -37,27 +38,32 @@ def text(*lines: str) -> bytes:
 
 def run(robot: Firmware, line: bytes) -> bytes | None:
     """Carry out a tool; return what it prints, or None if the first word names none."""
-    words = line.decode("ascii", errors="replace").split()
-    if not words or words[0] not in SUMMARY or (words[0] == "flash" and not robot.spec.firmware.has_user_flash):
-        return None
-    return _TOOLS[words[0]](robot, words[1:])
+    # Blanks are blanks and tabs: `str.split` would take control characters for blanks, too.
+    words = re.split("[ \t]+", line.decode("latin-1").strip(" \t"))
+    return _TOOLS[words[0]](robot, words[1:]) if words[0] in _summary(robot) else None
+
+
+def _summary(robot: Firmware) -> dict[str, str]:
+    has_flash = robot.spec.firmware.has_user_flash
+    return {name: line for name, line in SUMMARY.items() if name != "flash" or has_flash}
 
 
 def _help(robot: Firmware, words: list[str]) -> bytes:
+    summary = _summary(robot)
     if not words:
-        return text(*SUMMARY.values())
-    if words[0] in SUMMARY:
-        return text(SUMMARY[words[0]])
+        return text(*summary.values())
+    if words[0] in summary:
+        return text(summary[words[0]])
     for command in COMMANDS:
         if command.letter == words[0]:
             return text(f"{','.join((command.letter, *command.parameters))}: {command.name}")
-    return text(f"No help on {words[0][:20]}")
+    return text("help: no tool or command of that name")
 
 
 def _list(robot: Firmware, words: list[str]) -> bytes:
     revision = robot.spec.firmware.bios_version
     rows = [f"PR_{c.letter}  {c.name}, {revision}" for c in COMMANDS]
-    rows += [f"TO{number:02d}  {name}, {revision}" for number, name in enumerate(SUMMARY)]
+    rows += [f"TO{number:02d}  {name}, {revision}" for number, name in enumerate(_summary(robot))]
     return text("ID    description, version", *rows, f"FU00  demo, {revision}", f"BI00  BIOS, {revision}")
 
 

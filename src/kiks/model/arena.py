@@ -49,8 +49,8 @@ class Arena:
 
     Example:
         >>> arena = Arena.box(400, 300)
-        >>> arena.clearance_at_mm(200, 150)
-        140.0
+        >>> arena.clearance_at_mm(60, 150)
+        50.0
         >>> arena.free_for(30, 30, radius_mm=27.5)
         False
     """
@@ -80,7 +80,7 @@ class Arena:
             )
         if given.all():
             raise ArenaError(
-                "An arena must have floor, but every cell is wall. Black (0) is floor and any other value wall: "
+                f"Arena {self.name!r} must have floor, but every cell is wall. Black (0) is floor and all else wall: "
                 "invert the picture if it was drawn the other way round."
             )
         if given.flags.writeable or given.base is not None or not given.flags.c_contiguous:
@@ -221,8 +221,9 @@ class Arena:
     def clearance_at_mm(self, x_mm: float, y_mm: float) -> float:
         """Return how far a point is from the surface of the nearest wall [mm].
 
-        Interpolates `clearance` between cell centres and takes off half a cell, which is exact before a straight
-        wall along the raster and at most 0.21 cells too much before a corner. In walls and outside it is negative.
+        Interpolates `clearance` between cell centres and takes off half a cell. That is exact before a straight wall
+        along the raster; before a corner it is up to 0.21 cells too much, half way between two walls up to half a
+        cell too little. In walls and outside it is negative.
 
         Raises:
             ParameterError: If a coordinate is not finite.

@@ -119,7 +119,8 @@ def _picture_arena(table: dict[str, Any], path: Path) -> Arena:
             "Copy the picture beside the file and give its name."
         )
     mm_per_pixel = table.get("mm_per_pixel", 1.0)
-    return Arena.from_array(read_picture(path.parent / given, mm_per_pixel), mm_per_pixel=mm_per_pixel)
+    brightness = read_picture(path.parent / given, mm_per_pixel)
+    return Arena.from_array(brightness, mm_per_pixel=mm_per_pixel, name=path.stem)
 
 
 def _starts(table: dict[str, Any]) -> Iterable[Pose]:

@@ -17,7 +17,7 @@ SENSOR_COUNT = 8
 
 @dataclass(frozen=True)
 class Body:
-    """Shape and contact. `slip_ratio_min` and `_max` bound how fast blocked wheels turn, as a share of their command."""
+    """Shape and contact. `slip_ratio_min` and `_max` bound a blocked wheel's speed, as a share of its command."""
 
     diameter_mm: float
     wheel_base_mm: float
@@ -130,7 +130,7 @@ class RobotSpec:
             name_or_path: Name of a robot of ours, or the path of a TOML file with the same keys.
 
         Raises:
-            ParameterError: If there is no such robot, the file is no TOML, or a key is missing, unknown or out of range.
+            ParameterError: If there is no such robot, the file is no TOML, or a key is missing, unknown or wrong.
         """
         folder = resources.files("kiks.model") / "robots"
         known = sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml"))
@@ -172,7 +172,9 @@ class RobotSpec:
         for section, values in table.items():
             part = getattr(spec, section, None)
             if part is None or isinstance(part, str):
-                raise ParameterError(f"a change must be named 'section__key', but it was {section!r}. Sections: {list(_SECTIONS)}.")
+                raise ParameterError(
+                    f"a change must be named 'section__key', but it was {section!r}. Sections: {list(_SECTIONS)}."
+                )
             for key in values:
                 _check_key(key, [f.name for f in fields(part)], f"section '{section}'")
             spec = replace(spec, **{section: replace(part, **values)})
@@ -204,17 +206,21 @@ def _robot_from_table(table: dict[str, Any], source: str) -> RobotSpec:
     for section, kind in _SECTIONS.items():
         values = table.get(section, {} if kind is Quirks else None)
         if not isinstance(values, dict):
-            raise ParameterError(f"{where} must have a section [{section}], but it has none. Copy it from 'khepera.toml'.")
+            raise ParameterError(
+                f"{where} must have a section [{section}], but it has none. Copy it from 'khepera.toml'."
+            )
         types = {f.name: str(f.type) for f in fields(kind)}
         for key in values:
             _check_key(key, list(types), f"{where}, section [{section}]")
         missing = [] if kind is Quirks else [key for key in types if key not in values]
         if missing:
-            raise ParameterError(f"{where}, section [{section}] must give {missing}, but does not. Copy them from 'khepera.toml'.")
+            raise ParameterError(
+                f"{where}, section [{section}] must give {missing}, but does not. Copy them from 'khepera.toml'."
+            )
         parts[section] = kind(**{key: _typed(values[key], types[key], f"{where}, {section}.{key}") for key in values})
     name = table.get("name")
     if not isinstance(name, str) or not name:
-        raise ParameterError(f"{where} must give the robot a name, but it was {name!r}. Write: name = \"My robot\".")
+        raise ParameterError(f'{where} must give the robot a name, but it was {name!r}. Write: name = "My robot".')
     spec = RobotSpec(name=name, **parts)
     _check(spec, where)
     return spec
@@ -231,9 +237,10 @@ def _typed(value: Any, annotation: str, where: str) -> Any:
     if not isinstance(value, wanted[annotation]) or (annotation != "bool" and isinstance(value, bool)):
         raise ParameterError(f"{where} must be of type {annotation}, but it was {value!r}.")
     if annotation == "float":
-        value = float(value)
-        if not math.isfinite(value):
+        number = float(str(value))
+        if not math.isfinite(number):
             raise ParameterError(f"{where} must be finite, but it was {value!r}.")
+        return number
     return value
 
 
@@ -241,7 +248,9 @@ def _check(spec: RobotSpec, where: str) -> None:
     def must(holds: bool, key: str, rule: str) -> None:
         if not holds:
             section, name = key.split(".")
-            raise ParameterError(f"{where}: {key} must be {rule}, but it was {getattr(getattr(spec, section), name)!r}.")
+            raise ParameterError(
+                f"{where}: {key} must be {rule}, but it was {getattr(getattr(spec, section), name)!r}."
+            )
 
     body, motor, reset, proximity = spec.body, spec.motor, spec.reset, spec.proximity
     must(10 <= body.diameter_mm <= 500, "body.diameter_mm", "between 10 and 500 mm")
@@ -264,11 +273,17 @@ def _check(spec: RobotSpec, where: str) -> None:
     must(1 <= reset.profile_acceleration <= 255, "reset.profile_acceleration", "between 1 and 255")
     for key in ("mount_angle_deg", "mount_radius_mm", "direction_deg", "baseline_counts"):
         must(len(getattr(proximity, key)) == SENSOR_COUNT, f"proximity.{key}", f"a list of {SENSOR_COUNT}")
-    must(all(0 < r <= body.radius_mm for r in proximity.mount_radius_mm), "proximity.mount_radius_mm", "inside the body")
+    must(
+        all(0 < r <= body.radius_mm for r in proximity.mount_radius_mm), "proximity.mount_radius_mm", "inside the body"
+    )
     must(0 < proximity.field_of_view_deg <= 180, "proximity.field_of_view_deg", "between 0 and 180 degrees")
     must(1 <= proximity.range_mm <= 1000, "proximity.range_mm", "between 1 and 1000 mm")
-    must(1 <= proximity.step_counts <= proximity.maximum_counts <= 65535, "proximity.maximum_counts", "1 to 65535 counts")
-    must(0 <= proximity.noise_large <= proximity.noise_small < 1, "proximity.noise_small", "from noise_large to below 1")
+    must(
+        1 <= proximity.step_counts <= proximity.maximum_counts <= 65535, "proximity.maximum_counts", "1 to 65535 counts"
+    )
+    must(
+        0 <= proximity.noise_large <= proximity.noise_small < 1, "proximity.noise_small", "from noise_large to below 1"
+    )
     must(1 <= proximity.noise_exponent <= 20, "proximity.noise_exponent", "a whole number from 1 to 20")
     must(proximity.noise_counts >= 0, "proximity.noise_counts", "at least 0")
     must(0 <= spec.ambient.dark_counts <= 1023, "ambient.dark_counts", "between 0 and 1023 counts")

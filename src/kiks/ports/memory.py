@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from kiks.clock.thinking import Thinking, ThinkingFixed, ThinkingLive, parse_thinking
-from kiks.clock.waiting import Waiting
 from kiks.errors import LinkError, ParameterError
 from kiks.sim.wire import BACKLOG_LIMIT
 from kiks.units import ns_from_s, s_from_ns
@@ -23,22 +21,17 @@ class SimPort:
 
     Attributes:
         timeout: Longest time a read waits [s] of simulated time; None waits for ever.
-        waiting: Cost of asking again and again; a program's clock shares it.
     """
 
     def __init__(self, sim: Simulation, robot: int) -> None:
         self.sim = sim
         self.robot = robot
         self.timeout: float | None = None
-        self.waiting = Waiting()
-        self.is_open = True
         self._wire = sim.wires[robot - 1]
-        self._thinking: Thinking | None = parse_thinking(sim.thinking)
-        if isinstance(self._thinking, ThinkingFixed) and self._thinking.time_ns == 0:
-            self._thinking = None
+        self._program = sim.program
         self._has_read = True
 
-    # ---- what pyserial's ports have -------------------------------------------------------------------------------------
+    # ---- what pyserial's ports have ----
 
     @property
     def baudrate(self) -> int:
@@ -48,7 +41,9 @@ class SimPort:
     @baudrate.setter
     def baudrate(self, baud: int) -> None:
         if not isinstance(baud, int) or not 75 <= baud <= 4_000_000:
-            raise ParameterError(f"baudrate must be a whole number from 75 to 4000000 bit/s, but it was {baud!r}. Usual: 9600.")
+            raise ParameterError(
+                f"baudrate must be a whole number from 75 to 4000000 bit/s, but it was {baud!r}. Usual: 9600."
+            )
         with self.sim.lock:
             self._wire.set_baud(baud)
 
@@ -58,14 +53,14 @@ class SimPort:
         with sim.lock:
             self._enter(is_command=self._has_read)
             self._has_read = False
-            self.waiting.act()
+            self._program.act()
             for begin in range(0, len(data), BACKLOG_LIMIT):
                 part = data[begin : begin + BACKLOG_LIMIT]
                 room_ns = wire.line.sending_until_ns - BACKLOG_LIMIT * wire.line.character_ns
                 if room_ns > sim.now_ns:
                     sim.advance_to(room_ns)
                 wire.send(part, sim.now_ns)
-            self._leave()
+            self._program.leave()
         return len(data)
 
     def read(self, size: int = 1) -> bytes:
@@ -94,15 +89,13 @@ class SimPort:
 
     @property
     def in_waiting(self) -> int:
-        """Characters that have arrived and were not read. Asking in vain lets a little time pass."""
+        """Characters that have arrived and were not read. Asking again and again lets time pass."""
         sim = self.sim
         with sim.lock:
             self._enter(is_command=False)
+            self._pass(self._program.ask())
             count = self._wire.line.arrived_count(sim.now_ns)
-            if not count:
-                self._pass(self.waiting.ask())
-                count = self._wire.line.arrived_count(sim.now_ns)
-            self._leave()
+            self._program.leave()
         return count
 
     def flush(self) -> None:
@@ -119,21 +112,42 @@ class SimPort:
     def reset_output_buffer(self) -> None:
         """Do nothing: what was written is on the line already."""
 
+    def claim(self, holder: str) -> None:
+        """Open the port for one client: only one can use a line at a time.
+
+        Args:
+            holder: Who it is, in words for the next one who tries.
+
+        Raises:
+            LinkError: If somebody holds it already.
+        """
+        if self._wire.holder is not None:
+            raise LinkError(
+                f"a port must be free to be opened, but robot {self.robot} is in use by {self._wire.holder}. "
+                f"Close it there first, or open another robot."
+            )
+        self._wire.holder = holder
+
     def close(self) -> None:
-        """Hang up: forget what nobody read. The robot drives on, and the port may be used again."""
+        """Hang up: forget what nobody read. The robot drives on, and the port may be opened again."""
         with self.sim.lock:
+            self._wire.holder = None
             self._wire.hang_up()
 
-    # ---- time, as the program lives it ----------------------------------------------------------------------------------
+    # ---- time, as the program lives it ----
+
+    def ask_ns(self) -> int:
+        """Return the simulated time [ns]; asking again and again lets time pass, so that a loop may wait for it."""
+        with self.sim.lock:
+            self._enter(is_command=False)
+            self._pass(self._program.ask())
+            self._program.leave()
+            return self.sim.now_ns
 
     @property
     def time_s(self) -> float:
-        """Simulated time [s]; asking again and again lets time pass, so that a loop may wait for it."""
-        with self.sim.lock:
-            self._enter(is_command=False)
-            self._pass(self.waiting.ask())
-            self._leave()
-            return s_from_ns(self.sim.now_ns)
+        """The simulated time [s], asked for in the same way."""
+        return s_from_ns(self.ask_ns())
 
     def sleep(self, seconds: float) -> None:
         """Let simulated time pass [s] without waiting for it.
@@ -143,24 +157,14 @@ class SimPort:
         """
         with self.sim.lock:
             self._enter(is_command=False)
-            self.waiting.act()
+            self._program.act()
             self.sim.run(seconds)
-            self._leave()
+            self._program.leave()
 
-    @property
-    def measured_thinking_ns(self) -> list[int]:
-        """What thinking 'live' has measured so far [ns]; `save_thinking` keeps it for 'replay'."""
-        return self._thinking.measured_ns if isinstance(self._thinking, ThinkingLive) else []
-
-    # ---- inside -----------------------------------------------------------------------------------------------------------
+    # ---- inside ----
 
     def _enter(self, *, is_command: bool) -> None:
-        if self._thinking is not None:
-            self._pass(self._thinking.enter(is_command=is_command))
-
-    def _leave(self) -> None:
-        if self._thinking is not None:
-            self._thinking.leave()
+        self._pass(self._program.enter(is_command=is_command))
 
     def _pass(self, time_ns: int) -> None:
         if time_ns:
@@ -190,18 +194,18 @@ class SimPort:
                     break
                 sim.advance_to(event_ns)
             if arrival_ns is not None and (deadline_ns is None or arrival_ns <= deadline_ns):
-                self.waiting.act()
+                self._program.act()
                 sim.advance_to(arrival_ns)
                 data = line.take(count or 0)
             elif deadline_ns is None:
                 raise LinkError(
-                    f"robot {self.robot} must have been asked something before its answer is read, but no command is on the "
-                    f"line, so the read would never end. Send a command that ends in a line feed, or set a timeout."
+                    f"robot {self.robot} must have been asked something before its answer is read, but no command is "
+                    f"on the line, so the read would never end. Send one that ends in a line feed, or set a timeout."
                 )
             else:
                 # A read that does not wait (timeout 0) is a question like any other.
-                sim.advance_to(max(deadline_ns, sim.now_ns + (self.waiting.ask() if self.timeout == 0 else 0)))
+                sim.advance_to(max(deadline_ns, sim.now_ns + (self._program.ask() if self.timeout == 0 else 0)))
                 arrived = line.arrived_count(sim.now_ns)
                 data = line.take(arrived if size is None else min(arrived, size))
-            self._leave()
+            self._program.leave()
         return data

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kiks.clock.thinking import parse_thinking
+from kiks.clock.program import Program
 from kiks.engine import contact, proximity, step
 from kiks.engine.numbers import uniform
 from kiks.engine.parameters import pack
@@ -18,8 +18,9 @@ from kiks.firmware.khepera import Firmware
 from kiks.firmware.turret import Turret
 from kiks.model.arena import PAD, Arena
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
+from kiks.sim.table import TABLE
 from kiks.sim.wire import Wire
-from kiks.units import NS_PER_S, TICK_NS, ns_from_s, s_from_ns
+from kiks.units import TICK_NS, ns_from_s, s_from_ns
 
 if TYPE_CHECKING:
     from kiks.ports.memory import SimPort
@@ -29,7 +30,7 @@ STREAM_PLACE = 4
 
 
 class Simulation:
-    """Robots in an arena, each at the end of a serial line.
+    r"""Robots in an arena, each at the end of a serial line.
 
     Time passes only when somebody lets it: a program that waits for a reply on a port, or `run`. Robots in one world
     do not see or touch each other yet.
@@ -48,9 +49,9 @@ class Simulation:
     Example:
         >>> sim = Simulation(Arena.box(500, 500), seed=1)
         >>> port = sim.port(1)
-        >>> port.write(b"D,10,10\\n"); port.readline()
+        >>> port.write(b"D,10,10\n"); port.readline()
         8
-        b'd\\r\\n'
+        b'd\r\n'
         >>> sim.run(1.0)
         >>> round(sim.time_s, 3)
         1.014
@@ -66,13 +67,17 @@ class Simulation:
         robot: str | RobotSpec = "khepera",
     ) -> None:
         if not isinstance(robots, int) or not 1 <= robots <= 1000:
-            raise ParameterError(f"robots must be a whole number from 1 to 1000, but it was {robots!r}. Say how many you need.")
+            raise ParameterError(
+                f"robots must be a whole number from 1 to 1000, but it was {robots!r}. Say how many you need."
+            )
         if not isinstance(seed, int) or not 0 <= seed < 2**63:
-            raise ParameterError(f"seed must be a whole number from 0 to 2^63 - 1, but it was {seed!r}. Any small number will do.")
-        parse_thinking(thinking)
+            raise ParameterError(
+                f"seed must be a whole number from 0 to 2^63 - 1, but it was {seed!r}. Any small number will do."
+            )
         self.arena = Arena.default() if arena is None else arena
         self.seed = seed
         self.thinking = thinking
+        self.program = Program(thinking)
         self.spec = robot if isinstance(robot, RobotSpec) else RobotSpec.load(robot)
         self.robot_count = robots
         self.lock = threading.RLock()
@@ -87,11 +92,19 @@ class Simulation:
         self._ports: dict[int, SimPort] = {}
         for index in range(robots):
             self._put(index, *self._start(index))
+        self.name = TABLE.enter(self)
 
     def _firmware(self, index: int) -> Firmware:
         def sense_proximity() -> list[int]:
             proximity.read_proximity(
-                self.state.robots, self._kinds, *self._sight, self.state.tick_count, self.now_ns, self.seed, index, self._counts
+                self.state.robots,
+                self._kinds,
+                *self._sight,
+                self.state.tick_count,
+                self.now_ns,
+                self.seed,
+                index,
+                self._counts,
             )
             return self._counts.tolist()
 
@@ -102,7 +115,7 @@ class Simulation:
         return Firmware(self.spec, self.state, index, sense_proximity=sense_proximity, sense_ambient=sense_ambient)
 
     def _start(self, index: int) -> tuple[float, float, float]:
-        """Return the arena's start pose for a robot, else a free place: the roomiest for the first, random for others."""
+        """Return the arena's start pose for a robot, else a free place: the roomiest for the first."""
         if index < len(self.arena.starts):
             return self.arena.starts[index]
         roomiest = self.arena.find_start(self.spec.body.radius_mm)
@@ -115,7 +128,7 @@ class Simulation:
                 return x, y, 2 * math.pi * turn
         return roomiest
 
-    # ---- time ---------------------------------------------------------------------------------------------------------
+    # ---- time ----
 
     @property
     def time_s(self) -> float:
@@ -132,7 +145,9 @@ class Simulation:
             ParameterError: If it is negative or not finite.
         """
         if not (isinstance(seconds, int | float) and math.isfinite(seconds) and seconds >= 0):
-            raise ParameterError(f"seconds must be a finite number of at least 0, but it was {seconds!r}. Time never runs backwards.")
+            raise ParameterError(
+                f"seconds must be a finite number of at least 0, but it was {seconds!r}. Time never runs backwards."
+            )
         with self.lock:
             self.advance_to(self.now_ns + ns_from_s(seconds))
 
@@ -169,12 +184,14 @@ class Simulation:
             step.advance(self.state.robots, self._kinds, *self._ground, self.seed, self.state.tick_count, ticks)
             self.state.tick_count += ticks
 
-    # ---- robots -------------------------------------------------------------------------------------------------------
+    # ---- robots ----
 
     def _index(self, robot: int) -> int:
         if not isinstance(robot, int) or not 1 <= robot <= self.robot_count:
             numbers = "robot 1" if self.robot_count == 1 else f"robots 1 to {self.robot_count}"
-            raise ParameterError(f"robot must be the number of one there is, but it was {robot!r}. This simulation has {numbers}.")
+            raise ParameterError(
+                f"robot must be the number of one there is, but it was {robot!r}. This simulation has {numbers}."
+            )
         return robot - 1
 
     def port(self, robot: int) -> SimPort:
@@ -192,6 +209,14 @@ class Simulation:
         if index not in self._ports:
             self._ports[index] = SimPort(self, robot)
         return self._ports[index]
+
+    def url(self, robot: int) -> str:
+        """Return the name under which pyserial opens a robot's port: 'kiks://sim1/1'.
+
+        Raises:
+            ParameterError: If there is no such robot.
+        """
+        return f"kiks://{self.name}/{self._index(robot) + 1}"
 
     def fit(self, robot: int, turret: Turret) -> None:
         """Put a turret on a robot; it answers to `T,<its number>,...` from now on.
@@ -233,7 +258,8 @@ class Simulation:
         inside = 0 <= x_mm <= self.arena.width_mm and 0 <= y_mm <= self.arena.height_mm
         if gap_mm < -0.01 or not inside:
             raise ParameterError(
-                f"the place of robot {robot} must be free, but at ({x_mm:g}, {y_mm:g}) mm a wall is {-gap_mm:.1f} mm inside it. "
+                f"the place of robot {robot} must be free, but at ({x_mm:g}, {y_mm:g}) mm "
+                f"a wall is {-gap_mm:.1f} mm inside it. "
                 f"The arena is {self.arena.width_mm:g} x {self.arena.height_mm:g} mm; the robot needs a radius of "
                 f"{self.spec.body.radius_mm:g} mm."
             )
@@ -291,14 +317,3 @@ class Simulation:
         with self.lock:
             self.sync()
             return self.state.hash()
-
-
-def minutes(time_ns: int) -> str:
-    """Return a time [ns] as a person writes it.
-
-    Example:
-        >>> minutes(61_500_000_000)
-        '1:01.5'
-    """
-    whole, rest = divmod(time_ns, 60 * NS_PER_S)
-    return f"{whole}:{rest / NS_PER_S:04.1f}"

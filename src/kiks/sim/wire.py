@@ -9,7 +9,7 @@ from kiks.firmware.khepera import Firmware
 from kiks.units import ns_from_s
 
 BACKLOG_LIMIT = 4096
-"""Characters on the way to the robot beyond which a sender has to wait [bytes], as a serial driver's buffer makes it."""
+"""Characters on the way to the robot beyond which a sender has to wait [bytes]: a serial driver's buffer."""
 
 
 class Wire:

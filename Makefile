@@ -1,0 +1,41 @@
+# make demo, make test: everything else is for people who develop KiKS (CONTRIBUTING.md).
+
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+VENV   := .venv
+BIN    := $(VENV)/bin
+
+.PHONY: demo test quick setup system lint types docs benchmarks clean
+
+demo: setup
+	$(BIN)/kiks demo follow --arena examples/arenas/office.toml --seconds 300 --picture kiks-demo.png
+
+test: setup
+	$(BIN)/python -m pytest -n auto
+
+quick: setup
+	$(BIN)/python -m pytest -n auto -m "not slow"
+
+setup: $(VENV)/.ready
+
+# The environment is made anew when the list of what it holds changes.
+$(VENV)/.ready: pyproject.toml tools/system-packages.sh
+	@PYTHON="$(PYTHON)" sh tools/system-packages.sh
+	$(or $(PYTHON),python3) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@
+
+lint: setup
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: setup
+	$(BIN)/mypy
+
+docs: setup
+	$(BIN)/python docs/make_commands.py
+
+benchmarks: setup
+	$(BIN)/python benchmarks/wire.py
+
+clean:
+	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,0 +1,5 @@
+"""`python -m kiks` is the command `kiks`."""
+
+from kiks.cli import main
+
+main()

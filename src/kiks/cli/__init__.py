@@ -1,0 +1,49 @@
+"""The command `kiks`."""
+
+from __future__ import annotations
+
+import sys
+
+import typer
+
+from kiks import __version__
+from kiks.cli.demo import demo
+from kiks.cli.run import run
+from kiks.cli.serve import serve
+from kiks.cli.warmup import warmup
+from kiks.errors import KiksError
+
+app = typer.Typer(
+    help="KiKS Is a Khepera Simulator: programs for a real Khepera robot run on a simulated one, unchanged.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+for _command in (demo, run, serve, warmup):
+    # A program's own options, and whatever stands after its name, belong to the program.
+    app.command(context_settings={"allow_interspersed_args": _command is not run})(_command)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"KiKS {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: bool = typer.Option(False, "--version", callback=_print_version, is_eager=True, help="Show the version."),
+) -> None:
+    pass
+
+
+def main() -> None:
+    """Run the command; what a user did wrong ends in one clear message."""
+    try:
+        app()
+    except KiksError as error:
+        typer.echo(f"kiks: {error}", err=True)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        sys.exit(130)

@@ -1,0 +1,149 @@
+"""`kiks serve`."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from kiks.cli.compile_note import note_compiling
+from kiks.errors import LinkError
+
+if TYPE_CHECKING:
+    from kiks.ports.endpoint import Endpoint
+    from kiks.sim.simulation import Simulation
+
+TCP_PORT = 10020
+"""TCP port of robot 1, that of the next one for robot 2 and so on (khepera-protocol.md 3.3)."""
+
+
+def serve(
+    arena: Annotated[
+        str | None, typer.Option(help="Arena file (.toml) or picture; the classic box if left out.")
+    ] = None,
+    robots: Annotated[int, typer.Option(help="Robots in the arena.", min=1, max=1000)] = 1,
+    robot: Annotated[str, typer.Option(help="Kind of robot: khepera, khepera_ii, or a file.")] = "khepera",
+    seed: Annotated[int, typer.Option(help="Seed: the same seed, the same run.", min=0)] = 0,
+    speed: Annotated[float, typer.Option(help="Simulated seconds in a real one, for thinking live.")] = 1.0,
+    thinking: Annotated[
+        str, typer.Option(help="live: the world runs all the time; none or fixed:MS: it waits for each command.")
+    ] = "live",
+    baud: Annotated[int, typer.Option(help="Line speed until a program sets one.", min=75, max=4_000_000)] = 9600,
+    pty: Annotated[bool, typer.Option(help="Make a serial port for each robot.")] = True,
+    link: Annotated[
+        Path | None, typer.Option(help="Name of the serial port; with several robots a number is appended.")
+    ] = None,
+    tcp: Annotated[
+        int | None, typer.Option(help="TCP port of robot 1, 0 for free ones; 10020, or a free one, if left out.")
+    ] = None,
+    rfc2217: Annotated[
+        int | None, typer.Option(help="The same for ports that speak RFC 2217; none if left out.")
+    ] = None,
+    host: Annotated[
+        str, typer.Option(help="Address that the TCP ports listen at; this computer's own only.")
+    ] = "127.0.0.1",
+    quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but warnings.")] = False,
+) -> None:
+    """Put simulated robots on real serial and TCP ports, for programs in any language.
+
+    The program opens the port that is printed, in place of that of a real robot. Ctrl-C ends.
+
+    Example: kiks serve --arena examples/arenas/maze.toml --link /tmp/khepera
+    """
+    from kiks.model.arena import Arena
+    from kiks.ports.server import Server
+    from kiks.sim.simulation import Simulation
+
+    def say(text: str) -> None:
+        if not quiet:
+            typer.echo(text)
+
+    ground = Arena.default() if arena is None else Arena.load(arena)
+    sim = Simulation(ground, robots=robots, seed=seed, robot=robot)
+    for wire in sim.wires:
+        wire.set_baud(baud)
+    if not quiet:
+        note_compiling()
+    _warm_up(sim)
+    ways: dict[int, list[Endpoint]] = {number: [] for number in range(1, robots + 1)}
+    server = None
+    # Whoever ends the process, the links are removed.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.default_int_handler)
+    try:
+        for number, endpoints in ways.items():
+            say(f"Robot {number}")
+            if pty:
+                endpoints.append(_open_pty(number, robots, link, baud))
+                say(f"  serial port  {endpoints[-1].name}")
+            endpoints.append(_open_tcp(number, tcp, host, say))
+            say(f"  TCP          socket://{endpoints[-1].name}")
+            if rfc2217 is not None:
+                endpoints.append(_open_rfc2217(number, rfc2217, host))
+                say(f"  RFC 2217     rfc2217://{endpoints[-1].name}")
+        server = Server(sim, ways, speed=speed, thinking=thinking)
+        say(_what_is_repeatable(thinking, speed, robots))
+        server.serve()
+    except KeyboardInterrupt:
+        say(f"Stopped after {sim.time_s:.1f} s of simulated time.")
+    finally:
+        if server is not None:
+            server.close()
+        else:
+            for endpoints in ways.values():
+                for endpoint in endpoints:
+                    endpoint.close()
+
+
+def _warm_up(sim: Simulation) -> None:
+    """Compile or load the engine before the first program waits for it, in a world of its own."""
+    from kiks.sim.simulation import Simulation
+
+    port = Simulation(sim.arena, robot=sim.spec).port(1)
+    for command in (b"D,1,1\n", b"N\n", b"O\n", b"D,0,0\n"):
+        port.write(command)
+        port.readline()
+
+
+def _open_pty(number: int, robots: int, link: Path | None, baud: int) -> Endpoint:
+    from kiks.ports.pty import PtyEndpoint, default_folder
+
+    if link is None:
+        return PtyEndpoint(default_folder() / str(number), baud=baud)
+    return PtyEndpoint(link if robots == 1 else f"{link}{number}", baud=baud)
+
+
+def _open_tcp(number: int, first: int | None, host: str, say: Callable[[str], None]) -> Endpoint:
+    from kiks.ports.tcp import TcpEndpoint
+
+    if first is not None:
+        return TcpEndpoint(first + number - 1 if first else 0, host=host)
+    try:
+        return TcpEndpoint(TCP_PORT + number - 1, host=host)
+    except LinkError:
+        # Nobody asked for that number: a host that is refused is refused again, a busy port is replaced.
+        endpoint = TcpEndpoint(0, host=host)
+        say(f"  TCP port {TCP_PORT + number - 1} is busy; a free one takes its place.")
+        return endpoint
+
+
+def _open_rfc2217(number: int, first: int, host: str) -> Endpoint:
+    from kiks.ports.rfc2217 import Rfc2217Endpoint
+
+    return Rfc2217Endpoint(first + number - 1 if first else 0, host=host)
+
+
+def _what_is_repeatable(thinking: str, speed: float, robots: int) -> str:
+    if thinking == "live":
+        return (
+            f"The world runs at {speed:g} times real time. Not repeatable: when a program's bytes come depends on this "
+            "computer; --thinking none makes it so."
+        )
+    others = ", as long as only one program is connected" if robots > 1 else ""
+    return (
+        "The world waits for each command. Repeatable to the bit for a program that waits for each reply"
+        f"{others}; its pauses take no time."
+    )

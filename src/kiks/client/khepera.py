@@ -1,0 +1,315 @@
+"""A Khepera as an object: one method a command, the same for a simulated and a real robot."""
+
+from __future__ import annotations
+
+import time
+from types import TracebackType
+from typing import Any, NamedTuple, Protocol
+
+from kiks.errors import LinkError, ParameterError
+from kiks.ports.memory import SimPort
+
+TIMEOUT_S = 2.0
+"""How long a reply may take [s]: the longest, 264 characters at 9600 baud, takes 0.3 s (khepera-protocol.md 2.2)."""
+
+
+class Port(Protocol):
+    """What is needed of a port; pyserial's and ours have it."""
+
+    def write(self, data: bytes, /) -> int | None:
+        """Send characters."""
+
+    def read_until(self, expected: bytes = b"\n") -> bytes:
+        """Return a line, or less after the time-out."""
+
+    def close(self) -> None:
+        """Hang up."""
+
+
+class Status(NamedTuple):
+    """What command K reports of one motor.
+
+    Attributes:
+        on_target: True once a position move has ended.
+        mode: 0 speed, 1 position, 2 PWM.
+        error: Command minus measurement [pulses/10 ms, or pulses in position mode].
+    """
+
+    on_target: bool
+    mode: int
+    error: int
+
+
+class Khepera:
+    """A robot at the end of a serial line.
+
+    Args:
+        port: A port of a simulation (`sim.port(1)`), a name ('kiks://1', '/dev/ttyUSB0', 'socket://127.0.0.1:10020'),
+            or an open pyserial port with a time-out.
+        baud: Speed of a port that is opened by name [bit/s].
+
+    Raises:
+        LinkError: If the port cannot be opened, or (every method) if the robot does not answer as it should.
+
+    Example:
+        >>> import kiks
+        >>> sim = kiks.Simulation(kiks.Arena.box(500, 500))
+        >>> with kiks.Khepera(sim.port(1)) as robot:
+        ...     robot.set_speed(10, 10)
+        ...     robot.pause(1.0)
+        ...     robot.encoders()
+        (977, 977)
+    """
+
+    def __init__(self, port: str | Port, *, baud: int = 9600) -> None:
+        if isinstance(port, str):
+            self.port: Port = open_port(port, baud)
+        elif isinstance(port, SimPort):
+            port.claim("another kiks.Khepera")
+            self.port = port
+        else:
+            self.port = port
+        if isinstance(self.port, SimPort) and self.port.timeout is None:
+            self.port.timeout = TIMEOUT_S
+
+    def close(self) -> None:
+        """Close the port. The robot keeps its last speed: nothing on board stops it."""
+        self.port.close()
+
+    def __enter__(self) -> Khepera:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    # ---- time ----
+
+    @property
+    def time_s(self) -> float:
+        """Time of the robot's world [s]: simulated, or the computer's own for a real robot."""
+        return self.port.time_s if isinstance(self.port, SimPort) else time.monotonic()
+
+    def pause(self, seconds: float) -> None:
+        """Let time pass [s]: at no cost on a simulated robot, by waiting on a real one."""
+        if isinstance(self.port, SimPort):
+            self.port.sleep(seconds)
+        else:
+            time.sleep(seconds)
+
+    # ---- motion ----
+
+    def set_speed(self, left: float, right: float) -> None:
+        """Turn the wheels (D). Speeds [pulses/10 ms] are rounded; 1 is 8 mm/s, 127 the most."""
+        self._order(b"D,%d,%d\n" % (round(left), round(right)))
+
+    def stop(self) -> None:
+        """Set both speeds to 0."""
+        self._order(b"D,0,0\n")
+
+    def speed(self) -> tuple[int, int]:
+        """Return the measured speeds, left and right [pulses/10 ms] (E)."""
+        left, right = self._ask(b"E\n", 2)
+        return left, right
+
+    def encoders(self) -> tuple[int, int]:
+        """Return the position counters, left and right [pulses] (H). A pulse is 0.08 mm."""
+        left, right = self._ask(b"H\n", 2)
+        return left, right
+
+    def set_encoders(self, left: int = 0, right: int = 0) -> None:
+        """Set the position counters [pulses] (G)."""
+        self._order(b"G,%d,%d\n" % (left, right))
+
+    def move_to(self, left: int, right: int, *, wait: bool = False, poll_s: float = 0.02) -> None:
+        """Move the wheels to counter readings [pulses] along a trapezoid of speed (C).
+
+        Args:
+            left: Target of the left wheel.
+            right: Target of the right wheel.
+            wait: True to return when both wheels report their arrival.
+            poll_s: Pause between two questions while waiting [s].
+        """
+        self._order(b"C,%d,%d\n" % (left, right))
+        while wait and not all(motor.on_target for motor in self.status()):
+            self.pause(poll_s)
+
+    def set_profile(self, speed: int = 20, acceleration: int = 64) -> None:
+        """Set the trapezoid of both wheels (J): speed [pulses/10 ms], acceleration [pulses/256 per (10 ms)^2]."""
+        self._order(b"J,%d,%d,%d,%d\n" % (speed, acceleration, speed, acceleration))
+
+    def set_pwm(self, left: int, right: int) -> None:
+        """Feed the motors without control, -255 to 255 (P)."""
+        self._order(b"P,%d,%d\n" % (left, right))
+
+    def set_speed_gains(self, kp: int = 3800, ki: int = 800, kd: int = 100) -> None:
+        """Set the gains of the speed controllers (A)."""
+        self._order(b"A,%d,%d,%d\n" % (kp, ki, kd))
+
+    def set_position_gains(self, kp: int = 3000, ki: int = 20, kd: int = 4000) -> None:
+        """Set the gains of the position controllers (F)."""
+        self._order(b"F,%d,%d,%d\n" % (kp, ki, kd))
+
+    def status(self) -> tuple[Status, Status]:
+        """Return what the two controllers report, left and right (K)."""
+        t1, m1, e1, t2, m2, e2 = self._ask(b"K\n", 6)
+        return Status(bool(t1), m1, e1), Status(bool(t2), m2, e2)
+
+    # ---- senses ----
+
+    def proximity(self) -> list[int]:
+        """Return the eight proximity readings, clockwise from the left; 1023 is near, 0 nothing (N)."""
+        return self._ask(b"N\n", 8)
+
+    def ambient(self) -> list[int]:
+        """Return the eight light readings, clockwise from the left; about 450 is dark, 50 bright (O)."""
+        return self._ask(b"O\n", 8)
+
+    def analog(self, channel: int) -> int:
+        """Return an analogue input [4 mV], channel 0 to 6 (I)."""
+        return self._ask(b"I,%d\n" % channel, 1)[0]
+
+    # ---- the rest ----
+
+    def led(self, led: int, action: int) -> None:
+        """Switch an LED (L): 0 lateral, 1 frontal; 0 off, 1 on, 2 toggle."""
+        self._order(b"L,%d,%d\n" % (led, action))
+
+    def version(self) -> tuple[str, str]:
+        """Return the versions of BIOS and protocol (B)."""
+        words = self.send("B").split(",")
+        if len(words) != 3 or words[0] != "b":
+            raise LinkError(f"the reply to 'B' must be b,x.xx,y.yy, but it was {','.join(words)!r}. Is it a Khepera?")
+        return words[1], words[2]
+
+    def read_bus(self, address: int) -> int:
+        """Return a byte of the extension bus (R)."""
+        return self._ask(b"R,%d\n" % address, 1)[0]
+
+    def write_bus(self, data: int, address: int) -> None:
+        """Write a byte to the extension bus (W)."""
+        self._order(b"W,%d,%d\n" % (data, address))
+
+    def turret(self, number: int, order: str) -> list[int]:
+        """Pass an order such as 'N' or 'D,1' to a turret (T) and return the values of its answer."""
+        request = f"T,{number},{order}"
+        reply = self.send(request)
+        start = f"t,{number},{order[:1].lower()}"
+        if not reply.startswith(start):
+            raise LinkError(
+                f"the reply to {request!r} must begin with {start!r}, but it was {reply!r}. Is the turret fitted?"
+            )
+        try:
+            return [int(word) for word in reply[len(start) :].split(",")[1:]]
+        except ValueError:
+            raise LinkError(
+                f"the reply to {request!r} must be whole numbers, but it was {reply!r}. Use send() for its text."
+            ) from None
+
+    def send(self, text: str) -> str:
+        """Send any line and return the first line of the reply, both without their ends."""
+        if "\n" in text or "\r" in text or not text.isascii():
+            raise ParameterError(f"text must be one line of ASCII, but it was {text!r}. The line end is added here.")
+        self.port.write(text.encode() + b"\n")
+        reply = self.port.read_until(b"\n")
+        if reply[-1:] != b"\n":
+            raise self._silence(text.encode(), reply)
+        return reply.rstrip(b"\r\n").decode("ascii", errors="replace")
+
+    # ---- inside ----
+
+    def _order(self, request: bytes) -> None:
+        """Send a command whose reply is its bare letter."""
+        self.port.write(request)
+        reply = self.port.read_until(b"\n")
+        if reply != request[:1].lower() + b"\r\n":
+            raise self._surprise(request, reply)
+
+    def _ask(self, request: bytes, count: int) -> list[int]:
+        """Send a command whose reply is whole numbers."""
+        self.port.write(request)
+        reply = self.port.read_until(b"\n")
+        words = reply.split(b",")
+        if len(words) == count + 1 and words[0] == request[:1].lower() and reply[-2:] == b"\r\n":
+            try:
+                return list(map(int, words[1:]))
+            except ValueError:
+                pass
+        raise self._surprise(request, reply)
+
+    def _surprise(self, request: bytes, reply: bytes) -> LinkError:
+        if reply[-1:] != b"\n":
+            return self._silence(request, reply)
+        return LinkError(
+            f"the reply to {request!r} must be that of a Khepera, but it was {reply!r}. "
+            f"Was an earlier reply left unread, or is another program on the line?"
+        )
+
+    @staticmethod
+    def _silence(request: bytes, reply: bytes) -> LinkError:
+        return LinkError(
+            f"a reply to {request!r} must come before the time-out, but only {reply!r} came. "
+            f"Check the cable, the robot's switch and the baud rate."
+        )
+
+
+def open_port(name: str, baud: int = 9600, timeout_s: float | None = TIMEOUT_S) -> Port:
+    """Open a simulated or a real port by name.
+
+    Args:
+        name: 'kiks://1', '/dev/ttyUSB0', 'COM3', 'socket://host:port', 'rfc2217://host:port'.
+        baud: Line speed [bit/s].
+        timeout_s: How long a read waits [s], None for ever.
+
+    Raises:
+        LinkError: If there is no such port or it is busy.
+    """
+    if name.startswith("kiks:"):
+        from kiks.ports.url import find_port
+
+        sim_port = find_port(name)
+        sim_port.claim(f"the program that opened {name!r}")
+        sim_port.baudrate = baud
+        sim_port.timeout = timeout_s
+        return sim_port
+    import serial
+
+    try:
+        port: Any = serial.serial_for_url(name, baudrate=baud, timeout=timeout_s, stopbits=2)
+    except (serial.SerialException, ValueError, OSError) as error:
+        raise LinkError(
+            f"port {name!r} must be one that can be opened, but: {error}. A simulated robot is 'kiks://1'."
+        ) from None
+    return QuickLines(port)
+
+
+class QuickLines:
+    """A pyserial port that reads a line in a few system calls; pyserial's own `read_until` makes two for each byte."""
+
+    def __init__(self, port: Any) -> None:
+        self.port = port
+        self._read_ahead = b""
+
+    def write(self, data: bytes, /) -> int | None:
+        """Send characters."""
+        count: int | None = self.port.write(data)
+        return count
+
+    def read_until(self, expected: bytes = b"\n") -> bytes:
+        """Return a line, or what there is of it after the time-out."""
+        data = self._read_ahead
+        while (end := data.find(expected)) < 0:
+            # The first byte is waited for, the others are there already or come at the next turn.
+            more = self.port.read(max(1, self.port.in_waiting))
+            if not more:
+                self._read_ahead = b""
+                return data
+            data += more
+        end += len(expected)
+        self._read_ahead = data[end:]
+        return data[:end]
+
+    def close(self) -> None:
+        """Close the port."""
+        self.port.close()

@@ -1,0 +1,53 @@
+"""The user's program, as the clock sees it: what its thinking and its waiting cost."""
+
+from __future__ import annotations
+
+from kiks.clock.thinking import ThinkingFixed, ThinkingLive, parse_thinking
+from kiks.clock.waiting import Waiting
+from kiks.units import NS_PER_S
+
+EPOCH_S = 946_684_800
+"""What a program's calendar says when a simulation starts [s since 1970]: 1 January 2000, so that runs repeat."""
+
+
+class Program:
+    """One program, with one thinking policy for all the ports and clocks that it uses.
+
+    Args:
+        thinking: A policy that `parse_thinking` knows.
+
+    Raises:
+        ParameterError: If it knows none of that name.
+    """
+
+    def __init__(self, thinking: str) -> None:
+        policy = parse_thinking(thinking)
+        self._policy = None if isinstance(policy, ThinkingFixed) and policy.time_ns == 0 else policy
+        self._waiting = Waiting()
+
+    def enter(self, *, is_command: bool = False) -> int:
+        """Return what the program has to pay as it calls [ns]; see `Thinking.enter`."""
+        return self._policy.enter(is_command=is_command) if self._policy is not None else 0
+
+    def leave(self) -> None:
+        """Note that the program goes on now."""
+        if self._policy is not None:
+            self._policy.leave()
+
+    def ask(self) -> int:
+        """Return the time that a question takes [ns], more and more while nothing else is done."""
+        return self._waiting.ask()
+
+    def act(self) -> None:
+        """Note that the program did something else than ask."""
+        self._waiting.act()
+
+    @property
+    def measured_ns(self) -> list[int]:
+        """What thinking 'live' has measured so far [ns]; `save_thinking` keeps it for 'replay'."""
+        return self._policy.measured_ns if isinstance(self._policy, ThinkingLive) else []
+
+
+def calendar_ns(now_ns: int) -> int:
+    """Return a simulated time as nanoseconds since 1970."""
+    return EPOCH_S * NS_PER_S + now_ns

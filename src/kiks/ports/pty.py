@@ -1,0 +1,208 @@
+"""A pseudo-terminal: a serial port for any program in any language, under a name that stays.
+
+Need: a client may open the port raw or canonical, at any speed, and the next one must find it as if it were new.
+Need: the server has to learn that a client has closed, to drop its unfinished command and its unread replies.
+Facts (Linux, tried): the master reports a hang-up while nobody has the slave open, but not before the first open; the
+settings of the slave and the characters in it outlive the client; the master reads and sets the slave's settings; what
+the master writes while the slave is closed waits for the next client.
+Method: between two clients the endpoint holds the slave open itself, so that nothing has to be polled. The first
+character shows that a client is there; the endpoint lets go, and the next hang-up is the client's. A program that opens
+the port and writes nothing, such as `stty`, is no client: its settings stay, as they do on a real port.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import os
+import select
+import socket
+import stat
+import struct
+import tempfile
+import termios
+from pathlib import Path
+
+from kiks.errors import LinkError
+from kiks.ports.endpoint import READ_SIZE, Channel, Endpoint
+
+TCGETS2 = 0x802C542A
+"""Linux request for terminal settings with the speed as a number, whatever it is (asm-generic/ioctls.h)."""
+
+SETTINGS2 = struct.Struct("4I20s2I")
+"""Four flag words, line discipline and control characters, speed in, speed out [bit/s] (asm-generic/termbits.h)."""
+
+SLAVES = "/dev/pts/"
+
+
+class PtyEndpoint(Endpoint):
+    """A pseudo-terminal with a stable link to it.
+
+    Args:
+        link: Where the link is made; a link that a dead server left there is replaced.
+        baud: Speed that a client finds who does not set one [bit/s].
+
+    Raises:
+        LinkError: If the link belongs to a living server, something else has its name, or it cannot be made.
+    """
+
+    def __init__(self, link: str | Path, *, baud: int = 9600) -> None:
+        self.name = os.path.abspath(link)
+        self._baud = baud
+        self._claim = _claim(self.name)
+        try:
+            self._master, self._slave_name, self._held = -1, "", -1
+            self._create()
+        except BaseException:
+            self._claim.close()
+            raise
+
+    def _create(self) -> None:
+        """Make a pseudo-terminal and point the link to it."""
+        master, held = os.openpty()
+        os.set_blocking(master, False)
+        slave_name = os.ttyname(held)
+        try:
+            _point(self.name, slave_name)
+        except BaseException:
+            os.close(held)
+            os.close(master)
+            raise
+        self._master, self._slave_name, self._held = master, slave_name, held
+        self._reset()
+
+    def _reset(self) -> None:
+        """Give the slave the settings of a new port: raw, no echo, 8N2."""
+        speed = getattr(termios, f"B{self._baud}", termios.B9600)
+        flags = termios.CS8 | termios.CSTOPB | termios.CREAD | termios.CLOCAL
+        characters = list(termios.tcgetattr(self._master)[6])
+        characters[termios.VMIN], characters[termios.VTIME] = 1, 0
+        termios.tcsetattr(self._master, termios.TCSANOW, [0, 0, flags, 0, speed, speed, characters])
+
+    def fileno(self) -> int:
+        """Return the master."""
+        return self._master
+
+    def accept(self) -> PtyChannel:
+        """Let go of the slave, so that the client's hang-up shows."""
+        os.close(self._held)
+        self._held = -1
+        return PtyChannel(self)
+
+    def turn_away(self) -> None:
+        """Drop what was written."""
+        os.read(self._master, READ_SIZE)
+
+    def renew(self) -> None:
+        """Make the port as good as new after a client."""
+        self._reset()
+        try:
+            self._held = os.open(self._slave_name, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        except OSError:
+            # The client has locked the terminal (TIOCEXCL) and died: nobody can open that one any more.
+            os.close(self._master)
+            self._create()
+            return
+        termios.tcflush(self._held, termios.TCIFLUSH)
+
+    def close(self) -> None:
+        """Remove the link and the pseudo-terminal; a client that is still there sees a hang-up."""
+        if os.path.islink(self.name) and os.readlink(self.name) == self._slave_name:
+            os.unlink(self.name)
+        if self._held >= 0:
+            os.close(self._held)
+        os.close(self._master)
+        self._claim.close()
+
+
+class PtyChannel(Channel):
+    """The client that has the slave open."""
+
+    def __init__(self, endpoint: PtyEndpoint) -> None:
+        super().__init__(endpoint.name)
+        self._endpoint = endpoint
+        self._master = endpoint.fileno()
+        self._settings = bytearray(SETTINGS2.size)
+
+    def fileno(self) -> int:
+        """Return the master."""
+        return self._master
+
+    def read(self) -> bytes | None:
+        """Return what the client has written, and note the speed that it has set; None when it has closed the slave."""
+        try:
+            data = os.read(self._master, READ_SIZE)
+        except BlockingIOError:
+            return b""
+        except OSError:
+            return None
+        fcntl.ioctl(self._master, TCGETS2, self._settings)
+        # Speed 0 asks a modem to hang up; there is none.
+        self.baud = SETTINGS2.unpack(self._settings)[-1] or self.baud
+        return data
+
+    def _put(self, data: bytes | bytearray) -> int:
+        try:
+            return os.write(self._master, data)
+        except BlockingIOError:
+            poll = select.poll()
+            poll.register(self._master, 0)
+            return len(data) if poll.poll(0) else 0
+
+    def close(self) -> None:
+        """Restore the port for the next client."""
+        self._endpoint.renew()
+
+
+def default_folder() -> Path:
+    """Return the folder of the links, made for this user alone: `$XDG_RUNTIME_DIR/kiks`, else `/tmp/kiks-<uid>`.
+
+    Raises:
+        LinkError: If something else has that name.
+    """
+    runtime = os.environ.get("XDG_RUNTIME_DIR", "")
+    folder = Path(runtime, "kiks") if os.path.isdir(runtime) else Path(tempfile.gettempdir(), f"kiks-{os.getuid()}")
+    try:
+        folder.mkdir(mode=0o700, exist_ok=True)
+        found = folder.lstat()
+    except OSError as error:
+        raise LinkError(
+            f"{str(folder)!r} must be a folder of yours, but it is not ({error.strerror}). Give a link of your own."
+        ) from None
+    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid():
+        raise LinkError(
+            f"{str(folder)!r} must be a folder of yours, but it is another user's. Give a link of your own."
+        )
+    return folder
+
+
+def _claim(path: str) -> socket.socket:
+    """Reserve a link's name until this process ends, however it ends: an abstract socket leaves no file behind."""
+    folder, name = os.path.split(path)
+    # An abstract name holds 107 bytes; a path may be longer.
+    digest = hashlib.sha256(os.fsencode(os.path.join(os.path.realpath(folder), name))).hexdigest()
+    claim = socket.socket(socket.AF_UNIX)
+    try:
+        claim.bind(f"\0kiks-link-{digest}")
+    except OSError:
+        claim.close()
+        raise LinkError(
+            f"link {path!r} must be free, but a KiKS that is running has it. Stop that one, or give another link."
+        ) from None
+    return claim
+
+
+def _point(path: str, target: str) -> None:
+    """Make a link, in the place of one that a dead server left; no other file is touched."""
+    if os.path.lexists(path) and not (os.path.islink(path) and os.readlink(path).startswith(SLAVES)):
+        raise LinkError(
+            f"link {path!r} must not exist or be an old link to a terminal, but it is another file. Give another name."
+        )
+    fresh = f"{path}.{os.getpid()}"
+    try:
+        os.symlink(target, fresh)
+        os.replace(fresh, path)
+    except OSError as error:
+        raise LinkError(
+            f"link {path!r} must be in a folder that you may write to, but it is not ({error.strerror}). Give another name."
+        ) from None

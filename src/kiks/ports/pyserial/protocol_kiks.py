@@ -1,0 +1,138 @@
+"""pyserial's plug-in for `serial.serial_for_url("kiks://1")`: a `Serial` object like any other."""
+
+from __future__ import annotations
+
+from typing import Any
+
+# pyserial imports this module itself, when a program opens such a name: it is there already.
+from serial import PortNotOpenError, SerialBase, SerialException  # noqa: TID253
+
+from kiks.errors import KiksError
+from kiks.ports.memory import SimPort
+from kiks.ports.url import find_port
+
+
+class Serial(SerialBase):  # type: ignore[misc, unused-ignore]
+    """A serial port at whose other end a simulated robot sits."""
+
+    _sim_port: SimPort | None = None
+
+    def find(self, name: str) -> SimPort:
+        """Return the simulated port behind a name; `kiks run` puts its own mapping here."""
+        return find_port(name)
+
+    def open(self) -> None:
+        """Open the port.
+
+        Raises:
+            SerialException: If there is no such port, or somebody has it open already.
+        """
+        if self.port is None:
+            raise SerialException("a port must have a name before it is opened, but it has none. Set .port to 'kiks://1'.")
+        if self.is_open:
+            raise SerialException(f"port {self.port!r} must be closed before it is opened, but it is open.")
+        try:
+            self._sim_port = self.find(str(self.port))
+            self._sim_port.claim(f"the program that opened {self.port!r}")
+        except KiksError as error:
+            raise SerialException(str(error)) from None
+        self.is_open = True
+        self._reconfigure_port()
+
+    def close(self) -> None:
+        """Hang up. The robot drives on."""
+        if self.is_open and self._sim_port is not None:
+            self._sim_port.close()
+        self.is_open = False
+        self._sim_port = None
+
+    def _reconfigure_port(self, *_: Any, **__: Any) -> None:
+        # Stop bits, parity and flow control are ignored, as the real robot does (khepera-protocol.md 2.1).
+        if self._sim_port is None:
+            return
+        self._sim_port.timeout = self.timeout
+        try:
+            self._sim_port.baudrate = self.baudrate
+        except KiksError as error:
+            raise ValueError(str(error)) from None
+
+    @property
+    def _open_port(self) -> SimPort:
+        if self._sim_port is None:
+            raise PortNotOpenError
+        return self._sim_port
+
+    @property
+    def in_waiting(self) -> int:
+        """Characters that have arrived and were not read."""
+        return self._open_port.in_waiting
+
+    @property
+    def out_waiting(self) -> int:
+        """Characters that were written and have not left: none, as with a large output buffer."""
+        return 0
+
+    def read(self, size: int = 1) -> bytes:
+        """Read `size` characters, fewer if the time-out is over first."""
+        return self._ask(lambda port: port.read(size))
+
+    def read_until(self, expected: bytes = b"\n", size: int | None = None) -> bytes:
+        """Read up to and including a terminator."""
+        return self._ask(lambda port: port.read_until(expected, size))
+
+    def readline(self, size: int | None = -1, /) -> bytes:
+        """Read a line with its end."""
+        return self._ask(lambda port: port.readline(size))
+
+    def _ask(self, question: Any) -> bytes:
+        try:
+            answer: bytes = question(self._open_port)
+        except KiksError as error:
+            raise SerialException(str(error)) from None
+        return answer
+
+    def write(self, b: Any, /) -> int:
+        """Write bytes; text must be encoded first, as for any serial port."""
+        if isinstance(b, str):
+            raise TypeError(f"unicode strings are not supported, please encode to bytes: {b!r}")
+        return self._open_port.write(bytes(b))
+
+    def flush(self) -> None:
+        """Wait until everything has been sent."""
+        self._open_port.flush()
+
+    def reset_input_buffer(self) -> None:
+        """Drop what has arrived."""
+        self._open_port.reset_input_buffer()
+
+    def reset_output_buffer(self) -> None:
+        """Do nothing: what was written is on the line."""
+        self._open_port.reset_output_buffer()
+
+    # A Khepera has no control lines and needs none (khepera-protocol.md 2.1).
+
+    def _update_break_state(self) -> None: ...
+
+    def _update_rts_state(self) -> None: ...
+
+    def _update_dtr_state(self) -> None: ...
+
+    @property
+    def cts(self) -> bool:
+        """Always ready."""
+        return True
+
+    @property
+    def dsr(self) -> bool:
+        """Always ready."""
+        return True
+
+    @property
+    def ri(self) -> bool:
+        """Nobody rings."""
+        return False
+
+    @property
+    def cd(self) -> bool:
+        """Held active by the interface box."""
+        return True

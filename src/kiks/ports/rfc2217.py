@@ -1,0 +1,97 @@
+"""RFC 2217: a serial port over TCP whose client can set the speed, for `rfc2217://` of pyserial.
+
+The protocol itself is pyserial's; it works on any object that has the attributes of a serial port.
+"""
+
+from __future__ import annotations
+
+import logging
+import socket
+import struct
+from typing import Any
+
+from kiks.ports.tcp import TcpChannel, TcpEndpoint
+
+REQUEST_LIMIT = 256
+"""Longest request of the telnet protocol [bytes]; the real ones have six."""
+
+_log = logging.getLogger("kiks.serve")
+
+
+class Rfc2217Endpoint(TcpEndpoint):
+    """A port of this computer that speaks RFC 2217; arguments and errors are those of `TcpEndpoint`."""
+
+    def accept(self) -> Rfc2217Channel | None:
+        """Let the client in and begin to negotiate."""
+        connection = self._connect()
+        return None if connection is None else Rfc2217Channel(self.name, connection)
+
+
+class _Settings:
+    """The serial port that the protocol believes it sets: all is accepted, the speed alone has an effect."""
+
+    def __init__(self, channel: Rfc2217Channel) -> None:
+        self._channel = channel
+        self._baud = 9600
+        self.bytesize, self.parity, self.stopbits = 8, "N", 2
+        self.xonxoff = self.rtscts = self.break_condition = False
+        self.dtr = self.rts = self.cts = self.dsr = self.cd = True
+        self.ri = False
+
+    @property
+    def baudrate(self) -> int:
+        return self._baud
+
+    @baudrate.setter
+    def baudrate(self, baud: int) -> None:
+        self._baud = self._channel.baud = baud
+
+    def reset_input_buffer(self) -> None:
+        self._channel.forget()
+
+    def reset_output_buffer(self) -> None:
+        pass  # what was written is on the line already
+
+
+class _Answers:
+    """Where the protocol sends its own messages, which are not data and so are not escaped."""
+
+    def __init__(self, channel: Rfc2217Channel) -> None:
+        self._channel = channel
+
+    def write(self, data: bytes) -> None:
+        TcpChannel.write(self._channel, bytes(data))
+
+
+class Rfc2217Channel(TcpChannel):
+    """A client that speaks RFC 2217."""
+
+    def __init__(self, name: str, connection: socket.socket) -> None:
+        from serial import rfc2217
+
+        super().__init__(name, connection)
+        settings: Any = _Settings(self)
+        answers: Any = _Answers(self)
+        self._manager: Any = rfc2217.PortManager(settings, answers)
+
+    def read(self) -> bytes | None:
+        """Return what the client has sent to the robot; None when it has gone or talks no telnet."""
+        data = super().read()
+        if not data:
+            return data
+        try:
+            data = b"".join(self._manager.filter(data))
+        except (struct.error, KeyError, TypeError, ValueError):
+            _log.warning(
+                "the client of %s must speak RFC 2217, but it sent another request. Use its plain port.", self.name
+            )
+            return None
+        return None if len(self._manager.suboption or b"") > REQUEST_LIMIT else data
+
+    def write(self, data: bytes) -> None:
+        """Send characters, escaped as telnet wants it."""
+        super().write(b"".join(self._manager.escape(data)))
+
+    def forget(self) -> None:
+        """Drop what waits for the client, because it asked for that."""
+        self._unsent.clear()

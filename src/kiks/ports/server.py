@@ -1,0 +1,196 @@
+"""The server of real ports: one thread that waits for clients and for the simulation."""
+
+from __future__ import annotations
+
+import logging
+import selectors
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+
+from kiks.clock.pace import Pace
+from kiks.clock.thinking import ThinkingFixed, parse_thinking
+from kiks.errors import ParameterError
+from kiks.ports.endpoint import Endpoint
+from kiks.ports.timing import Link, Live, Lockstep, Timing
+from kiks.sim.simulation import Simulation
+
+BAUD_MIN = 75
+BAUD_MAX = 4_000_000
+
+_log = logging.getLogger("kiks.serve")
+
+
+class Server:
+    """Serves the robots of a simulation to programs in other processes.
+
+    Args:
+        sim: The simulation; others may use it at the same time if they hold its lock.
+        endpoints: The ways in to each robot, by its number from 1. They are closed with the server.
+        speed: Simulated seconds in a real one (live only).
+        thinking: 'live': the world runs all the time. 'none' or 'fixed:MS': the world waits for each command, before
+            which no or a fixed time passes; repeatable to the bit for one program that waits for its replies.
+        pace: For tests: a pace with its own wall clock, instead of `speed`.
+
+    Raises:
+        ParameterError: If there is no such robot, or a value is out of range.
+
+    Example:
+        >>> from kiks.ports.tcp import TcpEndpoint
+        >>> server = Server(Simulation(), {1: [TcpEndpoint(0)]}, thinking="none")
+        >>> server.serve(until=lambda: True)
+        >>> server.close()
+    """
+
+    def __init__(
+        self,
+        sim: Simulation,
+        endpoints: Mapping[int, Sequence[Endpoint]],
+        *,
+        speed: float = 1.0,
+        thinking: str = "live",
+        pace: Pace | None = None,
+    ) -> None:
+        self.sim = sim
+        self._timing = _timing(sim, thinking, Pace(speed) if pace is None else pace)
+        self._links = {robot: Link(robot, sim.wires[_index(sim, robot)]) for robot in endpoints}
+        self._endpoints = {robot: list(ways) for robot, ways in endpoints.items()}
+        self._selector = selectors.DefaultSelector()
+        for robot, ways in self._endpoints.items():
+            for endpoint in ways:
+                self._open_door(self._links[robot], endpoint)
+
+    def serve(self, until: threading.Event | Callable[[], bool] | None = None) -> None:
+        """Serve until an event is set, a function returns True, or Ctrl-C; that is looked at every 50 ms at least."""
+        is_over = until.is_set if isinstance(until, threading.Event) else until or (lambda: False)
+        links = list(self._links.values())
+        self._timing.start()
+        while not is_over():
+            with self.sim.lock:
+                wait_s = self._timing.advance(links)
+                for link in links:
+                    self._wait_for(link)
+            for key, events in self._selector.select(wait_s):
+                with self.sim.lock:
+                    key.data(events)
+
+    def close(self) -> None:
+        """Part from all clients, close all endpoints and remove what they made."""
+        with self.sim.lock:
+            for link in self._links.values():
+                if link.channel is not None:
+                    self._leave(link)
+        self._selector.close()
+        for ways in self._endpoints.values():
+            for endpoint in ways:
+                endpoint.close()
+        self._endpoints.clear()
+
+    # ---- clients come and go ----
+
+    def _open_door(self, link: Link, endpoint: Endpoint) -> None:
+        self._selector.register(endpoint.fileno(), selectors.EVENT_READ, partial(self._enter, link, endpoint))
+
+    def _enter(self, link: Link, endpoint: Endpoint, _events: int) -> None:
+        """Let a client in if the robot has none."""
+        wire = link.wire
+        if wire.holder is not None:
+            endpoint.turn_away()
+            if endpoint.name not in link.refused:
+                link.refused.add(endpoint.name)
+                _log.warning(
+                    "robot %d must have one client at a time, but another came to %s while %s has it. "
+                    "Close that one first.",
+                    link.robot,
+                    endpoint.name,
+                    wire.holder,
+                )
+            return
+        channel = endpoint.accept()
+        if channel is None:
+            return
+        if channel.fileno() == endpoint.fileno():
+            self._selector.unregister(endpoint.fileno())
+        link.clear()
+        link.channel = channel
+        wire.holder = f"the client of {endpoint.name}"
+        _log.info("robot %d has a client at %s", link.robot, endpoint.name)
+        self._wait_for(link)
+
+    def _leave(self, link: Link) -> None:
+        """Part from a client."""
+        channel = link.channel
+        if channel is None:
+            return
+        if link.events:
+            self._selector.unregister(channel.fileno())
+            link.events = 0
+        channel.close()
+        link.channel = None
+        link.clear()
+        link.wire.holder = None
+        _log.info("robot %d has lost its client at %s", link.robot, channel.name)
+        for endpoint in self._endpoints[link.robot]:
+            if endpoint.fileno() not in self._selector.get_map():
+                self._open_door(link, endpoint)
+
+    # ---- bytes come and go ----
+
+    def _exchange(self, link: Link, events: int) -> None:
+        """Do what the channel's descriptor is ready for."""
+        channel = link.channel
+        if channel is None:
+            return
+        if events & selectors.EVENT_WRITE:
+            channel.flush()
+        if events & selectors.EVENT_READ:
+            data = channel.read()
+            if data is None:
+                self._leave(link)
+                return
+            baud = channel.baud
+            if baud is not None and baud != link.wire.line.baud and BAUD_MIN <= baud <= BAUD_MAX:
+                link.wire.set_baud(baud)
+            if data:
+                self._timing.receive(link, data)
+
+    def _wait_for(self, link: Link) -> None:
+        """Wait for what the channel can use: no characters without room on the line, no room that nobody needs.
+
+        A descriptor that is waited for with no event would still report a hang-up, again and again: it is taken out.
+        """
+        channel = link.channel
+        if channel is None:
+            return
+        events = (0 if self._timing.is_full(link) else selectors.EVENT_READ) | (
+            selectors.EVENT_WRITE if channel.has_unsent else 0
+        )
+        if events == link.events:
+            return
+        if not events:
+            self._selector.unregister(channel.fileno())
+        elif link.events:
+            self._selector.modify(channel.fileno(), events, partial(self._exchange, link))
+        else:
+            self._selector.register(channel.fileno(), events, partial(self._exchange, link))
+        link.events = events
+
+
+def _timing(sim: Simulation, thinking: str, pace: Pace) -> Timing:
+    if thinking == "live":
+        return Live(sim, pace)
+    policy = parse_thinking(thinking)
+    if not isinstance(policy, ThinkingFixed):
+        raise ParameterError(
+            f"thinking of a server must be 'live', 'none' or 'fixed:MS', but it was {thinking!r}. "
+            "The other policies are for ports in memory."
+        )
+    return Lockstep(sim, policy.time_ns)
+
+
+def _index(sim: Simulation, robot: int) -> int:
+    if not isinstance(robot, int) or not 1 <= robot <= sim.robot_count:
+        raise ParameterError(
+            f"endpoints must be those of robots 1 to {sim.robot_count}, but one was of robot {robot!r}. Count from 1."
+        )
+    return robot - 1

@@ -1,0 +1,71 @@
+"""Names of simulated ports: `kiks://1`, `kiks://sim2/1`, `kiks://1?arena=maze.toml&seed=3&thinking=fixed:2`."""
+
+from __future__ import annotations
+
+from typing import Any
+from urllib.parse import parse_qsl, urlsplit
+
+from kiks.errors import LinkError, ParameterError, nearest
+from kiks.model.arena import Arena
+from kiks.ports.memory import SimPort
+from kiks.sim.simulation import Simulation
+from kiks.sim.table import TABLE
+
+_OPTIONS = ("arena", "robots", "robot", "seed", "thinking")
+
+
+def find_port(url: str) -> SimPort:
+    """Return the port that a name stands for.
+
+    A number alone is a robot of the simulation that was created last, or of a fresh one in the default arena if there
+    is none. Options after a question mark always make a fresh simulation.
+
+    Args:
+        url: 'kiks://ROBOT', 'kiks://SIMULATION/ROBOT' or 'kiks://ROBOT?arena=FILE&robots=2&seed=3&thinking=none'.
+
+    Raises:
+        LinkError: If the name is malformed, or there is no such simulation or robot.
+        ParameterError: If an option is unknown or out of range.
+        ArenaError: If the arena cannot be read.
+    """
+    parts = urlsplit(url)
+    path = parts.path.strip("/")
+    name, number = (parts.netloc, path) if path else ("", parts.netloc)
+    if parts.scheme != "kiks" or not (number.isascii() and number.isdigit()):
+        raise LinkError(
+            f"a simulated port must be named like 'kiks://1', but it was {url!r}. The number is the robot's, from 1."
+        )
+    options = dict(parse_qsl(parts.query, keep_blank_values=True))
+    if options:
+        sim = _fresh(options, url)
+    elif name:
+        sim = TABLE.find(name)
+    else:
+        sim = TABLE.newest() or Simulation()
+    robot = int(number)
+    if not 1 <= robot <= sim.robot_count:
+        known = "robot 1 only" if sim.robot_count == 1 else f"robots 1 to {sim.robot_count}"
+        raise LinkError(
+            f"a port must belong to a robot there is, but {url!r} names robot {robot} and the simulation has {known}. "
+            f"Open {sim.url(min(max(robot, 1), sim.robot_count))!r}, or create it with more robots."
+        )
+    return sim.port(robot)
+
+
+def _fresh(options: dict[str, str], url: str) -> Simulation:
+    settings: dict[str, Any] = {}
+    for key, value in options.items():
+        if key not in _OPTIONS:
+            raise ParameterError(
+                f"an option of {url!r} must be one of {list(_OPTIONS)}, but it was {key!r}.{nearest(key, _OPTIONS)}"
+            )
+        if key in ("robots", "seed"):
+            if not (value.isascii() and value.isdigit()):
+                raise ParameterError(
+                    f"option {key} of {url!r} must be a whole number, but it was {value!r}. Write {key}=1."
+                )
+            settings[key] = int(value)
+        else:
+            settings[key] = value
+    arena = Arena.load(settings.pop("arena")) if "arena" in settings else None
+    return Simulation(arena, **settings)

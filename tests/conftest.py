@@ -1,0 +1,12 @@
+"""What all tests share: an engine that is compiled before the workers of xdist start, each of which would do it anew."""
+
+from __future__ import annotations
+
+import pytest
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    if not hasattr(config, "workerinput") and not config.option.collectonly:
+        from kiks.cli.warmup import compile_everything
+
+        compile_everything()

@@ -1,0 +1,82 @@
+"""When replies arrive: 11 bits a character and 1 ms for each command (khepera-protocol.md 2.2), to the nanosecond."""
+
+from fractions import Fraction
+
+import pytest
+
+from kiks.model.arena import Arena
+from kiks.ports.memory import SimPort
+from kiks.sim.simulation import Simulation
+from kiks.units import character_ns
+
+PROCESSING_NS = 1_000_000
+
+BAUDS = pytest.mark.parametrize("baud", [9600, 38400, 115200])
+
+
+def port_at(baud: int) -> SimPort:
+    port = Simulation(Arena.box(500, 500)).port(1)
+    port.baudrate = baud
+    port.timeout = 1.0
+    return port
+
+
+@BAUDS
+@pytest.mark.parametrize("command", [b"D,0,0\n", b"N\n", b"H\r", b"B\n", b"M\n", b"T,1,B\n", b"D,5\n"])
+def test_a_single_command(baud: int, command: bytes) -> None:
+    port = port_at(baud)
+    port.write(command)
+    reply = port.readline()
+    count = len(command) + len(reply)
+    assert port.sim.now_ns == count * character_ns(baud) + PROCESSING_NS
+    # The formula, of which each character may lose a part of a nanosecond.
+    formula_ns = Fraction(11 * count * 10**9, baud) + PROCESSING_NS
+    assert formula_ns - count <= port.sim.now_ns <= formula_ns
+
+
+@BAUDS
+def test_a_second_command_starts_where_the_first_ended(baud: int) -> None:
+    port = port_at(baud)
+    port.write(b"H\n")
+    port.readline()
+    port.sleep(0.0123456)
+    begin_ns = port.sim.now_ns
+    port.write(b"E\n")
+    assert port.readline() == b"e,0,0\r\n"
+    assert port.sim.now_ns - begin_ns == 9 * character_ns(baud) + PROCESSING_NS
+
+
+@BAUDS
+@pytest.mark.parametrize("end", [b"\n", b"\r", b"\r\n", b"\r\n\r\n"])
+def test_pipelined_commands(baud: int, end: bytes) -> None:
+    commands = [b"N", b"O", b"H", b"E", b"K", b"T,1,G", b"T,1,F"]
+    port = port_at(baud)
+    port.write(b"".join(command + end for command in commands))
+    character = character_ns(baud)
+    sent_count = acted_ns = answered_ns = 0
+    for command in commands:
+        # The terminator is the first character of the line end; what is left of it comes before the next command.
+        arrived_ns = (sent_count + len(command) + 1) * character
+        sent_count += len(command) + len(end)
+        acted_ns = max(arrived_ns, acted_ns) + PROCESSING_NS
+        reply = port.readline()
+        answered_ns = max(acted_ns, answered_ns) + len(reply) * character
+        assert port.sim.now_ns == answered_ns, command
+
+
+@BAUDS
+def test_pieces_of_a_command_wait_for_each_other(baud: int) -> None:
+    port = port_at(baud)
+    port.write(b"H")
+    port.sleep(1.0)
+    port.write(b"\n")
+    port.readline()
+    assert port.sim.now_ns == 1_000_000_000 + (1 + 7) * character_ns(baud) + PROCESSING_NS
+
+
+def test_a_character_of_a_reply_arrives_at_its_time() -> None:
+    port = port_at(9600)
+    port.write(b"B\n")
+    for count in range(1, 12):
+        assert len(port.read(1)) == 1
+        assert port.sim.now_ns == (2 + count) * character_ns(9600) + PROCESSING_NS

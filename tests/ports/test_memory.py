@@ -1,0 +1,153 @@
+"""The port in memory: what a program sees of time and bytes."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import kiks
+from kiks.clock.line import OUTPUT_LIMIT
+from kiks.units import character_ns
+
+
+def test_an_exchange_takes_its_characters_and_one_millisecond() -> None:
+    sim = kiks.Simulation()
+    port = sim.port(1)
+    for baud in (9600, 38400, 115200):
+        port.baudrate = baud
+        start_ns = sim.now_ns
+        port.write(b"H\n")
+        reply = port.readline()
+        assert sim.now_ns - start_ns == (2 + len(reply)) * character_ns(baud) + 1_000_000
+
+
+def test_characters_arrive_one_after_the_other() -> None:
+    sim = kiks.Simulation()
+    port = sim.port(1)
+    port.write(b"H\n")
+    sim.run(2 * character_ns(9600) * 1e-9 + 1e-3)
+    assert port.in_waiting == 0
+    begin_ns = sim.now_ns
+    assert port.read(1) == b"h"
+    first_ns = sim.now_ns
+    assert port.read(3) == b",0,"
+    assert sim.now_ns - first_ns == 3 * character_ns(9600)
+    assert first_ns - begin_ns <= character_ns(9600)
+
+
+def test_a_read_waits_for_its_time_out_and_keeps_the_rest() -> None:
+    sim = kiks.Simulation()
+    port = sim.port(1)
+    port.timeout = 0.25
+    before_s = sim.time_s
+    assert port.read(5) == b""
+    assert sim.time_s - before_s == pytest.approx(0.25)
+    port.write(b"H\n")
+    port.timeout = 0.006
+    part = port.readline()
+    assert b"h,0,0\r\n".startswith(part)
+    port.timeout = 1.0
+    assert part + port.readline() == b"h,0,0\r\n"
+
+
+def test_a_read_that_can_never_end_says_so() -> None:
+    port = kiks.Simulation().port(1)
+    with pytest.raises(kiks.LinkError, match=r"robot 1 must have been asked.*would never end.*set a timeout"):
+        port.read(1)
+
+
+def test_asking_in_vain_lets_time_pass() -> None:
+    sim = kiks.Simulation()
+    port = sim.port(1)
+    port.timeout = 0
+    for question in (lambda: port.in_waiting, lambda: port.read(1), lambda: port.time_s):
+        before_ns = sim.now_ns
+        for _ in range(30):
+            question()
+        assert sim.now_ns > before_ns + 10_000_000
+
+
+def test_waiting_for_a_reply_by_polling_ends() -> None:
+    port = kiks.Simulation().port(1)
+    port.write(b"K\n")
+    while port.in_waiting < 15:
+        pass
+    assert port.read(15) == b"k,0,0,0,0,0,0\r\n"
+
+
+def test_one_client_a_robot() -> None:
+    sim = kiks.Simulation()
+    first = kiks.Khepera(sim.port(1))
+    with pytest.raises(kiks.LinkError, match=r"must be free to be opened, but robot 1 is in use by another kiks.Khepera"):
+        kiks.Khepera(sim.port(1))
+    first.close()
+    kiks.Khepera(sim.port(1)).stop()
+
+
+def test_hanging_up_drops_what_nobody_read_and_the_robot_drives_on() -> None:
+    sim = kiks.Simulation(kiks.Arena.box(1000, 1000))
+    port = sim.port(1)
+    port.write(b"D,5,5\nN\nH")
+    sim.run(0.5)
+    port.close()
+    begin = sim.pose(1)
+    sim.run(1.0)
+    assert sim.pose(1)[1] - begin[1] == pytest.approx(40, abs=2)
+    port.timeout = 1.0
+    port.write(b"\nE\n")
+    assert port.readline() == b"e,5,5\r\n"
+    assert port.read(1) == b""
+
+
+def test_output_that_nobody_reads_is_bounded() -> None:
+    sim = kiks.Simulation()
+    port = sim.port(1)
+    port.baudrate = 4_000_000
+    for _ in range(20):
+        port.write(b"list\n" * 500)
+        sim.run(10.0)
+    line = sim.wires[0].line
+    assert len(line.waiting) <= OUTPUT_LIMIT
+    assert line.lost_count > 0
+
+
+def test_a_writer_faster_than_the_line_is_held_back() -> None:
+    sim = kiks.Simulation()
+    port = sim.port(1)
+    port.write(b"D,1,1\n" * 10_000)
+    assert sim.time_s > (60_000 - 2 * 4096) * character_ns(9600) * 1e-9
+
+
+@settings(max_examples=30, deadline=None, derandomize=True)
+@given(st.lists(st.integers(1, 7), min_size=1, max_size=20), st.integers(1, 5))
+def test_reading_in_any_pieces_gives_the_same_bytes_at_the_same_time(pieces: list[int], commands: int) -> None:
+    whole, parts = kiks.Simulation().port(1), kiks.Simulation().port(1)
+    for port in (whole, parts):
+        port.timeout = 1.0
+        port.write(b"H\n" * commands)
+    expected = b"".join(whole.readline() for _ in range(commands))
+    got = b""
+    while len(got) < len(expected):
+        got += parts.read(min(pieces[len(got) % len(pieces)], len(expected) - len(got)))
+    assert got == expected
+    assert parts.sim.now_ns == whole.sim.now_ns
+
+
+def test_two_threads_do_not_tear_the_simulation() -> None:
+    sim = kiks.Simulation(robots=2)
+
+    def drive(number: int) -> None:
+        robot = kiks.Khepera(sim.port(number))
+        for _ in range(200):
+            robot.set_speed(number, number)
+            assert len(robot.proximity()) == 8
+
+    threads = [threading.Thread(target=drive, args=(number,)) for number in (1, 2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sim.time_s > 1

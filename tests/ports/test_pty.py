@@ -1,0 +1,211 @@
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import termios
+from pathlib import Path
+
+import pytest
+import serial
+from tests.served import GUARD_S, PROGRAMS, ask, fresh, open_plain, read_line, run_python, served
+
+from kiks.errors import LinkError
+from kiks.ports.pty import PtyEndpoint, default_folder
+from kiks.sim.simulation import Simulation
+
+CANONICAL = """
+import os, sys, termios
+port = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY)
+settings = termios.tcgetattr(port)
+settings[0], settings[1], settings[3] = termios.IGNCR, 0, termios.ICANON
+settings[4] = settings[5] = termios.B38400
+termios.tcsetattr(port, termios.TCSANOW, settings)
+for command in (b"G,5,6\\n", b"H\\r", b"H\\r\\n"):
+    os.write(port, command)
+    print(os.read(port, 100))
+"""
+
+
+@pytest.fixture
+def link(tmp_path: Path) -> str:
+    return str(tmp_path / "robot")
+
+
+def course_in_memory() -> tuple[str, Simulation]:
+    """Drive the course of `tests/programs` on a port in memory."""
+    sim = fresh()
+    port = sim.port(1)
+
+    def tell(command: bytes) -> str:
+        port.write(command + b"\n")
+        return port.readline().decode()
+
+    for command in (b"D,8,5", *[b"N"] * 40, b"D,0,0", b"C,400,300", *[b"E"] * 60):
+        tell(command)
+    return tell(b"H"), sim
+
+
+def test_pyserial_program_does_what_it_does_in_memory(link: str) -> None:
+    counts, memory = course_in_memory()
+    with served([PtyEndpoint(link)]) as run:
+        assert run_python(PROGRAMS / "course.py", link).strip() == counts.strip()
+        assert run.sim.state_hash() == memory.state_hash()
+        assert run.sim.now_ns == memory.now_ns
+
+
+def test_c_program_does_what_the_python_program_does(link: str, tmp_path: Path) -> None:
+    compiler = shutil.which("gcc")
+    if compiler is None:
+        pytest.skip("there is no gcc to compile the C program with")
+    program = tmp_path / "course"
+    subprocess.run([compiler, "-O2", "-o", program, PROGRAMS / "course.c"], check=True, timeout=60)
+    counts, memory = course_in_memory()
+    with served([PtyEndpoint(link)]) as run:
+        done = subprocess.run([program, link], capture_output=True, text=True, timeout=GUARD_S, check=True)
+        assert done.stdout.strip() == counts.strip()
+        assert run.sim.state_hash() == memory.state_hash()
+
+
+def test_canonical_client_is_served_like_a_raw_one(link: str) -> None:
+    with served([PtyEndpoint(link)]):
+        assert run_python(CANONICAL, link).split() == [r"b'g\n'", r"b'h,5,6\n'", r"b'h,5,6\n'"]
+
+
+def test_client_after_a_canonical_one_finds_a_raw_line_without_echo(link: str) -> None:
+    with served([PtyEndpoint(link)]) as run:
+        run_python(CANONICAL, link)
+        run.wait_free()
+        port = open_plain(link)
+        assert termios.tcgetattr(port)[0:2] == [0, 0]
+        assert termios.tcgetattr(port)[3] == 0
+        assert termios.tcgetattr(port)[4] == termios.B9600
+        # With an echo the robot would hear its own answers, and the second question got another one first.
+        assert ask(port, b"H\n") == b"h,5,6\r\n"
+        assert ask(port, b"B\r") == b"b,5.02,5.01\r\n"
+        assert run.sim.wires[0].line.baud == 9600
+        os.close(port)
+
+
+def test_settings_of_a_program_that_writes_nothing_stay(link: str) -> None:
+    with served([PtyEndpoint(link)]) as run:
+        port = open_plain(link)
+        settings = termios.tcgetattr(port)
+        settings[4] = settings[5] = termios.B19200
+        termios.tcsetattr(port, termios.TCSANOW, settings)
+        os.close(port)
+        port = open_plain(link)
+        assert ask(port, b"H\n") == b"h,0,0\r\n"
+        assert run.sim.wires[0].line.baud == 19200
+        os.close(port)
+
+
+@pytest.mark.parametrize("baud", [9600, 19200, 38400, 115200, 12345])
+@pytest.mark.parametrize("stop_bits", [1, 2])
+def test_line_follows_the_speed_and_ignores_the_stop_bits(link: str, baud: int, stop_bits: int) -> None:
+    with served([PtyEndpoint(link)]) as run, serial.Serial(link, baud, stopbits=stop_bits, timeout=GUARD_S) as port:
+        port.write(b"H\n")
+        assert port.readline() == b"h,0,0\r\n"
+        assert run.sim.wires[0].line.baud == baud
+        port.baudrate = 57600
+        port.write(b"H\n")
+        assert port.readline() == b"h,0,0\r\n"
+        assert run.sim.wires[0].line.baud == 57600
+
+
+def test_hang_up_drops_what_was_not_read_and_half_a_command(link: str) -> None:
+    with served([PtyEndpoint(link)]) as run:
+        port = open_plain(link)
+        assert ask(port, b"D,5,5\n") == b"d\r\n"
+        os.write(port, b"N\nB\nD,0,")
+        run.wait_rounds(2)
+        os.close(port)
+        run.wait_free()
+        port = open_plain(link)
+        assert ask(port, b"N\n").startswith(b"n,")
+        assert ask(port, b"E\n") != b"e,0,0\r\n"  # the robot drives on
+        os.close(port)
+
+
+def test_command_of_a_client_that_closes_at_once_is_carried_out(link: str) -> None:
+    with served([PtyEndpoint(link)]) as run:
+        port = open_plain(link)
+        os.write(port, b"G,7,8\n")
+        os.close(port)
+        run.wait_for(lambda: run.sim.now_ns > 0)
+        run.wait_free()
+        port = open_plain(link)
+        assert ask(port, b"H\n") == b"h,7,8\r\n"
+        os.close(port)
+
+
+def test_link_lasts_as_long_as_the_server(link: str) -> None:
+    with served([PtyEndpoint(link)]):
+        assert os.readlink(link).startswith("/dev/pts/")
+    assert not os.path.lexists(link)
+
+
+def test_default_folder_belongs_to_the_user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    assert default_folder() == tmp_path / "kiks"
+    assert (tmp_path / "kiks").stat().st_mode & 0o777 == 0o700
+    (tmp_path / "kiks").rmdir()
+    (tmp_path / "kiks").symlink_to(tmp_path)
+    with pytest.raises(LinkError, match=r"must be a folder of yours, but .*Give a link of your own\."):
+        default_folder()
+
+
+def test_link_of_a_dead_server_is_replaced(link: str) -> None:
+    os.symlink("/dev/pts/123456", link)
+    endpoint = PtyEndpoint(link)
+    assert os.readlink(link) != "/dev/pts/123456"
+    endpoint.close()
+
+
+def test_link_of_a_living_server_is_refused(link: str) -> None:
+    endpoint = PtyEndpoint(link)
+    target = os.readlink(link)
+    with pytest.raises(LinkError, match=r"must be free, but a KiKS that is running has it\. Stop that one"):
+        PtyEndpoint(link)
+    assert os.readlink(link) == target
+    endpoint.close()
+
+
+def test_other_files_are_never_removed(link: str, tmp_path: Path) -> None:
+    (tmp_path / "robot").write_text("precious")
+    (tmp_path / "other").symlink_to(tmp_path / "robot")
+    for path in (link, str(tmp_path / "other"), str(tmp_path)):
+        with pytest.raises(LinkError, match=r"must not exist or be an old link to a terminal, but it is another file"):
+            PtyEndpoint(path)
+    assert (tmp_path / "other").read_text() == "precious"
+    with pytest.raises(LinkError, match=r"must be in a folder that you may write to, but it is not \(No such file"):
+        PtyEndpoint(tmp_path / "nowhere" / "robot")
+
+
+def test_link_that_was_taken_over_is_left_alone(link: str) -> None:
+    endpoint = PtyEndpoint(link)
+    os.unlink(link)
+    os.symlink("/dev/null", link)
+    endpoint.close()
+    assert os.readlink(link) == "/dev/null"
+
+
+def test_terminal_that_a_client_has_locked_is_replaced(link: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    endpoint = PtyEndpoint(link)
+    first = os.stat(link).st_rdev
+    other = os.openpty()  # takes the next number, so that the new terminal has another one than the old
+    endpoint.accept()
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "open", lambda *_: (_ for _ in ()).throw(OSError(16, "busy")))
+        endpoint.renew()
+    port = open_plain(link)
+    os.write(port, b"x")
+    channel = endpoint.accept()
+    assert channel.read() == b"x"
+    channel.write(b"y\n")
+    assert read_line(port) == b"y\n"
+    assert os.path.exists(link)
+    assert first
+    for descriptor in (port, *other):
+        os.close(descriptor)
+    endpoint.close()

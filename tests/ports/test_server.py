@@ -1,0 +1,229 @@
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from tests.ports.test_pty import course_in_memory
+from tests.served import GUARD_S, PROGRAMS, Served, ask, fresh, open_plain, read_line, run_python, served
+
+from kiks.clock.pace import Pace
+from kiks.errors import ParameterError
+from kiks.ports.endpoint import READ_SIZE
+from kiks.ports.pty import PtyEndpoint
+from kiks.ports.server import Server
+from kiks.ports.tcp import TcpEndpoint
+from kiks.sim.wire import BACKLOG_LIMIT
+from kiks.units import NS_PER_S, character_ns
+
+
+class Wall:
+    """A wall clock that a test sets."""
+
+    def __init__(self) -> None:
+        self.time_ns = 5 * NS_PER_S
+
+    def __call__(self) -> int:
+        return self.time_ns
+
+    def pass_ns(self, time_ns: int) -> None:
+        self.time_ns += time_ns
+
+
+def play(link: str, run: Served, commands: list[bytes], how: str) -> tuple[str, int, list[bytes]]:
+    port = open_plain(link)
+    replies = []
+    for command in commands:
+        for piece in [command] if how == "lines" else [bytes([byte]) for byte in command]:
+            os.write(port, piece)
+            if how == "bytes":
+                run.wait_rounds(1)
+        replies.append(read_line(port))
+    os.close(port)
+    run.wait_free()
+    return run.sim.state_hash(), run.sim.now_ns, replies
+
+
+@pytest.mark.parametrize("end", [b"\n", b"\r", b"\r\n"])
+@pytest.mark.parametrize("thinking", ["none", "fixed:3.5"])
+def test_lockstep_does_not_see_how_bytes_are_cut(tmp_path: Path, end: bytes, thinking: str) -> None:
+    commands = [command + end for command in (b"D,9,7", b"N", b"D,-2", b"N", b"x", b"N")]
+    runs = []
+    for how in ("lines", "bytes"):
+        link = str(tmp_path / how)
+        with served([PtyEndpoint(link)], thinking=thinking) as run:
+            runs.append(play(link, run, commands, how))
+    memory = fresh()
+    memory.program.__init__(thinking)  # type: ignore[misc]
+    port = memory.port(1)
+    replies = []
+    for command in commands:
+        port.write(command)
+        replies.append(port.readline())
+    assert runs[0] == runs[1] == (memory.state_hash(), memory.now_ns, replies)
+
+
+def test_lockstep_drops_a_line_without_end_as_the_robot_does(tmp_path: Path) -> None:
+    link = str(tmp_path / "robot")
+    with served([PtyEndpoint(link)]) as run:
+        port = open_plain(link)
+        for _ in range(3 * BACKLOG_LIMIT // 1024):
+            os.write(port, b"x" * 1024)
+            run.wait_rounds(1)
+        assert ask(port, b"\n") == b"Command not found\r\n"
+        assert ask(port, b"H\n") == b"h,0,0\r\n"
+        os.close(port)
+
+
+def test_commands_in_one_write_are_answered_in_their_order(tmp_path: Path) -> None:
+    link = str(tmp_path / "robot")
+    with served([PtyEndpoint(link)]):
+        port = open_plain(link)
+        os.write(port, b"N\nO\nH\nE\nK\nB\nG,1,1\n")
+        assert [read_line(port)[:1] for _ in range(7)] == [b"n", b"o", b"h", b"e", b"k", b"b", b"g"]
+        os.close(port)
+
+
+def test_live_reply_comes_when_the_clock_says_so(tmp_path: Path) -> None:
+    link, wall = str(tmp_path / "robot"), Wall()
+    with served([PtyEndpoint(link)], thinking="live", pace=Pace(2.0, wall_ns=wall)) as run:
+        port = open_plain(link)
+        os.write(port, b"H\n")
+        run.wait_held()
+        run.wait_rounds(3)
+        os.set_blocking(port, False)
+        with pytest.raises(BlockingIOError):
+            os.read(port, 100)
+        # Two characters, 1 ms in the robot, and four characters of the reply; the clock passes half of that.
+        begun_ns = (6 * character_ns(9600) + 1_000_000) // 2 + 100
+        wall.pass_ns(begun_ns)
+        run.wait_rounds(3)
+        assert os.read(port, 100) == b"h,0,"
+        wall.pass_ns(NS_PER_S // 10)
+        os.set_blocking(port, True)
+        assert read_line(port) == b"0\r\n"
+        assert run.sim.now_ns == 2 * (begun_ns + NS_PER_S // 10)
+        os.close(port)
+
+
+def test_live_world_runs_without_a_client() -> None:
+    wall = Wall()
+    with served([TcpEndpoint(0)], thinking="live", pace=Pace(wall_ns=wall)) as run:
+        run.wait_rounds(1)
+        wall.pass_ns(NS_PER_S)
+        run.wait_for(lambda: run.sim.now_ns == NS_PER_S)
+
+
+@pytest.mark.parametrize("length", [2, 1])
+def test_live_client_that_babbles_waits_for_the_line(tmp_path: Path, length: int) -> None:
+    link, wall = str(tmp_path / "robot"), Wall()
+    with served([PtyEndpoint(link)], thinking="live", pace=Pace(wall_ns=wall)) as run:
+        port = open_plain(link)
+        os.set_blocking(port, False)
+        line = run.sim.wires[0].line
+
+        def babble() -> None:
+            try:
+                while True:
+                    os.write(port, b"H\n"[:length] * 500)
+            except BlockingIOError:
+                pass
+
+        def backlog() -> int:
+            return (line.sending_until_ns - run.sim.now_ns) // line.character_ns
+
+        for _ in range(3):
+            babble()
+            run.wait_for(lambda: backlog() > BACKLOG_LIMIT)
+            run.wait_rounds(2)
+            babble()
+            assert backlog() <= BACKLOG_LIMIT + READ_SIZE
+            wall.pass_ns(10 * NS_PER_S)
+        os.close(port)
+
+
+def test_one_client_of_several_endpoints_has_the_robot(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    link, tcp = str(tmp_path / "robot"), TcpEndpoint(0)
+    with served([PtyEndpoint(link), tcp]) as run:
+        client = socket.create_connection(("127.0.0.1", tcp.port), timeout=GUARD_S)
+        run.wait_held()
+        port = open_plain(link)
+        for _ in range(2):
+            os.write(port, b"G,1,1\n")
+            run.wait_for(lambda: caplog.records)
+            run.wait_rounds(1)
+        client.close()
+        run.wait_free()
+        assert ask(port, b"H\n") == b"h,0,0\r\n"
+        second = socket.create_connection(("127.0.0.1", tcp.port), timeout=GUARD_S)
+        assert second.recv(1) == b""
+        second.close()
+        os.close(port)
+    said = [record.getMessage() for record in caplog.records if record.levelno == logging.WARNING]
+    assert said == [
+        f"robot 1 must have one client at a time, but another came to {came} while the client of {has} has it. "
+        "Close that one first."
+        for came, has in ((link, tcp.name), (tcp.name, link))
+    ]
+
+
+def test_robot_that_somebody_else_holds_is_refused(caplog: pytest.LogCaptureFixture) -> None:
+    sim, tcp = fresh(), TcpEndpoint(0)
+    sim.wires[0].holder = "a program in this process"
+    with served([tcp], sim=sim):
+        client = socket.create_connection(("127.0.0.1", tcp.port), timeout=GUARD_S)
+        assert client.recv(1) == b""
+        client.close()
+    assert "while a program in this process has it" in caplog.text
+    assert sim.wires[0].holder == "a program in this process"
+
+
+def test_simulation_that_falls_behind_says_so_once(caplog: pytest.LogCaptureFixture) -> None:
+    wall = Wall()
+    pace = Pace(4.0, wall_ns=wall)
+    pace.start(0)
+    wall.pass_ns(NS_PER_S)
+    pace.report(3_900_000_000)
+    assert not caplog.records
+    for _ in range(2):
+        pace.report(2_000_000_000)
+    assert [record.getMessage() for record in caplog.records] == [
+        "the simulation must keep up with 4 times real time, but it is 0.5 s behind. Ask for a lower speed; "
+        "the robots do the same as ever, only later."
+    ]
+
+
+def test_values_out_of_range_are_refused() -> None:
+    with pytest.raises(ParameterError, match=r"endpoints must be those of robots 1 to 1, but one was of robot 2"):
+        Server(fresh(), {2: []})
+    with pytest.raises(ParameterError, match=r"thinking of a server must be 'live', 'none' or 'fixed:MS', but it was"):
+        Server(fresh(), {1: []}, thinking="live:2")
+    for speed in (0, -1, float("nan"), 1e9):
+        with pytest.raises(ParameterError, match=r"speed must be a number from 0\.001 to 1000, but it was"):
+            Server(fresh(), {1: []}, speed=speed)
+
+
+@pytest.mark.parametrize("ending", [signal.SIGTERM, signal.SIGINT])
+def test_serve_command(tmp_path: Path, ending: signal.Signals) -> None:
+    link = str(tmp_path / "robot")
+    command = [sys.executable, "-m", "kiks", "serve", "--thinking", "none", "--link", link, "--tcp", "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "Robot 1\n"
+        assert process.stdout.readline() == f"  serial port  {link}\n"
+        assert process.stdout.readline().startswith("  TCP          socket://127.0.0.1:")
+        assert process.stdout.readline().startswith("The world waits for each command. Repeatable to the bit")
+        assert run_python(PROGRAMS / "course.py", link).startswith("h,")
+        process.send_signal(ending)
+        assert process.stdout.readline().startswith("Stopped after ")
+        assert process.wait(GUARD_S) == 0
+    assert not os.path.lexists(link)
+
+
+def test_course_is_the_same_in_a_new_run(tmp_path: Path) -> None:
+    assert course_in_memory()[1].state_hash() == course_in_memory()[1].state_hash()

@@ -1,0 +1,75 @@
+"""Simulated ports by name, through pyserial's own door."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import serial
+
+import kiks
+
+ARENAS = Path(__file__).parents[2] / "examples" / "arenas"
+
+
+def test_pyserial_opens_a_robot() -> None:
+    sim = kiks.Simulation(robots=2, seed=3)
+    with serial.serial_for_url("kiks://2", 19200, timeout=1, stopbits=2) as port:
+        assert isinstance(port, serial.SerialBase)
+        port.write(b"D,3,-3\n")
+        assert port.readline() == b"d\r\n"
+        assert sim.port(2).baudrate == 19200
+        assert port.in_waiting == 0
+        port.write(b"B\nH\n")
+        assert port.read_until(b"\n") == b"b,5.02,5.01\r\n"
+        port.flush()
+        port.reset_input_buffer()
+    with pytest.raises(serial.PortNotOpenError):
+        port.write(b"N\n")
+
+
+def test_a_robot_is_busy_until_it_is_closed() -> None:
+    sim = kiks.Simulation()
+    port = serial.serial_for_url(sim.url(1), timeout=1)
+    with pytest.raises(serial.SerialException, match="must be free to be opened, but robot 1 is in use by the program"):
+        serial.serial_for_url(sim.url(1))
+    port.close()
+    serial.serial_for_url(sim.url(1)).close()
+
+
+def test_the_name_alone_means_the_newest_simulation() -> None:
+    older, newer = kiks.Simulation(), kiks.Simulation()
+    for url, sim in (("kiks://1", newer), (older.url(1), older)):
+        port = serial.serial_for_url(url, timeout=1)
+        port.write(b"L,0,1\n")
+        port.readline()
+        port.close()
+        assert sim.time_s > 0
+
+
+def test_options_make_a_simulation() -> None:
+    url = f"kiks://2?arena={ARENAS / 'maze.toml'}&robots=2&seed=7&thinking=fixed:1&robot=khepera_ii"
+    with serial.serial_for_url(url, timeout=1) as port:
+        port.write(b"B\n")
+        assert port.readline() == b"b,6.01,6.01\r\n"
+
+
+@pytest.mark.parametrize(
+    ("url", "words"),
+    [
+        ("kiks://", "must be named like 'kiks://1'"),
+        ("kiks://one", "must be named like 'kiks://1'"),
+        ("kiks://9", "names robot 9 and the simulation has robot 1 only"),
+        ("kiks://nowhere/1", "a simulation's name must be one of"),
+        ("kiks://1?sead=3", "Did you mean 'seed'"),
+        ("kiks://1?seed=x", "must be a whole number, but it was 'x'"),
+        ("kiks://1?arena=/no/where.toml", "/no/where.toml"),
+        ("kiks://1?robot=kephera", "Did you mean 'khepera'"),
+    ],
+)
+def test_bad_names_are_explained(url: str, words: str) -> None:
+    sim = kiks.Simulation()
+    with pytest.raises(serial.SerialException) as caught:
+        serial.serial_for_url(url)
+    assert words in str(caught.value)
+    assert sim.robot_count == 1

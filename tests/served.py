@@ -1,0 +1,112 @@
+"""A server in a thread, for tests that are clients: nothing sleeps; waiting ends with an event, or a guard fails."""
+
+from __future__ import annotations
+
+import os
+import select
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from kiks.model.arena import Arena
+from kiks.ports.endpoint import Endpoint
+from kiks.ports.server import Server
+from kiks.sim.simulation import Simulation
+
+GUARD_S = 20.0
+PROGRAMS = Path(__file__).parent / "programs"
+
+
+class Served:
+    """A server that runs, and a way to wait for what it does."""
+
+    def __init__(self, server: Server) -> None:
+        self.server = server
+        self.sim = server.sim
+        self.rounds = 0
+        self._is_over = False
+        self._round = threading.Condition()
+        self._thread = threading.Thread(target=server.serve, args=(self._until,), daemon=True)
+
+    def _until(self) -> bool:
+        with self._round:
+            self.rounds += 1
+            self._round.notify_all()
+        return self._is_over
+
+    def wait_for(self, fact: Callable[[], object]) -> None:
+        """Wait until something is so, looked at after each round of the server."""
+        with self._round:
+            assert self._round.wait_for(fact, GUARD_S), "the server did not do it in time"
+
+    def wait_rounds(self, count: int) -> None:
+        """Wait until the server has looked at everything a few times more."""
+        last = self.rounds + count
+        self.wait_for(lambda: self.rounds >= last)
+
+    def wait_free(self, robot: int = 1) -> None:
+        """Wait until the server has noticed that the client has gone."""
+        self.wait_for(lambda: self.sim.wires[robot - 1].holder is None)
+
+    def wait_held(self, robot: int = 1) -> None:
+        """Wait until the server has let a client in."""
+        self.wait_for(lambda: self.sim.wires[robot - 1].holder is not None)
+
+
+@contextmanager
+def served(
+    endpoints: Sequence[Endpoint] | Mapping[int, Sequence[Endpoint]],
+    *,
+    sim: Simulation | None = None,
+    thinking: str = "none",
+    **options: Any,
+) -> Iterator[Served]:
+    """Serve endpoints, of robot 1 if nothing else is said, until the block ends."""
+    ways = endpoints if isinstance(endpoints, Mapping) else {1: endpoints}
+    run = Served(Server(fresh(len(ways)) if sim is None else sim, ways, thinking=thinking, **options))
+    run._thread.start()
+    try:
+        yield run
+    finally:
+        run._is_over = True
+        run._thread.join(GUARD_S)
+        run.server.close()
+
+
+def fresh(robots: int = 1) -> Simulation:
+    """Return a world that is always the same."""
+    return Simulation(Arena.box(600, 600), robots=robots, seed=7)
+
+
+def open_plain(path: str) -> int:
+    """Open a port as a program does that leaves the terminal's settings as they are."""
+    return os.open(path, os.O_RDWR | os.O_NOCTTY)
+
+
+def read_line(port: int) -> bytes:
+    """Return a line that a port says."""
+    line = b""
+    while not line.endswith(b"\n"):
+        assert select.select([port], [], [], GUARD_S)[0], f"no more than {line!r} came"
+        line += os.read(port, 1)
+    return line
+
+
+def ask(port: int, command: bytes) -> bytes:
+    """Send a command and return the reply."""
+    os.write(port, command)
+    return read_line(port)
+
+
+def run_python(program: str | Path, *arguments: str) -> str:
+    """Run a client in its own process; return what it prints."""
+    source = ["-c", program] if isinstance(program, str) else [str(program)]
+    done = subprocess.run(
+        [sys.executable, *source, *arguments], capture_output=True, text=True, timeout=GUARD_S, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout

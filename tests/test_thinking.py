@@ -1,0 +1,88 @@
+"""What the program's own computing costs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import kiks
+from kiks.clock.thinking import ThinkingLive, parse_thinking, save_thinking
+from kiks.demos import avoid
+
+
+def course(sim: kiks.Simulation, loops: int = 40) -> str:
+    robot = kiks.Khepera(sim.port(1))
+    for _ in range(loops):
+        avoid.step(robot)
+    robot.close()
+    return sim.state_hash()
+
+
+def test_fixed_thinking_is_added_before_each_command() -> None:
+    times = []
+    for thinking in ("none", "fixed:0", "fixed:2.5"):
+        sim = kiks.Simulation(thinking=thinking)
+        robot = kiks.Khepera(sim.port(1))
+        for _ in range(10):
+            robot.stop()
+        times.append(sim.time_s)
+    assert times[0] == times[1]
+    assert times[2] - times[0] == pytest.approx(10 * 0.0025, abs=1e-12)
+
+
+def test_a_burst_is_one_thought() -> None:
+    sim = kiks.Simulation(thinking="fixed:5")
+    port = sim.port(1)
+    for piece in (b"N\n", b"H", b"\n"):
+        port.write(piece)
+    port.readline()
+    port.readline()
+    quick = kiks.Simulation()
+    same = quick.port(1)
+    same.write(b"N\nH\n")
+    same.readline()
+    same.readline()
+    assert sim.time_s - quick.time_s == pytest.approx(0.005, abs=1e-12)
+
+
+def test_live_thinking_charges_measured_time_and_replay_repeats_it(tmp_path: Path) -> None:
+    live = kiks.Simulation(thinking="live:3", seed=5)
+    state = course(live)
+    measured = live.program.measured_ns
+    assert len(measured) > 40
+    assert sum(measured) > 0
+    save_thinking(measured, tmp_path / "times.txt")
+    replay = kiks.Simulation(thinking=f"replay:{tmp_path / 'times.txt'}", seed=5)
+    assert course(replay) == state
+    assert replay.now_ns == live.now_ns
+
+
+def test_a_slower_computer_lets_more_time_pass() -> None:
+    policy = ThinkingLive(0.0)
+    policy.leave()
+    assert policy.enter(is_command=True) == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("nonee", "Did you mean 'none'"),
+        ("fixed", "milliseconds from 0"),
+        ("fixed:-1", "'fixed:-1'"),
+        ("live:nan", "a factor from 0"),
+        ("replay:", "must be 'none'"),
+        ("replay:/no/such/file", "must be readable text"),
+    ],
+)
+def test_errors_name_the_rule_and_the_value(text: str, words: str) -> None:
+    with pytest.raises(kiks.ParameterError, match="must") as caught:
+        parse_thinking(text)
+    assert words in str(caught.value)
+
+
+def test_a_bad_replay_file_is_named_with_its_line(tmp_path: Path) -> None:
+    path = tmp_path / "times.txt"
+    path.write_text("100\nfast\n")
+    with pytest.raises(kiks.ParameterError, match=r"line 2, must be a whole number.*'fast'"):
+        parse_thinking(f"replay:{path}")
