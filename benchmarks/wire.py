@@ -19,7 +19,7 @@ from pathlib import Path
 from calibration import calibration_loops_per_s, median_of, report
 
 import kiks
-from kiks.demos import follow
+from kiks.demos.follow import Follow
 
 ARENA = Path(__file__).parent.parent / "examples" / "arenas" / "office.toml"
 
@@ -27,7 +27,7 @@ ARENA = Path(__file__).parent.parent / "examples" / "arenas" / "office.toml"
 def memory_run(loops: int) -> tuple[float, float]:
     """Return simulated and real time [s] of some loops of the demo on the port in memory."""
     sim = kiks.Simulation(kiks.Arena.load(ARENA), seed=1)
-    robot = kiks.Khepera(sim.port(1))
+    robot, follow = kiks.Khepera(sim.port(1)), Follow()
     for _ in range(200):
         follow.step(robot)
     begin_s, start_s = sim.time_s, time.perf_counter()
@@ -53,6 +53,7 @@ def server(link: Path) -> Iterator[None]:
 
 def pty_run(link: Path, loops: int) -> float:
     """Return the real time [s] of some loops through the pseudo-terminal, client and simulator in two processes."""
+    follow = Follow()
     with kiks.Khepera(str(link)) as robot:
         for _ in range(50):
             follow.step(robot)

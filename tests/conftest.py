@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+# Programs to be run as processes, not modules to be imported.
+collect_ignore_glob = ["programs/*"]
+
 
 def pytest_configure(config: pytest.Config) -> None:
     if not hasattr(config, "workerinput") and not config.option.collectonly:

@@ -77,9 +77,9 @@ def served(
         run.server.close()
 
 
-def fresh(robots: int = 1) -> Simulation:
+def fresh(robots: int = 1, *, thinking: str = "none") -> Simulation:
     """Return a world that is always the same."""
-    return Simulation(Arena.box(600, 600), robots=robots, seed=7)
+    return Simulation(Arena.box(600, 600), robots=robots, seed=7, thinking=thinking)
 
 
 def open_plain(path: str) -> int:

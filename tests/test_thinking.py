@@ -8,13 +8,13 @@ import pytest
 
 import kiks
 from kiks.clock.thinking import ThinkingLive, parse_thinking, save_thinking
-from kiks.demos import avoid
+from kiks.demos.avoid import Avoid
 
 
 def course(sim: kiks.Simulation, loops: int = 40) -> str:
     robot = kiks.Khepera(sim.port(1))
     for _ in range(loops):
-        avoid.step(robot)
+        Avoid().step(robot)
     robot.close()
     return sim.state_hash()
 

@@ -19,7 +19,8 @@ _FLOOR = (246, 243, 236)
 _BODY = (38, 84, 60)
 _PATH_BEGIN = (66, 135, 245)
 _PATH_END = (220, 60, 60)
-_LONGEST_SIDE = 1400
+_LONGEST_SIDE = 1200
+_FINER = 2  # drawn that much larger and shrunk, which smooths the lines
 
 
 def draw_run(arena: Arena, path: Sequence[tuple[float, float, float]], *, diameter_mm: float) -> Image:
@@ -32,7 +33,7 @@ def draw_run(arena: Arena, path: Sequence[tuple[float, float, float]], *, diamet
     """
     from PIL import Image, ImageDraw
 
-    scale = min(_LONGEST_SIDE / max(arena.width_mm, arena.height_mm), 2.0)
+    scale = _FINER * min(_LONGEST_SIDE / max(arena.width_mm, arena.height_mm), 2.0)
     size = (max(round(arena.width_mm * scale), 1), max(round(arena.height_mm * scale), 1))
     cells = np.flipud(arena.surface[PAD:-PAD, PAD:-PAD])
     # Walls are shown darker than they are: on paper a white wall would be taken for floor.
@@ -48,7 +49,7 @@ def draw_run(arena: Arena, path: Sequence[tuple[float, float, float]], *, diamet
     for k in range(len(path) - 1):
         share = k / steps
         colour = tuple(round(a + (b - a) * share) for a, b in zip(_PATH_BEGIN, _PATH_END, strict=True))
-        draw.line([point(*path[k][:2]), point(*path[k + 1][:2])], fill=colour, width=max(round(scale * 1.5), 1))
+        draw.line([point(*path[k][:2]), point(*path[k + 1][:2])], fill=colour, width=max(round(scale), 2), joint="curve")
     if path:
         x_mm, y_mm, heading = path[-1]
         radius = diameter_mm / 2
@@ -56,7 +57,7 @@ def draw_run(arena: Arena, path: Sequence[tuple[float, float, float]], *, diamet
         draw.ellipse((left, top, right, bottom), fill=_BODY)
         nose = point(x_mm + radius * math.cos(heading), y_mm + radius * math.sin(heading))
         draw.line([point(x_mm, y_mm), nose], fill=(255, 255, 255), width=max(round(scale * 3), 1))
-    return image
+    return image.resize((size[0] // _FINER, size[1] // _FINER), Image.Resampling.LANCZOS)
 
 
 def save_picture(image: Image, path: str | Path) -> None:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import subprocess
@@ -178,7 +179,7 @@ def test_other_files_are_never_removed(link: str, tmp_path: Path) -> None:
         with pytest.raises(LinkError, match=r"must not exist or be an old link to a terminal, but it is another file"):
             PtyEndpoint(path)
     assert (tmp_path / "other").read_text() == "precious"
-    with pytest.raises(LinkError, match=r"must be in a folder that you may write to, but it is not \(No such file"):
+    with pytest.raises(LinkError, match=r"must be in a folder that you can write to, but it is not \(No such file"):
         PtyEndpoint(tmp_path / "nowhere" / "robot")
 
 
@@ -191,12 +192,13 @@ def test_link_that_was_taken_over_is_left_alone(link: str) -> None:
 
 
 def test_terminal_that_a_client_has_locked_is_replaced(link: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> int:
+        raise OSError(errno.EBUSY, "busy")
+
     endpoint = PtyEndpoint(link)
-    first = os.stat(link).st_rdev
-    other = os.openpty()  # takes the next number, so that the new terminal has another one than the old
     endpoint.accept()
     with monkeypatch.context() as patch:
-        patch.setattr(os, "open", lambda *_: (_ for _ in ()).throw(OSError(16, "busy")))
+        patch.setattr(os, "open", refuse)
         endpoint.renew()
     port = open_plain(link)
     os.write(port, b"x")
@@ -204,8 +206,5 @@ def test_terminal_that_a_client_has_locked_is_replaced(link: str, monkeypatch: p
     assert channel.read() == b"x"
     channel.write(b"y\n")
     assert read_line(port) == b"y\n"
-    assert os.path.exists(link)
-    assert first
-    for descriptor in (port, *other):
-        os.close(descriptor)
+    os.close(port)
     endpoint.close()

@@ -9,7 +9,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from tests.ports.test_pty import course_in_memory
 from tests.served import GUARD_S, PROGRAMS, Served, ask, fresh, open_plain, read_line, run_python, served
 
 from kiks.clock.pace import Pace
@@ -58,8 +57,7 @@ def test_lockstep_does_not_see_how_bytes_are_cut(tmp_path: Path, end: bytes, thi
         link = str(tmp_path / how)
         with served([PtyEndpoint(link)], thinking=thinking) as run:
             runs.append(play(link, run, commands, how))
-    memory = fresh()
-    memory.program.__init__(thinking)  # type: ignore[misc]
+    memory = fresh(thinking=thinking)
     port = memory.port(1)
     replies = []
     for command in commands:
@@ -223,7 +221,3 @@ def test_serve_command(tmp_path: Path, ending: signal.Signals) -> None:
         assert process.stdout.readline().startswith("Stopped after ")
         assert process.wait(GUARD_S) == 0
     assert not os.path.lexists(link)
-
-
-def test_course_is_the_same_in_a_new_run(tmp_path: Path) -> None:
-    assert course_in_memory()[1].state_hash() == course_in_memory()[1].state_hash()

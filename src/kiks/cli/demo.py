@@ -10,8 +10,11 @@ import typer
 
 from kiks.cli.compile_note import note_compiling
 
-SLICE_S = 0.5
-"""Simulated time between two points of the drawn path and two updates of the display [s]."""
+SLICE_S = 0.1
+"""Simulated time between two points of the drawn path [s]."""
+
+SLICES_A_REPORT = 20
+"""Points of the path between two updates of the display: more would cost more than the simulation."""
 
 
 class Behaviour(enum.StrEnum):
@@ -36,9 +39,10 @@ def demo(
     Example: kiks demo follow --arena examples/arenas/office.toml --seconds 300
     """
     note_compiling()
-    from kiks.demos import avoid, follow
+    from kiks.demos.avoid import Avoid
+    from kiks.demos.follow import Follow
 
-    step = {Behaviour.AVOID: avoid.step, Behaviour.FOLLOW: follow.step}[behaviour]
+    step = {Behaviour.AVOID: Avoid().step, Behaviour.FOLLOW: Follow().step}[behaviour]
     run_demo(behaviour.value, step, seconds=seconds, arena=arena, seed=seed, baud=baud, picture=picture)
 
 
@@ -80,7 +84,8 @@ def run_demo(
                 step(robot)
             working_s += perf_counter() - start_s
             path.append(sim.pose(1))
-            progress.update(task, completed=min(sim.time_s, seconds), description=report())
+            if len(path) % SLICES_A_REPORT == 0:
+                progress.update(task, completed=min(sim.time_s, seconds), description=report())
     target = picture or Path(f"kiks-{name}.png")
     save_picture(draw_run(place, path, diameter_mm=sim.spec.body.diameter_mm), target)
     typer.echo(f"{name}: {report().strip()}")

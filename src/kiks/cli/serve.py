@@ -70,9 +70,10 @@ def serve(
     _warm_up(sim)
     ways: dict[int, list[Endpoint]] = {number: [] for number in range(1, robots + 1)}
     server = None
-    # Whoever ends the process, the links are removed.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
-    signal.signal(signal.SIGHUP, signal.default_int_handler)
+    # However the process is ended, the links are removed; `nohup` keeps it alive as ever.
+    for ending in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(ending) is not signal.SIG_IGN:
+            signal.signal(ending, signal.default_int_handler)
     try:
         for number, endpoints in ways.items():
             say(f"Robot {number}")

@@ -12,17 +12,30 @@ CRUISE = 5
 WANTED = 200
 """Reading of the left side at the distance to keep, about 3 cm from a white wall."""
 
+CORNER_STEPS = 70
+"""Steps without a wall after which none is round the corner: from then on the robot looks for one farther off."""
 
-def step(robot: Khepera) -> None:
-    """Read the sensors once and set the speeds."""
-    left, front_left, front, front_right, *_ = robot.proximity()
-    # Steer away from a wall that is too near, gently towards one that is too far, and hard away from one ahead.
-    side = max(-1.5, min(5.0, (max(left, front_left) - WANTED) / 50))
-    ahead = (0.1 * front_left + max(front, front_right)) / 25
-    robot.set_speed(max(-6, min(9, CRUISE + side + ahead)), max(-6, min(9, CRUISE - side - ahead)))
+
+class Follow:
+    """The behaviour. It remembers one thing: for how many steps it has seen no wall."""
+
+    def __init__(self) -> None:
+        self.lost_steps = CORNER_STEPS
+
+    def step(self, robot: Khepera) -> None:
+        """Read the sensors once and set the speeds."""
+        left, front_left, front, front_right, *_ = robot.proximity()
+        nearest = max(left, front_left)
+        self.lost_steps = 0 if nearest > 40 else self.lost_steps + 1
+        # Steer away from a wall that is too near, towards one that is too far, and hard away from one ahead.
+        drift = 2.5 if self.lost_steps < CORNER_STEPS else 0.4
+        side = max(-drift, min(5.0, (nearest - WANTED) / 50))
+        ahead = (0.3 * front_left + max(front, front_right)) / 20
+        robot.set_speed(max(-6, min(9, CRUISE + side + ahead)), max(-6, min(9, CRUISE - side - ahead)))
 
 
 if __name__ == "__main__":
     with Khepera(sys.argv[1] if len(sys.argv) > 1 else "kiks://1") as khepera:
+        follow = Follow()
         while True:
-            step(khepera)
+            follow.step(khepera)

@@ -78,8 +78,10 @@ def command_position(robot: Any, left_pulses: Any, right_pulses: Any) -> Any:
     """Command C: move the wheels to these counter readings [pulses], along a trapezoid of speed."""
     for wheel in range(2):
         if robot.motor_mode[wheel] == MODE_POSITION:
-            # What slip has swallowed is not made up for: the move starts where the wheel is.
-            robot.trajectory_pulses[wheel] -= robot.slip_count[wheel]
+            # What slip has swallowed is not made up for: the move starts where the wheel is, and where its counter is,
+            # should that have gone over 32 bits.
+            overflow = robot.pulse_count[wheel] + robot.counter_offset[wheel] - counter(robot, wheel)
+            robot.trajectory_pulses[wheel] -= robot.slip_count[wheel] + overflow
         else:
             robot.trajectory_pulses[wheel] = counter(robot, wheel)
             robot.trajectory_speed[wheel] = robot.controlled_speed[wheel]
@@ -93,11 +95,17 @@ def command_position(robot: Any, left_pulses: Any, right_pulses: Any) -> Any:
 def command_counters(robot: Any, left_pulses: Any, right_pulses: Any) -> Any:
     """Command G: set the counters [pulses]. A move in progress is shifted with them, so that nothing stirs."""
     for wheel in range(2):
-        value = wrap_int32(left_pulses if wheel == 0 else right_pulses)
-        shift = value - counter(robot, wheel)
-        robot.counter_offset[wheel] = value - robot.pulse_count[wheel]
+        offset = wrap_int32(left_pulses if wheel == 0 else right_pulses) - robot.pulse_count[wheel]
+        shift = offset - robot.counter_offset[wheel]
+        robot.counter_offset[wheel] = offset
         robot.target_pulses[wheel] += shift
         robot.trajectory_pulses[wheel] += shift
+
+
+@kernel
+def position_error(robot: Any, wheel: Any) -> Any:
+    """Return by how many pulses a wheel lags behind its trajectory, counted over the overflow of 32 bits."""
+    return wrap_int32(np.floor(robot.trajectory_pulses[wheel] + 0.5) - counter(robot, wheel))
 
 
 @entry
@@ -131,7 +139,7 @@ def controller_error(robots: Any, world: Any, robot: Any, wheel: Any) -> Any:
     if state.motor_mode[wheel] == MODE_SPEED:
         return np.int64(state.speed_setpoint[wheel]) - state.measured_speed[wheel]
     if state.motor_mode[wheel] == MODE_POSITION:
-        return np.int64(np.floor(state.trajectory_pulses[wheel] + 0.5)) - counter(state, wheel)
+        return position_error(state, wheel)
     return np.int64(0)
 
 
@@ -189,7 +197,8 @@ def pid(robot: Any, wheel: Any, gains: Any, error: Any, scale: Any) -> Any:
     demand = gains[0] * error + gains[1] * error_sum + gains[2] * (error - robot.last_error[wheel])
     power = abs(demand) // scale
     power = power if demand >= 0 else -power
-    if abs(power) <= PWM_MAX:  # the integrator rests while the power is clipped
+    # The integrator rests while the power is clipped, unless it works its way back.
+    if abs(power) <= PWM_MAX or (error < 0) == (demand > 0):
         robot.error_sum[wheel] = error_sum
     robot.last_error[wheel] = error
     return clamp(power, PWM_MAX)
@@ -206,8 +215,7 @@ def control_motors(robot: Any, parameters: Any) -> Any:
         elif mode == MODE_POSITION:
             if robot.on_target[wheel] == 0:
                 advance_trajectory(robot, wheel)
-            path = counter(robot, wheel) + robot.slip_count[wheel]
-            error = np.int64(np.floor(robot.trajectory_pulses[wheel] + 0.5)) - path
+            error = position_error(robot, wheel) - robot.slip_count[wheel]
             power = pid(robot, wheel, robot.position_gains, error, parameters.gain_scale)
         else:
             power = np.int64(robot.pwm_setpoint[wheel])

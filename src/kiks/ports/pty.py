@@ -204,5 +204,5 @@ def _point(path: str, target: str) -> None:
         os.replace(fresh, path)
     except OSError as error:
         raise LinkError(
-            f"link {path!r} must be in a folder that you may write to, but it is not ({error.strerror}). Give another name."
+            f"link {path!r} must be in a folder that you can write to, but it is not ({error.strerror}). Take another."
         ) from None

@@ -81,12 +81,16 @@ class Rfc2217Channel(TcpChannel):
             return data
         try:
             data = b"".join(self._manager.filter(data))
+            is_sound = len(self._manager.suboption or b"") <= REQUEST_LIMIT
         except (struct.error, KeyError, TypeError, ValueError):
+            is_sound = False
+        if not is_sound:
             _log.warning(
-                "the client of %s must speak RFC 2217, but it sent another request. Use its plain port.", self.name
+                "the client of %s must speak RFC 2217, but it sent no request of that. Use the plain TCP port.",
+                self.name,
             )
             return None
-        return None if len(self._manager.suboption or b"") > REQUEST_LIMIT else data
+        return data
 
     def write(self, data: bytes) -> None:
         """Send characters, escaped as telnet wants it."""

@@ -40,7 +40,7 @@ class TcpEndpoint(Endpoint):
         except OSError as error:
             self._listener.close()
             raise LinkError(
-                f"port {port} of {host} must be free, but it is not ({error.strerror}). Give another, or 0 for a free one."
+                f"port {port} of {host} must be free, but it is not ({error.strerror}). 0 takes a free one."
             ) from None
         self._listener.setblocking(False)
         self.port = int(self._listener.getsockname()[1])

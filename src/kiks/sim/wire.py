@@ -26,10 +26,11 @@ class Wire:
         self._processing_ns = ns_from_s(firmware.spec.firmware.processing_ms * 1e-3)
         self._pending: deque[tuple[int, bytes]] = deque()
         self._last_act_ns = 0
+        self._orphan_count = 0
 
     def set_baud(self, baud: int) -> None:
         """Set both ends of the line to a speed [bit/s], as the person does who turns the robot's mode selector."""
-        self.firmware.baud = baud
+        self.firmware.baud = self.firmware.selected_baud = baud
         self.line.set_baud(baud)
 
     def send(self, data: bytes, at_ns: int) -> None:
@@ -59,13 +60,21 @@ class Wire:
         """Do what is due."""
         if self._pending and self._pending[0][0] <= now_ns:
             _, line = self._pending.popleft()
-            self.line.answer(self.firmware.execute(line, now_ns), now_ns)
+            reply = self.firmware.execute(line, now_ns)
+            if self._orphan_count:
+                self._orphan_count -= 1
+            else:
+                self.line.answer(reply, now_ns)
             if self.firmware.baud != self.line.baud:
                 self.line.set_baud(self.firmware.baud)
         else:
             self.firmware.run_demo(now_ns)
 
     def hang_up(self) -> None:
-        """Forget what the host left behind: an unfinished command and replies that nobody read. The robot drives on."""
+        """Forget what the host left behind: an unfinished command, and replies that nobody will read.
+
+        Commands that were sent whole still act, and the robot drives on (khepera-protocol.md 11.3).
+        """
+        self._orphan_count = len(self._pending)
         self.firmware.receiver.clear()
         self.line.forget()

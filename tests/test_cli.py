@@ -1,0 +1,121 @@
+"""The commands, as a person calls them."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+ARENA = str(ROOT / "examples" / "arenas" / "office.toml")
+WANDER = str(ROOT / "tests" / "programs" / "wander.py")
+
+
+def kiks(*arguments: str, cwd: Path | None = None, env: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "kiks", *arguments]
+    return subprocess.run(
+        command, capture_output=True, text=True, cwd=cwd, env={**os.environ, **(env or {})}, timeout=300, check=False
+    )
+
+
+def state_of(text: str) -> str:
+    found = re.search(r"state ([0-9a-f]{16})", text)
+    assert found, text
+    return found[1]
+
+
+@pytest.mark.parametrize("command", ["demo", "run", "serve", "warmup"])
+def test_every_command_has_help_with_an_example(command: str) -> None:
+    result = kiks(command, "--help")
+    assert result.returncode == 0
+    assert f"Example: kiks {command}" in result.stdout
+
+
+def test_help_and_version_need_no_engine() -> None:
+    script = "import sys; sys.argv = ['kiks', '--help']\nimport kiks.cli\ntry: kiks.cli.main()\nexcept SystemExit: pass\n"
+    script += "heavy = {'numba', 'scipy', 'numpy', 'PIL', 'rich'} & set(sys.modules); assert not heavy, heavy"
+    assert subprocess.run([sys.executable, "-c", script], capture_output=True, check=False).returncode == 0
+    assert re.fullmatch(r"KiKS \d+\.\d+.*\n", kiks("--version").stdout)
+
+
+@pytest.mark.parametrize("behaviour", ["avoid", "follow"])
+def test_a_demo_is_the_same_in_two_processes_and_on_any_processor(behaviour: str, tmp_path: Path) -> None:
+    arguments = ("demo", behaviour, "--seconds", "30", "--arena", ARENA, "--seed", "4")
+    first = kiks(*arguments, "--picture", "run.png", cwd=tmp_path)
+    assert first.returncode == 0, first.stderr
+    assert (tmp_path / "run.png").stat().st_size > 5000
+    assert re.search(r"30\.\d s .* x real time .* m .* contacts", first.stdout)
+    second = kiks(*arguments, "--picture", "again.png", cwd=tmp_path)
+    generic = kiks(*arguments, cwd=tmp_path, env={"NUMBA_CPU_NAME": "generic"})
+    assert state_of(first.stdout) == state_of(second.stdout) == state_of(generic.stdout)
+    assert (tmp_path / f"kiks-{behaviour}.png").exists()
+
+
+def test_a_cold_start_says_that_it_compiles(tmp_path: Path) -> None:
+    result = kiks("warmup", env={"NUMBA_CACHE_DIR": str(tmp_path)})
+    assert "Compiling the engine" in result.stderr
+    assert "The engine is ready" in result.stdout
+    again = kiks("warmup", env={"NUMBA_CACHE_DIR": str(tmp_path)})
+    assert "Compiling" not in again.stderr
+
+
+def test_a_program_runs_unchanged_in_simulated_time() -> None:
+    result = kiks("run", "--seed", "3", WANDER)
+    assert result.returncode == 0, result.stderr
+    version, counters = result.stdout.splitlines()
+    assert version == "b,5.02,5.01"
+    assert re.fullmatch(r"h,-?\d+,-?\d+", counters)
+    assert re.search(r"kiks: 2[01]\.\d{3} s simulated, seed 3, state", result.stderr)
+    again = kiks("run", "--seed", "3", "--map", "/dev/ttyUSB0=1", WANDER)
+    assert (again.stdout, state_of(again.stderr)) == (result.stdout, state_of(result.stderr))
+    other = kiks("run", "--seed", "3", "--thinking", "fixed:20", WANDER)
+    assert state_of(other.stderr) != state_of(result.stderr)
+
+
+def test_a_programs_exit_code_and_errors_are_its_own(tmp_path: Path) -> None:
+    assert kiks("run", WANDER, "7").returncode == 7
+    program = tmp_path / "wrong.py"
+    program.write_text("import serial\nserial.Serial('COM1', timeout=1)\nprint(1 / 0)\n")
+    result = kiks("run", str(program))
+    assert result.returncode == 1
+    assert "ZeroDivisionError" in result.stderr
+    assert "runpy" not in result.stderr
+    assert f'File "{program}", line 3' in result.stderr
+    program.write_text("import serial\nserial.Serial('COM1')\nserial.Serial('COM2')\n")
+    assert "is one more than there are" in kiks("run", str(program)).stderr
+    assert kiks("run", "--robots", "2", str(program)).returncode == 0
+    program.write_text("import serial\nserial.Serial('COM1').read(1)\n")
+    assert "the read would never end" in kiks("run", str(program)).stderr
+
+
+def test_live_thinking_is_recorded_and_replayed(tmp_path: Path) -> None:
+    times = tmp_path / "times.txt"
+    live = kiks("run", "--thinking", "live", "--save-thinking", str(times), WANDER)
+    assert "not repeatable" in live.stderr
+    replays = [kiks("run", "--thinking", f"replay:{times}", WANDER) for _ in range(2)]
+    assert replays[0].stdout == replays[1].stdout == live.stdout
+    assert state_of(replays[0].stderr) == state_of(replays[1].stderr)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("run", "nowhere.py"), "PROGRAM must be a Python file, but 'nowhere.py' is none"),
+        (("run", "--map", "ttyS0", WANDER), "--map must be a port's name, = and a robot's number"),
+        (("run", "--map", "ttyS0=4", WANDER), "This simulation has robot 1"),
+        (("run", "--thinking", "slow", WANDER), "thinking must be 'none'"),
+        (("run", "--robot", "kephera", WANDER), "Did you mean 'khepera'"),
+        (("demo", "--arena", "nowhere.png"), "nowhere.png"),
+        (("demo", "--seconds", "2", "--picture", "/no/folder/x.png"), "a picture must go to a writable file"),
+        (("demo", "--seconds", "2", "--baud", "3"), "baudrate must be a whole number from 75"),
+    ],
+)
+def test_mistakes_end_in_one_clear_line(arguments: tuple[str, ...], words: str, tmp_path: Path) -> None:
+    result = kiks(*arguments, cwd=tmp_path)
+    assert result.returncode == 2, result.stdout + result.stderr
+    assert words in result.stderr
+    assert "Traceback" not in result.stderr
