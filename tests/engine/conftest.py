@@ -80,8 +80,10 @@ class World:
         x, y, _ = self.pose
         surface = self.arena.surface
         reach = self.radius + 4.0
-        columns = np.arange(max(int((x - reach) / self.cell) + PAD, 0), min(int((x + reach) / self.cell) + PAD + 2, surface.shape[1]))
-        rows = np.arange(max(int((y - reach) / self.cell) + PAD, 0), min(int((y + reach) / self.cell) + PAD + 2, surface.shape[0]))
+        rows, columns = (
+            np.arange(max(int((v - reach) / self.cell) + PAD, 0), min(int((v + reach) / self.cell) + PAD + 2, count))
+            for v, count in zip((y, x), surface.shape, strict=True)
+        )
         near_x = (columns - PAD) * self.cell
         near_y = (rows - PAD) * self.cell
         gap_x = np.maximum(np.maximum(near_x - x, x - near_x - self.cell), 0.0)
@@ -92,7 +94,7 @@ class World:
 
 
 def random_arena(number: int, *, start_room_mm: float = 30.0) -> Arena:
-    """Return an arena of rectangles, discs, single pixels, staircases and narrow gaps: a pure function of its number."""
+    """Return arena `number`: rectangles, discs, single pixels, staircases, narrow gaps; the same one every time."""
     rng = np.random.default_rng([2001, number])
     mm_per_pixel = (0.5, 1.0, 2.5)[rng.integers(3)]
     while True:

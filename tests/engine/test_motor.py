@@ -32,7 +32,8 @@ def spin(world, ticks):
 @settings(derandomize=True, deadline=None, max_examples=40)
 @given(left=SPEEDS, right=SPEEDS)
 def test_speed_reaches_its_command_in_about_five_ticks_and_on_average_exactly(make_world, left, right):
-    left, right = (min(max(v, -115), 115) for v in (left, right))  # near full power there is nothing left to control with
+    # Near full power there is nothing left to control with.
+    left, right = (min(max(v, -115), 115) for v in (left, right))
     world = make_world(FAR).place(1000.0, 1000.0)
     world.speed(left, right)
     spin(world, 5)
@@ -118,7 +119,7 @@ def test_a_move_arrives_whatever_ran_before(make_world, mode, first, target, tic
     getattr(world, mode)(first * scale, -first * scale)
     world.tick(ticks)
     world.position(target, -target)
-    world.tick(900)
+    world.tick(1500)
     assert (world.status[0], world.status[3]) == (1, 1)
     assert world.counters == pytest.approx((target, -target), abs=2)
 

@@ -97,7 +97,7 @@ def test_unread_output_is_bounded_and_hinders_nobody(caplog: pytest.LogCaptureFi
     ]
     there.close()
     channel.flush()
-    assert not channel.has_unsent
+    assert len(channel._unsent) == 0
     assert channel.read() is None
     channel.close()
 

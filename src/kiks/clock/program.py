@@ -23,6 +23,7 @@ class Program:
     def __init__(self, thinking: str) -> None:
         policy = parse_thinking(thinking)
         self._policy = None if isinstance(policy, ThinkingFixed) and policy.time_ns == 0 else policy
+        self.thinks = self._policy is not None
         self._waiting = Waiting()
 
     def enter(self, *, is_command: bool = False) -> int:

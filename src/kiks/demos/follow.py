@@ -1,4 +1,4 @@
-"""Follow a wall on the left side: drift to the left until there is one, then keep its reading where it should be."""
+"""Follow a wall on the left side: drive straight on until there is one, then keep its reading where it should be."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ WANTED = 200
 """Reading of the left side at the distance to keep, about 3 cm from a white wall."""
 
 CORNER_STEPS = 70
-"""Steps without a wall after which none is round the corner: from then on the robot looks for one farther off."""
+"""Steps without a wall after which none is round the corner: from then on the robot drives straight on."""
 
 
 class Follow:
@@ -28,7 +28,7 @@ class Follow:
         nearest = max(left, front_left)
         self.lost_steps = 0 if nearest > 40 else self.lost_steps + 1
         # Steer away from a wall that is too near, towards one that is too far, and hard away from one ahead.
-        drift = 2.5 if self.lost_steps < CORNER_STEPS else 0.4
+        drift = 2.5 if self.lost_steps < CORNER_STEPS else 0.0
         side = max(-drift, min(5.0, (nearest - WANTED) / 50))
         ahead = (0.3 * front_left + max(front, front_right)) / 20
         robot.set_speed(max(-6, min(9, CRUISE + side + ahead)), max(-6, min(9, CRUISE - side - ahead)))

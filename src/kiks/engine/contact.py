@@ -6,7 +6,8 @@ Assumption: the tyres drag with a force proportional to their slip, the same in 
 the wheels want and the one they get differ like the velocities of a free disc before and after an impulse, a disc of
 mass 1 whose radius of gyration is half the wheel base; and there is no momentum from one tick to the next.
 Method: move a short piece; let the wall push the disc back along its gradient, which yields the normal impulse N; let
-friction, at most mu N, oppose what remains of the sliding at the rim (Coulomb).
+friction, at most mu N, oppose what remains of the sliding at the rim (Coulomb). No push leads farther than the wheels
+wanted to go, so that walls give no energy.
 
 Symbols: (u, v) the piece's displacement [mm], q its turn [rad], R the body's radius, h half the wheel base,
 n the wall's normal, t = (-ny, nx) along the wall. The rim's point at the wall moves by s = (u, v).t - R q along t.
@@ -32,7 +33,7 @@ PUSHES = 100
 """Most steps out of the walls. One wall takes one or two, a corner of 90 degrees ten, a sharp one many."""
 
 ROUND_A_CORNER = 1.001
-"""How much farther than wanted a disc may get: along a convex corner the nearest free place is at most 0.03 % farther."""
+"""How much farther than wanted a disc may get: beyond a convex corner the nearest free place is 0.02 % farther."""
 
 
 @kernel
@@ -100,7 +101,7 @@ def distance(x0: Any, y0: Any, x1: Any, y1: Any) -> Any:
 
 @kernel
 def resolve(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, u: Any, v: Any, q: Any) -> Any:
-    """Move a robot by at most (u, v) and turn it by about q; return the displacement, the turn, and whether it touched."""
+    """Move a robot by at most (u, v), turn it by about q; return the displacement, the turn, and whether it touched."""
     radius = parameters.radius_mm
     x, y = robot.x_mm, robot.y_mm
     wanted_x, wanted_y = x + u, y + v

@@ -44,7 +44,7 @@ def move(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, left: Any
     travel = max(abs(left), abs(right)) * pulse
     pieces = 1
     if clearance_mm(field, cell, pad, robot.x_mm, robot.y_mm) < parameters.radius_mm + travel + 2.0 * cell:
-        pieces = int(math.ceil(travel / PIECE_MM)) if travel > PIECE_MM else 1
+        pieces = math.ceil(travel / PIECE_MM) if travel > PIECE_MM else 1
     arc = 0.5 * (left + right) * pulse / pieces
     turn = (right - left) * pulse / base / pieces
     is_touching = False
@@ -90,7 +90,7 @@ def pose_between(robot: Any, ticks_ago: Any, share: Any) -> Any:
         dx = robot.trail[ticks_ago - 1, 0] - x0
         dy = robot.trail[ticks_ago - 1, 1] - y0
         turn = robot.trail[ticks_ago - 1, 2] - heading
-    # The chord to a point on the arc is shorter by the ratio of the sines and turned back by the rest of the half angle.
+    # The chord to a point on the arc is shorter by the ratio of the sines turned back by the rest of the half angle.
     length = share * sinc(0.5 * share * turn) / sinc(0.5 * turn)
     sine, cosine = sin_cos(0.5 * (share - 1.0) * turn)
     x = x0 + length * (dx * cosine - dy * sine)

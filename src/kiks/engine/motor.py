@@ -44,7 +44,7 @@ def counter(robot: Any, wheel: Any) -> Any:
     return wrap_int32(robot.pulse_count[wheel] + robot.counter_offset[wheel])
 
 
-# ---- set-points: what the commands A, C, D, F, G, J, P and a reset write ----------------------------------------------
+# ---- set-points: what the commands A, C, D, F, G, J, P and a reset write ----
 
 
 @kernel

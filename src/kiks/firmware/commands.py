@@ -49,13 +49,16 @@ class Command:
     act: Callable[..., Reply]
 
 
+_LONG = 2**62
+
+
 def _clamp(value: int, low: int, high: int) -> int:
     return min(max(value, low), high)
 
 
 def _limit(value: int) -> int:
     """Fit a number of any length into the kernels' 64 bits; every command clamps to much less."""
-    return _clamp(value, -(2**62), 2**62)
+    return value if -_LONG < value < _LONG else (_LONG if value > 0 else -_LONG)
 
 
 def _in_range(value: int, low: int, high: int) -> int:

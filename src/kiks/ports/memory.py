@@ -49,19 +49,19 @@ class SimPort:
 
     def write(self, data: bytes) -> int:
         """Send characters; return how many. They leave one after the other while the program goes on."""
-        sim, wire = self.sim, self._wire
+        sim, wire, count = self.sim, self._wire, len(data)
         with sim.lock:
             self._enter(is_command=self._has_read)
             self._has_read = False
             self._program.act()
-            for begin in range(0, len(data), BACKLOG_LIMIT):
-                part = data[begin : begin + BACKLOG_LIMIT]
+            while data:
                 room_ns = wire.line.sending_until_ns - BACKLOG_LIMIT * wire.line.character_ns
                 if room_ns > sim.now_ns:
                     sim.advance_to(room_ns)
-                wire.send(part, sim.now_ns)
+                wire.send(data[:BACKLOG_LIMIT], sim.now_ns)
+                data = data[BACKLOG_LIMIT:]
             self._program.leave()
-        return len(data)
+        return count
 
     def read(self, size: int = 1) -> bytes:
         """Return `size` characters, fewer if the time-out is over first.
@@ -164,7 +164,8 @@ class SimPort:
     # ---- inside ----
 
     def _enter(self, *, is_command: bool) -> None:
-        self._pass(self._program.enter(is_command=is_command))
+        if self._program.thinks:
+            self._pass(self._program.enter(is_command=is_command))
 
     def _pass(self, time_ns: int) -> None:
         if time_ns:

@@ -153,29 +153,28 @@ class Simulation:
 
     def advance_to(self, time_ns: int) -> None:
         """Let time pass up to a time [ns]; nothing happens if it is over already."""
-        while True:
-            wire = self._next_wire()
-            due_ns = wire.next_ns if wire is not None else None
-            if wire is None or due_ns is None or due_ns > time_ns:
-                break
-            if due_ns > self.now_ns:
-                self.now_ns = due_ns
+        wire = self._next_wire()
+        while wire.next_ns is not None and wire.next_ns <= time_ns:
+            if wire.next_ns > self.now_ns:
+                self.now_ns = wire.next_ns
             self.sync()
             wire.act(self.now_ns)
+            wire = self._next_wire()
         if time_ns > self.now_ns:
             self.now_ns = time_ns
 
     def next_event_ns(self) -> int | None:
         """Return when a robot does something next [ns], None while all of them wait for characters."""
-        wire = self._next_wire()
-        return None if wire is None else wire.next_ns
+        return self._next_wire().next_ns
 
-    def _next_wire(self) -> Wire | None:
-        if self.robot_count == 1:
-            return self.wires[0]
-        busy = [wire for wire in self.wires if wire.next_ns is not None]
-        # Of two that act at the same instant the one with the lower number is first.
-        return min(busy, key=lambda wire: wire.next_ns or 0) if busy else None
+    def _next_wire(self) -> Wire:
+        """Return the wire that acts first; of two at the same instant the one with the lower number."""
+        first = self.wires[0]
+        if self.robot_count > 1:
+            for wire in self.wires:
+                if wire.next_ns is not None and (first.next_ns is None or wire.next_ns < first.next_ns):
+                    first = wire
+        return first
 
     def sync(self) -> None:
         """Do the ticks that have begun: the engine is behind the clock until somebody looks."""

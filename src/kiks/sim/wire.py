@@ -17,12 +17,14 @@ class Wire:
 
     Attributes:
         holder: Who has opened the robot's port, in words for the next one who tries; None while nobody has.
+        next_ns: When the robot does something next [ns], or None while it only waits for characters.
     """
 
     def __init__(self, firmware: Firmware) -> None:
         self.firmware = firmware
         self.line = SerialLine(firmware.baud)
         self.holder: str | None = None
+        self.next_ns: int | None = None
         self._processing_ns = ns_from_s(firmware.spec.firmware.processing_ms * 1e-3)
         self._pending: deque[tuple[int, bytes]] = deque()
         self._last_act_ns = 0
@@ -41,15 +43,8 @@ class Wire:
             arrival_ns = start_ns + (index + 1) * character_ns
             self._last_act_ns = max(arrival_ns, self._last_act_ns) + self._processing_ns
             self._pending.append((self._last_act_ns, line))
-
-    @property
-    def next_ns(self) -> int | None:
-        """When the robot does something next [ns], or None while it only waits for characters."""
-        command_ns = self._pending[0][0] if self._pending else None
-        demo_ns = self.firmware.demo_wakes_ns
-        if demo_ns is None or command_ns is None:
-            return command_ns if demo_ns is None else demo_ns
-        return min(command_ns, demo_ns)
+            if self.next_ns is None or self._last_act_ns < self.next_ns:
+                self.next_ns = self._last_act_ns
 
     @property
     def has_command(self) -> bool:
@@ -69,6 +64,12 @@ class Wire:
                 self.line.set_baud(self.firmware.baud)
         else:
             self.firmware.run_demo(now_ns)
+        command_ns = self._pending[0][0] if self._pending else None
+        demo_ns = self.firmware.demo_wakes_ns
+        if demo_ns is None or command_ns is None:
+            self.next_ns = command_ns if demo_ns is None else demo_ns
+        else:
+            self.next_ns = min(command_ns, demo_ns)
 
     def hang_up(self) -> None:
         """Forget what the host left behind: an unfinished command, and replies that nobody will read.

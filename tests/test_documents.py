@@ -1,0 +1,53 @@
+"""Documents tell the truth: their programs run, their commands exist, their links lead somewhere."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+
+
+PROGRAMS = [(page.name, code) for page in PAGES for code in blocks(page, "python")]
+
+
+@pytest.mark.parametrize(("page", "code"), PROGRAMS, ids=lambda value: value[:20].replace("\n", " "))
+def test_programs_run(page: str, code: str) -> None:
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False)
+    assert result.returncode == 0, f"{page}: {result.stderr}"
+
+
+def test_the_first_program_keeps_clear_of_the_walls() -> None:
+    (code,) = blocks(ROOT / "README.md", "python")
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True)
+    found = re.fullmatch(r"(\d+) mm, (\d+) contacts, state [0-9a-f]{16}\n", result.stdout)
+    assert found
+    assert int(found[1]) > 1000
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page: Path) -> None:
+    for target in re.findall(r"\]\(([^)#]+)[^)]*\)", page.read_text(encoding="utf-8")):
+        if "://" not in target:
+            assert (page.parent / target).exists(), f"{page.name} points to {target}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_commands_and_targets_exist(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), flags=re.MULTILINE))
+    assert set(re.findall(r"\bmake ([a-z]+)\b", "".join(blocks(page, "sh")))) <= targets
+    for command in re.findall(r"^kiks ([a-z]+)", "".join(blocks(page, "sh")), flags=re.MULTILINE):
+        assert command in {"demo", "run", "serve", "warmup"}, f"{page.name}: kiks {command}"
+    # Paths that a page names in code must exist.
+    for path in re.findall(r"\b(?:examples|docs|benchmarks|tests|src)/[\w./-]+\.\w+", text):
+        assert (ROOT / path).exists(), f"{page.name} names {path}"
