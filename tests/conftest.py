@@ -1,4 +1,4 @@
-"""What all tests share: an engine that is compiled before the workers of xdist start, each of which would do it anew."""
+"""What all tests share: an engine compiled before the workers of xdist start, each of which would do it anew."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ def _pairs(*pairs: tuple[bytes, bytes]) -> Pairs:
     return [(re.compile(request, re.DOTALL), re.compile(reply + END)) for request, reply in pairs]
 
 
-STATUS = b"," + at_most(1) + b"," + at_most(2) + rb"," + signed(9_999_999_999)
+STATUS = b"," + at_most(1) + b"," + at_most(2) + rb"," + signed(2**31 - 1)
 
 LETTERS: dict[bytes, Pairs] = {
     b"A": _pairs((values(NATURAL, 3), b"a")),

@@ -15,7 +15,9 @@ ARENA = str(ROOT / "examples" / "arenas" / "office.toml")
 WANDER = str(ROOT / "tests" / "programs" / "wander.py")
 
 
-def kiks(*arguments: str, cwd: Path | None = None, env: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
+def kiks(
+    *arguments: str, cwd: Path | None = None, env: dict[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "kiks", *arguments]
     return subprocess.run(
         command, capture_output=True, text=True, cwd=cwd, env={**os.environ, **(env or {})}, timeout=300, check=False
@@ -36,7 +38,9 @@ def test_every_command_has_help_with_an_example(command: str) -> None:
 
 
 def test_help_and_version_need_no_engine() -> None:
-    script = "import sys; sys.argv = ['kiks', '--help']\nimport kiks.cli\ntry: kiks.cli.main()\nexcept SystemExit: pass\n"
+    script = (
+        "import sys; sys.argv = ['kiks', '--help']\nimport kiks.cli\ntry: kiks.cli.main()\nexcept SystemExit: pass\n"
+    )
     script += "heavy = {'numba', 'scipy', 'numpy', 'PIL', 'rich'} & set(sys.modules); assert not heavy, heavy"
     assert subprocess.run([sys.executable, "-c", script], capture_output=True, check=False).returncode == 0
     assert re.fullmatch(r"KiKS \d+\.\d+.*\n", kiks("--version").stdout)

@@ -12,7 +12,20 @@ import kiks
 ROOT = Path(kiks.__file__).parent
 
 # Each folder or file may import those that stand before it, and itself.
-LAYERS = ["errors", "units", "model", "engine", "firmware", "clock", "sim", "ports", "client", "demos", "drawing", "cli"]
+LAYERS = [
+    "errors",
+    "units",
+    "model",
+    "engine",
+    "firmware",
+    "clock",
+    "sim",
+    "ports",
+    "client",
+    "demos",
+    "drawing",
+    "cli",
+]
 
 # `sim.port(1)` hands out the port in memory: the one call upwards, made when it is asked for.
 ALLOWED = {("sim", "ports")}

@@ -49,7 +49,9 @@ def draw_run(arena: Arena, path: Sequence[tuple[float, float, float]], *, diamet
     for k in range(len(path) - 1):
         share = k / steps
         colour = tuple(round(a + (b - a) * share) for a, b in zip(_PATH_BEGIN, _PATH_END, strict=True))
-        draw.line([point(*path[k][:2]), point(*path[k + 1][:2])], fill=colour, width=max(round(scale), 2), joint="curve")
+        draw.line(
+            [point(*path[k][:2]), point(*path[k + 1][:2])], fill=colour, width=max(round(scale), 2), joint="curve"
+        )
     if path:
         x_mm, y_mm, heading = path[-1]
         radius = diameter_mm / 2

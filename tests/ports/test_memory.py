@@ -81,7 +81,9 @@ def test_waiting_for_a_reply_by_polling_ends() -> None:
 def test_one_client_a_robot() -> None:
     sim = kiks.Simulation()
     first = kiks.Khepera(sim.port(1))
-    with pytest.raises(kiks.LinkError, match=r"must be free to be opened, but robot 1 is in use by another kiks.Khepera"):
+    with pytest.raises(
+        kiks.LinkError, match=r"must be free to be opened, but robot 1 is in use by another kiks.Khepera"
+    ):
         kiks.Khepera(sim.port(1))
     first.close()
     kiks.Khepera(sim.port(1)).stop()

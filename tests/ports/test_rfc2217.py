@@ -10,7 +10,6 @@ from tests.served import GUARD_S, PROGRAMS, run_python, served
 from kiks.ports.rfc2217 import Rfc2217Endpoint
 
 # pyserial's own client sets its thread up in the way of old Pythons.
-pytestmark = pytest.mark.filterwarnings("ignore:set(Daemon|Name):DeprecationWarning")
 
 
 def test_stock_client_does_what_the_port_in_memory_does() -> None:

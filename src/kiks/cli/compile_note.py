@@ -10,4 +10,4 @@ def note_compiling() -> None:
     from kiks.engine.compiling import is_compiled
 
     if not is_compiled():
-        typer.echo("Compiling the engine for this computer: once, about half a minute ...", err=True)
+        typer.echo("Compiling the engine for this computer: once, ten seconds or so ...", err=True)

@@ -53,6 +53,8 @@ def kopen(settings: Sequence[float]) -> Reference:
         LinkError: If the port does not exist or is open already.
 
     Example:
+        >>> import kiks
+        >>> sim = kiks.Simulation()
         >>> ref = kopen([-1, 9600, 1])
         >>> ksend("D,0,0\n", ref)
         'd'

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import select
 import time
 from types import TracebackType
 from typing import Any, NamedTuple, Protocol
@@ -58,7 +60,7 @@ class Khepera:
         ...     robot.set_speed(10, 10)
         ...     robot.pause(1.0)
         ...     robot.encoders()
-        (977, 977)
+        (965, 965)
     """
 
     def __init__(self, port: str | Port, *, baud: int = 9600) -> None:
@@ -290,6 +292,10 @@ class QuickLines:
     def __init__(self, port: Any) -> None:
         self.port = port
         self._read_ahead = b""
+        try:
+            self._descriptor = int(port.fileno()) if os.name == "posix" else None
+        except (AttributeError, OSError):
+            self._descriptor = None  # not a port of the operating system: RFC 2217
 
     def write(self, data: bytes, /) -> int | None:
         """Send characters."""
@@ -297,11 +303,14 @@ class QuickLines:
         return count
 
     def read_until(self, expected: bytes = b"\n") -> bytes:
-        """Return a line, or what there is of it after the time-out."""
+        """Return a line, or what there is of it after the time-out.
+
+        Raises:
+            LinkError: If the port is gone.
+        """
         data = self._read_ahead
         while (end := data.find(expected)) < 0:
-            # The first byte is waited for, the others are there already or come at the next turn.
-            more = self.port.read(max(1, self.port.in_waiting))
+            more = self._some()
             if not more:
                 self._read_ahead = b""
                 return data
@@ -309,6 +318,24 @@ class QuickLines:
         end += len(expected)
         self._read_ahead = data[end:]
         return data[:end]
+
+    def _some(self) -> bytes:
+        """Wait for the first character and return what is there, nothing after the time-out."""
+        try:
+            if self._descriptor is None:
+                return bytes(self.port.read(max(1, self.port.in_waiting)))
+            if not select.select([self._descriptor], [], [], self.port.timeout)[0]:
+                return b""
+            some = os.read(self._descriptor, 4096)
+        except (OSError, ValueError) as error:
+            raise LinkError(
+                f"port {self.port.port!r} must stay open while it is used, but it is gone: {error}."
+            ) from None
+        if not some:
+            raise LinkError(
+                f"port {self.port.port!r} must stay open while it is used, but the other end has closed it."
+            )
+        return some
 
     def close(self) -> None:
         """Close the port."""

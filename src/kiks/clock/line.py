@@ -14,7 +14,13 @@ OUTPUT_LIMIT = 1 << 20
 
 
 class SerialLine:
-    """Both directions of one robot's line."""
+    """Both directions of one robot's line.
+
+    Attributes:
+        waiting: Characters for the host that nobody has read, arrived or not.
+        sending_until_ns: When the last character for the robot will have arrived [ns].
+        lost_count: Characters that were dropped because nobody read for too long.
+    """
 
     def __init__(self, baud: int) -> None:
         self.baud = baud
@@ -22,8 +28,8 @@ class SerialLine:
         self.sending_until_ns = 0
         self.lost_count = 0
         self._answering_until_ns = 0
-        self._waiting = bytearray()
-        # Pieces of `_waiting`, oldest first: when the first character set out [ns], time of one [ns], their count.
+        self.waiting = bytearray()
+        # Pieces of `waiting`, oldest first: when the first character set out [ns], time of one [ns], their count.
         self._pieces: deque[list[int]] = deque()
 
     def set_baud(self, baud: int) -> None:
@@ -41,18 +47,13 @@ class SerialLine:
         """Put a reply on the way to the host."""
         if not data:
             return
-        if len(self._waiting) + len(data) > OUTPUT_LIMIT:
+        if len(self.waiting) + len(data) > OUTPUT_LIMIT:
             self.lost_count += len(data)
             return
         start_ns = max(at_ns, self._answering_until_ns)
         self._answering_until_ns = start_ns + len(data) * self.character_ns
-        self._waiting += data
+        self.waiting += data
         self._pieces.append([start_ns, self.character_ns, len(data)])
-
-    @property
-    def waiting(self) -> bytearray:
-        """Characters that nobody has read, arrived or not."""
-        return self._waiting
 
     def arrived_count(self, now_ns: int) -> int:
         """Return how many of the waiting characters have arrived."""
@@ -74,8 +75,12 @@ class SerialLine:
 
     def take(self, count: int) -> bytes:
         """Remove and return the first `count` waiting characters."""
-        taken = bytes(self._waiting[:count])
-        del self._waiting[:count]
+        if count == len(self.waiting):
+            taken = bytes(self.waiting)
+            self.forget()
+            return taken
+        taken = bytes(self.waiting[:count])
+        del self.waiting[:count]
         left = len(taken)
         while left:
             piece = self._pieces[0]
@@ -90,5 +95,5 @@ class SerialLine:
 
     def forget(self) -> None:
         """Drop every character that nobody has read."""
-        self._waiting.clear()
+        self.waiting.clear()
         self._pieces.clear()

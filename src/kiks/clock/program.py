@@ -26,22 +26,20 @@ class Program:
         self.thinks = self._policy is not None
         self._waiting = Waiting()
 
-    def enter(self, *, is_command: bool = False) -> int:
+    def enter(self, *, is_command: bool) -> int:
         """Return what the program has to pay as it calls [ns]; see `Thinking.enter`."""
         return self._policy.enter(is_command=is_command) if self._policy is not None else 0
-
-    def leave(self) -> None:
-        """Note that the program goes on now."""
-        if self._policy is not None:
-            self._policy.leave()
 
     def ask(self) -> int:
         """Return the time that a question takes [ns], more and more while nothing else is done."""
         return self._waiting.ask()
 
-    def act(self) -> None:
-        """Note that the program did something else than ask."""
-        self._waiting.act()
+    def leave(self, *, has_acted: bool) -> None:
+        """Note that the program goes on now, after it has done something or has only asked."""
+        if has_acted:
+            self._waiting.act()
+        if self._policy is not None:
+            self._policy.leave()
 
     @property
     def measured_ns(self) -> list[int]:

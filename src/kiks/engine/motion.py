@@ -90,7 +90,7 @@ def pose_between(robot: Any, ticks_ago: Any, share: Any) -> Any:
         dx = robot.trail[ticks_ago - 1, 0] - x0
         dy = robot.trail[ticks_ago - 1, 1] - y0
         turn = robot.trail[ticks_ago - 1, 2] - heading
-    # The chord to a point on the arc is shorter by the ratio of the sines turned back by the rest of the half angle.
+    # The chord to a point on the arc is shorter by the ratio of sines, and turned back by the rest of the half angle.
     length = share * sinc(0.5 * share * turn) / sinc(0.5 * turn)
     sine, cosine = sin_cos(0.5 * (share - 1.0) * turn)
     x = x0 + length * (dx * cosine - dy * sine)

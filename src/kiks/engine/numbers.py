@@ -20,6 +20,8 @@ _HALF_PI_LOW = 6.077100506506192e-11
 _LN2_HIGH = 0.6931471804855391
 _LN2_LOW = 7.440617110012397e-11
 
+_RECIPROCALS = (0.0, *(1.0 / k for k in range(1, 22)))  # a multiplication costs a fraction of a division
+
 
 @kernel
 def sin_cos(angle_rad: Any) -> Any:
@@ -71,8 +73,8 @@ def exponential(x: Any) -> Any:
     r = (x - shift * _LN2_HIGH) - shift * _LN2_LOW
     total = 1.0
     for k in range(14, 0, -1):
-        total = 1.0 + total * r / k
-    return math.ldexp(total, np.int32(shift))
+        total = 1.0 + total * r * _RECIPROCALS[k]
+    return math.ldexp(total, int(shift))
 
 
 @kernel
@@ -86,7 +88,7 @@ def logarithm(x: Any) -> Any:
     q = s * s
     total = 0.0
     for k in range(21, 0, -2):
-        total = total * q + 1.0 / k
+        total = total * q + _RECIPROCALS[k]
     return 2.0 * s * total + shift * _LN2_LOW + shift * _LN2_HIGH
 
 

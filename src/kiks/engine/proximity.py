@@ -15,13 +15,14 @@ from kiks.engine.compiling import entry, kernel
 from kiks.engine.motion import pose_between
 from kiks.engine.numbers import exponential, power, sin_cos, uniform
 from kiks.engine.parameters import RAY_COUNT
-from kiks.engine.rays import cast
+from kiks.engine.rays import cast, free_cells
 from kiks.units import SENSOR_ROUND_NS, SENSOR_SLOT_NS, TICK_NS
 
 STREAM_SLIP, STREAM_PROXIMITY, STREAM_AMBIENT = 1, 2, 3
 """Random streams: whoever draws has a number of his own."""
 
 _WEIGHTS = (0.35, 0.33, 0.69, 0.43, 0.69, 0.33, 0.35)  # kiks-behaviour.md 3.1.1
+_MARGIN = 0.06  # of the range
 
 
 @kernel
@@ -44,16 +45,16 @@ def pose_at(robot: Any, tick_count: Any, time_ns: Any) -> Any:
 
 
 @kernel
-def nearness(length_mm: Any, brightness: Any, range_mm: Any) -> Any:
-    """Return what the response makes of a ray: 50 at the sensor, 0 out of range, less for a dark surface.
+def nearness(range_share: Any, brightness: Any) -> Any:
+    """Return what the response makes of a ray: 1 at the sensor, 0 out of range, less for a dark surface.
 
-    Length is inverted and scaled to the 50 mm of the Khepera; black counts half of white (thesis 3.4, "Proximity sensor
-    colour sensitivity").
+    The length, a share of the sensor's range, is inverted; black counts half of white (thesis 3.4, "Proximity sensor
+    colour sensitivity"). The margin is what the sampled rays of KiKS 2.2.0 add (kiks-behaviour.md 3.1).
     """
     if brightness == 0:
         return 0.0
-    inverted = 50.0 * min(max(1.06 - length_mm / range_mm, 0.0), 0.98)
-    return inverted * (1.0 - 0.5 * (255.0 - brightness) / 255.0)
+    inverted = min(max(1.0 + _MARGIN - range_share, 0.0), 0.98)
+    return inverted * (0.5 + brightness * (0.5 / 255.0))
 
 
 @kernel
@@ -61,9 +62,8 @@ def respond(nearnesses: Any) -> Any:
     """Return the expected count for seven nearnesses (kiks-behaviour.md 3.1.1)."""
     total = 0.0
     for ray in range(RAY_COUNT):
-        share = nearnesses[ray] / 50.0
-        root = math.sqrt(share)
-        total += _WEIGHTS[ray] * share * root * math.sqrt(root)  # to the power of 1.75
+        root = math.sqrt(nearnesses[ray])
+        total += _WEIGHTS[ray] * nearnesses[ray] * root * math.sqrt(root)  # to the power of 1.75
     if total == 0.0:
         return 0.0
     return 1023.0 * (1.0 - exponential(-power(total, 1.61)))
@@ -76,16 +76,20 @@ def expected_count(
     """Return the count that a sensor of a robot at this pose gives on average."""
     sine, cosine = sin_cos(heading)
     mount_x, mount_y = parameters.mount_x_mm[sensor], parameters.mount_y_mm[sensor]
-    eye_x = x + mount_x * cosine - mount_y * sine
-    eye_y = y + mount_x * sine + mount_y * cosine
-    reach = parameters.range_mm * 1.06
+    per_cell = 1.0 / cell
+    column = (x + mount_x * cosine - mount_y * sine) * per_cell + pad
+    row = (y + mount_x * sine + mount_y * cosine) * per_cell + pad
+    reach = parameters.range_mm * (1.0 + _MARGIN) * per_cell
+    if free_cells(field, per_cell, column, row) > reach:
+        return parameters.baseline_counts[sensor]
+    per_range = cell / parameters.range_mm
     seen = np.empty(RAY_COUNT, np.float64)
     for ray in range(RAY_COUNT):
         ray_x, ray_y = parameters.ray_cos[sensor, ray], parameters.ray_sin[sensor, ray]
         direction_x = ray_x * cosine - ray_y * sine
         direction_y = ray_x * sine + ray_y * cosine
-        length, brightness = cast(field, surface, cell, pad, eye_x, eye_y, direction_x, direction_y, reach)
-        seen[ray] = nearness(length, brightness, parameters.range_mm)
+        length, brightness = cast(field, surface, per_cell, column, row, direction_x, direction_y, reach)
+        seen[ray] = nearness(length * per_range, brightness)
     return parameters.baseline_counts[sensor] + respond(seen)
 
 

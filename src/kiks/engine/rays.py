@@ -19,44 +19,56 @@ _FAR = 1e30
 
 
 @kernel
-def cast(field: Any, surface: Any, cell: Any, pad: Any, x: Any, y: Any, cosine: Any, sine: Any, reach: Any) -> Any:
-    """Follow one ray.
+def free_cells(field: Any, per_cell: Any, column: Any, row: Any) -> Any:
+    """Return how far a point may go in any direction without meeting a wall [cells]; at most 0 next to one."""
+    i = min(max(np.int64(column), 0), field.shape[1] - 1)
+    j = min(max(np.int64(row), 0), field.shape[0] - 1)
+    return field[j, i] * per_cell - _DIAGONAL
+
+
+@kernel
+def cast(field: Any, surface: Any, per_cell: Any, column: Any, row: Any, cosine: Any, sine: Any, reach: Any) -> Any:
+    """Follow one ray; lengths and places in cells of the raster with its border.
 
     Args:
-        field: Distance of cells to the nearest wall [mm], shape [rows, columns].
+        field: Distance of cells to the nearest wall [mm], 0 in a wall, shape [rows, columns].
         surface: Brightness of cells, 0 for floor, shape [rows, columns].
-        cell: Edge of a cell [mm].
-        pad: Cells of the border around the arena.
-        x: Origin [mm].
-        y: Origin [mm].
+        per_cell: Cells in a millimetre.
+        column: Origin.
+        row: Origin.
         cosine: Direction.
         sine: Direction.
-        reach: Longest length followed [mm].
+        reach: Longest length followed.
 
     Returns:
-        Length of the ray [mm], `reach` if it meets nothing, and the brightness of what it met, 0 for nothing.
+        Length of the ray, `reach` if it meets nothing, and the brightness of what it met, 0 for nothing.
     """
-    column = x / cell + pad
-    row = y / cell + pad
-    reach_cells = reach / cell
     per_column = 1.0 / cosine if abs(cosine) > 1e-12 else _FAR
     per_row = 1.0 / sine if abs(sine) > 1e-12 else _FAR
+    right = 1 if cosine > 0.0 else 0
+    up = 1 if sine > 0.0 else 0
     length = 0.0
-    while length < reach_cells:
+    while length < reach:
         px = column + length * cosine
         py = row + length * sine
         i = min(max(np.int64(px), 0), field.shape[1] - 1)
         j = min(max(np.int64(py), 0), field.shape[0] - 1)
-        if surface[j, i] > 0:
-            return length * cell, np.int64(surface[j, i])
-        to_column = ((i + 1 if cosine > 0.0 else i) - px) * per_column if per_column < _FAR else _FAR
-        to_row = ((j + 1 if sine > 0.0 else j) - py) * per_row if per_row < _FAR else _FAR
-        to_edge = max(min(to_column, to_row), 0.0) + _NUDGE
-        length += max(field[j, i] / cell - _DIAGONAL, to_edge)
+        clearance = field[j, i] * per_cell
+        if clearance == 0.0:
+            return length, np.int64(surface[j, i])
+        if clearance > 2.5:
+            length += clearance - _DIAGONAL
+        else:
+            to_column = (i + right - px) * per_column if per_column < _FAR else _FAR
+            to_row = (j + up - py) * per_row if per_row < _FAR else _FAR
+            length += max(min(to_column, to_row), 0.0) + _NUDGE
     return reach, np.int64(0)
 
 
 @entry
 def cast_ray(field: Any, surface: Any, cell: Any, pad: Any, x: Any, y: Any, cosine: Any, sine: Any, reach: Any) -> Any:
-    """Call `cast` from Python."""
-    return cast(field, surface, cell, pad, x, y, cosine, sine, reach)
+    """Follow one ray from Python; lengths and places in mm of the arena."""
+    per_cell = 1.0 / cell
+    origin = x * per_cell + pad, y * per_cell + pad
+    length, brightness = cast(field, surface, per_cell, origin[0], origin[1], cosine, sine, reach * per_cell)
+    return (length * cell if brightness > 0 else reach), brightness

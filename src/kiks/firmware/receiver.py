@@ -32,7 +32,12 @@ class Receiver:
 
     def feed(self, data: bytes) -> list[tuple[int, bytes]]:
         """Take characters; return each line that they complete with the index of its terminator in `data`."""
-        if not self._partial and data.find(b"\n") == len(data) - 1 and 1 < len(data) <= LINE_LIMIT and b"\r" not in data:
+        if (
+            not self._partial
+            and data.find(b"\n") == len(data) - 1
+            and 1 < len(data) <= LINE_LIMIT
+            and b"\r" not in data
+        ):
             return [(len(data) - 1, data[:-1])]  # what nearly every program sends: one whole line
         lines = []
         begin = 0

@@ -53,14 +53,13 @@ class SimPort:
         with sim.lock:
             self._enter(is_command=self._has_read)
             self._has_read = False
-            self._program.act()
             while data:
                 room_ns = wire.line.sending_until_ns - BACKLOG_LIMIT * wire.line.character_ns
                 if room_ns > sim.now_ns:
                     sim.advance_to(room_ns)
                 wire.send(data[:BACKLOG_LIMIT], sim.now_ns)
                 data = data[BACKLOG_LIMIT:]
-            self._program.leave()
+            self._program.leave(has_acted=True)
         return count
 
     def read(self, size: int = 1) -> bytes:
@@ -95,7 +94,7 @@ class SimPort:
             self._enter(is_command=False)
             self._pass(self._program.ask())
             count = self._wire.line.arrived_count(sim.now_ns)
-            self._program.leave()
+            self._program.leave(has_acted=False)
         return count
 
     def flush(self) -> None:
@@ -141,7 +140,7 @@ class SimPort:
         with self.sim.lock:
             self._enter(is_command=False)
             self._pass(self._program.ask())
-            self._program.leave()
+            self._program.leave(has_acted=False)
             return self.sim.now_ns
 
     @property
@@ -157,9 +156,8 @@ class SimPort:
         """
         with self.sim.lock:
             self._enter(is_command=False)
-            self._program.act()
             self.sim.run(seconds)
-            self._program.leave()
+            self._program.leave(has_acted=True)
 
     # ---- inside ----
 
@@ -172,33 +170,25 @@ class SimPort:
             self.sim.advance_to(self.sim.now_ns + time_ns)
 
     def _read(self, size: int | None, terminator: bytes | None) -> bytes:
+        """Wait, in simulated time, for `size` characters or a terminator, whichever comes first."""
         sim, wire, line = self.sim, self._wire, self._wire.line
         with sim.lock:
             self._enter(is_command=False)
             self._has_read = True
-            deadline_ns = None if self.timeout is None else sim.now_ns + ns_from_s(self.timeout)
-            searched = 0
-            while True:
-                # How many characters complete the read: known as soon as the robot has answered, before they arrive.
-                count = size if size is not None and size <= len(line.waiting) else None
-                if terminator is not None:
-                    found = line.waiting.find(terminator, searched)
-                    if found >= 0:
-                        count = found + len(terminator) if size is None else min(found + len(terminator), size)
-                    searched = max(len(line.waiting) - len(terminator) + 1, 0)
-                if count is not None:
-                    arrival_ns = line.arrival_ns(count) if count else sim.now_ns
-                    break
-                event_ns = wire.next_ns if wire.has_command else None
-                if event_ns is None or (deadline_ns is not None and event_ns > deadline_ns):
-                    arrival_ns = None
+            deadline_ns = _NEVER if self.timeout is None else sim.now_ns + ns_from_s(self.timeout)
+            # What completes the read is known as soon as the robot has answered, before the characters arrive.
+            while not (count := _complete(line.waiting, size, terminator)) and wire.pending:
+                event_ns = wire.next_ns
+                if event_ns is None or event_ns > deadline_ns:
                     break
                 sim.advance_to(event_ns)
-            if arrival_ns is not None and (deadline_ns is None or arrival_ns <= deadline_ns):
-                self._program.act()
+            arrival_ns = line.arrival_ns(count) if count else None
+            if arrival_ns is not None and arrival_ns <= deadline_ns:
                 sim.advance_to(arrival_ns)
-                data = line.take(count or 0)
-            elif deadline_ns is None:
+                data = line.take(count)
+            elif size == 0:
+                data = b""
+            elif deadline_ns is _NEVER:
                 raise LinkError(
                     f"robot {self.robot} must have been asked something before its answer is read, but no command is "
                     f"on the line, so the read would never end. Send one that ends in a line feed, or set a timeout."
@@ -208,5 +198,19 @@ class SimPort:
                 sim.advance_to(max(deadline_ns, sim.now_ns + (self._program.ask() if self.timeout == 0 else 0)))
                 arrived = line.arrived_count(sim.now_ns)
                 data = line.take(arrived if size is None else min(arrived, size))
-            self._program.leave()
+            self._program.leave(has_acted=bool(data))
         return data
+
+
+_NEVER = 1 << 63
+"""A deadline [ns] that no simulation reaches."""
+
+
+def _complete(waiting: bytearray, size: int | None, terminator: bytes | None) -> int:
+    """Return how many of the waiting characters make a read complete, 0 while they do not."""
+    if terminator is not None:
+        found = waiting.find(terminator)
+        if found >= 0:
+            end = found + len(terminator)
+            return end if size is None or end < size else size
+    return size if size is not None and size <= len(waiting) else 0

@@ -172,7 +172,7 @@ class Lockstep:
         else:
             sim.advance_to(sim.now_ns + self._thinking_ns)
             wire.send(piece, sim.now_ns)
-        while wire.has_command and (next_ns := wire.next_ns) is not None:
+        while wire.pending and (next_ns := wire.next_ns) is not None:
             sim.advance_to(next_ns)
         if line.waiting:
             count = len(line.waiting)

@@ -17,6 +17,7 @@ class Wire:
 
     Attributes:
         holder: Who has opened the robot's port, in words for the next one who tries; None while nobody has.
+        pending: Commands on their way: when each acts [ns] and its line.
         next_ns: When the robot does something next [ns], or None while it only waits for characters.
     """
 
@@ -26,7 +27,7 @@ class Wire:
         self.holder: str | None = None
         self.next_ns: int | None = None
         self._processing_ns = ns_from_s(firmware.spec.firmware.processing_ms * 1e-3)
-        self._pending: deque[tuple[int, bytes]] = deque()
+        self.pending: deque[tuple[int, bytes]] = deque()
         self._last_act_ns = 0
         self._orphan_count = 0
 
@@ -42,19 +43,14 @@ class Wire:
         for index, line in self.firmware.receiver.feed(data):
             arrival_ns = start_ns + (index + 1) * character_ns
             self._last_act_ns = max(arrival_ns, self._last_act_ns) + self._processing_ns
-            self._pending.append((self._last_act_ns, line))
+            self.pending.append((self._last_act_ns, line))
             if self.next_ns is None or self._last_act_ns < self.next_ns:
                 self.next_ns = self._last_act_ns
 
-    @property
-    def has_command(self) -> bool:
-        """Say whether a command is on its way, so that a reply may come."""
-        return bool(self._pending)
-
     def act(self, now_ns: int) -> None:
         """Do what is due."""
-        if self._pending and self._pending[0][0] <= now_ns:
-            _, line = self._pending.popleft()
+        if self.pending and self.pending[0][0] <= now_ns:
+            _, line = self.pending.popleft()
             reply = self.firmware.execute(line, now_ns)
             if self._orphan_count:
                 self._orphan_count -= 1
@@ -64,7 +60,7 @@ class Wire:
                 self.line.set_baud(self.firmware.baud)
         else:
             self.firmware.run_demo(now_ns)
-        command_ns = self._pending[0][0] if self._pending else None
+        command_ns = self.pending[0][0] if self.pending else None
         demo_ns = self.firmware.demo_wakes_ns
         if demo_ns is None or command_ns is None:
             self.next_ns = command_ns if demo_ns is None else demo_ns
@@ -76,6 +72,6 @@ class Wire:
 
         Commands that were sent whole still act, and the robot drives on (khepera-protocol.md 11.3).
         """
-        self._orphan_count = len(self._pending)
+        self._orphan_count = len(self.pending)
         self.firmware.receiver.clear()
         self.line.forget()

@@ -28,7 +28,9 @@ class Serial(SerialBase):  # type: ignore[misc, unused-ignore]
             SerialException: If there is no such port, or somebody has it open already.
         """
         if self.port is None:
-            raise SerialException("a port must have a name before it is opened, but it has none. Set .port to 'kiks://1'.")
+            raise SerialException(
+                "a port must have a name before it is opened, but it has none. Set .port to 'kiks://1'."
+            )
         if self.is_open:
             raise SerialException(f"port {self.port!r} must be closed before it is opened, but it is open.")
         try:

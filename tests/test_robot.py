@@ -1,0 +1,79 @@
+"""Robots are data files: ours are complete, and what is wrong in a user's own is named."""
+
+from __future__ import annotations
+
+from importlib import resources
+from pathlib import Path
+
+import pytest
+
+import kiks
+from kiks.model.robot import RobotSpec
+
+OURS = (resources.files("kiks.model") / "robots" / "khepera.toml").read_text(encoding="utf-8")
+
+
+def changed(tmp_path: Path, before: str, after: str) -> str:
+    assert before in OURS
+    path = tmp_path / "mine.toml"
+    path.write_text(OURS.replace(before, after), encoding="utf-8")
+    return str(path)
+
+
+def test_ours_differ_where_the_robots_do() -> None:
+    first, second = RobotSpec.load("khepera"), RobotSpec.load("khepera_ii")
+    assert (first.body.diameter_mm, second.body.diameter_mm) == (55.0, 70.0)
+    assert first.body.wheel_base_mm == second.body.wheel_base_mm == 53.0
+    assert (first.proximity.maximum_counts, second.proximity.maximum_counts) == (1023, 1020)
+    assert first.motor == second.motor
+    assert first.reset == second.reset
+
+
+def test_a_robot_of_ones_own_drives(tmp_path: Path) -> None:
+    path = changed(tmp_path, "pulse_mm = 0.08 ", "pulse_mm = 0.12 ")
+    far = kiks.Simulation(kiks.Arena.box(2000, 2000), robot=path)
+    near = kiks.Simulation(kiks.Arena.box(2000, 2000))
+    for sim in (far, near):
+        kiks.Khepera(sim.port(1)).set_speed(5, 5)
+        sim.run(5)
+    assert far.travelled_mm(1) == pytest.approx(1.5 * near.travelled_mm(1))
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "words"),
+    [
+        ("diameter_mm = 55.0", "diametre_mm = 55.0", "Did you mean 'diameter_mm'"),
+        ("diameter_mm = 55.0", "", r"section [body] must give ['diameter_mm']"),
+        ("diameter_mm = 55.0", "diameter_mm = '55'", "body.diameter_mm must be of type float, but it was '55'"),
+        ("diameter_mm = 55.0", "diameter_mm = nan", "body.diameter_mm must be finite"),
+        ("diameter_mm = 55.0", "diameter_mm = 5", "body.diameter_mm must be between 10 and 500 mm, but it was 5.0"),
+        ("diameter_mm = 55.0", "diameter_mm = ", "must be TOML, but"),
+        ("[motor]", "[motors]", "Did you mean 'motor'"),
+        ("baud = 9600", "baud = true", "firmware.baud must be of type int, but it was True"),
+        (
+            "profile_acceleration = 64",
+            "profile_acceleration = 0",
+            "reset.profile_acceleration must be between 1 and 255",
+        ),
+        ("speed_gains = [3800, 800, 100]", "speed_gains = [3800, 800]", "reset.speed_gains must be three numbers"),
+        ('name = "Khepera"', 'name = ""', "must give the robot a name"),
+        ("slip_ratio_min = 0.10", "slip_ratio_min = 0.5", "body.slip_ratio_min must be between 0 and slip_ratio_max"),
+        ("range_mm = 50.0", "range_mm = 0", "proximity.range_mm must be between 1 and 1000 mm"),
+    ],
+)
+def test_what_is_wrong_is_named(before: str, after: str, words: str, tmp_path: Path) -> None:
+    with pytest.raises(kiks.ParameterError, match="must") as caught:
+        RobotSpec.load(changed(tmp_path, before, after))
+    assert words in str(caught.value)
+    assert "mine.toml" in str(caught.value)
+
+
+def test_an_unknown_name_is_answered_with_the_nearest() -> None:
+    with pytest.raises(kiks.ParameterError, match="Did you mean 'khepera'"):
+        RobotSpec.load("kephera")
+    with pytest.raises(kiks.ParameterError, match=r"must hold only .*Did you mean 'wall_friction'"):
+        RobotSpec.load("khepera").with_changes(body__wall_fricton=0.1)
+    with pytest.raises(kiks.ParameterError, match="must be named 'section__key'"):
+        RobotSpec.load("khepera").with_changes(speed=1)
+    with pytest.raises(kiks.ParameterError, match="between 0 and 2"):
+        RobotSpec.load("khepera").with_changes(body__wall_friction=-1)
