@@ -131,3 +131,8 @@ def test_placing(sim: kiks.Simulation) -> None:
         sim.pose(2)
     with pytest.raises(kiks.ParameterError, match="Time never runs backwards"):
         sim.run(-1)
+
+
+def test_an_arena_is_an_arena() -> None:
+    with pytest.raises(kiks.ParameterError, match=r"arena must be a kiks.Arena, but it was 'maze.png'. Read a file"):
+        kiks.Simulation("maze.png")  # type: ignore[arg-type]

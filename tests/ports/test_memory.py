@@ -80,13 +80,26 @@ def test_waiting_for_a_reply_by_polling_ends() -> None:
 
 def test_one_client_a_robot() -> None:
     sim = kiks.Simulation()
-    first = kiks.Khepera(sim.port(1))
-    with pytest.raises(
-        kiks.LinkError, match=r"must be free to be opened, but robot 1 is in use by another kiks.Khepera"
-    ):
-        kiks.Khepera(sim.port(1))
+    first = kiks.Khepera(sim.url(1))
+    with pytest.raises(kiks.LinkError, match=r"must be free to be opened, but robot 1 is in use by the program that"):
+        kiks.Khepera(sim.url(1))
+    sim.port(1).close()  # the port that supervises is not the one that holds the line
+    with pytest.raises(kiks.LinkError, match="must be free"):
+        kiks.kopen([-1, 9600, 1])
     first.close()
-    kiks.Khepera(sim.port(1)).stop()
+    kiks.Khepera(sim.url(1)).stop()
+
+
+def test_replies_that_nobody_waits_for_any_more_are_dropped() -> None:
+    sim = kiks.Simulation()
+    port = sim.port(1)
+    port.write(b"N\nL,0,1\n")
+    port.close()
+    sim.run(1.0)
+    assert port.in_waiting == 0
+    assert sim.state.robots["led"][0, 0, 0] == 1
+    port.write(b"B\n")
+    assert port.readline() == b"b,5.02,5.01\r\n"
 
 
 def test_hanging_up_drops_what_nobody_read_and_the_robot_drives_on() -> None:

@@ -66,9 +66,6 @@ class Khepera:
     def __init__(self, port: str | Port, *, baud: int = 9600) -> None:
         if isinstance(port, str):
             self.port: Port = open_port(port, baud)
-        elif isinstance(port, SimPort):
-            port.claim("another kiks.Khepera")
-            self.port = port
         else:
             self.port = port
         if isinstance(self.port, SimPort) and self.port.timeout is None:

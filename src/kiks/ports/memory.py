@@ -30,6 +30,7 @@ class SimPort:
         self._wire = sim.wires[robot - 1]
         self._program = sim.program
         self._has_read = True
+        self._is_claimed = False
 
     # ---- what pyserial's ports have ----
 
@@ -112,7 +113,7 @@ class SimPort:
         """Do nothing: what was written is on the line already."""
 
     def claim(self, holder: str) -> None:
-        """Open the port for one client: only one can use a line at a time.
+        """Take the line for this port alone, as opening it by name does; `close` gives it back.
 
         Args:
             holder: Who it is, in words for the next one who tries.
@@ -126,11 +127,14 @@ class SimPort:
                 f"Close it there first, or open another robot."
             )
         self._wire.holder = holder
+        self._is_claimed = True
 
     def close(self) -> None:
         """Hang up: forget what nobody read. The robot drives on, and the port may be opened again."""
         with self.sim.lock:
-            self._wire.holder = None
+            if self._is_claimed:
+                self._wire.holder = None
+                self._is_claimed = False
             self._wire.hang_up()
 
     # ---- time, as the program lives it ----

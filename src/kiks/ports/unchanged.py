@@ -44,7 +44,7 @@ class Assignment:
                     f"Run it with --robots {self.sim.robot_count + 1}, or map two names to one robot with --map."
                 )
             self._robots[name] = free[0]
-        return self.sim.port(self._robots[name])
+        return SimPort(self.sim, self._robots[name])
 
 
 @contextmanager

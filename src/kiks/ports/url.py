@@ -15,7 +15,7 @@ _OPTIONS = ("arena", "robots", "robot", "seed", "thinking")
 
 
 def find_port(url: str) -> SimPort:
-    """Return the port that a name stands for.
+    """Return a port of its own on the line that a name stands for.
 
     A number alone is a robot of the simulation that was created last, or of a fresh one in the default arena if there
     is none. Options after a question mark always make a fresh simulation.
@@ -49,7 +49,7 @@ def find_port(url: str) -> SimPort:
             f"a port must belong to a robot there is, but {url!r} names robot {robot} and the simulation has {known}. "
             f"Open {sim.url(min(max(robot, 1), sim.robot_count))!r}, or create it with more robots."
         )
-    return sim.port(robot)
+    return SimPort(sim, robot)
 
 
 def _fresh(options: dict[str, str], url: str) -> Simulation:

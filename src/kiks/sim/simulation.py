@@ -66,6 +66,10 @@ class Simulation:
         thinking: str = "none",
         robot: str | RobotSpec = "khepera",
     ) -> None:
+        if not isinstance(arena, Arena | None):
+            raise ParameterError(
+                f"arena must be a kiks.Arena, but it was {arena!r}. Read a file with kiks.Arena.load(path)."
+            )
         if not isinstance(robots, int) or not 1 <= robots <= 1000:
             raise ParameterError(
                 f"robots must be a whole number from 1 to 1000, but it was {robots!r}. Say how many you need."
