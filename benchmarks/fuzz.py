@@ -20,6 +20,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from calibration import report
 from tests.reply_grammar import allowed, first_violation, kind
 from tests.session_player import turrets
 
@@ -122,7 +123,7 @@ def peak_memory_mb() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
-def fuzz(name: str, batches: Iterator[bytes], rng: random.Random) -> bool:
+def fuzz(name: str, batches: Iterator[bytes], rng: random.Random, *, as_json: bool) -> bool:
     """Push batches through one robot and report; say whether every reply was right."""
     sim = Simulation(Arena.box(500, 500), robot="khepera_ii", seed=rng.randrange(2**32))
     for turret in turrets().values():
@@ -138,17 +139,21 @@ def fuzz(name: str, batches: Iterator[bytes], rng: random.Random) -> bool:
         lines = [line for line in re.split(rb"[\r\n]", data) if line]
         fault = first_violation(lines, output, has_flash=True)
         if fault is not None:
-            print(f"{name}, batch {number}: {fault}")
+            print(f"{name}, batch {number}: {fault}", file=sys.stderr)
             return False
         counts.update(kind(allowed(line, has_flash=True)) for line in lines)
         if number == BATCHES_PER_WIRE + 1:
             warm_mb = peak_memory_mb()
     total = sum(counts.values())
+    growth_mb = peak_memory_mb() - warm_mb if warm_mb else 0.0
+    if as_json:
+        rows = [("lines_per_s", total / robot_s, "1/s"), ("lines", total, "1"), ("memory_growth_mb", growth_mb, "MB")]
+        report([(f"fuzz.{name}.{figure}", value, unit) for figure, value, unit in rows], as_json=True)
+        return True
     print(f"{name}: {total:,} lines that are not empty, {byte_count:,} bytes, {sim.time_s:,.0f} s on the robot's clock")
     print(f"  {robot_s:.1f} s: {total / robot_s:,.0f} lines/s, {byte_count / robot_s / 1e6:.2f} MB/s")
     print("  replies:", ", ".join(f"{reply} {count:,}" for reply, count in counts.most_common()))
     if warm_mb:
-        growth_mb = peak_memory_mb() - warm_mb
         print(f"  peak memory {peak_memory_mb():.1f} MB, {growth_mb:.1f} MB more than after the first batches")
     return True
 
@@ -158,11 +163,12 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--lines", type=int, default=1_000_000, help="random lines to send")
     parser.add_argument("--bytes", type=int, default=10_000_000, help="random bytes to send")
+    parser.add_argument("--json", action="store_true", help="one JSON object a line")
     parser.add_argument("--seed", type=int, default=0, help="the same seed sends the same")
     options = parser.parse_args()
     rng = random.Random(options.seed)
-    is_right = fuzz("lines", line_batches(options.lines, rng), rng)
-    is_right = fuzz("bytes", byte_batches(options.bytes, rng), rng) and is_right
+    is_right = fuzz("lines", line_batches(options.lines, rng), rng, as_json=options.json)
+    is_right = fuzz("bytes", byte_batches(options.bytes, rng), rng, as_json=options.json) and is_right
     return 0 if is_right else 1
 
 
