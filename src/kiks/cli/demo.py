@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from kiks.cli.compile_note import note_compiling
+from kiks.cli.options import ArenaFile, Seed, load_arena
 
 SLICE_S = 0.1
 """Simulated time between two points of the drawn path [s]."""
@@ -27,10 +28,8 @@ class Behaviour(enum.StrEnum):
 def demo(
     behaviour: Annotated[Behaviour, typer.Argument(help="What the robot does.")] = Behaviour.AVOID,
     seconds: Annotated[float, typer.Option(help="Simulated time [s].", min=1, max=86400)] = 120.0,
-    arena: Annotated[
-        str | None, typer.Option(help="Arena file (.toml) or picture; the classic box if left out.")
-    ] = None,
-    seed: Annotated[int, typer.Option(help="Seed: the same seed, the same run.", min=0)] = 0,
+    arena: ArenaFile = None,
+    seed: Seed = 0,
     baud: Annotated[int, typer.Option(help="Speed of the simulated serial line [bit/s].")] = 9600,
     picture: Annotated[Path | None, typer.Option(help="Where the picture of the path goes.")] = None,
 ) -> None:
@@ -57,10 +56,9 @@ def run_demo(
 
     from kiks.client.khepera import Khepera
     from kiks.drawing import draw_run, save_picture
-    from kiks.model.arena import Arena
     from kiks.sim.simulation import Simulation
 
-    place = Arena.default() if arena is None else Arena.load(arena)
+    place = load_arena(arena)
     sim = Simulation(place, seed=seed)
     port = sim.port(1)
     port.baudrate = baud

@@ -8,18 +8,17 @@ from typing import Annotated
 import typer
 
 from kiks.cli.compile_note import note_compiling
+from kiks.cli.options import ArenaFile, RobotKind, Robots, Seed, load_arena
 from kiks.errors import ParameterError
 
 
 def run(
     program: Annotated[Path, typer.Argument(help="A Python program that talks to a Khepera through pyserial.")],
     arguments: Annotated[list[str] | None, typer.Argument(help="What the program finds in sys.argv.")] = None,
-    arena: Annotated[
-        str | None, typer.Option(help="Arena file (.toml) or picture; the classic box if left out.")
-    ] = None,
-    robots: Annotated[int, typer.Option(help="Robots in the arena.", min=1, max=1000)] = 1,
-    robot: Annotated[str, typer.Option(help="Kind of robot: khepera, khepera_ii, or a file.")] = "khepera",
-    seed: Annotated[int, typer.Option(help="Seed: the same seed, the same run.", min=0)] = 0,
+    arena: ArenaFile = None,
+    robots: Robots = 1,
+    robot: RobotKind = "khepera",
+    seed: Seed = 0,
     thinking: Annotated[
         str, typer.Option(help="What the program's computing costs: none, fixed:MS, live, live:FACTOR, replay:FILE.")
     ] = "none",
@@ -38,7 +37,6 @@ def run(
     Example: kiks run --arena examples/arenas/maze.toml --map /dev/ttyUSB0=1 wander.py
     """
     note_compiling()
-    from kiks.model.arena import Arena
     from kiks.ports.unchanged import run_program
     from kiks.sim.simulation import Simulation
 
@@ -48,7 +46,7 @@ def run(
         )
     mapping = dict(parse_map(entry) for entry in map_ or [])
     sim = Simulation(
-        Arena.default() if arena is None else Arena.load(arena),
+        load_arena(arena),
         robots=robots,
         seed=seed,
         thinking=thinking,

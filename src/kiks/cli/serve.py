@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from kiks.cli.compile_note import note_compiling
+from kiks.cli.options import ArenaFile, RobotKind, Robots, Seed, load_arena
 from kiks.errors import LinkError
 
 if TYPE_CHECKING:
@@ -21,12 +22,10 @@ TCP_PORT = 10020
 
 
 def serve(
-    arena: Annotated[
-        str | None, typer.Option(help="Arena file (.toml) or picture; the classic box if left out.")
-    ] = None,
-    robots: Annotated[int, typer.Option(help="Robots in the arena.", min=1, max=1000)] = 1,
-    robot: Annotated[str, typer.Option(help="Kind of robot: khepera, khepera_ii, or a file.")] = "khepera",
-    seed: Annotated[int, typer.Option(help="Seed: the same seed, the same run.", min=0)] = 0,
+    arena: ArenaFile = None,
+    robots: Robots = 1,
+    robot: RobotKind = "khepera",
+    seed: Seed = 0,
     speed: Annotated[float, typer.Option(help="Simulated seconds in a real one, for thinking live.")] = 1.0,
     thinking: Annotated[
         str, typer.Option(help="live: the world runs all the time; none or fixed:MS: it waits for each command.")
@@ -53,7 +52,6 @@ def serve(
 
     Example: kiks serve --arena examples/arenas/maze.toml --link /tmp/khepera
     """
-    from kiks.model.arena import Arena
     from kiks.ports.server import Server
     from kiks.sim.simulation import Simulation
 
@@ -61,7 +59,7 @@ def serve(
         if not quiet:
             typer.echo(text)
 
-    ground = Arena.default() if arena is None else Arena.load(arena)
+    ground = load_arena(arena)
     sim = Simulation(ground, robots=robots, seed=seed, robot=robot)
     for wire in sim.wires:
         wire.set_baud(baud)

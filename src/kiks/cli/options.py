@@ -1,0 +1,26 @@
+"""Options that several commands have, in one wording."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from kiks.model.arena import Arena
+
+ArenaFile = Annotated[str | None, typer.Option(help="Arena file (.toml) or picture; the classic box if left out.")]
+Robots = Annotated[int, typer.Option(help="Robots in the arena.", min=1, max=1000)]
+RobotKind = Annotated[str, typer.Option(help="Kind of robot: khepera, khepera_ii, or a file.")]
+Seed = Annotated[int, typer.Option(help="Seed: the same seed, the same run.", min=0)]
+
+
+def load_arena(file: str | None) -> Arena:
+    """Return the arena of a file, the classic box if there is none.
+
+    Raises:
+        ArenaError: If the file is no arena.
+    """
+    from kiks.model.arena import Arena
+
+    return Arena.default() if file is None else Arena.load(file)
