@@ -10,6 +10,6 @@ collect_ignore_glob = ["programs/*"]
 
 def pytest_configure(config: pytest.Config) -> None:
     if not hasattr(config, "workerinput") and not config.option.collectonly:
-        from kiks.cli.warmup import compile_everything
+        from kiks.cli.engine_start import compile_everything
 
         compile_everything()

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from kiks.cli.compile_note import note_compiling
+from kiks.cli.engine_start import ready_engine
 from kiks.cli.options import ArenaFile, Seed, load_arena
 
 SLICE_S = 0.1
@@ -37,7 +37,7 @@ def demo(
 
     Example: kiks demo follow --arena examples/arenas/office.toml --seconds 300
     """
-    note_compiling()
+    ready_engine()
     from kiks.demos.avoid import Avoid
     from kiks.demos.follow import Follow
 

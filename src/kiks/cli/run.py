@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from kiks.cli.compile_note import note_compiling
+from kiks.cli.engine_start import ready_engine
 from kiks.cli.options import ArenaFile, RobotKind, Robots, Seed, load_arena
 from kiks.errors import ParameterError
 
@@ -36,7 +36,7 @@ def run(
 
     Example: kiks run --arena examples/arenas/maze.toml --map /dev/ttyUSB0=1 wander.py
     """
-    note_compiling()
+    ready_engine()
     from kiks.ports.unchanged import run_program
     from kiks.sim.simulation import Simulation
 

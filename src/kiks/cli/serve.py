@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from kiks.cli.compile_note import note_compiling
+from kiks.cli.engine_start import compile_everything, ready_engine
 from kiks.cli.options import ArenaFile, RobotKind, Robots, Seed, load_arena
 from kiks.errors import LinkError
 
 if TYPE_CHECKING:
     from kiks.ports.endpoint import Endpoint
-    from kiks.sim.simulation import Simulation
 
 TCP_PORT = 10020
 """TCP port of robot 1, that of the next one for robot 2 and so on (khepera-protocol.md 3.3)."""
@@ -64,8 +63,8 @@ def serve(
     for wire in sim.wires:
         wire.set_baud(baud)
     if not quiet:
-        note_compiling()
-    _warm_up(sim)
+        ready_engine()
+    compile_everything()  # or load it: before the first program waits for it
     ways: dict[int, list[Endpoint]] = {number: [] for number in range(1, robots + 1)}
     server = None
     # However the process is ended, the links are removed; `nohup` keeps it alive as ever.
@@ -95,16 +94,6 @@ def serve(
             for endpoints in ways.values():
                 for endpoint in endpoints:
                     endpoint.close()
-
-
-def _warm_up(sim: Simulation) -> None:
-    """Compile or load the engine before the first program waits for it, in a world of its own."""
-    from kiks.sim.simulation import Simulation
-
-    port = Simulation(sim.arena, robot=sim.spec).port(1)
-    for command in (b"D,1,1\n", b"N\n", b"O\n", b"D,0,0\n"):
-        port.write(command)
-        port.readline()
 
 
 def _open_pty(number: int, robots: int, link: Path | None, baud: int) -> Endpoint:

@@ -1,0 +1,33 @@
+"""The word to the person who waits: the first start compiles the engine."""
+
+from __future__ import annotations
+
+import typer
+
+
+def ready_engine() -> None:
+    """Compile the engine if it is not in the cache, and say so on the terminal before the wait begins."""
+    from kiks.engine.compiling import is_compiled
+
+    if not is_compiled():
+        typer.echo("Compiling the engine for this computer: once, ten seconds or so ...", err=True)
+        compile_everything()
+
+
+def compile_everything() -> None:
+    """Call every compiled function once, by way of what users call."""
+    from kiks.client.khepera import Khepera
+    from kiks.model.arena import Arena
+    from kiks.sim.simulation import Simulation
+
+    sim = Simulation(Arena.box(200, 200))
+    robot = Khepera(sim.port(1))
+    robot.set_speed(1, 1)
+    robot.set_pwm(1, 1)
+    robot.set_encoders(0, 0)
+    robot.move_to(1, 1)
+    robot.status()
+    robot.proximity()
+    robot.ambient()
+    sim.proximity(1)
+    sim.place(1, *sim.pose(1))
