@@ -24,6 +24,7 @@ LAYERS = [
     "client",
     "demos",
     "drawing",
+    "fit",
     "cli",
 ]
 

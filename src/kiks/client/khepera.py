@@ -206,6 +206,13 @@ class Khepera:
                 f"the reply to {request!r} must be whole numbers, but it was {reply!r}. Use send() for its text."
             ) from None
 
+    def image(self) -> list[int]:
+        """Return the 64 greys 0..255 of the K213 camera's last picture, the leftmost first (T,2,N)."""
+        pixels = self.turret(2, "N")
+        if len(pixels) != 64:
+            raise LinkError(f"the reply to 'T,2,N' must be 64 greys, but it was {len(pixels)}. Is turret 2 a K213?")
+        return pixels
+
     def send(self, text: str) -> str:
         """Send any line and return the first line of the reply, both without their ends."""
         if "\n" in text or "\r" in text or not text.isascii():

@@ -101,6 +101,19 @@ def power(base: Any, exponent: Any) -> Any:
 
 
 @kernel
+def tanh(x: Any) -> Any:
+    """Return the hyperbolic tangent within 7e-6: its continued fraction to the ninth level, up to 1."""
+    if x >= 6.297:
+        return 1.0
+    if x <= -6.297:
+        return -1.0
+    q = x * x
+    above = (((q + 990.0) * q + 135135.0) * q + 4729725.0) * q + 34459425.0
+    below = (((45.0 * q + 13860.0) * q + 945945.0) * q + 16216200.0) * q + 34459425.0
+    return x * above / below
+
+
+@kernel
 def mix(value: Any) -> Any:
     """Scramble 64 bits so that every bit of the input flips half of the output (the finalizer of SplitMix64)."""
     z = np.uint64(value) + np.uint64(0x9E3779B97F4A7C15)

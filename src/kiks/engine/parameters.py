@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.engine.numbers import exponential, sin_cos
-from kiks.model.robot import SENSOR_COUNT, RobotSpec
+from kiks.model.robot import AMBIENT_MODELS, LAMP_POINT_LIMIT, SENSOR_COUNT, Ambient, RobotSpec
 from kiks.units import TICK_NS
 
 RAY_COUNT = 7
@@ -41,8 +41,17 @@ PARAMETERS = np.dtype(
         ("noise_large", "f8"),
         ("noise_exponent", "i8"),
         ("noise_counts", "f8"),
+        ("axis_cos", "f8", (SENSOR_COUNT,)),
+        ("axis_sin", "f8", (SENSOR_COUNT,)),
+        ("ambient_model", "i8"),
         ("dark_counts", "f8"),
         ("dark_noise_counts", "f8"),
+        ("background_counts", "f8"),
+        ("background_flux", "f8"),  # of the lamp of 1 W that would read so [W/mm^2]
+        ("angle_exponent", "f8"),
+        ("lamp_step_mm", "f8"),
+        ("lamp_point_count", "i8"),
+        ("lamp_counts", "f8", (LAMP_POINT_LIMIT,)),
     ],
     align=True,
 )
@@ -79,6 +88,32 @@ def pack(spec: RobotSpec) -> NDArray[np.void]:
         robot[name] = getattr(proximity, name)
     for name in ("noise_small", "noise_large", "noise_exponent", "noise_counts"):
         robot[name] = getattr(proximity, name)
-    robot["dark_counts"] = spec.ambient.dark_counts
-    robot["dark_noise_counts"] = spec.ambient.noise_counts
+    _pack_ambient(robot, spec)
     return packed
+
+
+def _pack_ambient(robot: Any, spec: RobotSpec) -> None:
+    ambient = spec.ambient
+    for sensor in range(SENSOR_COUNT):
+        sine, cosine = sin_cos(math.radians(spec.proximity.direction_deg[sensor]))
+        robot["axis_cos"][sensor] = cosine
+        robot["axis_sin"][sensor] = sine
+    robot["ambient_model"] = AMBIENT_MODELS.index(ambient.model)
+    robot["dark_noise_counts"] = ambient.noise_counts
+    for name in ("dark_counts", "background_counts", "angle_exponent", "lamp_step_mm"):
+        robot[name] = getattr(ambient, name)
+    robot["lamp_point_count"] = len(ambient.lamp_counts)
+    robot["lamp_counts"][: len(ambient.lamp_counts)] = ambient.lamp_counts
+    robot["background_flux"] = 1.0 / _lamp_distance_mm(ambient) ** 2
+
+
+def _lamp_distance_mm(ambient: Ambient) -> float:
+    """Return how far a lamp of 1 W is that reads as much as the background [mm], infinity in the dark."""
+    wanted, counts = ambient.background_counts, ambient.lamp_counts
+    rest = ambient.dark_counts - wanted
+    if rest <= 0:
+        return math.inf
+    for i in range(len(counts) - 1):
+        if wanted <= counts[i + 1]:
+            return ambient.lamp_step_mm * (i + (wanted - counts[i]) / (counts[i + 1] - counts[i]))
+    return ambient.lamp_step_mm * (len(counts) - 1) * math.sqrt((ambient.dark_counts - counts[-1]) / rest)

@@ -18,7 +18,7 @@ from kiks.engine.parameters import RAY_COUNT
 from kiks.engine.rays import cast, free_cells
 from kiks.units import SENSOR_ROUND_NS, SENSOR_SLOT_NS, TICK_NS
 
-STREAM_SLIP, STREAM_PROXIMITY, STREAM_AMBIENT = 1, 2, 3
+STREAM_SLIP, STREAM_PROXIMITY = 1, 2
 """Random streams: whoever draws has a number of his own."""
 
 _WEIGHTS = (0.35, 0.33, 0.69, 0.43, 0.69, 0.33, 0.35)  # kiks-behaviour.md 3.1.1
@@ -161,16 +161,6 @@ def expect_proximity(
     x, y, heading = pose_at(robots[0, robot], tick_count, time_ns)
     for sensor in range(out.shape[0]):
         out[sensor] = expected_count(field, surface, cell, pad, kinds[robot], x, y, heading, sensor)
-
-
-@entry
-def read_ambient(robots: Any, kinds: Any, time_ns: Any, seed: Any, robot: Any, out: Any) -> Any:
-    """Write the eight counts that command O returns at a time into `out`: the dark value and its noise."""
-    parameters = kinds[robot]
-    for sensor in range(out.shape[0]):
-        turn, _ = sample_instant(time_ns, sensor)
-        jitter = uniform(seed, 0, robot, STREAM_AMBIENT, turn, sensor)
-        out[sensor] = quantize(parameters, parameters.dark_counts + parameters.dark_noise_counts * (2.0 * jitter - 1.0))
 
 
 @entry

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 import tomllib
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from importlib import resources
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +15,13 @@ from kiks.errors import ParameterError, nearest
 
 SENSOR_COUNT = 8
 """Infra-red sensors of a Khepera, clockwise from the left side (khepera-protocol.md 4.14)."""
+
+
+AMBIENT_MODELS = ("flux", "thesis")
+"""How several lamps make one reading: their light adds up, or the thesis's formula for the strongest."""
+
+LAMP_POINT_LIMIT = 64
+"""Most points of the curve of light against distance."""
 
 
 @dataclass(frozen=True)
@@ -74,10 +83,19 @@ class Proximity:
 
 @dataclass(frozen=True)
 class Ambient:
-    """How the sensors answer to light: the count in the dark and its noise."""
+    """How the sensors answer to light.
 
+    `lamp_counts` is what a sensor reads that looks straight at a lamp of 1 W from 0, 1, 2, ... steps of `lamp_step_mm`;
+    `background_counts` what it reads of the room's daylight alone, which in the dark is `dark_counts`.
+    """
+
+    model: str
     dark_counts: float
     noise_counts: float
+    background_counts: float
+    angle_exponent: float
+    lamp_step_mm: float
+    lamp_counts: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -288,5 +306,21 @@ def _check(spec: RobotSpec, where: str) -> None:
     must(proximity.noise_counts >= 0, "proximity.noise_counts", "at least 0")
     must(0 <= spec.ambient.dark_counts <= 1023, "ambient.dark_counts", "between 0 and 1023 counts")
     must(spec.ambient.noise_counts >= 0, "ambient.noise_counts", "at least 0")
+    _check_light(spec.ambient, must)
     must(0 <= spec.firmware.processing_ms <= 1000, "firmware.processing_ms", "between 0 and 1000 ms")
     must(75 <= spec.firmware.baud <= 4_000_000, "firmware.baud", "between 75 and 4000000 bit/s")
+
+
+def _check_light(ambient: Ambient, must: Callable[[bool, str, str], None]) -> None:
+    counts, dark = ambient.lamp_counts, ambient.dark_counts
+    must(ambient.model in AMBIENT_MODELS, "ambient.model", f"one of {list(AMBIENT_MODELS)}")
+    must(2 <= len(counts) <= LAMP_POINT_LIMIT, "ambient.lamp_counts", f"a list of 2 to {LAMP_POINT_LIMIT}")
+    rises = all(nearer <= farther for nearer, farther in pairwise(counts))
+    must(rises and counts[0] >= 0 and counts[-1] <= dark, "ambient.lamp_counts", "0 or more, rising, up to dark_counts")
+    must(
+        counts[0] < ambient.background_counts <= dark,
+        "ambient.background_counts",
+        "above lamp_counts, up to dark_counts",
+    )
+    must(0.1 <= ambient.lamp_step_mm <= 1000, "ambient.lamp_step_mm", "between 0.1 and 1000 mm")
+    must(0 < ambient.angle_exponent <= 20, "ambient.angle_exponent", "above 0 and up to 20")

@@ -9,15 +9,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kiks.clock.program import Program
-from kiks.engine import contact, proximity, step
+from kiks.engine import ambient, contact, proximity, step
 from kiks.engine.numbers import uniform
 from kiks.engine.parameters import pack
 from kiks.engine.state import State
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, nearest
 from kiks.firmware.khepera import Firmware
 from kiks.firmware.turret import Turret
 from kiks.model.arena import PAD, Arena
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
+from kiks.sim.cameras import Cameras
 from kiks.sim.table import TABLE
 from kiks.sim.wire import Wire
 from kiks.units import TICK_NS, ns_from_s, s_from_ns
@@ -41,6 +42,10 @@ class Simulation:
         seed: Seed of all random numbers; the same seed gives the same run, to the bit.
         thinking: What the program's own computing costs: 'none', 'fixed:MS', 'live', 'live:FACTOR' or 'replay:FILE'.
         robot: Kind of all robots: a name that `RobotSpec.load` knows, a file, or a `RobotSpec`.
+
+    Attributes:
+        lamps: The arena's lamps, float64 [lamp, 4]: x_mm, y_mm, power_w, and 1 for on or 0 for off. Write to it to
+            move or switch them.
 
     Raises:
         ParameterError: If a number is out of range or a name unknown.
@@ -89,9 +94,11 @@ class Simulation:
         self.state = State.empty(world_count=1, robot_count=robots)
         self._kinds = np.repeat(pack(self.spec), robots)
         self._ground = (self.arena.clearance, float(self.arena.mm_per_cell), PAD)
-        self._sight = (self.arena.clearance, self.arena.surface, float(self.arena.mm_per_cell), PAD)
+        self.sight = (self.arena.clearance, self.arena.surface, float(self.arena.mm_per_cell), PAD)
+        self.lamps = np.array(self.arena.lamps, np.float64).reshape(-1, 4)
         self._counts = np.zeros(SENSOR_COUNT, np.int64)
         self._expected = np.zeros(SENSOR_COUNT, np.float64)
+        self._cameras = Cameras(self)
         self.wires = [Wire(self._firmware(index)) for index in range(robots)]
         self._ports: dict[int, SimPort] = {}
         for index in range(robots):
@@ -103,7 +110,7 @@ class Simulation:
             proximity.read_proximity(
                 self.state.robots,
                 self._kinds,
-                *self._sight,
+                *self.sight,
                 self.state.tick_count,
                 self.now_ns,
                 self.seed,
@@ -113,7 +120,17 @@ class Simulation:
             return self._counts.tolist()
 
         def sense_ambient() -> list[int]:
-            proximity.read_ambient(self.state.robots, self._kinds, self.now_ns, self.seed, index, self._counts)
+            ambient.read_ambient(
+                self.state.robots,
+                self._kinds,
+                *self.sight,
+                self.lamps,
+                self.state.tick_count,
+                self.now_ns,
+                self.seed,
+                index,
+                self._counts,
+            )
             return self._counts.tolist()
 
         return Firmware(self.spec, self.state, index, sense_proximity=sense_proximity, sense_ambient=sense_ambient)
@@ -182,7 +199,13 @@ class Simulation:
 
     def sync(self) -> None:
         """Do the ticks that have begun: the engine is behind the clock until somebody looks."""
-        ticks = -(-self.now_ns // TICK_NS) - self.state.tick_count
+        if self._cameras:
+            self._cameras.sync()
+        self.tick_to(self.now_ns)
+
+    def tick_to(self, time_ns: int) -> None:
+        """Do the ticks that have begun up to a time [ns]."""
+        ticks = -(-time_ns // TICK_NS) - self.state.tick_count
         if ticks > 0:
             step.advance(self.state.robots, self._kinds, *self._ground, self.seed, self.state.tick_count, ticks)
             self.state.tick_count += ticks
@@ -221,13 +244,34 @@ class Simulation:
         """
         return f"kiks://{self.name}/{self._index(robot) + 1}"
 
-    def fit(self, robot: int, turret: Turret) -> None:
-        """Put a turret on a robot; it answers to `T,<its number>,...` from now on.
+    def fit(self, robot: int, turret: str | Turret) -> None:
+        r"""Put a turret on a robot; it answers to `T,<its number>,...` from now on.
+
+        Args:
+            robot: Number of the robot, from 1.
+            turret: 'k213', the linear camera, or an object of your own.
 
         Raises:
-            ParameterError: If there is no such robot.
+            ParameterError: If there is no such robot or turret.
+
+        Example:
+            >>> sim = Simulation()
+            >>> sim.fit(1, "k213")
+            >>> port = sim.port(1)
+            >>> port.write(b"T,2,B\n"); port.readline()
+            6
+            b't,2,b,1,0\r\n'
         """
-        self.wires[self._index(robot)].firmware.turrets[turret.number] = turret
+        index = self._index(robot)
+        if isinstance(turret, str) and turret != "k213":
+            raise ParameterError(
+                f"turret must be 'k213' or an object of your own, but it was {turret!r}.{nearest(turret, ['k213'])} "
+                f"kiks.firmware.turret.Turret says what such an object must be able to do."
+            )
+        with self.lock:
+            self.sync()
+            fitted = self._cameras.fit(index) if isinstance(turret, str) else turret
+            self.wires[index].firmware.turrets[fitted.number] = fitted
 
     def pose(self, robot: int) -> tuple[float, float, float]:
         """Return where a robot is at this very instant: x_mm, y_mm, heading_rad (not wrapped).
@@ -269,6 +313,7 @@ class Simulation:
         with self.lock:
             self.sync()
             self._put(index, float(x_mm), float(y_mm), float(heading_rad))
+            self._cameras.replace(index)
 
     def _put(self, index: int, x_mm: float, y_mm: float, heading_rad: float) -> None:
         robot: Any = self.state.robots[0, index]
@@ -291,9 +336,47 @@ class Simulation:
             if noise:
                 return [float(count) for count in self.wires[index].firmware.sense_proximity()]
             proximity.expect_proximity(
-                self.state.robots, self._kinds, *self._sight, self.state.tick_count, self.now_ns, index, self._expected
+                self.state.robots, self._kinds, *self.sight, self.state.tick_count, self.now_ns, index, self._expected
             )
             return [float(count) for count in self._expected]
+
+    def ambient(self, robot: int, *, noise: bool = False) -> list[float]:
+        """Return what the eight light sensors would read at this instant and pose, without waiting for their round.
+
+        Args:
+            robot: Number of the robot, from 1.
+            noise: True for the counts that command `O` would report now, with noise and rounding.
+
+        Raises:
+            ParameterError: If there is no such robot.
+        """
+        index = self._index(robot)
+        with self.lock:
+            self.sync()
+            if noise:
+                return [float(count) for count in self.wires[index].firmware.sense_ambient()]
+            ambient.expect_ambient(
+                self.state.robots,
+                self._kinds,
+                *self.sight,
+                self.lamps,
+                self.state.tick_count,
+                self.now_ns,
+                index,
+                self._expected,
+            )
+            return [float(count) for count in self._expected]
+
+    def image(self, robot: int) -> list[float]:
+        """Return what a K213 would see at this instant and pose, 64 greys from the left, without noise or rounding.
+
+        Raises:
+            ParameterError: If there is no such robot.
+        """
+        index = self._index(robot)
+        with self.lock:
+            self.sync()
+            return self._cameras.expect(index)
 
     def travelled_mm(self, robot: int) -> float:
         """Return the length of a robot's path so far [mm].

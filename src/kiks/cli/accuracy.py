@@ -1,0 +1,86 @@
+"""`kiks accuracy`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from kiks.cli.compile_note import note_compiling
+from kiks.errors import ParameterError
+
+if TYPE_CHECKING:
+    from kiks.fit.accuracy import Card
+
+DataFolder = Annotated[
+    Path | None,
+    typer.Option("--data", help="Folder of the measured samples; beside the repository or in KIKS_SHARED if left out."),
+]
+PlotFolder = Annotated[Path | None, typer.Option("--plots", help="Folder for pictures (needs Matplotlib).")]
+
+
+def accuracy(
+    data: DataFolder = None,
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object a line: name, value, unit.")] = False,
+    plots: PlotFolder = None,
+    page: Annotated[Path | None, typer.Option(help="Write the card as Markdown here: docs/accuracy.md.")] = None,
+) -> None:
+    """Compare the sensors with a real Khepera's: KiKS's models, and those of other simulators, on measured samples.
+
+    Example: kiks accuracy --plots card
+    """
+    note_compiling()
+    from kiks.fit import accuracy as cards
+
+    card = cards.make_card(cards.load_tables(cards.data_folder(data)))
+    if as_json:
+        for figure in card.figures():
+            typer.echo(json.dumps(vars(figure)))
+    else:
+        _show(card)
+    if page is not None:
+        try:
+            page.write_text(cards.page(card), encoding="utf-8")
+        except OSError as error:
+            raise ParameterError(
+                f"--page must name a file that can be written, but {str(page)!r} cannot ({error.strerror}). "
+                "Choose another."
+            ) from error
+    if plots is not None:
+        from kiks.fit.plots import plot_card
+
+        for file in plot_card(card, plots):
+            typer.echo(f"Picture: {file}", err=as_json)
+
+
+def _show(card: Card) -> None:
+    """Print the card as two tables."""
+    import numpy as np
+    from rich.console import Console
+    from rich.table import Table
+
+    from kiks.fit.models import MODELS
+
+    console = Console()
+    errors = Table(title="Absolute errors in counts (held-out half)")
+    parts = Table(title="By object: median / mean in counts, largest error of a 50 % distance in mm")
+    for table in (errors, parts):
+        table.add_column("model", no_wrap=True)
+    for column in ("median", "mean", "95 %", "maximum"):
+        errors.add_column(column, justify="right")
+    for name in card.tables:
+        parts.add_column(name, justify="right")
+        parts.add_column("50 %", justify="right")
+    for key, (title, _) in MODELS.items():
+        score = card.score(key)
+        errors.add_row(title, *(f"{value:.1f}" for value in vars(score).values()))
+        entries = []
+        for name in card.tables:
+            score = card.score(key, [name])
+            off_mm = np.abs(card.half_distances_mm(name, key) - card.half_distances_mm(name)).max()
+            entries += [f"{score.median:.1f} / {score.mean:.1f}", f"{off_mm:.1f}"]
+        parts.add_row(title, *entries)
+    console.print(errors)
+    console.print(parts)

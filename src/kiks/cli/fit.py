@@ -1,0 +1,114 @@
+"""`kiks fit`."""
+
+from __future__ import annotations
+
+import enum
+import math
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from kiks.cli.accuracy import DataFolder, PlotFolder
+from kiks.errors import ParameterError
+
+if TYPE_CHECKING:
+    from kiks.fit.samples import Samples
+
+
+class Places(enum.StrEnum):
+    """Where the rays of the networks begin and look."""
+
+    RIM = "rim"
+    PROTOCOL = "protocol"
+
+
+def fit(
+    files: Annotated[
+        list[str] | None,
+        typer.Argument(help="Files of samples; =RADIUS in mm after that of a round object: post.sam=12.5."),
+    ] = None,
+    data: DataFolder = None,
+    out: Annotated[Path | None, typer.Option(help="Write the networks here, for a robot's data file.")] = None,
+    plots: PlotFolder = None,
+    starts: Annotated[int, typer.Option(help="Random starts for each sensor; the best is kept.", min=1)] = 12,
+    seed: Annotated[int, typer.Option(help="Seed: the same seed, the same networks.", min=0)] = 0,
+    places: Annotated[Places, typer.Option(help="Rays from the rim or from the protocol's mounts.")] = Places.RIM,
+) -> None:
+    """Train the thesis's networks on samples of a real robot: on every other angle, and test them on the rest.
+
+    Without FILES the wall and the cylinder of the shared samples are taken.
+
+    Example: kiks fit wall.sam round.sam=27 --out my_networks.json
+    """
+    # Before NumPy is imported: the matrices are small, and threads of its linear algebra would wait for each other.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    from rich.console import Console
+    from rich.table import Table
+
+    from kiks.fit import networks
+
+    tables = _tables(files, data)
+    learn = [table.at_angles(slice(0, None, 2)) for table in tables]
+    test = [table.at_angles(slice(1, None, 2)) for table in tables]
+    console = Console()
+    result = Table(title="Absolute errors in counts (test set)")
+    for column in ("network", "maximum", "mean", "median"):
+        result.add_column(column, justify="left" if column == "network" else "right")
+    with console.status("") as status:
+        for size, layers in networks.SIZES.items():
+            trained = networks.train_sensors(
+                learn,
+                layers,
+                places=places.value,
+                seed=seed,
+                starts=starts,
+                progress=lambda sensor, size=size: status.update(f"{size}, {sensor}"),  # type: ignore[misc]
+            )
+            counts, expected = networks.predictions(test, trained, places=places.value)
+            result.add_row(size, *(f"{error:.1f}" for error in networks.errors(counts, expected)))
+            if plots is not None:
+                from kiks.fit.plots import plot_errors
+
+                name = "-".join(size.replace("+", " ").split())
+                plot_errors(f"{size}: test set", counts, expected, plots / f"fit-{name}.png")
+    console.print(result)
+    if out is not None:
+        networks.response_of(trained, places=places.value).save(out)
+        typer.echo(f"Networks: {out}")
+
+
+def _tables(files: list[str] | None, data: Path | None) -> list[Samples]:
+    """Return the samples of the files named on the command line, of the shared folder if there are none."""
+    from kiks.fit.accuracy import data_folder, load_tables
+    from kiks.fit.samples import load_samples
+
+    if not files:
+        return list(load_tables(data_folder(data)).values())
+    return [load_samples(path, radius_mm=radius_mm) for path, radius_mm in map(parse_file, files)]
+
+
+def parse_file(entry: str) -> tuple[str, float]:
+    """Return the path and the radius [mm] of 'post.sam=12.5'; the radius of a wall is infinite.
+
+    Raises:
+        ParameterError: If what stands after = is no positive number.
+
+    Example:
+        >>> parse_file("post.sam=12.5")
+        ('post.sam', 12.5)
+    """
+    path, equals, radius = entry.partition("=")
+    if not equals:
+        return entry, math.inf
+    try:
+        radius_mm = float(radius)
+    except ValueError:
+        radius_mm = math.nan
+    if not radius_mm > 0:
+        raise ParameterError(
+            f"The radius after a file's name must be a positive number of mm, but it was {entry!r}. "
+            "Example: round.sam=27; a wall's file has none."
+        )
+    return path, radius_mm

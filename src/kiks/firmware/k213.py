@@ -1,0 +1,131 @@
+"""The K213 linear camera, turret 2: what it answers to each order (khepera-protocol.md 10.3).
+
+It takes pictures at times of its own, one in each reading period, and answers with the last one, however often it is
+asked: two answers between two instants are equal to the bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+NUMBER = 2
+"""Where K-Team put it among the turrets (khepera-protocol.md 10.1)."""
+
+PERIODS_NS = tuple(ms * 1_000_000 for ms in (200, 50, 100, 150, 250, 500, 1000, 5000))
+"""Reading periods by the code of order U [ns]; code 0 is also that of the power-on."""
+
+Picture = tuple[list[int], int]
+"""64 greys 0..255, the leftmost first, and the light level, which is more for a darker scene."""
+
+
+class K213:
+    """A camera on a robot.
+
+    Args:
+        take: Takes a picture of what the robot sees at a time [ns], which is the present one.
+
+    Attributes:
+        period_ns: Pictures are taken when the time is a multiple of this [ns].
+        taken_ns: When the present picture was taken [ns].
+
+    Example:
+        >>> camera = K213(lambda time_ns: (list(range(64)), 300))
+        >>> camera.look(0)
+        >>> camera.order("Q", (60,)), camera.order("L", ()), camera.order("X", ())
+        ((56, 57, 58, 59, 60, 61, 62, 63), (1, 44), None)
+    """
+
+    number = NUMBER
+    name = "K213 linear vision"
+    revision = (1, 0)
+
+    def __init__(self, take: Callable[[int], Picture]) -> None:
+        self._take = take
+        self.period_ns = PERIODS_NS[0]
+        self.taken_ns = -1
+        self.pixels: list[int] = []
+        self.light = 0
+
+    def look(self, instant_ns: int) -> None:
+        """Take a picture."""
+        self.pixels, self.light = self._take(instant_ns)
+        self.taken_ns = instant_ns
+
+    def order(self, letter: str, values: tuple[int, ...]) -> tuple[int, ...] | None:
+        """Carry out an order and return the values of its answer, None for an order it does not know."""
+        count, act = _ORDERS.get(letter, (-1, _read_all))
+        return act(self, *values) if len(values) == count else None
+
+
+def _read_light(camera: K213) -> tuple[int, ...]:
+    """L: the light level, high byte and low byte."""
+    return divmod(camera.light, 256)
+
+
+def _read_packed(camera: K213) -> tuple[int, ...]:
+    """M: two neighbours in a byte, the upper four bits of each, the left one on top."""
+    return tuple(left & 0xF0 | right >> 4 for left, right in zip(camera.pixels[::2], camera.pixels[1::2], strict=True))
+
+
+def _read_all(camera: K213) -> tuple[int, ...]:
+    """N: all pixels."""
+    return tuple(camera.pixels)
+
+
+def _find_brightest(camera: K213) -> tuple[int, ...]:
+    """O: the index of the brightest pixel, the leftmost of equals."""
+    return (camera.pixels.index(max(camera.pixels)),)
+
+
+def _find_darkest(camera: K213) -> tuple[int, ...]:
+    """P: the index of the darkest pixel, the leftmost of equals."""
+    return (camera.pixels.index(min(camera.pixels)),)
+
+
+def _read_block(camera: K213, start: int, count: int) -> tuple[int, ...]:
+    """Return pixels from one on; a block that would leave the row is moved back into it."""
+    start = min(max(start, 0), len(camera.pixels) - count)
+    return tuple(camera.pixels[start : start + count])
+
+
+def _read_8(camera: K213, start: int) -> tuple[int, ...]:
+    """Q: 8 pixels."""
+    return _read_block(camera, start, 8)
+
+
+def _read_16(camera: K213, start: int) -> tuple[int, ...]:
+    """R: 16 pixels."""
+    return _read_block(camera, start, 16)
+
+
+def _read_every_second(camera: K213) -> tuple[int, ...]:
+    """S: every second pixel."""
+    return tuple(camera.pixels[::2])
+
+
+def _read_every_fourth(camera: K213) -> tuple[int, ...]:
+    """T: every fourth pixel."""
+    return tuple(camera.pixels[::4])
+
+
+def _set_period(camera: K213, code: int) -> tuple[int, ...] | None:
+    """U: set the reading period; the present picture stays until the next instant."""
+    if not 0 <= code < len(PERIODS_NS):
+        return None
+    camera.period_ns = PERIODS_NS[code]
+    return ()
+
+
+_ORDERS: dict[str, tuple[int, Callable[..., tuple[int, ...] | None]]] = {
+    "L": (0, _read_light),
+    "M": (0, _read_packed),
+    "N": (0, _read_all),
+    "O": (0, _find_brightest),
+    "P": (0, _find_darkest),
+    "Q": (1, _read_8),
+    "R": (1, _read_16),
+    "S": (0, _read_every_second),
+    "T": (0, _read_every_fourth),
+    "U": (1, _set_period),
+}
+"""For each order how many numbers it takes, and what it does. B is the firmware's: `revision`."""

@@ -1,0 +1,217 @@
+"""The accuracy card: how far each model's counts are from those that were measured on a real Khepera.
+
+Only active cells count, those with a measured reading between 20 and 1000: below is noise, above saturation. Models
+were fitted to angles with an even index at most, so that those with an odd one, the held-out half, were never seen.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.errors import ParameterError
+from kiks.fit.models import MODELS
+from kiks.fit.samples import ACTIVE_COUNTS, MAXIMUM_COUNTS, Floats, Samples, is_active, load_samples
+from kiks.model.robot import SENSOR_COUNT
+
+OBJECTS = {"wall": np.inf, "cylinder": 27.0}
+"""The tables of the samples' folder: their names and the radius of what stood there [mm]."""
+
+HALVES = {"odd": slice(1, None, 2), "even": slice(0, None, 2), "all": slice(None)}
+"""Parts of a table by the index of the angle; `odd` is the held-out half."""
+
+HELD_OUT = "odd"
+
+_REPOSITORY = Path(__file__).parents[3]
+
+
+@dataclass(frozen=True)
+class Score:
+    """Absolute errors over the active cells [counts]."""
+
+    median: float
+    mean: float
+    p95: float
+    max: float
+
+    @classmethod
+    def of(cls, error: Floats) -> Score:
+        """Return the score of errors of any sign."""
+        size = np.abs(error)
+        return cls(float(np.median(size)), float(size.mean()), float(np.percentile(size, 95)), float(size.max()))
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One number of the card, as `kiks accuracy --json` prints it."""
+
+    name: str
+    value: float
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class Card:
+    """What was measured and what each model answers.
+
+    Args:
+        tables: Measured samples by object.
+        answers: By model and object, counts of the shape [gaps, angles, 8].
+    """
+
+    tables: Mapping[str, Samples]
+    answers: Mapping[str, Mapping[str, Floats]]
+
+    def errors(self, model: str, objects: Sequence[str] | None = None, half: str = HELD_OUT) -> Floats:
+        """Return predicted less measured counts of the active cells [counts], shape [cells]."""
+        parts = []
+        for name in objects or list(self.tables):
+            counts = self.tables[name].counts[:, HALVES[half]]
+            answer = self.answers[model][name][:, HALVES[half]]
+            parts.append((answer - counts)[is_active(counts)])
+        return np.concatenate(parts)
+
+    def score(self, model: str, objects: Sequence[str] | None = None, half: str = HELD_OUT) -> Score:
+        """Return a model's score; for all objects if none is named, on the held-out half."""
+        return Score.of(self.errors(model, objects, half))
+
+    def half_distances_mm(self, name: str, model: str | None = None) -> Floats:
+        """Return at which gap each sensor falls to half of the range, shape [8]; measured if no model is named."""
+        table = self.tables[name]
+        return half_distances_mm(table.gap_mm, table.counts if model is None else self.answers[model][name])
+
+    def figures(self) -> Iterator[Figure]:
+        """Return all numbers of the card; those without a part in their name are of the held-out half."""
+        for model in self.answers:
+            parts: list[tuple[str, Sequence[str] | None, str]] = [("", None, HELD_OUT)]
+            parts += [(f"_{name}_{half}", [name], half) for name in self.tables for half in HALVES]
+            parts += [(f"_{half}", None, half) for half in HALVES if half != HELD_OUT]
+            for suffix, objects, half in parts:
+                for measure, value in vars(self.score(model, objects, half)).items():
+                    yield Figure(f"accuracy.{model}{suffix}_{measure}_counts", round(value, 2), "counts")
+            for name in self.tables:
+                off_mm = self.half_distances_mm(name, model) - self.half_distances_mm(name)
+                for sensor in range(SENSOR_COUNT):
+                    label = f"accuracy.{model}_{name}_sensor_{sensor}_half_distance_error_mm"
+                    yield Figure(label, round(float(off_mm[sensor]), 3), "mm")
+
+
+def smoothed(counts: NDArray[Any]) -> Floats:
+    """Return the mean of each reading and the three on either side of it along the angle."""
+    return np.asarray(np.mean([np.roll(counts, shift, axis=1) for shift in range(-3, 4)], axis=0))
+
+
+def half_distances_mm(gap_mm: Floats, counts: NDArray[Any]) -> Floats:
+    """Return the gap at which each sensor reads half of 1023, at its best angle, shape [8].
+
+    The best angle is where a sensor reads most over all gaps; readings are means of seven neighbouring angles. A sensor
+    that never reads as much, or always, gets the end of the table.
+    """
+    curves = smoothed(counts)
+    best = curves.sum(axis=0).argmax(axis=0)
+    found = np.empty(SENSOR_COUNT)
+    for sensor in range(SENSOR_COUNT):
+        curve = curves[:, best[sensor], sensor]
+        below = np.nonzero(curve < MAXIMUM_COUNTS / 2)[0]
+        if len(below) == 0 or below[0] == 0:
+            found[sensor] = gap_mm[0 if len(below) else -1]
+            continue
+        i = below[0]
+        share = (curve[i - 1] - MAXIMUM_COUNTS / 2) / (curve[i - 1] - curve[i])
+        found[sensor] = gap_mm[i - 1] + share * (gap_mm[i] - gap_mm[i - 1])
+    return found
+
+
+def data_folder(given: str | Path | None = None) -> Path:
+    """Return the folder of the samples: the one given, that below `KIKS_SHARED`, or that beside the repository.
+
+    Raises:
+        ParameterError: If there is no such folder.
+    """
+    shared = Path(os.environ.get("KIKS_SHARED") or _REPOSITORY.parent / "shared")
+    folder = Path(given) if given is not None else shared / "data" / "khepera-samples"
+    if not (folder / "wall.npz").is_file():
+        raise ParameterError(
+            f"The measured samples (wall.npz, cylinder.npz) must lie in the data folder, but {str(folder)!r} has none. "
+            "Name their folder with --data, or the one above data/khepera-samples in KIKS_SHARED."
+        )
+    return folder
+
+
+def load_tables(folder: Path) -> dict[str, Samples]:
+    """Return the measured samples of a folder by object.
+
+    Raises:
+        ParameterError: If one of its files is missing or broken.
+    """
+    return {name: load_samples(folder / f"{name}.npz", radius_mm=radius) for name, radius in OBJECTS.items()}
+
+
+def make_card(tables: Mapping[str, Samples]) -> Card:
+    """Ask every model for every sample."""
+    return Card(
+        tables, {key: {name: model(table) for name, table in tables.items()} for key, (_, model) in MODELS.items()}
+    )
+
+
+def page(card: Card) -> str:
+    """Return the page `docs/accuracy.md`: the card in Markdown."""
+    cells = int(sum(is_active(table.counts[:, HALVES[HELD_OUT]]).sum() for table in card.tables.values()))
+    lines = [
+        "# How true the proximity sensors are",
+        "",
+        "This page is made by `kiks accuracy --page docs/accuracy.md` from readings of a real Khepera. They stand in",
+        "`data/khepera-samples` of the shared folder, with a README that says where they come from. The robot stood at",
+        "20 gaps from 5 to 43 mm before a wall and a cylinder of its own size, and turned in steps of 2 degrees.",
+        "A test fails when the figures here are no longer those of the program. How to bring readings of your own:",
+        "[samples](samples.md).",
+        "",
+        "## Absolute errors [counts]",
+        "",
+        f"Over the {cells} active cells of the held-out half: a measured reading between {ACTIVE_COUNTS[0]} and "
+        f"{ACTIVE_COUNTS[1]}, and an angle with an",
+        "odd index; KiKS's own models were trained on the even ones. The last line predicts each reading from the two",
+        "measured beside it: about the noise of the data, which no model can go below by much.",
+        "",
+        "| model | median | mean | 95 % | maximum |",
+        "|---|---|---|---|---|",
+    ]
+    for key, (title, _) in MODELS.items():
+        score = card.score(key)
+        lines.append(f"| {title} | {score.median:.1f} | {score.mean:.1f} | {score.p95:.0f} | {score.max:.0f} |")
+    columns = [(name, half) for name in card.tables for half in ("odd", "even")]
+    lines += [
+        "",
+        "## By object and half: median / mean / 95 % / maximum [counts]",
+        "",
+        "| model | " + " | ".join(f"{name}, {half}" for name, half in columns) + " |",
+        "|---|" + "---|" * len(columns),
+    ]
+    for key, (title, _) in MODELS.items():
+        scores = [card.score(key, [name], half) for name, half in columns]
+        entries = [f"{s.median:.0f} / {s.mean:.0f} / {s.p95:.0f} / {s.max:.0f}" for s in scores]
+        lines.append(f"| {title} | " + " | ".join(entries) + " |")
+    for name in card.tables:
+        lines += [
+            "",
+            f"## 50 % distance, {name} [mm]",
+            "",
+            "Gap at which a sensor reads 512 at its best angle (mean of seven neighbouring angles): as measured, and",
+            "how much farther each model puts it.",
+            "",
+            "| | " + " | ".join(f"sensor {sensor}" for sensor in range(SENSOR_COUNT)) + " |",
+            "|---|" + "---|" * SENSOR_COUNT,
+        ]
+        measured_mm = card.half_distances_mm(name)
+        lines.append("| measured | " + " | ".join(f"{gap:.1f}" for gap in measured_mm) + " |")
+        for key, (title, _) in MODELS.items():
+            if key != "floor":
+                off_mm = card.half_distances_mm(name, key) - measured_mm
+                lines.append(f"| {title} | " + " | ".join(f"{off:+.1f}" for off in off_mm) + " |")
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,129 @@
+"""What each model of the sensors answers to the poses of a table of samples: KiKS's own and the published ones.
+
+All of them get the same poses and give counts of the shape [gaps, angles, 8]. The published formulas are kept here as
+they were published, with the mounts of khepera-protocol.md 7.4; they serve as competitors and nothing else.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from kiks.engine import networks
+from kiks.fit.networks import PLACES, fan_of
+from kiks.fit.samples import BODY_RADIUS_MM, MAXIMUM_COUNTS, Fan, Floats, Samples, nearnesses, ray_lengths_mm
+from kiks.model.network import NetworkResponse
+from kiks.model.robot import SENSOR_COUNT
+
+Model = Callable[[Samples], Floats]
+
+_CELL_MM = 0.25
+_ROOM_MM = 100.0  # what a model may look at around the robot
+_PLAN = PLACES["protocol"]
+_KIKS2_WEIGHTS = (0.35, 0.33, 0.69, 0.43, 0.69, 0.33, 0.35)  # kiks-behaviour.md 3.1.1
+
+
+def default(samples: Samples) -> Floats:
+    """Answer as the simulated robot does: it is put in front of the object in an arena, and its sensors are asked."""
+    from kiks.model.arena import Arena
+    from kiks.sim.simulation import Simulation
+
+    side_mm = 2 * (BODY_RADIUS_MM + float(samples.gap_mm.max()) + _ROOM_MM)
+    cells = math.ceil(side_mm / _CELL_MM)
+    centre_mm = cells // 2 * _CELL_MM
+    # The object stands in the positive x direction, its nearest point in the middle of the arena.
+    x = (np.arange(cells) + 0.5) * _CELL_MM - centre_mm
+    if math.isinf(samples.radius_mm):
+        inside = np.broadcast_to(x >= 0.0, (cells, cells))
+    else:
+        inside = np.hypot(x - samples.radius_mm, x[:, None]) <= samples.radius_mm
+    sim = Simulation(Arena(inside.astype(np.uint8) * 255, _CELL_MM, samples.name))
+    counts = np.empty(samples.counts.shape, np.float64)
+    for i, gap_mm in enumerate(samples.gap_mm):
+        for j, angle_deg in enumerate(samples.angle_deg):
+            sim.place(1, centre_mm - BODY_RADIUS_MM - float(gap_mm), centre_mm, math.radians(float(angle_deg)))
+            counts[i, j] = sim.proximity(1)
+    return counts
+
+
+def thesis(samples: Samples, response: NetworkResponse | None = None) -> Floats:
+    """Answer with the thesis's networks; those that come with KiKS if left out."""
+    response = response or NetworkResponse.load()
+    seen = nearnesses(samples, fan_of(response))
+    counts = np.empty(samples.counts.shape, np.float64)
+    networks.respond_networks(*response.weights, seen.reshape(-1, *seen.shape[2:]), counts.reshape(-1, SENSOR_COUNT))
+    return counts
+
+
+def fast(samples: Samples) -> Floats:
+    """Answer with the thesis's table of 6^7 entries, made from the networks that come with KiKS."""
+    response = NetworkResponse.load()
+    seen = nearnesses(samples, fan_of(response))
+    counts = np.empty(samples.counts.shape, np.float64)
+    networks.respond_table(fast_table(), seen.reshape(-1, *seen.shape[2:]), counts.reshape(-1, SENSOR_COUNT))
+    return counts
+
+
+@functools.cache
+def fast_table() -> np.ndarray[tuple[int], np.dtype[np.float32]]:
+    """Return the thesis's table, shape [6^7]."""
+    table = np.empty(networks.TABLE_SIZE, np.float32)
+    networks.fill_table(*NetworkResponse.load().weights, table)
+    return table
+
+
+def kiks2(samples: Samples) -> Floats:
+    """Answer with the formula that stands in for the lost table of KiKS 2.2.0 (kiks-behaviour.md 3.1 and 3.1.1)."""
+    lengths_mm = ray_lengths_mm(samples, Fan.spread(*_PLAN, range_mm=53.0))
+    # Rays were sampled every 6 mm: a surface at d counts as 51 - d to 55 - d, and 49 at most.
+    near = np.clip(53.0 - lengths_mm, 0.0, 49.0) / 50.0
+    total = near**1.75 @ np.array(_KIKS2_WEIGHTS)
+    return np.asarray(MAXIMUM_COUNTS * (1.0 - np.exp(-(total**1.61))), np.float64)
+
+
+def webots(samples: Samples) -> Floats:
+    """Answer with one ray for each sensor: 1023 at 0 mm, falling on a line to 0 at 50 mm (Webots' Khepera)."""
+    fan = Fan.spread(*_PLAN, offsets_deg=(0.0,))
+    return MAXIMUM_COUNTS * nearnesses(samples, fan)[..., 0]
+
+
+def enki(samples: Samples) -> Floats:
+    """Answer with Enki's three rays: f(x) = (c - a^2) m / (x^2 - 2 a x + c) with m 1200, a -0.9, c 7 and x in cm.
+
+    The rays are added, less twice what one at +-15 degrees would give if the middle one stands upright on a wall.
+    Enki's own mounts, which are for a robot with a radius of 26 mm, are kept; readings end at 1023.
+    """
+    place_mm = np.array(
+        [(10, 15), (13, 13), (16, 6), (16, -6), (13, -13), (10, -15), (-15, -10), (-15, 10)], np.float64
+    )
+    direction = np.radians([90.0, 45.0, 0.0, 0.0, -45.0, -90.0, 180.0, 180.0])
+    fan = Fan(place_mm, np.add.outer(direction, np.radians([15.0, 0.0, -15.0])), 100.0)
+    length_cm = ray_lengths_mm(samples, fan) / 10.0
+
+    def answer(x: Floats) -> Floats:
+        return np.where(x < 10.0, 1200.0 * (7.0 - 0.81) / (x * x + 1.8 * x + 7.0), 0.0)
+
+    middle = length_cm[..., 1]
+    double = np.where(middle < 10.0, 2.0 * answer(middle / math.cos(math.radians(15.0))), 0.0)
+    return np.asarray(np.clip(answer(length_cm).sum(axis=-1) - double, 0.0, MAXIMUM_COUNTS))
+
+
+def neighbours(samples: Samples) -> Floats:
+    """Answer with the mean of the two readings next to each: what is left is about the noise of the data."""
+    counts = samples.counts.astype(np.float64)
+    return (np.roll(counts, 1, axis=1) + np.roll(counts, -1, axis=1)) / 2
+
+
+MODELS: dict[str, tuple[str, Model]] = {
+    "default": ("KiKS (default)", default),
+    "thesis": ("thesis networks", thesis),
+    "fast": ("thesis, fast table", fast),
+    "kiks2": ("KiKS 2.2.0, stand-in", kiks2),
+    "webots": ("Webots, one ray", webots),
+    "enki": ("Enki, three rays", enki),
+    "floor": ("neighbouring samples", neighbours),
+}
+"""The models on the card: their keys, what people call them, and how they answer."""

@@ -1,0 +1,284 @@
+"""Samples measured on a real robot: readers for tables, for the laboratory's text files, and the rays of each sample.
+
+A table of samples was measured on a rig: the robot stands at a gap from one object and is turned on the spot. Angles of
+tables grow clockwise, the direction to the object's nearest point less the robot's heading. The robot sat on its rig a
+little askew (`RIG_OFFSET_DEG`): what a table calls straight ahead is that much to the left of the robot's nose.
+
+Grammar of the text files (a table is `[distance, angle, sensor]`; blanks and tabs separate, empty lines do not count):
+
+    file   = header block*                 as many blocks as the header says distances
+    header = SENSORS ANGLES DISTANCES FIRST_MM STEP_MM      whole numbers, such as 8 180 20 5 2
+    block  = "TURN" NUMBER row*            NUMBER counts the blocks from 0; as many rows as the header says angles
+    row    = SENSORS readings, whole numbers from 0 to 1023; row i was measured at angle i * 360 / ANGLES degrees
+    end    = ["END"]                       may close the file
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.errors import ParameterError
+from kiks.model.robot import SENSOR_COUNT
+
+Floats = NDArray[np.float64]
+
+BODY_RADIUS_MM = 27.5
+"""Radius of the robot from whose rim gaps were measured [mm]."""
+
+RIG_OFFSET_DEG = 2.0
+"""How far the robot was turned to the right on its rig [deg]: its sensors say 1.5 to 3 (README of the samples)."""
+
+MAXIMUM_COUNTS = 1023
+"""Largest reading of the converter (khepera-protocol.md 8.4)."""
+
+ACTIVE_COUNTS = (20, 1000)
+"""Least and largest reading that tells something: below is noise, above saturation."""
+
+_ARRAYS = ("values", "gap_mm", "object_angle_deg_cw")
+
+_HEADER = "sensors, angles, distances, first distance [mm] and step [mm], like '8 180 20 5 2'"
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Readings of the eight sensors of a robot that was turned on the spot at several gaps from one object.
+
+    Args:
+        name: What people call the object.
+        radius_mm: Radius of the object [mm]: infinite for a straight wall.
+        gap_mm: From the robot's rim to the object's surface [mm], shape [gaps].
+        angle_deg: From the robot's heading to the object, clockwise and without the rig's offset [deg], shape [angles].
+        counts: Readings, shape [gaps, angles, 8].
+    """
+
+    name: str
+    radius_mm: float
+    gap_mm: Floats
+    angle_deg: Floats
+    counts: NDArray[np.int64]
+
+    def at_angles(self, chosen: slice) -> Samples:
+        """Return the samples of some of the angles: `slice(0, None, 2)` for those with an even index."""
+        return Samples(self.name, self.radius_mm, self.gap_mm, self.angle_deg[chosen], self.counts[:, chosen])
+
+
+@dataclass(frozen=True, eq=False)
+class Fan:
+    """Where the rays of each sensor begin and where they go, seen from the robot: x ahead, y to the left.
+
+    Args:
+        origin_mm: Where a sensor sits, shape [8, 2].
+        direction_rad: Direction of each ray, counter-clockwise from ahead, the leftmost first, shape [8, rays].
+        range_mm: Longest length of a ray [mm].
+    """
+
+    origin_mm: Floats
+    direction_rad: Floats
+    range_mm: float
+
+    @classmethod
+    def spread(
+        cls,
+        mount_angle_deg: tuple[float, ...],
+        mount_radius_mm: tuple[float, ...],
+        direction_deg: tuple[float, ...],
+        *,
+        range_mm: float = 50.0,
+        offsets_deg: tuple[float, ...] = (60.0, 40.0, 20.0, 0.0, -20.0, -40.0, -60.0),
+    ) -> Fan:
+        """Return the fan of sensors at polar places [deg, mm] that look in directions [deg]; left is positive."""
+        place = np.radians(mount_angle_deg)
+        origin = np.stack([np.cos(place), np.sin(place)], axis=-1) * np.array(mount_radius_mm)[:, None]
+        return cls(origin, np.radians(np.add.outer(np.array(direction_deg), np.array(offsets_deg))), range_mm)
+
+
+def ray_lengths_mm(samples: Samples, fan: Fan) -> Floats:
+    """Return how far each ray goes before it meets the object, at most the fan's range [mm].
+
+    Geometry: a ray from p in the unit direction u meets the wall n.x = D after t = (D - n.p) / (n.u), and the disc with
+    centre c and radius R after t = b - sqrt(b^2 - q), with b = u.(c - p) and q = |c - p|^2 - R^2.
+
+    Returns:
+        Lengths, shape [gaps, angles, 8, rays].
+    """
+    towards = -np.radians(samples.angle_deg)
+    normal = np.stack([np.cos(towards), np.sin(towards)], axis=-1)  # [angles, 2]
+    ray = np.stack([np.cos(fan.direction_rad), np.sin(fan.direction_rad)], axis=-1)  # [8, rays, 2]
+    rim_mm = BODY_RADIUS_MM + samples.gap_mm
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if math.isinf(samples.radius_mm):
+            before_mm = rim_mm[:, None, None] - normal @ fan.origin_mm.T  # [gaps, angles, 8]
+            length = before_mm[..., None] / np.einsum("ai,sri->asr", normal, ray)
+        else:
+            centre = (rim_mm + samples.radius_mm)[:, None, None] * normal
+            between = centre[:, :, None, :] - fan.origin_mm  # [gaps, angles, 8, 2]
+            along = np.einsum("gasi,sri->gasr", between, ray)
+            outside = (between**2).sum(axis=-1) - samples.radius_mm**2
+            length = along - np.sqrt(along**2 - outside[..., None])
+    met = np.isfinite(length) & (length >= 0.0)
+    return np.minimum(np.where(met, length, fan.range_mm), fan.range_mm)
+
+
+def nearnesses(samples: Samples, fan: Fan) -> Floats:
+    """Return the thesis's inverted lengths as shares of the range: 1 at the sensor, 0 for nothing in range.
+
+    Returns:
+        Shape [gaps, angles, 8, rays].
+    """
+    return 1.0 - ray_lengths_mm(samples, fan) / fan.range_mm
+
+
+def is_active(counts: NDArray[Any]) -> NDArray[np.bool_]:
+    """Say which readings tell something: those between noise and saturation."""
+    return (counts >= ACTIVE_COUNTS[0]) & (counts <= ACTIVE_COUNTS[1])
+
+
+# ---- files ----
+
+
+def load_samples(file: str | Path, *, name: str = "", radius_mm: float = math.inf) -> Samples:
+    """Read samples from a table (.npz) or from the laboratory's text format (any other name).
+
+    Args:
+        file: A .npz with `values`, `gap_mm` and `object_angle_deg_cw`, or a text file.
+        name: What people call the object; the file's name without its ending if left out.
+        radius_mm: Radius of the object [mm]: infinite for a straight wall. The files do not tell.
+
+    Raises:
+        ParameterError: If the file cannot be read or is no file of samples, or the radius is not positive.
+    """
+    path = Path(file)
+    if not radius_mm > 0:
+        raise ParameterError(f"radius_mm must be positive, but it was {radius_mm!r}. Leave it out for a straight wall.")
+    read = _read_table if path.suffix == ".npz" else _read_text
+    try:
+        gap_mm, angle_deg, counts = read(path)
+    except OSError as error:
+        raise ParameterError(
+            f"Samples must come from a readable file, but {str(path)!r} is none ({error.strerror or error}). "
+            "Check the path."
+        ) from error
+    return Samples(name or path.stem, radius_mm, gap_mm, angle_deg - RIG_OFFSET_DEG, counts)
+
+
+def _read_table(path: Path) -> tuple[Floats, Floats, NDArray[np.int64]]:
+    """Return gaps, angles and readings of a .npz."""
+    import zipfile
+
+    def wrong(what: str) -> ParameterError:
+        return ParameterError(
+            f"{path}: A table of samples must hold 'values' [gaps, angles, {SENSOR_COUNT}] of whole numbers from 0 to "
+            f"{MAXIMUM_COUNTS}, 'gap_mm' and 'object_angle_deg_cw', but {what}. See the README of the samples."
+        )
+
+    try:
+        with zipfile.ZipFile(path), np.load(path, allow_pickle=False) as table:
+            arrays = {name: table[name] for name in _ARRAYS if name in table}
+    except (ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise wrong("it is no .npz file") from error
+    for name in _ARRAYS:
+        if name not in arrays:
+            raise wrong(f"{name!r} is missing")
+    values, gap, angle = (arrays[name] for name in _ARRAYS)
+    if values.ndim != 3 or values.shape != (*gap.shape, *angle.shape, SENSOR_COUNT):
+        raise wrong(f"'values' has the shape {values.shape}, where {gap.size} gaps and {angle.size} angles stand")
+    if values.dtype.kind not in "iu":
+        raise wrong(f"'values' is of type {values.dtype}")
+    if values.size == 0:
+        raise wrong("it is empty")
+    if values.min() < 0 or values.max() > MAXIMUM_COUNTS:
+        raise wrong(f"a value is {values.min() if values.min() < 0 else values.max()}")
+    return gap.astype(np.float64), angle.astype(np.float64), values.astype(np.int64)
+
+
+def _read_text(path: Path) -> tuple[Floats, Floats, NDArray[np.int64]]:
+    """Return gaps, angles and readings of a text file."""
+    lines = _Lines(path)
+    header = lines.numbers(_HEADER, 5)
+    sensors, angles, distances, first_mm, step_mm = header
+    if sensors != SENSOR_COUNT:
+        raise lines.wrong(f"The first number must be {SENSOR_COUNT}, the sensors of a Khepera", str(sensors))
+    if not (1 <= angles <= 3600 and 1 <= distances <= 1000 and first_mm >= 0 and step_mm >= 1):
+        raise lines.wrong(
+            f"The first line must hold {_HEADER}, with 1 to 3600 angles and 1 to 1000 distances", repr(lines.text)
+        )
+    counts = np.empty((distances, angles, sensors), np.int64)
+    for distance in range(distances):
+        lines.marker(distance)
+        for angle in range(angles):
+            row = lines.numbers(f"{sensors} readings (row {angle + 1} of {angles} of TURN {distance})", sensors)
+            for count in row:
+                if not 0 <= count <= MAXIMUM_COUNTS:
+                    raise lines.wrong(f"A reading must be from 0 to {MAXIMUM_COUNTS}", str(count))
+            counts[distance, angle] = row
+    lines.finish(distances)
+    gap_mm = first_mm + step_mm * np.arange(distances, dtype=np.float64)
+    return gap_mm, np.arange(angles, dtype=np.float64) * (360.0 / angles), counts
+
+
+class _Lines:
+    """The lines of a text file one after the other, and whose number an error names."""
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.number, self.text = path, 1, ""
+        data = path.read_bytes()
+        if not data.strip():
+            raise self.wrong(f"A file of samples must begin with {_HEADER}", "an empty file", "Was it copied whole?")
+        try:
+            text = data.decode("ascii")
+        except UnicodeDecodeError as error:
+            self.number = data.count(b"\n", 0, error.start) + 1
+            raise self._binary(data[error.start]) from error
+        for place, character in enumerate(text):
+            if character < " " and character not in "\t\n\r":
+                self.number = text.count("\n", 0, place) + 1
+                raise self._binary(ord(character))
+        self._rest = iter([(i, line.strip()) for i, line in enumerate(text.split("\n"), start=1) if line.strip()])
+
+    def wrong(self, rule: str, given: str, advice: str = "Correct that line, or leave the file out.") -> ParameterError:
+        """Return the error that something in the present line breaks a rule."""
+        return ParameterError(f"{self.path}, line {self.number}: {rule}, but it was {given}. {advice}")
+
+    def _binary(self, byte: int) -> ParameterError:
+        return self.wrong(
+            "A file of samples must be plain text", f"binary (byte 0x{byte:02x})", "Name a table of NumPy's *.npz."
+        )
+
+    def next(self, expected: str) -> str:
+        """Return the next line that is not empty."""
+        try:
+            self.number, self.text = next(self._rest)
+        except StopIteration:
+            raise self.wrong(f"After this line must come {expected}", "the end of the file", "It is cut off.") from None
+        return self.text
+
+    def numbers(self, expected: str, count: int) -> list[int]:
+        """Return the next line's whole numbers."""
+        words = self.next(expected).split()
+        for word in words:
+            if not word.removeprefix("-").isdigit() or len(word) > 9:
+                raise self.wrong(f"A line here must hold {expected}, whole numbers", repr(word))
+        if len(words) != count:
+            raise self.wrong(f"A line here must hold {expected}", f"{len(words)} numbers")
+        return [int(word) for word in words]
+
+    def marker(self, number: int) -> None:
+        """Go past the line that opens a block."""
+        expected = f"'TURN {number}'"
+        if self.next(expected).split() != ["TURN", str(number)]:
+            raise self.wrong(f"A line here must be {expected}", repr(self.text))
+
+    def finish(self, blocks: int) -> None:
+        """Make sure that nothing but 'END' is left."""
+        for number, text in self._rest:
+            self.number, self.text = number, text
+            if text != "END":
+                raise self.wrong(
+                    f"After the {blocks} blocks that the first line tells must come nothing", repr(self.text)
+                )

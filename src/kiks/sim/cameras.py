@@ -1,0 +1,78 @@
+"""The cameras of a simulation: which robots carry one, when each takes its pictures, and what they show."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kiks.engine import camera
+from kiks.firmware.k213 import K213, Picture
+from kiks.units import TICK_NS
+
+if TYPE_CHECKING:
+    from kiks.sim.simulation import Simulation
+
+
+class Cameras:
+    """K213 turrets on robots.
+
+    Pictures are taken when the time is a multiple of a camera's reading period. All periods are whole ticks, so the
+    engine stops there, on a tick's boundary, however seldom or often somebody looks.
+    """
+
+    def __init__(self, sim: Simulation) -> None:
+        self._sim = sim
+        self._fitted: dict[int, K213] = {}
+        self._pixels = np.zeros(camera.PIXEL_COUNT, np.float64)
+
+    def __bool__(self) -> bool:
+        return bool(self._fitted)
+
+    def fit(self, index: int) -> K213:
+        """Return a new camera for a robot, with a first picture."""
+        fitted = self._fitted[index] = K213(lambda time_ns: self._take(index, time_ns))
+        fitted.look(self._sim.now_ns)
+        return fitted
+
+    def sync(self) -> None:
+        """Let each camera take the last of its pictures that is due; the earlier ones nobody can ask for.
+
+        An instant that the engine has passed came with a change of the period: no picture is taken of the past.
+        """
+        sim = self._sim
+        instants = [(sim.now_ns // each.period_ns * each.period_ns, index) for index, each in self._fitted.items()]
+        for instant_ns, index in sorted(instants):
+            fitted = self._fitted[index]
+            if instant_ns > fitted.taken_ns and instant_ns >= sim.state.tick_count * TICK_NS:
+                sim.tick_to(instant_ns)
+                fitted.look(instant_ns)
+
+    def replace(self, index: int) -> None:
+        """Take a picture again whose robot was put elsewhere at the very instant of the picture."""
+        fitted = self._fitted.get(index)
+        if fitted is not None and fitted.taken_ns == self._sim.now_ns:
+            fitted.look(self._sim.now_ns)
+
+    def expect(self, index: int) -> list[float]:
+        """Return what a camera would see now, without noise or rounding."""
+        self._kernel(index, self._sim.now_ns, is_noisy=False)
+        return [float(grey) for grey in self._pixels]
+
+    def _take(self, index: int, time_ns: int) -> Picture:
+        light = self._kernel(index, time_ns, is_noisy=True)
+        return self._pixels.astype(np.int64).tolist(), light
+
+    def _kernel(self, index: int, time_ns: int, *, is_noisy: bool) -> int:
+        sim = self._sim
+        light: int = camera.take_image(
+            sim.state.robots,
+            *sim.sight,
+            sim.state.tick_count,
+            time_ns,
+            sim.seed,
+            index,
+            is_noisy,
+            self._pixels,
+        )
+        return light

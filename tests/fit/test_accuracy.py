@@ -1,0 +1,155 @@
+"""The accuracy card says what its page says, and holds what the sensors promise."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from kiks.cli.accuracy import accuracy
+from kiks.cli.fit import fit, parse_file
+from kiks.errors import ParameterError
+from kiks.fit import models
+from kiks.fit.accuracy import Score, data_folder, half_distances_mm, load_tables, make_card, page
+from kiks.fit.samples import Samples
+
+PAGE = Path(__file__).parents[2] / "docs" / "accuracy.md"
+NUMBER = re.compile(r"[+-]?\d+(?:\.\d+)?")
+TOLERANCE = 1.0  # counts or mm: what rounding and another processor's last bits may change
+
+try:
+    FOLDER = data_folder()
+except ParameterError as error:
+    FOLDER = None
+    REASON = str(error)
+needs_data = pytest.mark.skipif(FOLDER is None, reason=REASON if FOLDER is None else "")
+
+
+@pytest.fixture(scope="module")
+def card():
+    return make_card(load_tables(FOLDER))
+
+
+@needs_data
+def test_the_page_tells_the_truth(card):
+    written, found = PAGE.read_text(encoding="utf-8"), page(card)
+    assert NUMBER.sub("#", written) == NUMBER.sub("#", found), "run kiks accuracy --page docs/accuracy.md"
+    for old, new in zip(NUMBER.findall(written), NUMBER.findall(found), strict=True):
+        assert float(new) == pytest.approx(float(old), abs=TOLERANCE), "run kiks accuracy --page docs/accuracy.md"
+
+
+@needs_data
+def test_the_floor_and_the_competitors_stand_where_others_measured_them(card):
+    assert card.score("floor").median == pytest.approx(30, abs=1)
+    assert card.score("floor").mean == pytest.approx(34, abs=1)
+    assert card.score("enki").median == pytest.approx(149, abs=5)
+    assert card.score("enki").mean == pytest.approx(209, abs=5)
+    assert card.score("webots").median > 150
+    assert card.score("thesis").median <= 42
+    assert card.score("thesis").mean <= 52
+    assert card.score("thesis").p95 <= 132
+    assert card.score("fast").median > card.score("thesis").median
+    measured_mm = {name: card.half_distances_mm(name) for name in card.tables}
+    assert measured_mm["wall"].mean() == pytest.approx(24.0, abs=0.2)  # README of the samples
+    assert measured_mm["cylinder"].mean() == pytest.approx(19.3, abs=0.2)
+
+
+@needs_data
+def test_every_figure_has_a_name_of_its_own(card):
+    figures = {figure.name: figure for figure in card.figures()}
+    assert len(figures) == len(list(card.figures()))
+    assert figures["accuracy.default_median_counts"].value == round(card.score("default").median, 2)
+    assert all(math.isfinite(figure.value) for figure in figures.values())
+
+
+def run(command, *arguments):
+    app = typer.Typer()
+    app.command()(command)
+    return CliRunner().invoke(app, list(arguments))
+
+
+@needs_data
+def test_the_command_prints_json_and_draws(tmp_path):
+    pytest.importorskip("matplotlib")
+    result = run(accuracy, "--json", "--plots", str(tmp_path / "card"))
+    lines = [json.loads(line) for line in result.stdout.splitlines()]
+    values = {line["name"]: line["value"] for line in lines if line["unit"] == "counts"}
+    for name in ("default_median", "default_mean", "thesis_median", "enki_median", "webots_median"):
+        assert values[f"accuracy.{name}_counts"] > 0
+    assert {file.name for file in (tmp_path / "card").iterdir()} >= {"errors-thesis.png", "curves-wall.png"}
+
+
+@needs_data
+def test_the_command_prints_a_table(tmp_path):
+    result = run(accuracy, "--page", str(tmp_path / "page.md"))
+    assert "thesis networks" in result.stdout
+    assert (tmp_path / "page.md").read_text().startswith("# How true")
+
+
+def test_no_data_is_said(tmp_path, monkeypatch):
+    with pytest.raises(ParameterError, match="must lie in the data folder"):
+        data_folder(tmp_path)
+    monkeypatch.setenv("KIKS_SHARED", str(tmp_path))
+    with pytest.raises(ParameterError, match="KIKS_SHARED"):
+        data_folder()
+    (tmp_path / "data" / "khepera-samples").mkdir(parents=True)
+    (tmp_path / "data" / "khepera-samples" / "wall.npz").touch()
+    assert data_folder() == tmp_path / "data" / "khepera-samples"
+
+
+def made_up():
+    gaps, angles = np.arange(5.0, 45.0, 6.0), np.arange(0.0, 360.0, 20.0)
+    wall = Samples("wall", math.inf, gaps, angles, np.zeros((len(gaps), len(angles), 8), np.int64))
+    counts = np.rint(models.kiks2(wall)).astype(np.int64)
+    return Samples("wall", math.inf, gaps, angles, counts)
+
+
+def test_fit_reads_files_and_writes_networks(tmp_path):
+    samples = made_up()
+    rows = ["8 18 7 5 6"]
+    for distance, block in enumerate(samples.counts):
+        rows += [f"TURN {distance}", *(" ".join(map(str, row)) for row in block)]
+    (tmp_path / "wall.sam").write_text("\n".join(rows))
+    out = tmp_path / "mine.json"
+    result = run(fit, str(tmp_path / "wall.sam"), "--out", str(out), "--starts", "1")
+    assert result.exit_code == 0, result.output
+    assert "13 tanh + 7 linear" in result.output
+    assert models.thesis(samples, models.NetworkResponse.load(out)).shape == samples.counts.shape
+
+
+def test_names_of_files_with_a_radius():
+    assert parse_file("wall.sam") == ("wall.sam", math.inf)
+    for entry in ("a.sam=", "a.sam=x", "a.sam=0", "a.sam=nan"):
+        with pytest.raises(ParameterError, match="must be a positive number of mm"):
+            parse_file(entry)
+
+
+def test_half_distances():
+    gap_mm = np.array([5.0, 7.0, 9.0])
+    counts = np.zeros((3, 20, 8))
+    counts[:, 10:17, 0] = np.array([[1023.0], [1023.0], [0.0]])
+    counts[:, :, 1] = 1023.0
+    found = half_distances_mm(gap_mm, counts)
+    assert found[:3].tolist() == [8.0, 9.0, 5.0]
+
+
+def test_scores():
+    score = Score.of(np.array([-1.0, 2.0, -3.0]))
+    assert (score.median, score.mean, score.max) == (2.0, 2.0, 3.0)
+
+
+def test_published_formulas():
+    """One wall straight ahead of a sensor that looks at it: the formulas' own values."""
+    wall = Samples("wall", math.inf, np.array([0.0]), np.array([-45.0]), np.zeros((1, 1, 8), np.int64))
+    assert models.webots(wall)[0, 0, 1] == pytest.approx(1023 * (1 - (27.5 - 25.2 * math.cos(math.radians(1))) / 50))
+    x = (27.5 - 13 * math.sqrt(2)) / 10
+    assert models.enki(wall)[0, 0, 1] == pytest.approx(1200 * 6.19 / (x * x + 1.8 * x + 7))
+    far = Samples("wall", math.inf, np.array([200.0]), np.array([0.0]), np.zeros((1, 1, 8), np.int64))
+    for model in (models.default, models.thesis, models.fast, models.kiks2, models.webots, models.enki):
+        assert model(far).max() <= 20

@@ -1,0 +1,189 @@
+"""Networks: exact gradients, training that trains, the same by the same seed; kernels that agree with NumPy."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+
+import numpy as np
+import pytest
+
+from kiks.engine import networks as kernels
+from kiks.engine.numbers import tanh
+from kiks.errors import ParameterError
+from kiks.fit import networks
+from kiks.fit.models import fast_table
+from kiks.fit.samples import Samples
+from kiks.model.network import THESIS, NetworkResponse
+
+SIZES = sorted(networks.SIZES)
+
+
+def parameters_of(layers, rng):
+    return networks._draw(layers, 7, rng)
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_the_jacobian_is_exact(size):
+    rng = np.random.default_rng(1)
+    layers = networks.SIZES[size]
+    parameters = parameters_of(layers, rng)
+    inputs, targets = rng.random((20, 7)), rng.uniform(0.1, 0.9, 20)
+    _, jacobian = networks.residuals_and_jacobian(parameters, layers, inputs, targets)
+    for k in range(len(parameters)):
+        step = np.zeros(len(parameters))
+        step[k] = 1e-6
+        above, _ = networks.residuals_and_jacobian(parameters + step, layers, inputs, targets)
+        below, _ = networks.residuals_and_jacobian(parameters - step, layers, inputs, targets)
+        np.testing.assert_allclose(jacobian[:, k], (above - below) / 2e-6, atol=1e-7)
+
+
+def test_what_the_converter_cuts_off_is_no_error():
+    parameters = np.array([0.0] * 7 + [1.5])
+    inputs, layers = np.zeros((2, 7)), networks.SIZES["no hidden layer"]
+    residuals, jacobian = networks.residuals_and_jacobian(parameters, layers, inputs, np.array([1.0, 0.5]))
+    assert residuals.tolist() == [0.0, 1.0]
+    assert jacobian[:, 7].tolist() == [0.0, 1.0]
+    residuals, _ = networks.residuals_and_jacobian(-parameters, layers, inputs, np.array([0.01, 0.5]))
+    assert residuals.tolist() == [0.0, -2.0]
+
+
+def made_up(count=400):
+    rng = np.random.default_rng(3)
+    inputs = rng.random((count, 7))
+    return inputs, 1023.0 / (1.0 + np.exp(-20.0 * (inputs[:, 3] * inputs[:, 2] - 0.3)))
+
+
+def error_of(network, inputs, counts):
+    return float(np.mean(np.abs(network(inputs) - counts)))
+
+
+def test_training_reduces_the_error():
+    inputs, counts = made_up()
+    layers = networks.SIZES[networks.THESIS_SIZE]
+    start = networks.Network(
+        networks.unpack(parameters_of(layers, np.random.default_rng(0)), layers, 7), (True, False, False)
+    )
+    linear = networks.train(inputs, counts, networks.SIZES["no hidden layer"], seed=0, starts=1)
+    thesis = networks.train(inputs, counts, layers, seed=0, starts=2)
+    assert error_of(linear, inputs, counts) < 0.7 * error_of(start, inputs, counts)
+    assert error_of(thesis, inputs, counts) < 0.5 * error_of(linear, inputs, counts)
+
+
+def test_the_same_seed_trains_the_same_network():
+    inputs, counts = made_up(150)
+    one, two, other = (
+        networks.train(inputs, counts, networks.SIZES[networks.THESIS_SIZE], seed=seed, starts=1) for seed in (4, 4, 5)
+    )
+    for a, b, c in zip(one.weights, two.weights, other.weights, strict=True):
+        np.testing.assert_array_equal(a, b)
+        assert not np.array_equal(a, c)
+
+
+def test_too_few_samples():
+    with pytest.raises(ParameterError, match="at least 10 samples with something near and 1 start"):
+        networks.train(np.zeros((9, 7)), np.zeros(9), networks.SIZES["7 linear"], seed=0)
+
+
+def test_sensors_are_trained_on_samples_and_saved(tmp_path):
+    angles = np.arange(0.0, 360.0, 10.0)
+    counts = np.random.default_rng(0).integers(0, 1024, (5, 36, 8))
+    samples = Samples("wall", math.inf, np.arange(5.0, 15.0, 2.0), angles, counts)
+    said = []
+    trained = networks.train_sensors([samples], networks.SIZES[networks.THESIS_SIZE], starts=1, progress=said.append)
+    assert said == [f"sensor {sensor}" for sensor in range(8)]
+    answers, expected = networks.predictions([samples], trained)
+    assert answers.shape == expected.shape
+    assert networks.errors(answers, answers + 3.0) == pytest.approx((3.0, 3.0, 3.0))
+    response = networks.response_of(trained)
+    response.save(tmp_path / "mine.json")
+    again = NetworkResponse.load(tmp_path / "mine.json")
+    for here, there in zip(response.weights, again.weights, strict=True):
+        np.testing.assert_allclose(here, there, rtol=1e-5)
+    fan = networks.fan_of(again)
+    np.testing.assert_allclose(np.degrees(fan.direction_rad[2]), [72, 52, 32, 12, -8, -28, -48])
+    # The kernel says what NumPy says.
+    inputs, _ = networks.pairs([samples], fan, 5)
+    seen = np.zeros((len(inputs), 8, 7))
+    seen[:, 5] = inputs
+    out = np.empty((len(inputs), 8))
+    kernels.respond_networks(*response.weights, seen, out)
+    np.testing.assert_allclose(out[:, 5], np.clip(trained[5](inputs), 0, 1023), atol=0.3)
+    assert not out[:, :5].any()  # nothing near, nothing read
+
+
+def test_tanh():
+    for x in np.linspace(-20.0, 20.0, 4001):
+        assert tanh(x) == pytest.approx(math.tanh(x), abs=7e-6)
+        assert tanh(-x) == -tanh(x)
+        assert abs(tanh(x)) <= 1.0
+
+
+def test_the_table_is_the_mean_of_the_networks():
+    response = NetworkResponse.load()
+    table = fast_table()
+    assert table.shape == (6**7,)
+    assert table[0] == 0.0
+    assert table.min() >= 0.0
+    assert table.max() <= 1023.0
+    rng = np.random.default_rng(0)
+    levels = rng.integers(0, 6, (50, 7))
+    seen = np.repeat((levels / 5.0)[:, None], 8, axis=1)
+    out, looked_up = np.empty((50, 8)), np.empty((50, 8))
+    kernels.respond_networks(*response.weights, seen, out)
+    # Anything that rounds to the same level is the same entry.
+    nearby = np.clip(seen + rng.uniform(-0.09, 0.09, seen.shape), 0.0, 1.0)
+    kernels.respond_table(table, nearby, looked_up)
+    np.testing.assert_allclose(looked_up, np.repeat(out.mean(axis=1)[:, None], 8, axis=1), rtol=1e-5, atol=1e-3)
+
+
+def test_kernels_against_numpy():
+    response = NetworkResponse.load()
+    seen = np.random.default_rng(1).random((200, 8, 7))
+    out = np.empty((200, 8))
+    kernels.respond_networks(*response.weights, seen, out)
+    for sensor in range(8):
+        weights = (response.hidden[sensor], response.middle[sensor], response.last[sensor][None])
+        network = networks.Network(weights, (True, False, False))
+        np.testing.assert_allclose(out[:, sensor], np.clip(network(seen[:, sensor]), 0, 1023), atol=0.5)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "is none"),
+        ("[]", "must hold"),
+        ("{}", "but it holds []"),
+        (None, "is none"),
+    ],
+)
+def test_files_that_hold_no_networks(tmp_path, text, words):
+    file = tmp_path / "net.json"
+    if text is not None:
+        file.write_text(text)
+    with pytest.raises(ParameterError) as caught:
+        NetworkResponse.load(file)
+    assert words in str(caught.value)
+    assert "kiks fit" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"hidden": [[1.0]]}, {"last": "x"}, {"range_mm": [1.0]}, {"direction_deg": [1.0]}, {"hidden": [[1], [2, 3]]}],
+)
+def test_networks_have_their_shape(tmp_path, change):
+    data = json.loads(THESIS.read_text()) | change
+    (tmp_path / "net.json").write_text(json.dumps(data))
+    with pytest.raises(ParameterError, match=f"{next(iter(change))} must be finite numbers of the shape"):
+        NetworkResponse.load(tmp_path / "net.json")
+    with pytest.raises(ParameterError, match="must go to a place that can be written"):
+        NetworkResponse.load().save(tmp_path / "no" / "net.json")
+
+
+def test_networks_never_change():
+    response = NetworkResponse.load()
+    with pytest.raises(ValueError, match="read-only"):
+        response.hidden[0, 0, 0] = 1.0
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        response.range_mm = 1.0

@@ -1,0 +1,202 @@
+"""Files of samples are read, and what is wrong in one is said with its line; rays are those of the engine."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from kiks.engine.rays import cast_ray
+from kiks.errors import ParameterError
+from kiks.fit.networks import PLACES
+from kiks.fit.samples import (
+    BODY_RADIUS_MM,
+    MAXIMUM_COUNTS,
+    RIG_OFFSET_DEG,
+    Fan,
+    Samples,
+    is_active,
+    load_samples,
+    nearnesses,
+    ray_lengths_mm,
+)
+from kiks.model.arena import PAD, Arena
+
+ROW = "0 1 2 3 4 5 6 1023"
+GOOD = f"8 2 3 5 2\nTURN 0\n{ROW}\n{ROW}\nTURN 1\n{ROW}\n{ROW}\nTURN 2\n{ROW}\n9 9 9 9 9 9 9 9\n"
+
+
+def write(folder, text):
+    file = folder / "post.sam"
+    file.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return file
+
+
+@pytest.mark.parametrize("text", [GOOD, GOOD + "END\n", GOOD.replace("\n", " \r\n"), "\n" + GOOD.replace(" ", "\t")])
+def test_text_files_are_read(tmp_path, text):
+    samples = load_samples(write(tmp_path, text), radius_mm=12.5)
+    assert (samples.name, samples.radius_mm) == ("post", 12.5)
+    assert samples.gap_mm.tolist() == [5, 7, 9]
+    assert (samples.angle_deg + RIG_OFFSET_DEG).tolist() == [0, 180]
+    assert samples.counts.shape == (3, 2, 8)
+    assert samples.counts[0, 0].tolist() == [0, 1, 2, 3, 4, 5, 6, 1023]
+    assert samples.counts[2, 1].tolist() == [9] * 8
+    assert samples.at_angles(slice(1, None, 2)).counts.shape == (3, 1, 8)
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "words"),
+    [
+        (b"", 1, "an empty file"),
+        (b" \n\n", 1, "an empty file"),
+        (b"8 2 3 5 2\nTURN 0\n\xff\xfe", 3, "binary (byte 0xff)"),
+        (b"8 2 3 5 2\n\x00\n", 2, "binary (byte 0x00)"),
+        ("hello\n", 1, "'hello'"),
+        ("8 180 20 5\n", 1, "4 numbers"),
+        ("7 2 3 5 2\n", 1, "must be 8"),
+        ("8 0 3 5 2\n", 1, "1 to 3600 angles"),
+        ("8 2 0 5 2\n", 1, "1 to 1000 distances"),
+        ("8 2 3 -5 2\n", 1, "first distance"),
+        ("8 2 3 5 0\n", 1, "step"),
+        ("8 99999999999 3 5 2\n", 1, "'99999999999'"),
+        ("8 2 3 5 2\n", 1, "cut off"),
+        (GOOD.replace("TURN 1", "TURN 2", 1), 5, "must be 'TURN 1', but it was 'TURN 2'"),
+        (GOOD.replace("TURN 1\n", ""), 5, "must be 'TURN 1'"),
+        (GOOD.replace("2 3 4", "2 3.0 4", 1), 3, "'3.0'"),
+        (GOOD.replace("2 3 4", "2 x 4", 1), 3, "'x'"),
+        (GOOD.replace("2 3 4", "2 -- 4", 1), 3, "'--'"),
+        (GOOD.replace("2 3 4", "2 4", 1), 3, "row 1 of 2 of TURN 0), but it was 7 numbers"),
+        (GOOD.replace("2 3 4", "2 3 3 4", 1), 3, "9 numbers"),
+        (GOOD.replace("1023", "1024", 1), 3, "from 0 to 1023, but it was 1024"),
+        (GOOD.replace("2 3 4", "2 -3 4", 1), 3, "from 0 to 1023, but it was -3"),
+        (GOOD.replace("9 9 9 9 9 9 9 9\n", ""), 9, "the end of the file"),
+        (GOOD + ROW, 11, "must come nothing"),
+    ],
+)
+def test_broken_text_files_are_told_by_their_line(tmp_path, text, line, words):
+    with pytest.raises(ParameterError) as caught:
+        load_samples(write(tmp_path, text))
+    message = str(caught.value)
+    assert f"post.sam, line {line}: " in message
+    assert words in message
+    assert message.endswith((".", "?"))
+
+
+def table(**changes):
+    arrays = {
+        "values": np.arange(48, dtype=np.int16).reshape(2, 3, 8),
+        "gap_mm": np.array([5, 7]),
+        "object_angle_deg_cw": np.array([0, 120, 240]),
+    }
+    return {name: array for name, array in (arrays | changes).items() if array is not None}
+
+
+def test_tables_are_read(tmp_path):
+    np.savez(tmp_path / "wall.npz", **table())
+    samples = load_samples(tmp_path / "wall.npz")
+    assert samples.name == "wall"
+    assert math.isinf(samples.radius_mm)
+    assert samples.counts[1, 2, 7] == 47
+    assert (samples.angle_deg + RIG_OFFSET_DEG).tolist() == [0, 120, 240]
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"values": None}, "'values' is missing"),
+        ({"gap_mm": None}, "'gap_mm' is missing"),
+        ({"gap_mm": np.array([5])}, "shape (2, 3, 8), where 1 gaps and 3 angles stand"),
+        ({"values": np.zeros((2, 3, 7), int)}, "shape (2, 3, 7)"),
+        ({"values": np.zeros((2, 3, 8))}, "type float64"),
+        ({"values": np.full((2, 3, 8), 1024)}, "a value is 1024"),
+        ({"values": np.full((2, 3, 8), -1)}, "a value is -1"),
+        ({"values": np.zeros((0, 3, 8), int), "gap_mm": np.zeros(0)}, "it is empty"),
+        ({"values": np.array([None])}, "no .npz"),
+    ],
+)
+def test_broken_tables_are_told(tmp_path, changes, words):
+    np.savez(tmp_path / "wall.npz", **table(**changes))
+    with pytest.raises(ParameterError) as caught:
+        load_samples(tmp_path / "wall.npz")
+    assert words in str(caught.value)
+    assert "wall.npz: A table of samples must hold" in str(caught.value)
+
+
+@pytest.mark.parametrize("data", [b"", b"8 180 20 5 2\n", b"PK\x03\x04broken"])
+def test_a_table_that_is_none(tmp_path, data):
+    (tmp_path / "wall.npz").write_bytes(data)
+    with pytest.raises(ParameterError, match=r"it is no \.npz file"):
+        load_samples(tmp_path / "wall.npz")
+
+
+@pytest.mark.parametrize("name", ["none.sam", "none.npz", "."])
+def test_a_file_that_is_not_there(tmp_path, name):
+    with pytest.raises(ParameterError, match="must come from a readable file"):
+        load_samples(tmp_path / name)
+
+
+@pytest.mark.parametrize("radius_mm", [0.0, -1.0, math.nan])
+def test_a_radius_is_positive(tmp_path, radius_mm):
+    with pytest.raises(ParameterError, match="radius_mm must be positive"):
+        load_samples(write(tmp_path, GOOD), radius_mm=radius_mm)
+
+
+def test_active_readings():
+    assert is_active(np.array([0, 19, 20, 1000, 1001, 1023])).tolist() == [False, False, True, True, False, False]
+
+
+@pytest.mark.parametrize("radius_mm", [math.inf, 27.0, 3.0])
+@pytest.mark.parametrize("places", sorted(PLACES))
+def test_rays_are_those_of_the_engine(radius_mm, places):
+    """The same rays, followed through a raster: as long within what the raster's cells allow."""
+    cell, side, middle = 0.2, 240.0, 120.0
+    fan = Fan.spread(*PLACES[places])
+    gaps, angles = np.array([5.0, 21.0, 43.0]), np.arange(0.0, 360.0, 33.0)
+    samples = Samples("object", radius_mm, gaps, angles, np.zeros((3, len(angles), 8), np.int64))
+    lengths = ray_lengths_mm(samples, fan)
+    x = np.arange(cell / 2, side, cell)
+    edge = 160.0
+    if math.isinf(radius_mm):
+        inside = np.broadcast_to(x >= edge, (len(x), len(x)))
+    else:
+        inside = np.hypot(x - edge - radius_mm, x[:, None] - middle) <= radius_mm
+    arena = Arena(inside.astype(np.uint8) * 255, cell, "object")
+    sight = (arena.clearance, arena.surface, cell, PAD)
+    checked = 0
+    for i, gap in enumerate(gaps):
+        for j, angle in enumerate(angles):
+            heading = math.radians(angle)
+            turn = np.array([[math.cos(heading), -math.sin(heading)], [math.sin(heading), math.cos(heading)]])
+            for sensor in range(8):
+                ox, oy = turn @ fan.origin_mm[sensor] + (edge - gap - BODY_RADIUS_MM, middle)
+                for ray in range(7):
+                    direction = heading + fan.direction_rad[sensor, ray]
+                    cosine, sine = math.cos(direction), math.sin(direction)
+                    length = lengths[i, j, sensor, ray]
+                    found, _ = cast_ray(*sight, ox, oy, cosine, sine, 50.0)
+                    if length < 50.0:
+                        # How steeply the ray meets the surface: a raster moves a grazing hit far along the ray.
+                        hit = np.array([ox + length * cosine, oy + length * sine])
+                        normal = (
+                            np.array([1.0, 0.0])
+                            if math.isinf(radius_mm)
+                            else (np.array([edge + radius_mm, middle]) - hit) / radius_mm
+                        )
+                        steepness = float(normal @ (cosine, sine))
+                        assert steepness >= -1e-9
+                        if steepness > 0.2:
+                            assert found == pytest.approx(length, abs=2 * cell / steepness)
+                            checked += 1
+                    elif found < 49.0:
+                        # Only a ray that passes within a cell of the disc may meet its raster.
+                        assert not math.isinf(radius_mm)
+                        centre = np.array([edge + radius_mm - ox, middle - oy])
+                        assert abs(centre[0] * sine - centre[1] * cosine) > radius_mm - cell
+    assert checked > 20
+
+
+def test_nothing_in_range_is_nothing():
+    samples = Samples("wall", math.inf, np.array([60.0]), np.arange(0.0, 360.0, 10.0), np.zeros((1, 36, 8), np.int64))
+    assert nearnesses(samples, Fan.spread(*PLACES["rim"])).max() == 0.0
+    assert MAXIMUM_COUNTS == 1023

@@ -1,0 +1,322 @@
+"""The linear camera K213: its orders, its view, its blur, its instants, its noise."""
+
+from __future__ import annotations
+
+import math
+import re
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import kiks
+from kiks.firmware.k213 import K213, PERIODS_NS
+
+LENGTHS = {"B": 2, "L": 2, "M": 32, "N": 64, "O": 1, "P": 1, "Q,5": 8, "R,5": 16, "S": 32, "T": 16, "U,0": 0}
+
+
+def scene(
+    *bars: tuple[int, int, int, int, int], wall: int = 255, size_mm: int = 600, at: float = 300.0, seed: int = 0
+) -> kiks.Simulation:
+    """A robot with a camera that looks up from the middle; bars are x, y, width, height [mm] and brightness."""
+    ground = np.zeros((size_mm, size_mm), np.uint8)
+    ground[:10], ground[-10:], ground[:, :10], ground[:, -10:] = wall, wall, wall, wall
+    for x, y, width, height, brightness in bars:
+        ground[size_mm - y - height : size_mm - y, x : x + width] = brightness
+    sim = kiks.Simulation(kiks.Arena.from_array(ground), seed=seed)
+    sim.place(1, size_mm / 2, at, math.pi / 2)
+    sim.fit(1, "k213")
+    return sim
+
+
+def contrast(image: list[float]) -> float:
+    """The steepest step between neighbours."""
+    return float(np.abs(np.diff(image)).max())
+
+
+# ---- orders ----
+
+
+@pytest.mark.parametrize(("order", "count"), LENGTHS.items())
+def test_every_order_has_its_reply(order: str, count: int) -> None:
+    reply = scene()
+    port = reply.port(1)
+    port.write(f"T,2,{order}\n".encode())
+    letter = order[0].lower()
+    assert re.fullmatch(rf"t,2,{letter}(,\d{{1,3}}){{{count}}}\r\n".encode(), port.readline())
+
+
+def test_the_parts_of_an_image_are_those_of_the_whole() -> None:
+    pixels = [(37 * p + 11) % 256 for p in range(64)]
+    camera = K213(lambda time_ns: (pixels, 1234))
+    camera.look(0)
+    assert camera.order("N", ()) == tuple(pixels)
+    assert camera.order("S", ()) == tuple(pixels[::2])
+    assert camera.order("T", ()) == tuple(pixels[::4])
+    assert camera.order("Q", (3,)) == tuple(pixels[3:11])
+    assert camera.order("R", (48,)) == tuple(pixels[48:])
+    assert camera.order("Q", (63,)) == tuple(pixels[56:])
+    assert camera.order("R", (2**62,)) == tuple(pixels[48:])
+    assert camera.order("Q", (-(2**62),)) == tuple(pixels[:8])
+    assert camera.order("L", ()) == (1234 // 256, 1234 % 256)
+    assert camera.order("O", ()) == (int(np.argmax(pixels)),)
+    assert camera.order("P", ()) == (int(np.argmin(pixels)),)
+    packed = camera.order("M", ())
+    assert packed is not None
+    assert [byte >> 4 for byte in packed] == [grey >> 4 for grey in pixels[::2]]
+    assert [byte & 15 for byte in packed] == [grey >> 4 for grey in pixels[1::2]]
+
+
+@pytest.mark.parametrize(
+    "order",
+    ["A", "C", "D", "Z", "N,1", "L,0", "Q", "R", "Q,1,2", "U", "U,8", "U,-1", "U,1,1", "U,99999999999999999999"],
+)
+def test_other_orders_are_a_protocol_error(order: str) -> None:
+    robot = kiks.Khepera(scene().port(1))
+    assert robot.send(f"T,2,{order}") == "z,Protocol error"
+
+
+@pytest.mark.parametrize("letter", "ABCDEFGHIJKLMNOPQRSTUVWXYZ")
+def test_no_number_breaks_it(letter: str) -> None:
+    firmware = scene().wires[0].firmware
+    for words in ("", ",0", ",-1", ",63", ",64", ",255", ",-99999999999999999999999", ",1,2,3"):
+        reply = firmware.execute(f"T,2,{letter}{words}".encode(), 0)
+        assert reply == b"z,Protocol error\r\n" or reply.startswith(b"t,2," + letter.lower().encode())
+
+
+def test_without_a_camera_there_is_none() -> None:
+    sim = kiks.Simulation()
+    robot = kiks.Khepera(sim.port(1))
+    assert robot.send("T,2,N") == "z,Turret order not supported"
+    with pytest.raises(kiks.LinkError, match="Is the turret fitted"):
+        robot.image()
+    with pytest.raises(kiks.ParameterError, match=r"turret must be 'k213' .*, but it was 'k214'. Did you mean 'k213'"):
+        sim.fit(1, "k214")
+    sim.fit(1, "k213")
+    assert len(robot.image()) == 64
+    assert robot.send("net") == "K213 linear vision, ID 2, revision 1.0"
+
+
+def test_a_camera_on_one_robot_is_not_on_the_other() -> None:
+    sim = kiks.Simulation(robots=2)
+    sim.fit(2, "k213")
+    assert kiks.Khepera(sim.port(1)).send("T,2,B") == "z,Turret order not supported"
+    assert len(kiks.Khepera(sim.port(2)).image()) == 64
+
+
+# ---- what it sees ----
+
+
+def test_left_is_left() -> None:
+    image = scene((200, 430, 95, 20, 1)).image(1)
+    assert max(image[2:24]) < 70 < 200 < min(image[34:44])
+    robot = kiks.Khepera(scene((305, 430, 95, 20, 1)).port(1))
+    noisy = robot.image()
+    assert np.mean(noisy[:28]) > np.mean(noisy[36:]) + 80
+    assert robot.turret(2, "P")[0] > 32
+
+
+def test_the_view_spans_exactly_18_degrees_to_either_side() -> None:
+    """A dark bar whose edge is just inside or outside the outermost ray."""
+    for side in (-1, 1):
+        outermost = 63 if side > 0 else 0
+        for angle_deg, is_seen in ((17.6, True), (18.4, False)):
+            edge = round(300 + side * 220 * math.tan(math.radians(angle_deg)))
+            bar = (edge, 520, 80, 1, 1) if side > 0 else (edge - 80, 520, 80, 1, 1)
+            image = scene(bar).image(1)
+            plain = scene((0, 0, 1, 1, 1)).image(1)
+            assert (image[outermost] < plain[outermost] - 20) is is_seen
+
+
+def test_left_and_right_are_mirror_images() -> None:
+    image = scene((240, 450, 30, 20, 60), (350, 480, 10, 10, 1)).image(1)
+    mirrored = scene((330, 450, 30, 20, 60), (240, 480, 10, 10, 1)).image(1)
+    assert image == pytest.approx(mirrored[::-1], abs=1e-6)
+
+
+def test_brighter_walls_are_brighter() -> None:
+    bars = [(0, 430, 600, 20, 255)] + [
+        (230 + 28 * k, 425, 28, 5, grey) for k, grey in enumerate((1, 64, 128, 192, 255))
+    ]
+    image = np.array(scene(*bars).image(1))
+    columns = [round((18 - math.degrees(math.atan2(-(244 + 28 * k - 300), 125))) * 63 / 36) for k in range(5)]
+    greys = [image[min(max(column, 0), 63)] for column in columns[1:4]]
+    assert greys == sorted(greys)
+    assert greys[-1] > greys[0] + 40
+
+
+def test_the_exposure_makes_the_brightest_white_and_the_light_level_tells() -> None:
+    dark, bright = scene(wall=1), scene(wall=255)
+    assert dark.image(1)[32] == pytest.approx(bright.image(1)[32], abs=12)
+
+    def level(sim: kiks.Simulation) -> int:
+        high, low = kiks.Khepera(sim.port(1)).turret(2, "L")
+        return 256 * high + low
+
+    assert 175 <= level(bright) <= 330
+    assert 1500 <= level(dark) <= 2000
+
+
+def test_edges_are_darker() -> None:
+    image = scene((0, 430, 600, 20, 255)).image(1)
+    assert image[:32] == sorted(image[:32])
+    assert image[0] == pytest.approx(0.9 * 132 + 12.75, abs=3)
+    assert image[32] == pytest.approx(0.9 * 235 + 12.75, abs=3)
+
+
+def test_near_is_sharp_and_far_is_blurred() -> None:
+    steps = []
+    for far in (100, 200, 250, 300, 400, 600, 900, 1700):
+        sim = scene((1000, 200 + far, 990, 20, 1), (10, 200 + far, 990, 20, 255), size_mm=2000, at=200)
+        steps.append(contrast(sim.image(1)))
+    assert steps[0] == pytest.approx(steps[1], rel=0.01)
+    assert steps[1] == pytest.approx(steps[2], rel=0.15)
+    assert all(near >= far for near, far in pairwise(steps[1:]))
+    assert steps[-1] < 0.2 * steps[0]
+    assert steps[-1] > 5  # but it sees at any distance
+
+
+def test_the_view_begins_50_mm_from_the_centre() -> None:
+    post = (298, 335, 4, 4, 1)  # between the rim and the beginning of the view
+    assert scene(post).image(1) == pytest.approx(scene((0, 0, 1, 1, 1)).image(1), abs=1e-6)
+    assert min(scene((298, 352, 4, 4, 1)).image(1)) < 80
+    # A wall nearer than that is seen all the same, with the brightness of its surface.
+    nearby = scene((0, 335, 600, 5, 1), (0, 340, 600, 100, 255), (0, 100, 600, 5, 255))
+    assert max(nearby.image(1)) - min(nearby.image(1)) == pytest.approx(92, abs=15)  # the fall-off alone
+    high, _ = kiks.Khepera(nearby.port(1)).turret(2, "L")
+    assert high >= 6  # dark
+
+
+# ---- motion ----
+
+
+def moving(left: int, right: int) -> list[float]:
+    sim = scene((230, 480, 70, 10, 1), (300, 480, 70, 10, 255), (0, 0, 1, 1, 1), size_mm=600, at=300)
+    kiks.Khepera(sim.port(1)).set_speed(left, right)
+    sim.run(0.5)
+    sim.place(1, 300, 300, math.pi / 2)
+    sim.run(0.03)  # then the trail knows how it moves
+    return sim.image(1)
+
+
+def test_motion_smears_and_turning_smears_more() -> None:
+    still, driving, turning = moving(0, 0), moving(5, 5), moving(5, -5)
+    assert contrast(turning) < contrast(driving) < contrast(still)
+    assert contrast(turning) < 0.5 * contrast(still)
+    assert contrast(moving(10, -10)) < contrast(turning)
+
+
+# ---- instants ----
+
+
+@pytest.mark.parametrize("code", range(8))
+def test_pictures_are_taken_at_whole_periods(code: int) -> None:
+    sim = scene(seed=3)
+    firmware = sim.wires[0].firmware
+    assert firmware.execute(f"T,2,U,{code}".encode(), 0) == b"t,2,u\r\n"
+    period_s = PERIODS_NS[code] / 1e9
+    before, changes = firmware.execute(b"T,2,N", 0), []
+    for k in range(1, 31):
+        sim.run(k * period_s / 10 - sim.time_s)
+        sim.sync()
+        now = firmware.execute(b"T,2,N", sim.now_ns)
+        if now != before:
+            changes.append(k)
+        before = now
+    assert changes == [10, 20, 30]
+
+
+def test_an_image_does_not_depend_on_how_often_one_looks() -> None:
+    def drive(looks: int) -> tuple[list[int], str]:
+        sim = scene((200, 480, 95, 20, 1), seed=8)
+        robot = kiks.Khepera(sim.port(1))
+        robot.set_speed(3, -2)
+        for k in range(1, looks + 1):
+            sim.run(0.1 + 1.234 * k / looks - sim.time_s)
+            sim.pose(1)
+        return robot.image(), sim.state_hash()
+
+    assert drive(1) == drive(7) == drive(400)
+
+
+def test_a_change_of_period_takes_no_picture_of_the_past() -> None:
+    sim = scene(seed=1)
+    camera = sim.wires[0].firmware.turrets[2]
+    assert isinstance(camera, K213)
+    sim.run(0.47)
+    sim.sync()
+    assert camera.taken_ns == 400_000_000
+    camera.order("U", (1,))
+    sim.run(0.02)
+    sim.sync()
+    assert camera.taken_ns == 400_000_000
+    sim.run(0.01)
+    sim.sync()
+    assert camera.taken_ns == 500_000_000
+
+
+def test_the_picture_shows_where_the_robot_was_at_that_instant() -> None:
+    sim = scene((200, 480, 95, 20, 1))
+    kiks.Khepera(sim.port(1)).set_speed(0, 0)
+    sim.run(0.25 - sim.time_s)
+    before = kiks.Khepera(sim.port(1)).image()
+    sim.place(1, 300, 300, -math.pi / 2)
+    sim.run(0.01)
+    camera = sim.wires[0].firmware.turrets[2]
+    assert isinstance(camera, K213)
+    assert camera.taken_ns % PERIODS_NS[0] == 0
+    assert np.mean(before[2:24]) < 100
+    sim.run(0.2)
+    sim.sync()
+    assert np.mean(camera.pixels[10:24]) > 150
+
+
+# ---- noise ----
+
+
+def test_noise_is_bounded_and_without_bias_and_repeats() -> None:
+    sim = scene(seed=5)
+    expected = np.array(sim.image(1))
+    camera = sim.wires[0].firmware.turrets[2]
+    assert isinstance(camera, K213)
+    rows = []
+    for k in range(500):
+        camera.look(k * 1000)
+        rows.append(camera.pixels)
+    noise = np.array(rows) - expected
+    # 10 % of chance makes +-12.75, the converter +-9 at most, smeared over neighbours.
+    assert np.abs(noise).max() <= 12.75 + 9 + 9 + 0.5
+    assert np.abs(noise.mean(axis=0)).max() < 4
+    assert 5 < noise.std() < 12
+    again = scene(seed=5).wires[0].firmware.turrets[2]
+    assert isinstance(again, K213)
+    again.look(499_000)
+    assert again.pixels == rows[-1]
+    other = scene(seed=6).wires[0].firmware.turrets[2]
+    assert isinstance(other, K213)
+    other.look(499_000)
+    assert other.pixels != rows[-1]
+
+
+def test_vector_26() -> None:
+    """khepera-protocol.md, section 12."""
+    sim = kiks.Simulation(robot="khepera_ii")
+    sim.fit(1, "k213")
+    port = sim.port(1)
+    port.write(b"T,2,N\n")
+    reply = port.readline()
+    assert re.fullmatch(rb"t,2,n(,\d{1,3}){64}\r\n", reply)
+    assert all(0 <= int(word) <= 255 for word in reply.strip().split(b",")[3:])
+
+
+def test_no_place_is_too_narrow_or_too_wide() -> None:
+    rng = np.random.default_rng(2)
+    for arena in (kiks.Arena.box(100, 100, wall_mm=0), kiks.Arena.box(3000, 3000), kiks.Arena.default()):
+        sim = kiks.Simulation(arena)
+        sim.fit(1, "k213")
+        for _ in range(100):
+            x, y = rng.uniform(28, arena.width_mm - 28), rng.uniform(28, arena.height_mm - 28)
+            if arena.free_for(x, y, 27.5):
+                sim.place(1, x, y, rng.uniform(-10, 10))
+                image = sim.image(1)
+                assert all(0 <= grey <= 255 for grey in image)
