@@ -47,7 +47,7 @@ def test_commands_and_targets_exist(page: Path) -> None:
     targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), flags=re.MULTILINE))
     assert set(re.findall(r"\bmake ([a-z]+)\b", "".join(blocks(page, "sh")))) <= targets
     for command in re.findall(r"^kiks ([a-z]+)", "".join(blocks(page, "sh")), flags=re.MULTILINE):
-        assert command in {"demo", "run", "serve", "warmup"}, f"{page.name}: kiks {command}"
+        assert command in {"demo", "run", "serve", "accuracy", "fit", "warmup"}, f"{page.name}: kiks {command}"
     # Paths that a page names in code must exist.
     for path in re.findall(r"\b(?:examples|docs|benchmarks|tests|src)/[\w./-]+\.\w+", text):
         assert (ROOT / path).exists(), f"{page.name} names {path}"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from kiks.cli.compile_note import note_compiling
+from kiks.cli.engine_start import ready_engine
 from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def accuracy(
 
     Example: kiks accuracy --plots card
     """
-    note_compiling()
+    ready_engine()
     from kiks.fit import accuracy as cards
 
     card = cards.make_card(cards.load_tables(cards.data_folder(data)))
