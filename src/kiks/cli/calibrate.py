@@ -1,0 +1,146 @@
+"""`kiks calibrate`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from kiks.cli.compile_note import note_compiling
+from kiks.cli.ending import end_as_with_ctrl_c
+from kiks.errors import ParameterError
+
+if TYPE_CHECKING:
+    from kiks.client.khepera import Khepera
+    from kiks.client.placements import Instruction, Placements
+
+REPEAT_MAX_MM = 2000.0
+
+
+def calibrate(
+    port: Annotated[str, typer.Option(help="Port of the robot: /dev/ttyUSB0, COM3, socket://host:port, kiks://1.")],
+    out: Annotated[Path, typer.Option(help="Robot file to write, for --robot.")],
+    base: Annotated[str, typer.Option(help="Its kind, for all that is not measured: khepera, khepera_ii, a file.")] = (
+        "khepera"
+    ),
+    baud: Annotated[int, typer.Option(help="Line speed [bit/s].", min=75, max=4_000_000)] = 9600,
+    gaps: Annotated[
+        str | None, typer.Option(help="Marks [mm] from the wall at which the robot spins: 5,15,25.")
+    ] = None,
+    run_up: Annotated[float, typer.Option(help="Mark [mm] from which it drives towards the wall.")] = 500.0,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file if it is there.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Take every default: for simulated robots.")] = False,
+) -> None:
+    """Measure a robot in front of a white wall and write a robot file, so that the simulated one is like it.
+
+    It says where the robot has to be put and waits. A simulated robot (kiks://1) is put there by itself.
+
+    Example: kiks calibrate --port /dev/ttyUSB0 --out mine.toml
+    """
+    note_compiling()
+    from kiks.client.calibration import calibrate as measure
+    from kiks.client.khepera import Khepera
+    from kiks.model.robot import RobotSpec
+    from kiks.model.robot_file import save_robot
+
+    kind = RobotSpec.load(base)
+    marks = None if gaps is None else parse_gaps(gaps)
+    check_target(out, overwrite=overwrite)
+    end_as_with_ctrl_c()
+    with Khepera(port, baud=baud) as robot:
+        placements = TerminalPlacements(hand_of(robot), asks=not yes)
+        found = measure(robot, placements, kind, baud=baud, gaps_mm=marks, run_up_mm=run_up, say=typer.echo)
+    comment = [
+        f"Measured by 'kiks calibrate' on {port}; what is not named here is that of {kind.name!r}.",
+        *found.lines(),
+    ]
+    save_robot(found.spec, out, comment="\n".join(comment))
+    typer.echo("\n".join(found.lines()))
+    typer.echo(f"Written: {out}. Use it with --robot {out}, or kiks.Simulation(robot={str(out)!r}).")
+
+
+class TerminalPlacements:
+    """A person at the terminal who puts the robot where it has to be.
+
+    Args:
+        hand: What moves the robot if it is a simulated one.
+        asks: False to take every default.
+    """
+
+    def __init__(self, hand: Placements | None = None, *, asks: bool = True) -> None:
+        self.hand = hand
+        self.asks = asks
+        self.count = 0
+
+    def place(self, instruction: Instruction) -> float:
+        """Say what is to be done and wait; return the gap that the person gives, the marked one by default [mm]."""
+        from dataclasses import replace
+
+        from kiks.client.placements import Place
+
+        self.count += 1
+        typer.echo(f"\n{self.count}. {instruction.text}")
+        gap_mm = instruction.gap_mm
+        if self.asks and instruction.place is Place.WALL:
+            gap_mm = _ask_gap("   Gap between wall and rim in mm; Enter when it stands there", gap_mm)
+        elif self.asks:
+            typer.prompt("   Enter when it stands there", default="", show_default=False)
+        if self.hand is not None:
+            self.hand.place(replace(instruction, gap_mm=gap_mm))
+        typer.echo("   Measuring; hands off ...")
+        return gap_mm
+
+    def wants_repeat(self, finding: str, *, is_good: bool) -> bool:
+        """Show what was found and ask whether to do it again: no by default if it was good, yes if not."""
+        typer.echo(f"   {finding}")
+        if not self.asks:
+            return False
+        return typer.confirm("   Do that again?", default=not is_good)
+
+
+def _ask_gap(question: str, default_mm: float) -> float:
+    while True:
+        gap_mm = float(typer.prompt(question, default=default_mm, type=float))
+        if 0 < gap_mm <= REPEAT_MAX_MM:
+            return gap_mm
+        typer.echo(f"   The gap must be above 0 and up to {REPEAT_MAX_MM:g} mm, but it was {gap_mm:g}. Measure again.")
+
+
+def hand_of(robot: Khepera) -> Placements | None:
+    """Return what can move the robot: nothing but a person, unless it is simulated in this very process."""
+    from kiks.client.placements import SimPlacements
+    from kiks.ports.memory import SimPort
+
+    port = robot.port
+    return SimPlacements(port.sim, port.robot) if isinstance(port, SimPort) else None
+
+
+def parse_gaps(text: str) -> list[float]:
+    """Return the numbers of '5,15,25' [mm].
+
+    Raises:
+        ParameterError: If there is something else.
+
+    Example:
+        >>> parse_gaps("5,15,25.5")
+        [5.0, 15.0, 25.5]
+    """
+    try:
+        return [float(word) for word in text.split(",")]
+    except ValueError:
+        raise ParameterError(f"--gaps must be numbers with commas, but it was {text!r}. Example: 5,15,25,35.") from None
+
+
+def check_target(out: Path, *, overwrite: bool) -> None:
+    """Raise, before anything is measured, if the file could not be written in the end.
+
+    Raises:
+        ParameterError: If it is there already, or its folder is not.
+    """
+    import os
+
+    if out.exists() and not overwrite:
+        raise ParameterError(f"--out must name a new file, but {str(out)!r} is there. Add --overwrite to replace it.")
+    if not out.parent.is_dir() or not os.access(out.parent, os.W_OK) or out.is_dir():
+        raise ParameterError(f"--out must name a file in a folder that can be written, but it was {str(out)!r}.")

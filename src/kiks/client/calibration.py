@@ -1,0 +1,327 @@
+"""Calibration: what makes a robot an individual, measured over its line by a few placements before a white wall."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, TypeVar
+
+import numpy as np
+
+from kiks.client.khepera import Khepera
+from kiks.client.measuring import (
+    SPIN_TURNS,
+    CalibrationError,
+    Rest,
+    Run,
+    drive,
+    halt,
+    processing_ms,
+    rest,
+    spin,
+)
+from kiks.client.placements import Instruction, Place, Placements
+from kiks.client.wall_fit import DIRECTION, GAIN, HAS_GAIN, Fit, fit_runs, guess_pulse
+from kiks.errors import LinkError, ParameterError
+from kiks.model.robot import SENSOR_COUNT, RobotSpec
+
+GAP_SHARES = (0.1, 0.3, 0.5, 0.7)
+"""Gaps at which the robot spins, as shares of the range of its sensors."""
+
+ALONG_GAP = 1
+"""Which of the gaps is the one at which it drives along the wall: near enough to see well, far enough not to touch."""
+
+ALONG_MM = 100.0
+"""How far it drives along the wall [mm]."""
+
+RUN_UP_MM = 500.0
+"""Marked gap from which it drives towards the wall [mm]."""
+
+FREE_SAMPLES, GAP_SAMPLES = 200, 40
+"""Readings at rest: in the open, and before each spin."""
+
+ATTEMPTS = 3
+"""How often a placement is tried at most."""
+
+NEAR_SHARE = 0.5
+"""The robot stops before the wall when a front sensor reads this share of its largest count."""
+
+SEEN_COUNTS, GLIMPSED_COUNTS = 50.0, 10.0
+"""What a sensor that sees a wall reads above its baseline at least [counts]: within half its range, and beyond."""
+
+GAP_ERROR_MAX_MM = 3.0
+"""Runs whose gaps the fit would rather change by more contradict the others [mm]."""
+
+MISFIT_MAX = 6.0
+"""Root mean square of the residuals above which the measurements are not those of such a robot."""
+
+Found = TypeVar("Found")
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What was found.
+
+    Attributes:
+        spec: The robot.
+        fit: How it was found, with uncertainties.
+        jitter_counts: Jitter of each sensor in the open, half width [counts].
+    """
+
+    spec: RobotSpec
+    fit: Fit
+    jitter_counts: tuple[float, ...]
+
+    def lines(self) -> list[str]:
+        """Return the result as lines of text, each number with its uncertainty (one standard deviation)."""
+        body, proximity, error = self.spec.body, self.spec.proximity, self.fit.uncertainty
+        base_mm, pulse_mm = error[2 * SENSOR_COUNT :] * (body.wheel_base_mm, body.pulse_mm)
+        lines = [
+            f"wheel base    {body.wheel_base_mm:.2f} +- {base_mm:.2f} mm",
+            f"pulse length  {body.pulse_mm:.5f} +- {pulse_mm:.5f} mm",
+            f"processing    {self.spec.firmware.processing_ms:.2f} ms",
+            f"misfit        {self.fit.misfit:.2f} (1: as good as the readings are steady)",
+        ]
+        for sensor in range(SENSOR_COUNT):
+            direction = getattr(proximity, DIRECTION)[sensor]
+            line = f"sensor {sensor}      looks to {direction:6.1f} +- {error[sensor]:.1f} deg"
+            if HAS_GAIN:
+                gain = getattr(proximity, GAIN)[sensor]
+                line += f", gain {gain:.3f} +- {gain * error[SENSOR_COUNT + sensor]:.3f}"
+            baseline = f", baseline {proximity.baseline_counts[sensor]:.0f}"
+            lines.append(f"{line}{baseline}, jitter {self.jitter_counts[sensor]:.0f} counts")
+        return lines
+
+
+def calibrate(
+    robot: Khepera,
+    placements: Placements,
+    base: RobotSpec,
+    *,
+    baud: int = 9600,
+    gaps_mm: Sequence[float] | None = None,
+    run_up_mm: float = RUN_UP_MM,
+    say: Say = lambda text: None,
+) -> Calibration:
+    """Measure a robot; it stands still when this returns or raises.
+
+    Args:
+        robot: The robot.
+        placements: Who puts it where it has to be.
+        base: The kind of robot that it is, for all that is not measured.
+        baud: Speed of its line [bit/s].
+        gaps_mm: Marked distances from wall to rim [mm], at least two; shares of the range of its sensors if left out.
+        run_up_mm: Marked gap from which it drives towards the wall [mm].
+        say: Takes a word on what is being done.
+
+    Raises:
+        ParameterError: If the gaps are not usable.
+        CalibrationError: If a measurement does not show what it should, or they contradict each other.
+        LinkError: If the robot does not answer.
+    """
+    gaps = checked_gaps(gaps_mm, run_up_mm, base)
+    bios, protocol = robot.version()
+    say(f"A Khepera answers: BIOS {bios}, protocol {protocol}.")
+    try:
+        halt(robot)
+        return _Session(robot, placements, base, baud, say).measure(gaps, run_up_mm)
+    finally:
+        halt(robot)
+
+
+def checked_gaps(gaps_mm: Sequence[float] | None, run_up_mm: float, base: RobotSpec) -> list[float]:
+    """Return the gaps to spin at, nearest first [mm].
+
+    Raises:
+        ParameterError: If they are too few, too near or too far, or the run-up is too short.
+    """
+    range_mm = base.proximity.range_mm
+    gaps = sorted(gaps_mm) if gaps_mm else [share * range_mm for share in GAP_SHARES]
+    if len(set(gaps)) < 2 or not all(2 <= gap <= range_mm for gap in gaps):
+        raise ParameterError(
+            f"gaps_mm must be at least two different numbers from 2 to {range_mm:g} mm, the range of the sensors, "
+            f"but they were {gaps}. Leave them out for good ones."
+        )
+    if not 3 * range_mm <= run_up_mm <= 2000:
+        raise ParameterError(
+            f"run_up_mm must be between {3 * range_mm:g} and 2000 mm, but it was {run_up_mm!r}. The longer, the better."
+        )
+    return gaps
+
+
+class _Session:
+    """One calibration under way."""
+
+    def __init__(self, robot: Khepera, placements: Placements, base: RobotSpec, baud: int, say: Say) -> None:
+        self.robot = robot
+        self.placements = placements
+        self.spec = base
+        self.guess = base
+        self.baud = baud
+        self.say = say
+        self.rests: list[Rest] = []
+
+    def measure(self, gaps: list[float], run_up_mm: float) -> Calibration:
+        jitter = self._at(
+            Instruction(Place.FREE, "Put the robot in the open: nothing within 300 mm, no lamp, no sun."),
+            self._measure_in_the_open,
+        )
+        runs: list[Run] = []
+        for index, gap_mm in enumerate(gaps):
+            text = f"Put the robot before the wall, facing it, its rim at the {gap_mm:g} mm mark."
+            measure = partial(
+                self._measure_before_the_wall, before=tuple(runs), is_along=index == ALONG_GAP, is_nearest=index == 0
+            )
+            runs += self._at(Instruction(Place.WALL, text, gap_mm), measure)
+        text = f"Put the robot before the wall, facing it squarely, its rim at the {run_up_mm:g} mm mark."
+        runs.append(self._at(Instruction(Place.WALL, text, run_up_mm), self._measure_run_up))
+        self.say("Working it out ...")
+        fit = fit_runs(self.spec, runs, guess_pulse(self.spec, self.guess, runs[-1]))
+        _check_fit(fit, runs)
+        spec = fit.spec
+        noise = {key: round(getattr(spec.proximity, key) * self._noise_factor(fit.spec), 4) for key in _NOISE}
+        spec = replace(spec, name=f"{self.spec.name} (calibrated)", proximity=replace(spec.proximity, **noise))
+        return Calibration(_rounded(spec), fit, jitter)
+
+    def _at(self, instruction: Instruction, measure: Callable[[float], tuple[Found, str]]) -> Found:
+        """Have the robot placed and measure, again if that is wanted; return what was measured."""
+        for attempt in range(1, ATTEMPTS + 1):
+            gap_mm = self.placements.place(instruction)
+            rest_count = len(self.rests)
+            try:
+                found, finding = measure(gap_mm)
+            except (CalibrationError, LinkError) as error:
+                halt(self.robot)
+                if attempt == ATTEMPTS or not self.placements.wants_repeat(str(error), is_good=False):
+                    raise
+            else:
+                if attempt == ATTEMPTS or not self.placements.wants_repeat(finding, is_good=True):
+                    return found
+            del self.rests[rest_count:]
+        raise AssertionError("the last attempt returns or raises")
+
+    def _measure_in_the_open(self, _: float) -> tuple[tuple[float, ...], str]:
+        thinking_ms = processing_ms(self.robot, self.baud)
+        at_rest = rest(self.robot, FREE_SAMPLES)
+        typical, jitter = at_rest.typical(), at_rest.jitter()
+        limit = self.spec.proximity.maximum_counts
+        if typical.max() > limit / 3:
+            raise CalibrationError(
+                f"the sensors must read little in the open, but sensor {int(typical.argmax())} reads "
+                f"{typical.max():.0f} counts. Move away what is near, and lamps with it."
+            )
+        proximity = replace(
+            self.spec.proximity, baseline_counts=tuple(typical.tolist()), noise_counts=float(np.median(jitter))
+        )
+        firmware = replace(self.spec.firmware, processing_ms=min(round(thinking_ms, 2), 1000.0))
+        self.spec = replace(self.spec, proximity=proximity, firmware=firmware)
+        baselines = ", ".join(f"{count:.0f}" for count in typical)
+        noise = f"jitter {proximity.noise_counts:.1f} counts; the robot thinks for {thinking_ms:.2f} ms"
+        return tuple(jitter.tolist()), f"Baselines {baselines}; {noise}."
+
+    def _measure_before_the_wall(
+        self, gap_mm: float, *, before: tuple[Run, ...], is_along: bool, is_nearest: bool
+    ) -> tuple[list[Run], str]:
+        self.rests.append(rest(self.robot, GAP_SAMPLES))
+        there = spin(self.robot, self.spec, gap_mm, SPIN_TURNS)
+        back = spin(self.robot, self.spec, gap_mm, -SPIN_TURNS)  # both ways, as readings are older than counters
+        runs = [there, replace(back, is_marked=False)]
+        above = np.concatenate([run.counts for run in runs]).max(axis=0) - np.array(self.spec.proximity.baseline_counts)
+        enough = SEEN_COUNTS if gap_mm <= self.spec.proximity.range_mm / 2 else GLIMPSED_COUNTS
+        if above.max() < enough:
+            raise CalibrationError(
+                f"some sensor must see the wall at {gap_mm:g} mm, but none reads more than {above.max():.0f} counts "
+                "above its baseline. Is the wall white, upright and at the mark?"
+            )
+        if is_nearest and above.min() < SEEN_COUNTS:
+            raise CalibrationError(
+                f"every sensor must see the wall at {gap_mm:g} mm as the robot spins, but sensor {int(above.argmin())} "
+                f"reads no more than {above.min():.0f} counts above its baseline. Is it covered or broken?"
+            )
+        if is_along:
+            runs += self._drive_along(gap_mm, [*before, *runs])
+        largest = ", ".join(f"{count:.0f}" for count in above)
+        return runs, f"Largest readings at {gap_mm:g} mm, above the baseline: {largest}."
+
+    def _drive_along(self, gap_mm: float, runs: list[Run]) -> list[Run]:
+        """Drive along the wall and back, first with the left and then with the right side to it; return the ways there.
+
+        Where to turn comes from a first fit of the runs so far.
+        """
+        fit = fit_runs(self.spec, [run.thinned(3) for run in runs])
+        self.guess = fit.spec
+        heading_rad = fit.end_heading_rad(len(runs) - 1, runs[-1])
+        ways = []
+        for side_rad in (-math.pi / 2, math.pi / 2):
+            turn_rad = math.remainder(side_rad - heading_rad, 2 * math.pi)
+            turn = spin(self.robot, fit.spec, gap_mm, turn_rad / (2 * math.pi))
+            heading_rad += turn.turned_pulses() * fit.spec.body.pulse_mm / fit.spec.body.wheel_base_mm
+            ways.append(replace(drive(self.robot, fit.spec, gap_mm, ALONG_MM), is_marked=False))
+            drive(self.robot, fit.spec, gap_mm, -ALONG_MM)
+        return ways
+
+    def _measure_run_up(self, gap_mm: float) -> tuple[Run, str]:
+        near = NEAR_SHARE * self.spec.proximity.maximum_counts
+
+        def is_near(counts: list[int]) -> bool:
+            return max(counts[1:5]) >= near
+
+        run = drive(self.robot, self.spec, gap_mm, 1.1 * gap_mm, is_near)
+        if not is_near(run.counts[-1].tolist()):
+            front = ", ".join(f"{count:.0f}" for count in run.counts[-1][1:5])
+            raise CalibrationError(
+                f"the wall must come into sight {gap_mm:g} mm ahead, but after {run.end_pulses[0]} pulses the front "
+                f"sensors read {front}. Put the robot at the mark, facing the wall squarely."
+            )
+        return run, f"The wall was near after {sum(run.end_pulses) / 2:.0f} pulses."
+
+    def _noise_factor(self, spec: RobotSpec) -> float:
+        """Return by how much the relative noise of this robot is larger than that of its kind, at rest by the wall."""
+        proximity = spec.proximity
+        shares = []
+        for at_rest in self.rests:
+            mean = at_rest.counts.mean(axis=0)
+            usual = proximity.noise_small - (proximity.noise_small - proximity.noise_large) * mean / 1000
+            usual_counts = mean * usual / (proximity.noise_exponent + 1)
+            # Far above the jitter, and where no noise is cut off by the converter's limit.
+            clear = (mean > 100 + 10 * proximity.noise_counts) & (at_rest.counts.max(axis=0) < proximity.maximum_counts)
+            shares += (at_rest.deviation()[clear] / np.maximum(usual_counts[clear], 1e-9)).tolist()
+        if not shares:
+            return 1.0
+        largest = 0.99 / proximity.noise_small if proximity.noise_small else 1.0
+        return min(float(np.mean(shares)), largest)
+
+
+_NOISE = ("noise_small", "noise_large")
+
+
+def _check_fit(fit: Fit, runs: Sequence[Run]) -> None:
+    """Raise if measurements contradict each other."""
+    worst = int(np.abs(fit.gap_errors_mm).argmax())
+    error_mm, marked_mm = float(fit.gap_errors_mm[worst]), runs[worst].gap_mm
+    if abs(error_mm) > GAP_ERROR_MAX_MM:
+        raise CalibrationError(
+            f"the measurements must agree with each other, but those at the {marked_mm:g} mm mark look like "
+            f"{marked_mm + error_mm:.1f} mm beside the others. Check the marks, measured from the wall to the robot's "
+            "nearest rim, and that the wall is white all over; then start again."
+        )
+    if fit.misfit > MISFIT_MAX:
+        raise CalibrationError(
+            f"the measurements must be those of a robot before a white wall, but they miss by {fit.misfit:.1f} times "
+            f"their noise. Is {fit.spec.name!r} the right --base, and was nothing else near the robot?"
+        )
+
+
+def _rounded(spec: RobotSpec) -> RobotSpec:
+    """Return the robot with its measured numbers rounded to what a file should show."""
+    proximity, body = spec.proximity, spec.body
+    digits = {DIRECTION: 2, "baseline_counts": 1} | ({GAIN: 4} if HAS_GAIN else {})
+    changes: dict[str, Any] = {
+        key: tuple(round(value, digit) for value in getattr(proximity, key)) for key, digit in digits.items()
+    }
+    changes["noise_counts"] = round(proximity.noise_counts, 1)
+    body = replace(body, wheel_base_mm=round(body.wheel_base_mm, 3), pulse_mm=round(body.pulse_mm, 6))
+    return replace(spec, body=body, proximity=replace(proximity, **changes))

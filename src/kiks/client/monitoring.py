@@ -1,0 +1,154 @@
+"""Monitoring: all readings of a robot again and again, and their log."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import NamedTuple, TextIO
+
+from kiks.client.khepera import Khepera, Status
+from kiks.errors import ParameterError
+from kiks.model.robot import SENSOR_COUNT
+
+RATE_MIN_HZ, RATE_MAX_HZ = 0.01, 100.0
+
+RATE_WINDOW = 20
+"""Samples over which the achieved rate is taken."""
+
+
+class Sample(NamedTuple):
+    """Everything that a robot says of itself at one time.
+
+    Attributes:
+        time_s: Time since the start [s], when the first question was asked.
+        proximity: Reflected light, clockwise from the left [counts]; more is nearer.
+        ambient: Ambient light [counts]; less is brighter.
+        encoders: Position counters, left and right [pulses].
+        speed: Measured speeds, left and right [pulses/10 ms].
+        status: What the two controllers report.
+    """
+
+    time_s: float
+    proximity: list[int]
+    ambient: list[int]
+    encoders: tuple[int, int]
+    speed: tuple[int, int]
+    status: tuple[Status, Status]
+
+    def row(self) -> str:
+        """Return the sample as a line of the log, in the order of `COLUMNS`."""
+        states = [value for motor in self.status for value in (int(motor.on_target), motor.mode, motor.error)]
+        numbers = [*self.proximity, *self.ambient, *self.encoders, *self.speed, *states]
+        return ",".join((f"{self.time_s:.3f}", *map(str, numbers)))
+
+
+COLUMNS = (
+    "time_s",
+    *(f"proximity_{sensor}_counts" for sensor in range(SENSOR_COUNT)),
+    *(f"ambient_{sensor}_counts" for sensor in range(SENSOR_COUNT)),
+    "left_pulses",
+    "right_pulses",
+    "left_speed_pulses",
+    "right_speed_pulses",
+    *(f"{side}_{what}" for side in ("left", "right") for what in ("on_target", "mode", "error_pulses")),
+)
+"""Columns of the log. Speeds are in pulses/10 ms; so is a controller's error, but for pulses during a position move."""
+
+
+def samples(robot: Khepera, *, rate_hz: float = 10.0, seconds: float | None = None) -> Iterator[Sample]:
+    """Yield samples at a steady rate, or as fast as the line allows if that is slower.
+
+    A round of questions takes 0.15 s at 9600 baud, so no more than 6 or 7 samples a second come through there.
+
+    Args:
+        robot: The robot.
+        rate_hz: Samples a second.
+        seconds: How long [s] of the robot's time; without end if left out.
+
+    Raises:
+        ParameterError: If a number is out of range.
+        LinkError: If the robot does not answer.
+    """
+    if not (isinstance(rate_hz, int | float) and RATE_MIN_HZ <= rate_hz <= RATE_MAX_HZ):
+        raise ParameterError(
+            f"rate_hz must be between {RATE_MIN_HZ:g} and {RATE_MAX_HZ:g}, but it was {rate_hz!r}. "
+            "At 9600 baud about 6 are possible."
+        )
+    if seconds is not None and not (math.isfinite(seconds) and seconds > 0):
+        raise ParameterError(f"seconds must be positive and finite, but it was {seconds!r}. Leave it out for no end.")
+    return _samples(robot, 1.0 / rate_hz, math.inf if seconds is None else seconds)
+
+
+def _samples(robot: Khepera, period_s: float, seconds: float) -> Iterator[Sample]:
+    start_s = robot.time_s
+    due_s = 0.0
+    while due_s < seconds:
+        now_s = robot.time_s - start_s
+        if now_s < due_s:
+            robot.pause(due_s - now_s)
+            now_s = robot.time_s - start_s
+        yield Sample(now_s, robot.proximity(), robot.ambient(), robot.encoders(), robot.speed(), robot.status())
+        # Who is late does not catch up: the next sample is due at once.
+        due_s = max(due_s + period_s, robot.time_s - start_s)
+
+
+class RateMeter:
+    """How many samples a second there were of late.
+
+    Example:
+        >>> meter = RateMeter()
+        >>> for time_s in (0.0, 0.5, 1.0):
+        ...     rate_hz = meter.note(time_s)
+        >>> rate_hz
+        2.0
+    """
+
+    def __init__(self) -> None:
+        self._times_s: list[float] = []
+
+    def note(self, time_s: float) -> float:
+        """Take the time of a sample [s] and return the rate [Hz], 0 before the second one."""
+        self._times_s = [*self._times_s[-RATE_WINDOW:], time_s]
+        span_s = time_s - self._times_s[0]
+        return (len(self._times_s) - 1) / span_s if span_s > 0 else 0.0
+
+
+class CsvLog:
+    """A log file: a header that names columns and units, then a line a sample, each on the disk at once.
+
+    Args:
+        path: A file that is not there yet.
+
+    Raises:
+        ParameterError: If it is there or cannot be written.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        try:
+            self._file: TextIO = open(path, "x", encoding="utf-8")  # noqa: SIM115  (closed by close)
+        except OSError as error:
+            raise ParameterError(
+                f"a log must go to a new file, but {str(path)!r} cannot be one ({error.strerror}). Choose another name."
+            ) from None
+        self._write(",".join(COLUMNS))
+
+    def add(self, sample: Sample) -> None:
+        """Write a sample."""
+        self._write(sample.row())
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def _write(self, line: str) -> None:
+        self._file.write(line + "\n")
+        self._file.flush()
+
+
+def logged(stream: Iterable[Sample], log: CsvLog | None) -> Iterator[Sample]:
+    """Yield samples, each written to the log, if there is one, before anybody else sees it."""
+    for sample in stream:
+        if log is not None:
+            log.add(sample)
+        yield sample

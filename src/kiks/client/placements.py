@@ -1,0 +1,94 @@
+"""Placements: who puts the robot where a measurement needs it, a person or, in a simulation, the program itself."""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+from kiks.errors import ParameterError
+from kiks.sim.simulation import Simulation
+
+
+class Place(enum.Enum):
+    """Where a robot may have to stand."""
+
+    FREE = "free"
+    WALL = "wall"
+
+
+@dataclass(frozen=True)
+class Instruction:
+    """What is to be done before a measurement.
+
+    Attributes:
+        place: In the open, or before a straight white wall, facing it.
+        text: The same in words, for a person.
+        gap_mm: Marked distance from the wall to the robot's rim [mm]; 0 in the open.
+    """
+
+    place: Place
+    text: str
+    gap_mm: float = 0.0
+
+
+class Placements(Protocol):
+    """Whoever carries out instructions."""
+
+    def place(self, instruction: Instruction) -> float:
+        """Put the robot there and return the gap that it really has [mm]."""
+
+    def wants_repeat(self, finding: str, *, is_good: bool) -> bool:
+        """Show what was found; return True to do the placement and its measurement again."""
+
+
+class SimPlacements:
+    """Places a simulated robot before the upper wall of its arena, or in the middle.
+
+    Args:
+        sim: The simulation.
+        robot: Number of the robot, from 1.
+        skew_rad: How far from square it puts the robot down [rad], as a hand would.
+    """
+
+    def __init__(self, sim: Simulation, robot: int = 1, *, skew_rad: float = 0.0) -> None:
+        self.sim = sim
+        self.robot = robot
+        self.skew_rad = skew_rad
+
+    def place(self, instruction: Instruction) -> float:
+        """Put the robot there.
+
+        Raises:
+            ParameterError: If the arena has no room for that.
+        """
+        arena, radius_mm = self.sim.arena, self.sim.spec.body.radius_mm
+        x_mm, y_mm = arena.width_mm / 2, arena.height_mm / 2
+        if instruction.place is Place.WALL:
+            y_mm = self._touching_mm(x_mm, y_mm) - instruction.gap_mm
+        if not arena.free_for(x_mm, y_mm, radius_mm):
+            raise ParameterError(
+                f"the arena must have room for a robot {instruction.gap_mm:g} mm below the middle of its upper wall, "
+                f"but {arena.name!r} has none. Take a box of at least 500 x 650 mm, empty, or shorten the run-up."
+            )
+        self.sim.place(self.robot, x_mm, y_mm, math.pi / 2 + self.skew_rad)
+        return instruction.gap_mm
+
+    def wants_repeat(self, finding: str, *, is_good: bool) -> bool:
+        """Return False: the same again would give the same again."""
+        return False
+
+    def _touching_mm(self, x_mm: float, free_mm: float) -> float:
+        """Return the y at which the robot's rim touches the upper wall [mm]."""
+        arena, radius_mm = self.sim.arena, self.sim.spec.body.radius_mm
+        blocked_mm = free_mm
+        while arena.free_for(x_mm, blocked_mm, radius_mm):
+            free_mm, blocked_mm = blocked_mm, blocked_mm + 1.0
+        while blocked_mm - free_mm > 1e-6:
+            middle_mm = (free_mm + blocked_mm) / 2
+            if arena.free_for(x_mm, middle_mm, radius_mm):
+                free_mm = middle_mm
+            else:
+                blocked_mm = middle_mm
+        return free_mm

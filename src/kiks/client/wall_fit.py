@@ -1,0 +1,264 @@
+"""The fit behind a calibration: which robot would have read what this one read in front of a straight wall?
+
+Need: directions and gains of eight sensors, wheel base and pulse length, from runs whose start gap is known and whose
+start heading is not, for a hand does not put a robot down squarely.
+
+Assumption: the simulator's own expected reading is right but for these numbers. Odometry turns counters into poses.
+
+Method: weighted least squares, all runs at once. A spin shows when the wall comes by a second time (wheel base over
+pulse length) and what each sensor makes of angle and gap; a drive along the wall shows which way is forward, as a
+heading that is wrong by a degree changes the gap; a drive towards the wall from a marked distance shows the pulse
+length. No reading depends on another sensor's numbers or another run's heading, so a Jacobian takes seven predictions.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from kiks.client.measuring import Array, CalibrationError, Run
+from kiks.model.arena import Arena
+from kiks.model.robot import SENSOR_COUNT, Proximity, RobotSpec
+from kiks.sim.simulation import Simulation
+
+DIRECTION, GAIN = "direction_deg", "gain"
+"""Keys of section [proximity] that are fitted for each sensor."""
+
+HAS_GAIN = GAIN in {key.name for key in fields(Proximity)}
+
+NOISE_COUNTS, NOISE_SHARE = 8.0, 0.05
+"""What a reading is taken to be uncertain by: so many counts and that share of it."""
+
+PRIOR_DEG, PRIOR_LOG_GAIN, PRIOR_LOG_LENGTH = 15.0, 0.7, 0.05
+"""How far robots are taken to differ from their kind; it only matters where the measurements are silent."""
+
+GAP_MIN_MM = 0.02
+"""Nearest that a predicted robot stands to the wall [mm]: odometry may be wrong, but nothing stands in a wall."""
+
+HEADING_ROOM_RAD = 0.7
+"""How far the guess of a heading may be off [rad]."""
+
+MARKED_MM, UNMARKED_MM = 0.01, 3.0
+"""How far the start gap of a run may be off [mm]: at a mark, and where the robot has driven to by itself."""
+
+_STEP = (1.0, 0.03, 0.003, 0.003, math.radians(1.0), 0.3)
+"""Steps of the Jacobian: direction [deg], logs of gain, wheel base and pulse length, heading [rad], gap [mm]."""
+
+_BASE, _PULSE = 2 * SENSOR_COUNT, 2 * SENSOR_COUNT + 1
+_HEADINGS = 2 * SENSOR_COUNT + 2  # then a heading for each run, and last a shift of the gap for each
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The robot that explains the runs.
+
+    Attributes:
+        spec: The robot.
+        headings_rad: Heading of each run's start; 0 faces the wall, left positive.
+        uncertainty: One standard deviation of: directions [deg], log of the gains, of wheel base and pulse length.
+        misfit: Root mean square of the residuals, in units of what readings are uncertain by; about 1 is good.
+        gap_errors_mm: For each run, how much farther away than marked the wall looks [mm].
+    """
+
+    spec: RobotSpec
+    headings_rad: Array
+    uncertainty: Array
+    misfit: float
+    gap_errors_mm: Array
+
+    def end_heading_rad(self, index: int, run: Run) -> float:
+        """Return where a robot looks after a run [rad]."""
+        body = self.spec.body
+        return float(self.headings_rad[index] + run.turned_pulses() * body.pulse_mm / body.wheel_base_mm)
+
+
+class Stand:
+    """A simulated robot in front of a wall: what it would read."""
+
+    def __init__(self, spec: RobotSpec) -> None:
+        self.radius_mm = spec.body.radius_mm
+        self.sight_mm = 2.0 * spec.proximity.range_mm
+        reach_mm = 2.0 * (self.radius_mm + self.sight_mm)
+        self.arena = Arena.box(math.ceil(reach_mm), math.ceil(reach_mm), wall_mm=0)
+
+    def readings(self, spec: RobotSpec, gaps_mm: Array, headings_rad: Array) -> Array:
+        """Return the expected counts at gaps to the wall [mm] and headings [rad], shape [pose, 8]."""
+        sim = Simulation(self.arena, robot=spec)
+        wall_mm, middle_mm = self.arena.width_mm - self.radius_mm, self.arena.height_mm / 2
+        expected = np.empty((len(gaps_mm), SENSOR_COUNT))
+        expected[:] = spec.proximity.baseline_counts
+        for index, (gap_mm, heading_rad) in enumerate(zip(gaps_mm.tolist(), headings_rad.tolist(), strict=True)):
+            if gap_mm < self.sight_mm:
+                sim.place(1, wall_mm - max(gap_mm, GAP_MIN_MM), middle_mm, heading_rad)
+                expected[index] = sim.proximity(1)
+        limited: Array = np.minimum(expected, spec.proximity.maximum_counts)
+        return limited
+
+
+def odometry(run: Run, spec: RobotSpec, heading_rad: float) -> tuple[Array, Array]:
+    """Return gap [mm] and heading [rad] at each reading of a run that began with a heading [rad]."""
+    path_mm = np.vstack(([0.0, 0.0], run.pulses)) * spec.body.pulse_mm
+    headings_rad = heading_rad + (path_mm[:, 1] - path_mm[:, 0]) / spec.body.wheel_base_mm
+    steps_mm = np.diff(path_mm.mean(axis=1))
+    nearer_mm = np.cumsum(steps_mm * np.cos((headings_rad[1:] + headings_rad[:-1]) / 2))
+    return run.gap_mm - nearer_mm, headings_rad[1:]
+
+
+def guess_heading_rad(run: Run, spec: RobotSpec) -> float:
+    """Return about which way a run began [rad]: the mean direction of the light, turned back by odometry."""
+    _, headings_rad = odometry(run, spec, 0.0)
+    looks_rad = headings_rad[:, None] + np.radians(getattr(spec.proximity, DIRECTION))
+    light = (run.counts - np.array(spec.proximity.baseline_counts)) * np.exp(1j * looks_rad)
+    return -float(np.angle(light.sum()))
+
+
+def guess_pulse(base: RobotSpec, spec: RobotSpec, run: Run) -> RobotSpec:
+    """Return `spec` with the pulse length that explains a run towards the wall best, and the wheel base in proportion.
+
+    A fit alone would not find it: a pulse that is too short puts the wall out of sight, where nothing changes.
+    """
+    stand = Stand(base)
+    best, least = spec, math.inf
+    for ratio in np.linspace(1 - 2 * PRIOR_LOG_LENGTH, 1 + 2 * PRIOR_LOG_LENGTH, 41).tolist():
+        lengths = {"pulse_mm": base.body.pulse_mm * ratio}
+        lengths["wheel_base_mm"] = spec.body.wheel_base_mm * lengths["pulse_mm"] / spec.body.pulse_mm
+        candidate = replace(spec, body=replace(spec.body, **lengths))
+        readings = stand.readings(candidate, *odometry(run, candidate, guess_heading_rad(run, spec)))
+        miss = float(np.abs(readings - run.counts).sum())
+        if miss < least:
+            best, least = candidate, miss
+    return best
+
+
+def fit_runs(base: RobotSpec, runs: Sequence[Run], guess: RobotSpec | None = None) -> Fit:
+    """Return the robot, like `base` otherwise, that explains the runs best.
+
+    Args:
+        base: What is known of the robot beforehand.
+        runs: What was measured.
+        guess: Where the search begins; at `base` if left out.
+
+    Raises:
+        CalibrationError: If no robot explains them.
+    """
+    from scipy.optimize import least_squares
+    from scipy.sparse import csr_array
+
+    stand = Stand(base)
+    measured = np.concatenate([run.counts for run in runs])
+    # A reading at its limit says no more than that: as good as one below, for the prediction is limited too.
+    weights = 1.0 / (NOISE_COUNTS + NOISE_SHARE * measured)
+    owners = np.repeat(np.arange(len(runs)), [len(run.counts) for run in runs])
+    prior = np.full(_HEADINGS, PRIOR_DEG)
+    prior[SENSOR_COUNT:_BASE] = PRIOR_LOG_GAIN
+    prior[_BASE:] = PRIOR_LOG_LENGTH
+    prior_mm = np.array([MARKED_MM if run.is_marked else UNMARKED_MM for run in runs])
+    shifts = _HEADINGS + len(runs)
+
+    def predict(unknowns: Array, farther_mm: float = 0.0) -> Array:
+        spec = robot_of(base, unknowns)
+        tracks = [odometry(run, spec, unknowns[_HEADINGS + index]) for index, run in enumerate(runs)]
+        gaps_mm, headings_rad = (np.concatenate(part) for part in zip(*tracks, strict=True))
+        return stand.readings(spec, gaps_mm + unknowns[shifts + owners] + farther_mm, headings_rad) * weights
+
+    def residuals(unknowns: Array) -> Array:
+        misses = predict(unknowns) - measured * weights
+        return np.concatenate((misses.ravel(), unknowns[:_HEADINGS] / prior, unknowns[shifts:] / prior_mm))
+
+    def slopes(unknowns: Array) -> Any:
+        now = predict(unknowns)
+        matrix = np.zeros((*now.shape, len(unknowns)))
+
+        def slope(chosen: Any, step: float) -> Array:
+            moved = unknowns.copy()
+            moved[chosen] += step
+            change: Array = (predict(moved) - now) / step
+            return change
+
+        sensors = np.arange(SENSOR_COUNT)
+        matrix[:, sensors, sensors] = slope(slice(0, SENSOR_COUNT), _STEP[0])
+        if HAS_GAIN:
+            matrix[:, sensors, SENSOR_COUNT + sensors] = slope(slice(SENSOR_COUNT, _BASE), _STEP[1])
+        matrix[:, :, _BASE] = slope(_BASE, _STEP[2])
+        matrix[:, :, _PULSE] = slope(_PULSE, _STEP[3])
+        samples = np.arange(len(owners))
+        matrix[samples, :, _HEADINGS + owners] = slope(slice(_HEADINGS, shifts), _STEP[4])
+        matrix[samples, :, shifts + owners] = slope(slice(shifts, None), _STEP[5])
+        bound = np.zeros((_HEADINGS + len(runs), len(unknowns)))
+        bound[:_HEADINGS, :_HEADINGS] = np.diag(1.0 / prior)
+        bound[_HEADINGS:, shifts:] = np.diag(1.0 / prior_mm)
+        # Six numbers a row are not zero: the sparse solver is several times as fast on a busy computer.
+        return csr_array(np.vstack((matrix.reshape(-1, len(unknowns)), bound)))
+
+    guess = base if guess is None else guess
+    headings = [guess_heading_rad(run, guess) for run in runs]
+    start = np.concatenate((unknowns_of(base, guess), headings, np.zeros(len(runs))))
+    room = np.concatenate((5 * prior, np.full(len(runs), HEADING_ROOM_RAD), 5 * prior_mm))
+    found = least_squares(
+        residuals,
+        start,
+        slopes,
+        bounds=(start - room, start + room),
+        x_scale=room,
+        loss="soft_l1",
+        f_scale=2.0,
+        xtol=1e-4,
+        ftol=1e-4,
+        max_nfev=30,
+    )
+    unknowns = found.x
+    misses = (predict(unknowns) - measured * weights).reshape(len(owners), SENSOR_COUNT)
+    misfit = float(np.sqrt(np.mean(misses[measured > NOISE_COUNTS] ** 2))) if (measured > NOISE_COUNTS).any() else 0.0
+    covariance = np.linalg.pinv((found.jac.T @ found.jac).toarray()) * max(misfit, 1.0) ** 2
+    return Fit(
+        spec=robot_of(base, unknowns),
+        headings_rad=unknowns[_HEADINGS:shifts],
+        uncertainty=np.sqrt(np.diag(covariance))[:_HEADINGS],
+        misfit=misfit,
+        gap_errors_mm=_gap_errors_mm(misses, predict(unknowns, 0.5) - predict(unknowns), owners, 0.5),
+    )
+
+
+def _gap_errors_mm(misses: Array, changes: Array, owners: Any, step_mm: float) -> Array:
+    """Return for each run the change of all its gaps that would explain it best [mm]."""
+    slopes = changes / step_mm
+    over = np.bincount(owners, (slopes**2).sum(axis=1))
+    errors_mm: Array = -np.bincount(owners, (slopes * misses).sum(axis=1)) / np.maximum(over, 1e-9)
+    return errors_mm
+
+
+def unknowns_of(base: RobotSpec, spec: RobotSpec) -> Array:
+    """Return the unknowns that make `spec` of `base`, without headings."""
+    unknowns = np.zeros(_HEADINGS)
+    unknowns[:SENSOR_COUNT] = np.subtract(getattr(spec.proximity, DIRECTION), getattr(base.proximity, DIRECTION))
+    if HAS_GAIN:
+        unknowns[SENSOR_COUNT:_BASE] = np.log(np.divide(getattr(spec.proximity, GAIN), getattr(base.proximity, GAIN)))
+    unknowns[_BASE] = math.log(spec.body.wheel_base_mm / base.body.wheel_base_mm)
+    unknowns[_PULSE] = math.log(spec.body.pulse_mm / base.body.pulse_mm)
+    return unknowns
+
+
+def robot_of(base: RobotSpec, unknowns: Array) -> RobotSpec:
+    """Return the robot that the unknowns of the fit stand for.
+
+    Raises:
+        CalibrationError: If there can be no such robot.
+    """
+    direction = np.array(getattr(base.proximity, DIRECTION)) + unknowns[:SENSOR_COUNT]
+    found: dict[str, Any] = {DIRECTION: tuple(direction.tolist())}
+    if HAS_GAIN:
+        gain = np.array(getattr(base.proximity, GAIN)) * np.exp(unknowns[SENSOR_COUNT:_BASE])
+        found[GAIN] = tuple(gain.tolist())
+    wheel_base_mm = base.body.wheel_base_mm * math.exp(unknowns[_BASE])
+    pulse_mm = base.body.pulse_mm * math.exp(unknowns[_PULSE])
+    if not 0.5 < wheel_base_mm / base.body.wheel_base_mm < 2 or not 0.5 < pulse_mm / base.body.pulse_mm < 2:
+        raise CalibrationError(
+            f"the measurements must come from a robot like {base.name!r}, but they ask for a wheel base of "
+            f"{wheel_base_mm:.1f} mm and a pulse of {pulse_mm:.4f} mm. Name the right kind with --base."
+        )
+    body = replace(base.body, wheel_base_mm=wheel_base_mm, pulse_mm=pulse_mm)
+    return replace(base, body=body, proximity=replace(base.proximity, **found))
