@@ -30,7 +30,7 @@ def state_of(text: str) -> str:
     return found[1]
 
 
-@pytest.mark.parametrize("command", ["demo", "run", "serve", "accuracy", "fit", "warmup"])
+@pytest.mark.parametrize("command", ["demo", "run", "serve", "monitor", "calibrate", "accuracy", "fit", "warmup"])
 def test_every_command_has_help_with_an_example(command: str) -> None:
     result = kiks(command, "--help")
     assert result.returncode == 0

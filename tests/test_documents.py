@@ -9,8 +9,13 @@ from pathlib import Path
 
 import pytest
 
+from kiks.cli import app
+
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+COMMANDS = {command.callback.__name__ for command in app.registered_commands if command.callback}
 
 
 def blocks(page: Path, language: str) -> list[str]:
@@ -47,7 +52,7 @@ def test_commands_and_targets_exist(page: Path) -> None:
     targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), flags=re.MULTILINE))
     assert set(re.findall(r"\bmake ([a-z]+)\b", "".join(blocks(page, "sh")))) <= targets
     for command in re.findall(r"^kiks ([a-z]+)", "".join(blocks(page, "sh")), flags=re.MULTILINE):
-        assert command in {"demo", "run", "serve", "accuracy", "fit", "warmup"}, f"{page.name}: kiks {command}"
+        assert command in COMMANDS, f"{page.name}: kiks {command}"
     # Paths that a page names in code must exist.
     for path in re.findall(r"\b(?:examples|docs|benchmarks|tests|src)/[\w./-]+\.\w+", text):
         assert (ROOT / path).exists(), f"{page.name} names {path}"

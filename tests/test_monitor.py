@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import importlib
 import io
 from pathlib import Path
 
@@ -12,10 +13,10 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 import kiks
-from kiks.cli import monitor as command
 from kiks.client.monitoring import COLUMNS, CsvLog, RateMeter, Sample, logged, samples
 
 app = typer.Typer()
+command = importlib.import_module("kiks.cli.monitor")  # `kiks.cli.monitor` itself is the function
 app.command()(command.monitor)
 
 

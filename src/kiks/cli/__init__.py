@@ -8,8 +8,10 @@ import typer
 
 from kiks import __version__
 from kiks.cli.accuracy import accuracy
+from kiks.cli.calibrate import calibrate
 from kiks.cli.demo import demo
 from kiks.cli.fit import fit
+from kiks.cli.monitor import monitor
 from kiks.cli.run import run
 from kiks.cli.serve import serve
 from kiks.cli.warmup import warmup
@@ -22,7 +24,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for _command in (demo, run, serve, accuracy, fit, warmup):
+for _command in (demo, run, serve, monitor, calibrate, accuracy, fit, warmup):
     # A program's own options, and whatever stands after its name, belong to the program.
     app.command(context_settings={"allow_interspersed_args": _command is not run})(_command)
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from kiks.cli.compile_note import note_compiling
 from kiks.cli.ending import end_as_with_ctrl_c
+from kiks.cli.engine_start import ready_engine
 from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def calibrate(
 
     Example: kiks calibrate --port /dev/ttyUSB0 --out mine.toml
     """
-    note_compiling()
+    ready_engine()
     from kiks.client.calibration import calibrate as measure
     from kiks.client.khepera import Khepera
     from kiks.model.robot import RobotSpec

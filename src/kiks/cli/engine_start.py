@@ -30,4 +30,8 @@ def compile_everything() -> None:
     robot.proximity()
     robot.ambient()
     sim.proximity(1)
+    sim.ambient(1)
+    sim.fit(1, "k213")
+    robot.image()
+    sim.image(1)
     sim.place(1, *sim.pose(1))

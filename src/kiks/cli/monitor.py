@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from kiks.cli.compile_note import note_compiling
 from kiks.cli.ending import end_as_with_ctrl_c
+from kiks.cli.engine_start import ready_engine
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -43,7 +43,7 @@ def monitor(
     from kiks.client.monitoring import CsvLog, RateMeter, logged, samples
 
     if port.startswith("kiks:"):
-        note_compiling()
+        ready_engine()
     console = Console()
     end_as_with_ctrl_c()
     count, rate_hz, log = 0, 0.0, None

@@ -213,11 +213,12 @@ def fit_runs(base: RobotSpec, runs: Sequence[Run], guess: RobotSpec | None = Non
     unknowns = found.x
     misses = (predict(unknowns) - measured * weights).reshape(len(owners), SENSOR_COUNT)
     misfit = float(np.sqrt(np.mean(misses[measured > NOISE_COUNTS] ** 2))) if (measured > NOISE_COUNTS).any() else 0.0
-    covariance = np.linalg.pinv((found.jac.T @ found.jac).toarray()) * max(misfit, 1.0) ** 2
+    covariance = np.linalg.pinv((found.jac.T @ found.jac).toarray(), hermitian=True) * max(misfit, 1.0) ** 2
     return Fit(
         spec=robot_of(base, unknowns),
         headings_rad=unknowns[_HEADINGS:shifts],
-        uncertainty=np.sqrt(np.diag(covariance))[:_HEADINGS],
+        # Rounding may bring a variance below 0.
+        uncertainty=np.sqrt(np.maximum(np.diag(covariance), 0.0))[:_HEADINGS],
         misfit=misfit,
         gap_errors_mm=_gap_errors_mm(misses, predict(unknowns, 0.5) - predict(unknowns), owners, 0.5),
     )

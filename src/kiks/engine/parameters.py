@@ -34,6 +34,7 @@ PARAMETERS = np.dtype(
         ("ray_cos", "f8", (SENSOR_COUNT, RAY_COUNT)),
         ("ray_sin", "f8", (SENSOR_COUNT, RAY_COUNT)),
         ("range_mm", "f8"),
+        ("gain", "f8", (SENSOR_COUNT,)),
         ("baseline_counts", "f8", (SENSOR_COUNT,)),
         ("maximum_counts", "f8"),
         ("step_counts", "f8"),
@@ -84,7 +85,7 @@ def pack(spec: RobotSpec) -> NDArray[np.void]:
             sine, cosine = sin_cos(math.radians(proximity.direction_deg[sensor] + offset_deg))
             robot["ray_cos"][sensor, ray] = cosine
             robot["ray_sin"][sensor, ray] = sine
-    for name in ("range_mm", "baseline_counts", "maximum_counts", "step_counts"):
+    for name in ("range_mm", "gain", "baseline_counts", "maximum_counts", "step_counts"):
         robot[name] = getattr(proximity, name)
     for name in ("noise_small", "noise_large", "noise_exponent", "noise_counts"):
         robot[name] = getattr(proximity, name)

@@ -90,7 +90,7 @@ def expected_count(
         direction_y = ray_x * sine + ray_y * cosine
         length, brightness = cast(field, surface, per_cell, column, row, direction_x, direction_y, reach)
         seen[ray] = nearness(length * per_range, brightness)
-    return parameters.baseline_counts[sensor] + respond(seen)
+    return parameters.baseline_counts[sensor] + parameters.gain[sensor] * respond(seen)
 
 
 @kernel

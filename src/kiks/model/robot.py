@@ -72,6 +72,7 @@ class Proximity:
     direction_deg: tuple[float, ...]
     field_of_view_deg: float
     range_mm: float
+    gain: tuple[float, ...]
     baseline_counts: tuple[float, ...]
     maximum_counts: int
     step_counts: int
@@ -289,11 +290,12 @@ def _check(spec: RobotSpec, where: str) -> None:
         must(len(gains) == 3 and all(0 <= g <= 32767 for g in gains), f"reset.{key}", "three numbers from 0 to 32767")
     must(1 <= reset.profile_speed_pulses <= 127, "reset.profile_speed_pulses", "between 1 and 127")
     must(1 <= reset.profile_acceleration <= 255, "reset.profile_acceleration", "between 1 and 255")
-    for key in ("mount_angle_deg", "mount_radius_mm", "direction_deg", "baseline_counts"):
+    for key in ("mount_angle_deg", "mount_radius_mm", "direction_deg", "gain", "baseline_counts"):
         must(len(getattr(proximity, key)) == SENSOR_COUNT, f"proximity.{key}", f"a list of {SENSOR_COUNT}")
     must(
         all(0 < r <= body.radius_mm for r in proximity.mount_radius_mm), "proximity.mount_radius_mm", "inside the body"
     )
+    must(all(0.05 <= gain <= 20 for gain in proximity.gain), "proximity.gain", "between 0.05 and 20")
     must(0 < proximity.field_of_view_deg <= 180, "proximity.field_of_view_deg", "between 0 and 180 degrees")
     must(1 <= proximity.range_mm <= 1000, "proximity.range_mm", "between 1 and 1000 mm")
     must(
