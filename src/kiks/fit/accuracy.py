@@ -176,8 +176,9 @@ def page(card: Card) -> str:
         "",
         f"Over the {cells} active cells of the held-out half: a measured reading between {ACTIVE_COUNTS[0]} and "
         f"{ACTIVE_COUNTS[1]}, and an angle with an",
-        "odd index; KiKS's own models were trained on the even ones. The last line predicts each reading from the two",
-        "measured beside it: about the noise of the data, which no model can go below by much.",
+        "odd index. The networks, and the table made of them, were trained on the even ones; the default is still a",
+        "stand-in without a constant fitted to these data. The last line predicts each reading from the two",
+        "measured beside it: about the noise of the data.",
         "",
         "| model | median | mean | 95 % | maximum |",
         "|---|---|---|---|---|",
