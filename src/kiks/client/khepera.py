@@ -15,6 +15,10 @@ TIMEOUT_S = 2.0
 """How long a reply may take [s]: the longest, 264 characters at 9600 baud, takes 0.3 s (khepera-protocol.md 2.2)."""
 
 
+AWAKE_S = 0.0002
+"""How long a program stays awake for a reply [s]: a simulator's is there sooner than a sleeper is woken."""
+
+
 class Port(Protocol):
     """What is needed of a port; pyserial's and ours have it."""
 
@@ -328,7 +332,7 @@ class QuickLines:
         try:
             if self._descriptor is None:
                 return bytes(self.port.read(max(1, self.port.in_waiting)))
-            if not select.select([self._descriptor], [], [], self.port.timeout)[0]:
+            if not self._wait(self._descriptor):
                 return b""
             some = os.read(self._descriptor, 4096)
         except (OSError, ValueError) as error:
@@ -340,6 +344,14 @@ class QuickLines:
                 f"port {self.port.port!r} must stay open while it is used, but the other end has closed it."
             )
         return some
+
+    def _wait(self, descriptor: int) -> bool:
+        """Wait for a character; say whether one came before the time-out."""
+        until_s = time.perf_counter() + AWAKE_S
+        while time.perf_counter() < until_s:
+            if select.select([descriptor], [], [], 0)[0]:
+                return True
+        return bool(select.select([descriptor], [], [], self.port.timeout)[0])
 
     def close(self) -> None:
         """Close the port."""
