@@ -57,7 +57,7 @@ def half_distances_mm(spec: kiks.RobotSpec, headings_deg: tuple[float, ...]) -> 
 
 
 def check(found: kiks.RobotSpec, hidden: kiks.RobotSpec) -> None:
-    """Fail unless one robot is the other, within what the issue demands."""
+    """Fail unless one robot is the other, within what docs/calibration.md promises."""
     directions = getattr(hidden.proximity, wall_fit.DIRECTION)
     assert getattr(found.proximity, wall_fit.DIRECTION) == pytest.approx(directions, abs=2.0)
     assert half_distances_mm(found, directions) == pytest.approx(half_distances_mm(hidden, directions), abs=1.0)
