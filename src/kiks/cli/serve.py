@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from kiks.cli.ending import end_as_with_ctrl_c
 from kiks.cli.engine_start import compile_everything, ready_engine
 from kiks.cli.options import ArenaFile, RobotKind, Robots, Seed, load_arena
 from kiks.errors import LinkError
@@ -67,10 +67,7 @@ def serve(
     compile_everything()  # or load it: before the first program waits for it
     ways: dict[int, list[Endpoint]] = {number: [] for number in range(1, robots + 1)}
     server = None
-    # However the process is ended, the links are removed; `nohup` keeps it alive as ever.
-    for ending in (signal.SIGTERM, signal.SIGHUP):
-        if signal.getsignal(ending) is not signal.SIG_IGN:
-            signal.signal(ending, signal.default_int_handler)
+    end_as_with_ctrl_c()  # so that the links are removed
     try:
         for number, endpoints in ways.items():
             say(f"Robot {number}")
