@@ -385,8 +385,9 @@ class Simulation:
             ParameterError: If there is no such robot.
         """
         index = self._index(robot)
-        self.sync()
-        return float(self.state.robots["travelled_mm"][0, index])
+        with self.lock:
+            self.sync()
+            return float(self.state.robots["travelled_mm"][0, index])
 
     def contacts(self, robot: int) -> int:
         """Return how often a robot has met a wall so far.
@@ -395,8 +396,9 @@ class Simulation:
             ParameterError: If there is no such robot.
         """
         index = self._index(robot)
-        self.sync()
-        return int(self.state.robots["contact_count"][0, index])
+        with self.lock:
+            self.sync()
+            return int(self.state.robots["contact_count"][0, index])
 
     def state_hash(self) -> str:
         """Return 16 hexadecimal digits that any two equal runs agree on."""
