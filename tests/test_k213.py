@@ -271,6 +271,76 @@ def test_the_picture_shows_where_the_robot_was_at_that_instant() -> None:
     assert np.mean(camera.pixels[10:24]) > 150
 
 
+# ---- memory ----
+
+
+def pictures(sim: kiks.Simulation, *, first_order: bytes | None = None) -> tuple[list[bytes], str, int]:
+    """Drive for 1.3 s and look at the picture 13 times."""
+    firmware = sim.wires[0].firmware
+    replies = [] if first_order is None else [firmware.execute(first_order, sim.now_ns)]
+    for _ in range(13):
+        replies += [firmware.execute(order, sim.now_ns) for order in (b"T,2,N", b"T,2,L")]
+        sim.run(0.1)
+        sim.sync()
+    return replies, sim.state_hash(), sim.now_ns
+
+
+def test_the_camera_is_part_of_the_state() -> None:
+    sim = scene((200, 480, 95, 20, 1), seed=8)
+    kiks.Khepera(sim.port(1)).set_speed(3, -2)
+    sim.run(0.53 - sim.time_s)
+    sim.wires[0].firmware.execute(b"T,2,U,1", sim.now_ns)
+    sim.run(0.3)
+    sim.sync()
+    snapshot, now_ns = sim.state.snapshot(), sim.now_ns
+    straight_on = pictures(sim)
+    assert len(set(straight_on[0])) > 20
+    for detour in (None, b"T,2,U,6", b"D,-9,4", b"restart"):
+        sim.state.restore(snapshot)
+        sim.now_ns = now_ns
+        assert sim.state_hash() == snapshot.hash()
+        assert pictures(sim) == straight_on
+        sim.state.restore(snapshot)
+        sim.now_ns = now_ns
+        if detour is not None:
+            assert pictures(sim, first_order=detour) != straight_on
+
+
+def test_the_hash_tells_pictures_and_periods_apart() -> None:
+    sim = scene((200, 480, 95, 20, 1))
+    before = sim.state.snapshot()
+    camera = sim.wires[0].firmware.turrets[2]
+    assert isinstance(camera, K213)
+    camera.order("U", (3,))
+    assert sim.state_hash() != before.hash()
+    camera.order("U", (0,))
+    assert sim.state_hash() == before.hash()
+    camera.look(0)
+    assert sim.state_hash() == before.hash()
+    sim.place(1, 300, 300, 0.3)
+    turned = sim.state.snapshot()
+    sim.place(1, 300, 300, math.pi / 2)
+    assert sim.state_hash() == before.hash() != turned.hash()
+
+
+def test_a_restart_sets_the_period_of_the_power_on() -> None:
+    sim = scene(seed=3)
+    robot, camera = kiks.Khepera(sim.port(1)), sim.wires[0].firmware.turrets[2]
+    assert isinstance(camera, K213)
+    robot.send("T,2,U,7")
+    assert camera.period_ns == 5_000_000_000
+    sim.run(1.1 - sim.time_s)
+    assert camera.taken_ns == 0
+    before = camera.pixels
+    sim.wires[0].firmware.execute(b"restart", sim.now_ns)
+    assert camera.period_ns == PERIODS_NS[0]
+    assert camera.pixels == before
+    sim.run(0.1)
+    sim.sync()
+    assert camera.taken_ns == 1_200_000_000
+    assert camera.pixels != before
+
+
 # ---- noise ----
 
 

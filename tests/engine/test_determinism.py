@@ -1,44 +1,81 @@
-"""The same run again: twice in one process, in another process, and for another processor."""
+"""The same run again: twice in one process, in another process, and for other processors."""
 
 from __future__ import annotations
 
 import os
 import subprocess
 import sys
+from pathlib import Path
+
+import pytest
+from llvmlite import binding
 
 from kiks.model.arena import Arena
 from kiks.sim.simulation import Simulation
 
 SCRIPT = (b"D,60,57\n", b"P,-255,200\n", b"D,-5,90\n", b"G,0,0\n", b"C,3000,-2000\n", b"D,127,127\n", b"C,-900,-900\n")
+LAMPS = ((60.0, 250.0, 1.0), (330.0, 90.0, 4.0), (200.0, 5.0, 2.0))
+ORDERS = (b"N\n", b"O\n", b"T,2,N\n", b"T,2,L\n")
 
 
-def run_hash() -> str:
-    sim = Simulation(Arena.box(400, 300, rounded_mm=60), seed=5, robots=2)
+def run_record() -> str:
+    """Drive two robots with all sensors about; return every reply and the state hash after each."""
+    plain = Arena.box(400, 300, rounded_mm=60)
+    sim = Simulation(Arena(plain.brightness, plain.mm_per_cell, "lit", lamps=LAMPS), seed=5, robots=2)
+    sim.fit(1, "k213")
+    sim.fit(2, "k213")
+    lines = []
     for number, command in enumerate(SCRIPT * 3):
-        sim.port(1 + number % 2).write(command)
+        port = sim.port(1 + number % 2)
+        for line in (command, *ORDERS):
+            port.write(line)
+            lines.append(port.readline().decode())
         sim.run(1.7)
+        for robot in (1, 2):
+            expected = (*sim.proximity(robot), *sim.ambient(robot), *sim.image(robot))
+            lines.append(" ".join(value.hex() for value in expected) + "\n")
+        lines.append(sim.state_hash() + "\n")
     assert sim.contacts(1) > 3
     assert sim.contacts(2) > 3
-    return sim.state_hash()
+    return "".join(lines)
 
 
-def hash_of_process(**environment: str) -> str:
+@pytest.fixture(scope="module")
+def record() -> str:
+    return run_record()
+
+
+def record_of_process(**environment: str) -> str:
     command = [sys.executable, __file__]
-    done = subprocess.run(command, env=os.environ | environment, capture_output=True, text=True, check=True)
-    return done.stdout.strip()
+    done = subprocess.run(command, env=os.environ | environment, capture_output=True, check=True)
+    return done.stdout.decode()
 
 
-def test_twice_in_one_process():
-    assert run_hash() == run_hash()
+def test_twice_in_one_process(record: str) -> None:
+    assert run_record() == record
 
 
-def test_in_another_process():
-    assert hash_of_process() == run_hash()
+def test_in_another_process(record: str) -> None:
+    assert record_of_process() == record
 
 
-def test_for_a_processor_without_vectors_and_fused_operations(tmp_path):
-    assert hash_of_process(NUMBA_CPU_NAME="generic", NUMBA_CACHE_DIR=str(tmp_path)) == run_hash()
+@pytest.mark.parametrize(
+    ("processor", "needed"),
+    [
+        ("generic", ()),
+        pytest.param("x86-64-v3", ("avx2", "fma"), marks=pytest.mark.slow),
+        pytest.param("x86-64-v4", ("avx512f", "avx512bw", "avx512dq", "avx512vl"), marks=pytest.mark.slow),
+    ],
+)
+def test_for_another_processor(record: str, processor: str, needed: tuple[str, ...], tmp_path: Path) -> None:
+    """Without vectors to speak of, with AVX2, with AVX-512; each is compiled anew."""
+    has = binding.get_host_cpu_features()
+    missing = [feature for feature in needed if not has.get(feature)]
+    if missing:
+        pytest.skip(f"this computer's processor has no {', '.join(missing)}")
+    target = {"NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": str(tmp_path)}
+    assert record_of_process(**target) == record
 
 
 if __name__ == "__main__":
-    print(run_hash())
+    sys.stdout.buffer.write(run_record().encode())

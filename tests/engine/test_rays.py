@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kiks.engine.rays import cast_ray
+from kiks.engine.rays import cast_ray, cast_rays
 from kiks.model.arena import PAD, Arena
 
 TOLERANCE_MM = 0.02
@@ -17,9 +17,8 @@ CLIPPED_MM = 0.003  # a ray that cuts less than this off a corner may pass it by
 
 
 def cast(arena, x, y, angle, reach=200.0):
-    return cast_ray(
-        arena.clearance, arena.surface, arena.mm_per_cell, PAD, x, y, math.cos(angle), math.sin(angle), reach
-    )
+    sight = (arena.clearance, arena.surface, arena.mm_per_cell, PAD)
+    return cast_ray(sight, x, y, math.cos(angle), math.sin(angle), reach)
 
 
 def crossings(arena, x, y, angle, *, shrink_mm=0.0):
@@ -90,6 +89,27 @@ def test_a_wall_more_never_lengthens_a_ray(make_random_arena, number, draw):
         x, y = rng.uniform(0, arena.width_mm), rng.uniform(0, arena.height_mm)
         angle = rng.uniform(-math.pi, math.pi)
         assert cast(fuller, x, y, angle)[0] <= cast(arena, x, y, angle)[0] + TOLERANCE_MM
+
+
+@settings(derandomize=True, deadline=None, max_examples=30)
+@given(number=st.integers(0, 300), draw=st.integers(0, 2**32), count=st.integers(1, 100))
+def test_rays_in_lanes_are_rays_one_by_one(make_random_arena, number, draw, count):
+    """To the bit, from floor, from walls and from outside, along the axes too."""
+    arena = make_random_arena(number)
+    rng = np.random.default_rng(draw)
+    x, y = rng.uniform(-60, arena.width_mm + 60, count), rng.uniform(-60, arena.height_mm + 60, count)
+    angle = rng.uniform(-math.pi, math.pi, count)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    cosine[::5], sine[::5] = rng.choice([-1.0, 0.0, 1.0], 2)
+    straight = (cosine == 0.0) == (sine == 0.0)
+    cosine[straight], sine[straight] = 0.0, -1.0
+    cell = arena.mm_per_cell
+    sight = (arena.clearance, arena.surface, cell, PAD)
+    columns, rows = x * (1.0 / cell) + PAD, y * (1.0 / cell) + PAD
+    lengths, brightnesses = np.empty(count), np.empty(count)
+    cast_rays(sight, columns, rows, cosine, sine, lengths, brightnesses)
+    alone = [cast_ray(sight, *ray, 1e6) for ray in zip(x, y, cosine, sine, strict=True)]
+    assert list(zip(lengths * cell, brightnesses, strict=True)) == alone
 
 
 @pytest.mark.parametrize("mm_per_pixel", [0.5, 1.0, 2.5])

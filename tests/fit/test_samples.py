@@ -174,7 +174,7 @@ def test_rays_are_those_of_the_engine(radius_mm, places):
                     direction = heading + fan.direction_rad[sensor, ray]
                     cosine, sine = math.cos(direction), math.sin(direction)
                     length = lengths[i, j, sensor, ray]
-                    found, _ = cast_ray(*sight, ox, oy, cosine, sine, 50.0)
+                    found, _ = cast_ray(sight, ox, oy, cosine, sine, 50.0)
                     if length < 50.0:
                         # How steeply the ray meets the surface: a raster moves a grazing hit far along the ray.
                         hit = np.array([ox + length * cosine, oy + length * sine])

@@ -23,7 +23,7 @@ import numpy as np
 from kiks.engine.compiling import entry, kernel
 from kiks.engine.numbers import power, sin_cos, uniform
 from kiks.engine.proximity import pose_at, quantize, sample_instant
-from kiks.engine.rays import cast
+from kiks.engine.rays import is_lit
 
 STREAM_AMBIENT = 3
 """Random stream of the noise on light readings."""
@@ -51,39 +51,7 @@ def curve(parameters: Any, distance_mm: Any) -> Any:
 
 
 @kernel
-def is_lit(field: Any, surface: Any, cell: Any, pad: Any, x: Any, y: Any, lamp_x: Any, lamp_y: Any) -> Any:
-    """Say whether no wall stands between a place and a lamp. A lamp may hang over a wall, which then hides nothing."""
-    per_cell = 1.0 / cell
-    column, row = x * per_cell + pad, y * per_cell + pad
-    dx, dy = (lamp_x - x) * per_cell, (lamp_y - y) * per_cell
-    reach = math.sqrt(dx * dx + dy * dy)
-    if reach == 0.0:
-        return True
-    length, brightness = cast(field, surface, per_cell, column, row, dx / reach, dy / reach, reach)
-    if brightness == 0:
-        return True
-    while length < reach:
-        i = min(max(np.int64(column + dx * length / reach), 0), field.shape[1] - 1)
-        j = min(max(np.int64(row + dy * length / reach), 0), field.shape[0] - 1)
-        if field[j, i] > 0.0:
-            return False
-        length += 0.5
-    return True
-
-
-@kernel
-def expected_ambient(
-    field: Any,
-    surface: Any,
-    cell: Any,
-    pad: Any,
-    parameters: Any,
-    lamps: Any,
-    x: Any,
-    y: Any,
-    heading: Any,
-    sensor: Any,
-) -> Any:
+def expected_ambient(sight: Any, lamps: Any, parameters: Any, x: Any, y: Any, heading: Any, sensor: Any) -> Any:
     """Return the count that a sensor of a robot at this pose gives on average for the lamps' light."""
     sine, cosine = sin_cos(heading)
     out_x = parameters.mount_x_mm[sensor] * cosine - parameters.mount_y_mm[sensor] * sine
@@ -102,7 +70,7 @@ def expected_ambient(
             continue
         if not (lamps[number, 3] > 0.0 and watts > 0.0):
             continue
-        if not is_lit(field, surface, cell, pad, x + out_x, y + out_y, lamps[number, 0], lamps[number, 1]):
+        if not is_lit(sight, x + out_x, y + out_y, lamps[number, 0], lamps[number, 1]):
             continue
         distance = max(distance, _NEAREST_MM)
         cos_angle = min(along / distance, 1.0)
@@ -120,15 +88,13 @@ def expected_ambient(
 def read_ambient(
     robots: Any,
     kinds: Any,
-    field: Any,
-    surface: Any,
-    cell: Any,
-    pad: Any,
+    sight: Any,
     lamps: Any,
     tick_count: Any,
     time_ns: Any,
     seed: Any,
     robot: Any,
+    is_noisy: Any,
     out: Any,
 ) -> Any:
     """Write the eight counts that command O returns at a time into `out`, each sampled at its own instant.
@@ -136,41 +102,21 @@ def read_ambient(
     Args:
         robots: Records of `ROBOT`, shape [world_count, robot_count].
         kinds: Records of `PARAMETERS`, shape [robot_count].
-        field: Distance of cells to the nearest wall [mm], shape [rows, columns].
-        surface: Brightness of cells, 0 for floor, shape [rows, columns].
-        cell: Edge of a cell [mm].
-        pad: Cells of the border around the arena.
+        sight: What rays meet (`kiks.engine.rays`).
         lamps: x [mm], y [mm], power [W] and 1 for on or 0 for off, shape [lamp, 4].
         tick_count: Ticks done.
         time_ns: When the robot reads.
         seed: Seed of the run.
         robot: Index of the robot.
-        out: int64, shape [8].
+        is_noisy: False for the expected counts at the pose of this very time, without rounding.
+        out: int64, or float64 for expected counts, shape [8].
     """
     state, parameters = robots[0, robot], kinds[robot]
     for sensor in range(out.shape[0]):
-        turn, instant_ns = sample_instant(time_ns, sensor)
+        turn, instant_ns = sample_instant(time_ns, sensor) if is_noisy else (np.int64(0), time_ns)
         x, y, heading = pose_at(state, tick_count, instant_ns)
-        count = expected_ambient(field, surface, cell, pad, parameters, lamps, x, y, heading, sensor)
-        jitter = uniform(seed, 0, robot, STREAM_AMBIENT, turn, sensor)
-        out[sensor] = quantize(parameters, count + parameters.dark_noise_counts * (2.0 * jitter - 1.0))
-
-
-@entry
-def expect_ambient(
-    robots: Any,
-    kinds: Any,
-    field: Any,
-    surface: Any,
-    cell: Any,
-    pad: Any,
-    lamps: Any,
-    tick_count: Any,
-    time_ns: Any,
-    robot: Any,
-    out: Any,
-) -> Any:
-    """Write the eight expected counts at the pose of this very time into `out`, without noise or rounding."""
-    x, y, heading = pose_at(robots[0, robot], tick_count, time_ns)
-    for sensor in range(out.shape[0]):
-        out[sensor] = expected_ambient(field, surface, cell, pad, kinds[robot], lamps, x, y, heading, sensor)
+        count = expected_ambient(sight, lamps, parameters, x, y, heading, sensor)
+        if is_noisy:
+            jitter = uniform(seed, 0, robot, STREAM_AMBIENT, turn, sensor)
+            count = quantize(parameters, count + parameters.dark_noise_counts * (2.0 * jitter - 1.0))
+        out[sensor] = count

@@ -25,27 +25,25 @@ from typing import Any
 import numpy as np
 
 from kiks.engine.compiling import entry, kernel
+from kiks.engine.lanes import stack_floats
 from kiks.engine.numbers import sin_cos, uniform
 from kiks.engine.proximity import pose_at
-from kiks.engine.rays import cast, free_cells
+from kiks.engine.rays import cast, cast_many, free_cells, scale
+from kiks.engine.state import PIXEL_COUNT
 from kiks.units import TICK_NS
-
-PIXEL_COUNT = 64
-"""Pixels in a row (khepera-protocol.md 10.3)."""
 
 STREAM_CAMERA = 5
 """Random stream of the noise on images."""
 
 _EDGE_DEG = 18.0
 _PIXEL_DEG = 2.0 * _EDGE_DEG / (PIXEL_COUNT - 1)
+_SUM_COUNT = PIXEL_COUNT + 1
 _PIXEL_RAD = 0.009973310011396168  # 36/63 degrees
 _PIXEL_COS, _PIXEL_SIN = 0.999950266955943, 0.009973144676492593
-_GROUP, _GROUP_RAD = 8, 0.03490658503988659  # neighbours, and 3.5 pixels from their middle to the outermost: 2 degrees
-_GROUP_COS, _GROUP_SIN = 0.9993908270190958, 0.03489949670250097
-_LEAP_CELLS = 4.0  # shorter leaps are no longer worth while
 _EDGE_COS, _EDGE_SIN = 0.9510565162951535, 0.3090169943749474
 
 _BEGIN_MM = 50.0
+_ANYWHERE = 1e9  # cells: the border of the world is always nearer
 _SHARP_MM = 250.0
 _DEFOCUS_PIXELS = 7.0  # to each side, for what is infinitely far
 
@@ -76,10 +74,10 @@ def smear(grey: Any, half_width: Any) -> Any:
 
     Half a pixel is no blur. All means come from one running sum, so wide ones cost as much as narrow ones.
     """
-    sums = np.zeros(PIXEL_COUNT + 1, np.float64)
+    sums, mean = stack_floats(_SUM_COUNT), stack_floats(PIXEL_COUNT)
+    sums[0] = 0.0
     for p in range(PIXEL_COUNT):
         sums[p + 1] = sums[p] + grey[p]
-    mean = np.empty(PIXEL_COUNT, np.float64)
     for p in range(PIXEL_COUNT):
         low, high = p + 0.5 - half_width[p], p + 0.5 + half_width[p]
         mean[p] = (integral(sums, grey, high) - integral(sums, grey, low)) / (2.0 * half_width[p])
@@ -87,43 +85,31 @@ def smear(grey: Any, half_width: Any) -> Any:
 
 
 @kernel
-def look(
-    field: Any, surface: Any, cell: Any, pad: Any, x: Any, y: Any, heading: Any, grey: Any, distance_mm: Any
-) -> Any:
-    """Write the grey of the wall that each pixel looks at, and how far it is [mm] from the robot's centre.
-
-    Eight neighbours leap together while they can: at the length t each of them is at most t 2 degrees away from the
-    ray in their middle, so what is free around its end, less that, is free for all.
-    """
+def look(sight: Any, x: Any, y: Any, heading: Any, grey: Any, distance_mm: Any) -> Any:
+    """Write the grey of the wall that each pixel looks at, and how far it is [mm] from the robot's centre."""
+    cell, pad = scale(sight)
     per_cell = 1.0 / cell
-    reach = 1.0 * (field.shape[0] + field.shape[1])  # cells: the border of the world is always nearer
     column, row = x * per_cell + pad, y * per_cell + pad
-    begin = max(_BEGIN_MM * per_cell, free_cells(field, per_cell, column, row))
+    begin = max(_BEGIN_MM * per_cell, free_cells(sight, column, row))
+    begin_columns, begin_rows = stack_floats(PIXEL_COUNT), stack_floats(PIXEL_COUNT)
+    rays_x, rays_y = stack_floats(PIXEL_COUNT), stack_floats(PIXEL_COUNT)
+    lengths, brightnesses = stack_floats(PIXEL_COUNT), stack_floats(PIXEL_COUNT)
     sine, cosine = sin_cos(heading)
     ray_x = cosine * _EDGE_COS - sine * _EDGE_SIN
     ray_y = sine * _EDGE_COS + cosine * _EDGE_SIN
-    together = begin
     for p in range(PIXEL_COUNT):
-        if p % _GROUP == 0:
-            together = begin
-            leap = _LEAP_CELLS
-            middle_x = ray_x * _GROUP_COS + ray_y * _GROUP_SIN
-            middle_y = ray_y * _GROUP_COS - ray_x * _GROUP_SIN
-            while leap >= _LEAP_CELLS:
-                free = free_cells(field, per_cell, column + together * middle_x, row + together * middle_y)
-                leap = free - together * _GROUP_RAD
-                together += max(leap, 0.0)
-        start = together
-        length, brightness = cast(
-            field, surface, per_cell, column + start * ray_x, row + start * ray_y, ray_x, ray_y, reach
-        )
-        if length == 0.0:  # the view begins inside a wall: what is seen is its surface
-            start = 0.0
-            length, brightness = cast(field, surface, per_cell, column, row, ray_x, ray_y, reach)
-        grey[p] = _BLACK + brightness * ((_WHITE - _BLACK) / 255.0)
-        distance_mm[p] = (start + length) * cell
+        rays_x[p], rays_y[p] = ray_x, ray_y
+        begin_columns[p], begin_rows[p] = column + begin * ray_x, row + begin * ray_y
         # Clockwise to the next pixel.
         ray_x, ray_y = ray_x * _PIXEL_COS + ray_y * _PIXEL_SIN, ray_y * _PIXEL_COS - ray_x * _PIXEL_SIN
+    cast_many(sight, begin_columns, begin_rows, rays_x, rays_y, lengths, brightnesses)
+    for p in range(PIXEL_COUNT):
+        start, length, brightness = begin, lengths[p], brightnesses[p]
+        if length == 0.0:  # the view begins inside a wall: what is seen is its surface
+            start = 0.0
+            length, brightness = cast(sight, column, row, rays_x[p], rays_y[p], _ANYWHERE)
+        grey[p] = _BLACK + brightness * ((_WHITE - _BLACK) / 255.0)
+        distance_mm[p] = (start + length) * cell
 
 
 @kernel
@@ -147,10 +133,7 @@ def darken_edges(grey: Any, noise: Any) -> Any:
 @entry
 def take_image(
     robots: Any,
-    field: Any,
-    surface: Any,
-    cell: Any,
-    pad: Any,
+    sight: Any,
     tick_count: Any,
     time_ns: Any,
     seed: Any,
@@ -162,10 +145,7 @@ def take_image(
 
     Args:
         robots: Records of `ROBOT`, shape [world_count, robot_count].
-        field: Distance of cells to the nearest wall [mm], shape [rows, columns].
-        surface: Brightness of cells, 0 for floor, shape [rows, columns].
-        cell: Edge of a cell [mm].
-        pad: Cells of the border around the arena.
+        sight: What rays meet (`kiks.engine.rays`).
         tick_count: Ticks done.
         time_ns: When, at most 10 ms before the end of the last tick.
         seed: Seed of the run.
@@ -192,9 +172,8 @@ def take_image(
             for p in range(PIXEL_COUNT):
                 chance[kind, p] = uniform(seed, 0, robot, STREAM_CAMERA, time_ns, kind * PIXEL_COUNT + p)
 
-    distance_mm = np.empty(PIXEL_COUNT, np.float64)
-    look(field, surface, cell, pad, x, y, heading, out, distance_mm)
-    half_width = np.empty(PIXEL_COUNT, np.float64)
+    distance_mm, half_width = stack_floats(PIXEL_COUNT), stack_floats(PIXEL_COUNT)
+    look(sight, x, y, heading, out, distance_mm)
     for p in range(PIXEL_COUNT):
         half_width[p] = 0.5 + _DEFOCUS_PIXELS * max(1.0 - _SHARP_MM / distance_mm[p], 0.0)
     if distance_mm.max() > _SHARP_MM:

@@ -15,7 +15,7 @@ from kiks.engine.compiling import entry, kernel
 from kiks.engine.motion import pose_between
 from kiks.engine.numbers import exponential, power, sin_cos, uniform
 from kiks.engine.parameters import RAY_COUNT
-from kiks.engine.rays import cast, free_cells
+from kiks.engine.rays import cast, free_cells, scale
 from kiks.units import SENSOR_ROUND_NS, SENSOR_SLOT_NS, TICK_NS
 
 STREAM_SLIP, STREAM_PROXIMITY = 1, 2
@@ -70,17 +70,16 @@ def respond(nearnesses: Any) -> Any:
 
 
 @kernel
-def expected_count(
-    field: Any, surface: Any, cell: Any, pad: Any, parameters: Any, x: Any, y: Any, heading: Any, sensor: Any
-) -> Any:
+def expected_count(sight: Any, parameters: Any, x: Any, y: Any, heading: Any, sensor: Any) -> Any:
     """Return the count that a sensor of a robot at this pose gives on average."""
     sine, cosine = sin_cos(heading)
     mount_x, mount_y = parameters.mount_x_mm[sensor], parameters.mount_y_mm[sensor]
+    cell, pad = scale(sight)
     per_cell = 1.0 / cell
     column = (x + mount_x * cosine - mount_y * sine) * per_cell + pad
     row = (y + mount_x * sine + mount_y * cosine) * per_cell + pad
     reach = parameters.range_mm * (1.0 + _MARGIN) * per_cell
-    if free_cells(field, per_cell, column, row) > reach:
+    if free_cells(sight, column, row) > reach:
         return parameters.baseline_counts[sensor]
     per_range = cell / parameters.range_mm
     seen = np.empty(RAY_COUNT, np.float64)
@@ -88,7 +87,7 @@ def expected_count(
         ray_x, ray_y = parameters.ray_cos[sensor, ray], parameters.ray_sin[sensor, ray]
         direction_x = ray_x * cosine - ray_y * sine
         direction_y = ray_x * sine + ray_y * cosine
-        length, brightness = cast(field, surface, per_cell, column, row, direction_x, direction_y, reach)
+        length, brightness = cast(sight, column, row, direction_x, direction_y, reach)
         seen[ray] = nearness(length * per_range, brightness)
     return parameters.baseline_counts[sensor] + parameters.gain[sensor] * respond(seen)
 
@@ -122,45 +121,38 @@ def quantize(parameters: Any, count: Any) -> Any:
 def read_proximity(
     robots: Any,
     kinds: Any,
-    field: Any,
-    surface: Any,
-    cell: Any,
-    pad: Any,
+    sight: Any,
     tick_count: Any,
     time_ns: Any,
     seed: Any,
     robot: Any,
+    is_noisy: Any,
     out: Any,
 ) -> Any:
-    """Write the eight counts that command N returns at a time into `out`, each sampled at its own instant."""
+    """Write the eight counts that command N returns at a time into `out`, each sampled at its own instant.
+
+    Args:
+        robots: Records of `ROBOT`, shape [world_count, robot_count].
+        kinds: Records of `PARAMETERS`, shape [robot_count].
+        sight: What rays meet (`kiks.engine.rays`).
+        tick_count: Ticks done.
+        time_ns: When the robot reads.
+        seed: Seed of the run.
+        robot: Index of the robot.
+        is_noisy: False for the expected counts at the pose of this very time, without rounding.
+        out: int64, or float64 for expected counts, shape [8].
+    """
     state, parameters = robots[0, robot], kinds[robot]
     for sensor in range(out.shape[0]):
-        turn, instant_ns = sample_instant(time_ns, sensor)
+        turn, instant_ns = sample_instant(time_ns, sensor) if is_noisy else (np.int64(0), time_ns)
         x, y, heading = pose_at(state, tick_count, instant_ns)
-        count = expected_count(field, surface, cell, pad, parameters, x, y, heading, sensor)
-        sign = uniform(seed, 0, robot, STREAM_PROXIMITY, turn, sensor * 3)
-        size = uniform(seed, 0, robot, STREAM_PROXIMITY, turn, sensor * 3 + 1)
-        jitter = uniform(seed, 0, robot, STREAM_PROXIMITY, turn, sensor * 3 + 2)
-        out[sensor] = quantize(parameters, add_noise(parameters, count, sign, size, jitter))
-
-
-@entry
-def expect_proximity(
-    robots: Any,
-    kinds: Any,
-    field: Any,
-    surface: Any,
-    cell: Any,
-    pad: Any,
-    tick_count: Any,
-    time_ns: Any,
-    robot: Any,
-    out: Any,
-) -> Any:
-    """Write the eight expected counts at the pose of this very time into `out`, without noise or rounding."""
-    x, y, heading = pose_at(robots[0, robot], tick_count, time_ns)
-    for sensor in range(out.shape[0]):
-        out[sensor] = expected_count(field, surface, cell, pad, kinds[robot], x, y, heading, sensor)
+        count = expected_count(sight, parameters, x, y, heading, sensor)
+        if is_noisy:
+            sign = uniform(seed, 0, robot, STREAM_PROXIMITY, turn, sensor * 3)
+            size = uniform(seed, 0, robot, STREAM_PROXIMITY, turn, sensor * 3 + 1)
+            jitter = uniform(seed, 0, robot, STREAM_PROXIMITY, turn, sensor * 3 + 2)
+            count = quantize(parameters, add_noise(parameters, count, sign, size, jitter))
+        out[sensor] = count
 
 
 @entry

@@ -1,48 +1,70 @@
-"""How far a ray goes before it meets a wall, exact to a hundredth of a millimetre, and how bright the wall is.
+"""What rays meet: how far one goes before it meets a wall, exact to a hundredth of a millimetre, and how bright it is.
 
 Method: the clearance of a cell (distance from its centre to the nearest wall cell's centre), less the diagonal of a
 cell, is a distance that any point of the cell may go freely in any direction: empty space is crossed in a few leaps.
 Next to a wall the ray goes to the edge of its cell instead, so no corner is missed.
+
+All that rays meet is one argument, `sight`, which sensors only pass on: a plain tuple, because with a named one each
+call from Python would cost half a microsecond more. It holds
+
+* field: distance of cells to the nearest wall [mm], 0 in a wall, float32 [rows, columns];
+* surface: brightness of cells, 0 for floor, uint8 [rows, columns];
+* cell: edge of a cell [mm];
+* pad: cells of the border around the arena.
+
+Places and lengths of the kernels are in cells of the raster with its border.
 """
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
 from kiks.engine.compiling import entry, kernel
+from kiks.engine.lanes import element, pointer_to, stack_floats
 
 _DIAGONAL = 1.4142135623730951
+_WALK = 2.5  # up to this clearance a ray goes from cell to cell [cells]
 _NUDGE = 1e-3  # over the edge of a cell [cells]
 _FAR = 1e30
+_LANES = 32
 
 
 @kernel
-def free_cells(field: Any, per_cell: Any, column: Any, row: Any) -> Any:
+def scale(sight: Any) -> Any:
+    """Return the edge of a cell [mm] and the cells of the border around the arena."""
+    _, _, cell, pad = sight
+    return cell, pad
+
+
+@kernel
+def free_cells(sight: Any, column: Any, row: Any) -> Any:
     """Return how far a point may go in any direction without meeting a wall [cells]; at most 0 next to one."""
+    field, _, cell, _ = sight
     i = min(max(np.int64(column), 0), field.shape[1] - 1)
     j = min(max(np.int64(row), 0), field.shape[0] - 1)
-    return field[j, i] * per_cell - _DIAGONAL
+    return field[j, i] * (1.0 / cell) - _DIAGONAL
 
 
 @kernel
-def cast(field: Any, surface: Any, per_cell: Any, column: Any, row: Any, cosine: Any, sine: Any, reach: Any) -> Any:
-    """Follow one ray; lengths and places in cells of the raster with its border.
+def cast(sight: Any, column: Any, row: Any, cosine: Any, sine: Any, reach: Any) -> Any:
+    """Follow one ray.
 
     Args:
-        field: Distance of cells to the nearest wall [mm], 0 in a wall, shape [rows, columns].
-        surface: Brightness of cells, 0 for floor, shape [rows, columns].
-        per_cell: Cells in a millimetre.
-        column: Origin.
-        row: Origin.
+        sight: What rays meet.
+        column: Origin [cells].
+        row: Origin [cells].
         cosine: Direction.
         sine: Direction.
-        reach: Longest length followed.
+        reach: Longest length followed [cells].
 
     Returns:
-        Length of the ray, `reach` if it meets nothing, and the brightness of what it met, 0 for nothing.
+        Length of the ray [cells], `reach` if it meets nothing, and the brightness of what it met, 0 for nothing.
     """
+    field, surface, cell, _ = sight
+    per_cell = 1.0 / cell
     per_column = 1.0 / cosine if abs(cosine) > 1e-12 else _FAR
     per_row = 1.0 / sine if abs(sine) > 1e-12 else _FAR
     right = 1 if cosine > 0.0 else 0
@@ -56,7 +78,7 @@ def cast(field: Any, surface: Any, per_cell: Any, column: Any, row: Any, cosine:
         clearance = field[j, i] * per_cell
         if clearance == 0.0:
             return length, np.int64(surface[j, i])
-        if clearance > 2.5:
+        if clearance > _WALK:
             length += clearance - _DIAGONAL
         else:
             to_column = (i + right - px) * per_column if per_column < _FAR else _FAR
@@ -65,10 +87,94 @@ def cast(field: Any, surface: Any, per_cell: Any, column: Any, row: Any, cosine:
     return reach, np.int64(0)
 
 
-@entry
-def cast_ray(field: Any, surface: Any, cell: Any, pad: Any, x: Any, y: Any, cosine: Any, sine: Any, reach: Any) -> Any:
-    """Follow one ray from Python; lengths and places in mm of the arena."""
+@kernel
+def cast_many(sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, lengths: Any, brightnesses: Any) -> Any:
+    """Follow many rays, each to the first wall: the lengths and brightnesses of `cast` to the bit, in less time.
+
+    Neighbours step together, one lane each, until the last of them has met its wall; a lane that has stays where it is.
+
+    Args:
+        sight: What rays meet.
+        columns: Origins [cells], shape [rays].
+        rows: Origins [cells], shape [rays].
+        cosines: Directions, shape [rays].
+        sines: Directions, shape [rays].
+        lengths: Where the lengths of the rays go [cells], shape [rays].
+        brightnesses: Where the brightnesses of the walls go, shape [rays].
+    """
+    field, surface, cell, _ = sight
     per_cell = 1.0 / cell
-    origin = x * per_cell + pad, y * per_cell + pad
-    length, brightness = cast(field, surface, per_cell, origin[0], origin[1], cosine, sine, reach * per_cell)
+    clearances, width = pointer_to(field), np.int32(field.shape[1])
+    last_column, last_row = np.int32(field.shape[1] - 1), np.int32(field.shape[0] - 1)
+    nought = np.int32(0)
+    column, row = stack_floats(_LANES), stack_floats(_LANES)
+    cosine, sine = stack_floats(_LANES), stack_floats(_LANES)
+    per_column, per_row = stack_floats(_LANES), stack_floats(_LANES)
+    right, up = stack_floats(_LANES), stack_floats(_LANES)
+    length = stack_floats(_LANES)
+    for first in range(0, lengths.shape[0], _LANES):
+        for lane in range(_LANES):
+            ray = min(first + lane, lengths.shape[0] - 1)
+            column[lane], row[lane], cosine[lane], sine[lane] = columns[ray], rows[ray], cosines[ray], sines[ray]
+            per_column[lane] = 1.0 / cosine[lane] if abs(cosine[lane]) > 1e-12 else _FAR
+            per_row[lane] = 1.0 / sine[lane] if abs(sine[lane]) > 1e-12 else _FAR
+            right[lane] = 1.0 if cosine[lane] > 0.0 else 0.0
+            up[lane] = 1.0 if sine[lane] > 0.0 else 0.0
+            length[lane] = 0.0
+        under_way = np.int32(1)
+        while under_way != 0:
+            under_way = nought
+            for lane in range(_LANES):
+                px = column[lane] + length[lane] * cosine[lane]
+                py = row[lane] + length[lane] * sine[lane]
+                i = min(max(np.int32(px), nought), last_column)
+                j = min(max(np.int32(py), nought), last_row)
+                clearance = element(clearances, np.int32(j * width + i)) * per_cell
+                to_column = (i + right[lane] - px) * per_column[lane] if per_column[lane] < _FAR else _FAR
+                to_row = (j + up[lane] - py) * per_row[lane] if per_row[lane] < _FAR else _FAR
+                walk = max(min(to_column, to_row), 0.0) + _NUDGE
+                step = clearance - _DIAGONAL if clearance > _WALK else walk
+                length[lane] += step if clearance > 0.0 else 0.0
+                under_way |= np.int32(clearance > 0.0)
+        for lane in range(min(_LANES, lengths.shape[0] - first)):
+            ray = first + lane
+            i = min(max(np.int32(column[lane] + length[lane] * cosine[lane]), nought), last_column)
+            j = min(max(np.int32(row[lane] + length[lane] * sine[lane]), nought), last_row)
+            lengths[ray], brightnesses[ray] = length[lane], surface[j, i]
+
+
+@kernel
+def is_lit(sight: Any, x: Any, y: Any, lamp_x: Any, lamp_y: Any) -> Any:
+    """Say whether no wall stands between a place and a lamp [mm]. A lamp may hang over a wall, which hides nothing."""
+    field, _, cell, pad = sight
+    per_cell = 1.0 / cell
+    column, row = x * per_cell + pad, y * per_cell + pad
+    dx, dy = (lamp_x - x) * per_cell, (lamp_y - y) * per_cell
+    reach = math.sqrt(dx * dx + dy * dy)
+    if reach == 0.0:
+        return True
+    length, brightness = cast(sight, column, row, dx / reach, dy / reach, reach)
+    if brightness == 0:
+        return True
+    while length < reach:
+        i = min(max(np.int64(column + dx * length / reach), 0), field.shape[1] - 1)
+        j = min(max(np.int64(row + dy * length / reach), 0), field.shape[0] - 1)
+        if field[j, i] > 0.0:
+            return False
+        length += 0.5
+    return True
+
+
+@entry
+def cast_ray(sight: Any, x: Any, y: Any, cosine: Any, sine: Any, reach: Any) -> Any:
+    """Follow one ray from Python; lengths and places in mm of the arena."""
+    cell, pad = scale(sight)
+    per_cell = 1.0 / cell
+    length, brightness = cast(sight, x * per_cell + pad, y * per_cell + pad, cosine, sine, reach * per_cell)
     return (length * cell if brightness > 0 else reach), brightness
+
+
+@entry
+def cast_rays(sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, lengths: Any, brightnesses: Any) -> Any:
+    """Follow many rays from Python, each to the first wall; lengths and places in cells."""
+    cast_many(sight, columns, rows, cosines, sines, lengths, brightnesses)

@@ -17,6 +17,9 @@ LEFT, RIGHT = 0, 1
 TRAIL_LENGTH = 3
 """Tick boundaries behind the present one whose poses are kept: a sensor reading is at most 20 ms old."""
 
+PIXEL_COUNT = 64
+"""Pixels in a row of the camera (khepera-protocol.md 10.3)."""
+
 ROBOT = np.dtype(
     [
         # The body. The pose is that of the end of the last tick; `trail` holds the boundaries before it, newest first.
@@ -56,6 +59,11 @@ ROBOT = np.dtype(
         ("led", "u1", (2,)),
         ("bus", "u1", (64,)),
         ("reserved", "u1", (2,)),
+        # The camera, where one is fitted: the code of its reading period, and its last picture.
+        ("camera_period", "i4"),
+        ("camera_light", "i4"),
+        ("camera_taken_ns", "i8"),
+        ("camera_pixels", "u1", (PIXEL_COUNT,)),
     ],
     align=True,
 )

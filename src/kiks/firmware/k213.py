@@ -7,6 +7,11 @@ asked: two answers between two instants are equal to the bit.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from kiks.engine.state import PIXEL_COUNT, ROBOT
 
 NUMBER = 2
 """Where K-Team put it among the turrets (khepera-protocol.md 10.1)."""
@@ -21,12 +26,12 @@ Picture = tuple[list[int], int]
 class K213:
     """A camera on a robot.
 
+    What it remembers (reading period, last picture) stands in the robot's record, so that it is part of every snapshot
+    and hash of the state. A reset of the robot sets the period to that of the power-on; the picture stays.
+
     Args:
         take: Takes a picture of what the robot sees at a time [ns], which is the present one.
-
-    Attributes:
-        period_ns: Pictures are taken when the time is a multiple of this [ns].
-        taken_ns: When the present picture was taken [ns].
+        record: The robot's record of `kiks.engine.state.ROBOT`; one of its own if left out.
 
     Example:
         >>> camera = K213(lambda time_ns: (list(range(64)), 300))
@@ -39,17 +44,41 @@ class K213:
     name = "K213 linear vision"
     revision = (1, 0)
 
-    def __init__(self, take: Callable[[int], Picture]) -> None:
+    def __init__(self, take: Callable[[int], Picture], record: Any = None) -> None:
         self._take = take
-        self.period_ns = PERIODS_NS[0]
-        self.taken_ns = -1
-        self.pixels: list[int] = []
-        self.light = 0
+        self._record = np.zeros(1, ROBOT)[0] if record is None else record
+        self._record["camera_period"] = 0
+        self._record["camera_taken_ns"] = -1
+
+    @property
+    def period_ns(self) -> int:
+        """Pictures are taken when the time is a multiple of this [ns]."""
+        return PERIODS_NS[int(self._record["camera_period"])]
+
+    @property
+    def taken_ns(self) -> int:
+        """When the last picture was taken [ns]."""
+        return int(self._record["camera_taken_ns"])
+
+    @property
+    def pixels(self) -> list[int]:
+        """The last picture's greys, the leftmost first."""
+        greys: list[int] = self._record["camera_pixels"].tolist()
+        return greys
+
+    @property
+    def light(self) -> int:
+        """The last picture's light level."""
+        return int(self._record["camera_light"])
 
     def look(self, instant_ns: int) -> None:
         """Take a picture."""
-        self.pixels, self.light = self._take(instant_ns)
-        self.taken_ns = instant_ns
+        self._record["camera_pixels"], self._record["camera_light"] = self._take(instant_ns)
+        self._record["camera_taken_ns"] = instant_ns
+
+    def set_period(self, code: int) -> None:
+        """Set the reading period to that of a code of order U."""
+        self._record["camera_period"] = code
 
     def order(self, letter: str, values: tuple[int, ...]) -> tuple[int, ...] | None:
         """Carry out an order and return the values of its answer, None for an order it does not know."""
@@ -64,7 +93,8 @@ def _read_light(camera: K213) -> tuple[int, ...]:
 
 def _read_packed(camera: K213) -> tuple[int, ...]:
     """M: two neighbours in a byte, the upper four bits of each, the left one on top."""
-    return tuple(left & 0xF0 | right >> 4 for left, right in zip(camera.pixels[::2], camera.pixels[1::2], strict=True))
+    pixels = camera.pixels
+    return tuple(left & 0xF0 | right >> 4 for left, right in zip(pixels[::2], pixels[1::2], strict=True))
 
 
 def _read_all(camera: K213) -> tuple[int, ...]:
@@ -74,17 +104,19 @@ def _read_all(camera: K213) -> tuple[int, ...]:
 
 def _find_brightest(camera: K213) -> tuple[int, ...]:
     """O: the index of the brightest pixel, the leftmost of equals."""
-    return (camera.pixels.index(max(camera.pixels)),)
+    pixels = camera.pixels
+    return (pixels.index(max(pixels)),)
 
 
 def _find_darkest(camera: K213) -> tuple[int, ...]:
     """P: the index of the darkest pixel, the leftmost of equals."""
-    return (camera.pixels.index(min(camera.pixels)),)
+    pixels = camera.pixels
+    return (pixels.index(min(pixels)),)
 
 
 def _read_block(camera: K213, start: int, count: int) -> tuple[int, ...]:
     """Return pixels from one on; a block that would leave the row is moved back into it."""
-    start = min(max(start, 0), len(camera.pixels) - count)
+    start = min(max(start, 0), PIXEL_COUNT - count)
     return tuple(camera.pixels[start : start + count])
 
 
@@ -112,7 +144,7 @@ def _set_period(camera: K213, code: int) -> tuple[int, ...] | None:
     """U: set the reading period; the present picture stays until the next instant."""
     if not 0 <= code < len(PERIODS_NS):
         return None
-    camera.period_ns = PERIODS_NS[code]
+    camera.set_period(code)
     return ()
 
 

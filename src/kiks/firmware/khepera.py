@@ -80,6 +80,7 @@ class Firmware:
             getattr(view, name)[:] = 0
         for name in ("speed_setpoint", "pwm_setpoint", "on_target", "led", "bus", "slip_pulses", "slip_count"):
             getattr(view, name)[:] = 0
+        view.camera_period[:] = 0
         view.motor_mode[:] = MODE_SPEED
         view.counter_offset[:] = -view.pulse_count
         view.speed_gains[:] = reset.speed_gains

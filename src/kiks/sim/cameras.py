@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kiks.engine import camera
+from kiks.engine.state import PIXEL_COUNT
 from kiks.firmware.k213 import K213, Picture
 from kiks.units import TICK_NS
 
@@ -24,14 +26,14 @@ class Cameras:
     def __init__(self, sim: Simulation) -> None:
         self._sim = sim
         self._fitted: dict[int, K213] = {}
-        self._pixels = np.zeros(camera.PIXEL_COUNT, np.float64)
+        self._pixels = np.zeros(PIXEL_COUNT, np.float64)
 
     def __bool__(self) -> bool:
         return bool(self._fitted)
 
     def fit(self, index: int) -> K213:
         """Return a new camera for a robot, with a first picture."""
-        fitted = self._fitted[index] = K213(lambda time_ns: self._take(index, time_ns))
+        fitted = self._fitted[index] = K213(partial(self._take, index), self._sim.state.robots[0, index])
         fitted.look(self._sim.now_ns)
         return fitted
 
@@ -67,7 +69,7 @@ class Cameras:
         sim = self._sim
         light: int = camera.take_image(
             sim.state.robots,
-            *sim.sight,
+            sim.sight,
             sim.state.tick_count,
             time_ns,
             sim.seed,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -106,34 +107,44 @@ class Simulation:
         self.name = TABLE.enter(self)
 
     def _firmware(self, index: int) -> Firmware:
-        def sense_proximity() -> list[int]:
-            proximity.read_proximity(
-                self.state.robots,
-                self._kinds,
-                *self.sight,
-                self.state.tick_count,
-                self.now_ns,
-                self.seed,
-                index,
-                self._counts,
-            )
-            return self._counts.tolist()
+        return Firmware(
+            self.spec,
+            self.state,
+            index,
+            sense_proximity=partial(self._sense_proximity, index),
+            sense_ambient=partial(self._sense_ambient, index),
+        )
 
-        def sense_ambient() -> list[int]:
-            ambient.read_ambient(
-                self.state.robots,
-                self._kinds,
-                *self.sight,
-                self.lamps,
-                self.state.tick_count,
-                self.now_ns,
-                self.seed,
-                index,
-                self._counts,
-            )
-            return self._counts.tolist()
+    def _sense_proximity(self, index: int, is_noisy: bool = True) -> list[Any]:
+        out = self._counts if is_noisy else self._expected
+        proximity.read_proximity(
+            self.state.robots,
+            self._kinds,
+            self.sight,
+            self.state.tick_count,
+            self.now_ns,
+            self.seed,
+            index,
+            is_noisy,
+            out,
+        )
+        return out.tolist()
 
-        return Firmware(self.spec, self.state, index, sense_proximity=sense_proximity, sense_ambient=sense_ambient)
+    def _sense_ambient(self, index: int, is_noisy: bool = True) -> list[Any]:
+        out = self._counts if is_noisy else self._expected
+        ambient.read_ambient(
+            self.state.robots,
+            self._kinds,
+            self.sight,
+            self.lamps,
+            self.state.tick_count,
+            self.now_ns,
+            self.seed,
+            index,
+            is_noisy,
+            out,
+        )
+        return out.tolist()
 
     def _start(self, index: int) -> tuple[float, float, float]:
         """Return the arena's start pose for a robot, else a free place: the roomiest for the first."""
@@ -333,12 +344,7 @@ class Simulation:
         index = self._index(robot)
         with self.lock:
             self.sync()
-            if noise:
-                return [float(count) for count in self.wires[index].firmware.sense_proximity()]
-            proximity.expect_proximity(
-                self.state.robots, self._kinds, *self.sight, self.state.tick_count, self.now_ns, index, self._expected
-            )
-            return [float(count) for count in self._expected]
+            return [float(count) for count in self._sense_proximity(index, noise)]
 
     def ambient(self, robot: int, *, noise: bool = False) -> list[float]:
         """Return what the eight light sensors would read at this instant and pose, without waiting for their round.
@@ -353,19 +359,7 @@ class Simulation:
         index = self._index(robot)
         with self.lock:
             self.sync()
-            if noise:
-                return [float(count) for count in self.wires[index].firmware.sense_ambient()]
-            ambient.expect_ambient(
-                self.state.robots,
-                self._kinds,
-                *self.sight,
-                self.lamps,
-                self.state.tick_count,
-                self.now_ns,
-                index,
-                self._expected,
-            )
-            return [float(count) for count in self._expected]
+            return [float(count) for count in self._sense_ambient(index, noise)]
 
     def image(self, robot: int) -> list[float]:
         """Return what a K213 would see at this instant and pose, 64 greys from the left, without noise or rounding.

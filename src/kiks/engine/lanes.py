@@ -1,0 +1,73 @@
+"""Scratch arrays and look-ups that the compiler turns into vector code.
+
+Need: a loop over lanes (many rays, one step each) becomes vector instructions only if LLVM can prove that no store in
+it changes what another lane loads, and if its loads need no test of their index.
+Method: scratch arrays on the stack, which nothing else can overlap, and a bare load for each lane. The instructions
+are the same additions and roundings as in scalar code, so the bits are the same on every processor.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from llvmlite import ir
+from numba import extending, types
+from numba.core import cgutils
+from numba.np import arrayobj
+
+# Numba annotates these in part, and not as they are used in kernels.
+_intrinsic: Any = extending.intrinsic
+_address: Any = types.CPointer
+_arrays: Any = arrayobj
+_pack: Any = cgutils.pack_array
+
+_CACHE_LINE = 64  # bytes
+
+
+@_intrinsic
+def stack_floats(typing: Any, count: Any) -> Any:
+    """Return an uninitialised float64 array on the stack, of a length that is a constant; it dies with its function."""
+    if not isinstance(count, types.IntegerLiteral):
+        return None
+    array_type = types.Array(types.float64, 1, "C")
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        with builder.goto_entry_block():
+            memory = builder.alloca(ir.ArrayType(ir.DoubleType(), count.literal_value))
+            memory.align = _CACHE_LINE
+        size = context.get_value_type(types.intp)
+        array = _arrays.make_array(array_type)(context, builder)
+        _arrays.populate_array(
+            array,
+            data=builder.bitcast(memory, ir.DoubleType().as_pointer()),
+            shape=_pack(builder, [size(count.literal_value)]),
+            strides=_pack(builder, [size(8)]),
+            itemsize=size(8),
+            meminfo=None,
+            parent=None,
+        )
+        return array._getvalue()
+
+    return array_type(count), generate
+
+
+@_intrinsic
+def pointer_to(typing: Any, array: Any) -> Any:
+    """Return the address of the first element of an array without gaps, in C order."""
+    if not (isinstance(array, types.Array) and array.layout == "C"):
+        return None
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return _arrays.make_array(array)(context, builder, arguments[0]).data
+
+    return _address(array.dtype)(array), generate
+
+
+@_intrinsic
+def element(typing: Any, pointer: Any, index: Any) -> Any:
+    """Return the element at an int32 index from an address; nothing checks that it lies within the array."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.load(builder.gep(arguments[0], [arguments[1]], inbounds=True))
+
+    return pointer.dtype(pointer, types.int32), generate
