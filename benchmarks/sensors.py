@@ -1,9 +1,13 @@
-"""What sensors cost: a second of each one's readings against a second of proximity, for robots at work.
+"""What sensors cost: a second of each one's readings against a second of proximity, and each response of proximity.
 
 Run: python benchmarks/sensors.py [--json]. `sensors.SENSOR.ARENA_BEHAVIOUR` is the time of all that a sensor reads in a
 simulated second, at its rate in `CASES`, over the time of 50 rounds of proximity with noise; they take turns, and the
 figure is the median of the ratios. For proximity itself it is the number of rounds in the time of a fixed piece of
 plain Python, measured in the same run. Calls are made from Python, as the simulation does.
+
+`sensors.response_RESPONSE` is the time of a reading without noise, rays and all, over that with the thesis's networks,
+for robots that stand 2 to 25 mm from a wall, many in one call; they take turns, too. `sensors.response_thesis_ns` is
+that time itself [ns]. The arena is small: it stays in the cache, as the surroundings of one robot do.
 """
 
 from __future__ import annotations
@@ -18,20 +22,28 @@ from typing import Any
 
 import numpy as np
 from calibration import calibration_loops_per_s, report
+from numba import njit
 
 import kiks
 from kiks.demos.avoid import Avoid
 from kiks.demos.follow import Follow
 from kiks.engine import ambient, camera, proximity
+from kiks.engine.networks import networks_for
 from kiks.engine.parameters import pack
 from kiks.engine.state import PIXEL_COUNT
-from kiks.model.robot import SENSOR_COUNT
+from kiks.model.robot import SENSOR_COUNT, RobotSpec
 from kiks.units import TICK_NS
 
 ARENAS = Path(__file__).parent.parent / "examples" / "arenas"
 RIDES = (("default", Follow), ("default", Avoid), ("office", Follow), ("office", Avoid))
 MOMENTS, LOOPS_BETWEEN = 400, 5
 TICK = 1000  # all moments are taken to be this tick
+
+RESPONSES = ("thesis", "fast", "standin")
+"""Responses of the Khepera; the first is what the others are compared with."""
+
+PLACES, NEAREST_MM, FARTHEST_MM = 1000, 2.0, 25.0
+"""Robots in one call, and how far they are from a wall."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +54,7 @@ class Ride:
     robots: Any
     kinds: Any
     sight: Any
+    networks: Any
     lamps: Any
 
     @staticmethod
@@ -57,13 +70,16 @@ class Ride:
             moments.append(sim.state.robots[0, 0].copy())
         kinds = np.repeat(pack(sim.spec), MOMENTS)
         name = f"{arena}_{behaviour.__name__.lower()}"
-        return Ride(name, np.array(moments).reshape(1, -1), kinds, sim.sight, sim.lamps)
+        networks = networks_for(sim.spec.proximity.response)
+        return Ride(name, np.array(moments).reshape(1, -1), kinds, sim.sight, networks, sim.lamps)
 
 
 def read_proximity(ride: Ride) -> None:
     out = np.zeros(SENSOR_COUNT, np.int64)
     for k in range(MOMENTS):
-        proximity.read_proximity(ride.robots, ride.kinds, ride.sight, TICK, TICK * TICK_NS, 1, k, True, out)
+        proximity.read_proximity(
+            ride.robots, ride.kinds, ride.sight, ride.networks, TICK, TICK * TICK_NS, 1, k, True, out
+        )
 
 
 def read_ambient(ride: Ride) -> None:
@@ -102,6 +118,47 @@ def readings_s(case: Case, ride: Ride) -> float:
     return (time.perf_counter() - start_s) / MOMENTS
 
 
+@njit(error_model="numpy")  # type: ignore[untyped-decorator, unused-ignore]
+def expect_all(sight: Any, networks: Any, kinds: Any, poses: Any, out: Any) -> None:
+    """Write what all sensors expect at each pose into `out`, shape [pose, 8]."""
+    for k in range(poses.shape[0]):
+        for sensor in range(out.shape[1]):
+            x, y, heading = poses[k, 0], poses[k, 1], poses[k, 2]
+            out[k, sensor] = proximity.expected_count(sight, networks, kinds[0], x, y, heading, sensor)
+
+
+def poses_by_walls(arena: kiks.Arena, radius_mm: float) -> Any:
+    """Return poses of robots near walls, x, y [mm] and heading [rad], shape [pose, 3]."""
+    rng = np.random.default_rng(1)
+    found: list[tuple[float, float, float]] = []
+    while len(found) < PLACES:
+        x, y = rng.uniform(0, arena.width_mm), rng.uniform(0, arena.height_mm)
+        if NEAREST_MM <= arena.clearance_at_mm(x, y) - radius_mm <= FARTHEST_MM:
+            found.append((x, y, rng.uniform(-np.pi, np.pi)))
+    return np.array(found)
+
+
+def response_rows(repeats: int) -> list[tuple[str, float, str]]:
+    """Return what a reading costs with each response."""
+    sim = kiks.Simulation(kiks.Arena.box(300, 300, rounded_mm=100))
+    poses, out = poses_by_walls(sim.arena, sim.spec.body.radius_mm), np.zeros((PLACES, SENSOR_COUNT))
+    robots = [(networks_for(each), pack(RobotSpec.load("khepera", response=each))) for each in RESPONSES]
+
+    def reading_ns(networks: Any, kinds: Any) -> float:
+        start_s = time.perf_counter()
+        expect_all(sim.sight, networks, kinds, poses, out)
+        return (time.perf_counter() - start_s) / out.size * 1e9
+
+    reading_ns(*robots[0])  # compiles
+    rounds = [[reading_ns(*robot) for robot in robots] for _ in range(repeats)]
+    reference_ns, *others_ns = zip(*rounds, strict=True)
+    rows = [(f"sensors.response_{RESPONSES[0]}_ns", statistics.median(reference_ns), "ns a reading")]
+    for response, times_ns in zip(RESPONSES[1:], others_ns, strict=True):
+        ratio = statistics.median(own / first for own, first in zip(times_ns, reference_ns, strict=True))
+        rows.append((f"sensors.response_{response}", ratio, f"of {RESPONSES[0]}'s time"))
+    return rows
+
+
 def main() -> None:
     """Measure and report."""
     arguments = argparse.ArgumentParser(description=__doc__)
@@ -123,6 +180,7 @@ def main() -> None:
             share = case.rate_hz / CASES[0].rate_hz
             ratio = share * statistics.median(own / first for own, first in zip(times_s, reference_s, strict=True))
             rows.append((f"sensors.{case.name}.{ride.name}", ratio, f"of {CASES[0].name}'s time"))
+    rows += response_rows(options.repeats)
     report(rows, as_json=options.json)
 
 

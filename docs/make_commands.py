@@ -74,7 +74,10 @@ class Gripper:
 def robot() -> Simulation:
     """Return a robot without noise, with a gripper, 30 mm in front of a wall at its left."""
     quiet = RobotSpec.load("khepera_ii").with_changes(
-        proximity__noise_counts=0.0, proximity__noise_small=0.0, proximity__noise_large=0.0, ambient__noise_counts=0.0
+        proximity__jitter_counts=(0.0,),
+        proximity__noise_small=0.0,
+        proximity__noise_large=0.0,
+        ambient__noise_counts=0.0,
     )
     sim = Simulation(Arena.box(1000, 1000), robot=quiet)
     sim.place(1, 300.0, 935.0, math.radians(10))

@@ -145,7 +145,7 @@ def simulation(session: Session) -> Simulation:
     if "quiet" in session.settings:
         changes |= {
             "proximity__baseline_counts": (0.0,) * 8,
-            "proximity__noise_counts": 0.0,
+            "proximity__jitter_counts": (0.0,),
             "proximity__noise_small": 0.0,
             "proximity__noise_large": 0.0,
             "ambient__noise_counts": 0.0,

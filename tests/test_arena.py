@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from kiks.errors import ArenaError, ParameterError
 from kiks.model.arena import PAD, Arena, Ball, Cylinder, Lamp, Pose
+from kiks.model.materials import REFLECTANCES
 
 ROBOT_MM = 27.5
 
@@ -159,11 +160,20 @@ def test_a_box_has_its_walls():
         ({"rounded_mm": 91}, "rounded_mm must be a whole number from 0 to 90, but it was 91"),
         ({"brightness": 0}, "brightness must be a whole number from 1 to 255, but it was 0. 0 would be floor"),
         ({"brightness": True}, "brightness must be a whole number from 1 to 255, but it was True"),
+        ({"brightness": "woods"}, r"one of \['white', 'wood', .*\], but it was 'woods'. Did you mean 'wood'"),
     ],
 )
 def test_a_box_keeps_its_rules(change, words):
     with pytest.raises(ParameterError, match=words):
         Arena.box(**({"width_mm": 300, "height_mm": 200} | change))
+
+
+def test_a_wall_may_be_of_a_material():
+    """The brightness c whose reflectance is 0.02 + 0.98 c/255, to half a step of c."""
+    for name, reflectance in REFLECTANCES.items():
+        brightness = int(Arena.box(300, 200, brightness=name).brightness.max())
+        assert 0.02 + 0.98 * brightness / 255 == pytest.approx(reflectance, abs=0.004)
+    assert Arena.box(300, 200, brightness="black").brightness.max() == 1
 
 
 def test_a_robot_starts_at_the_first_start_pose():

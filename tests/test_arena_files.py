@@ -306,6 +306,8 @@ def test_an_arena_file_may_be_a_box(tmp_path):
     arena = Arena.load(write(tmp_path, "size_mm = [500, 650]\nrounded_mm = 100"))
     assert np.array_equal(arena.brightness, Arena.default().brightness)
     assert arena.name == "a"
+    arena = Arena.load(write(tmp_path, "size_mm = [200, 300]\nbrightness = 'pink sponge'"))
+    assert arena.brightness.max() == 86
     arena = Arena.load(write(tmp_path, "size_mm = [200, 300]\nwall_mm = 5\nbrightness = 9"))
     assert np.array_equal(arena.brightness, Arena.box(200, 300, wall_mm=5, brightness=9).brightness)
 
@@ -337,6 +339,7 @@ REFUSED = [
     ("", r"must have a picture or a size, but it has neither. Give picture"),
     ("nmae = 'x'", r"the file must have known keys only, but has 'nmae'. Did you mean 'name'\? Known are picture"),
     (BOX + "[[ball]]\nat_m = [1, 2]", r"ball 1 must have known keys only, but has 'at_m'. Did you mean 'at_mm'\?"),
+    (BOX + "brightness = 'gray'", r"one of \['white', .*, 'black'\], but it was 'gray'. Did you mean 'grey'"),
     (BOX + "picture = 'maze.png'", r"must be either a picture or a box, but size_mm came with picture. Remove"),
     (BOX + "mm_per_pixel = 1", r"but size_mm came with mm_per_pixel"),
     ("picture = 'sub/maze.png'\nwall_mm = 1", r"but picture came with wall_mm"),

@@ -15,7 +15,7 @@ import kiks
 from kiks.cli.calibrate import calibrate as command
 from kiks.cli.calibrate import parse_gaps
 from kiks.client import wall_fit
-from kiks.client.calibration import Calibration, calibrate, checked_gaps
+from kiks.client.calibration import Calibration, calibrate, checked_gaps, default_gaps_mm
 from kiks.client.measuring import CalibrationError, Run, processing_ms, spin
 from kiks.client.placements import Instruction, Place, SimPlacements
 from kiks.model.robot_file import robot_toml, save_robot
@@ -34,7 +34,7 @@ def hidden_robot(seed: int, base: kiks.RobotSpec = BASE) -> kiks.RobotSpec:
     changes: dict[str, object] = {
         f"proximity__{wall_fit.DIRECTION}": directions,
         "proximity__baseline_counts": tuple(rng.uniform(5, 40) for _ in directions),
-        "proximity__noise_counts": 3.0,
+        "proximity__jitter_counts": (-3.0, 3.0),
         "body__pulse_mm": 0.0823,
         "body__wheel_base_mm": 54.1,
         "firmware__processing_ms": 2.0,
@@ -65,7 +65,7 @@ def check(found: kiks.RobotSpec, hidden: kiks.RobotSpec) -> None:
     assert found.body.wheel_base_mm == pytest.approx(hidden.body.wheel_base_mm, rel=0.005)
     assert found.firmware.processing_ms == pytest.approx(hidden.firmware.processing_ms, abs=0.05)
     assert found.proximity.baseline_counts == pytest.approx(hidden.proximity.baseline_counts, abs=2.0)
-    assert found.proximity.noise_counts == pytest.approx(hidden.proximity.noise_counts, abs=1.5)
+    assert found.proximity.jitter_counts == pytest.approx(hidden.proximity.jitter_counts, abs=1.5)
     assert found.proximity.noise_small == pytest.approx(hidden.proximity.noise_small, rel=0.25)
 
 
@@ -100,6 +100,12 @@ def test_a_khepera_ii_is_calibrated_too() -> None:
     assert half_distances_mm(found, directions) == pytest.approx(half_distances_mm(hidden, directions), abs=1.0)
     assert found.body.pulse_mm == pytest.approx(hidden.body.pulse_mm, rel=0.005)
     assert found.body.wheel_base_mm == pytest.approx(hidden.body.wheel_base_mm, rel=0.005)
+
+
+@pytest.mark.parametrize("name", ["khepera", "khepera_ii"])
+def test_the_guide_names_the_default_marks(name: str) -> None:
+    guide = (Path(__file__).parents[1] / "docs" / "calibration.md").read_text(encoding="utf-8")
+    assert ", ".join(f"{gap:g}" for gap in default_gaps_mm(kiks.RobotSpec.load(name))) + " and" in guide
 
 
 # ---- the command ----
@@ -185,7 +191,7 @@ def failure(placements: SimPlacements, gaps_mm: tuple[float, ...] = (5, 15)) -> 
 
 
 def test_a_wall_that_is_not_seen_is_named_and_asked_for_again() -> None:
-    placements = Misplaced(kiks.Simulation(), {5: 150})
+    placements = Misplaced(kiks.Simulation(robot=BASE.with_changes(proximity__jitter_counts=(0.0,))), {5: 150})
     words = failure(placements)
     assert "some sensor must see the wall at 5 mm, but none reads more than 0 counts above its baseline" in words
     assert len(placements.findings) == 3  # one good in the open, two before the last attempt

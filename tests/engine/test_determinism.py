@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from llvmlite import binding
 
 from kiks.model.arena import Arena
+from kiks.model.robot import RESPONSES
 from kiks.sim.simulation import Simulation
 
 SCRIPT = (b"D,60,57\n", b"P,-255,200\n", b"D,-5,90\n", b"G,0,0\n", b"C,3000,-2000\n", b"D,127,127\n", b"C,-900,-900\n")
@@ -35,9 +37,23 @@ def run_record() -> str:
             expected = (*sim.proximity(robot), *sim.ambient(robot), *sim.image(robot))
             lines.append(" ".join(value.hex() for value in expected) + "\n")
         lines.append(sim.state_hash() + "\n")
+    lines += every_response(plain)
     assert sim.contacts(1) > 3
     assert sim.contacts(2) > 3
     return "".join(lines)
+
+
+def every_response(arena: Arena) -> Iterator[str]:
+    """Yield what robots with each response expect and read as they creep along a wall, and how they end."""
+    for response in RESPONSES:
+        kind = "khepera_ii" if response == "curve" else "khepera"
+        sim = Simulation(arena, seed=6, robot=kind, response=response)
+        sim.place(1, 55.0, 100.0, 1.2)
+        sim.port(1).write(b"D,4,5\n")
+        for _ in range(40):
+            sim.run(0.13)
+            yield " ".join(value.hex() for value in (*sim.proximity(1), *sim.proximity(1, noise=True))) + "\n"
+        yield sim.state_hash() + "\n"
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,6 @@ from kiks.engine import networks as kernels
 from kiks.engine.numbers import tanh
 from kiks.errors import ParameterError
 from kiks.fit import networks
-from kiks.fit.models import fast_table
 from kiks.fit.samples import Samples
 from kiks.model.network import THESIS, NetworkResponse
 
@@ -122,7 +121,7 @@ def test_tanh():
 
 def test_the_table_is_the_mean_of_the_networks():
     response = NetworkResponse.load()
-    table = fast_table()
+    table = kernels.networks_for("fast")["table"][0]
     assert table.shape == (6**7,)
     assert table[0] == 0.0
     assert table.min() >= 0.0

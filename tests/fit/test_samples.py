@@ -38,7 +38,7 @@ def test_text_files_are_read(tmp_path, text):
     samples = load_samples(write(tmp_path, text), radius_mm=12.5)
     assert (samples.name, samples.radius_mm) == ("post", 12.5)
     assert samples.gap_mm.tolist() == [5, 7, 9]
-    assert (samples.angle_deg + RIG_OFFSET_DEG).tolist() == [0, 180]
+    assert (samples.angle_deg[0] + RIG_OFFSET_DEG).tolist() == [0, 180]
     assert samples.counts.shape == (3, 2, 8)
     assert samples.counts[0, 0].tolist() == [0, 1, 2, 3, 4, 5, 6, 1023]
     assert samples.counts[2, 1].tolist() == [9] * 8
@@ -98,7 +98,7 @@ def test_tables_are_read(tmp_path):
     assert samples.name == "wall"
     assert math.isinf(samples.radius_mm)
     assert samples.counts[1, 2, 7] == 47
-    assert (samples.angle_deg + RIG_OFFSET_DEG).tolist() == [0, 120, 240]
+    assert (samples.angle_deg[-1] + RIG_OFFSET_DEG).tolist() == [0, 120, 240]
 
 
 @pytest.mark.parametrize(

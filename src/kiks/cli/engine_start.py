@@ -35,3 +35,4 @@ def compile_everything() -> None:
     robot.image()
     sim.image(1)
     sim.place(1, *sim.pose(1))
+    Simulation(Arena.box(200, 200), response="fast")

@@ -13,6 +13,7 @@ import numpy as np
 from kiks.client.khepera import Khepera
 from kiks.client.measuring import (
     SPIN_TURNS,
+    Array,
     CalibrationError,
     Rest,
     Run,
@@ -23,12 +24,12 @@ from kiks.client.measuring import (
     spin,
 )
 from kiks.client.placements import Instruction, Place, Placements
-from kiks.client.wall_fit import DIRECTION, GAIN, HAS_GAIN, Fit, fit_runs, guess_pulse
+from kiks.client.wall_fit import DIRECTION, GAIN, HAS_GAIN, Fit, Stand, fit_runs, guess_pulse
 from kiks.errors import LinkError, ParameterError
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
 
-GAP_SHARES = (0.1, 0.3, 0.5, 0.7)
-"""Gaps at which the robot spins, as shares of the range of its sensors."""
+GAP_SHARES, FAINT_SHARE = (0.15, 0.4, 0.7, 1.0), 0.05
+"""Gaps at which the robot spins, as shares of that at which a wall gives so little of the largest count."""
 
 ALONG_GAP = 1
 """Which of the gaps is the one at which it drives along the wall: near enough to see well, far enough not to touch."""
@@ -49,7 +50,7 @@ NEAR_SHARE = 0.5
 """The robot stops before the wall when a front sensor reads this share of its largest count."""
 
 SEEN_COUNTS, GLIMPSED_COUNTS = 50.0, 10.0
-"""What a sensor that sees a wall reads above its baseline at least [counts]: within half its range, and beyond."""
+"""What a sensor that sees a wall reads above its baseline at least [counts]: near by, and where little is expected."""
 
 GAP_ERROR_MAX_MM = 3.0
 """Runs whose gaps the fit would rather change by more contradict the others [mm]."""
@@ -113,7 +114,7 @@ def calibrate(
         placements: Who puts it where it has to be.
         base: The kind of robot that it is, for all that is not measured.
         baud: Speed of its line [bit/s].
-        gaps_mm: Marked distances from wall to rim [mm], at least two; shares of the range of its sensors if left out.
+        gaps_mm: Marked distances from wall to rim [mm], at least two; where it sees well if left out.
         run_up_mm: Marked gap from which it drives towards the wall [mm].
         say: Takes a word on what is being done.
 
@@ -139,7 +140,7 @@ def checked_gaps(gaps_mm: Sequence[float] | None, run_up_mm: float, base: RobotS
         ParameterError: If they are too few, too near or too far, or the run-up is too short.
     """
     range_mm = base.proximity.range_mm
-    gaps = sorted(gaps_mm) if gaps_mm else [share * range_mm for share in GAP_SHARES]
+    gaps = sorted(gaps_mm) if gaps_mm else default_gaps_mm(base)
     if len(set(gaps)) < 2 or not all(2 <= gap <= range_mm for gap in gaps):
         raise ParameterError(
             f"gaps_mm must be at least two different numbers from 2 to {range_mm:g} mm, the range of the sensors, "
@@ -150,6 +151,23 @@ def checked_gaps(gaps_mm: Sequence[float] | None, run_up_mm: float, base: RobotS
             f"run_up_mm must be between {3 * range_mm:g} and 2000 mm, but it was {run_up_mm!r}. The longer, the better."
         )
     return gaps
+
+
+def default_gaps_mm(base: RobotSpec) -> list[float]:
+    """Return gaps at which such a robot sees a wall well [mm], nearest first."""
+    tried_mm = np.arange(1.0, base.proximity.range_mm)
+    faint = FAINT_SHARE * base.proximity.maximum_counts
+    seen_mm = float(tried_mm[facing_counts(base, tried_mm) >= faint].max(initial=10.0))
+    return [float(round(share * seen_mm)) for share in GAP_SHARES]
+
+
+def facing_counts(spec: RobotSpec, gaps_mm: Sequence[float] | Array) -> Array:
+    """Return what the sensor with most gain reads above its baseline as it faces a wall at gaps [counts]."""
+    best = int(np.argmax(getattr(spec.proximity, GAIN)))
+    headings_rad = np.full(len(gaps_mm), -math.radians(getattr(spec.proximity, DIRECTION)[best]))
+    readings = Stand(spec).readings(spec, np.asarray(gaps_mm, np.float64), headings_rad)[:, best]
+    above: Array = readings - spec.proximity.baseline_counts[best]
+    return above
 
 
 class _Session:
@@ -213,13 +231,12 @@ class _Session:
                 f"the sensors must read little in the open, but sensor {int(typical.argmax())} reads "
                 f"{typical.max():.0f} counts. Move away what is near, and lamps with it."
             )
-        proximity = replace(
-            self.spec.proximity, baseline_counts=tuple(typical.tolist()), noise_counts=float(np.median(jitter))
-        )
+        usual = round(float(np.median(jitter)), 1)
+        proximity = replace(self.spec.proximity, baseline_counts=tuple(typical.tolist()), jitter_counts=(-usual, usual))
         firmware = replace(self.spec.firmware, processing_ms=min(round(thinking_ms, 2), 1000.0))
         self.spec = replace(self.spec, proximity=proximity, firmware=firmware)
         baselines = ", ".join(f"{count:.0f}" for count in typical)
-        noise = f"jitter {proximity.noise_counts:.1f} counts; the robot thinks for {thinking_ms:.2f} ms"
+        noise = f"jitter {usual:.1f} counts; the robot thinks for {thinking_ms:.2f} ms"
         return tuple(jitter.tolist()), f"Baselines {baselines}; {noise}."
 
     def _measure_before_the_wall(
@@ -230,7 +247,7 @@ class _Session:
         back = spin(self.robot, self.spec, gap_mm, -SPIN_TURNS)  # both ways, as readings are older than counters
         runs = [there, replace(back, is_marked=False)]
         above = np.concatenate([run.counts for run in runs]).max(axis=0) - np.array(self.spec.proximity.baseline_counts)
-        enough = SEEN_COUNTS if gap_mm <= self.spec.proximity.range_mm / 2 else GLIMPSED_COUNTS
+        enough = min(max(facing_counts(self.spec, [gap_mm])[0] / 2, GLIMPSED_COUNTS), SEEN_COUNTS)
         if above.max() < enough:
             raise CalibrationError(
                 f"some sensor must see the wall at {gap_mm:g} mm, but none reads more than {above.max():.0f} counts "
@@ -287,7 +304,9 @@ class _Session:
             usual = proximity.noise_small - (proximity.noise_small - proximity.noise_large) * mean / 1000
             usual_counts = mean * usual / (proximity.noise_exponent + 1)
             # Far above the jitter, and where no noise is cut off by the converter's limit.
-            clear = (mean > 100 + 10 * proximity.noise_counts) & (at_rest.counts.max(axis=0) < proximity.maximum_counts)
+            clear = (mean > 100 + 10 * proximity.jitter_counts[-1]) & (
+                at_rest.counts.max(axis=0) < proximity.maximum_counts
+            )
             shares += (at_rest.deviation()[clear] / np.maximum(usual_counts[clear], 1e-9)).tolist()
         if not shares:
             return 1.0
@@ -322,6 +341,5 @@ def _rounded(spec: RobotSpec) -> RobotSpec:
     changes: dict[str, Any] = {
         key: tuple(round(value, digit) for value in getattr(proximity, key)) for key, digit in digits.items()
     }
-    changes["noise_counts"] = round(proximity.noise_counts, 1)
     body = replace(body, wheel_base_mm=round(body.wheel_base_mm, 3), pulse_mm=round(body.pulse_mm, 6))
     return replace(spec, body=body, proximity=replace(proximity, **changes))

@@ -7,18 +7,36 @@ weights the last is the bias; their shapes stand in `kiks.model.network`. Sums r
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kiks.engine.compiling import entry, kernel
 from kiks.engine.numbers import tanh
+from kiks.model.network import INPUT_COUNT, LINEAR_COUNT, TANH_COUNT, NetworkResponse
+from kiks.model.robot import SENSOR_COUNT
 
 TABLE_LEVELS = 6
 """Values of each ray that the table knows: 0, 10, ..., 50 mm (thesis 3.3)."""
 
 TABLE_SIZE = TABLE_LEVELS**7
 """Entries of the table."""
+
+NETWORK_RESPONSES = ("thesis", "fast")
+"""Responses of robots' files that need a record of `NETWORKS`."""
+
+NETWORKS = np.dtype(
+    [
+        ("hidden", "f8", (SENSOR_COUNT, TANH_COUNT, INPUT_COUNT + 1)),
+        ("middle", "f8", (SENSOR_COUNT, LINEAR_COUNT, TANH_COUNT + 1)),
+        ("last", "f8", (SENSOR_COUNT, LINEAR_COUNT + 1)),
+        ("table", "f4", (TABLE_SIZE,)),  # zeros unless it is wanted
+    ],
+    align=True,
+)
+"""Weights and table for the sensors' kernels: one record for all robots, as it has a megabyte."""
 
 MAXIMUM = 1023.0
 
@@ -88,3 +106,16 @@ def respond_table(table: Any, seen: Any, out: Any) -> Any:
     for sample in range(seen.shape[0]):
         for sensor in range(seen.shape[1]):
             out[sample, sensor] = table_count(table, seen[sample, sensor])
+
+
+@functools.cache
+def networks_for(response: str) -> NDArray[np.void]:
+    """Return what a response of a robot's file needs of the networks that come with KiKS, shape [1] or [0]."""
+    packed = np.zeros(1 if response in NETWORK_RESPONSES else 0, NETWORKS)
+    if len(packed):
+        networks = NetworkResponse.load()
+        packed["hidden"], packed["middle"], packed["last"] = networks.weights
+        if response == "fast":
+            fill_table(*networks.weights, packed["table"][0])
+    packed.setflags(write=False)
+    return packed

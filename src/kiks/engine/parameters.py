@@ -3,17 +3,37 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.engine.numbers import exponential, sin_cos
-from kiks.model.robot import AMBIENT_MODELS, LAMP_POINT_LIMIT, SENSOR_COUNT, Ambient, RobotSpec
+from kiks.engine.networks import NETWORK_RESPONSES, TABLE_LEVELS
+from kiks.engine.numbers import exponential, logarithm, sin_cos
+from kiks.model.network import BODY_RADIUS_MM, NetworkResponse
+from kiks.model.robot import (
+    AMBIENT_MODELS,
+    JITTER_POINT_LIMIT,
+    LAMP_POINT_LIMIT,
+    RESPONSES,
+    SENSOR_COUNT,
+    Ambient,
+    Curve,
+    Proximity,
+    RobotSpec,
+)
 from kiks.units import TICK_NS
 
 RAY_COUNT = 7
 """Rays of a proximity sensor (thesis 3.3, "Proximity sensors")."""
+
+CURVE_POINT_COUNT = 129
+"""Points of a measured curve, evenly spread from 0 to the end of the range."""
+
+STANDIN_REACH = 1.06
+"""How far the stand-in looks, in ranges: the sampled rays of KiKS 2.2.0 saw so much farther (kiks-behaviour.md 3.1)."""
 
 PARAMETERS = np.dtype(
     [
@@ -31,9 +51,15 @@ PARAMETERS = np.dtype(
         ("gain_scale", "i8"),
         ("mount_x_mm", "f8", (SENSOR_COUNT,)),
         ("mount_y_mm", "f8", (SENSOR_COUNT,)),
+        ("range_mm", "f8"),  # what the response measures lengths by
+        ("response", "i8"),
+        ("ray_x_mm", "f8", (SENSOR_COUNT,)),  # where the response lets its rays begin
+        ("ray_y_mm", "f8", (SENSOR_COUNT,)),
         ("ray_cos", "f8", (SENSOR_COUNT, RAY_COUNT)),
         ("ray_sin", "f8", (SENSOR_COUNT, RAY_COUNT)),
-        ("range_mm", "f8"),
+        ("reach_mm", "f8"),  # longest length of a ray
+        ("ray_weight", "f8", (RAY_COUNT,)),
+        ("curve_counts", "f4", (CURVE_POINT_COUNT,)),
         ("gain", "f8", (SENSOR_COUNT,)),
         ("baseline_counts", "f8", (SENSOR_COUNT,)),
         ("maximum_counts", "f8"),
@@ -41,7 +67,9 @@ PARAMETERS = np.dtype(
         ("noise_small", "f8"),
         ("noise_large", "f8"),
         ("noise_exponent", "i8"),
-        ("noise_counts", "f8"),
+        ("noise_down", "f8"),
+        ("jitter_point_count", "i8"),
+        ("jitter_counts", "f8", (JITTER_POINT_LIMIT + 1,)),
         ("axis_cos", "f8", (SENSOR_COUNT,)),
         ("axis_sin", "f8", (SENSOR_COUNT,)),
         ("ambient_model", "i8"),
@@ -75,22 +103,81 @@ def pack(spec: RobotSpec) -> NDArray[np.void]:
     robot["lag_decay"] = exponential(-1.0 / lag_ticks)
     robot["lag_ticks"] = lag_ticks * (1.0 - robot["lag_decay"])
     robot["gain_scale"] = motor.gain_scale
-    for sensor in range(SENSOR_COUNT):
-        sine, cosine = sin_cos(math.radians(proximity.mount_angle_deg[sensor]))
-        robot["mount_x_mm"][sensor] = proximity.mount_radius_mm[sensor] * cosine
-        robot["mount_y_mm"][sensor] = proximity.mount_radius_mm[sensor] * sine
-        for ray in range(RAY_COUNT):
-            # The leftmost ray comes first, as in the thesis.
-            offset_deg = proximity.field_of_view_deg * (0.5 - ray / (RAY_COUNT - 1))
-            sine, cosine = sin_cos(math.radians(proximity.direction_deg[sensor] + offset_deg))
-            robot["ray_cos"][sensor, ray] = cosine
-            robot["ray_sin"][sensor, ray] = sine
     for name in ("range_mm", "gain", "baseline_counts", "maximum_counts", "step_counts"):
         robot[name] = getattr(proximity, name)
-    for name in ("noise_small", "noise_large", "noise_exponent", "noise_counts"):
+    for name in ("noise_small", "noise_large", "noise_exponent", "noise_down"):
         robot[name] = getattr(proximity, name)
+    robot["jitter_point_count"] = len(proximity.jitter_counts)
+    robot["jitter_counts"][: len(proximity.jitter_counts)] = proximity.jitter_counts
+    robot["mount_x_mm"], robot["mount_y_mm"] = _places_mm(proximity.mount_angle_deg, proximity.mount_radius_mm)
+    _pack_response(robot, spec)
     _pack_ambient(robot, spec)
     return packed
+
+
+def _places_mm(angle_deg: Sequence[float], radius_mm: Sequence[float]) -> tuple[list[float], list[float]]:
+    """Return x and y of polar places on the robot [mm]."""
+    turns = [sin_cos(math.radians(angle)) for angle in angle_deg]
+    x_mm = [radius * cosine for radius, (_, cosine) in zip(radius_mm, turns, strict=True)]
+    y_mm = [radius * sine for radius, (sine, _) in zip(radius_mm, turns, strict=True)]
+    return x_mm, y_mm
+
+
+def _pack_response(robot: Any, spec: RobotSpec) -> None:
+    """Write which response it is, its rays and its constants."""
+    proximity = spec.proximity
+    robot["response"] = RESPONSES.index(proximity.response)
+    geometry: Proximity | NetworkResponse = proximity
+    radius_mm: Sequence[float] = proximity.mount_radius_mm
+    reach_mm = proximity.range_mm
+    if proximity.response == "standin":
+        reach_mm *= STANDIN_REACH
+    elif proximity.response in NETWORK_RESPONSES:
+        geometry = networks = NetworkResponse.load()
+        robot["range_mm"] = reach_mm = networks.range_mm
+        if proximity.response == "fast":
+            reach_mm *= 1.0 - 0.5 / (TABLE_LEVELS - 1)  # what is farther is rounded to nothing
+        # On the rim of this robot, as they were on that of the one that was measured.
+        radius_mm = [radius * spec.body.radius_mm / BODY_RADIUS_MM for radius in networks.mount_radius_mm]
+    robot["reach_mm"] = reach_mm
+    robot["ray_x_mm"], robot["ray_y_mm"] = _places_mm(geometry.mount_angle_deg, radius_mm)
+    for sensor in range(SENSOR_COUNT):
+        for ray in range(RAY_COUNT):
+            # The leftmost ray comes first, as in the thesis.
+            offset_deg = geometry.field_of_view_deg * (0.5 - ray / (RAY_COUNT - 1))
+            sine, cosine = sin_cos(math.radians(geometry.direction_deg[sensor] + offset_deg))
+            robot["ray_cos"][sensor, ray] = cosine
+            robot["ray_sin"][sensor, ray] = sine
+    if spec.curve is not None:
+        _pack_curve(robot, spec.curve, proximity)
+
+
+def _pack_curve(robot: Any, curve: Curve, proximity: Proximity) -> None:
+    """Write a measured curve at evenly spread distances, and how much of it each ray brings.
+
+    Between the points that were measured the logarithm of the counts is a straight line over that of the distance;
+    before the first it goes on so, beyond the last it falls with the square of the distance. What would be left of it
+    at the end of the range is taken off, so that nothing jumps there. The weights are such that a white wall, square
+    to the axis of a sensor, gives what the curve says: its rays at the angle a are longer by 1/cos(a), and what comes
+    back along them is less by cos(a)^2.
+    """
+    points = list(zip(curve.distance_mm, curve.counts, strict=True))
+    points.append((2.0 * points[-1][0], points[-1][1] / 4.0))
+
+    def counts_at(distance_mm: float) -> float:
+        nearer, farther = next((pair for pair in pairwise(points) if distance_mm <= pair[1][0]), points[-2:])
+        slope = logarithm(nearer[1] / farther[1]) / logarithm(farther[0] / nearer[0])
+        return float(nearer[1] * exponential(slope * logarithm(nearer[0] / distance_mm)))
+
+    last = counts_at(proximity.range_mm)
+    for point in range(CURVE_POINT_COUNT):
+        distance_mm = max(proximity.range_mm * point / (CURVE_POINT_COUNT - 1), 1.0)
+        robot["curve_counts"][point] = curve.scale * max(counts_at(distance_mm) - last, 0.0)
+    step_deg = proximity.field_of_view_deg / (RAY_COUNT - 1)
+    middle = RAY_COUNT // 2
+    cosines = [sin_cos(math.radians(step_deg * abs(ray - middle)))[1] for ray in range(RAY_COUNT)]
+    whole = sum(curve.ray_weight[abs(ray - middle)] * cosines[ray] ** 2 for ray in range(RAY_COUNT))
+    robot["ray_weight"] = [curve.ray_weight[abs(ray - middle)] / whole for ray in range(RAY_COUNT)]
 
 
 def _pack_ambient(robot: Any, spec: RobotSpec) -> None:

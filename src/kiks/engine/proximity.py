@@ -1,28 +1,26 @@
-"""The eight proximity sensors: when each was sampled, its seven rays, the response to them, and the noise.
+"""The eight proximity sensors: when each was sampled, its seven rays, and the noise on its response to them.
 
 Source: thesis section 3.3 ("Proximity sensors", "noise model"), khepera-protocol.md 8.1 (sampling) and
-kiks-behaviour.md 3.1 (rays, colour) and 3.1.1 (the response: a compact stand-in for the measured one).
+kiks-behaviour.md 3.1 (rays, noise). The responses themselves are in `kiks.engine.responses`.
 """
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 
 from kiks.engine.compiling import entry, kernel
+from kiks.engine.lanes import stack_floats
 from kiks.engine.motion import pose_between
-from kiks.engine.numbers import exponential, power, sin_cos, uniform
+from kiks.engine.numbers import sin_cos, uniform
 from kiks.engine.parameters import RAY_COUNT
-from kiks.engine.rays import cast, free_cells, scale
+from kiks.engine.rays import cast, free_cells, scale, stride
+from kiks.engine.responses import FAST, respond
 from kiks.units import SENSOR_ROUND_NS, SENSOR_SLOT_NS, TICK_NS
 
 STREAM_SLIP, STREAM_PROXIMITY = 1, 2
 """Random streams: whoever draws has a number of his own."""
-
-_WEIGHTS = (0.35, 0.33, 0.69, 0.43, 0.69, 0.33, 0.35)  # kiks-behaviour.md 3.1.1
-_MARGIN = 0.06  # of the range
 
 
 @kernel
@@ -45,51 +43,31 @@ def pose_at(robot: Any, tick_count: Any, time_ns: Any) -> Any:
 
 
 @kernel
-def nearness(range_share: Any, brightness: Any) -> Any:
-    """Return what the response makes of a ray: 1 at the sensor, 0 out of range, less for a dark surface.
-
-    The length, a share of the sensor's range, is inverted; black counts half of white (thesis 3.4, "Proximity sensor
-    colour sensitivity"). The margin is what the sampled rays of KiKS 2.2.0 add (kiks-behaviour.md 3.1).
-    """
-    if brightness == 0:
-        return 0.0
-    inverted = min(max(1.0 + _MARGIN - range_share, 0.0), 0.98)
-    return inverted * (0.5 + brightness * (0.5 / 255.0))
-
-
-@kernel
-def respond(nearnesses: Any) -> Any:
-    """Return the expected count for seven nearnesses (kiks-behaviour.md 3.1.1)."""
-    total = 0.0
-    for ray in range(RAY_COUNT):
-        root = math.sqrt(nearnesses[ray])
-        total += _WEIGHTS[ray] * nearnesses[ray] * root * math.sqrt(root)  # to the power of 1.75
-    if total == 0.0:
-        return 0.0
-    return 1023.0 * (1.0 - exponential(-power(total, 1.61)))
-
-
-@kernel
-def expected_count(sight: Any, parameters: Any, x: Any, y: Any, heading: Any, sensor: Any) -> Any:
-    """Return the count that a sensor of a robot at this pose gives on average."""
+def expected_count(sight: Any, networks: Any, parameters: Any, x: Any, y: Any, heading: Any, sensor: Any) -> Any:
+    """Return the count that a sensor of a robot at this pose gives on average; nothing cuts it off at the top."""
     sine, cosine = sin_cos(heading)
-    mount_x, mount_y = parameters.mount_x_mm[sensor], parameters.mount_y_mm[sensor]
+    ray_x, ray_y = parameters.ray_x_mm[sensor], parameters.ray_y_mm[sensor]
     cell, pad = scale(sight)
     per_cell = 1.0 / cell
-    column = (x + mount_x * cosine - mount_y * sine) * per_cell + pad
-    row = (y + mount_x * sine + mount_y * cosine) * per_cell + pad
-    reach = parameters.range_mm * (1.0 + _MARGIN) * per_cell
-    if free_cells(sight, column, row) > reach:
+    column = (x + ray_x * cosine - ray_y * sine) * per_cell + pad
+    row = (y + ray_x * sine + ray_y * cosine) * per_cell + pad
+    reach = parameters.reach_mm * per_cell
+    begin = max(free_cells(sight, column, row), 0.0)
+    if begin > reach:
         return parameters.baseline_counts[sensor]
-    per_range = cell / parameters.range_mm
-    seen = np.empty(RAY_COUNT, np.float64)
+    lengths_mm, brightnesses = stack_floats(RAY_COUNT), stack_floats(RAY_COUNT)
     for ray in range(RAY_COUNT):
-        ray_x, ray_y = parameters.ray_cos[sensor, ray], parameters.ray_sin[sensor, ray]
-        direction_x = ray_x * cosine - ray_y * sine
-        direction_y = ray_x * sine + ray_y * cosine
-        length, brightness = cast(sight, column, row, direction_x, direction_y, reach)
-        seen[ray] = nearness(length * per_range, brightness)
-    return parameters.baseline_counts[sensor] + parameters.gain[sensor] * respond(seen)
+        ray_cos, ray_sin = parameters.ray_cos[sensor, ray], parameters.ray_sin[sensor, ray]
+        direction_x = ray_cos * cosine - ray_sin * sine
+        direction_y = ray_cos * sine + ray_sin * cosine
+        # The table rounds lengths to 10 mm: for it, rays need not be exact.
+        if parameters.response == FAST:
+            length, brightness = stride(sight, column, row, direction_x, direction_y, reach, begin)
+        else:
+            length, brightness = cast(sight, column, row, direction_x, direction_y, reach, begin)
+        lengths_mm[ray], brightnesses[ray] = length * cell, brightness
+    counts = respond(networks, parameters, sensor, lengths_mm, brightnesses)
+    return parameters.baseline_counts[sensor] + parameters.gain[sensor] * counts
 
 
 @kernel
@@ -102,12 +80,24 @@ def integer_power(base: Any, exponent: Any) -> Any:
 
 
 @kernel
+def quantile(values: Any, count: Any, share: Any) -> Any:
+    """Return what a share 0..1 of all draws stays below: the first `count` of the values are equally probable steps."""
+    place = share * (count - 1)
+    i = min(np.int64(place), max(count - 2, 0))
+    return values[i] + (place - i) * (values[i + 1] - values[i])
+
+
+@kernel
 def add_noise(parameters: Any, count: Any, sign: Any, size: Any, jitter: Any) -> Any:
-    """Return a count with noise: at most 25 % of small and 10 % of large readings, and seldom that much."""
+    """Return a count with noise, from three random numbers 0..1.
+
+    A share of the reading, at most 25 % of small and 10 % of large ones and seldom that much, to either side; and
+    what is there with nothing near, too, drawn from the robot's own distribution.
+    """
     largest = parameters.noise_small - count / 1000.0 * (parameters.noise_small - parameters.noise_large)
     deviation = largest * integer_power(size, parameters.noise_exponent)
-    noisy = count * (1.0 + deviation) if sign < 0.5 else count * (1.0 - deviation)
-    return noisy + parameters.noise_counts * (2.0 * jitter - 1.0)
+    noisy = count * (1.0 + deviation) if sign < 0.5 else count * (1.0 - parameters.noise_down * deviation)
+    return noisy + quantile(parameters.jitter_counts, parameters.jitter_point_count, jitter)
 
 
 @kernel
@@ -122,6 +112,7 @@ def read_proximity(
     robots: Any,
     kinds: Any,
     sight: Any,
+    networks: Any,
     tick_count: Any,
     time_ns: Any,
     seed: Any,
@@ -135,6 +126,7 @@ def read_proximity(
         robots: Records of `ROBOT`, shape [world_count, robot_count].
         kinds: Records of `PARAMETERS`, shape [robot_count].
         sight: What rays meet (`kiks.engine.rays`).
+        networks: A record of `kiks.engine.networks.NETWORKS`, or none if no robot's response needs them.
         tick_count: Ticks done.
         time_ns: When the robot reads.
         seed: Seed of the run.
@@ -146,13 +138,14 @@ def read_proximity(
     for sensor in range(out.shape[0]):
         turn, instant_ns = sample_instant(time_ns, sensor) if is_noisy else (np.int64(0), time_ns)
         x, y, heading = pose_at(state, tick_count, instant_ns)
-        count = expected_count(sight, parameters, x, y, heading, sensor)
+        count = expected_count(sight, networks, parameters, x, y, heading, sensor)
         if is_noisy:
             sign = uniform(seed, 0, robot, STREAM_PROXIMITY, turn, sensor * 3)
             size = uniform(seed, 0, robot, STREAM_PROXIMITY, turn, sensor * 3 + 1)
             jitter = uniform(seed, 0, robot, STREAM_PROXIMITY, turn, sensor * 3 + 2)
-            count = quantize(parameters, add_noise(parameters, count, sign, size, jitter))
-        out[sensor] = count
+            out[sensor] = quantize(parameters, add_noise(parameters, count, sign, size, jitter))
+        else:
+            out[sensor] = min(count, parameters.maximum_counts)
 
 
 @entry

@@ -6,7 +6,6 @@ they were published, with the mounts of khepera-protocol.md 7.4; they serve as c
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Callable
 
@@ -26,8 +25,13 @@ _PLAN = PLACES["protocol"]
 _KIKS2_WEIGHTS = (0.35, 0.33, 0.69, 0.43, 0.69, 0.33, 0.35)  # kiks-behaviour.md 3.1.1
 
 
-def default(samples: Samples) -> Floats:
-    """Answer as the simulated robot does: it is put in front of the object in an arena, and its sensors are asked."""
+def default(samples: Samples, response: str | None = None) -> Floats:
+    """Answer as the simulated robot does: it is put in front of the object in an arena, and its sensors are asked.
+
+    Args:
+        samples: The poses.
+        response: What makes counts of its rays; that of its file if left out.
+    """
     from kiks.model.arena import Arena
     from kiks.sim.simulation import Simulation
 
@@ -40,10 +44,10 @@ def default(samples: Samples) -> Floats:
         inside = np.broadcast_to(x >= 0.0, (cells, cells))
     else:
         inside = np.hypot(x - samples.radius_mm, x[:, None]) <= samples.radius_mm
-    sim = Simulation(Arena(inside.astype(np.uint8) * 255, _CELL_MM, samples.name))
+    sim = Simulation(Arena(inside.astype(np.uint8) * 255, _CELL_MM, samples.name), response=response)
     counts = np.empty(samples.counts.shape, np.float64)
     for i, gap_mm in enumerate(samples.gap_mm):
-        for j, angle_deg in enumerate(samples.angle_deg):
+        for j, angle_deg in enumerate(samples.angle_deg[i]):
             sim.place(1, centre_mm - BODY_RADIUS_MM - float(gap_mm), centre_mm, math.radians(float(angle_deg)))
             counts[i, j] = sim.proximity(1)
     return counts
@@ -63,16 +67,9 @@ def fast(samples: Samples) -> Floats:
     response = NetworkResponse.load()
     seen = nearnesses(samples, fan_of(response))
     counts = np.empty(samples.counts.shape, np.float64)
-    networks.respond_table(fast_table(), seen.reshape(-1, *seen.shape[2:]), counts.reshape(-1, SENSOR_COUNT))
+    table = networks.networks_for("fast")["table"][0]
+    networks.respond_table(table, seen.reshape(-1, *seen.shape[2:]), counts.reshape(-1, SENSOR_COUNT))
     return counts
-
-
-@functools.cache
-def fast_table() -> np.ndarray[tuple[int], np.dtype[np.float32]]:
-    """Return the thesis's table, shape [6^7]."""
-    table = np.empty(networks.TABLE_SIZE, np.float32)
-    networks.fill_table(*NetworkResponse.load().weights, table)
-    return table
 
 
 def kiks2(samples: Samples) -> Floats:

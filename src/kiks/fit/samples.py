@@ -16,7 +16,7 @@ Grammar of the text files (a table is `[distance, angle, sensor]`; blanks and ta
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +53,8 @@ class Samples:
         name: What people call the object.
         radius_mm: Radius of the object [mm]: infinite for a straight wall.
         gap_mm: From the robot's rim to the object's surface [mm], shape [gaps].
-        angle_deg: From the robot's heading to the object, clockwise and without the rig's offset [deg], shape [angles].
+        angle_deg: From the robot's heading to the object, clockwise and without the rig's offset [deg], shape
+            [gaps, angles].
         counts: Readings, shape [gaps, angles, 8].
     """
 
@@ -65,7 +66,7 @@ class Samples:
 
     def at_angles(self, chosen: slice) -> Samples:
         """Return the samples of some of the angles: `slice(0, None, 2)` for those with an even index."""
-        return Samples(self.name, self.radius_mm, self.gap_mm, self.angle_deg[chosen], self.counts[:, chosen])
+        return replace(self, angle_deg=self.angle_deg[:, chosen], counts=self.counts[:, chosen])
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,31 +99,43 @@ class Fan:
         return cls(origin, np.radians(np.add.outer(np.array(direction_deg), np.array(offsets_deg))), range_mm)
 
 
-def ray_lengths_mm(samples: Samples, fan: Fan) -> Floats:
-    """Return how far each ray goes before it meets the object, at most the fan's range [mm].
+def meet(samples: Samples, fan: Fan) -> tuple[Floats, Floats]:
+    """Return how far each ray goes before it meets the object, at most the fan's range [mm], and how it meets it.
 
     Geometry: a ray from p in the unit direction u meets the wall n.x = D after t = (D - n.p) / (n.u), and the disc with
-    centre c and radius R after t = b - sqrt(b^2 - q), with b = u.(c - p) and q = |c - p|^2 - R^2.
+    centre c and radius R after t = b - w, with b = u.(c - p), q = |c - p|^2 - R^2 and w = sqrt(b^2 - q). The angle of
+    incidence has the cosine n.u on the wall and w / R on the disc.
 
     Returns:
-        Lengths, shape [gaps, angles, 8, rays].
+        Lengths, and cosines of the incidence, 0 for a ray that meets nothing; shapes [gaps, angles, 8, rays].
     """
     towards = -np.radians(samples.angle_deg)
-    normal = np.stack([np.cos(towards), np.sin(towards)], axis=-1)  # [angles, 2]
+    normal = np.stack([np.cos(towards), np.sin(towards)], axis=-1)  # [gaps, angles, 2]
     ray = np.stack([np.cos(fan.direction_rad), np.sin(fan.direction_rad)], axis=-1)  # [8, rays, 2]
     rim_mm = BODY_RADIUS_MM + samples.gap_mm
     with np.errstate(divide="ignore", invalid="ignore"):
         if math.isinf(samples.radius_mm):
             before_mm = rim_mm[:, None, None] - normal @ fan.origin_mm.T  # [gaps, angles, 8]
-            length = before_mm[..., None] / np.einsum("ai,sri->asr", normal, ray)
+            cosine = np.einsum("gai,sri->gasr", normal, ray)
+            length = before_mm[..., None] / cosine
         else:
             centre = (rim_mm + samples.radius_mm)[:, None, None] * normal
             between = centre[:, :, None, :] - fan.origin_mm  # [gaps, angles, 8, 2]
             along = np.einsum("gasi,sri->gasr", between, ray)
             outside = (between**2).sum(axis=-1) - samples.radius_mm**2
-            length = along - np.sqrt(along**2 - outside[..., None])
-    met = np.isfinite(length) & (length >= 0.0)
-    return np.minimum(np.where(met, length, fan.range_mm), fan.range_mm)
+            within = np.sqrt(along**2 - outside[..., None])
+            length, cosine = along - within, within / samples.radius_mm
+    is_met = np.isfinite(length) & (length >= 0.0) & (length < fan.range_mm)
+    return np.where(is_met, length, fan.range_mm), np.where(is_met, cosine, 0.0)
+
+
+def ray_lengths_mm(samples: Samples, fan: Fan) -> Floats:
+    """Return how far each ray goes before it meets the object, at most the fan's range [mm].
+
+    Returns:
+        Shape [gaps, angles, 8, rays].
+    """
+    return meet(samples, fan)[0]
 
 
 def nearnesses(samples: Samples, fan: Fan) -> Floats:
@@ -164,7 +177,8 @@ def load_samples(file: str | Path, *, name: str = "", radius_mm: float = math.in
             f"Samples must come from a readable file, but {str(path)!r} is none ({error.strerror or error}). "
             "Check the path."
         ) from error
-    return Samples(name or path.stem, radius_mm, gap_mm, angle_deg - RIG_OFFSET_DEG, counts)
+    angle_deg = np.broadcast_to(angle_deg - RIG_OFFSET_DEG, counts.shape[:2])
+    return Samples(name or path.stem, radius_mm, gap_mm, angle_deg, counts)
 
 
 def _read_table(path: Path) -> tuple[Floats, Floats, NDArray[np.int64]]:

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from kiks.errors import ArenaError, ParameterError
+from kiks.model.materials import brightness_of
 from kiks.model.places import Ball, Cylinder, Lamp, Pose, checked_places
 from kiks.model.raster import MAX_CELLS, PAD, SIZE_MIN_MM, between, box_raster, cells_per_pixel, clearance_mm
 
@@ -166,7 +167,7 @@ class Arena:
 
     @classmethod
     def box(
-        cls, width_mm: int, height_mm: int, *, wall_mm: int = 10, rounded_mm: int = 0, brightness: int = 255
+        cls, width_mm: int, height_mm: int, *, wall_mm: int = 10, rounded_mm: int = 0, brightness: int | str = 255
     ) -> Arena:
         """Return an empty arena with a wall around it, in whole millimetres.
 
@@ -175,13 +176,17 @@ class Arena:
             height_mm: Outer height [mm].
             wall_mm: Thickness of the wall [mm]; 0 leaves the border of the world alone.
             rounded_mm: Radius of the corners of the floor [mm].
-            brightness: Brightness of the wall, 1..255.
+            brightness: Brightness of the wall, 1..255, or a material of `kiks.model.materials`, such as 'wood'.
 
         Raises:
-            ParameterError: If a number is not whole or out of range.
+            ParameterError: If a number is not whole or out of range, or a material unknown.
             ArenaError: If the box is too small or too large.
+
+        Example:
+            >>> int(Arena.box(400, 300, brightness="wood").brightness.max())
+            190
         """
-        raster = box_raster(width_mm, height_mm, wall_mm, rounded_mm, brightness)
+        raster = box_raster(width_mm, height_mm, wall_mm, rounded_mm, brightness_of(brightness))
         return cls.from_array(raster, name="box")
 
     @property

@@ -20,6 +20,9 @@ from kiks.model.robot import SENSOR_COUNT
 INPUT_COUNT, TANH_COUNT, LINEAR_COUNT = 7, 13, 7
 """Rays, neurons of the first and of the second hidden layer (thesis 3.3)."""
 
+BODY_RADIUS_MM = 27.5
+"""Radius of the robot whose readings the networks were trained on [mm] (`responses/SOURCE.md`)."""
+
 THESIS = Path(__file__).with_name("responses") / "thesis_khepera.json"
 """The networks that come with KiKS."""
 

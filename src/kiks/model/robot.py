@@ -16,6 +16,14 @@ from kiks.errors import ParameterError, nearest
 SENSOR_COUNT = 8
 """Infra-red sensors of a Khepera, clockwise from the left side (khepera-protocol.md 4.14)."""
 
+RESPONSES = ("standin", "thesis", "fast", "curve")
+"""What makes counts of a sensor's rays (`kiks.engine.responses`)."""
+
+JITTER_POINT_LIMIT = 51
+"""Most points of the distribution of the jitter."""
+
+CURVE_POINT_LIMIT = 32
+"""Most points of a measured curve of counts against distance."""
 
 AMBIENT_MODELS = ("flux", "thesis")
 """How several lamps make one reading: their light adds up, or the thesis's formula for the strongest."""
@@ -65,8 +73,15 @@ class Reset:
 
 @dataclass(frozen=True)
 class Proximity:
-    """Where the eight infra-red sensors sit and look [deg, left positive], and how they answer [counts]."""
+    """Where the eight infra-red sensors sit and look [deg, left positive], and how they answer [counts].
 
+    `response` is one of `RESPONSES`. With noise a reading r becomes r (1 + e u^n) or, as often, r (1 - d e u^n), with
+    e from `noise_small` at 0 to `noise_large` at 1000 counts, the exponent n, `noise_down` d and u from 0 to 1.
+    `jitter_counts` come on top, whatever the reading: the distribution of what a sensor reads above and below its
+    baseline with nothing near, from its least to its largest value in equally probable steps.
+    """
+
+    response: str
     mount_angle_deg: tuple[float, ...]
     mount_radius_mm: tuple[float, ...]
     direction_deg: tuple[float, ...]
@@ -79,7 +94,22 @@ class Proximity:
     noise_small: float
     noise_large: float
     noise_exponent: int
-    noise_counts: float
+    noise_down: float
+    jitter_counts: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Curve:
+    """What the response 'curve' knows: counts above the baseline of a sensor that looks straight at a white wall.
+
+    `distance_mm` rises, `counts` fall; `ray_weight` says how much a ray counts, from the middle one to the edge.
+    All counts are multiplied by `scale`.
+    """
+
+    distance_mm: tuple[float, ...]
+    counts: tuple[float, ...]
+    ray_weight: tuple[float, ...]
+    scale: float
 
 
 @dataclass(frozen=True)
@@ -140,13 +170,16 @@ class RobotSpec:
     ambient: Ambient
     firmware: FirmwareSpec
     quirks: Quirks = field(default_factory=Quirks)
+    curve: Curve | None = None
 
     @staticmethod
-    def load(name_or_path: str | Path) -> RobotSpec:
+    def load(name_or_path: str | Path, *, response: str | None = None) -> RobotSpec:
         """Return a robot that comes with KiKS ('khepera', 'khepera_ii') or one from a file ('mine.toml').
 
         Args:
             name_or_path: Name of a robot of ours, or the path of a TOML file with the same keys.
+            response: What makes counts of the rays of its proximity sensors, one of `RESPONSES`; what the file says
+                if left out.
 
         Raises:
             ParameterError: If there is no such robot, the file is no TOML, or a key is missing, unknown or wrong.
@@ -171,7 +204,8 @@ class RobotSpec:
             raise ParameterError(
                 f"robot file {source!r} must be TOML, but {error}. Compare it with 'khepera.toml'."
             ) from None
-        return _robot_from_table(table, source)
+        spec = _robot_from_table(table, source)
+        return spec if response is None else spec.with_changes(proximity__response=response)
 
     def with_changes(self, **changes: Any) -> RobotSpec:
         """Return a copy with some values changed, named 'section__key'.
@@ -192,7 +226,8 @@ class RobotSpec:
             part = getattr(spec, section, None)
             if part is None or isinstance(part, str):
                 raise ParameterError(
-                    f"a change must be named 'section__key', but it was {section!r}. Sections: {list(_SECTIONS)}."
+                    f"a change must be named 'section__key' of a section that the robot has, but it was {section!r}. "
+                    f"Sections: {list(_SECTIONS)}."
                 )
             for key in values:
                 _check_key(key, [f.name for f in fields(part)], f"section '{section}'")
@@ -209,7 +244,11 @@ _SECTIONS: dict[str, type[Any]] = {
     "ambient": Ambient,
     "firmware": FirmwareSpec,
     "quirks": Quirks,
+    "curve": Curve,
 }
+
+_ABSENT: dict[str, Any] = {"quirks": Quirks(), "curve": None}
+"""Sections that a file may leave out, and what that means."""
 
 
 def _check_key(key: str, known: list[str], where: str) -> None:
@@ -223,7 +262,10 @@ def _robot_from_table(table: dict[str, Any], source: str) -> RobotSpec:
         _check_key(key, ["name", *_SECTIONS], where)
     parts: dict[str, Any] = {}
     for section, kind in _SECTIONS.items():
-        values = table.get(section, {} if kind is Quirks else None)
+        if section in _ABSENT and section not in table:
+            parts[section] = _ABSENT[section]
+            continue
+        values = table.get(section)
         if not isinstance(values, dict):
             raise ParameterError(
                 f"{where} must have a section [{section}], but it has none. Copy it from 'khepera.toml'."
@@ -305,12 +347,32 @@ def _check(spec: RobotSpec, where: str) -> None:
         0 <= proximity.noise_large <= proximity.noise_small < 1, "proximity.noise_small", "from noise_large to below 1"
     )
     must(1 <= proximity.noise_exponent <= 20, "proximity.noise_exponent", "a whole number from 1 to 20")
-    must(proximity.noise_counts >= 0, "proximity.noise_counts", "at least 0")
+    must(0 <= proximity.noise_down <= 1, "proximity.noise_down", "between 0 and 1")
+    _check_response(spec, must)
     must(0 <= spec.ambient.dark_counts <= 1023, "ambient.dark_counts", "between 0 and 1023 counts")
     must(spec.ambient.noise_counts >= 0, "ambient.noise_counts", "at least 0")
     _check_light(spec.ambient, must)
     must(0 <= spec.firmware.processing_ms <= 1000, "firmware.processing_ms", "between 0 and 1000 ms")
     must(75 <= spec.firmware.baud <= 4_000_000, "firmware.baud", "between 75 and 4000000 bit/s")
+
+
+def _check_response(spec: RobotSpec, must: Callable[[bool, str, str], None]) -> None:
+    response, jitter, curve = spec.proximity.response, spec.proximity.jitter_counts, spec.curve
+    possible = [name for name in RESPONSES if name != "curve" or curve is not None]
+    needed = "" if "curve" in possible else " ('curve' needs a section [curve], as in 'khepera_ii.toml')"
+    must(response in possible, "proximity.response", f"one of {possible}{needed}")
+    rises = all(low <= high for low, high in pairwise(jitter))
+    is_jitter = 1 <= len(jitter) <= JITTER_POINT_LIMIT and rises
+    must(is_jitter, "proximity.jitter_counts", f"a list of 1 to {JITTER_POINT_LIMIT}, none below the one before")
+    if curve is not None:
+        far = curve.distance_mm
+        rises = 2 <= len(far) <= CURVE_POINT_LIMIT and all(nearer < farther for nearer, farther in pairwise(far))
+        must(rises and far[0] >= 1, "curve.distance_mm", f"a list of 2 to {CURVE_POINT_LIMIT}, from 1 mm, rising")
+        falls = all(high >= low for high, low in pairwise(curve.counts)) and min(curve.counts, default=0) > 0
+        must(falls and len(curve.counts) == len(far), "curve.counts", "one for each distance, above 0, falling")
+        must(0.05 <= curve.scale <= 20, "curve.scale", "between 0.05 and 20")
+        weighs = len(curve.ray_weight) == 4 and all(0 <= weight <= 1 for weight in curve.ray_weight)
+        must(weighs and curve.ray_weight[0] > 0, "curve.ray_weight", "4 numbers from 0 to 1, the first above 0")
 
 
 def _check_light(ambient: Ambient, must: Callable[[bool, str, str], None]) -> None:

@@ -61,7 +61,7 @@ def robot_toml(spec: RobotSpec, comment: str = "") -> str:
         if hasattr(value, "__dataclass_fields__"):
             sections += ["", f"[{entry.name}]"]
             sections += [f"{key.name} = {_toml(getattr(value, key.name))}" for key in fields(value)]
-        else:
+        elif value is not None:
             lines.append(f"{entry.name} = {_toml(value)}")
     return "\n".join(lines + sections) + "\n"
 

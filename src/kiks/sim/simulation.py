@@ -11,6 +11,7 @@ import numpy as np
 
 from kiks.clock.program import Program
 from kiks.engine import ambient, contact, proximity, step
+from kiks.engine.networks import networks_for
 from kiks.engine.numbers import uniform
 from kiks.engine.parameters import pack
 from kiks.engine.state import State
@@ -43,6 +44,8 @@ class Simulation:
         seed: Seed of all random numbers; the same seed gives the same run, to the bit.
         thinking: What the program's own computing costs: 'none', 'fixed:MS', 'live', 'live:FACTOR' or 'replay:FILE'.
         robot: Kind of all robots: a name that `RobotSpec.load` knows, a file, or a `RobotSpec`.
+        response: What makes counts of their proximity sensors' rays, such as 'thesis' or 'fast' (docs/sensors.md); what
+            the robot's file says if left out.
 
     Attributes:
         lamps: The arena's lamps, float64 [lamp, 4]: x_mm, y_mm, power_w, and 1 for on or 0 for off. Write to it to
@@ -71,6 +74,7 @@ class Simulation:
         seed: int = 0,
         thinking: str = "none",
         robot: str | RobotSpec = "khepera",
+        response: str | None = None,
     ) -> None:
         if not isinstance(arena, Arena | None):
             raise ParameterError(
@@ -88,12 +92,14 @@ class Simulation:
         self.seed = seed
         self.thinking = thinking
         self.program = Program(thinking)
-        self.spec = robot if isinstance(robot, RobotSpec) else RobotSpec.load(robot)
+        spec = robot if isinstance(robot, RobotSpec) else RobotSpec.load(robot)
+        self.spec = spec if response is None else spec.with_changes(proximity__response=response)
         self.robot_count = robots
         self.lock = threading.RLock()
         self.now_ns = 0
         self.state = State.empty(world_count=1, robot_count=robots)
         self._kinds = np.repeat(pack(self.spec), robots)
+        self._networks = networks_for(self.spec.proximity.response)
         self._ground = (self.arena.clearance, float(self.arena.mm_per_cell), PAD)
         self.sight = (self.arena.clearance, self.arena.surface, float(self.arena.mm_per_cell), PAD)
         self.lamps = np.array(self.arena.lamps, np.float64).reshape(-1, 4)
@@ -121,6 +127,7 @@ class Simulation:
             self.state.robots,
             self._kinds,
             self.sight,
+            self._networks,
             self.state.tick_count,
             self.now_ns,
             self.seed,
