@@ -58,7 +58,7 @@ def test_a_robot_of_ones_own_drives(tmp_path: Path) -> None:
         ("speed_gains = [3800, 800, 100]", "speed_gains = [3800, 800]", "reset.speed_gains must be three numbers"),
         ('name = "Khepera"', 'name = ""', "must give the robot a name"),
         ("slip_ratio_min = 0.10", "slip_ratio_min = 0.5", "body.slip_ratio_min must be between 0 and slip_ratio_max"),
-        ("range_mm = 50.0", "range_mm = 0", "proximity.range_mm must be between 1 and 1000 mm"),
+        ("range_mm = 60.0", "range_mm = 0", "proximity.range_mm must be between 1 and 1000 mm"),
     ],
 )
 def test_what_is_wrong_is_named(before: str, after: str, words: str, tmp_path: Path) -> None:

@@ -86,7 +86,7 @@ def test_too_few_samples():
 
 
 def test_sensors_are_trained_on_samples_and_saved(tmp_path):
-    angles = np.arange(0.0, 360.0, 10.0)
+    angles = np.tile(np.arange(0.0, 360.0, 10.0), (5, 1))
     counts = np.random.default_rng(0).integers(0, 1024, (5, 36, 8))
     samples = Samples("wall", math.inf, np.arange(5.0, 15.0, 2.0), angles, counts)
     said = []

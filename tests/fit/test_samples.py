@@ -18,8 +18,8 @@ from kiks.fit.samples import (
     Samples,
     is_active,
     load_samples,
+    meet,
     nearnesses,
-    ray_lengths_mm,
 )
 from kiks.model.arena import PAD, Arena
 
@@ -153,8 +153,9 @@ def test_rays_are_those_of_the_engine(radius_mm, places):
     cell, side, middle = 0.2, 240.0, 120.0
     fan = Fan.spread(*PLACES[places])
     gaps, angles = np.array([5.0, 21.0, 43.0]), np.arange(0.0, 360.0, 33.0)
-    samples = Samples("object", radius_mm, gaps, angles, np.zeros((3, len(angles), 8), np.int64))
-    lengths = ray_lengths_mm(samples, fan)
+    every_gap = np.broadcast_to(angles, (len(gaps), len(angles)))
+    samples = Samples("object", radius_mm, gaps, every_gap, np.zeros((*every_gap.shape, 8), np.int64))
+    lengths, cosines = meet(samples, fan)
     x = np.arange(cell / 2, side, cell)
     edge = 160.0
     if math.isinf(radius_mm):
@@ -162,7 +163,7 @@ def test_rays_are_those_of_the_engine(radius_mm, places):
     else:
         inside = np.hypot(x - edge - radius_mm, x[:, None] - middle) <= radius_mm
     arena = Arena(inside.astype(np.uint8) * 255, cell, "object")
-    sight = (arena.clearance, arena.surface, cell, PAD)
+    sight = (arena.clearance, arena.surface, arena.inward, cell, PAD)
     checked = 0
     for i, gap in enumerate(gaps):
         for j, angle in enumerate(angles):
@@ -184,6 +185,7 @@ def test_rays_are_those_of_the_engine(radius_mm, places):
                             else (np.array([edge + radius_mm, middle]) - hit) / radius_mm
                         )
                         steepness = float(normal @ (cosine, sine))
+                        assert steepness == pytest.approx(cosines[i, j, sensor, ray], abs=1e-9)
                         assert steepness >= -1e-9
                         if steepness > 0.2:
                             assert found == pytest.approx(length, abs=2 * cell / steepness)
@@ -197,6 +199,6 @@ def test_rays_are_those_of_the_engine(radius_mm, places):
 
 
 def test_nothing_in_range_is_nothing():
-    samples = Samples("wall", math.inf, np.array([60.0]), np.arange(0.0, 360.0, 10.0), np.zeros((1, 36, 8), np.int64))
+    samples = Samples("wall", math.inf, np.array([60.0]), np.arange(0.0, 360.0, 10.0)[None], np.zeros((1, 36, 8), int))
     assert nearnesses(samples, Fan.spread(*PLACES["rim"])).max() == 0.0
     assert MAXIMUM_COUNTS == 1023

@@ -61,21 +61,24 @@ def _show(card: Card) -> None:
     from rich.console import Console
     from rich.table import Table
 
+    from kiks.fit.accuracy import FOUND, TOLD
     from kiks.fit.models import MODELS
 
     console = Console()
     errors = Table(title="Absolute errors in counts (held-out half)")
+    errors_told = Table(title="The same at the poses of the tables, errors of the rig and all")
     parts = Table(title="By object: median / mean in counts, largest error of a 50 % distance in mm")
-    for table in (errors, parts):
+    for table in (errors, errors_told, parts):
         table.add_column("model", no_wrap=True)
     for column in ("median", "mean", "95 %", "maximum"):
         errors.add_column(column, justify="right")
+        errors_told.add_column(column, justify="right")
     for name in card.tables:
         parts.add_column(name, justify="right")
         parts.add_column("50 %", justify="right")
     for key, (title, _) in MODELS.items():
-        score = card.score(key)
-        errors.add_row(title, *(f"{value:.1f}" for value in vars(score).values()))
+        for table, poses in ((errors, FOUND), (errors_told, TOLD)):
+            table.add_row(title, *(f"{value:.1f}" for value in vars(card.score(key, poses=poses)).values()))
         entries = []
         for name in card.tables:
             score = card.score(key, [name])
@@ -83,4 +86,5 @@ def _show(card: Card) -> None:
             entries += [f"{score.median:.1f} / {score.mean:.1f}", f"{off_mm:.1f}"]
         parts.add_row(title, *entries)
     console.print(errors)
+    console.print(errors_told)
     console.print(parts)

@@ -14,7 +14,7 @@ from kiks.cli.accuracy import DataFolder, PlotFolder
 from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
-    from kiks.fit.samples import Samples
+    from kiks.fit.samples import Floats, Samples
 
 
 class Places(enum.StrEnum):
@@ -30,33 +30,54 @@ def fit(
         typer.Argument(help="Files of samples; =RADIUS in mm after that of a round object: post.sam=12.5."),
     ] = None,
     data: DataFolder = None,
-    out: Annotated[Path | None, typer.Option(help="Write the networks here, for a robot's data file.")] = None,
+    robot: Annotated[Path | None, typer.Option(help="Write the robot that was found here: mine.toml.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Write the networks here: mine.json.")] = None,
     plots: PlotFolder = None,
     starts: Annotated[int, typer.Option(help="Random starts for each sensor; the best is kept.", min=1)] = 12,
     seed: Annotated[int, typer.Option(help="Seed: the same seed, the same networks.", min=0)] = 0,
     places: Annotated[Places, typer.Option(help="Rays from the rim or from the protocol's mounts.")] = Places.RIM,
 ) -> None:
-    """Train the thesis's networks on samples of a real robot: on every other angle, and test them on the rest.
+    """Fit the sensors to samples of a real robot: on every other angle, and test them on the rest.
 
+    First come the default response and how the rig was off, then the thesis's networks, at the poses that were found.
     Without FILES the wall and the cylinder of the shared samples are taken.
 
-    Example: kiks fit wall.sam round.sam=27 --out my_networks.json
+    Example: kiks fit wall.sam round.sam=27 --robot mine.toml
     """
     # Before NumPy is imported: the matrices are small, and threads of its linear algebra would wait for each other.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from rich.console import Console
     from rich.table import Table
 
+    from kiks.cli.engine_start import ready_engine
     from kiks.fit import networks
+    from kiks.fit.reflection import active_pairs, fit_reflection
+    from kiks.model.robot import RobotSpec
+    from kiks.model.robot_file import save_robot
 
+    ready_engine()
     tables = _tables(files, data)
     learn = [table.at_angles(slice(0, None, 2)) for table in tables]
     test = [table.at_angles(slice(1, None, 2)) for table in tables]
     console = Console()
     result = Table(title="Absolute errors in counts (test set)")
-    for column in ("network", "maximum", "mean", "median"):
-        result.add_column(column, justify="left" if column == "network" else "right")
-    with console.status("") as status:
+    for column in ("model", "maximum", "mean", "median"):
+        result.add_column(column, justify="left" if column == "model" else "right")
+
+    def enter(name: str, counts: Floats, expected: Floats) -> None:
+        result.add_row(name, *(f"{error:.1f}" for error in networks.errors(counts, expected)))
+        if plots is not None:
+            from kiks.fit.plots import plot_errors
+
+            plot_errors(
+                f"{name}: test set", counts, expected, plots / f"fit-{'-'.join(name.replace('+', ' ').split())}.png"
+            )
+
+    with console.status("default response") as status:
+        found = fit_reflection(learn, RobotSpec.load("khepera"))
+        learn = [rig.moved(table) for rig, table in zip(found.rigs, learn, strict=True)]
+        test = [rig.moved(table) for rig, table in zip(found.rigs, test, strict=True)]
+        enter("default", *active_pairs(found.spec, test))
         for size, layers in networks.SIZES.items():
             trained = networks.train_sensors(
                 learn,
@@ -66,14 +87,11 @@ def fit(
                 starts=starts,
                 progress=lambda sensor, size=size: status.update(f"{size}, {sensor}"),  # type: ignore[misc]
             )
-            counts, expected = networks.predictions(test, trained, places=places.value)
-            result.add_row(size, *(f"{error:.1f}" for error in networks.errors(counts, expected)))
-            if plots is not None:
-                from kiks.fit.plots import plot_errors
-
-                name = "-".join(size.replace("+", " ").split())
-                plot_errors(f"{size}: test set", counts, expected, plots / f"fit-{name}.png")
+            enter(size, *networks.predictions(test, trained, places=places.value))
     console.print(result)
+    if robot is not None:
+        save_robot(found.spec, robot, comment="Proximity sensors fitted to samples by `kiks fit`.")
+        typer.echo(f"Robot: {robot}")
     if out is not None:
         networks.response_of(trained, places=places.value).save(out)
         typer.echo(f"Networks: {out}")

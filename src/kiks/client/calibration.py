@@ -24,12 +24,13 @@ from kiks.client.measuring import (
     spin,
 )
 from kiks.client.placements import Instruction, Place, Placements
-from kiks.client.wall_fit import DIRECTION, GAIN, HAS_GAIN, Fit, Stand, fit_runs, guess_pulse
+from kiks.client.wall_fit import Fit, Stand, fit_runs, guess_pulse
+from kiks.engine.networks import NETWORK_RESPONSES
 from kiks.errors import LinkError, ParameterError
-from kiks.model.robot import SENSOR_COUNT, RobotSpec
+from kiks.model.robot import RESPONSES, SENSOR_COUNT, RobotSpec
 
-GAP_SHARES, FAINT_SHARE = (0.15, 0.4, 0.7, 1.0), 0.05
-"""Gaps at which the robot spins, as shares of that at which a wall gives so little of the largest count."""
+GAP_SHARES, FAINT_SHARE = (0.15, 0.45, 0.7, 0.95), 0.03
+"""Gaps at which the robot spins, as shares of that at which the best sensor reads so little of the largest count."""
 
 ALONG_GAP = 1
 """Which of the gaps is the one at which it drives along the wall: near enough to see well, far enough not to touch."""
@@ -40,14 +41,17 @@ ALONG_MM = 100.0
 RUN_UP_MM = 500.0
 """Marked gap from which it drives towards the wall [mm]."""
 
-FREE_SAMPLES, GAP_SAMPLES = 200, 40
+FREE_SAMPLES, GAP_SAMPLES = 200, 100
 """Readings at rest: in the open, and before each spin."""
 
 ATTEMPTS = 3
 """How often a placement is tried at most."""
 
-NEAR_SHARE = 0.5
-"""The robot stops before the wall when a front sensor reads this share of its largest count."""
+FRONT = slice(1, 5)
+"""The sensors that look ahead."""
+
+NEAR_SHARE, TOUCHING_MM = 0.5, 2.0
+"""The robot stops before the wall when a front sensor reads this share of what the weakest one would there [mm]."""
 
 SEEN_COUNTS, GLIMPSED_COUNTS = 50.0, 10.0
 """What a sensor that sees a wall reads above its baseline at least [counts]: near by, and where little is expected."""
@@ -69,7 +73,7 @@ class Calibration:
     Attributes:
         spec: The robot.
         fit: How it was found, with uncertainties.
-        jitter_counts: Jitter of each sensor in the open, half width [counts].
+        jitter_counts: By how much each sensor strays in the open, on average [counts].
     """
 
     spec: RobotSpec
@@ -81,19 +85,18 @@ class Calibration:
         body, proximity, error = self.spec.body, self.spec.proximity, self.fit.uncertainty
         base_mm, pulse_mm = error[2 * SENSOR_COUNT :] * (body.wheel_base_mm, body.pulse_mm)
         lines = [
-            f"wheel base    {body.wheel_base_mm:.2f} +- {base_mm:.2f} mm",
-            f"pulse length  {body.pulse_mm:.5f} +- {pulse_mm:.5f} mm",
+            f"wheel base    {body.wheel_base_mm:.3f} +- {base_mm:.3f} mm",
+            f"pulse length  {body.pulse_mm:.6f} +- {pulse_mm:.6f} mm",
             f"processing    {self.spec.firmware.processing_ms:.2f} ms",
             f"misfit        {self.fit.misfit:.2f} (1: as good as the readings are steady)",
         ]
         for sensor in range(SENSOR_COUNT):
-            direction = getattr(proximity, DIRECTION)[sensor]
-            line = f"sensor {sensor}      looks to {direction:6.1f} +- {error[sensor]:.1f} deg"
-            if HAS_GAIN:
-                gain = getattr(proximity, GAIN)[sensor]
-                line += f", gain {gain:.3f} +- {gain * error[SENSOR_COUNT + sensor]:.3f}"
-            baseline = f", baseline {proximity.baseline_counts[sensor]:.0f}"
-            lines.append(f"{line}{baseline}, jitter {self.jitter_counts[sensor]:.0f} counts")
+            gain = proximity.gain[sensor]
+            lines.append(
+                f"sensor {sensor}      looks to {proximity.direction_deg[sensor]:6.1f} +- {error[sensor]:.1f} deg, "
+                f"gain {gain:.3f} +- {gain * error[SENSOR_COUNT + sensor]:.3f}, "
+                f"baseline {proximity.baseline_counts[sensor]:.0f}, jitter {self.jitter_counts[sensor]:.1f} counts"
+            )
         return lines
 
 
@@ -119,10 +122,11 @@ def calibrate(
         say: Takes a word on what is being done.
 
     Raises:
-        ParameterError: If the gaps are not usable.
+        ParameterError: If the gaps are not usable, or the response has directions of its own.
         CalibrationError: If a measurement does not show what it should, or they contradict each other.
         LinkError: If the robot does not answer.
     """
+    check_response(base)
     gaps = checked_gaps(gaps_mm, run_up_mm, base)
     bios, protocol = robot.version()
     say(f"A Khepera answers: BIOS {bios}, protocol {protocol}.")
@@ -131,6 +135,20 @@ def calibrate(
         return _Session(robot, placements, base, baud, say).measure(gaps, run_up_mm)
     finally:
         halt(robot)
+
+
+def check_response(base: RobotSpec) -> None:
+    """Raise if nothing that is measured would change what the simulated robot's sensors see.
+
+    Raises:
+        ParameterError: If the response has directions of its own.
+    """
+    if base.proximity.response in NETWORK_RESPONSES:
+        others = [response for response in RESPONSES if response not in NETWORK_RESPONSES]
+        raise ParameterError(
+            f"the response of the --base must be one of {others}, but it was {base.proximity.response!r}, whose "
+            "directions are those of the robot it was trained on. Calibrate with the response that a robot of ours has."
+        )
 
 
 def checked_gaps(gaps_mm: Sequence[float] | None, run_up_mm: float, base: RobotSpec) -> list[float]:
@@ -157,16 +175,19 @@ def default_gaps_mm(base: RobotSpec) -> list[float]:
     """Return gaps at which such a robot sees a wall well [mm], nearest first."""
     tried_mm = np.arange(1.0, base.proximity.range_mm)
     faint = FAINT_SHARE * base.proximity.maximum_counts
-    seen_mm = float(tried_mm[facing_counts(base, tried_mm) >= faint].max(initial=10.0))
+    seen_mm = float(tried_mm[facing_counts(base, tried_mm).max(axis=1) >= faint].max(initial=10.0))
     return [float(round(share * seen_mm)) for share in GAP_SHARES]
 
 
 def facing_counts(spec: RobotSpec, gaps_mm: Sequence[float] | Array) -> Array:
-    """Return what the sensor with most gain reads above its baseline as it faces a wall at gaps [counts]."""
-    best = int(np.argmax(getattr(spec.proximity, GAIN)))
-    headings_rad = np.full(len(gaps_mm), -math.radians(getattr(spec.proximity, DIRECTION)[best]))
-    readings = Stand(spec).readings(spec, np.asarray(gaps_mm, np.float64), headings_rad)[:, best]
-    above: Array = readings - spec.proximity.baseline_counts[best]
+    """Return what each sensor reads above its baseline as it faces a wall at gaps [counts], shape [gap, 8]."""
+    stand, gaps = Stand(spec), np.asarray(gaps_mm, np.float64)
+    above = np.empty((len(gaps), SENSOR_COUNT))
+    for sensor, (direction_deg, baseline) in enumerate(
+        zip(spec.proximity.direction_deg, spec.proximity.baseline_counts, strict=True)
+    ):
+        headings_rad = np.full(len(gaps), -math.radians(direction_deg))
+        above[:, sensor] = stand.readings(spec, gaps, headings_rad)[:, sensor] - baseline
     return above
 
 
@@ -177,7 +198,6 @@ class _Session:
         self.robot = robot
         self.placements = placements
         self.spec = base
-        self.guess = base
         self.baud = baud
         self.say = say
         self.rests: list[Rest] = []
@@ -197,7 +217,8 @@ class _Session:
         text = f"Put the robot before the wall, facing it squarely, its rim at the {run_up_mm:g} mm mark."
         runs.append(self._at(Instruction(Place.WALL, text, run_up_mm), self._measure_run_up))
         self.say("Working it out ...")
-        fit = fit_runs(self.spec, runs, guess_pulse(self.spec, self.guess, runs[-1]))
+        guess = fit_runs(self.spec, [run.thinned(2) for run in runs[:-1]]).spec
+        fit = fit_runs(self.spec, runs, guess_pulse(self.spec, guess, runs[-1]))
         _check_fit(fit, runs)
         spec = fit.spec
         noise = {key: round(getattr(spec.proximity, key) * self._noise_factor(fit.spec), 4) for key in _NOISE}
@@ -224,20 +245,21 @@ class _Session:
     def _measure_in_the_open(self, _: float) -> tuple[tuple[float, ...], str]:
         thinking_ms = processing_ms(self.robot, self.baud)
         at_rest = rest(self.robot, FREE_SAMPLES)
-        typical, jitter = at_rest.typical(), at_rest.jitter()
-        limit = self.spec.proximity.maximum_counts
-        if typical.max() > limit / 3:
+        mean = at_rest.counts.mean(axis=0)
+        if mean.max() > self.spec.proximity.maximum_counts / 3:
             raise CalibrationError(
-                f"the sensors must read little in the open, but sensor {int(typical.argmax())} reads "
-                f"{typical.max():.0f} counts. Move away what is near, and lamps with it."
+                f"the sensors must read little in the open, but sensor {int(mean.argmax())} reads "
+                f"{mean.max():.0f} counts. Move away what is near, and lamps with it."
             )
-        usual = round(float(np.median(jitter)), 1)
-        proximity = replace(self.spec.proximity, baseline_counts=tuple(typical.tolist()), jitter_counts=(-usual, usual))
+        jitter, deviation = at_rest.jitter(), at_rest.deviation()
+        proximity = replace(
+            self.spec.proximity, baseline_counts=tuple(mean.tolist()), jitter_counts=tuple(jitter.round(1).tolist())
+        )
         firmware = replace(self.spec.firmware, processing_ms=min(round(thinking_ms, 2), 1000.0))
         self.spec = replace(self.spec, proximity=proximity, firmware=firmware)
-        baselines = ", ".join(f"{count:.0f}" for count in typical)
-        noise = f"jitter {usual:.1f} counts; the robot thinks for {thinking_ms:.2f} ms"
-        return tuple(jitter.tolist()), f"Baselines {baselines}; {noise}."
+        baselines = ", ".join(f"{count:.0f}" for count in mean)
+        noise = f"jitter {deviation.mean():.1f} counts; the robot thinks for {thinking_ms:.2f} ms"
+        return tuple(deviation.tolist()), f"Baselines {baselines}; {noise}."
 
     def _measure_before_the_wall(
         self, gap_mm: float, *, before: tuple[Run, ...], is_along: bool, is_nearest: bool
@@ -247,7 +269,7 @@ class _Session:
         back = spin(self.robot, self.spec, gap_mm, -SPIN_TURNS)  # both ways, as readings are older than counters
         runs = [there, replace(back, is_marked=False)]
         above = np.concatenate([run.counts for run in runs]).max(axis=0) - np.array(self.spec.proximity.baseline_counts)
-        enough = min(max(facing_counts(self.spec, [gap_mm])[0] / 2, GLIMPSED_COUNTS), SEEN_COUNTS)
+        enough = min(max(facing_counts(self.spec, [gap_mm]).max() / 2, GLIMPSED_COUNTS), SEEN_COUNTS)
         if above.max() < enough:
             raise CalibrationError(
                 f"some sensor must see the wall at {gap_mm:g} mm, but none reads more than {above.max():.0f} counts "
@@ -259,41 +281,48 @@ class _Session:
                 f"reads no more than {above.min():.0f} counts above its baseline. Is it covered or broken?"
             )
         if is_along:
-            runs += self._drive_along(gap_mm, [*before, *runs])
+            runs = self._drive_along(gap_mm, before, runs)
         largest = ", ".join(f"{count:.0f}" for count in above)
         return runs, f"Largest readings at {gap_mm:g} mm, above the baseline: {largest}."
 
-    def _drive_along(self, gap_mm: float, runs: list[Run]) -> list[Run]:
-        """Drive along the wall and back, first with the left and then with the right side to it; return the ways there.
+    def _drive_along(self, gap_mm: float, before: tuple[Run, ...], runs: list[Run]) -> list[Run]:
+        """Drive along the wall and back, first with the left and then with the right side to it.
 
-        Where to turn comes from a first fit of the runs so far.
+        Where to turn comes from a first fit of the runs so far. A way is one run with the turn that led to it, the
+        first one with the spin too: readings while it turns tell how it stands, and counters from there where it goes.
+
+        Returns:
+            The runs here, the ways there among them.
         """
-        fit = fit_runs(self.spec, [run.thinned(3) for run in runs])
-        self.guess = fit.spec
-        heading_rad = fit.end_heading_rad(len(runs) - 1, runs[-1])
+        fit = fit_runs(self.spec, [run.thinned(3) for run in (*before, *runs)])
+        body = fit.spec.body
+        heading_rad = fit.end_heading_rad(len(before) + len(runs) - 1, runs[-1])
         ways = []
         for side_rad in (-math.pi / 2, math.pi / 2):
             turn_rad = math.remainder(side_rad - heading_rad, 2 * math.pi)
             turn = spin(self.robot, fit.spec, gap_mm, turn_rad / (2 * math.pi))
-            heading_rad += turn.turned_pulses() * fit.spec.body.pulse_mm / fit.spec.body.wheel_base_mm
-            ways.append(replace(drive(self.robot, fit.spec, gap_mm, ALONG_MM), is_marked=False))
+            heading_rad += turn.turned_pulses() * body.pulse_mm / body.wheel_base_mm
+            ways.append(turn.then(drive(self.robot, fit.spec, gap_mm, ALONG_MM)))
             drive(self.robot, fit.spec, gap_mm, -ALONG_MM)
-        return ways
+        return [*runs[:-1], runs[-1].then(ways[0]), replace(ways[1], is_marked=False)]
 
     def _measure_run_up(self, gap_mm: float) -> tuple[Run, str]:
-        near = NEAR_SHARE * self.spec.proximity.maximum_counts
+        touching = facing_counts(self.spec, [TOUCHING_MM])[0, FRONT].min()
+        near = NEAR_SHARE * touching + np.array(self.spec.proximity.baseline_counts[FRONT])
 
-        def is_near(counts: list[int]) -> bool:
-            return max(counts[1:5]) >= near
+        def is_near(counts: Sequence[float]) -> bool:
+            return bool((np.array(counts[FRONT]) >= near).any())
 
         run = drive(self.robot, self.spec, gap_mm, 1.1 * gap_mm, is_near)
         if not is_near(run.counts[-1].tolist()):
-            front = ", ".join(f"{count:.0f}" for count in run.counts[-1][1:5])
+            front = ", ".join(f"{count:.0f}" for count in run.counts[-1][FRONT])
             raise CalibrationError(
                 f"the wall must come into sight {gap_mm:g} mm ahead, but after {run.end_pulses[0]} pulses the front "
                 f"sensors read {front}. Put the robot at the mark, facing the wall squarely."
             )
-        return run, f"The wall was near after {sum(run.end_pulses) / 2:.0f} pulses."
+        finding = f"The wall was near after {sum(run.end_pulses) / 2:.0f} pulses."
+        # A few degrees askew shorten the way like a longer pulse: a spin tells how it stood.
+        return run.then(spin(self.robot, self.spec, gap_mm, SPIN_TURNS)), finding
 
     def _noise_factor(self, spec: RobotSpec) -> float:
         """Return by how much the relative noise of this robot is larger than that of its kind, at rest by the wall."""
@@ -337,7 +366,7 @@ def _check_fit(fit: Fit, runs: Sequence[Run]) -> None:
 def _rounded(spec: RobotSpec) -> RobotSpec:
     """Return the robot with its measured numbers rounded to what a file should show."""
     proximity, body = spec.proximity, spec.body
-    digits = {DIRECTION: 2, "baseline_counts": 1} | ({GAIN: 4} if HAS_GAIN else {})
+    digits = {"direction_deg": 2, "gain": 4, "baseline_counts": 1}
     changes: dict[str, Any] = {
         key: tuple(round(value, digit) for value in getattr(proximity, key)) for key, digit in digits.items()
     }

@@ -20,8 +20,8 @@ from kiks.units import character_ns, s_from_ns
 
 Array = NDArray[np.float64]
 
-SPIN_TURNS = 1.5
-"""Turns of a spin: more than one, so that the wall comes by twice and the wheel base shows."""
+SPIN_TURNS = 2.5
+"""Turns of a spin: the wall comes by more than once, so that the wheel base shows, and readings go into a mean."""
 
 SPIN_SPEED_PULSES, DRIVE_SPEED_PULSES = 4, 4
 """Wheel speeds [pulses/10 ms]: slow, as a reading is up to 20 ms old."""
@@ -33,6 +33,9 @@ LEAD_S = 0.005
 SETTLE_S = 0.4
 """How long a robot takes to stand still after a stop [s], generously."""
 
+JITTER_POINTS = 26
+"""Points that tell the distribution of the jitter: 4 % of the readings between two."""
+
 PULSES_PER_S = 100
 """Wheel speed 1 is a pulse every 10 ms."""
 
@@ -43,7 +46,7 @@ class CalibrationError(KiksError):
 
 @dataclass(frozen=True)
 class Run:
-    """What was noted during one movement.
+    """What was noted during one movement, or during several without a hand in between.
 
     Attributes:
         gap_mm: Distance from wall to rim at the start [mm].
@@ -62,6 +65,16 @@ class Run:
     def turned_pulses(self) -> int:
         """Return the difference of the wheels over the whole run, positive to the left [pulses]."""
         return self.end_pulses[1] - self.end_pulses[0]
+
+    def then(self, after: Run) -> Run:
+        """Return this run and the one that began where it ended as one."""
+        left, right = self.end_pulses
+        return replace(
+            self,
+            pulses=np.vstack((self.pulses, after.pulses + self.end_pulses)),
+            counts=np.vstack((self.counts, after.counts)),
+            end_pulses=(left + after.end_pulses[0], right + after.end_pulses[1]),
+        )
 
     def thinned(self, step: int) -> Run:
         """Return the run with every `step`-th reading alone."""
@@ -166,14 +179,10 @@ class Rest:
 
     counts: Array
 
-    def typical(self) -> Array:
-        """Return the median of each sensor [counts]: a reading that is cut off at zero does not move it."""
-        median: Array = np.median(self.counts, axis=0)
-        return median
-
     def jitter(self) -> Array:
-        """Return the half width of each sensor's jitter, taken as uniform [counts]: twice its upper quartile."""
-        jitter: Array = 2.0 * (np.quantile(self.counts, 0.75, axis=0) - self.typical())
+        """Return how the readings of all sensors lie around the mean of each, least to largest, evenly [counts]."""
+        strayed = self.counts - self.counts.mean(axis=0)
+        jitter: Array = np.quantile(strayed, np.linspace(0.0, 1.0, JITTER_POINTS))
         return jitter
 
     def deviation(self) -> Array:

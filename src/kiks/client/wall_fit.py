@@ -8,27 +8,24 @@ Assumption: the simulator's own expected reading is right but for these numbers.
 Method: weighted least squares, all runs at once. A spin shows when the wall comes by a second time (wheel base over
 pulse length) and what each sensor makes of angle and gap; a drive along the wall shows which way is forward, as a
 heading that is wrong by a degree changes the gap; a drive towards the wall from a marked distance shows the pulse
-length. No reading depends on another sensor's numbers or another run's heading, so a Jacobian takes seven predictions.
+length. Each drive is one run with a turn before or after it, for sensors tell a heading well only while it changes. No
+reading depends on another sensor's numbers or another run's heading, so a Jacobian takes seven predictions.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
 
 from kiks.client.measuring import Array, CalibrationError, Run
 from kiks.model.arena import Arena
-from kiks.model.robot import SENSOR_COUNT, Proximity, RobotSpec
+from kiks.model.robot import SENSOR_COUNT, RobotSpec
 from kiks.sim.simulation import Simulation
-
-DIRECTION, GAIN = "direction_deg", "gain"
-"""Keys of section [proximity] that are fitted for each sensor."""
-
-HAS_GAIN = GAIN in {key.name for key in fields(Proximity)}
 
 NOISE_COUNTS, NOISE_SHARE = 8.0, 0.05
 """What a reading is taken to be uncertain by: so many counts and that share of it."""
@@ -39,13 +36,22 @@ PRIOR_DEG, PRIOR_LOG_GAIN, PRIOR_LOG_LENGTH = 15.0, 0.7, 0.05
 GAP_MIN_MM = 0.02
 """Nearest that a predicted robot stands to the wall [mm]: odometry may be wrong, but nothing stands in a wall."""
 
-HEADING_ROOM_RAD = 0.7
-"""How far the guess of a heading may be off [rad]."""
+HEADING_STEP_RAD, HEADING_ROOM_RAD = math.radians(5.0), math.radians(25.0)
+"""Step between the headings that are tried as a guess [rad], and how far a guess may be off."""
+
+FINER = 0.125
+"""Share of the step of a coarse search that is the step of the fine one, four to either side."""
+
+ASKEW_RAD = math.radians(20.0)
+"""How far from square a hand puts a robot down at most that was told to face the wall [rad]."""
+
+REACH_RANGES = 1.1
+"""No response sees a wall that is farther from the rim than so many ranges."""
 
 MARKED_MM, UNMARKED_MM = 0.01, 3.0
 """How far the start gap of a run may be off [mm]: at a mark, and where the robot has driven to by itself."""
 
-_STEP = (1.0, 0.03, 0.003, 0.003, math.radians(1.0), 0.3)
+_STEP = (0.3, 0.01, 0.001, 0.001, math.radians(0.3), 0.1)
 """Steps of the Jacobian: direction [deg], logs of gain, wheel base and pulse length, heading [rad], gap [mm]."""
 
 _BASE, _PULSE = 2 * SENSOR_COUNT, 2 * SENSOR_COUNT + 1
@@ -81,7 +87,7 @@ class Stand:
 
     def __init__(self, spec: RobotSpec) -> None:
         self.radius_mm = spec.body.radius_mm
-        self.sight_mm = 2.0 * spec.proximity.range_mm
+        self.sight_mm = REACH_RANGES * spec.proximity.range_mm
         reach_mm = 2.0 * (self.radius_mm + self.sight_mm)
         self.arena = Arena.box(math.ceil(reach_mm), math.ceil(reach_mm), wall_mm=0)
 
@@ -108,30 +114,42 @@ def odometry(run: Run, spec: RobotSpec, heading_rad: float) -> tuple[Array, Arra
     return run.gap_mm - nearer_mm, headings_rad[1:]
 
 
-def guess_heading_rad(run: Run, spec: RobotSpec) -> float:
-    """Return about which way a run began [rad]: the mean direction of the light, turned back by odometry."""
-    _, headings_rad = odometry(run, spec, 0.0)
-    looks_rad = headings_rad[:, None] + np.radians(getattr(spec.proximity, DIRECTION))
-    light = (run.counts - np.array(spec.proximity.baseline_counts)) * np.exp(1j * looks_rad)
-    return -float(np.angle(light.sum()))
+def miss(stand: Stand, spec: RobotSpec, run: Run, heading_rad: float) -> float:
+    """Return by how much a robot would have read something else on a run that began with a heading [counts]."""
+    return float(np.abs(stand.readings(spec, *odometry(run, spec, heading_rad)) - run.counts).sum())
+
+
+def guess_heading_rad(stand: Stand, spec: RobotSpec, run: Run) -> float:
+    """Return about which way a run began [rad]: the heading that explains it best, of some all around, then nearby."""
+
+    def missed(heading_rad: float) -> float:
+        return miss(stand, spec, run, heading_rad)
+
+    about_rad = min(np.arange(-math.pi, math.pi, HEADING_STEP_RAD).tolist(), key=missed)
+    nearby_rad: list[float] = (about_rad + HEADING_STEP_RAD * FINER * np.arange(-4, 5)).tolist()
+    return min(nearby_rad, key=missed)
 
 
 def guess_pulse(base: RobotSpec, spec: RobotSpec, run: Run) -> RobotSpec:
     """Return `spec` with the pulse length that explains a run towards the wall best, and the wheel base in proportion.
 
-    A fit alone would not find it: a pulse that is too short puts the wall out of sight, where nothing changes.
+    A fit alone would not find it: a pulse that is too short puts the wall out of sight, where nothing changes; and
+    pulse and heading make up for each other along a bent valley, through which a fit creeps.
     """
-    stand = Stand(base)
-    best, least = spec, math.inf
-    for ratio in np.linspace(1 - 2 * PRIOR_LOG_LENGTH, 1 + 2 * PRIOR_LOG_LENGTH, 41).tolist():
-        lengths = {"pulse_mm": base.body.pulse_mm * ratio}
-        lengths["wheel_base_mm"] = spec.body.wheel_base_mm * lengths["pulse_mm"] / spec.body.pulse_mm
-        candidate = replace(spec, body=replace(spec.body, **lengths))
-        readings = stand.readings(candidate, *odometry(run, candidate, guess_heading_rad(run, spec)))
-        miss = float(np.abs(readings - run.counts).sum())
-        if miss < least:
-            best, least = candidate, miss
-    return best
+    stand, run = Stand(base), run.thinned(3)
+
+    def with_pulse(ratio: float) -> RobotSpec:
+        pulse_mm = base.body.pulse_mm * ratio
+        wheel_base_mm = spec.body.wheel_base_mm * pulse_mm / spec.body.pulse_mm
+        return replace(spec, body=replace(spec.body, pulse_mm=pulse_mm, wheel_base_mm=wheel_base_mm))
+
+    best = (1.0, 0.0)
+    for share in (1.0, FINER):
+        ratios = best[0] + share * np.linspace(-2 * PRIOR_LOG_LENGTH, 2 * PRIOR_LOG_LENGTH, 41)
+        headings_rad = best[1] + share * np.linspace(-ASKEW_RAD, ASKEW_RAD, 9)
+        tried = product(ratios.tolist(), headings_rad.tolist())
+        best = min(tried, key=lambda pair: miss(stand, with_pulse(pair[0]), run, pair[1]))
+    return with_pulse(best[0])
 
 
 def fit_runs(base: RobotSpec, runs: Sequence[Run], guess: RobotSpec | None = None) -> Fit:
@@ -181,8 +199,7 @@ def fit_runs(base: RobotSpec, runs: Sequence[Run], guess: RobotSpec | None = Non
 
         sensors = np.arange(SENSOR_COUNT)
         matrix[:, sensors, sensors] = slope(slice(0, SENSOR_COUNT), _STEP[0])
-        if HAS_GAIN:
-            matrix[:, sensors, SENSOR_COUNT + sensors] = slope(slice(SENSOR_COUNT, _BASE), _STEP[1])
+        matrix[:, sensors, SENSOR_COUNT + sensors] = slope(slice(SENSOR_COUNT, _BASE), _STEP[1])
         matrix[:, :, _BASE] = slope(_BASE, _STEP[2])
         matrix[:, :, _PULSE] = slope(_PULSE, _STEP[3])
         samples = np.arange(len(owners))
@@ -195,7 +212,7 @@ def fit_runs(base: RobotSpec, runs: Sequence[Run], guess: RobotSpec | None = Non
         return csr_array(np.vstack((matrix.reshape(-1, len(unknowns)), bound)))
 
     guess = base if guess is None else guess
-    headings = [guess_heading_rad(run, guess) for run in runs]
+    headings = [guess_heading_rad(stand, guess, run) for run in runs]
     start = np.concatenate((unknowns_of(base, guess), headings, np.zeros(len(runs))))
     room = np.concatenate((5 * prior, np.full(len(runs), HEADING_ROOM_RAD), 5 * prior_mm))
     found = least_squares(
@@ -208,7 +225,7 @@ def fit_runs(base: RobotSpec, runs: Sequence[Run], guess: RobotSpec | None = Non
         f_scale=2.0,
         xtol=1e-4,
         ftol=1e-4,
-        max_nfev=30,
+        max_nfev=40,
     )
     unknowns = found.x
     misses = (predict(unknowns) - measured * weights).reshape(len(owners), SENSOR_COUNT)
@@ -235,9 +252,8 @@ def _gap_errors_mm(misses: Array, changes: Array, owners: Any, step_mm: float) -
 def unknowns_of(base: RobotSpec, spec: RobotSpec) -> Array:
     """Return the unknowns that make `spec` of `base`, without headings."""
     unknowns = np.zeros(_HEADINGS)
-    unknowns[:SENSOR_COUNT] = np.subtract(getattr(spec.proximity, DIRECTION), getattr(base.proximity, DIRECTION))
-    if HAS_GAIN:
-        unknowns[SENSOR_COUNT:_BASE] = np.log(np.divide(getattr(spec.proximity, GAIN), getattr(base.proximity, GAIN)))
+    unknowns[:SENSOR_COUNT] = np.subtract(spec.proximity.direction_deg, base.proximity.direction_deg)
+    unknowns[SENSOR_COUNT:_BASE] = np.log(np.divide(spec.proximity.gain, base.proximity.gain))
     unknowns[_BASE] = math.log(spec.body.wheel_base_mm / base.body.wheel_base_mm)
     unknowns[_PULSE] = math.log(spec.body.pulse_mm / base.body.pulse_mm)
     return unknowns
@@ -249,11 +265,9 @@ def robot_of(base: RobotSpec, unknowns: Array) -> RobotSpec:
     Raises:
         CalibrationError: If there can be no such robot.
     """
-    direction = np.array(getattr(base.proximity, DIRECTION)) + unknowns[:SENSOR_COUNT]
-    found: dict[str, Any] = {DIRECTION: tuple(direction.tolist())}
-    if HAS_GAIN:
-        gain = np.array(getattr(base.proximity, GAIN)) * np.exp(unknowns[SENSOR_COUNT:_BASE])
-        found[GAIN] = tuple(gain.tolist())
+    direction_deg = np.array(base.proximity.direction_deg) + unknowns[:SENSOR_COUNT]
+    gain = np.array(base.proximity.gain) * np.exp(unknowns[SENSOR_COUNT:_BASE])
+    proximity = replace(base.proximity, direction_deg=tuple(direction_deg.tolist()), gain=tuple(gain.tolist()))
     wheel_base_mm = base.body.wheel_base_mm * math.exp(unknowns[_BASE])
     pulse_mm = base.body.pulse_mm * math.exp(unknowns[_PULSE])
     if not 0.5 < wheel_base_mm / base.body.wheel_base_mm < 2 or not 0.5 < pulse_mm / base.body.pulse_mm < 2:
@@ -262,4 +276,4 @@ def robot_of(base: RobotSpec, unknowns: Array) -> RobotSpec:
             f"{wheel_base_mm:.1f} mm and a pulse of {pulse_mm:.4f} mm. Name the right kind with --base."
         )
     body = replace(base.body, wheel_base_mm=wheel_base_mm, pulse_mm=pulse_mm)
-    return replace(base, body=body, proximity=replace(base.proximity, **found))
+    return replace(base, body=body, proximity=proximity)

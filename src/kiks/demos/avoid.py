@@ -20,8 +20,8 @@ class Avoid:
     def step(self, robot: Khepera) -> None:
         """Read the sensors once and set the speeds."""
         readings = robot.proximity()
-        left = CRUISE + sum(weight * reading for weight, reading in zip(LEFT, readings, strict=True)) / 400
-        right = CRUISE + sum(weight * reading for weight, reading in zip(RIGHT, readings, strict=True)) / 400
+        left = CRUISE + sum(weight * reading for weight, reading in zip(LEFT, readings, strict=True)) / 250
+        right = CRUISE + sum(weight * reading for weight, reading in zip(RIGHT, readings, strict=True)) / 250
         robot.set_speed(max(-8, min(8, left)), max(-8, min(8, right)))
 
 

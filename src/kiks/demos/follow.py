@@ -6,11 +6,11 @@ import sys
 
 from kiks.client.khepera import Khepera
 
-CRUISE = 5
+CRUISE = 4
 """Speed along the wall [pulses/10 ms]."""
 
-WANTED = 200
-"""Reading of the left side at the distance to keep, about 3 cm from a white wall."""
+WANTED = 300
+"""Reading of the left side at the distance to keep, about 26 mm from a white wall."""
 
 CORNER_STEPS = 70
 """Steps without a wall after which none is round the corner: from then on the robot drives straight on."""
@@ -30,7 +30,7 @@ class Follow:
         # Steer away from a wall that is too near, towards one that is too far, and hard away from one ahead.
         drift = 2.5 if self.lost_steps < CORNER_STEPS else 0.0
         side = max(-drift, min(5.0, (nearest - WANTED) / 50))
-        ahead = (0.3 * front_left + max(front, front_right)) / 20
+        ahead = (front_left + max(front, front_right)) / 8
         robot.set_speed(max(-6, min(9, CRUISE + side + ahead)), max(-6, min(9, CRUISE - side - ahead)))
 
 

@@ -22,6 +22,7 @@ from kiks.model.robot import (
     Ambient,
     Curve,
     Proximity,
+    Reflection,
     RobotSpec,
 )
 from kiks.units import TICK_NS
@@ -31,6 +32,9 @@ RAY_COUNT = 7
 
 CURVE_POINT_COUNT = 129
 """Points of a measured curve, evenly spread from 0 to the end of the range."""
+
+LIGHT_MM = 20.0
+"""Length of a ray at which the light of a sensor is given [mm]."""
 
 STANDIN_REACH = 1.06
 """How far the stand-in looks, in ranges: the sampled rays of KiKS 2.2.0 saw so much farther (kiks-behaviour.md 3.1)."""
@@ -58,8 +62,12 @@ PARAMETERS = np.dtype(
         ("ray_cos", "f8", (SENSOR_COUNT, RAY_COUNT)),
         ("ray_sin", "f8", (SENSOR_COUNT, RAY_COUNT)),
         ("reach_mm", "f8"),  # longest length of a ray
-        ("ray_weight", "f8", (RAY_COUNT,)),
+        ("ray_weight", "f8", (SENSOR_COUNT, RAY_COUNT)),
         ("curve_counts", "f4", (CURVE_POINT_COUNT,)),
+        ("behind_mm", "f8"),
+        ("threshold", "f8", (SENSOR_COUNT,)),
+        ("faint", "f8"),
+        ("bright", "f8"),
         ("gain", "f8", (SENSOR_COUNT,)),
         ("baseline_counts", "f8", (SENSOR_COUNT,)),
         ("maximum_counts", "f8"),
@@ -148,8 +156,22 @@ def _pack_response(robot: Any, spec: RobotSpec) -> None:
             sine, cosine = sin_cos(math.radians(geometry.direction_deg[sensor] + offset_deg))
             robot["ray_cos"][sensor, ray] = cosine
             robot["ray_sin"][sensor, ray] = sine
-    if spec.curve is not None:
+    if proximity.response == "curve" and spec.curve is not None:
         _pack_curve(robot, spec.curve, proximity)
+    if proximity.response == "reflection" and spec.reflection is not None:
+        _pack_reflection(robot, spec.reflection, proximity)
+
+
+def _pack_reflection(robot: Any, reflection: Reflection, proximity: Proximity) -> None:
+    """Write what each ray of each sensor counts, its lobe being a Gaussian, and the constants that all have."""
+    for name in ("behind_mm", "threshold", "faint", "bright"):
+        robot[name] = getattr(reflection, name)
+    scale = (LIGHT_MM + reflection.behind_mm) ** 3
+    for sensor in range(SENSOR_COUNT):
+        for ray in range(RAY_COUNT):
+            off_deg = proximity.field_of_view_deg * (0.5 - ray / (RAY_COUNT - 1))
+            lobe = exponential(-0.5 * (off_deg / reflection.lobe_deg[sensor]) ** 2)
+            robot["ray_weight"][sensor, ray] = reflection.light[sensor] * lobe * scale
 
 
 def _pack_curve(robot: Any, curve: Curve, proximity: Proximity) -> None:
@@ -177,13 +199,13 @@ def _pack_curve(robot: Any, curve: Curve, proximity: Proximity) -> None:
     middle = RAY_COUNT // 2
     cosines = [sin_cos(math.radians(step_deg * abs(ray - middle)))[1] for ray in range(RAY_COUNT)]
     whole = sum(curve.ray_weight[abs(ray - middle)] * cosines[ray] ** 2 for ray in range(RAY_COUNT))
-    robot["ray_weight"] = [curve.ray_weight[abs(ray - middle)] / whole for ray in range(RAY_COUNT)]
+    robot["ray_weight"][:] = [curve.ray_weight[abs(ray - middle)] / whole for ray in range(RAY_COUNT)]
 
 
 def _pack_ambient(robot: Any, spec: RobotSpec) -> None:
     ambient = spec.ambient
     for sensor in range(SENSOR_COUNT):
-        sine, cosine = sin_cos(math.radians(spec.proximity.direction_deg[sensor]))
+        sine, cosine = sin_cos(math.radians(ambient.direction_deg[sensor]))
         robot["axis_cos"][sensor] = cosine
         robot["axis_sin"][sensor] = sine
     robot["ambient_model"] = AMBIENT_MODELS.index(ambient.model)

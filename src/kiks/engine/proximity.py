@@ -15,8 +15,8 @@ from kiks.engine.lanes import stack_floats
 from kiks.engine.motion import pose_between
 from kiks.engine.numbers import sin_cos, uniform
 from kiks.engine.parameters import RAY_COUNT
-from kiks.engine.rays import cast, free_cells, scale, stride
-from kiks.engine.responses import FAST, respond
+from kiks.engine.rays import cast, free_cells, incidence, scale, stride
+from kiks.engine.responses import FAST, REFLECTION, respond
 from kiks.units import SENSOR_ROUND_NS, SENSOR_SLOT_NS, TICK_NS
 
 STREAM_SLIP, STREAM_PROXIMITY = 1, 2
@@ -55,7 +55,7 @@ def expected_count(sight: Any, networks: Any, parameters: Any, x: Any, y: Any, h
     begin = max(free_cells(sight, column, row), 0.0)
     if begin > reach:
         return parameters.baseline_counts[sensor]
-    lengths_mm, brightnesses = stack_floats(RAY_COUNT), stack_floats(RAY_COUNT)
+    lengths_mm, cosines, brightnesses = stack_floats(RAY_COUNT), stack_floats(RAY_COUNT), stack_floats(RAY_COUNT)
     for ray in range(RAY_COUNT):
         ray_cos, ray_sin = parameters.ray_cos[sensor, ray], parameters.ray_sin[sensor, ray]
         direction_x = ray_cos * cosine - ray_sin * sine
@@ -66,8 +66,11 @@ def expected_count(sight: Any, networks: Any, parameters: Any, x: Any, y: Any, h
         else:
             length, brightness = cast(sight, column, row, direction_x, direction_y, reach, begin)
         lengths_mm[ray], brightnesses[ray] = length * cell, brightness
-    counts = respond(networks, parameters, sensor, lengths_mm, brightnesses)
-    return parameters.baseline_counts[sensor] + parameters.gain[sensor] * counts
+        cosines[ray] = 1.0
+        if parameters.response == REFLECTION and brightness > 0:
+            cosines[ray] = incidence(sight, column, row, direction_x, direction_y, length)
+    counts = respond(networks, parameters, sensor, lengths_mm, cosines, brightnesses)
+    return parameters.baseline_counts[sensor] + counts
 
 
 @kernel

@@ -9,6 +9,7 @@ call from Python would cost half a microsecond more. It holds
 
 * field: distance of cells to the nearest wall [mm], 0 in a wall, float32 [rows, columns];
 * surface: brightness of cells, 0 for floor, uint8 [rows, columns];
+* inward: straight into the wall, for free cells that touch one: unit vectors, float32 [rows, columns, 2];
 * cell: edge of a cell [mm];
 * pad: cells of the border around the arena.
 
@@ -29,6 +30,7 @@ _DIAGONAL = 1.4142135623730951
 _WALK = 2.5  # up to this clearance a ray goes from cell to cell [cells]
 _STRIDE = 1.0  # shortest leap of a ray that need not be exact [cells]
 _NUDGE = 1e-3  # over the edge of a cell [cells]
+_BACK = 2e-3  # from there back over it [cells]
 _FAR = 1e30
 _LANES = 32
 
@@ -36,14 +38,14 @@ _LANES = 32
 @kernel
 def scale(sight: Any) -> Any:
     """Return the edge of a cell [mm] and the cells of the border around the arena."""
-    _, _, cell, pad = sight
+    _, _, _, cell, pad = sight
     return cell, pad
 
 
 @kernel
 def free_cells(sight: Any, column: Any, row: Any) -> Any:
     """Return how far a point may go in any direction without meeting a wall [cells]; at most 0 next to one."""
-    field, _, cell, _ = sight
+    field, _, _, cell, _ = sight
     i = min(max(np.int64(column), 0), field.shape[1] - 1)
     j = min(max(np.int64(row), 0), field.shape[0] - 1)
     return field[j, i] * (1.0 / cell) - _DIAGONAL
@@ -65,7 +67,7 @@ def cast(sight: Any, column: Any, row: Any, cosine: Any, sine: Any, reach: Any, 
     Returns:
         Length of the ray [cells], `reach` if it meets nothing, and the brightness of what it met, 0 for nothing.
     """
-    field, surface, cell, _ = sight
+    field, surface, _, cell, _ = sight
     per_cell = 1.0 / cell
     per_column = 1.0 / cosine if abs(cosine) > 1e-12 else _FAR
     per_row = 1.0 / sine if abs(sine) > 1e-12 else _FAR
@@ -90,6 +92,18 @@ def cast(sight: Any, column: Any, row: Any, cosine: Any, sine: Any, reach: Any, 
 
 
 @kernel
+def incidence(sight: Any, column: Any, row: Any, cosine: Any, sine: Any, length: Any) -> Any:
+    """Return how squarely a ray that `cast` followed meets its wall: the cosine of the angle to the wall's normal."""
+    inward = sight[2]
+    before = length - _BACK
+    i = min(max(np.int64(column + before * cosine), 0), inward.shape[1] - 1)
+    j = min(max(np.int64(row + before * sine), 0), inward.shape[0] - 1)
+    x, y = inward[j, i, 0], inward[j, i, 1]
+    # Who begins in a wall, or meets the tip of a corner between cells, sees it squarely.
+    return max(x * cosine + y * sine, 0.0) if x != 0.0 or y != 0.0 else 1.0
+
+
+@kernel
 def stride(sight: Any, column: Any, row: Any, cosine: Any, sine: Any, reach: Any, begin: Any) -> Any:
     """Follow one ray in fewer and longer leaps than `cast`, to within a cell or so of what that says.
 
@@ -108,7 +122,7 @@ def stride(sight: Any, column: Any, row: Any, cosine: Any, sine: Any, reach: Any
     Returns:
         Length of the ray [cells] and the brightness of what it met, as `cast` does.
     """
-    field, surface, cell, _ = sight
+    field, surface, _, cell, _ = sight
     per_cell = 1.0 / cell
     length = begin
     while length < reach:
@@ -136,7 +150,7 @@ def cast_many(sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, len
         lengths: Where the lengths of the rays go [cells], shape [rays].
         brightnesses: Where the brightnesses of the walls go, shape [rays].
     """
-    field, surface, cell, _ = sight
+    field, surface, _, cell, _ = sight
     per_cell = 1.0 / cell
     clearances, width = pointer_to(field), np.int32(field.shape[1])
     last_column, last_row = np.int32(field.shape[1] - 1), np.int32(field.shape[0] - 1)
@@ -180,7 +194,7 @@ def cast_many(sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, len
 @kernel
 def is_lit(sight: Any, x: Any, y: Any, lamp_x: Any, lamp_y: Any) -> Any:
     """Say whether no wall stands between a place and a lamp [mm]. A lamp may hang over a wall, which hides nothing."""
-    field, _, cell, pad = sight
+    field, _, _, cell, pad = sight
     per_cell = 1.0 / cell
     column, row = x * per_cell + pad, y * per_cell + pad
     dx, dy = (lamp_x - x) * per_cell, (lamp_y - y) * per_cell

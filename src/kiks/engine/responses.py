@@ -1,9 +1,12 @@
 """What a proximity sensor makes of its seven rays: the responses that a robot's file can name.
 
-A response takes the length of each ray [mm] and the brightness 1..255 of what it met, 0 for nothing, and says how many
-counts above its baseline the sensor expects. Where the rays begin and go is the response's own, too
-(`kiks.engine.parameters`); gain, baseline, noise and rounding are common to all and no part of it.
+A response takes the length of each ray [mm], how squarely it met a surface (the cosine of the angle of incidence) and
+that one's brightness 1..255, 0 for nothing, and says how many counts above its baseline the sensor expects. Where the
+rays begin and go is the response's own, too (`kiks.engine.parameters`); baseline, noise and rounding are common to all
+and no part of it. The sensor's gain is a factor on the light where there is one, else on the counts.
 
+* REFLECTION: the light that comes back along the rays, and the share of it above a threshold
+  (`kiks.model.robot.Reflection`).
 * STANDIN: a formula in place of the lost table of KiKS 2.2.0 (kiks-behaviour.md 3.1.1).
 * THESIS, FAST: the thesis's networks, and its table made of them (`kiks.engine.networks`).
 * CURVE: counts against distance as measured, times reflectance, over rays that count less off the axis
@@ -19,14 +22,14 @@ from typing import Any
 
 import numpy as np
 
-from kiks.engine.compiling import kernel
+from kiks.engine.compiling import entry, kernel
 from kiks.engine.lanes import stack_floats
 from kiks.engine.networks import network_count, table_count
 from kiks.engine.numbers import exponential, power
 from kiks.engine.parameters import CURVE_POINT_COUNT, RAY_COUNT, STANDIN_REACH
 from kiks.model.materials import BLACK_REFLECTANCE
 
-STANDIN, THESIS, FAST, CURVE = 0, 1, 2, 3
+REFLECTION, THESIS, FAST, STANDIN, CURVE = 0, 1, 2, 3, 4
 """Responses in the order of `kiks.model.robot.RESPONSES`."""
 
 _WEIGHTS = (0.35, 0.33, 0.69, 0.43, 0.69, 0.33, 0.35)  # kiks-behaviour.md 3.1.1
@@ -42,6 +45,27 @@ def darkness(brightness: Any) -> Any:
 def reflectance(brightness: Any) -> Any:
     """Return the share of light that a surface sends back (`kiks.model.materials`), 0 for nothing."""
     return BLACK_REFLECTANCE + brightness * ((1.0 - BLACK_REFLECTANCE) / 255.0) if brightness > 0.0 else 0.0
+
+
+@kernel
+def ramp(share: Any, rounding: Any) -> Any:
+    """Return a share, 0 instead of a negative one, with a parabola between -rounding and +rounding."""
+    if share <= -rounding:
+        return 0.0
+    return share if share >= rounding else (share + rounding) * (share + rounding) / (4.0 * rounding)
+
+
+@kernel
+def reflection_count(parameters: Any, sensor: Any, lengths_mm: Any, cosines: Any, brightnesses: Any) -> Any:
+    """Return the count for the light that comes back to a sensor."""
+    light = 0.0
+    for ray in range(RAY_COUNT):
+        near = cosines[ray] / (lengths_mm[ray] + parameters.behind_mm)
+        light += parameters.ray_weight[sensor, ray] * reflectance(brightnesses[ray]) * near * near * near
+    threshold = parameters.threshold[sensor]
+    share = (1.0 + threshold) * parameters.gain[sensor] * light - threshold
+    rounded = ramp(share, parameters.faint) - ramp(share - 1.0, parameters.bright)
+    return parameters.maximum_counts * max(rounded, 0.0)
 
 
 @kernel
@@ -69,26 +93,50 @@ def inverted_lengths(range_mm: Any, lengths_mm: Any, brightnesses: Any, seen: An
 
 
 @kernel
-def curve_count(parameters: Any, lengths_mm: Any, brightnesses: Any) -> Any:
+def curve_count(parameters: Any, sensor: Any, lengths_mm: Any, brightnesses: Any) -> Any:
     """Return the count of a measured curve, whose values up to its range stand in the robot's record."""
     total, points_per_mm = 0.0, (CURVE_POINT_COUNT - 1) / parameters.range_mm
     for ray in range(RAY_COUNT):
         place = min(max(lengths_mm[ray] * points_per_mm, 0.0), CURVE_POINT_COUNT - 1.001)
         i = np.int64(place)
         low, high = parameters.curve_counts[i], parameters.curve_counts[i + 1]
-        total += parameters.ray_weight[ray] * reflectance(brightnesses[ray]) * (low + (place - i) * (high - low))
+        weight = parameters.ray_weight[sensor, ray] * reflectance(brightnesses[ray])
+        total += weight * (low + (place - i) * (high - low))
     return total
 
 
 @kernel
-def respond(networks: Any, parameters: Any, sensor: Any, lengths_mm: Any, brightnesses: Any) -> Any:
+def respond(networks: Any, parameters: Any, sensor: Any, lengths_mm: Any, cosines: Any, brightnesses: Any) -> Any:
     """Return the counts above its baseline that a sensor expects, by the response of the robot's file."""
+    if parameters.response == REFLECTION:
+        return reflection_count(parameters, sensor, lengths_mm, cosines, brightnesses)
+    gain = parameters.gain[sensor]
     if parameters.response == STANDIN:
-        return standin_count(parameters.range_mm, lengths_mm, brightnesses)
+        return gain * standin_count(parameters.range_mm, lengths_mm, brightnesses)
     if parameters.response == CURVE:
-        return curve_count(parameters, lengths_mm, brightnesses)
+        return gain * curve_count(parameters, sensor, lengths_mm, brightnesses)
     seen = stack_floats(RAY_COUNT)
     inverted_lengths(parameters.range_mm, lengths_mm, brightnesses, seen)
     if parameters.response == FAST:
-        return table_count(networks[0].table, seen)
-    return network_count(networks[0].hidden, networks[0].middle, networks[0].last, sensor, seen)
+        return gain * table_count(networks[0].table, seen)
+    return gain * network_count(networks[0].hidden, networks[0].middle, networks[0].last, sensor, seen)
+
+
+@entry
+def respond_all(kinds: Any, lengths_mm: Any, cosines: Any, out: Any) -> Any:
+    """Write the counts above its baseline that a robot without networks expects of white surfaces.
+
+    Args:
+        kinds: Records of `PARAMETERS`, shape [1].
+        lengths_mm: Of rays [mm], shape [samples, 8, 7].
+        cosines: Of the angles of incidence, 0 for a ray that meets nothing, shape [samples, 8, 7].
+        out: Shape [samples, 8].
+    """
+    brightnesses = stack_floats(RAY_COUNT)
+    for sample in range(out.shape[0]):
+        for sensor in range(out.shape[1]):
+            for ray in range(RAY_COUNT):
+                brightnesses[ray] = 255.0 if cosines[sample, sensor, ray] > 0.0 else 0.0
+            out[sample, sensor] = reflection_count(
+                kinds[0], sensor, lengths_mm[sample, sensor], cosines[sample, sensor], brightnesses
+            )

@@ -78,7 +78,7 @@ def plot_card(card: Card, folder: Path) -> list[Path]:
     Raises:
         ParameterError: If Matplotlib is missing or the folder cannot be written.
     """
-    from kiks.fit.accuracy import HALVES, HELD_OUT, smoothed
+    from kiks.fit.accuracy import FOUND, HALVES, HELD_OUT, smoothed
     from kiks.fit.models import MODELS
 
     half = HALVES[HELD_OUT]
@@ -86,20 +86,21 @@ def plot_card(card: Card, folder: Path) -> list[Path]:
     active = {name: is_active(counts) for name, counts in measured.items()}
     expected = np.concatenate([measured[name][active[name]] for name in measured]).astype(np.float64)
     files = []
-    for key, answers in card.answers.items():
+    for key, answers in card.answers[FOUND].items():
         counts = np.concatenate([answers[name][:, half][active[name]] for name in measured])
         files.append(plot_errors(f"{MODELS[key][0]}: held-out half", counts, expected, folder / f"errors-{key}.png"))
     for name, table in card.tables.items():
         figure, axes = _figure(4, 2)
+        gap_mm = table.gap_mm + card.rigs[name].gap_mm
         curves = smoothed(table.counts.astype(np.float64))
         best = curves.sum(axis=0).argmax(axis=0)
         for sensor in range(SENSOR_COUNT):
             axis = axes[sensor // 4, sensor % 4]
-            axis.plot(table.gap_mm, curves[:, best[sensor], sensor], "o", color=_MEASURED, label="measured")
-            for key, answers in card.answers.items():
+            axis.plot(gap_mm, curves[:, best[sensor], sensor], "o", color=_MEASURED, label="measured")
+            for key, answers in card.answers[FOUND].items():
                 if key != "floor":
-                    axis.plot(table.gap_mm, smoothed(answers[name])[:, best[sensor], sensor], label=MODELS[key][0])
-            direction = f"{table.angle_deg[best[sensor]]:.0f} degrees clockwise"
+                    axis.plot(gap_mm, smoothed(answers[name])[:, best[sensor], sensor], label=MODELS[key][0])
+            direction = f"{table.angle_deg[0, best[sensor]]:.0f} degrees clockwise"
             axis.set(title=f"sensor {sensor}, {direction}", xlabel="gap [mm]", ylabel="counts")
         axes[0, 0].legend(fontsize="small")
         figure.suptitle(f"{name}: readings at the sensor's best angle")

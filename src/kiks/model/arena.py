@@ -17,7 +17,16 @@ import numpy.typing as npt
 from kiks.errors import ArenaError, ParameterError
 from kiks.model.materials import brightness_of
 from kiks.model.places import Ball, Cylinder, Lamp, Pose, checked_places
-from kiks.model.raster import MAX_CELLS, PAD, SIZE_MIN_MM, between, box_raster, cells_per_pixel, clearance_mm
+from kiks.model.raster import (
+    MAX_CELLS,
+    PAD,
+    SIZE_MIN_MM,
+    between,
+    box_raster,
+    cells_per_pixel,
+    clearance_mm,
+    inward_normals,
+)
 
 __all__ = ["MAX_CELLS", "PAD", "SIZE_MIN_MM", "Arena", "Ball", "Cylinder", "Lamp", "Pose"]
 
@@ -65,6 +74,7 @@ class Arena:
     cylinders: tuple[Cylinder, ...] = ()
     _surface: npt.NDArray[np.uint8] | None = field(default=None, init=False, repr=False)
     _clearance: npt.NDArray[np.float32] | None = field(default=None, init=False, repr=False)
+    _inward: npt.NDArray[np.float32] | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
         given = self.brightness
@@ -222,6 +232,19 @@ class Arena:
             object.__setattr__(self, "_clearance", clearance)
         assert self._clearance is not None
         return self._clearance
+
+    @property
+    def inward(self) -> npt.NDArray[np.float32]:
+        """Which way is straight into the wall, for free cells that touch one: unit vectors, 0 elsewhere.
+
+        float32 [row + 2 PAD, column + 2 PAD, 2], the last axis x and y.
+        """
+        if self._inward is None:
+            inward = inward_normals(self.surface, self.clearance, self.mm_per_cell)
+            inward.setflags(write=False)
+            object.__setattr__(self, "_inward", inward)
+        assert self._inward is not None
+        return self._inward
 
     def clearance_at_mm(self, x_mm: float, y_mm: float) -> float:
         """Return how far a point is from the surface of the nearest wall [mm].

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ MM_PER_PIXEL_MIN, MM_PER_PIXEL_MAX = 0.1, 100.0
 
 _NUMBER_MAX = 1e9
 _BLOCK_ROWS = 64
+_SMOOTHING, _SMOOTHING_REACH = 2.5, 10  # standard deviation of the Gaussian of normals, and how far it goes [blocks]
 
 
 def cells_per_pixel(row_count: int, column_count: int, mm_per_pixel: float) -> int:
@@ -120,6 +122,50 @@ def clearance_mm(surface: npt.NDArray[np.uint8], mm_per_cell: float) -> npt.NDAr
         np.sqrt((up * up + right * right).astype(np.float32), out=clearance[block])
     clearance *= np.float32(mm_per_cell)
     return clearance
+
+
+def inward_normals(
+    surface: npt.NDArray[np.uint8], clearance: npt.NDArray[np.float32], mm_per_cell: float
+) -> npt.NDArray[np.float32]:
+    """Return which way into the wall is straight, for every free cell that touches one; elsewhere 0.
+
+    It is the gradient of how much wall is around, smoothed by a Gaussian, so that a disc drawn in cells is round. Cells
+    much smaller than a millimetre are taken together in blocks, of which it counts how much of each is wall.
+
+    Returns:
+        Unit vectors in x and y, shape [rows, columns, 2].
+    """
+    inward = np.zeros((*surface.shape, 2), np.float32)
+    rows, columns = np.nonzero((clearance > 0.0) & (clearance < 1.5 * mm_per_cell))
+    block = max(round(1.0 / mm_per_cell), 1)
+    walls = _block_means(surface > 0, block)
+    # Places in blocks; the middle of the block that a cell is in, and how far the cell is from there.
+    row, column = (rows + 0.5) / block - 0.5, (columns + 0.5) / block - 0.5
+    middle_row, middle_column = np.rint(row).astype(np.int64), np.rint(column).astype(np.int64)
+    gradient = np.zeros((len(rows), 2))
+    steps = range(-_SMOOTHING_REACH, _SMOOTHING_REACH + 1)
+    for up, right in product(steps, steps):
+        other_row = np.clip(middle_row + up, 0, walls.shape[0] - 1)
+        other_column = np.clip(middle_column + right, 0, walls.shape[1] - 1)
+        dy, dx = middle_row + up - row, middle_column + right - column
+        weight = np.exp(-0.5 * (dx * dx + dy * dy) / _SMOOTHING**2) * walls[other_row, other_column]
+        gradient[:, 0] += dx * weight
+        gradient[:, 1] += dy * weight
+    length = np.hypot(gradient[:, 0], gradient[:, 1])
+    # In the middle of a gap as narrow as a cell both sides are as near: any way is as good.
+    inward[rows, columns] = gradient / np.where(length > 1e-9, length, np.inf)[:, None]
+    return inward
+
+
+def _block_means(values: npt.NDArray[np.bool_], block: int) -> npt.NDArray[np.float64]:
+    """Return which share of each square block of cells is true; those at the end may be smaller."""
+    if block == 1:
+        return values.astype(np.float64)
+    rows, columns = (np.arange(0, count, block) for count in values.shape)
+    sums = np.add.reduceat(np.add.reduceat(values, rows, axis=0, dtype=np.int64), columns, axis=1)
+    cells = np.add.reduceat(np.add.reduceat(np.ones_like(values), rows, axis=0, dtype=np.int64), columns, axis=1)
+    means: npt.NDArray[np.float64] = sums / cells
+    return means
 
 
 def between(position: float, count: int) -> tuple[int, float]:

@@ -101,7 +101,13 @@ class Simulation:
         self._kinds = np.repeat(pack(self.spec), robots)
         self._networks = networks_for(self.spec.proximity.response)
         self._ground = (self.arena.clearance, float(self.arena.mm_per_cell), PAD)
-        self.sight = (self.arena.clearance, self.arena.surface, float(self.arena.mm_per_cell), PAD)
+        self.sight = (
+            self.arena.clearance,
+            self.arena.surface,
+            self.arena.inward,
+            float(self.arena.mm_per_cell),
+            PAD,
+        )
         self.lamps = np.array(self.arena.lamps, np.float64).reshape(-1, 4)
         self._counts = np.zeros(SENSOR_COUNT, np.int64)
         self._expected = np.zeros(SENSOR_COUNT, np.float64)

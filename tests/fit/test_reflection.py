@@ -1,0 +1,88 @@
+"""The fit of the default response: a made-up robot on a made-up rig is found again."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kiks.errors import ParameterError
+from kiks.fit.reflection import find_rigs, fit_reflection, predict
+from kiks.fit.rig import Rig
+from kiks.fit.samples import Samples
+from kiks.model.robot import RobotSpec
+
+GAPS_MM = np.arange(5.0, 41.0, 4.0)
+ANGLES_DEG = np.tile(np.arange(0.0, 360.0, 8.0), (len(GAPS_MM), 1))
+BASE = RobotSpec.load("khepera")
+
+
+def robot(rng):
+    """A robot whose sensors are not those of its kind."""
+    proximity, reflection = BASE.proximity, BASE.reflection
+    return BASE.with_changes(
+        proximity__mount_angle_deg=tuple(proximity.mount_angle_deg + rng.uniform(-4, 4, 8)),
+        proximity__direction_deg=tuple(proximity.direction_deg + rng.uniform(-4, 4, 8)),
+        reflection__light=tuple(reflection.light * rng.uniform(0.8, 1.25, 8)),
+        reflection__threshold=tuple(reflection.threshold + rng.uniform(-0.05, 0.05, 8)),
+    )
+
+
+def rig(rng):
+    errors = rng.normal(0.0, (0.4, 0.8, 1.5), (len(GAPS_MM), 3)).T
+    return Rig(*(errors - errors.mean(axis=1, keepdims=True)))
+
+
+def samples(spec, name, radius_mm, true_rig, rng):
+    empty = Samples(name, radius_mm, GAPS_MM, ANGLES_DEG, np.zeros((*ANGLES_DEG.shape, 8), np.int64))
+    counts = predict(spec, true_rig.moved(empty)) + rng.normal(0.0, 10.0, empty.counts.shape)
+    return replace(empty, counts=np.clip(np.rint(counts), 0, 1023).astype(np.int64))
+
+
+@pytest.fixture(scope="module")
+def made_up():
+    rng = np.random.default_rng(3)
+    spec, rigs = robot(rng), (rig(rng), rig(rng))
+    tables = [samples(spec, "wall", math.inf, rigs[0], rng), samples(spec, "post", 20.0, rigs[1], rng)]
+    return spec, rigs, tables
+
+
+def test_a_robot_and_its_rig_are_found(made_up):
+    spec, rigs, tables = made_up
+    found = fit_reflection(tables, BASE)
+    assert np.subtract(found.spec.proximity.direction_deg, spec.proximity.direction_deg) == pytest.approx(0, abs=2.5)
+    for table, before, after in zip(tables, rigs, found.rigs, strict=True):
+        saw = ((table.counts > 20) & (table.counts < 1000)).any(axis=(1, 2))
+        assert np.sqrt(np.mean((before.gap_mm - after.gap_mm)[saw] ** 2)) < 0.25
+        assert np.sqrt(np.mean((before.angle_deg - after.angle_deg)[saw] ** 2)) < 0.5
+        answers = predict(found.spec, after.moved(table))
+        truth = predict(spec, before.moved(table))
+        assert np.abs(answers - truth).mean() < 3.0
+
+
+def test_the_rig_of_a_known_robot_is_found(made_up):
+    spec, rigs, tables = made_up
+    for before, after in zip(rigs, find_rigs(tables, spec), strict=True):
+        assert np.abs(before.gap_mm - after.gap_mm)[:5].max() < 0.2
+        assert np.abs(before.angle_deg - after.angle_deg)[:5].max() < 0.5
+
+
+def test_a_rig_moves_poses_and_nothing_else():
+    table = Samples("wall", math.inf, GAPS_MM, ANGLES_DEG, np.zeros((*ANGLES_DEG.shape, 8), np.int64))
+    ones = np.ones(len(GAPS_MM))
+    moved = Rig(0.5 * ones, 2.0 * ones, 3.6 * ones).moved(table)
+    assert moved.gap_mm.tolist() == (GAPS_MM + 0.5).tolist()
+    assert moved.angle_deg[0, [0, 22]].tolist() == pytest.approx([2.0 - 1.8, 176 + 2.0 + 3.6 * (176 / 360 - 0.5)])
+    assert moved.counts is table.counts
+    exact = Rig.exact(len(GAPS_MM)).moved(table)
+    assert np.array_equal(exact.angle_deg, table.angle_deg)
+
+
+def test_what_cannot_be_fitted_is_said():
+    empty = Samples("wall", math.inf, GAPS_MM, ANGLES_DEG, np.zeros((*ANGLES_DEG.shape, 8), np.int64))
+    with pytest.raises(ParameterError, match="readings between 20 and 1000, but there are none"):
+        fit_reflection([empty], BASE)
+    with pytest.raises(ParameterError, match="must have the response 'reflection', but 'Khepera' has 'thesis'"):
+        fit_reflection([empty], RobotSpec.load("khepera", response="thesis"))
