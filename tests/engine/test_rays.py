@@ -17,7 +17,7 @@ CLIPPED_MM = 0.003  # a ray that cuts less than this off a corner may pass it by
 
 
 def cast(arena, x, y, angle, reach=200.0):
-    sight = (arena.clearance, arena.surface, arena.inward, arena.mm_per_cell, PAD)
+    sight = (arena.clearance, arena.surface, arena.faces, arena.mm_per_cell, PAD)
     return cast_ray(sight, x, y, math.cos(angle), math.sin(angle), reach)
 
 
@@ -104,7 +104,7 @@ def test_rays_in_lanes_are_rays_one_by_one(make_random_arena, number, draw, coun
     straight = (cosine == 0.0) == (sine == 0.0)
     cosine[straight], sine[straight] = 0.0, -1.0
     cell = arena.mm_per_cell
-    sight = (arena.clearance, arena.surface, arena.inward, cell, PAD)
+    sight = (arena.clearance, arena.surface, arena.faces, cell, PAD)
     columns, rows = x * (1.0 / cell) + PAD, y * (1.0 / cell) + PAD
     lengths, brightnesses = np.empty(count), np.empty(count)
     cast_rays(sight, columns, rows, cosine, sine, lengths, brightnesses)

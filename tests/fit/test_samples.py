@@ -163,7 +163,7 @@ def test_rays_are_those_of_the_engine(radius_mm, places):
     else:
         inside = np.hypot(x - edge - radius_mm, x[:, None] - middle) <= radius_mm
     arena = Arena(inside.astype(np.uint8) * 255, cell, "object")
-    sight = (arena.clearance, arena.surface, arena.inward, cell, PAD)
+    sight = (arena.clearance, arena.surface, arena.faces, cell, PAD)
     checked = 0
     for i, gap in enumerate(gaps):
         for j, angle in enumerate(angles):

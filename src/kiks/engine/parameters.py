@@ -36,8 +36,8 @@ CURVE_POINT_COUNT = 129
 LIGHT_MM = 20.0
 """Length of a ray at which the light of a sensor is given [mm]."""
 
-STANDIN_REACH = 1.06
-"""How far the stand-in looks, in ranges: the sampled rays of KiKS 2.2.0 saw so much farther (kiks-behaviour.md 3.1)."""
+STANDIN_RANGE_MM, STANDIN_REACH = 50.0, 1.06
+"""Range of KiKS 2.2.0, and how much farther its sampled rays saw, in ranges (kiks-behaviour.md 3.1)."""
 
 PARAMETERS = np.dtype(
     [
@@ -139,7 +139,7 @@ def _pack_response(robot: Any, spec: RobotSpec) -> None:
     radius_mm: Sequence[float] = proximity.mount_radius_mm
     reach_mm = proximity.range_mm
     if proximity.response == "standin":
-        reach_mm *= STANDIN_REACH
+        robot["range_mm"], reach_mm = STANDIN_RANGE_MM, STANDIN_RANGE_MM * STANDIN_REACH
     elif proximity.response in NETWORK_RESPONSES:
         geometry = networks = NetworkResponse.load()
         robot["range_mm"] = reach_mm = networks.range_mm

@@ -15,7 +15,7 @@ from kiks.engine.lanes import stack_floats
 from kiks.engine.motion import pose_between
 from kiks.engine.numbers import sin_cos, uniform
 from kiks.engine.parameters import RAY_COUNT
-from kiks.engine.rays import cast, free_cells, incidence, scale, stride
+from kiks.engine.rays import cast, free_cells, meet_face, scale, stride
 from kiks.engine.responses import FAST, REFLECTION, respond
 from kiks.units import SENSOR_ROUND_NS, SENSOR_SLOT_NS, TICK_NS
 
@@ -65,10 +65,10 @@ def expected_count(sight: Any, networks: Any, parameters: Any, x: Any, y: Any, h
             length, brightness = stride(sight, column, row, direction_x, direction_y, reach, begin)
         else:
             length, brightness = cast(sight, column, row, direction_x, direction_y, reach, begin)
-        lengths_mm[ray], brightnesses[ray] = length * cell, brightness
         cosines[ray] = 1.0
         if parameters.response == REFLECTION and brightness > 0:
-            cosines[ray] = incidence(sight, column, row, direction_x, direction_y, length)
+            length, cosines[ray] = meet_face(sight, column, row, direction_x, direction_y, length)
+        lengths_mm[ray], brightnesses[ray] = length * cell, brightness
     counts = respond(networks, parameters, sensor, lengths_mm, cosines, brightnesses)
     return parameters.baseline_counts[sensor] + counts
 

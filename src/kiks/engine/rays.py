@@ -9,7 +9,8 @@ call from Python would cost half a microsecond more. It holds
 
 * field: distance of cells to the nearest wall [mm], 0 in a wall, float32 [rows, columns];
 * surface: brightness of cells, 0 for floor, uint8 [rows, columns];
-* inward: straight into the wall, for free cells that touch one: unit vectors, float32 [rows, columns, 2];
+* faces: the smooth surface of the wall beside free cells that touch one (`kiks.model.arena.Arena.faces`), float32
+  [rows, columns, 3];
 * cell: edge of a cell [mm];
 * pad: cells of the border around the arena.
 
@@ -31,6 +32,7 @@ _WALK = 2.5  # up to this clearance a ray goes from cell to cell [cells]
 _STRIDE = 1.0  # shortest leap of a ray that need not be exact [cells]
 _NUDGE = 1e-3  # over the edge of a cell [cells]
 _BACK = 2e-3  # from there back over it [cells]
+_GRAZING = 0.1  # cosine of an incidence below which a surface is not worth finding
 _FAR = 1e30
 _LANES = 32
 
@@ -92,15 +94,25 @@ def cast(sight: Any, column: Any, row: Any, cosine: Any, sine: Any, reach: Any, 
 
 
 @kernel
-def incidence(sight: Any, column: Any, row: Any, cosine: Any, sine: Any, length: Any) -> Any:
-    """Return how squarely a ray that `cast` followed meets its wall: the cosine of the angle to the wall's normal."""
-    inward = sight[2]
+def meet_face(sight: Any, column: Any, row: Any, cosine: Any, sine: Any, length: Any) -> Any:
+    """Return where a ray that `cast` followed meets its wall's surface, taken to be smooth, and how squarely.
+
+    Returns:
+        Length of the ray [cells], at most a cell from that of `cast`, and the cosine of the angle of incidence.
+    """
+    faces = sight[2]
     before = length - _BACK
-    i = min(max(np.int64(column + before * cosine), 0), inward.shape[1] - 1)
-    j = min(max(np.int64(row + before * sine), 0), inward.shape[0] - 1)
-    x, y = inward[j, i, 0], inward[j, i, 1]
-    # Who begins in a wall, or meets the tip of a corner between cells, sees it squarely.
-    return max(x * cosine + y * sine, 0.0) if x != 0.0 or y != 0.0 else 1.0
+    px, py = column + before * cosine, row + before * sine
+    i = min(max(np.int64(px), 0), faces.shape[1] - 1)
+    j = min(max(np.int64(py), 0), faces.shape[0] - 1)
+    x, y = faces[j, i, 0], faces[j, i, 1]
+    squarely = x * cosine + y * sine
+    if x == 0.0 and y == 0.0:  # it begins in a wall, or meets the tip of a corner between cells
+        return length, 1.0
+    if squarely < _GRAZING:
+        return length, max(squarely, 0.0)
+    left = faces[j, i, 2] - (px - i - 0.5) * x - (py - j - 0.5) * y
+    return max(before + min(max(left / squarely, -1.0), 1.0), 0.0), squarely
 
 
 @kernel

@@ -25,7 +25,7 @@ from kiks.model.raster import (
     box_raster,
     cells_per_pixel,
     clearance_mm,
-    inward_normals,
+    wall_faces,
 )
 
 __all__ = ["MAX_CELLS", "PAD", "SIZE_MIN_MM", "Arena", "Ball", "Cylinder", "Lamp", "Pose"]
@@ -74,7 +74,7 @@ class Arena:
     cylinders: tuple[Cylinder, ...] = ()
     _surface: npt.NDArray[np.uint8] | None = field(default=None, init=False, repr=False)
     _clearance: npt.NDArray[np.float32] | None = field(default=None, init=False, repr=False)
-    _inward: npt.NDArray[np.float32] | None = field(default=None, init=False, repr=False)
+    _faces: npt.NDArray[np.float32] | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
         given = self.brightness
@@ -234,17 +234,18 @@ class Arena:
         return self._clearance
 
     @property
-    def inward(self) -> npt.NDArray[np.float32]:
-        """Which way is straight into the wall, for free cells that touch one: unit vectors, 0 elsewhere.
+    def faces(self) -> npt.NDArray[np.float32]:
+        """Where the surface of the wall runs beside free cells that touch one, without the steps of the raster.
 
-        float32 [row + 2 PAD, column + 2 PAD, 2], the last axis x and y.
+        float32 [row + 2 PAD, column + 2 PAD, 3]: unit vectors straight into the wall, x and y, and how far that way its
+        surface is from the cell's centre [cells]; 0 for all other cells.
         """
-        if self._inward is None:
-            inward = inward_normals(self.surface, self.clearance, self.mm_per_cell)
-            inward.setflags(write=False)
-            object.__setattr__(self, "_inward", inward)
-        assert self._inward is not None
-        return self._inward
+        if self._faces is None:
+            faces = wall_faces(self.surface, self.clearance, self.mm_per_cell)
+            faces.setflags(write=False)
+            object.__setattr__(self, "_faces", faces)
+        assert self._faces is not None
+        return self._faces
 
     def clearance_at_mm(self, x_mm: float, y_mm: float) -> float:
         """Return how far a point is from the surface of the nearest wall [mm].

@@ -28,7 +28,7 @@ MM_PER_PIXEL_MIN, MM_PER_PIXEL_MAX = 0.1, 100.0
 
 _NUMBER_MAX = 1e9
 _BLOCK_ROWS = 64
-_SMOOTHING, _SMOOTHING_REACH = 2.5, 10  # standard deviation of the Gaussian of normals, and how far it goes [blocks]
+_WAY_REACH, _FILL_REACH = 9.0, 3.5  # surroundings of a cell that tell which way its wall is, and how far [blocks]
 
 
 def cells_per_pixel(row_count: int, column_count: int, mm_per_pixel: float) -> int:
@@ -124,37 +124,59 @@ def clearance_mm(surface: npt.NDArray[np.uint8], mm_per_cell: float) -> npt.NDAr
     return clearance
 
 
-def inward_normals(
+def wall_faces(
     surface: npt.NDArray[np.uint8], clearance: npt.NDArray[np.float32], mm_per_cell: float
 ) -> npt.NDArray[np.float32]:
-    """Return which way into the wall is straight, for every free cell that touches one; elsewhere 0.
+    """Return where the surface of the wall runs beside every free cell that touches one, as if it were not in steps.
 
-    It is the gradient of how much wall is around, smoothed by a Gaussian, so that a disc drawn in cells is round. Cells
-    much smaller than a millimetre are taken together in blocks, of which it counts how much of each is wall.
+    The way into the wall is the gradient of how much wall is around, and the distance to its surface is that at which a
+    straight one would fill as much of a smaller surrounding; so a disc drawn in cells is round. Cells much smaller than
+    a millimetre are taken together in blocks, of which it counts how much of each is wall.
 
     Returns:
-        Unit vectors in x and y, shape [rows, columns, 2].
+        Unit vectors in x and y into the wall, and how far its surface is from the cell's centre that way [cells],
+        shape [rows, columns, 3]; 0 for all other cells.
     """
-    inward = np.zeros((*surface.shape, 2), np.float32)
+    faces = np.zeros((*surface.shape, 3), np.float32)
     rows, columns = np.nonzero((clearance > 0.0) & (clearance < 1.5 * mm_per_cell))
     block = max(round(1.0 / mm_per_cell), 1)
     walls = _block_means(surface > 0, block)
     # Places in blocks; the middle of the block that a cell is in, and how far the cell is from there.
     row, column = (rows + 0.5) / block - 0.5, (columns + 0.5) / block - 0.5
     middle_row, middle_column = np.rint(row).astype(np.int64), np.rint(column).astype(np.int64)
-    gradient = np.zeros((len(rows), 2))
-    steps = range(-_SMOOTHING_REACH, _SMOOTHING_REACH + 1)
+    gradient, filled, whole = np.zeros((len(rows), 2)), np.zeros(len(rows)), np.zeros(len(rows))
+    steps = range(-math.ceil(_WAY_REACH), math.ceil(_WAY_REACH) + 1)
     for up, right in product(steps, steps):
-        other_row = np.clip(middle_row + up, 0, walls.shape[0] - 1)
-        other_column = np.clip(middle_column + right, 0, walls.shape[1] - 1)
+        if math.hypot(up, right) > _WAY_REACH + 1.0:
+            continue
         dy, dx = middle_row + up - row, middle_column + right - column
-        weight = np.exp(-0.5 * (dx * dx + dy * dy) / _SMOOTHING**2) * walls[other_row, other_column]
+        square = dx * dx + dy * dy
+        wall = walls[
+            np.clip(middle_row + up, 0, walls.shape[0] - 1), np.clip(middle_column + right, 0, walls.shape[1] - 1)
+        ]
+        weight = np.maximum(1.0 - square / _WAY_REACH**2, 0.0) ** 2 * wall
         gradient[:, 0] += dx * weight
         gradient[:, 1] += dy * weight
+        near = np.maximum(1.0 - square / _FILL_REACH**2, 0.0) ** 2
+        filled += near * wall
+        whole += near
     length = np.hypot(gradient[:, 0], gradient[:, 1])
     # In the middle of a gap as narrow as a cell both sides are as near: any way is as good.
-    inward[rows, columns] = gradient / np.where(length > 1e-9, length, np.inf)[:, None]
-    return inward
+    faces[rows, columns, :2] = gradient / np.where(length > 1e-9, length, np.inf)[:, None]
+    faces[rows, columns, 2] = _distance_of_share(filled / whole) * block
+    return faces
+
+
+def _distance_of_share(share: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Return how far from a straight wall a place is whose surrounding is filled to such a share [blocks].
+
+    What lies x reaches away counts (1 - x^2)^(5/2), the integral of the weights (1 - x^2 - y^2)^2 over y.
+    """
+    x = np.linspace(-1.0, 1.0, 401)
+    density = (1.0 - x * x) ** 2.5
+    filled = np.concatenate([[0.0], np.cumsum(density[1:] + density[:-1])])
+    distance: npt.NDArray[np.float64] = -_FILL_REACH * np.interp(share, filled / filled[-1], x)
+    return distance
 
 
 def _block_means(values: npt.NDArray[np.bool_], block: int) -> npt.NDArray[np.float64]:

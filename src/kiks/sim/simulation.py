@@ -104,7 +104,7 @@ class Simulation:
         self.sight = (
             self.arena.clearance,
             self.arena.surface,
-            self.arena.inward,
+            self.arena.faces,
             float(self.arena.mm_per_cell),
             PAD,
         )
