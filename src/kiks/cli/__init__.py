@@ -8,6 +8,7 @@ import typer
 
 from kiks import __version__
 from kiks.cli.accuracy import accuracy
+from kiks.cli.arena import arena
 from kiks.cli.calibrate import calibrate
 from kiks.cli.demo import demo
 from kiks.cli.fit import fit
@@ -27,6 +28,7 @@ app = typer.Typer(
 for _command in (demo, run, serve, monitor, calibrate, accuracy, fit, warmup):
     # A program's own options, and whatever stands after its name, belong to the program.
     app.command(context_settings={"allow_interspersed_args": _command is not run})(_command)
+app.add_typer(arena, name="arena")
 
 
 def _print_version(wanted: bool) -> None:

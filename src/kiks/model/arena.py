@@ -7,7 +7,7 @@ x points right, y up, and (0, 0) is the lower left corner of the raster. Picture
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from kiks.errors import ArenaError, ParameterError
 from kiks.model.materials import brightness_of
+from kiks.model.maze import draw_maze
 from kiks.model.places import Ball, Cylinder, Lamp, Pose, checked_places
 from kiks.model.raster import (
     MAX_CELLS,
@@ -198,6 +199,30 @@ class Arena:
         """
         raster = box_raster(width_mm, height_mm, wall_mm, rounded_mm, brightness_of(brightness))
         return cls.from_array(raster, name="box")
+
+    @classmethod
+    def maze(cls, *, columns: int = 4, rows: int = 4, path_mm: int = 120, wall_mm: int = 10, seed: int = 0) -> Arena:
+        """Return a random maze with white walls; exactly one way leads from each of its places to each other.
+
+        The robot starts in the entrance, left of the top row, and a lamp hangs in the exit, right of the bottom row.
+
+        Args:
+            columns: Cells side by side, without the entrance and the exit.
+            rows: Cells one above the other.
+            path_mm: Width of a passage [mm], at least 2 `wall_mm` + 77.
+            wall_mm: Thickness of a wall between passages [mm].
+            seed: The same seed, the same maze, on every computer.
+
+        Raises:
+            ParameterError: If a number is not whole or out of range.
+            ArenaError: If the maze is too small or too large for an arena.
+
+        Example:
+            >>> Arena.maze(columns=5, rows=5).width_mm
+            880.0
+        """
+        picture, start, lamp = draw_maze(columns, rows, path_mm, wall_mm, seed)
+        return replace(cls.from_array(picture, name="maze"), starts=(start,), lamps=(lamp,))
 
     @property
     def width_mm(self) -> float:

@@ -1,0 +1,117 @@
+"""`kiks arena`: makes arena files and tells what is in one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from kiks.errors import ParameterError
+
+if TYPE_CHECKING:
+    from kiks.model.arena import Arena
+
+Out = Annotated[Path, typer.Argument(metavar="OUT.toml", help="The arena file; its picture goes beside it as .png.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace files that are there.")]
+
+arena = typer.Typer(help="Make arenas, and tell what is in one.", no_args_is_help=True, rich_markup_mode=None)
+
+
+@arena.command()
+def maze(
+    out: Out,
+    columns: Annotated[int, typer.Option(help="Cells side by side, without entrance and exit.")] = 4,
+    rows: Annotated[int, typer.Option(help="Cells one above the other.")] = 4,
+    path_mm: Annotated[int, typer.Option(help="Width of the passages [mm].")] = 120,
+    wall_mm: Annotated[int, typer.Option(help="Thickness of the walls between them [mm].")] = 10,
+    seed: Annotated[int, typer.Option(help="Seed: the same seed, the same maze.", min=0)] = 0,
+    force: Force = False,
+) -> None:
+    """Make a random maze: a robot starts in the entrance, upper left, and a lamp hangs in the exit, lower right.
+
+    Example: kiks arena maze maze.toml --columns 6 --rows 5 --seed 3
+    """
+    from kiks.model.arena import Arena
+
+    _save(Arena.maze(columns=columns, rows=rows, path_mm=path_mm, wall_mm=wall_mm, seed=seed), out, force=force)
+
+
+@arena.command()
+def new(
+    out: Out,
+    width_mm: Annotated[int, typer.Option(help="Outer width [mm].")],
+    height_mm: Annotated[int, typer.Option(help="Outer height [mm].")],
+    wall_mm: Annotated[int, typer.Option(help="Thickness of the wall around it [mm].")] = 10,
+    rounded_mm: Annotated[int, typer.Option(help="Radius of the corners [mm].")] = 0,
+    brightness: Annotated[str, typer.Option(help="Brightness of the wall, 1 to 255, or a material: wood.")] = "255",
+    force: Force = False,
+) -> None:
+    """Make an empty box whose picture, one pixel per millimetre, is ready to draw in.
+
+    Example: kiks arena new room.toml --width-mm 800 --height-mm 600 --brightness wood
+    """
+    from kiks.model.arena import Arena
+
+    shade = int(brightness) if brightness.removeprefix("-").isdecimal() else brightness
+    box = Arena.box(width_mm, height_mm, wall_mm=wall_mm, rounded_mm=rounded_mm, brightness=shade)
+    _save(box, out, force=force)
+
+
+@arena.command()
+def info(file: Annotated[Path, typer.Argument(metavar="ARENA", help="Arena file (.toml) or picture.")]) -> None:
+    """Tell how large an arena is, what stands in it, and whether a Khepera has room where it starts.
+
+    Example: kiks arena info examples/arenas/maze.toml
+    """
+    import math
+
+    from kiks.model.arena import Arena
+    from kiks.model.robot import RobotSpec
+
+    place = Arena.load(file)
+    robot_mm = RobotSpec.load("khepera").body.diameter_mm
+    # Clearance is counted between the centres of cells, so half a cell of it is wall.
+    widest_mm = 2 * float(place.clearance.max()) - place.mm_per_cell
+    walls = f"{100 * (place.brightness > 0).mean():.0f} % of it wall"
+    typer.echo(f"{place.name}: {place.width_mm:g} x {place.height_mm:g} mm, cells of {place.mm_per_cell:g} mm, {walls}")
+    typer.echo(f"Widest place: room for {widest_mm:.1f} mm across")
+    for number, start in enumerate(place.starts, start=1):
+        room_mm = max(2 * place.clearance_at_mm(start.x_mm, start.y_mm), 0.0)
+        fits = "fits" if place.free_for(start.x_mm, start.y_mm, robot_mm / 2) else "does not fit"
+        typer.echo(
+            f"Start {number}: {_at(start.x_mm, start.y_mm)}, heading {math.degrees(start.heading_rad):g} degrees, "
+            f"room for {room_mm:.1f} mm across: a Khepera ({robot_mm:g} mm) {fits}"
+        )
+    if not place.starts:
+        where = "fits nowhere"
+        if widest_mm >= robot_mm:
+            x_mm, y_mm, _ = place.find_start(robot_mm / 2)
+            where = f"starts at {_at(x_mm, y_mm)}"
+        typer.echo(f"Start: none; a Khepera ({robot_mm:g} mm) {where}")
+    for number, lamp in enumerate(place.lamps, start=1):
+        switch = "on" if lamp.is_on else "off"
+        typer.echo(f"Lamp {number}: {_at(lamp.x_mm, lamp.y_mm)}, {lamp.power_w:g} W, {switch}")
+    for label, bodies in (("Ball", place.balls), ("Cylinder", place.cylinders)):
+        for number, (x_mm, y_mm) in enumerate(bodies, start=1):
+            typer.echo(f"{label} {number}: {_at(x_mm, y_mm)}")
+
+
+def _at(x_mm: float, y_mm: float) -> str:
+    return f"({x_mm:g}, {y_mm:g}) mm"
+
+
+def _save(made: Arena, out: Path, *, force: bool) -> None:
+    """Write an arena under the file's name; `save_arena` refuses other endings than .toml itself."""
+    from dataclasses import replace
+
+    from kiks.model.arena_file import save_arena
+
+    if out.suffix.lower() == ".toml" and not force:
+        for file in (out, out.with_suffix(".png")):
+            if file.exists():
+                raise ParameterError(
+                    f"The arena's files must be new, but {str(file)!r} is there. Choose another name or add --force."
+                )
+    save_arena(replace(made, name=out.stem), out)
+    typer.echo(f"Arena: {out}   Picture: {out.with_suffix('.png')}")

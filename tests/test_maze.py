@@ -1,0 +1,148 @@
+"""Mazes: the sizes of the Matlab KiKS, every place within a robot's reach, the same for the same seed."""
+
+import hashlib
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.ndimage import label
+
+from kiks.errors import ArenaError, ParameterError
+from kiks.model.arena import PAD, Arena, Lamp, Pose
+from kiks.model.arena_file import save_arena
+
+KHEPERA_MM = 55.0
+
+SIZES = [
+    {},
+    {"columns": 5, "rows": 5},
+    {"columns": 1, "rows": 1},
+    {"columns": 1, "rows": 6},
+    {"columns": 9, "rows": 1, "path_mm": 100},
+    {"columns": 7, "rows": 3, "path_mm": 79, "wall_mm": 1},
+    {"columns": 3, "rows": 4, "path_mm": 97, "wall_mm": 10},
+    {"columns": 3, "rows": 4, "path_mm": 98, "wall_mm": 10},
+    {"columns": 4, "rows": 3, "path_mm": 277, "wall_mm": 100},
+]
+
+
+def parts_for_a_robot(arena: Arena) -> np.ndarray:
+    """Number the connected places where a Khepera's centre may be, 0 for none: [row, column], row 0 at the bottom."""
+    from_wall_mm = arena.clearance[PAD:-PAD, PAD:-PAD] - 0.5
+    return label(from_wall_mm >= KHEPERA_MM / 2)[0]
+
+
+def open_doors(arena: Arena, columns: int, rows: int, path_mm: int = 120, wall_mm: int = 10) -> frozenset[tuple]:
+    """Return between which neighbouring cells there is floor, read from the raster."""
+    picture, step = arena.brightness[::-1], path_mm + wall_mm
+    doors = set()
+    for column in range(columns):
+        for row in range(rows):
+            x, y = path_mm + column * step + path_mm // 2, row * step + path_mm // 2
+            if column + 1 < columns and picture[y, x + step // 2] == 0:
+                doors.add((column, row, "right"))
+            if row + 1 < rows and picture[y + step // 2, x] == 0:
+                doors.add((column, row, "down"))
+    return frozenset(doors)
+
+
+@pytest.mark.parametrize("size", SIZES, ids=str)
+@pytest.mark.parametrize("seed", range(12))
+def test_a_khepera_reaches_every_cell_from_the_start(size, seed):
+    arena = Arena.maze(**size, seed=seed)
+    size = {"columns": 4, "rows": 4, "path_mm": 120, "wall_mm": 10} | size
+    parts, (start,), (lamp,) = parts_for_a_robot(arena), arena.starts, arena.lamps
+    assert arena.free_for(start.x_mm, start.y_mm, KHEPERA_MM / 2)
+    here = parts[int(start.y_mm), int(start.x_mm)]
+    assert here > 0
+    assert parts[int(lamp.y_mm), int(lamp.x_mm)] == here
+    step, half = size["path_mm"] + size["wall_mm"], size["path_mm"] / 2
+    for column in range(size["columns"]):
+        for row in range(size["rows"]):
+            x, y = size["path_mm"] + column * step + half, arena.height_mm - row * step - half
+            assert parts[int(y), int(x)] == here, (column, row)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_one_way_leads_from_each_cell_to_each_other(seed):
+    columns, rows = 3 + seed % 5, 2 + seed % 4
+    # All cells are joined, as the test above says; one door fewer than cells leaves no loop.
+    assert len(open_doors(Arena.maze(columns=columns, rows=rows, seed=seed), columns, rows)) == columns * rows - 1
+
+
+def test_every_maze_is_as_likely():
+    # Two by two cells have four spanning trees; of 400 draws each gets 100 with a standard deviation of 9.
+    counts = Counter(open_doors(Arena.maze(columns=2, rows=2, seed=seed), 2, 2) for seed in range(400))
+    assert len(counts) == 4
+    assert all(65 <= count <= 135 for count in counts.values()), counts
+
+
+def test_sizes_and_places_are_those_of_the_matlab_maze_demo():
+    # kiks-behaviour.md, section 1.9: 640 rows x 880 columns, start (55, 60), light (830, 580), y counted from the top.
+    arena = Arena.maze(columns=5, rows=5)
+    assert arena.brightness.shape == (640, 880)
+    assert arena.starts == (Pose(55.0, 640.0 - 60.0, 0.0),)
+    assert arena.lamps == (Lamp(830.0, 640.0 - 580.0),)
+
+
+@pytest.mark.parametrize("size", SIZES, ids=str)
+def test_sizes_follow_the_formula(size):
+    arena = Arena.maze(**size)
+    xs, ys, path, wall = ({"columns": 4, "rows": 4, "path_mm": 120, "wall_mm": 10} | size).values()
+    assert arena.brightness.shape == (ys * path + (ys - 1) * wall, (xs + 2) * path + (xs + 1) * wall - 2 * wall)
+
+
+def test_the_frame_is_wall():
+    picture = Arena.maze(columns=3, rows=2).brightness[::-1]
+    for frame in (picture[:10], picture[-11:], picture[:, :10], picture[:, -11:]):
+        assert (frame == 255).all()
+    # Entrance and exit begin right behind it, and there is nothing else left and right of the maze's cells.
+    assert picture[60, 10] == picture[190, -12] == 0
+    assert picture[125:, :120].all()
+    assert picture[:125, -120:].all()
+
+
+def test_the_same_seed_is_the_same_maze_on_every_computer():
+    arena = Arena.maze(columns=6, rows=5, seed=7)
+    assert np.array_equal(arena.brightness, Arena.maze(columns=6, rows=5, seed=7).brightness)
+    assert not np.array_equal(arena.brightness, Arena.maze(columns=6, rows=5, seed=8).brightness)
+    assert hashlib.sha256(arena.brightness.tobytes()).hexdigest()[:16] == "de27aa544cbcf8d3"
+
+
+@pytest.mark.parametrize("size", SIZES, ids=str)
+def test_saved_and_loaded_is_equal(tmp_path, size):
+    arena = replace(Arena.maze(**size, seed=2), name='a "maze"')
+    save_arena(arena, tmp_path / "maze.toml")
+    again = Arena.load(tmp_path / "maze.toml")
+    assert np.array_equal(again.brightness, arena.brightness)
+    assert (again.mm_per_cell, again.name, again.starts, again.lamps) == (1.0, arena.name, arena.starts, arena.lamps)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"columns": 0}, "columns must be a whole number from 1 to 100, but it was 0. It counts the cells side by"),
+        ({"rows": 101}, "rows must be a whole number from 1 to 100, but it was 101. It counts the cells one above"),
+        ({"rows": 2.5}, "rows must be a whole number from 1 to 100, but it was 2.5."),
+        ({"columns": True}, "columns must be a whole number from 1 to 100, but it was True."),
+        ({"columns": "4"}, "columns must be a whole number from 1 to 100, but it was '4'."),
+        ({"wall_mm": 0}, "wall_mm must be a whole number from 1 to 1000, but it was 0. Mazes are drawn in whole"),
+        ({"path_mm": 96}, "path_mm must be a whole number from 97 to 10000, but it was 96. A Khepera is 55 mm across"),
+        ({"wall_mm": 50}, "path_mm must be a whole number from 177 to 10000, but it was 120."),
+        ({"path_mm": float("nan")}, "path_mm must be a whole number from 97 to 10000, but it was nan."),
+        ({"seed": -1}, "seed must be a whole number from 0 to 9223372036854775807, but it was -1. Any small number"),
+        ({"seed": None}, "but it was None."),
+    ],
+)
+def test_bad_numbers_are_named(given, words):
+    with pytest.raises(ParameterError) as error:
+        Arena.maze(**given)
+    assert words in str(error.value)
+
+
+def test_a_maze_that_is_too_large_or_too_small_is_refused():
+    with pytest.raises(ArenaError, match="at most 64 million cells"):
+        Arena.maze(columns=100, rows=100)
+    with pytest.raises(ArenaError, match="at least 100 x 100 mm"):
+        Arena.maze(rows=1, path_mm=97)
