@@ -22,7 +22,7 @@ import numpy as np
 
 from kiks.engine.compiling import entry, kernel
 from kiks.engine.numbers import power, sin_cos, uniform
-from kiks.engine.proximity import pose_at, quantize, sample_instant
+from kiks.engine.proximity import quantize, sampled_pose
 from kiks.engine.rays import is_lit
 
 STREAM_AMBIENT = 3
@@ -113,8 +113,7 @@ def read_ambient(
     """
     state, parameters = robots[0, robot], kinds[robot]
     for sensor in range(out.shape[0]):
-        turn, instant_ns = sample_instant(time_ns, sensor) if is_noisy else (np.int64(0), time_ns)
-        x, y, heading = pose_at(state, tick_count, instant_ns)
+        turn, x, y, heading = sampled_pose(state, tick_count, time_ns, sensor, is_noisy)
         count = expected_ambient(sight, lamps, parameters, x, y, heading, sensor)
         if is_noisy:
             jitter = uniform(seed, 0, robot, STREAM_AMBIENT, turn, sensor)

@@ -131,6 +131,11 @@ def _places_mm(angle_deg: Sequence[float], radius_mm: Sequence[float]) -> tuple[
     return x_mm, y_mm
 
 
+def ray_offsets_deg(field_of_view_deg: float) -> tuple[float, ...]:
+    """Return the angles of a sensor's rays off its axis [deg], the leftmost first (thesis); left is positive."""
+    return tuple(field_of_view_deg * (0.5 - ray / (RAY_COUNT - 1)) for ray in range(RAY_COUNT))
+
+
 def _pack_response(robot: Any, spec: RobotSpec) -> None:
     """Write which response it is, its rays and its constants."""
     proximity = spec.proximity
@@ -150,9 +155,7 @@ def _pack_response(robot: Any, spec: RobotSpec) -> None:
     robot["reach_mm"] = reach_mm
     robot["ray_x_mm"], robot["ray_y_mm"] = _places_mm(geometry.mount_angle_deg, radius_mm)
     for sensor in range(SENSOR_COUNT):
-        for ray in range(RAY_COUNT):
-            # The leftmost ray comes first, as in the thesis.
-            offset_deg = geometry.field_of_view_deg * (0.5 - ray / (RAY_COUNT - 1))
+        for ray, offset_deg in enumerate(ray_offsets_deg(geometry.field_of_view_deg)):
             sine, cosine = sin_cos(math.radians(geometry.direction_deg[sensor] + offset_deg))
             robot["ray_cos"][sensor, ray] = cosine
             robot["ray_sin"][sensor, ray] = sine
@@ -168,9 +171,8 @@ def _pack_reflection(robot: Any, reflection: Reflection, proximity: Proximity) -
         robot[name] = getattr(reflection, name)
     scale = (LIGHT_MM + reflection.behind_mm) ** 3
     for sensor in range(SENSOR_COUNT):
-        for ray in range(RAY_COUNT):
-            off_deg = proximity.field_of_view_deg * (0.5 - ray / (RAY_COUNT - 1))
-            lobe = exponential(-0.5 * (off_deg / reflection.lobe_deg[sensor]) ** 2)
+        for ray, offset_deg in enumerate(ray_offsets_deg(proximity.field_of_view_deg)):
+            lobe = exponential(-0.5 * (offset_deg / reflection.lobe_deg[sensor]) ** 2)
             robot["ray_weight"][sensor, ray] = reflection.light[sensor] * lobe * scale
 
 

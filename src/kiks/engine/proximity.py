@@ -43,6 +43,14 @@ def pose_at(robot: Any, tick_count: Any, time_ns: Any) -> Any:
 
 
 @kernel
+def sampled_pose(robot: Any, tick_count: Any, time_ns: Any, sensor: Any, is_sampled: Any) -> Any:
+    """Return a sensor's round, and x, y and heading of the robot as it was sampled in it; if it is not, those now."""
+    turn, instant_ns = sample_instant(time_ns, sensor) if is_sampled else (np.int64(0), time_ns)
+    x, y, heading = pose_at(robot, tick_count, instant_ns)
+    return turn, x, y, heading
+
+
+@kernel
 def expected_count(sight: Any, networks: Any, parameters: Any, x: Any, y: Any, heading: Any, sensor: Any) -> Any:
     """Return the count that a sensor of a robot at this pose gives on average; nothing cuts it off at the top."""
     sine, cosine = sin_cos(heading)
@@ -139,8 +147,7 @@ def read_proximity(
     """
     state, parameters = robots[0, robot], kinds[robot]
     for sensor in range(out.shape[0]):
-        turn, instant_ns = sample_instant(time_ns, sensor) if is_noisy else (np.int64(0), time_ns)
-        x, y, heading = pose_at(state, tick_count, instant_ns)
+        turn, x, y, heading = sampled_pose(state, tick_count, time_ns, sensor, is_noisy)
         count = expected_count(sight, networks, parameters, x, y, heading, sensor)
         if is_noisy:
             sign = uniform(seed, 0, robot, STREAM_PROXIMITY, turn, sensor * 3)

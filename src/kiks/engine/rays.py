@@ -45,11 +45,16 @@ def scale(sight: Any) -> Any:
 
 
 @kernel
+def cell_at(raster: Any, column: Any, row: Any) -> Any:
+    """Return the column and row of the cell that a place is in; outside the raster, of the nearest one."""
+    return min(max(np.int64(column), 0), raster.shape[1] - 1), min(max(np.int64(row), 0), raster.shape[0] - 1)
+
+
+@kernel
 def free_cells(sight: Any, column: Any, row: Any) -> Any:
     """Return how far a point may go in any direction without meeting a wall [cells]; at most 0 next to one."""
     field, _, _, cell, _ = sight
-    i = min(max(np.int64(column), 0), field.shape[1] - 1)
-    j = min(max(np.int64(row), 0), field.shape[0] - 1)
+    i, j = cell_at(field, column, row)
     return field[j, i] * (1.0 / cell) - _DIAGONAL
 
 
@@ -79,8 +84,7 @@ def cast(sight: Any, column: Any, row: Any, cosine: Any, sine: Any, reach: Any, 
     while length < reach:
         px = column + length * cosine
         py = row + length * sine
-        i = min(max(np.int64(px), 0), field.shape[1] - 1)
-        j = min(max(np.int64(py), 0), field.shape[0] - 1)
+        i, j = cell_at(field, px, py)
         clearance = field[j, i] * per_cell
         if clearance == 0.0:
             return length, np.int64(surface[j, i])
@@ -103,8 +107,7 @@ def meet_face(sight: Any, column: Any, row: Any, cosine: Any, sine: Any, length:
     faces = sight[2]
     before = length - _BACK
     px, py = column + before * cosine, row + before * sine
-    i = min(max(np.int64(px), 0), faces.shape[1] - 1)
-    j = min(max(np.int64(py), 0), faces.shape[0] - 1)
+    i, j = cell_at(faces, px, py)
     x, y = faces[j, i, 0], faces[j, i, 1]
     squarely = x * cosine + y * sine
     if x == 0.0 and y == 0.0:  # it begins in a wall, or meets the tip of a corner between cells
@@ -120,26 +123,14 @@ def stride(sight: Any, column: Any, row: Any, cosine: Any, sine: Any, reach: Any
     """Follow one ray in fewer and longer leaps than `cast`, to within a cell or so of what that says.
 
     A leap takes the ray to begin in the middle of its cell and may end inside a wall, a cell deep at most. Tips of
-    corners that a ray meets for less than a cell it may miss, straight walls of one cell it does not.
-
-    Args:
-        sight: What rays meet.
-        column: Origin [cells].
-        row: Origin [cells].
-        cosine: Direction.
-        sine: Direction.
-        reach: Longest length followed [cells].
-        begin: Length that is known to be free [cells].
-
-    Returns:
-        Length of the ray [cells] and the brightness of what it met, as `cast` does.
+    corners that a ray meets for less than a cell it may miss, straight walls of one cell it does not. It takes and
+    returns what `cast` does.
     """
     field, surface, _, cell, _ = sight
     per_cell = 1.0 / cell
     length = begin
     while length < reach:
-        i = min(max(np.int64(column + length * cosine), 0), field.shape[1] - 1)
-        j = min(max(np.int64(row + length * sine), 0), field.shape[0] - 1)
+        i, j = cell_at(field, column + length * cosine, row + length * sine)
         clearance = field[j, i] * per_cell
         if clearance == 0.0:
             return max(length - 0.5 * _STRIDE, 0.0), np.int64(surface[j, i])
@@ -217,8 +208,7 @@ def is_lit(sight: Any, x: Any, y: Any, lamp_x: Any, lamp_y: Any) -> Any:
     if brightness == 0:
         return True
     while length < reach:
-        i = min(max(np.int64(column + dx * length / reach), 0), field.shape[1] - 1)
-        j = min(max(np.int64(row + dy * length / reach), 0), field.shape[0] - 1)
+        i, j = cell_at(field, column + dx * length / reach, row + dy * length / reach)
         if field[j, i] > 0.0:
             return False
         length += 0.5

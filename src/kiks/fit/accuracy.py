@@ -195,7 +195,7 @@ def _unseen(tables: Mapping[str, Samples]) -> dict[str, dict[str, Score]]:
     base = RobotSpec.load("khepera")
     assert base.reflection is not None
     # It must not begin with what it knows of the object already.
-    alike = {f"reflection__{key}": (1.0 * np.mean(getattr(base.reflection, key)),) * SENSOR_COUNT for key in _FITTED}
+    alike = {f"reflection__{key}": (float(np.mean(getattr(base.reflection, key))),) * SENSOR_COUNT for key in _FITTED}
     scores: dict[str, dict[str, Score]] = {FOUND: {}, TOLD: {}}
     for name, table in tables.items():
         others = [other.at_angles(HALVES["even"]) for each, other in tables.items() if each != name]

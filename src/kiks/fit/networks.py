@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from kiks.engine.parameters import ray_offsets_deg
 from kiks.errors import ParameterError
 from kiks.fit.samples import MAXIMUM_COUNTS, Fan, Floats, Samples, is_active, nearnesses
 from kiks.model.network import INPUT_COUNT, LINEAR_COUNT, TANH_COUNT, NetworkResponse
@@ -264,13 +265,12 @@ def response_of(networks: Sequence[Network], *, places: str = "rim") -> NetworkR
 
 def fan_of(response: NetworkResponse) -> Fan:
     """Return the rays of a response."""
-    half = response.field_of_view_deg / 2
     return Fan.spread(
         response.mount_angle_deg,
         response.mount_radius_mm,
         response.direction_deg,
         range_mm=response.range_mm,
-        offsets_deg=tuple(np.linspace(half, -half, INPUT_COUNT).tolist()),
+        offsets_deg=ray_offsets_deg(response.field_of_view_deg),
     )
 
 

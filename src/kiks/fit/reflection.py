@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from kiks.engine.parameters import RAY_COUNT, pack
+from kiks.engine.parameters import RAY_COUNT, pack, ray_offsets_deg
 from kiks.engine.responses import respond_all
 from kiks.errors import ParameterError
 from kiks.fit.rig import Rig
@@ -65,13 +65,12 @@ def predict(spec: RobotSpec, samples: Samples) -> Floats:
         Counts, shape [gaps, angles, 8].
     """
     proximity = spec.proximity
-    offsets_deg = tuple((proximity.field_of_view_deg * (0.5 - np.arange(RAY_COUNT) / (RAY_COUNT - 1))).tolist())
     fan = Fan.spread(
         proximity.mount_angle_deg,
         proximity.mount_radius_mm,
         proximity.direction_deg,
         range_mm=proximity.range_mm,
-        offsets_deg=offsets_deg,
+        offsets_deg=ray_offsets_deg(proximity.field_of_view_deg),
     )
     length_mm, cosine = (part.reshape(-1, SENSOR_COUNT, RAY_COUNT) for part in meet(samples, fan))
     counts = np.empty(samples.counts.shape)
@@ -147,6 +146,9 @@ class _Search:
         active = np.bincount(self.sweep[is_active(self.measured)], minlength=self.sweeps)
         owned = np.repeat(np.eye(len(tables)), self.gap_counts, axis=1) * active
         self.share = owned / np.maximum(owned.sum(axis=1, keepdims=True), 1)
+        # The priors are linear.
+        zero = self._priors(np.zeros(self.size))
+        self.prior_slopes = np.stack([self._priors(unit) - zero for unit in np.eye(self.size)], axis=1)
 
     def _pick(self, parts: list[Any]) -> Floats:
         picked: Floats = np.concatenate([part.ravel() for part in parts])[self.chosen]
@@ -159,19 +161,17 @@ class _Search:
         room = np.concatenate(
             [np.repeat(_ROOM, SENSOR_COUNT), _SHARED_ROOM, np.repeat(5 * np.array(_RIG_PRIORS), self.sweeps)]
         )
-        free = np.arange(0 if is_robot_free else self.rig, self.size)
+        fixed = 0 if is_robot_free else self.rig
 
-        def widened(some: Floats) -> Floats:
-            unknowns = start.copy()
-            unknowns[free] = some
-            return unknowns
+        def widened(free: Floats) -> Floats:
+            return np.concatenate([start[:fixed], free])
 
         found = least_squares(
-            lambda some: self._residuals(widened(some)),
-            start[free],
-            lambda some: self._slopes(widened(some))[:, free],
-            bounds=((start - room)[free], (start + room)[free]),
-            x_scale=room[free],
+            lambda free: self._residuals(widened(free)),
+            start[fixed:],
+            lambda free: self._slopes(widened(free), fixed),
+            bounds=((start - room)[fixed:], (start + room)[fixed:]),
+            x_scale=room[fixed:],
             loss="soft_l1",
             xtol=1e-6,
             ftol=1e-6,
@@ -239,14 +239,14 @@ class _Search:
     def _residuals(self, unknowns: Floats) -> Floats:
         return np.concatenate([self._misses(unknowns), self._priors(unknowns)])
 
-    def _slopes(self, unknowns: Floats) -> Any:
+    def _slopes(self, unknowns: Floats, fixed: int) -> Any:
+        """Return how the residuals grow with the unknowns after the first few, which are fixed."""
         from scipy.sparse import csr_array
 
         now = self._misses(unknowns)
         rows = np.arange(len(now))
-        zero = self._priors(np.zeros(self.size))  # the priors are linear
-        matrix = np.zeros((len(now) + len(zero), self.size))
-        matrix[len(now) :] = np.stack([self._priors(unit) - zero for unit in np.eye(self.size)], axis=1)
+        matrix = np.zeros((len(now) + len(self.prior_slopes), self.size))
+        matrix[len(now) :] = self.prior_slopes
 
         def slope(first: int, count: int, step: float) -> Floats:
             moved = unknowns.copy()
@@ -261,6 +261,7 @@ class _Search:
         )
         for steps, count, owner in groups:
             for step in steps.values():
-                matrix[rows, first + owner] = slope(first, count, step)
+                if first >= fixed:
+                    matrix[rows, first + owner] = slope(first, count, step)
                 first += count
-        return csr_array(matrix)
+        return csr_array(matrix[:, fixed:])

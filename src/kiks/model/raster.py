@@ -185,7 +185,9 @@ def _block_means(values: npt.NDArray[np.bool_], block: int) -> npt.NDArray[np.fl
         return values.astype(np.float64)
     rows, columns = (np.arange(0, count, block) for count in values.shape)
     sums = np.add.reduceat(np.add.reduceat(values, rows, axis=0, dtype=np.int64), columns, axis=1)
-    cells = np.add.reduceat(np.add.reduceat(np.ones_like(values), rows, axis=0, dtype=np.int64), columns, axis=1)
+    cells = np.outer(
+        *(np.diff(starts, append=count) for starts, count in zip((rows, columns), values.shape, strict=True))
+    )
     means: npt.NDArray[np.float64] = sums / cells
     return means
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 import threading
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kiks.clock.program import Program
 from kiks.engine import ambient, contact, proximity, step
@@ -128,28 +130,19 @@ class Simulation:
         )
 
     def _sense_proximity(self, index: int, is_noisy: bool = True) -> list[Any]:
-        out = self._counts if is_noisy else self._expected
-        proximity.read_proximity(
-            self.state.robots,
-            self._kinds,
-            self.sight,
-            self._networks,
-            self.state.tick_count,
-            self.now_ns,
-            self.seed,
-            index,
-            is_noisy,
-            out,
-        )
-        return out.tolist()
+        return self._sense(proximity.read_proximity, self._networks, index, is_noisy)
 
     def _sense_ambient(self, index: int, is_noisy: bool = True) -> list[Any]:
+        return self._sense(ambient.read_ambient, self.lamps, index, is_noisy)
+
+    def _sense(self, read: Callable[..., Any], given: NDArray[Any], index: int, is_noisy: bool) -> list[Any]:
+        """Return what an entry of the engine reads, which besides what rays meet needs one thing more."""
         out = self._counts if is_noisy else self._expected
-        ambient.read_ambient(
+        read(
             self.state.robots,
             self._kinds,
             self.sight,
-            self.lamps,
+            given,
             self.state.tick_count,
             self.now_ns,
             self.seed,
