@@ -9,6 +9,7 @@ import pytest
 
 from kiks.engine import motor, step
 from kiks.engine.parameters import pack
+from kiks.engine.scene import make_scene
 from kiks.engine.state import State
 from kiks.model.arena import PAD, Arena
 from kiks.model.robot import RobotSpec
@@ -29,6 +30,7 @@ class World:
         self.robot["position_gains"] = self.spec.reset.position_gains
         self.robot["profile_speed"] = self.spec.reset.profile_speed_pulses
         self.robot["profile_acceleration"] = self.spec.reset.profile_acceleration
+        self.scene = make_scene(self.state, self.kinds, arena.width_mm, arena.height_mm)
         self.radius = self.spec.body.radius_mm
 
     def place(self, x_mm: float, y_mm: float, heading_rad: float = 0.0) -> World:
@@ -50,7 +52,7 @@ class World:
 
     def tick(self, count: int = 1) -> None:
         now = self.state.tick_count
-        step.advance(self.state.robots, self.kinds, self.arena.clearance, self.cell, PAD, self.seed, now, count)
+        step.advance(self.scene, (self.arena.clearance, self.cell, PAD), self.seed, now, count)
         self.state.tick_count = now + count
 
     @property

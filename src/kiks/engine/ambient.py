@@ -21,9 +21,11 @@ from typing import Any
 import numpy as np
 
 from kiks.engine.compiling import entry, kernel
+from kiks.engine.discs import ALL_AROUND, everybody_else, see
 from kiks.engine.numbers import power, sin_cos, uniform
 from kiks.engine.proximity import quantize, sampled_pose
-from kiks.engine.rays import is_lit
+from kiks.engine.rays import is_lit, scale
+from kiks.engine.scene import moment_of
 
 STREAM_AMBIENT = 3
 """Random stream of the noise on light readings."""
@@ -51,8 +53,30 @@ def curve(parameters: Any, distance_mm: Any) -> Any:
 
 
 @kernel
-def expected_ambient(sight: Any, lamps: Any, parameters: Any, x: Any, y: Any, heading: Any, sensor: Any) -> Any:
-    """Return the count that a sensor of a robot at this pose gives on average for the lamps' light."""
+def expected_ambient(
+    sight: Any,
+    lamps: Any,
+    parameters: Any,
+    seen: Any,
+    seen_count: Any,
+    x: Any,
+    y: Any,
+    heading: Any,
+    sensor: Any,
+) -> Any:
+    """Return the count that a sensor of a robot at this pose gives on average for the lamps' light.
+
+    Args:
+        sight: What rays meet of the arena.
+        lamps: x [mm], y [mm], power [W] and 1 for on or 0 for off, shape [lamp, 4].
+        parameters: Record of the robot's constants.
+        seen: The discs that may hide a lamp (`kiks.engine.discs`).
+        seen_count: How many they are.
+        x: Where the robot is [mm].
+        y: Where the robot is [mm].
+        heading: Where it looks [rad].
+        sensor: Index of the sensor.
+    """
     sine, cosine = sin_cos(heading)
     out_x = parameters.mount_x_mm[sensor] * cosine - parameters.mount_y_mm[sensor] * sine
     out_y = parameters.mount_x_mm[sensor] * sine + parameters.mount_y_mm[sensor] * cosine
@@ -70,7 +94,7 @@ def expected_ambient(sight: Any, lamps: Any, parameters: Any, x: Any, y: Any, he
             continue
         if not (lamps[number, 3] > 0.0 and watts > 0.0):
             continue
-        if not is_lit(sight, x + out_x, y + out_y, lamps[number, 0], lamps[number, 1]):
+        if not is_lit(sight, seen, seen_count, x + out_x, y + out_y, lamps[number, 0], lamps[number, 1]):
             continue
         distance = max(distance, _NEAREST_MM)
         cos_angle = min(along / distance, 1.0)
@@ -86,8 +110,7 @@ def expected_ambient(sight: Any, lamps: Any, parameters: Any, x: Any, y: Any, he
 
 @entry
 def read_ambient(
-    robots: Any,
-    kinds: Any,
+    scene: Any,
     sight: Any,
     lamps: Any,
     tick_count: Any,
@@ -100,9 +123,8 @@ def read_ambient(
     """Write the eight counts that command O returns at a time into `out`, each sampled at its own instant.
 
     Args:
-        robots: Records of `ROBOT`, shape [world_count, robot_count].
-        kinds: Records of `PARAMETERS`, shape [robot_count].
-        sight: What rays meet (`kiks.engine.rays`).
+        scene: What there is (`kiks.engine.scene`).
+        sight: What rays meet of the arena (`kiks.engine.rays`).
         lamps: x [mm], y [mm], power [W] and 1 for on or 0 for off, shape [lamp, 4].
         tick_count: Ticks done.
         time_ns: When the robot reads.
@@ -111,11 +133,15 @@ def read_ambient(
         is_noisy: False for the expected counts at the pose of this very time, without rounding.
         out: int64, or float64 for expected counts, shape [8].
     """
-    state, parameters = robots[0, robot], kinds[robot]
+    robots, _, kinds, _ = scene
+    state = robots[0, robot]
+    parameters = kinds[state.kind]
+    found, count, seen = everybody_else(scene, 0, robot)
     for sensor in range(out.shape[0]):
-        turn, x, y, heading = sampled_pose(state, tick_count, time_ns, sensor, is_noisy)
-        count = expected_ambient(sight, lamps, parameters, x, y, heading, sensor)
+        turn, instant_ns, x, y, heading = sampled_pose(state, tick_count, time_ns, sensor, is_noisy)
+        seen_count = see(scene, 0, found, count, moment_of(tick_count, instant_ns), scale(sight), ALL_AROUND, seen)
+        counts = expected_ambient(sight, lamps, parameters, seen, seen_count, x, y, heading, sensor)
         if is_noisy:
             jitter = uniform(seed, 0, robot, STREAM_AMBIENT, turn, sensor)
-            count = quantize(parameters, count + parameters.dark_noise_counts * (2.0 * jitter - 1.0))
-        out[sensor] = count
+            counts = quantize(parameters, counts + parameters.dark_noise_counts * (2.0 * jitter - 1.0))
+        out[sensor] = counts

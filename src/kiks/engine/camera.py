@@ -4,7 +4,7 @@ Source: khepera-protocol.md 10.3, kiks-behaviour.md 3.3 (whose constants were tu
 manual) and thesis 3.4 ("Linear vision extension module").
 
 Method: 64 rays from +18 to -18 degrees, the leftmost pixel first, from the robot's centre; the view begins 50 mm from
-it. A ray ends at the first wall, whose brightness 1..255 becomes a grey of 50..245. Then, in this order: the lens
+it. A ray ends at the first thing, whose brightness 1..255 becomes a grey of 50..245. Then, in this order: the lens
 blurs what is far, the exposure adapts to the scene, the converter adds noise, the picture darkens towards its edges,
 motion smears it, the line adds noise once more.
 
@@ -25,10 +25,12 @@ from typing import Any
 import numpy as np
 
 from kiks.engine.compiling import entry, kernel
+from kiks.engine.discs import ALL_AROUND, everybody_else, meet_disc, see
 from kiks.engine.lanes import stack_floats
-from kiks.engine.numbers import sin_cos, uniform
+from kiks.engine.numbers import draw, sin_cos, source
 from kiks.engine.proximity import pose_at
 from kiks.engine.rays import cast, cast_many, free_cells, scale
+from kiks.engine.scene import moment_of
 from kiks.engine.state import PIXEL_COUNT
 from kiks.units import TICK_NS
 
@@ -85,8 +87,10 @@ def smear(grey: Any, half_width: Any) -> Any:
 
 
 @kernel
-def look(sight: Any, x: Any, y: Any, heading: Any, grey: Any, distance_mm: Any) -> Any:
-    """Write the grey of the wall that each pixel looks at, and how far it is [mm] from the robot's centre."""
+def look(
+    sight: Any, seen: Any, seen_count: Any, x: Any, y: Any, heading: Any, grey: Any, distance_mm: Any
+) -> Any:
+    """Write the grey of what each pixel looks at, and how far it is [mm] from the robot's centre."""
     cell, pad = scale(sight)
     per_cell = 1.0 / cell
     column, row = x * per_cell + pad, y * per_cell + pad
@@ -108,6 +112,10 @@ def look(sight: Any, x: Any, y: Any, heading: Any, grey: Any, distance_mm: Any) 
         if length == 0.0:  # the view begins inside a wall: what is seen is its surface
             start = 0.0
             length, brightness = cast(sight, column, row, rays_x[p], rays_y[p], _ANYWHERE)
+        if seen_count > 0:
+            to_disc, _, disc_brightness = meet_disc(seen, seen_count, column, row, rays_x[p], rays_y[p], start + length)
+            if disc_brightness > 0:
+                start, length, brightness = 0.0, to_disc, disc_brightness
         grey[p] = _BLACK + brightness * ((_WHITE - _BLACK) / 255.0)
         distance_mm[p] = (start + length) * cell
 
@@ -132,7 +140,7 @@ def darken_edges(grey: Any, noise: Any) -> Any:
 
 @entry
 def take_image(
-    robots: Any,
+    scene: Any,
     sight: Any,
     tick_count: Any,
     time_ns: Any,
@@ -144,8 +152,8 @@ def take_image(
     """Write the image that a robot's camera takes at a time into `out` and return its light level.
 
     Args:
-        robots: Records of `ROBOT`, shape [world_count, robot_count].
-        sight: What rays meet (`kiks.engine.rays`).
+        scene: What there is (`kiks.engine.scene`).
+        sight: What rays meet of the arena (`kiks.engine.rays`).
         tick_count: Ticks done.
         time_ns: When, at most 10 ms before the end of the last tick.
         seed: Seed of the run.
@@ -156,7 +164,7 @@ def take_image(
     Returns:
         What the light detector says of the scene, more for a darker one.
     """
-    state = robots[0, robot]
+    state = scene[0][0, robot]
     x, y, heading = pose_at(state, tick_count, time_ns)
     x_before, y_before, heading_before = pose_at(state, tick_count, time_ns - TICK_NS)
     sine, cosine = sin_cos(heading)
@@ -167,13 +175,16 @@ def take_image(
     chance = np.full((3, PIXEL_COUNT), 0.5)
     flicker = 0.5
     if is_noisy:
-        flicker = uniform(seed, 0, robot, STREAM_CAMERA, time_ns, 3 * PIXEL_COUNT)
+        origin = source(seed, 0, robot, STREAM_CAMERA, time_ns)
+        flicker = draw(origin, 3 * PIXEL_COUNT)
         for kind in range(3):
             for p in range(PIXEL_COUNT):
-                chance[kind, p] = uniform(seed, 0, robot, STREAM_CAMERA, time_ns, kind * PIXEL_COUNT + p)
+                chance[kind, p] = draw(origin, kind * PIXEL_COUNT + p)
 
     distance_mm, half_width = stack_floats(PIXEL_COUNT), stack_floats(PIXEL_COUNT)
-    look(sight, x, y, heading, out, distance_mm)
+    found, count, seen = everybody_else(scene, 0, robot)
+    seen_count = see(scene, 0, found, count, moment_of(tick_count, time_ns), scale(sight), ALL_AROUND, seen)
+    look(sight, seen, seen_count, x, y, heading, out, distance_mm)
     for p in range(PIXEL_COUNT):
         half_width[p] = 0.5 + _DEFOCUS_PIXELS * max(1.0 - _SHARP_MM / distance_mm[p], 0.0)
     if distance_mm.max() > _SHARP_MM:

@@ -24,22 +24,22 @@ _pack: Any = cgutils.pack_array
 _CACHE_LINE = 64  # bytes
 
 
-@_intrinsic
-def stack_floats(typing: Any, count: Any) -> Any:
-    """Return an uninitialised float64 array on the stack, of a length that is a constant; it dies with its function."""
+def _on_the_stack(count: Any, element_type: Any) -> Any:
+    """Return signature and code of an intrinsic that makes an array on the stack; None if its length is no constant."""
     if not isinstance(count, types.IntegerLiteral):
         return None
-    array_type = types.Array(types.float64, 1, "C")
+    array_type = types.Array(element_type, 1, "C")
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        content = context.get_data_type(element_type)
         with builder.goto_entry_block():
-            memory = builder.alloca(ir.ArrayType(ir.DoubleType(), count.literal_value))
+            memory = builder.alloca(ir.ArrayType(content, count.literal_value))
             memory.align = _CACHE_LINE
         size = context.get_value_type(types.intp)
         array = _arrays.make_array(array_type)(context, builder)
         _arrays.populate_array(
             array,
-            data=builder.bitcast(memory, ir.DoubleType().as_pointer()),
+            data=builder.bitcast(memory, content.as_pointer()),
             shape=_pack(builder, [size(count.literal_value)]),
             strides=_pack(builder, [size(8)]),
             itemsize=size(8),
@@ -49,6 +49,18 @@ def stack_floats(typing: Any, count: Any) -> Any:
         return array._getvalue()
 
     return array_type(count), generate
+
+
+@_intrinsic
+def stack_floats(typing: Any, count: Any) -> Any:
+    """Return an uninitialised float64 array on the stack, of a length that is a constant; it dies with its function."""
+    return _on_the_stack(count, types.float64)
+
+
+@_intrinsic
+def stack_integers(typing: Any, count: Any) -> Any:
+    """Return an uninitialised int64 array on the stack, of a length that is a constant; it dies with its function."""
+    return _on_the_stack(count, types.int64)
 
 
 @_intrinsic

@@ -38,6 +38,9 @@ def move(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, left: Any
         left: Path that the left wheel would make without a wall [pulses].
         right: The same of the right wheel.
         slip_ratio: Share of its command at which a blocked wheel turns.
+
+    Returns:
+        Whether it touched a wall.
     """
     pulse = parameters.pulse_mm
     base = parameters.wheel_base_mm
@@ -69,9 +72,38 @@ def move(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, left: Any
     robot.slip_pulses[1] += right - rim_right
     robot.wheel_pulses[0] += rim_left
     robot.wheel_pulses[1] += rim_right
+    return is_touching
+
+
+@kernel
+def note_contact(robot: Any, is_touching: Any) -> Any:
+    """Phase: count the contacts; one that lasts counts once."""
     if is_touching and robot.is_touching == 0:
         robot.contact_count += 1
     robot.is_touching = 1 if is_touching else 0
+
+
+@kernel
+def give_way(robot: Any, parameters: Any, dx: Any, dy: Any, wheels: Any, slip_ratio: Any) -> Any:
+    """Let a robot that something has pushed by (dx, dy) [mm] count what its rims did.
+
+    A push brakes the wheels, at most to a stop, and turns none faster: gears of 25:1 cannot be driven from the wheel.
+
+    Args:
+        robot: Record of the robot.
+        parameters: Record of its constants.
+        dx: How far it was pushed [mm].
+        dy: How far it was pushed [mm].
+        wheels: The paths that its wheels have made [pulses].
+        slip_ratio: Share of its command at which a blocked wheel turns.
+    """
+    sine, cosine = sin_cos(robot.heading_rad)
+    pushed = (1.0 - slip_ratio) * (dx * cosine + dy * sine) / parameters.pulse_mm
+    for wheel in range(2):
+        path = wheels[wheel]
+        lost = min(max(-pushed, 0.0), path) if path > 0.0 else max(min(-pushed, 0.0), path)
+        robot.wheel_pulses[wheel] -= lost
+        robot.slip_pulses[wheel] += lost
 
 
 @kernel

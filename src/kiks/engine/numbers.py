@@ -123,12 +123,23 @@ def mix(value: Any) -> Any:
 
 
 @kernel
-def uniform(seed: Any, world: Any, robot: Any, stream: Any, instant: Any, index: Any) -> Any:
-    """Return the random number in [0, 1) that belongs to this seed, world, robot, stream, instant and index."""
+def source(seed: Any, world: Any, robot: Any, stream: Any, instant: Any) -> Any:
+    """Return what the random numbers of this seed, world, robot, stream and instant come from, for `draw`."""
     z = mix(np.uint64(seed))
     z = mix(z ^ np.uint64(world))
     z = mix(z ^ np.uint64(robot))
     z = mix(z ^ np.uint64(stream))
-    z = mix(z ^ np.uint64(instant))
-    z = mix(z ^ np.uint64(index))
+    return mix(z ^ np.uint64(instant))
+
+
+@kernel
+def draw(origin: Any, index: Any) -> Any:
+    """Return a random number in [0, 1): the one of an index from a source."""
+    z = mix(origin ^ np.uint64(index))
     return np.float64(z >> np.uint64(11)) * (1.0 / 9007199254740992.0)
+
+
+@kernel
+def uniform(seed: Any, world: Any, robot: Any, stream: Any, instant: Any, index: Any) -> Any:
+    """Return the random number in [0, 1) that belongs to this seed, world, robot, stream, instant and index."""
+    return draw(source(seed, world, robot, stream, instant), index)

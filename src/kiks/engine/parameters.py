@@ -30,6 +30,9 @@ from kiks.units import TICK_NS
 RAY_COUNT = 7
 """Rays of a proximity sensor (thesis 3.3, "Proximity sensors")."""
 
+AHEAD = 3
+"""The ray of a sensor that goes straight ahead."""
+
 CURVE_POINT_COUNT = 129
 """Points of a measured curve, evenly spread from 0 to the end of the range."""
 
@@ -42,6 +45,7 @@ STANDIN_RANGE_MM, STANDIN_REACH = 50.0, 1.06
 PARAMETERS = np.dtype(
     [
         ("radius_mm", "f8"),
+        ("brightness", "i8"),  # of the body, as others see it
         ("wheel_base_mm", "f8"),
         ("pulse_mm", "f8"),
         ("wall_friction", "f8"),
@@ -99,7 +103,7 @@ def pack(spec: RobotSpec) -> NDArray[np.void]:
     packed = np.zeros(1, PARAMETERS)
     robot: Any = packed[0]
     body, motor, proximity = spec.body, spec.motor, spec.proximity
-    robot["radius_mm"] = body.radius_mm
+    robot["radius_mm"], robot["brightness"] = body.radius_mm, body.brightness
     for name in ("wheel_base_mm", "pulse_mm", "wall_friction", "slip_ratio_min", "slip_ratio_max"):
         robot[name] = getattr(body, name)
     robot["free_speed_pulses"] = motor.free_speed_pulses

@@ -11,16 +11,21 @@ from typing import Any
 import numpy as np
 
 from kiks.engine.compiling import entry, kernel
-from kiks.engine.lanes import stack_floats
+from kiks.engine.discs import SEEN_LIMIT, SEEN_SIZE, meet_disc, see
+from kiks.engine.lanes import stack_floats, stack_integers
 from kiks.engine.motion import pose_between
-from kiks.engine.numbers import sin_cos, uniform
-from kiks.engine.parameters import RAY_COUNT
+from kiks.engine.numbers import draw, sin_cos, source
+from kiks.engine.parameters import AHEAD, RAY_COUNT
 from kiks.engine.rays import cast, free_cells, meet_face, scale, stride
 from kiks.engine.responses import FAST, REFLECTION, respond
+from kiks.engine.scene import find_near, moment_of
 from kiks.units import SENSOR_ROUND_NS, SENSOR_SLOT_NS, TICK_NS
 
 STREAM_SLIP, STREAM_PROXIMITY = 1, 2
 """Random streams: whoever draws has a number of his own."""
+
+MOVED_MM = 40.0
+"""How much farther a thing may have been from a robot when its sensors were sampled: 20 ms, both at 1 m/s."""
 
 
 @kernel
@@ -44,15 +49,53 @@ def pose_at(robot: Any, tick_count: Any, time_ns: Any) -> Any:
 
 @kernel
 def sampled_pose(robot: Any, tick_count: Any, time_ns: Any, sensor: Any, is_sampled: Any) -> Any:
-    """Return a sensor's round, and x, y and heading of the robot as it was sampled in it; if it is not, those now."""
+    """Return a sensor's round, its instant [ns], and x, y and heading of the robot then; if not sampled, those now."""
     turn, instant_ns = sample_instant(time_ns, sensor) if is_sampled else (np.int64(0), time_ns)
     x, y, heading = pose_at(robot, tick_count, instant_ns)
-    return turn, x, y, heading
+    return turn, instant_ns, x, y, heading
 
 
 @kernel
-def expected_count(sight: Any, networks: Any, parameters: Any, x: Any, y: Any, heading: Any, sensor: Any) -> Any:
-    """Return the count that a sensor of a robot at this pose gives on average; nothing cuts it off at the top."""
+def view_of(parameters: Any, x: Any, y: Any, heading: Any, sensor: Any) -> Any:
+    """Return the view of a sensor of a robot at a pose, for `kiks.engine.discs.see`."""
+    sine, cosine = sin_cos(heading)
+    ray_x, ray_y = parameters.ray_x_mm[sensor], parameters.ray_y_mm[sensor]
+    ahead_x, ahead_y = parameters.ray_cos[sensor, AHEAD], parameters.ray_sin[sensor, AHEAD]
+    return (
+        x + ray_x * cosine - ray_y * sine,
+        y + ray_x * sine + ray_y * cosine,
+        ahead_x * cosine - ahead_y * sine,
+        ahead_x * sine + ahead_y * cosine,
+        parameters.reach_mm,
+        True,
+    )
+
+
+@kernel
+def expected_count(
+    sight: Any,
+    networks: Any,
+    parameters: Any,
+    seen: Any,
+    seen_count: Any,
+    x: Any,
+    y: Any,
+    heading: Any,
+    sensor: Any,
+) -> Any:
+    """Return the count that a sensor of a robot at this pose gives on average; nothing cuts it off at the top.
+
+    Args:
+        sight: What rays meet of the arena.
+        networks: What the response needs besides.
+        parameters: Record of the robot's constants.
+        seen: The discs that are in its view (`kiks.engine.discs`).
+        seen_count: How many they are.
+        x: Where the robot is [mm].
+        y: Where the robot is [mm].
+        heading: Where it looks [rad].
+        sensor: Index of the sensor.
+    """
     sine, cosine = sin_cos(heading)
     ray_x, ray_y = parameters.ray_x_mm[sensor], parameters.ray_y_mm[sensor]
     cell, pad = scale(sight)
@@ -61,7 +104,7 @@ def expected_count(sight: Any, networks: Any, parameters: Any, x: Any, y: Any, h
     row = (y + ray_x * sine + ray_y * cosine) * per_cell + pad
     reach = parameters.reach_mm * per_cell
     begin = max(free_cells(sight, column, row), 0.0)
-    if begin > reach:
+    if begin > reach and seen_count == 0:
         return parameters.baseline_counts[sensor]
     lengths_mm, cosines, brightnesses = stack_floats(RAY_COUNT), stack_floats(RAY_COUNT), stack_floats(RAY_COUNT)
     for ray in range(RAY_COUNT):
@@ -76,6 +119,10 @@ def expected_count(sight: Any, networks: Any, parameters: Any, x: Any, y: Any, h
         cosines[ray] = 1.0
         if parameters.response == REFLECTION and brightness > 0:
             length, cosines[ray] = meet_face(sight, column, row, direction_x, direction_y, length)
+        if seen_count > 0:
+            to_disc, squarely, disc_brightness = meet_disc(seen, seen_count, column, row, direction_x, direction_y, length)
+            if disc_brightness > 0:
+                length, cosines[ray], brightness = to_disc, squarely, disc_brightness
         lengths_mm[ray], brightnesses[ray] = length * cell, brightness
     counts = respond(networks, parameters, sensor, lengths_mm, cosines, brightnesses)
     return parameters.baseline_counts[sensor] + counts
@@ -120,8 +167,7 @@ def quantize(parameters: Any, count: Any) -> Any:
 
 @entry
 def read_proximity(
-    robots: Any,
-    kinds: Any,
+    scene: Any,
     sight: Any,
     networks: Any,
     tick_count: Any,
@@ -134,9 +180,8 @@ def read_proximity(
     """Write the eight counts that command N returns at a time into `out`, each sampled at its own instant.
 
     Args:
-        robots: Records of `ROBOT`, shape [world_count, robot_count].
-        kinds: Records of `PARAMETERS`, shape [robot_count].
-        sight: What rays meet (`kiks.engine.rays`).
+        scene: What there is (`kiks.engine.scene`).
+        sight: What rays meet of the arena (`kiks.engine.rays`).
         networks: A record of `kiks.engine.networks.NETWORKS`, or none if no robot's response needs them.
         tick_count: Ticks done.
         time_ns: When the robot reads.
@@ -145,14 +190,22 @@ def read_proximity(
         is_noisy: False for the expected counts at the pose of this very time, without rounding.
         out: int64, or float64 for expected counts, shape [8].
     """
-    state, parameters = robots[0, robot], kinds[robot]
+    robots, _, kinds, _ = scene
+    state = robots[0, robot]
+    parameters = kinds[state.kind]
+    found, seen = stack_integers(SEEN_LIMIT), stack_floats(SEEN_SIZE)
+    reach = parameters.radius_mm + parameters.reach_mm
+    near_count = find_near(scene, 0, state.x_mm, state.y_mm, reach + MOVED_MM, robot, found)
     for sensor in range(out.shape[0]):
-        turn, x, y, heading = sampled_pose(state, tick_count, time_ns, sensor, is_noisy)
-        count = expected_count(sight, networks, parameters, x, y, heading, sensor)
+        turn, instant_ns, x, y, heading = sampled_pose(state, tick_count, time_ns, sensor, is_noisy)
+        seen_count = 0
+        if near_count > 0:
+            moment, view = moment_of(tick_count, instant_ns), view_of(parameters, x, y, heading, sensor)
+            seen_count = see(scene, 0, found, near_count, moment, scale(sight), view, seen)
+        count = expected_count(sight, networks, parameters, seen, seen_count, x, y, heading, sensor)
         if is_noisy:
-            sign = uniform(seed, 0, robot, STREAM_PROXIMITY, turn, sensor * 3)
-            size = uniform(seed, 0, robot, STREAM_PROXIMITY, turn, sensor * 3 + 1)
-            jitter = uniform(seed, 0, robot, STREAM_PROXIMITY, turn, sensor * 3 + 2)
+            chance = source(seed, 0, robot, STREAM_PROXIMITY, turn)
+            sign, size, jitter = draw(chance, sensor * 3), draw(chance, sensor * 3 + 1), draw(chance, sensor * 3 + 2)
             out[sensor] = quantize(parameters, add_noise(parameters, count, sign, size, jitter))
         else:
             out[sensor] = min(count, parameters.maximum_counts)

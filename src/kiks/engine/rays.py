@@ -1,10 +1,10 @@
-"""What rays meet: how far one goes before it meets a wall, exact to a hundredth of a millimetre, and how bright it is.
+"""What rays meet of an arena: how far one goes to a wall, exact to a hundredth of a millimetre, and how bright that is.
 
 Method: the clearance of a cell (distance from its centre to the nearest wall cell's centre), less the diagonal of a
 cell, is a distance that any point of the cell may go freely in any direction: empty space is crossed in a few leaps.
 Next to a wall the ray goes to the edge of its cell instead, so no corner is missed.
 
-All that rays meet is one argument, `sight`, which sensors only pass on: a plain tuple, because with a named one each
+All that rays meet of an arena is one argument, `sight`, which sensors only pass on: a plain tuple, because with a named one each
 call from Python would cost half a microsecond more. It holds
 
 * field: distance of cells to the nearest wall [mm], 0 in a wall, float32 [rows, columns];
@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from kiks.engine.compiling import entry, kernel
+from kiks.engine.discs import hides
 from kiks.engine.lanes import element, pointer_to, stack_floats
 
 _DIAGONAL = 1.4142135623730951
@@ -195,8 +196,20 @@ def cast_many(sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, len
 
 
 @kernel
-def is_lit(sight: Any, x: Any, y: Any, lamp_x: Any, lamp_y: Any) -> Any:
-    """Say whether no wall stands between a place and a lamp [mm]. A lamp may hang over a wall, which hides nothing."""
+def is_lit(sight: Any, seen: Any, seen_count: Any, x: Any, y: Any, lamp_x: Any, lamp_y: Any) -> Any:
+    """Say whether nothing stands between a place and a lamp [mm].
+
+    A lamp may hang over a wall or a thing, which hides nothing then.
+
+    Args:
+        sight: What rays meet of the arena.
+        seen: Discs that may stand between (`kiks.engine.discs`).
+        seen_count: How many they are.
+        x: The place [mm].
+        y: The place [mm].
+        lamp_x: The lamp [mm].
+        lamp_y: The lamp [mm].
+    """
     field, _, _, cell, pad = sight
     per_cell = 1.0 / cell
     column, row = x * per_cell + pad, y * per_cell + pad
@@ -204,6 +217,9 @@ def is_lit(sight: Any, x: Any, y: Any, lamp_x: Any, lamp_y: Any) -> Any:
     reach = math.sqrt(dx * dx + dy * dy)
     if reach == 0.0:
         return True
+    for k in range(seen_count):
+        if hides(seen, k, column, row, dx / reach, dy / reach, reach):
+            return False
     length, brightness = cast(sight, column, row, dx / reach, dy / reach, reach)
     if brightness == 0:
         return True

@@ -1,4 +1,4 @@
-"""Everything that changes in a world: one record a robot, in an array [world, robot], so that a copy is a snapshot."""
+"""Everything that changes in a world: a record for each robot, ball and cylinder, so that a copy is a snapshot."""
 
 from __future__ import annotations
 
@@ -54,7 +54,8 @@ ROBOT = np.dtype(
         ("profile_acceleration", "i4", (2,)),
         ("speed_gains", "i4", (3,)),
         ("position_gains", "i4", (3,)),
-        # The rest of the robot.
+        # The rest of the robot: which of the kinds' constants are its own, and what its user sees and sets.
+        ("kind", "i8"),
         ("is_touching", "i4"),
         ("led", "u1", (2,)),
         ("bus", "u1", (64,)),
@@ -68,10 +69,36 @@ ROBOT = np.dtype(
     align=True,
 )
 
+BALL, CYLINDER = 3, 4
+"""What a body is, numbered as in the arenas of KiKS (kiks-behaviour.md 1.1)."""
+
+BODY = np.dtype(
+    [
+        ("x_mm", "f8"),
+        ("y_mm", "f8"),
+        ("trail", "f8", (TRAIL_LENGTH, 2)),
+        ("velocity_x", "f8"),  # [mm/s]
+        ("velocity_y", "f8"),
+        ("radius_mm", "f8"),
+        ("friction_mm_s2", "f8"),  # what a rolling or sliding body loses of its speed
+        ("kick_share", "f8"),  # of a robot's speed that it takes on when the robot runs into it
+        ("brightness", "i4"),
+        ("what", "i4"),
+        ("holder", "i4"),  # number of the robot whose gripper holds it, from 1; 0 for none
+        ("is_lifted", "i4"),  # above the floor, where nothing meets and nothing sees it
+    ],
+    align=True,
+)
+
 
 @dataclass
 class State:
-    """What changes: `robots`, an array of `ROBOT` with shape [world_count, robot_count], and the ticks done.
+    """What changes: the records of robots and of bodies, and the ticks done.
+
+    Attributes:
+        robots: An array of `ROBOT`, shape [world_count, robot_count].
+        bodies: An array of `BODY`, shape [world_count, body_count]; another array when a body comes or goes.
+        tick_count: Ticks done.
 
     Example:
         >>> state = State.empty(world_count=1, robot_count=2)
@@ -85,22 +112,25 @@ class State:
     """
 
     robots: NDArray[np.void]
+    bodies: NDArray[np.void]
     tick_count: int = 0
 
     @staticmethod
-    def empty(*, world_count: int, robot_count: int) -> State:
+    def empty(*, world_count: int, robot_count: int, body_count: int = 0) -> State:
         """Return a state of zeros."""
-        return State(np.zeros((world_count, robot_count), ROBOT))
+        return State(np.zeros((world_count, robot_count), ROBOT), np.zeros((world_count, body_count), BODY))
 
     def snapshot(self) -> State:
         """Return a copy."""
-        return State(self.robots.copy(), self.tick_count)
+        return State(self.robots.copy(), self.bodies.copy(), self.tick_count)
 
     def restore(self, snapshot: State) -> None:
-        """Become equal to a snapshot, in place: views of the arrays stay valid."""
+        """Become equal to a snapshot; robots in place, so that views of them stay valid."""
         self.robots[...] = snapshot.robots
+        self.bodies = snapshot.bodies.copy()
         self.tick_count = snapshot.tick_count
 
     def hash(self) -> str:
         """Return the first 16 hexadecimal digits of the SHA-256 of every bit of the state."""
-        return hashlib.sha256(self.tick_count.to_bytes(8, "little") + self.robots.tobytes()).hexdigest()[:16]
+        parts = (self.tick_count.to_bytes(8, "little"), self.robots.tobytes(), self.bodies.tobytes())
+        return hashlib.sha256(b"".join(parts)).hexdigest()[:16]

@@ -53,6 +53,7 @@ def check(spec: RobotSpec, where: str) -> None:
 def _check_drive(spec: RobotSpec, must: Must) -> None:
     body, motor, reset = spec.body, spec.motor, spec.reset
     must(10 <= body.diameter_mm <= 500, "body.diameter_mm", "between 10 and 500 mm")
+    must(1 <= body.brightness <= 255, "body.brightness", "between 1 and 255")
     must(0 < body.wheel_base_mm <= body.diameter_mm, "body.wheel_base_mm", "positive and no more than the diameter")
     must(0.001 <= body.pulse_mm <= 1, "body.pulse_mm", "between 0.001 and 1 mm")
     must(0 <= body.wall_friction <= 2, "body.wall_friction", "between 0 and 2")

@@ -25,9 +25,13 @@ LAMP_POINT_LIMIT = 64
 
 @dataclass(frozen=True)
 class Body:
-    """Shape and contact. `slip_ratio_min` and `_max` bound a blocked wheel's speed, as a share of its command."""
+    """Shape and contact. `slip_ratio_min` and `_max` bound a blocked wheel's speed, as a share of its command.
+
+    `brightness` is how other robots see it: 1 black to 255 white.
+    """
 
     diameter_mm: float
+    brightness: int
     wheel_base_mm: float
     pulse_mm: float
     wall_friction: float

@@ -16,6 +16,7 @@ from kiks.engine import ambient, contact, proximity, step
 from kiks.engine.networks import networks_for
 from kiks.engine.numbers import uniform
 from kiks.engine.parameters import pack
+from kiks.engine.scene import enter_everybody, make_scene
 from kiks.engine.state import State
 from kiks.errors import ParameterError, nearest
 from kiks.firmware.khepera import Firmware
@@ -100,7 +101,8 @@ class Simulation:
         self.lock = threading.RLock()
         self.now_ns = 0
         self.state = State.empty(world_count=1, robot_count=robots)
-        self._kinds = np.repeat(pack(self.spec), robots)
+        self._kinds = pack(self.spec)
+        self._scene = make_scene(self.state, self._kinds, self.arena.width_mm, self.arena.height_mm)
         self._networks = networks_for(self.spec.proximity.response)
         self._ground = (self.arena.clearance, float(self.arena.mm_per_cell), PAD)
         self.sight = (
@@ -139,8 +141,7 @@ class Simulation:
         """Return what an entry of the engine reads, which besides what rays meet needs one thing more."""
         out = self._counts if is_noisy else self._expected
         read(
-            self.state.robots,
-            self._kinds,
+            self._scene,
             self.sight,
             given,
             self.state.tick_count,
@@ -224,7 +225,7 @@ class Simulation:
         """Do the ticks that have begun up to a time [ns]."""
         ticks = -(-time_ns // TICK_NS) - self.state.tick_count
         if ticks > 0:
-            step.advance(self.state.robots, self._kinds, *self._ground, self.seed, self.state.tick_count, ticks)
+            step.advance(self._scene, self._ground, self.seed, self.state.tick_count, ticks)
             self.state.tick_count += ticks
 
     # ---- robots ----
@@ -336,6 +337,7 @@ class Simulation:
         robot: Any = self.state.robots[0, index]
         robot["x_mm"], robot["y_mm"], robot["heading_rad"] = x_mm, y_mm, heading_rad
         robot["trail"][:] = (x_mm, y_mm, heading_rad)
+        enter_everybody(self._scene)
 
     def proximity(self, robot: int, *, noise: bool = False) -> list[float]:
         """Return what the eight proximity sensors would read at this instant and pose, without waiting for their round.
