@@ -136,7 +136,9 @@ def test_info_tells_all_that_stands_in_it(tmp_path):
     assert said[2].endswith("a Khepera (55 mm) fits")
     assert said[3].startswith("Start 2: (20, 50) mm")
     assert said[3].endswith("room for 40.0 mm across: a Khepera (55 mm) does not fit")
-    assert said[4:] == ["Lamp 1: (10, 20) mm, 2.5 W, off", "Ball 1: (30, 40) mm", "Cylinder 1: (50, 60) mm"]
+    assert said[4] == "Lamp 1: (10, 20) mm, 2.5 W, off"
+    assert said[5] == "Ball 1: (30, 40) mm, radius 32 mm, brightness 255"
+    assert said[6] == "Cylinder 1: (50, 60) mm, radius 16 mm, brightness 190"
 
 
 @pytest.mark.parametrize(

@@ -125,7 +125,7 @@ def test_placing(sim: kiks.Simulation) -> None:
         sim.place(1, 20, 500, 0)
     with pytest.raises(kiks.ParameterError, match="must be free"):
         sim.place(1, -500, 500, 0)
-    with pytest.raises(kiks.ParameterError, match="x_mm must be finite"):
+    with pytest.raises(kiks.ParameterError, match="x_mm must be a finite number"):
         sim.place(1, math.nan, 500, 0)
     with pytest.raises(kiks.ParameterError, match="This simulation has robot 1"):
         sim.pose(2)

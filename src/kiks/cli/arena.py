@@ -92,9 +92,11 @@ def info(file: Annotated[Path, typer.Argument(metavar="ARENA", help="Arena file 
     for number, lamp in enumerate(place.lamps, start=1):
         switch = "on" if lamp.is_on else "off"
         typer.echo(f"Lamp {number}: {_at(lamp.x_mm, lamp.y_mm)}, {lamp.power_w:g} W, {switch}")
-    for label, bodies in (("Ball", place.balls), ("Cylinder", place.cylinders)):
-        for number, (x_mm, y_mm) in enumerate(bodies, start=1):
-            typer.echo(f"{label} {number}: {_at(x_mm, y_mm)}")
+    for number, body in enumerate(place.bodies, start=1):
+        is_ball = number <= len(place.balls)
+        label = f"Ball {number}" if is_ball else f"Cylinder {number - len(place.balls)}"
+        size = f"radius {body.radius_mm:g} mm, brightness {body.brightness}"
+        typer.echo(f"{label}: {_at(body.x_mm, body.y_mm)}, {size}")
 
 
 def _at(x_mm: float, y_mm: float) -> str:

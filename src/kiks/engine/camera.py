@@ -87,9 +87,7 @@ def smear(grey: Any, half_width: Any) -> Any:
 
 
 @kernel
-def look(
-    sight: Any, seen: Any, seen_count: Any, x: Any, y: Any, heading: Any, grey: Any, distance_mm: Any
-) -> Any:
+def look(sight: Any, seen: Any, seen_count: Any, x: Any, y: Any, heading: Any, grey: Any, distance_mm: Any) -> Any:
     """Write the grey of what each pixel looks at, and how far it is [mm] from the robot's centre."""
     cell, pad = scale(sight)
     per_cell = 1.0 / cell
@@ -113,9 +111,9 @@ def look(
             start = 0.0
             length, brightness = cast(sight, column, row, rays_x[p], rays_y[p], _ANYWHERE)
         if seen_count > 0:
-            to_disc, _, disc_brightness = meet_disc(seen, seen_count, column, row, rays_x[p], rays_y[p], start + length)
-            if disc_brightness > 0:
-                start, length, brightness = 0.0, to_disc, disc_brightness
+            to_disc, _, shade = meet_disc(seen, seen_count, column, row, rays_x[p], rays_y[p], start + length)
+            if shade > 0:
+                start, length, brightness = 0.0, to_disc, shade
         grey[p] = _BLACK + brightness * ((_WHITE - _BLACK) / 255.0)
         distance_mm[p] = (start + length) * cell
 

@@ -56,9 +56,11 @@ SLACK_MM = 10.0
 """How much nearer than now two things may come before pairs are looked for again [mm]."""
 
 HASTE = 4.0
-"""How much nearer two things come in a tick at most, in ways of the fastest of all: what is hit may be faster than it."""
+"""How much nearer two things come in a tick at most, in ways of the fastest: what is hit may be faster than that."""
 
-Room: Any = namedtuple("Room", ("ways", "starts", "moved", "neighbours", "pairs", "is_near", "is_touching", "is_pushed", "is_back"))
+Room: Any = namedtuple(
+    "Room", ("ways", "starts", "moved", "neighbours", "pairs", "is_near", "is_touching", "is_pushed", "is_back")
+)
 """What a tick writes down about its discs.
 
 * ways: paths of the left and right wheel [pulses] and slip ratio, float64 [robot_count, 3];

@@ -105,7 +105,6 @@ def meet_disc(seen: Any, count: Any, column: Any, row: Any, cosine: Any, sine: A
     return length, squarely, brightness
 
 
-
 @kernel
 def hides(seen: Any, k: Any, column: Any, row: Any, cosine: Any, sine: Any, reach: Any) -> Any:
     """Say whether a disc stands between the origin of a ray and its end; a lamp that hangs over it is not hidden."""
@@ -113,7 +112,7 @@ def hides(seen: Any, k: Any, column: Any, row: Any, cosine: Any, sine: Any, reac
     radius = seen[PER_DISC * k + 2]
     along, aside = dx * cosine + dy * sine, dx * sine - dy * cosine
     is_over = aside * aside + (reach - along) * (reach - along) <= radius * radius
-    return 0.0 < along and along < reach and abs(aside) < radius and not is_over
+    return 0.0 < along < reach and abs(aside) < radius and not is_over
 
 
 @kernel

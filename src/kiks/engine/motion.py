@@ -63,16 +63,25 @@ def move(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, left: Any
             along = u * cosine + v * sine
             rim_left += slip(along - 0.5 * q * base, left * pulse / pieces, slip_ratio) / pulse
             rim_right += slip(along + 0.5 * q * base, right * pulse / pieces, slip_ratio) / pulse
-            robot.travelled_mm += math.sqrt(u * u + v * v)
+            count_path(robot, math.sqrt(u * u + v * v) if along > 0.0 else -math.sqrt(u * u + v * v))
         else:
             rim_left += left / pieces
             rim_right += right / pieces
-            robot.travelled_mm += abs(arc)
+            count_path(robot, arc)
     robot.slip_pulses[0] += left - rim_left
     robot.slip_pulses[1] += right - rim_right
     robot.wheel_pulses[0] += rim_left
     robot.wheel_pulses[1] += rim_right
     return is_touching
+
+
+@kernel
+def count_path(robot: Any, way_mm: Any) -> Any:
+    """Add a piece of path to what the robot has driven ahead, or back if it is negative."""
+    if way_mm > 0.0:
+        robot.forwards_mm += way_mm
+    else:
+        robot.backwards_mm -= way_mm
 
 
 @kernel
@@ -98,12 +107,17 @@ def give_way(robot: Any, parameters: Any, dx: Any, dy: Any, wheels: Any, slip_ra
         slip_ratio: Share of its command at which a blocked wheel turns.
     """
     sine, cosine = sin_cos(robot.heading_rad)
-    pushed = (1.0 - slip_ratio) * (dx * cosine + dy * sine) / parameters.pulse_mm
+    pushed = (dx * cosine + dy * sine) / parameters.pulse_mm
     for wheel in range(2):
         path = wheels[wheel]
         lost = min(max(-pushed, 0.0), path) if path > 0.0 else max(min(-pushed, 0.0), path)
-        robot.wheel_pulses[wheel] -= lost
-        robot.slip_pulses[wheel] += lost
+        robot.wheel_pulses[wheel] -= (1.0 - slip_ratio) * lost
+        robot.slip_pulses[wheel] += (1.0 - slip_ratio) * lost
+        # What was counted as driven and was not is taken off again.
+        if lost > 0.0:
+            robot.forwards_mm -= 0.5 * lost * parameters.pulse_mm
+        else:
+            robot.backwards_mm += 0.5 * lost * parameters.pulse_mm
 
 
 @kernel

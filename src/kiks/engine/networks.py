@@ -109,13 +109,13 @@ def respond_table(table: Any, seen: Any, out: Any) -> Any:
 
 
 @functools.cache
-def networks_for(response: str) -> NDArray[np.void]:
-    """Return what a response of a robot's file needs of the networks that come with KiKS, shape [1] or [0]."""
-    packed = np.zeros(1 if response in NETWORK_RESPONSES else 0, NETWORKS)
+def networks_for(*responses: str) -> NDArray[np.void]:
+    """Return what responses of robots' files need of the networks that come with KiKS, shape [1] or [0]."""
+    packed = np.zeros(0 if set(responses).isdisjoint(NETWORK_RESPONSES) else 1, NETWORKS)
     if len(packed):
         networks = NetworkResponse.load()
         packed["hidden"], packed["middle"], packed["last"] = networks.weights
-        if response == "fast":
+        if "fast" in responses:
             fill_table(*networks.weights, packed["table"][0])
     packed.setflags(write=False)
     return packed

@@ -120,9 +120,9 @@ def expected_count(
         if parameters.response == REFLECTION and brightness > 0:
             length, cosines[ray] = meet_face(sight, column, row, direction_x, direction_y, length)
         if seen_count > 0:
-            to_disc, squarely, disc_brightness = meet_disc(seen, seen_count, column, row, direction_x, direction_y, length)
-            if disc_brightness > 0:
-                length, cosines[ray], brightness = to_disc, squarely, disc_brightness
+            to_disc, squarely, shade = meet_disc(seen, seen_count, column, row, direction_x, direction_y, length)
+            if shade > 0:
+                length, cosines[ray], brightness = to_disc, squarely, shade
         lengths_mm[ray], brightnesses[ray] = length * cell, brightness
     counts = respond(networks, parameters, sensor, lengths_mm, cosines, brightnesses)
     return parameters.baseline_counts[sensor] + counts

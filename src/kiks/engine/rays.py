@@ -4,8 +4,8 @@ Method: the clearance of a cell (distance from its centre to the nearest wall ce
 cell, is a distance that any point of the cell may go freely in any direction: empty space is crossed in a few leaps.
 Next to a wall the ray goes to the edge of its cell instead, so no corner is missed.
 
-All that rays meet of an arena is one argument, `sight`, which sensors only pass on: a plain tuple, because with a named one each
-call from Python would cost half a microsecond more. It holds
+All that rays meet of an arena is one argument, `sight`, which sensors only pass on: a plain tuple, because with a named
+one each call from Python would cost half a microsecond more. It holds
 
 * field: distance of cells to the nearest wall [mm], 0 in a wall, float32 [rows, columns];
 * surface: brightness of cells, 0 for floor, uint8 [rows, columns];

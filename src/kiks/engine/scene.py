@@ -5,7 +5,8 @@ Discs are counted through: robots first, from 0, then bodies. All of it is one a
 * robots: records of `ROBOT`, shape [world_count, robot_count];
 * bodies: records of `BODY`, shape [world_count, body_count];
 * kinds: records of `PARAMETERS`, one for each kind of robot; a robot's `kind` says which is its own;
-* near: `heads` int32 [world_count, rows, columns], `links` int32 [world_count, disc_count], and the largest radius [mm].
+* near: `heads` int32 [world_count, rows, columns], `links` int32 [world_count, disc_count], and the largest
+  radius [mm].
 
 Need: a robot among a thousand must not cost much more than one alone, so nobody may look at all the others.
 Method: squares of 64 mm lie over the arena. `heads` has the first disc of each square and `links` the next one behind

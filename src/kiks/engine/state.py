@@ -27,7 +27,10 @@ ROBOT = np.dtype(
         ("y_mm", "f8"),
         ("heading_rad", "f8"),
         ("trail", "f8", (TRAIL_LENGTH, 3)),
-        ("travelled_mm", "f8"),
+        ("start_x_mm", "f8"),  # where the robot was put last
+        ("start_y_mm", "f8"),
+        ("forwards_mm", "f8"),  # the length of its path, as far as it drove ahead, and back
+        ("backwards_mm", "f8"),
         ("contact_count", "i8"),
         # The wheels [pulses]: the rim's path, and the path that slip has swallowed since the set-point was given.
         ("wheel_pulses", "f8", (2,)),
@@ -82,6 +85,7 @@ BODY = np.dtype(
         ("radius_mm", "f8"),
         ("friction_mm_s2", "f8"),  # what a rolling or sliding body loses of its speed
         ("kick_share", "f8"),  # of a robot's speed that it takes on when the robot runs into it
+        ("number", "i8"),  # from 1, never given twice
         ("brightness", "i4"),
         ("what", "i4"),
         ("holder", "i4"),  # number of the robot whose gripper holds it, from 1; 0 for none

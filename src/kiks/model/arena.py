@@ -235,6 +235,12 @@ class Arena:
         return float(self.brightness.shape[0] * self.mm_per_cell)
 
     @property
+    def bodies(self) -> tuple[Ball | Cylinder, ...]:
+        """The balls, then the cylinders."""
+        together: list[Ball | Cylinder] = [*self.balls]
+        return (*together, *self.cylinders)
+
+    @property
     def surface(self) -> npt.NDArray[np.uint8]:
         """Brightness with the border of the world around it: uint8 [row + 2 PAD, column + 2 PAD], border 255."""
         # Computed on first use. Threads that race here compute the same array twice, and one of the two is kept.

@@ -8,7 +8,7 @@ import tomllib
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -23,9 +23,10 @@ _BOX_KEYS = ("size_mm", "wall_mm", "rounded_mm", "brightness")
 _ENTRY_KEYS = {
     "start": ("at_mm", "heading_deg"),
     "lamp": ("at_mm", "power_w", "is_on"),
-    "ball": ("at_mm",),
-    "cylinder": ("at_mm",),
+    "ball": ("at_mm", "radius_mm", "friction_mm_s2", "brightness"),
+    "cylinder": ("at_mm", "radius_mm", "friction_mm_s2", "brightness"),
 }
+_Body = TypeVar("_Body", Ball, Cylinder)
 _TOP_KEYS = (*_PICTURE_KEYS, *_BOX_KEYS, "name", *_ENTRY_KEYS)
 
 
@@ -100,8 +101,8 @@ def _arena_of(table: dict[str, Any], path: Path) -> Arena:
         name=_typed(table, "name", str, path.stem, "the file"),
         starts=tuple(_starts(table)),
         lamps=tuple(_lamps(table)),
-        balls=tuple(Ball(*_pair(entry, "at_mm", who)) for who, entry in _entries(table, "ball")),
-        cylinders=tuple(Cylinder(*_pair(entry, "at_mm", who)) for who, entry in _entries(table, "cylinder")),
+        balls=tuple(_body(Ball, who, entry) for who, entry in _entries(table, "ball")),
+        cylinders=tuple(_body(Cylinder, who, entry) for who, entry in _entries(table, "cylinder")),
     )
 
 
@@ -139,6 +140,11 @@ def _lamps(table: dict[str, Any]) -> Iterable[Lamp]:
             raise ArenaError(f"{who}: power_w must be a number, but it was {power_w!r}. A Khepera lamp has 1 W.")
         x_mm, y_mm = _pair(entry, "at_mm", who)
         yield Lamp(x_mm, y_mm, power_w, _typed(entry, "is_on", bool, True, who))
+
+
+def _body(kind: type[_Body], who: str, entry: dict[str, Any]) -> _Body:
+    x_mm, y_mm = _pair(entry, "at_mm", who)
+    return kind(x_mm, y_mm, **{key: value for key, value in entry.items() if key != "at_mm"})
 
 
 def _entries(table: dict[str, Any], label: str) -> Iterable[tuple[str, dict[str, Any]]]:
@@ -189,7 +195,8 @@ def _toml_of(arena: Arena, picture: str) -> str:
         lines += ["", "[[lamp]]", _at(lamp), f"power_w = {lamp.power_w!r}", f"is_on = {str(lamp.is_on).lower()}"]
     for label, bodies in (("ball", arena.balls), ("cylinder", arena.cylinders)):
         for body in bodies:
-            lines += ["", f"[[{label}]]", _at(body)]
+            lines += ["", f"[[{label}]]", _at(body), f"radius_mm = {body.radius_mm!r}"]
+            lines += [f"friction_mm_s2 = {body.friction_mm_s2!r}", f"brightness = {body.brightness!r}"]
     return "\n".join(lines) + "\n"
 
 

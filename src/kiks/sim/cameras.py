@@ -68,7 +68,7 @@ class Cameras:
     def _kernel(self, index: int, time_ns: int, *, is_noisy: bool) -> int:
         sim = self._sim
         light: int = camera.take_image(
-            sim._scene,
+            sim.scene,
             sim.sight,
             sim.state.tick_count,
             time_ns,

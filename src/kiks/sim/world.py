@@ -1,0 +1,263 @@
+"""Robots in an arena: where they are, and the ticks in which they and all else move."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.engine import contact, proximity, step
+from kiks.engine.numbers import uniform
+from kiks.engine.parameters import pack
+from kiks.engine.scene import enter_everybody, make_scene
+from kiks.engine.state import BALL, State
+from kiks.errors import ArenaError, ParameterError
+from kiks.model.arena import PAD, Arena
+from kiks.model.robot import RobotSpec
+from kiks.units import TICK_NS, s_from_ns
+
+STREAM_PLACE = 4
+"""Random stream of the places of robots for which the arena gives no start pose."""
+
+ATTEMPTS = 10_000
+"""Random places that are tried for a robot."""
+
+OVERLAP_MM = 0.01
+"""How deep things may be put into each other [mm], so that what touches may be put back where it was."""
+
+
+class World:
+    """Robots in an arena. Time passes in ticks, up to whatever time is asked for.
+
+    Args:
+        arena: Where they are.
+        specs: What each robot is.
+        seed: Seed of all random numbers.
+
+    Attributes:
+        lock: Held by whoever looks at the world or changes it.
+        now_ns: The simulated time [ns].
+
+    Raises:
+        ArenaError: If the arena has no free place for a robot.
+    """
+
+    def __init__(self, arena: Arena, specs: Sequence[RobotSpec], seed: int) -> None:
+        self.arena = arena
+        self.specs = list(specs)
+        self.seed = seed
+        self.robot_count = len(self.specs)
+        self.lock = threading.RLock()
+        self.now_ns = 0
+        self.state = State.empty(world_count=1, robot_count=self.robot_count)
+        kinds = list(dict.fromkeys(self.specs))
+        self.state.robots["kind"][0] = [kinds.index(spec) for spec in self.specs]
+        self._kinds = np.concatenate([pack(spec) for spec in kinds])
+        self.ground = (arena.clearance, float(arena.mm_per_cell), PAD)
+        self.sight = (arena.clearance, arena.surface, arena.faces, float(arena.mm_per_cell), PAD)
+        self._enter()
+        for index in range(self.robot_count):
+            self._put(index, *self._start(index))
+
+    def _enter(self) -> None:
+        """Make the scene anew, as must be when the arrays of the state were replaced."""
+        self.scene = make_scene(self.state, self._kinds, self.arena.width_mm, self.arena.height_mm)
+
+    # ---- time ----
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time since the start [s]."""
+        return s_from_ns(self.now_ns)
+
+    def sync(self) -> None:
+        """Do the ticks that have begun: the engine is behind the clock until somebody looks."""
+        self.tick_to(self.now_ns)
+
+    def tick_to(self, time_ns: int) -> None:
+        """Do the ticks that have begun up to a time [ns]."""
+        ticks = -(-time_ns // TICK_NS) - self.state.tick_count
+        if ticks > 0:
+            step.advance(self.scene, self.ground, self.seed, self.state.tick_count, ticks)
+            self.state.tick_count += ticks
+
+    # ---- robots ----
+
+    def index_of(self, robot: int) -> int:
+        """Return the index of a robot by its number.
+
+        Raises:
+            ParameterError: If there is no such robot.
+        """
+        if not isinstance(robot, int) or not 1 <= robot <= self.robot_count:
+            numbers = "robot 1" if self.robot_count == 1 else f"robots 1 to {self.robot_count}"
+            raise ParameterError(
+                f"robot must be the number of one there is, but it was {robot!r}. This simulation has {numbers}."
+            )
+        return robot - 1
+
+    def pose(self, robot: int) -> tuple[float, float, float]:
+        """Return where a robot is at this very instant: x_mm, y_mm, heading_rad (not wrapped).
+
+        Raises:
+            ParameterError: If there is no such robot.
+        """
+        index = self.index_of(robot)
+        with self.lock:
+            self.sync()
+            x_mm, y_mm, heading_rad = proximity.pose_of(self.state.robots, self.state.tick_count, self.now_ns, index)
+        return x_mm, y_mm, heading_rad
+
+    def poses(self) -> NDArray[np.float64]:
+        """Return where all robots are at this very instant, float64 [robot, 3]: x_mm, y_mm, heading_rad."""
+        return np.array([self.pose(robot) for robot in range(1, self.robot_count + 1)])
+
+    def place(self, robot: int, x_mm: float, y_mm: float, heading_rad: float) -> None:
+        """Lift a robot and put it down somewhere else; its wheels and counters do not notice.
+
+        Args:
+            robot: Number of the robot, from 1.
+            x_mm: From the arena's lower left corner to the right.
+            y_mm: From the arena's lower left corner upwards.
+            heading_rad: Counter-clockwise from the x axis.
+
+        Raises:
+            ParameterError: If there is no such robot, a number is not finite, or something is in the way.
+        """
+        index = self.index_of(robot)
+        check_finite(x_mm=x_mm, y_mm=y_mm, heading_rad=heading_rad)
+        with self.lock:
+            self.sync()
+            radius_mm = self.specs[index].body.radius_mm
+            self._check_free(f"the place of robot {robot}", x_mm, y_mm, radius_mm, but=index)
+            self._put(index, float(x_mm), float(y_mm), float(heading_rad))
+
+    def _put(self, index: int, x_mm: float, y_mm: float, heading_rad: float) -> None:
+        robot: Any = self.state.robots[0, index]
+        robot["x_mm"], robot["y_mm"], robot["heading_rad"] = x_mm, y_mm, heading_rad
+        robot["trail"][:] = (x_mm, y_mm, heading_rad)
+        robot["start_x_mm"], robot["start_y_mm"] = x_mm, y_mm
+        enter_everybody(self.scene)
+
+    def _start(self, index: int) -> tuple[float, float, float]:
+        """Return the arena's start pose for a robot, else a free place: the roomiest for the first.
+
+        Raises:
+            ArenaError: If there is no free place for it.
+        """
+        radius_mm = self.specs[index].body.radius_mm
+        if index == 0:
+            return self.arena.find_start(radius_mm)
+        others = self._discs()[:index]
+        if index < len(self.arena.starts):
+            start = self.arena.starts[index]
+            if (obstacle := self._obstacle(start.x_mm, start.y_mm, radius_mm, others)) is not None:
+                raise ArenaError(
+                    f"Arena {self.arena.name!r}: start {index + 1} at ({start.x_mm:g}, {start.y_mm:g}) mm must be "
+                    f"free, but {obstacle}. Move it."
+                )
+            return start
+        for attempt in range(ATTEMPTS):
+            x, y, turn = (uniform(self.seed, 0, index, STREAM_PLACE, attempt, axis) for axis in range(3))
+            x, y = x * self.arena.width_mm, y * self.arena.height_mm
+            if self._obstacle(x, y, radius_mm, others) is None:
+                return x, y, 2 * math.pi * turn
+        raise ArenaError(
+            f"Arena {self.arena.name!r} must have room for {self.robot_count} robots, but {ATTEMPTS} random places for "
+            f"robot {index + 1} were all taken. Ask for fewer, give start poses, or take a larger arena."
+        )
+
+    def travelled_mm(self, robot: int) -> float:
+        """Return the length of a robot's path so far [mm].
+
+        Raises:
+            ParameterError: If there is no such robot.
+        """
+        forwards_mm, backwards_mm, _ = self.distances_mm()[self.index_of(robot)]
+        return float(forwards_mm + backwards_mm)
+
+    def distances_mm(self) -> NDArray[np.float64]:
+        """Return how far robots have come, float64 [robot, 3] [mm].
+
+        The columns are the way driven forwards, the way driven backwards, and the straight distance from where the
+        robot started or was put last.
+        """
+        with self.lock:
+            self.sync()
+            robots: Any = self.state.robots[0]
+            straight = np.hypot(robots["x_mm"] - robots["start_x_mm"], robots["y_mm"] - robots["start_y_mm"])
+            return np.column_stack([robots["forwards_mm"], robots["backwards_mm"], straight])
+
+    def contacts(self, robot: int) -> int:
+        """Return how often a robot has met something so far: a wall, a robot, a ball or a cylinder.
+
+        Raises:
+            ParameterError: If there is no such robot.
+        """
+        index = self.index_of(robot)
+        with self.lock:
+            self.sync()
+            return int(self.state.robots["contact_count"][0, index])
+
+    # ---- places ----
+
+    def _discs(self) -> NDArray[np.float64]:
+        """Return place and radius [mm] of everything that may be in the way, float64 [disc, 3], robots first."""
+        robots, bodies = self.state.robots[0], self.state.bodies[0]
+        radii = [spec.body.radius_mm for spec in self.specs]
+        # What a gripper has lifted is in nobody's way.
+        body_radii = np.where(bodies["is_lifted"] != 0, -math.inf, bodies["radius_mm"])
+        return np.vstack(
+            [
+                np.column_stack([robots["x_mm"], robots["y_mm"], radii]),
+                np.column_stack([bodies["x_mm"], bodies["y_mm"], body_radii]),
+            ]
+        )
+
+    def _name(self, disc: int) -> str:
+        if disc < self.robot_count:
+            return f"robot {disc + 1}"
+        body = self.state.bodies[0, disc - self.robot_count]
+        return f"{'ball' if body['what'] == BALL else 'cylinder'} {body['number']}"
+
+    def _obstacle(
+        self, x_mm: float, y_mm: float, radius_mm: float, discs: NDArray[np.float64], but: int = -1
+    ) -> str | None:
+        """Say which wall or disc but one is in the way of a disc, None if it is free."""
+        inside = 0 <= x_mm <= self.arena.width_mm and 0 <= y_mm <= self.arena.height_mm
+        gap_mm = contact.clearance_of_disc(*self.ground, float(x_mm), float(y_mm), radius_mm)
+        if not inside or gap_mm < -OVERLAP_MM:
+            return f"a wall is {-gap_mm:.1f} mm inside it"
+        overlaps_mm = radius_mm + discs[:, 2] - np.hypot(discs[:, 0] - x_mm, discs[:, 1] - y_mm)
+        if but >= 0:
+            overlaps_mm[but] = -math.inf
+        if len(overlaps_mm) and overlaps_mm.max() > OVERLAP_MM:
+            return f"{self._name(int(overlaps_mm.argmax()))} is {overlaps_mm.max():.1f} mm inside it"
+        return None
+
+    def _check_free(self, what: str, x_mm: float, y_mm: float, radius_mm: float, but: int = -1) -> None:
+        """Raise a ParameterError if a disc [mm] would be in a wall or, but for one disc, in something else."""
+        obstacle = self._obstacle(x_mm, y_mm, radius_mm, self._discs(), but)
+        if obstacle is not None:
+            raise ParameterError(
+                f"{what} must be free, but at ({x_mm:g}, {y_mm:g}) mm {obstacle}. "
+                f"The arena is {self.arena.width_mm:g} x {self.arena.height_mm:g} mm; a radius of "
+                f"{radius_mm:g} mm is needed."
+            )
+
+    def state_hash(self) -> str:
+        """Return 16 hexadecimal digits that any two equal runs agree on."""
+        with self.lock:
+            self.sync()
+            return self.state.hash()
+
+
+def check_finite(**numbers: float) -> None:
+    """Raise a ParameterError if one of the numbers, named, is none or not finite."""
+    for name, value in numbers.items():
+        if not isinstance(value, int | float) or not math.isfinite(value):
+            raise ParameterError(f"{name} must be a finite number, but it was {value!r}.")
