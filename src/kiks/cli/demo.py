@@ -12,7 +12,7 @@ from kiks.cli.engine_start import ready_engine
 from kiks.cli.options import Seed, load_arena
 
 SLICES_A_REPORT = 20
-"""Tenths of a simulated second between two updates of the display: more would cost more than the simulation."""
+"""Notes of the trace between two updates of the display: more would cost more than the simulation."""
 
 
 class Behaviour(enum.StrEnum):

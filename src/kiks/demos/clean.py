@@ -10,14 +10,14 @@ import sys
 
 from kiks.client.khepera import Khepera
 
-CRUISE = 20
+CRUISE = 30
 """Speed ahead, with a cylinder or without [pulses/10 ms]."""
 
 WALL = 700
 """Reading that both diagonal sensors have in front of a wall, and never before a cylinder."""
 
 BLOCKED_STEPS = 8
-"""Steps, of 50 ms at 9600 baud, at less than half of the speed asked for, after which what is in front moves no more."""
+"""Steps, of 50 ms at 9600 baud, with wheels slower than half of what was asked, after which nothing moves any more."""
 
 BACK = 1000
 """How far to back off [pulses]: 80 mm, so that turning does not touch what was brought."""
@@ -60,7 +60,10 @@ class Clean:
         self.slow_steps = 0
         turn = TURN_LEAST + round(TURN_RANGE * (self.turns * GOLDEN % 1))
         self.moves = [(-BACK, -BACK), (turn, -turn)]
-        robot.set_profile(speed=40)
+        # A move begins with the speed that there is, so stop first.
+        robot.stop()
+        robot.pause(0.1)
+        robot.set_profile(speed=40, acceleration=128)
         self.start_move(robot)
 
     def start_move(self, robot: Khepera) -> None:

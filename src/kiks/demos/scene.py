@@ -12,9 +12,6 @@ from kiks.errors import ArenaError
 from kiks.model.arena import Arena
 from kiks.sim.simulation import Simulation
 
-SLICE_S = 0.1
-"""Simulated time between two looks from outside [s]."""
-
 STREAM_SCENE = 100
 """Random stream of what scenes leave to chance."""
 
@@ -47,6 +44,9 @@ class Scene:
     baud: ClassVar[int] = 9600
     """Speed of the lines if nobody says otherwise [bit/s]."""
 
+    slice_s: ClassVar[float] = 0.1
+    """Simulated time between two looks from outside [s]."""
+
     robot_count: ClassVar[int] = 1
     """How many robots there are."""
 
@@ -73,7 +73,7 @@ class Scene:
         raise NotImplementedError
 
     def watch(self) -> None:
-        """Look from outside, ten times in a simulated second."""
+        """Look from outside, after each slice of time."""
 
     @property
     def is_over(self) -> bool:
@@ -87,14 +87,14 @@ class Scene:
     # ---- what all share ----
 
     def slices(self, seconds: float | None = None) -> Iterator[None]:
-        """Run, and stop for a moment after each tenth of a simulated second.
+        """Run, and stop for a moment after each slice of time.
 
         Args:
             seconds: Until when [s]; the scene's own time if left out.
         """
         end_s = self.seconds if seconds is None else seconds
         while self.sim.time_s < end_s and not self.is_over:
-            until_s = self.sim.time_s + SLICE_S
+            until_s = self.sim.time_s + self.slice_s
             while self.sim.time_s < until_s and not self.is_over:
                 self.step()
             self.watch()

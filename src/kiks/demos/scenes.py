@@ -16,7 +16,7 @@ from kiks.demos.follow import Follow
 from kiks.demos.maze import Maze
 from kiks.demos.race import BAUD as RACE_BAUD
 from kiks.demos.race import Race
-from kiks.demos.scene import SLICE_S, Scene
+from kiks.demos.scene import Scene
 from kiks.demos.swarm import Swarm
 from kiks.engine.numbers import sin_cos
 from kiks.errors import ParameterError
@@ -77,10 +77,9 @@ class CleanScene(Scene):
 
     def tidy_count(self) -> int:
         """Return how many cylinders are with all of them near a wall."""
-        return sum(
-            self.sim.arena.clearance_at_mm(float(body["x_mm"]), float(body["y_mm"])) + body["radius_mm"] <= self.TIDY_MM
-            for body in self.sim.bodies()
-        )
+        clearance_mm, bodies = self.sim.arena.clearance_at_mm, self.sim.bodies()
+        places = zip(bodies["x_mm"].tolist(), bodies["y_mm"].tolist(), bodies["radius_mm"].tolist(), strict=True)
+        return sum(clearance_mm(x, y) + radius_mm <= self.TIDY_MM for x, y, radius_mm in places)
 
     def result(self) -> str:
         """Return how many are tidied up."""
@@ -164,7 +163,7 @@ class CameraScene(Scene):
     def watch(self) -> None:
         """Lead the ball on, and measure how well the robot looks at it."""
         before_rad = self.angle_rad
-        self.angle_rad += self.BALL_RAD_S * SLICE_S
+        self.angle_rad += self.BALL_RAD_S * self.slice_s
         try:
             self.sim.move_body(self.ball, *self.ball_place())
         except ParameterError:
@@ -193,6 +192,7 @@ class RaceScene(Scene):
 
     seconds: ClassVar[float] = 60.0
     baud: ClassVar[int] = RACE_BAUD
+    slice_s: ClassVar[float] = 0.02
 
     def make_arena(self) -> Arena:
         """Return the oval of examples/arenas/track.toml, with a robot at its start."""
