@@ -78,15 +78,15 @@ def draw_simulation(sim: Simulation, trace: Trace | None = None) -> Image:
         sheet.lamp((x_mm, y_mm), power_w, is_on=bool(is_on))
     bodies = sim.bodies()
     if trace is not None:
-        for body in bodies:
-            places = trace.bodies.get(int(body["number"]), [])
-            sheet.line(places, (*_tint(body), 110), 1.5)
-            if places:
-                sheet.ring(places[0], float(body["radius_mm"]), (*_tint(body), 150))
         for index, radius_mm in enumerate(radii_mm):
             poses = [tuple(note[index]) for note in trace.robots]
             sheet.path(poses, _colours(index, sim.robot_count, len(poses)), 1.2 if sim.robot_count == 1 else 1.6)
             sheet.ring(poses[0][:2], radius_mm, (*_robot_colour(index, sim.robot_count), 90))
+        for body in bodies:
+            places = trace.bodies.get(int(body["number"]), [])
+            sheet.line(places, (*_tint(body), 200), 2.4)
+            if places:
+                sheet.ring(places[0], float(body["radius_mm"]), (*_tint(body), 190))
     for body in bodies:
         place, radius_mm = (float(body["x_mm"]), float(body["y_mm"])), float(body["radius_mm"])
         sheet.body(place, radius_mm, _tint(body), is_ball=bool(body["what"] == BALL))
