@@ -10,7 +10,10 @@ BAUD = 38400
 """Speed of the line: a picture takes 75 ms, at 9600 baud 0.3 s."""
 
 BRIGHT = 150
-"""Grey above which a pixel shows the ball; what else there is should be darker."""
+"""Grey above which a pixel shows the ball."""
+
+DARK = 100
+"""Grey that there must be beside the ball: the exposure makes the brightest thing white, even a dark wall on its own."""
 
 FEWEST = 4
 """Bright pixels from which on they are a ball: noise makes one or two."""
@@ -18,7 +21,7 @@ FEWEST = 4
 WANTED = 32
 """Bright pixels when the ball is as far as it should be, a hand's width."""
 
-SEARCH_SPEED = 4
+SEARCH_SPEED = 6
 """Speed of the wheels while the robot looks round for the ball [pulses/10 ms]."""
 
 
@@ -36,7 +39,7 @@ class Camera:
         """Look at one picture and set the speeds."""
         image = robot.image()
         bright = [place for place, grey in enumerate(image) if grey > BRIGHT]
-        if len(bright) < FEWEST:
+        if len(bright) < FEWEST or min(image) > DARK:
             robot.set_speed(self.side * SEARCH_SPEED, -self.side * SEARCH_SPEED)
             return
         off_centre = sum(bright) / len(bright) - (len(image) - 1) / 2
