@@ -13,7 +13,7 @@ BRIGHT = 150
 """Grey above which a pixel shows the ball."""
 
 DARK = 100
-"""Grey that there must be beside the ball: the exposure makes the brightest thing white, even a dark wall on its own."""
+"""Grey that there must be beside the ball: the exposure makes the brightest thing white, were it a wall on its own."""
 
 FEWEST = 4
 """Bright pixels from which on they are a ball: noise makes one or two."""
