@@ -12,10 +12,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from kiks.clock.line import BACKLOG_LIMIT
 from kiks.clock.pace import Pace
 from kiks.ports.endpoint import Channel
 from kiks.sim.simulation import Simulation
-from kiks.sim.wire import BACKLOG_LIMIT, Wire
+from kiks.sim.wire import Wire
 from kiks.units import NS_PER_S
 
 IDLE_S = 0.05
