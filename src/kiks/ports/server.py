@@ -173,7 +173,7 @@ class Server:
     def _missing(self) -> str:
         """Return whose programs are not there, for a person."""
         robots = [str(link.robot) for link in self._links.values() if link.channel is None and not link.is_leaving]
-        return f"for robot {', '.join(robots[:-1]) + ' or ' if len(robots) > 1 else ''}{robots[-1]}"
+        return f"that of robot {' or '.join(robots)}"
 
     # ---- bytes come and go ----
 

@@ -8,11 +8,11 @@ done beyond it. What may be done is done in the order of simulated time: at one 
 what the programs do, in the order of their ranks.
 
 
-Why that is repeatable: think of the list of all that is done, each thing with its instant and rank. A thing is done only
-when it is the first of all that are known, and when every program that thinks stands behind it with its own instant and
-rank. So the list is in order, whatever came first in real time. What a program does is a function of what it has been
-told; what it is told is a function of the list so far; so the whole list is one function of the beginning. Only the
-real time at which a thing is done varies.
+Why that is repeatable: think of the list of all that is done, each thing with its instant and rank. A thing is done
+only when it is the first of all that are known, and when every program that thinks stands behind it with its own
+instant and rank. So the list is in order, whatever came first in real time. What a program does is a function of what
+it has been told; what it is told is a function of the list so far; so the whole list is one function of the beginning.
+Only the real time at which a thing is done varies.
 
 Why it goes on: of all things known and all programs that think one is the first. If it is a thing, it is done. If it is
 a program, it will act; or it is silent, and there is a policy for that.
@@ -88,6 +88,11 @@ class Player(ABC):
     def next_ns(self) -> int | None:
         """Return when it does the next thing that is known [ns]; None if it has yet to say what that is."""
 
+    @property
+    def is_held_up(self) -> bool:
+        """Say whether it can do nothing in real time before the world has gone on."""
+        return self.waits or self.next_ns() is not None
+
     @abstractmethod
     def act(self) -> None:
         """Do that thing: the world has got there."""
@@ -108,12 +113,17 @@ class Turns:
         sim: The world.
         expected: How many programs begin together.
         missing: Returns who of them is not there yet, in words for a person.
+        log: Where a person is told.
         when_silent: What happens to a program that is silent while others wait: 'wait', 'drop' or 'ignore'.
         patience_s: How long it may be [s of real time].
-        log: Where a person is told.
 
     Raises:
         ParameterError: If there is no such policy, or the patience is out of range.
+
+    Attributes:
+        players: Those who take part, in the order in which they have come.
+        has_begun: Whether the world has begun.
+        is_repeatable: Whether the world has waited for everybody so far.
     """
 
     def __init__(
@@ -126,14 +136,10 @@ class Turns:
         when_silent: str = "ignore",
         patience_s: float = PATIENCE_S,
     ) -> None:
-        if when_silent not in POLICIES:
-            raise ParameterError(
-                f"when_silent must be 'wait', 'drop' or 'ignore', but it was {when_silent!r}."
-                f"{nearest(str(when_silent), POLICIES)}"
-            )
-        Patience(patience_s)
+        check_policy(when_silent, patience_s)
         self.players: list[Player] = []
         self.has_begun = False
+        self.is_repeatable = True
         self._sim = sim
         self._expected = expected
         self._missing = missing
@@ -254,18 +260,19 @@ class Turns:
             if not self._has_named_missing:
                 self._has_named_missing = True
                 self._log.warning(
-                    "the world begins when %d programs are there, but there is none yet %s. It waits %g s more.",
+                    "the world begins when %d programs are there, but %s is missing. It waits %.0f s more.",
                     self._expected,
                     self._missing(),
                     left_s,
                 )
             return left_s
         self._log.warning(
-            "the world has begun without a program %s, since it did not come within %g s; whoever comes now acts from "
-            "now on, which is not repeatable. --programs says how many begin together.",
+            "the world has begun without %s, which did not come within %g s. Who comes now acts from now on, and the "
+            "run is not repeatable.",
             self._missing(),
             START_PATIENCE_S,
         )
+        self.is_repeatable = False
         for player in self.players:
             player.is_waited_for = player.is_here
         self._expected = 1
@@ -274,11 +281,11 @@ class Turns:
 
     def _bear_with(self, holders: list[Player]) -> float | None:
         """Lose patience with those who have kept others waiting for too long; return how long it still lasts [s]."""
-        share = 1.0
-        if self._when_silent == "ignore" and any(
-            not player.is_waited_for and (player.waits or player.next_ns() is not None) for player in self.players
-        ):
-            share = IMPATIENT_SHARE
+        held_up = [player for player in self.players if player.is_held_up]
+        if not held_up:
+            holders = []
+        is_in_turn = self._when_silent == "ignore" and not all(player.is_waited_for for player in held_up)
+        share = IMPATIENT_SHARE if is_in_turn else 1.0
         wait_s: float | None = None
         for player in self.players:
             if player not in holders:
@@ -300,6 +307,7 @@ class Turns:
         return wait_s
 
     def _give_up(self, player: Player, waited_s: float) -> None:
+        self.is_repeatable = False
         if self._when_silent == "drop":
             self._log.warning(
                 "%s must act within %g s while others wait, but it did not: the world parts from it. "
@@ -316,3 +324,17 @@ class Turns:
             player.name,
             waited_s,
         )
+
+
+def check_policy(when_silent: str, patience_s: float) -> None:
+    """Check what is to happen to a silent program, and when.
+
+    Raises:
+        ParameterError: If there is no such policy, or the patience is out of range.
+    """
+    if when_silent not in POLICIES:
+        raise ParameterError(
+            f"when_silent must be 'wait', 'drop' or 'ignore', but it was {when_silent!r}."
+            f"{nearest(str(when_silent), POLICIES)}"
+        )
+    Patience(patience_s)
