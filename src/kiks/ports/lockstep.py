@@ -12,6 +12,7 @@ import re
 from collections.abc import Callable, Iterable
 
 from kiks.clock.line import BACKLOG_LIMIT
+from kiks.clock.patience import Patience
 from kiks.ports.timing import IDLE_S, Link
 from kiks.ports.turns import PATIENCE_S, Player, Turns
 from kiks.sim.simulation import Simulation
@@ -33,6 +34,7 @@ class Lockstep:
         missing: Returns who of them is not there yet, in words for a person.
         when_silent: What happens to a program that is silent while others wait: 'wait', 'drop' or 'ignore'.
         patience_s: How long it may be [s of real time].
+        new_patience: For tests: makes patiences with their own wall clock.
 
     Raises:
         ParameterError: If there is no such policy, or the patience is out of range.
@@ -47,12 +49,19 @@ class Lockstep:
         missing: Callable[[], str] = lambda: "",
         when_silent: str = "ignore",
         patience_s: float = PATIENCE_S,
+        new_patience: Callable[[float], Patience] = Patience,
     ) -> None:
         self._sim = sim
         self._thinking_ns = thinking_ns
         self._clients: dict[int, Client] = {}
         self._turns = Turns(
-            sim, expected=programs, missing=missing, log=_log, when_silent=when_silent, patience_s=patience_s
+            sim,
+            expected=programs,
+            missing=missing,
+            log=_log,
+            when_silent=when_silent,
+            patience_s=patience_s,
+            new_patience=new_patience,
         )
 
     def start(self) -> None:

@@ -10,6 +10,7 @@ from functools import partial
 
 from kiks.clock.line import BACKLOG_LIMIT
 from kiks.clock.pace import Pace
+from kiks.clock.patience import Patience
 from kiks.clock.thinking import ThinkingFixed, parse_thinking
 from kiks.errors import ParameterError
 from kiks.ports.endpoint import Endpoint
@@ -36,6 +37,7 @@ class Server:
             'drop': it is hung up on; 'ignore': the world no longer waits for it (not live).
         patience_s: How long it may be silent [s of real time].
         pace: For tests: a pace with its own wall clock, instead of `speed`.
+        new_patience: For tests: makes patiences with their own wall clock.
 
     Raises:
         ParameterError: If there is no such robot, or a value is out of range.
@@ -58,6 +60,7 @@ class Server:
         when_silent: str = "ignore",
         patience_s: float = PATIENCE_S,
         pace: Pace | None = None,
+        new_patience: Callable[[float], Patience] = Patience,
     ) -> None:
         self.sim = sim
         self._timing: Timing
@@ -71,6 +74,7 @@ class Server:
                 missing=self._missing,
                 when_silent=when_silent,
                 patience_s=patience_s,
+                new_patience=new_patience,
             )
         self._links = {robot: Link(robot, sim.wires[_index(sim, robot)]) for robot in endpoints}
         self._endpoints = {robot: list(ways) for robot, ways in endpoints.items()}

@@ -116,6 +116,7 @@ class Turns:
         log: Where a person is told.
         when_silent: What happens to a program that is silent while others wait: 'wait', 'drop' or 'ignore'.
         patience_s: How long it may be [s of real time].
+        new_patience: For tests: makes patiences with their own wall clock.
 
     Raises:
         ParameterError: If there is no such policy, or the patience is out of range.
@@ -135,6 +136,7 @@ class Turns:
         log: logging.Logger,
         when_silent: str = "ignore",
         patience_s: float = PATIENCE_S,
+        new_patience: Callable[[float], Patience] = Patience,
     ) -> None:
         check_policy(when_silent, patience_s)
         self.players: list[Player] = []
@@ -145,14 +147,15 @@ class Turns:
         self._missing = missing
         self._when_silent = when_silent
         self._patience_s = patience_s
+        self._new_patience = new_patience
         self._log = log
-        self._start = Patience(START_PATIENCE_S)
+        self._start = new_patience(START_PATIENCE_S)
         self._has_named_missing = False
         self._seen_ns = 0
 
     def join(self, player: Player) -> None:
         """Let a program take part from now on."""
-        player.patience = Patience(self._patience_s)
+        player.patience = self._new_patience(self._patience_s)
         self.players.append(player)
 
     def see(self, time_ns: int) -> None:
