@@ -108,7 +108,7 @@ def _run_several(
         say=lambda text: typer.echo(f"kiks: {text}", err=True),
     )
     code = programs.run()
-    return code, "" if programs.is_repeatable else "the world did not wait for every program"
+    return code, programs.doubt
 
 
 def parse_words(words: list[str]) -> list[Command]:

@@ -36,6 +36,7 @@ class Connection:
         self._there = there
         self._told_ns = 0
         self._unanswered_count = 0
+        self._ticket = 0
         self._received = bytearray()
 
     def pass_to(self, time_ns: int) -> None:
@@ -46,7 +47,7 @@ class Connection:
 
     def tell(self, kind: Kind, robot: int = 0, *, first: int = 0, data: bytes = b"") -> None:
         """Say something and go on."""
-        self._send(Request(kind, robot, self.now_ns, first, data=data))
+        self._send(Request(kind, robot, self.now_ns, first=first, data=data))
         self._unanswered_count += 1
         if self._unanswered_count >= WINDOW:
             self.ask(Kind.MEET)
@@ -59,20 +60,26 @@ class Connection:
         Raises:
             LinkError: If the answer is an error.
         """
-        self._send(Request(kind, robot, self.now_ns, first, second, third, data))
-        while (answer := take_answer(self._received)) is None:
-            try:
-                received = self._there.recv(RECEIVE_SIZE)
-            except OSError:
-                received = b""
-            if not received:
-                _end()
-            self._received += received
+        # The answer to a question that Ctrl-C has interrupted is still to come: it has another ticket.
+        self._ticket = (self._ticket + 1) % (1 << 32)
+        self._send(Request(kind, robot, self.now_ns, self._ticket, first, second, third, data))
+        while (answer := take_answer(self._received)) is None or answer.ticket != self._ticket:
+            if answer is None:
+                self._receive()
         self._unanswered_count = 0
         self.now_ns = self._told_ns = answer.now_ns
         if not answer.is_good:
             raise LinkError(answer.data.decode())
         return answer
+
+    def _receive(self) -> None:
+        try:
+            received = self._there.recv(RECEIVE_SIZE)
+        except OSError:
+            received = b""
+        if not received:
+            _end()
+        self._received += received
 
     def _send(self, request: Request) -> None:
         self._told_ns = self.now_ns

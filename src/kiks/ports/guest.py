@@ -47,6 +47,8 @@ class Guest(Player):
         self._requests: deque[Request] = deque()
         self._read: Request | None = None
         self._robots: set[int] = set()
+        self._ticket = 0
+        self._has_made_room = False
         self._has_been_warned = False
 
     def fileno(self) -> int:
@@ -127,6 +129,8 @@ class Guest(Player):
         if request.kind in (Kind.SEND, Kind.SEND_AND_MEET) and not self._has_room(request.robot):
             return
         self._requests.popleft()
+        self._ticket = request.ticket
+        self._has_made_room = False
         try:
             self._do(request)
         except KiksError as error:
@@ -161,9 +165,10 @@ class Guest(Player):
         """Say whether the line can take more; if not, try again when it can."""
         line = self._sim.wires[robot - 1].line
         room_ns = line.sending_until_ns - BACKLOG_LIMIT * line.character_ns
-        if room_ns <= self.acts_from_ns:
+        if room_ns <= self.acts_from_ns or self._has_made_room:
             return True
         self.acts_from_ns = room_ns
+        self._has_made_room = True
         if not self._has_been_warned:
             self._has_been_warned = True
             _log.warning(
@@ -236,5 +241,5 @@ class Guest(Player):
             line = self._sim.wires[robot - 1].line
             ahead_count = max(-((now_ns - line.sending_until_ns) // line.character_ns), 0)
         self.acts_from_ns = now_ns
-        self._unsent += Answer(is_good, now_ns, number, ahead_count, data).pack()
+        self._unsent += Answer(self._ticket, is_good, now_ns, number, ahead_count, data).pack()
         self.flush()

@@ -16,8 +16,8 @@ RECEIVE_SIZE = 1 << 16
 WINDOW = 64
 """Requests that a program may send without an answer: nobody runs farther ahead of the world than that."""
 
-_REQUEST = struct.Struct("<BHqqqqI")
-_ANSWER = struct.Struct("<?qqqI")
+_REQUEST = struct.Struct("<BHqIqqqI")
+_ANSWER = struct.Struct("<I?qqqI")
 
 
 class Kind(IntEnum):
@@ -59,11 +59,12 @@ ASKING = frozenset(Kind) - {Kind.REACHED, Kind.HANG_UP, Kind.SEND, Kind.DROP, Ki
 
 
 class Request(NamedTuple):
-    """What a program says; `robot` is 0 where it does not matter."""
+    """What a program says; `robot` is 0 where it does not matter, and the answer has the same ticket."""
 
     kind: Kind
     robot: int
     at_ns: int
+    ticket: int = 0
     first: int = 0
     second: int = 0
     third: int = 0
@@ -71,13 +72,14 @@ class Request(NamedTuple):
 
     def pack(self) -> bytes:
         """Return it as bytes."""
-        return _REQUEST.pack(*self[:6], len(self.data)) + self.data
+        return _REQUEST.pack(*self[:7], len(self.data)) + self.data
 
 
 class Answer(NamedTuple):
     """What it is answered.
 
     Attributes:
+        ticket: The request's.
         is_good: False: `data` is the text of an error.
         now_ns: The program's time from now on [ns].
         number: What was asked for.
@@ -85,6 +87,7 @@ class Answer(NamedTuple):
         data: The characters that were read.
     """
 
+    ticket: int
     is_good: bool
     now_ns: int
     number: int = 0
@@ -93,30 +96,30 @@ class Answer(NamedTuple):
 
     def pack(self) -> bytes:
         """Return it as bytes."""
-        return _ANSWER.pack(*self[:4], len(self.data)) + self.data
+        return _ANSWER.pack(*self[:5], len(self.data)) + self.data
 
 
 def take_request(buffer: bytearray) -> Request | None:
     """Remove and return the first request of a buffer, None while it is not complete."""
     if len(buffer) < _REQUEST.size:
         return None
-    kind, robot, at_ns, first, second, third, length = _REQUEST.unpack_from(buffer)
+    kind, robot, at_ns, ticket, first, second, third, length = _REQUEST.unpack_from(buffer)
     end = _REQUEST.size + length
     if len(buffer) < end:
         return None
     data = bytes(buffer[_REQUEST.size : end])
     del buffer[:end]
-    return Request(Kind(kind), robot, at_ns, first, second, third, data)
+    return Request(Kind(kind), robot, at_ns, ticket, first, second, third, data)
 
 
 def take_answer(buffer: bytearray) -> Answer | None:
     """Remove and return the first answer of a buffer, None while it is not complete."""
     if len(buffer) < _ANSWER.size:
         return None
-    is_good, now_ns, number, ahead_count, length = _ANSWER.unpack_from(buffer)
+    ticket, is_good, now_ns, number, ahead_count, length = _ANSWER.unpack_from(buffer)
     end = _ANSWER.size + length
     if len(buffer) < end:
         return None
     data = bytes(buffer[_ANSWER.size : end])
     del buffer[:end]
-    return Answer(is_good, now_ns, number, ahead_count, data)
+    return Answer(ticket, is_good, now_ns, number, ahead_count, data)

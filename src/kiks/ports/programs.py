@@ -114,9 +114,11 @@ class Programs:
             self._selector.register(guest, selectors.EVENT_READ, self._runs[-1])
 
     @property
-    def is_repeatable(self) -> bool:
-        """Say whether the same programs would do the same again, as far as their thinking is not live."""
-        return self._turns.is_repeatable and not self._signals
+    def doubt(self) -> str:
+        """Say why the same programs might not do the same again; nothing if they would, but for live thinking."""
+        if self._signals:
+            return "it was interrupted"
+        return "" if self._turns.is_repeatable else "the world did not wait for every program"
 
     def run(self) -> int:
         """Let them run until the last has ended; return 0 if all went well, else the first exit code that tells."""
@@ -185,6 +187,10 @@ class Programs:
         run.code = code if code >= 0 else 128 - code
         how = f"with exit code {code}" if code >= 0 else f"by signal {-code}"
         self._say(f"{run.guest.name} has ended {how}.")
+        left = [other.guest for other in self._runs if other.code is None]
+        if left and not any(guest.is_waited_for for guest in left):
+            names = ", ".join(guest.name for guest in left)
+            _log.warning("%s, which the world does not wait for, still runs. Ctrl-C ends it.", names)
 
     def _missing(self) -> str:
         """Return who has not taken part yet."""
