@@ -260,7 +260,7 @@ def test_each_program_has_the_robot_of_its_number() -> None:
         Names(world, {}).robot(other.url(1))
 
 
-def test_names_of_kiks_mean_this_world(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_names_of_kiks_mean_this_world(tmp_path: Path) -> None:
     program = write(
         tmp_path,
         "names.py",
@@ -268,10 +268,10 @@ def test_names_of_kiks_mean_this_world(tmp_path: Path, capfd: pytest.CaptureFixt
         "    robot.pause(1)\n    print(robot.time_s >= 1, robot.encoders())\n"
         "try: kiks.kopen([-7])\nexcept kiks.LinkError as error: print(error)\n",
     )
-    assert run([[program, "2"], [program, "1"]])[2] == 0
-    out = capfd.readouterr().out
-    assert out.count("True (0, 0)") == 2
-    assert out.count("names robot 7 and the simulation has robots 1 to 2") == 2
+    _, _, *outs = run_and_read([[program, "2"], [program, "1"]], tmp_path)
+    for out in outs:
+        assert str(out).startswith("True (0, 0)\n")
+        assert "names robot 7 and the simulation has robots 1 to 2" in str(out)
 
 
 def test_words_are_programs_and_arguments(tmp_path: Path) -> None:
