@@ -126,6 +126,11 @@ def test_live_thinking_of_each_is_recorded_and_replayed(tmp_path: Path) -> None:
 # ---- who ends, crashes, hangs or babbles ----
 
 
+def silences(caplog: pytest.LogCaptureFixture) -> list[str]:
+    """Return what a person is told of the programs, but for who is late at the beginning: a busy computer is slow."""
+    return [text for text in said(caplog) if not text.startswith("the world begins when")]
+
+
 @pytest.mark.parametrize(
     ("ending", "code", "how"),
     [
@@ -166,7 +171,7 @@ def test_hanging_program_is_ignored(tmp_path: Path, caplog: pytest.LogCaptureFix
         "program 2 (ends.py) has ended with exit code 0.",
     ]
     assert doubt == "the world did not wait for every program"
-    assert said(caplog)[0].startswith("program 1 (hangs.py) must act while others wait, but it did nothing for 0.")
+    assert silences(caplog)[0].startswith("program 1 (hangs.py) must act while others wait, but it did nothing for 0.")
 
 
 def test_program_that_is_left_hanging_is_named(tmp_path: Path) -> None:
@@ -182,12 +187,12 @@ def test_program_that_is_left_hanging_is_named(tmp_path: Path) -> None:
 
 def test_hanging_program_is_dropped(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     hangs = write(tmp_path, "hangs.py", HANGS)
-    _, _, code, ends, doubt = run([[hangs], [DRIVE, "COM1", "20", "3", "3"]], patience_s=0.2, when_silent="drop")
+    _, _, code, ends, doubt = run([[hangs], [DRIVE, "COM1", "20", "3", "3"]], patience_s=1, when_silent="drop")
     assert code == 137
     assert ends == ["program 1 (hangs.py) has ended by signal 9.", "program 2 (drive.py) has ended with exit code 0."]
     assert doubt
-    assert said(caplog) == [
-        "program 1 (hangs.py) must act within 0.2 s while others wait, but it did not: the world parts from it. "
+    assert silences(caplog) == [
+        "program 1 (hangs.py) must act within 1 s while others wait, but it did not: the world parts from it. "
         "--patience gives it more time."
     ]
 
@@ -203,7 +208,7 @@ def test_babbling_program_hinders_nobody(tmp_path: Path, caplog: pytest.LogCaptu
     _, _, code, ends, _ = run([[babbles], [write(tmp_path, "ends.py", ENDS), str(over)]])
     assert code == 0
     assert len(ends) == 2
-    assert said(caplog) == [
+    assert silences(caplog) == [
         "program 1 (babbles.py) must wait for its replies, but it is more than 4096 characters ahead of robot 1; what "
         "it sends now has to wait. Read a line after each command."
     ]

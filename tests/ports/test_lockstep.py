@@ -239,6 +239,43 @@ def test_missing_program_is_named_and_then_done_without(caplog: pytest.LogCaptur
         one.close()
 
 
+def test_program_that_looks_in_and_goes_does_not_count() -> None:
+    with served({robot: [TcpEndpoint(0)] for robot in (1, 2)}) as run:
+        ways = run.server._endpoints
+        for _ in range(2):
+            glance = Client(ways[1][0])
+            run.wait_held(1)
+            glance.hang_up()
+            run.wait_free(1)
+        one = Client(ways[1][0])
+        one.send(b"H\n")
+        run.wait_rounds(5)
+        assert one.has_heard_nothing()
+        other = Client(ways[2][0])
+        assert other.ask(b"H\n") == one.lines.readline() == b"h,0,0\r\n"
+        one.close()
+        other.close()
+
+
+def test_commands_left_behind_act_before_the_next_client_is_let_in() -> None:
+    with clients() as (run, (one, two), _):
+        one.send(b"G,1,2\nN\nG,3,4\nG,5")
+        run.wait_rounds(3)
+        one.hang_up()
+        run.wait_rounds(3)
+        again = Client(run.server._endpoints[1][0])
+        again.send(b"H\n")
+        run.wait_rounds(3)
+        assert again.has_heard_nothing()
+        # The clock of the wall stands still: the world waits for the other program.
+        assert run.sim.now_ns == 0
+        for _ in range(9):
+            two.send(b"B\n")
+            run.wait_rounds(2)
+        assert again.lines.readline() == b"h,3,4\r\n"
+        again.close()
+
+
 def test_fewer_programs_than_robots_may_begin() -> None:
     with served({1: [TcpEndpoint(0)], 2: [TcpEndpoint(0)]}, programs=1) as run:
         one = Client(run.server._endpoints[2][0])

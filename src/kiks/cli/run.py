@@ -61,23 +61,26 @@ def run(
         thinking=thinking if len(commands) == 1 else "none",
         robot=robot,
     )
-    if len(commands) == 1:
-        code, doubt = _run_one(sim, commands[0], mapping, save_thinking)
-    else:
-        code, doubt = _run_several(sim, commands, mapping, thinking, save_thinking, when_silent, patience)
-    if thinking.startswith("live"):
-        doubt = "thinking was live"
-    repeatable = f"not repeatable: {doubt}" if doubt else f"state {sim.state_hash()}"
-    typer.echo(f"kiks: {sim.time_s:.3f} s simulated, seed {seed}, {repeatable}", err=True)
+    code, doubt = 1, ""
+    try:
+        if len(commands) == 1:
+            code = _run_one(sim, commands[0], mapping, save_thinking)
+        else:
+            code, doubt = _run_several(sim, commands, mapping, thinking, save_thinking, when_silent, patience)
+    finally:
+        if thinking.startswith("live"):
+            doubt = "thinking was live"
+        repeatable = f"not repeatable: {doubt}" if doubt else f"state {sim.state_hash()}"
+        typer.echo(f"kiks: {sim.time_s:.3f} s simulated, seed {seed}, {repeatable}", err=True)
     raise typer.Exit(code)
 
 
-def _run_one(sim: Simulation, command: Command, told: dict[str, int], record: Path | None) -> tuple[int, str]:
-    """Run a program in this process; return its exit code and nothing that speaks against its being repeatable."""
+def _run_one(sim: Simulation, command: Command, told: dict[str, int], record: Path | None) -> int:
+    """Run a program in this process; return its exit code."""
     from kiks.ports.unchanged import run_here
 
     try:
-        return run_here(sim, command.program, command.arguments, told), ""
+        return run_here(sim, command.program, command.arguments, told)
     finally:
         if record is not None:
             from kiks.clock.thinking import save_thinking

@@ -123,6 +123,8 @@ class Server:
     def _enter(self, link: Link, endpoint: Endpoint, _events: int) -> None:
         """Let a client in if the robot has none."""
         wire = link.wire
+        if link.is_leaving:
+            return  # Who comes meanwhile waits at the door.
         if wire.holder is not None:
             endpoint.turn_away()
             if endpoint.name not in link.refused:

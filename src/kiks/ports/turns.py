@@ -180,7 +180,7 @@ class Turns:
         if self.players:
             horizon_ns = min((player.acts_from_ns for player in self._thinking()), default=NEVER_NS)
             self._sim.advance_to(min(self._seen_ns, horizon_ns))
-        return self._bear_with(holders) if holders else None
+        return self._bear_with(holders)
 
     def finish(self) -> None:
         """Bring the world to its end, when the last program has gone: commands under way still act."""
@@ -247,9 +247,11 @@ class Turns:
     # ---- those who keep others waiting ----
 
     def _wait_for_all(self) -> float | None:
-        """Begin when all are there or for long enough; return how long nothing will happen [s]."""
+        """Begin when all are there, or have been waited for; return how long nothing will happen [s]."""
+        self.players = [player for player in self.players if not player.has_left]
         if not self.players:
             self._start.renew()
+            self._has_named_missing = False
             return None
         here = sum(player.is_here for player in self.players)
         if here >= self._expected:
