@@ -8,9 +8,10 @@ import select
 import signal
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import pytest
 from tests.ports.test_lockstep import busy_computer, said
@@ -63,9 +64,19 @@ def write(folder: Path, name: str, text: str) -> str:
     return str(path)
 
 
-def start(*words: str) -> subprocess.Popen[bytes]:
+@contextmanager
+def started(*words: str) -> Iterator[tuple[subprocess.Popen[bytes], IO[bytes], IO[bytes]]]:
+    """Start the command; yield its process and what it says, and let nothing of it outlive the test."""
     command = [sys.executable, "-m", "kiks", "run", *words]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True)
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen(command, start_new_session=True, **pipes) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        try:
+            yield process, process.stdout, process.stderr
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
 
 
 # ---- the same as alone, the same again ----
@@ -175,14 +186,11 @@ def test_hanging_program_is_ignored(tmp_path: Path, caplog: pytest.LogCaptureFix
 
 
 def test_program_that_is_left_hanging_is_named(tmp_path: Path) -> None:
-    process = start("--patience", "0.2", write(tmp_path, "hangs.py", HANGS), WATCHER, "1")
-    assert process.stderr is not None
-    told = b""
-    while b"Ctrl-C" not in told:
-        told = process.stderr.readline()
+    with started("--patience", "0.2", write(tmp_path, "hangs.py", HANGS), WATCHER, "1") as (_, _, errors):
+        told = b""
+        while b"Ctrl-C" not in told:
+            told = errors.readline()
     assert told == b"program 1 (hangs.py), which the world does not wait for, still runs. Ctrl-C ends it.\n"
-    os.killpg(process.pid, signal.SIGINT)
-    process.communicate(timeout=GUARD_S)
 
 
 def test_hanging_program_is_dropped(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
@@ -223,11 +231,11 @@ def test_ctrl_c_ends_all_programs(tmp_path: Path) -> None:
         "        port.readline()\nexcept KeyboardInterrupt:\n    port.write(b'D,0,0\\n')\n"
         "    while port.readline() != b'd\\r\\n': pass\n    print('tidied')\n",
     )
-    process = start(hangs, tidy)
-    assert process.stderr is not None
-    assert process.stderr.readline() == b"l\r\n"
-    os.killpg(process.pid, signal.SIGINT)
-    out, told = process.communicate(timeout=GUARD_S)
+    with started(hangs, tidy) as (process, _, errors):
+        while errors.readline() != b"l\r\n":
+            pass
+        os.killpg(process.pid, signal.SIGINT)
+        out, told = process.communicate(timeout=GUARD_S)
     assert process.returncode == 130
     assert out == b"tidied\n"
     assert b"not repeatable: it was interrupted" in told
@@ -236,15 +244,14 @@ def test_ctrl_c_ends_all_programs(tmp_path: Path) -> None:
 
 def test_no_program_outlives_a_killed_kiks(tmp_path: Path) -> None:
     hangs = write(tmp_path, "hangs.py", "import os\nos.write(1, f'{os.getpid()}\\n'.encode())\n" + HANGS)
-    process = start(hangs, hangs)
-    assert process.stdout is not None
-    pids = [int(process.stdout.readline()) for _ in range(2)]
-    watched = [os.pidfd_open(pid) for pid in pids]
-    process.kill()
-    process.communicate(timeout=GUARD_S)
-    for descriptor in watched:
-        assert select.select([descriptor], [], [], GUARD_S)[0]
-        os.close(descriptor)
+    with started(hangs, hangs) as (process, output, _):
+        watched = [os.pidfd_open(int(output.readline())) for _ in range(2)]
+        process.kill()
+        process.wait(GUARD_S)
+        # Nobody but its end has told them.
+        for descriptor in watched:
+            assert select.select([descriptor], [], [], GUARD_S)[0]
+            os.close(descriptor)
 
 
 # ---- names, words and the command ----

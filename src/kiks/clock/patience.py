@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 
 from kiks.errors import ParameterError
-from kiks.units import NS_PER_S, s_from_ns
+from kiks.units import s_from_ns
 
 LONGEST_S = 86_400.0
 
@@ -54,7 +54,7 @@ class Patience:
 
     def waited_s(self) -> float:
         """Return how long it has been running [s]."""
-        return 0.0 if self._begin_ns is None else (self._wall_ns() - self._begin_ns) / NS_PER_S
+        return 0.0 if self._begin_ns is None else s_from_ns(self._wall_ns() - self._begin_ns)
 
     def renew(self) -> None:
         """Stop it and wind it up again."""

@@ -158,8 +158,6 @@ class Programs:
                 events = selectors.EVENT_READ | (selectors.EVENT_WRITE if run.guest.has_unsent else 0)
                 if self._selector.get_key(run.guest).events != events:
                     self._selector.modify(run.guest, events, run)
-        if not self._selector.get_map():
-            return True
         ready = self._selector.select(wait_s)
         for key, events in ready:
             if events & selectors.EVENT_WRITE:

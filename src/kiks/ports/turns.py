@@ -69,6 +69,7 @@ class Player(ABC):
         is_here: Whether it has taken part yet.
         is_waited_for: Whether the world waits for it while it thinks.
         has_left: Whether it has gone and everything that it left behind is done.
+        has_been_named: Whether a person has been told that the world waits for it.
         patience: How long it has been holding up others in real time; `Turns.join` puts it there.
     """
 
@@ -199,7 +200,8 @@ class Turns:
         is_waited = False
         for player in self.players:
             if player.has_left:
-                return self._let_go(player), []
+                self._let_go(player)
+                return False, []
             if player.waits:
                 is_waited = True
                 continue
@@ -235,14 +237,13 @@ class Turns:
             if player.is_waited_for and not player.waits and not player.has_left and player.next_ns() is None
         ]
 
-    def _let_go(self, player: Player) -> bool:
-        """Take out a program that has gone; return that nothing is stuck by that."""
+    def _let_go(self, player: Player) -> None:
+        """Take out a program that has gone."""
         self.players.remove(player)
         if not self.players:
             self.finish()
-            # The next programs begin together, too, unless it has shown that nobody else comes.
+            # The next programs begin together, too, unless one alone may begin.
             self.has_begun = self._expected == 1
-        return False
 
     # ---- those who keep others waiting ----
 
