@@ -10,7 +10,8 @@ import typer
 
 from kiks.cli.ending import end_as_with_ctrl_c
 from kiks.cli.engine_start import compile_everything, ready_engine
-from kiks.cli.options import ArenaFile, PatienceS, RobotKind, Robots, Seed, WhenSilent, load_arena
+from kiks.cli.log import show_log
+from kiks.cli.options import ArenaFile, PatienceS, RobotKinds, Robots, Seed, WhenSilent, load_arena
 from kiks.errors import LinkError
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ TCP_PORT = 10020
 def serve(
     arena: ArenaFile = None,
     robots: Robots = 1,
-    robot: RobotKind = "khepera",
+    robot: RobotKinds = ["khepera"],
     seed: Seed = 0,
     speed: Annotated[float, typer.Option(help="Simulated seconds in a real one, for thinking live.")] = 1.0,
     thinking: Annotated[
@@ -64,6 +65,8 @@ def serve(
         if not quiet:
             typer.echo(text)
 
+    show_log(is_quiet=quiet)
+    robots = max(robots, len(robot))
     ground = load_arena(arena)
     sim = Simulation(ground, robots=robots, seed=seed, robot=robot)
     for wire in sim.wires:
