@@ -12,7 +12,8 @@ if TYPE_CHECKING:
 ArenaFile = Annotated[str | None, typer.Option(help="Arena file (.toml) or picture; the classic box if left out.")]
 Robots = Annotated[int, typer.Option(help="Robots in the arena.", min=1, max=1000)]
 RobotKinds = Annotated[
-    list[str], typer.Option("--robot", help="Kind of robot: khepera, khepera_ii, or a file; once for all, or for each.")
+    list[str] | None,
+    typer.Option("--robot", help="Kind of robot: khepera, khepera_ii, or a file; once for all, or once for each."),
 ]
 WhenSilent = Annotated[
     str,

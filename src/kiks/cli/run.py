@@ -26,7 +26,7 @@ def run(
     ] = None,
     arena: ArenaFile = None,
     robots: Annotated[int, typer.Option(help="Robots in the arena; at least one a program.", min=1, max=1000)] = 1,
-    robot: RobotKinds = ["khepera"],
+    robot: RobotKinds = None,
     seed: Seed = 0,
     thinking: Annotated[
         str, typer.Option(help="What the program's computing costs: none, fixed:MS, live, live:FACTOR, replay:FILE.")
@@ -50,6 +50,7 @@ def run(
     """
     ready_engine()
     show_log()
+    kinds = robot or ["khepera"]
     from kiks.ports.turns import check_policy
     from kiks.sim.simulation import Simulation
 
@@ -58,10 +59,10 @@ def run(
     check_policy(when_silent, patience)
     sim = Simulation(
         load_arena(arena),
-        robots=max(robots, len(robot), len(commands)),
+        robots=max(robots, len(kinds), len(commands)),
         seed=seed,
         thinking=thinking if len(commands) == 1 else "none",
-        robot=robot,
+        robot=kinds,
     )
     code, doubt = 1, ""
     try:

@@ -24,7 +24,7 @@ TCP_PORT = 10020
 def serve(
     arena: ArenaFile = None,
     robots: Robots = 1,
-    robot: RobotKinds = ["khepera"],
+    robot: RobotKinds = None,
     seed: Seed = 0,
     speed: Annotated[float, typer.Option(help="Simulated seconds in a real one, for thinking live.")] = 1.0,
     thinking: Annotated[
@@ -66,9 +66,10 @@ def serve(
             typer.echo(text)
 
     show_log(is_quiet=quiet)
-    robots = max(robots, len(robot))
+    kinds = robot or ["khepera"]
+    robots = max(robots, len(kinds))
     ground = load_arena(arena)
-    sim = Simulation(ground, robots=robots, seed=seed, robot=robot)
+    sim = Simulation(ground, robots=robots, seed=seed, robot=kinds)
     for wire in sim.wires:
         wire.set_baud(baud)
     if not quiet:
@@ -100,7 +101,8 @@ def serve(
         say(_what_is_repeatable(thinking, speed, robots if programs is None else programs))
         server.serve()
     except KeyboardInterrupt:
-        say(f"Stopped after {sim.time_s:.1f} s of simulated time.")
+        state = "" if thinking == "live" else f" State {sim.state_hash()}."
+        say(f"Stopped after {sim.time_s:.1f} s of simulated time.{state}")
     finally:
         if server is not None:
             server.close()
