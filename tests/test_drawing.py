@@ -53,6 +53,7 @@ def test_a_trace_shows_where_everything_was() -> None:
     before = pixel(draw_simulation(sim), 200, 190)
     sim.place(1, 200, 100, 0.0)
     sim.move_body(2, 200, 160)
+    sim.run(0.2)
     trace.note()
     image = draw_simulation(sim, trace)
     assert before == FLOOR

@@ -35,27 +35,31 @@ _GOLDEN = 0.618034  # hues that differ by this share of the circle stay apart, h
 
 
 class Trace:
-    """Where robots, balls and cylinders of a simulation were, each time that `note` was called.
+    """The way of a simulation to where it stands: the paths of robots, and places of balls and cylinders.
 
     Args:
-        sim: The simulation; a first note is taken at once.
+        sim: The simulation; from now on it records the paths of its robots.
+        every_s: Time between two points of a path [s], whole hundredths.
 
     Attributes:
-        robots: The poses at each note, float64 [robot, 3].
-        bodies: The places of each ball and cylinder, by its number.
+        bodies: The places of each ball and cylinder at each note, by its number.
     """
 
-    def __init__(self, sim: Simulation) -> None:
+    def __init__(self, sim: Simulation, every_s: float = 0.1) -> None:
         self.sim = sim
-        self.robots: list[Any] = []
+        self.sim.record_paths(every_s)
         self.bodies: dict[int, list[Place]] = {}
         self.note()
 
     def note(self) -> None:
-        """Write down where everything is now."""
-        self.robots.append(self.sim.poses())
+        """Write down where balls and cylinders are now; robots need no notes."""
         for body in self.sim.bodies():
             self.bodies.setdefault(int(body["number"]), []).append((float(body["x_mm"]), float(body["y_mm"])))
+
+    def paths(self) -> list[list[list[float]]]:
+        """Return the poses of each robot on its way: x_mm, y_mm, heading_rad."""
+        poses: list[list[list[float]]] = self.sim.paths()[:, :, 1:].tolist()
+        return poses
 
 
 def draw_simulation(sim: Simulation, trace: Trace | None = None) -> Image:
@@ -78,8 +82,7 @@ def draw_simulation(sim: Simulation, trace: Trace | None = None) -> Image:
         sheet.lamp((x_mm, y_mm), power_w, is_on=bool(is_on))
     bodies = sim.bodies()
     if trace is not None:
-        for index, radius_mm in enumerate(radii_mm):
-            poses = [tuple(note[index]) for note in trace.robots]
+        for index, (radius_mm, poses) in enumerate(zip(radii_mm, trace.paths(), strict=True)):
             sheet.path(poses, _colours(index, sim.robot_count, len(poses)), 1.2 if sim.robot_count == 1 else 1.6)
             sheet.ring(poses[0][:2], radius_mm, (*_robot_colour(index, sim.robot_count), 90))
         for body in bodies:
@@ -173,7 +176,7 @@ class _Sheet:
         return max(round(length_mm * self.scale), _FINER)
 
     def line(self, places: Sequence[Sequence[float]], colour: Colour, width_mm: float) -> None:
-        if len(set(places)) > 1:
+        if len(places) > 1:
             points = [self.point(place) for place in places]
             self.pen.line(points, fill=colour, width=self.pixels(width_mm), joint="curve")
 

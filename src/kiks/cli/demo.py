@@ -11,8 +11,8 @@ import typer
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.options import Seed, load_arena
 
-SLICES_A_REPORT = 20
-"""Notes of the trace between two updates of the display: more would cost more than the simulation."""
+REPORT_S = 2.0
+"""Simulated time between two updates of the display [s]: more of them would cost more than the simulation."""
 
 
 class Behaviour(enum.StrEnum):
@@ -60,8 +60,8 @@ def demo(
 
     scene = SCENES[behaviour](None if arena is None else load_arena(arena), seed=seed, baud=baud)
     sim, total_s = scene.sim, scene.seconds if seconds is None else seconds
-    trace = Trace(sim)
-    working_s = 0.0
+    trace = Trace(sim, scene.slice_s)
+    working_s = told_s = 0.0
 
     def report() -> str:
         speedup = sim.time_s / working_s if working_s else 0.0
@@ -74,7 +74,8 @@ def demo(
         for _ in scene.slices(total_s):
             working_s += perf_counter() - start_s
             trace.note()
-            if len(trace.robots) % SLICES_A_REPORT == 0:
+            if sim.time_s - told_s >= REPORT_S:
+                told_s = sim.time_s
                 progress.update(task, completed=min(sim.time_s, total_s), description=report())
             start_s = perf_counter()
     target = picture or Path(f"kiks-{behaviour}.png")

@@ -10,7 +10,7 @@ import sys
 from kiks.client.khepera import Khepera
 
 BAUD = 38400
-"""Speed of the line: at 9600 baud readings come a third as often, and half of the speed is the limit."""
+"""Speed of the line: at 9600 baud readings come a third as often, and half of the speed is enough."""
 
 CRUISE = 80
 """Mean speed of the wheels [pulses/10 ms]: 640 mm/s."""
