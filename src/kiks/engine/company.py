@@ -21,6 +21,7 @@ import numpy as np
 from kiks.engine.bodies import collide, kick, roll, speed_of
 from kiks.engine.compiling import kernel
 from kiks.engine.contact import clearance_mm, outward
+from kiks.engine.gripper import REACH, begin_holds, carry_along, go_back_together, is_dragged, keep_holds, turn_back
 from kiks.engine.lanes import stack_integers
 from kiks.engine.motion import give_way, move, note_contact
 from kiks.engine.scene import count_discs, disc_at, enter_all, find_near, is_on_floor
@@ -129,6 +130,7 @@ def move_together(scene: Any, ground: Any, world: Any, room: Any, neighbour_coun
         neighbour_count = find_neighbours(scene, world, room, slack_mm)
     slack_mm -= nearer_mm
     pair_count = find_pairs(scene, world, room, neighbour_count, nearer_mm)
+    begin_holds(scene, world, room)
     fastest_mm = 0.0
     for disc in range(disc_count):
         if room.is_near[disc]:
@@ -139,6 +141,7 @@ def move_together(scene: Any, ground: Any, world: Any, room: Any, neighbour_coun
     pieces = max(math.ceil(fastest_mm / PIECE_MM), 1)
     for _ in range(pieces):
         drive_and_roll(scene, ground, world, room, pieces)
+        carry_along(scene, world, room, TICK_S / pieces)
         hit(scene, world, room, pair_count, TICK_S / pieces)
         if not part(scene, ground, world, room, pair_count):
             go_back(scene, ground, world, room, pair_count)
@@ -149,6 +152,7 @@ def move_together(scene: Any, ground: Any, world: Any, room: Any, neighbour_coun
                 if dx != 0.0 or dy != 0.0:
                     parameters = scene[2][robot.kind]
                     give_way(robot, parameters, dx, dy, room.ways[number, :2] / pieces, room.ways[number, 2])
+        turn_back(scene, world, room, pieces)
     for number in range(robot_count):
         note_contact(robots[world, number], room.is_touching[number])
     return neighbour_count, slack_mm
@@ -157,11 +161,20 @@ def move_together(scene: Any, ground: Any, world: Any, room: Any, neighbour_coun
 @kernel
 def way_of(scene: Any, world: Any, room: Any, disc: Any) -> Any:
     """Return how far a disc goes in this tick if nothing is in its way [mm]; a robot, its faster wheel."""
-    robots, bodies, kinds, _ = scene
+    robots, bodies, _, _ = scene
     if disc < robots.shape[1]:
-        pulse = kinds[robots[world, disc].kind].pulse_mm
-        return max(abs(room.ways[disc, 0]), abs(room.ways[disc, 1])) * pulse
-    return speed_of(bodies[world, disc - robots.shape[1]]) * TICK_S
+        return way_of_robot(scene, world, room, disc)
+    body = bodies[world, disc - robots.shape[1]]
+    if is_dragged(body):
+        return REACH * way_of_robot(scene, world, room, body.holder - 1)
+    return speed_of(body) * TICK_S
+
+
+@kernel
+def way_of_robot(scene: Any, world: Any, room: Any, number: Any) -> Any:
+    """Return how far the faster wheel of a robot goes in this tick [mm]."""
+    pulse = scene[2][scene[0][world, number].kind].pulse_mm
+    return max(abs(room.ways[number, 0]), abs(room.ways[number, 1])) * pulse
 
 
 @kernel
@@ -287,6 +300,7 @@ def part(scene: Any, ground: Any, world: Any, room: Any, pair_count: Any) -> Any
             shift(scene, world, first, -back * nx, -back * ny)
             shift(scene, world, second, (overlap - back) * nx, (overlap - back) * ny)
             worst = max(worst, overlap)
+        worst = max(worst, keep_holds(scene, ground, world, room))
         if worst == 0.0:
             return True
         for disc in range(disc_count):
@@ -327,6 +341,8 @@ def go_back(scene: Any, ground: Any, world: Any, room: Any, pair_count: Any) -> 
                 put_back(scene, world, room, first)
                 put_back(scene, world, room, second)
                 is_done = False
+        if go_back_together(scene, world, room, STUCK_MM):
+            is_done = False
 
 
 @kernel
