@@ -21,7 +21,7 @@ import numpy as np
 from kiks.engine.bodies import collide, kick, roll, speed_of
 from kiks.engine.compiling import kernel
 from kiks.engine.contact import clearance_mm, outward
-from kiks.engine.gripper import REACH, begin_holds, carry_along, go_back_together, is_dragged, keep_holds, turn_back
+from kiks.engine.gripper import begin_holds, carry_along, go_back_together, keep_holds, turn_back, way_of_held
 from kiks.engine.lanes import stack_integers
 from kiks.engine.motion import give_way, move, note_contact
 from kiks.engine.scene import count_discs, disc_at, enter_all, find_near, is_on_floor
@@ -124,6 +124,8 @@ def move_together(scene: Any, ground: Any, world: Any, room: Any, neighbour_coun
         fastest_mm = max(fastest_mm, way)
         room.is_near[disc] = disc >= robot_count and way > 0.0
         room.is_touching[disc] = False
+    held_mm = way_of_held(scene, world, room)
+    fastest_mm = max(fastest_mm, held_mm)
     nearer_mm = HASTE * fastest_mm + TOUCHING_MM
     if slack_mm < nearer_mm:
         slack_mm = max(SLACK_MM, nearer_mm)
@@ -138,6 +140,7 @@ def move_together(scene: Any, ground: Any, world: Any, room: Any, neighbour_coun
         elif disc < robot_count:
             left, right, slip_ratio = room.ways[disc, 0], room.ways[disc, 1], room.ways[disc, 2]
             room.is_touching[disc] = move_alone(scene, ground, world, disc, left, right, slip_ratio)
+    fastest_mm = max(fastest_mm, held_mm)
     pieces = max(math.ceil(fastest_mm / PIECE_MM), 1)
     for _ in range(pieces):
         drive_and_roll(scene, ground, world, room, pieces)
@@ -161,20 +164,11 @@ def move_together(scene: Any, ground: Any, world: Any, room: Any, neighbour_coun
 @kernel
 def way_of(scene: Any, world: Any, room: Any, disc: Any) -> Any:
     """Return how far a disc goes in this tick if nothing is in its way [mm]; a robot, its faster wheel."""
-    robots, bodies, _, _ = scene
+    robots, bodies, kinds, _ = scene
     if disc < robots.shape[1]:
-        return way_of_robot(scene, world, room, disc)
-    body = bodies[world, disc - robots.shape[1]]
-    if is_dragged(body):
-        return REACH * way_of_robot(scene, world, room, body.holder - 1)
-    return speed_of(body) * TICK_S
-
-
-@kernel
-def way_of_robot(scene: Any, world: Any, room: Any, number: Any) -> Any:
-    """Return how far the faster wheel of a robot goes in this tick [mm]."""
-    pulse = scene[2][scene[0][world, number].kind].pulse_mm
-    return max(abs(room.ways[number, 0]), abs(room.ways[number, 1])) * pulse
+        pulse = kinds[robots[world, disc].kind].pulse_mm
+        return max(abs(room.ways[disc, 0]), abs(room.ways[disc, 1])) * pulse
+    return speed_of(bodies[world, disc - robots.shape[1]]) * TICK_S
 
 
 @kernel

@@ -255,6 +255,20 @@ def is_dragged(body: Any) -> Any:
 
 
 @kernel
+def way_of_held(scene: Any, world: Any, room: Any) -> Any:
+    """Return the longest way in this tick of what is held on the floor [mm], if nothing is in its way."""
+    robots, bodies, kinds, _ = scene
+    longest_mm = 0.0
+    for row in range(bodies.shape[1]):
+        body = bodies[world, row]
+        if is_dragged(body):
+            number = body.holder - 1
+            wheel = max(abs(room.ways[number, 0]), abs(room.ways[number, 1]))
+            longest_mm = max(longest_mm, REACH * wheel * kinds[robots[world, number].kind].pulse_mm)
+    return longest_mm
+
+
+@kernel
 def begin_holds(scene: Any, world: Any, room: Any) -> Any:
     """Let those who hold something on the floor, and what they hold, take part in all pieces of this tick."""
     robots, bodies, _, _ = scene
