@@ -21,7 +21,7 @@ import numpy as np
 from kiks.engine.bodies import collide, kick, roll, speed_of
 from kiks.engine.compiling import kernel
 from kiks.engine.contact import clearance_mm, outward
-from kiks.engine.gripper import begin_holds, carry_along, go_back_together, keep_holds, turn_back, way_of_held
+from kiks.engine.hold import begin_holds, carry_along, go_back_together, keep_holds, turn_back, way_of_held
 from kiks.engine.lanes import stack_integers
 from kiks.engine.motion import give_way, move, note_contact
 from kiks.engine.scene import count_discs, disc_at, enter_all, find_near, is_on_floor

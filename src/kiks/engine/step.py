@@ -7,7 +7,8 @@ from typing import Any
 from kiks.engine.bodies import remember_place
 from kiks.engine.company import make_room, move_alone, move_together
 from kiks.engine.compiling import entry, kernel
-from kiks.engine.gripper import carry_lifted, move_gripper, tend_grippers
+from kiks.engine.gripper import move_gripper, tend_grippers
+from kiks.engine.hold import carry_lifted
 from kiks.engine.motion import note_contact, remember_pose
 from kiks.engine.motor import control_motors, latch_encoders, turn_motors
 from kiks.engine.numbers import uniform
