@@ -5,8 +5,8 @@ Derivation: let r be the way from the robot to the place where the body ought to
 k the radius of gyration. An impulse p moves the body by -p and the robot by p, which also turns by (r x p)/k^2. That
 takes e away if p = e/2 along r, and p = e/(2 + r^2/k^2) across.
 
-So a hold is one more thing that `part` has to bring in order in each sweep, after the overlaps: what pushes the one moves
-the other, and where both are stopped the sweeps find that out.
+So a hold is one more thing that `part` has to bring in order in each sweep, after the overlaps: what pushes the one
+moves the other, and where both are stopped the sweeps find that out.
 """
 
 from __future__ import annotations
