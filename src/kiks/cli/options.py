@@ -6,14 +6,23 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from kiks.errors import ParameterError
+
 if TYPE_CHECKING:
     from kiks.model.arena import Arena
+    from kiks.sim.simulation import Simulation
 
 ArenaFile = Annotated[str | None, typer.Option(help="Arena file (.toml) or picture; the classic box if left out.")]
 Robots = Annotated[int, typer.Option(help="Robots in the arena.", min=1, max=1000)]
 RobotKinds = Annotated[
     list[str] | None,
     typer.Option("--robot", help="Kind of robot: khepera, khepera_ii, or a file; once for all, or once for each."),
+]
+Turrets = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--turret", help="k213, gripper, radio, io or battle, for all robots; with a number, gripper=2, for that one."
+    ),
 ]
 WhenSilent = Annotated[
     str,
@@ -32,3 +41,20 @@ def load_arena(file: str | None) -> Arena:
     from kiks.model.arena import Arena
 
     return Arena.default() if file is None else Arena.load(file)
+
+
+def fit_turrets(sim: Simulation, entries: list[str] | None) -> None:
+    """Put turrets on robots.
+
+    Raises:
+        ParameterError: If an entry is no turret, or names no robot.
+    """
+    for entry in entries or []:
+        name, equals, number = entry.partition("=")
+        if equals and not (number.isascii() and number.isdigit()):
+            raise ParameterError(
+                f"--turret must be a turret, or one with = and a robot's number, but it was {entry!r}. "
+                "Example: gripper=2."
+            )
+        for robot in [int(number)] if equals else range(1, sim.robot_count + 1):
+            sim.fit(robot, name)

@@ -10,7 +10,7 @@ import typer
 
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.log import show_log
-from kiks.cli.options import ArenaFile, PatienceS, RobotKinds, Seed, WhenSilent, load_arena
+from kiks.cli.options import ArenaFile, PatienceS, RobotKinds, Seed, Turrets, WhenSilent, fit_turrets, load_arena
 from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ def run(
     arena: ArenaFile = None,
     robots: Annotated[int, typer.Option(help="Robots in the arena; at least one a program.", min=1, max=1000)] = 1,
     robot: RobotKinds = None,
+    turret: Turrets = None,
     seed: Seed = 0,
     thinking: Annotated[
         str, typer.Option(help="What the program's computing costs: none, fixed:MS, live, live:FACTOR, replay:FILE.")
@@ -64,6 +65,7 @@ def run(
         thinking=thinking if len(commands) == 1 else "none",
         robot=kinds,
     )
+    fit_turrets(sim, turret)
     code, doubt = 1, ""
     try:
         if len(commands) == 1:

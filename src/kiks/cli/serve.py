@@ -11,7 +11,17 @@ import typer
 from kiks.cli.ending import end_as_with_ctrl_c
 from kiks.cli.engine_start import compile_everything, ready_engine
 from kiks.cli.log import show_log
-from kiks.cli.options import ArenaFile, PatienceS, RobotKinds, Robots, Seed, WhenSilent, load_arena
+from kiks.cli.options import (
+    ArenaFile,
+    PatienceS,
+    RobotKinds,
+    Robots,
+    Seed,
+    Turrets,
+    WhenSilent,
+    fit_turrets,
+    load_arena,
+)
 from kiks.errors import LinkError
 
 if TYPE_CHECKING:
@@ -25,6 +35,7 @@ def serve(
     arena: ArenaFile = None,
     robots: Robots = 1,
     robot: RobotKinds = None,
+    turret: Turrets = None,
     seed: Seed = 0,
     speed: Annotated[float, typer.Option(help="Simulated seconds in a real one, for thinking live.")] = 1.0,
     thinking: Annotated[
@@ -70,6 +81,7 @@ def serve(
     robots = max(robots, len(kinds))
     ground = load_arena(arena)
     sim = Simulation(ground, robots=robots, seed=seed, robot=kinds)
+    fit_turrets(sim, turret)
     for wire in sim.wires:
         wire.set_baud(baud)
     if not quiet:
