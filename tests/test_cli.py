@@ -80,6 +80,28 @@ def test_a_program_runs_unchanged_in_simulated_time() -> None:
     assert state_of(other.stderr) != state_of(result.stderr)
 
 
+def test_turrets_and_kinds_of_robots_from_the_command_line(tmp_path: Path) -> None:
+    program = tmp_path / "ask.py"
+    program.write_text(
+        "import serial\n"
+        "for name in 'ab':\n"
+        "    port = serial.Serial(name, timeout=1)\n"
+        "    for order in (b'B\\n', b'T,1,B\\n', b'T,4,B\\n'):\n"
+        "        port.write(order)\n"
+        "        print(port.readline())\n"
+    )
+    options = ("--robot", "khepera", "--robot", "khepera_ii", "--turret", "radio", "--turret", "gripper=2")
+    result = kiks("run", *options, str(program))
+    assert result.stdout.splitlines() == [
+        "b'b,5.02,5.01\\r\\n'",
+        "b'z,Turret order not supported\\r\\n'",
+        "b't,4,b,1,0\\r\\n'",
+        "b'b,6.01,6.01\\r\\n'",
+        "b't,1,b,1,0\\r\\n'",
+        "b't,4,b,1,0\\r\\n'",
+    ], result.stderr
+
+
 def test_a_programs_exit_code_and_errors_are_its_own(tmp_path: Path) -> None:
     assert kiks("run", WANDER, "7").returncode == 7
     program = tmp_path / "wrong.py"
@@ -113,6 +135,9 @@ def test_live_thinking_is_recorded_and_replayed(tmp_path: Path) -> None:
         (("run", "--map", "ttyS0=4", WANDER), "This simulation has robot 1"),
         (("run", "--thinking", "slow", WANDER), "thinking must be 'none'"),
         (("run", "--robot", "kephera", WANDER), "Did you mean 'khepera'"),
+        (("run", "--turret", "grippr", WANDER), "Did you mean 'gripper'"),
+        (("run", "--turret", "gripper=2", WANDER), "This simulation has robot 1"),
+        (("run", "--turret", "gripper=x", WANDER), "--turret must be a turret, or one with = and a robot's number"),
         (("demo", "--arena", "nowhere.png"), "nowhere.png"),
         (("demo", "--seconds", "2", "--picture", "/no/folder/x.png"), "a picture must go to a writable file"),
         (("demo", "--seconds", "2", "--baud", "3"), "baudrate must be a whole number from 75"),
