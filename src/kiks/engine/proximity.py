@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from kiks.engine.compiling import entry, kernel
-from kiks.engine.discs import SEEN_LIMIT, SEEN_SIZE, meet_disc, see
+from kiks.engine.discs import LANES, SEEN_LIMIT, SEEN_SIZE, TRACKS_SIZE, follow, meet_discs, see
 from kiks.engine.lanes import stack_floats, stack_integers
 from kiks.engine.motion import pose_between
 from kiks.engine.numbers import draw, sin_cos, source
-from kiks.engine.parameters import AHEAD, RAY_COUNT
-from kiks.engine.rays import cast, free_cells, meet_face, scale, stride
+from kiks.engine.parameters import RAY_COUNT
+from kiks.engine.rays import cast_fan, free_cells, meet_face, scale, stride
 from kiks.engine.responses import FAST, REFLECTION, respond
 from kiks.engine.scene import find_near, moment_of
 from kiks.units import SENSOR_ROUND_NS, SENSOR_SLOT_NS, TICK_NS
@@ -24,8 +24,8 @@ from kiks.units import SENSOR_ROUND_NS, SENSOR_SLOT_NS, TICK_NS
 STREAM_SLIP, STREAM_PROXIMITY = 1, 2
 """Random streams: whoever draws has a number of his own."""
 
-MOVED_MM = 40.0
-"""How much farther a thing may have been from a robot when its sensors were sampled: 20 ms, both at 1 m/s."""
+MOVED_MM = 30.0
+"""How far a robot or a thing moves between the first sensor's sample and a reading, at most: 20 ms at 1.5 m/s."""
 
 
 @kernel
@@ -56,19 +56,13 @@ def sampled_pose(robot: Any, tick_count: Any, time_ns: Any, sensor: Any, is_samp
 
 
 @kernel
-def view_of(parameters: Any, x: Any, y: Any, heading: Any, sensor: Any) -> Any:
-    """Return the view of a sensor of a robot at a pose, for `kiks.engine.discs.see`."""
-    sine, cosine = sin_cos(heading)
-    ray_x, ray_y = parameters.ray_x_mm[sensor], parameters.ray_y_mm[sensor]
-    ahead_x, ahead_y = parameters.ray_cos[sensor, AHEAD], parameters.ray_sin[sensor, AHEAD]
-    return (
-        x + ray_x * cosine - ray_y * sine,
-        y + ray_x * sine + ray_y * cosine,
-        ahead_x * cosine - ahead_y * sine,
-        ahead_x * sine + ahead_y * cosine,
-        parameters.reach_mm,
-        True,
-    )
+def aim(parameters: Any, sine: Any, cosine: Any, sensor: Any, rays_x: Any, rays_y: Any) -> Any:
+    """Write the directions of a sensor's rays, an array on the stack [`LANES`] each; the one over repeats the last."""
+    for lane in range(LANES):
+        ray = min(lane, RAY_COUNT - 1)
+        ray_cos, ray_sin = parameters.ray_cos[sensor, ray], parameters.ray_sin[sensor, ray]
+        rays_x[lane] = ray_cos * cosine - ray_sin * sine
+        rays_y[lane] = ray_cos * sine + ray_sin * cosine
 
 
 @kernel
@@ -76,8 +70,9 @@ def expected_count(
     sight: Any,
     networks: Any,
     parameters: Any,
-    seen: Any,
-    seen_count: Any,
+    tracks: Any,
+    track_count: Any,
+    moment: Any,
     x: Any,
     y: Any,
     heading: Any,
@@ -89,8 +84,9 @@ def expected_count(
         sight: What rays meet of the arena.
         networks: What the response needs besides.
         parameters: Record of the robot's constants.
-        seen: The discs that are in its view (`kiks.engine.discs`).
-        seen_count: How many they are.
+        tracks: Where the discs about have been (`kiks.engine.discs`).
+        track_count: How many they are.
+        moment: When (`kiks.engine.scene.moment_of`).
         x: Where the robot is [mm].
         y: Where the robot is [mm].
         heading: Where it looks [rad].
@@ -98,34 +94,63 @@ def expected_count(
     """
     sine, cosine = sin_cos(heading)
     ray_x, ray_y = parameters.ray_x_mm[sensor], parameters.ray_y_mm[sensor]
+    x, y = x + ray_x * cosine - ray_y * sine, y + ray_x * sine + ray_y * cosine
     cell, pad = scale(sight)
     per_cell = 1.0 / cell
-    column = (x + ray_x * cosine - ray_y * sine) * per_cell + pad
-    row = (y + ray_x * sine + ray_y * cosine) * per_cell + pad
-    reach = parameters.reach_mm * per_cell
+    column, row, reach = x * per_cell + pad, y * per_cell + pad, parameters.reach_mm * per_cell
     begin = max(free_cells(sight, column, row), 0.0)
+    if begin > reach and track_count == 0:
+        return parameters.baseline_counts[sensor]
+    rays_x, rays_y = stack_floats(LANES), stack_floats(LANES)
+    aim(parameters, sine, cosine, sensor, rays_x, rays_y)
+    seen, seen_count = stack_floats(SEEN_SIZE), 0
+    if track_count > 0:
+        view = x, y, (rays_x[0], rays_y[0]), (rays_x[RAY_COUNT - 1], rays_y[RAY_COUNT - 1]), parameters.reach_mm
+        seen_count = see(tracks, track_count, moment, (cell, pad), view, seen)
     if begin > reach and seen_count == 0:
         return parameters.baseline_counts[sensor]
-    lengths_mm, cosines, brightnesses = stack_floats(RAY_COUNT), stack_floats(RAY_COUNT), stack_floats(RAY_COUNT)
-    for ray in range(RAY_COUNT):
-        ray_cos, ray_sin = parameters.ray_cos[sensor, ray], parameters.ray_sin[sensor, ray]
-        direction_x = ray_cos * cosine - ray_sin * sine
-        direction_y = ray_cos * sine + ray_sin * cosine
-        # The table rounds lengths to 10 mm: for it, rays need not be exact.
-        if parameters.response == FAST:
-            length, brightness = stride(sight, column, row, direction_x, direction_y, reach, begin)
-        else:
-            length, brightness = cast(sight, column, row, direction_x, direction_y, reach, begin)
-        cosines[ray] = 1.0
-        if parameters.response == REFLECTION and brightness > 0:
-            length, cosines[ray] = meet_face(sight, column, row, direction_x, direction_y, length)
-        if seen_count > 0:
-            to_disc, squarely, shade = meet_disc(seen, seen_count, column, row, direction_x, direction_y, length)
-            if shade > 0:
-                length, cosines[ray], brightness = to_disc, squarely, shade
-        lengths_mm[ray], brightnesses[ray] = length * cell, brightness
-    counts = respond(networks, parameters, sensor, lengths_mm, cosines, brightnesses)
+    lengths, cosines, brightnesses = stack_floats(LANES), stack_floats(LANES), stack_floats(LANES)
+    for lane in range(LANES):
+        lengths[lane], cosines[lane], brightnesses[lane] = reach, 1.0, 0.0
+    if begin <= reach:
+        meet_walls(sight, parameters, column, row, rays_x, rays_y, begin, lengths, cosines, brightnesses)
+    if seen_count > 0:
+        meet_discs(seen, seen_count, column, row, rays_x, rays_y, lengths, cosines, brightnesses)
+    for lane in range(LANES):
+        lengths[lane] *= cell
+    counts = respond(networks, parameters, sensor, lengths, cosines, brightnesses)
     return parameters.baseline_counts[sensor] + counts
+
+
+@kernel
+def meet_walls(
+    sight: Any,
+    parameters: Any,
+    column: Any,
+    row: Any,
+    rays_x: Any,
+    rays_y: Any,
+    begin: Any,
+    lengths: Any,
+    cosines: Any,
+    brightnesses: Any,
+) -> Any:
+    """Shorten a sensor's rays to the walls they meet, as exactly as the response needs them."""
+    reach = lengths[0]
+    if parameters.response == FAST:
+        # The table rounds lengths to 10 mm: for it, rays need not be exact.
+        for ray in range(RAY_COUNT):
+            lengths[ray], shade = stride(sight, column, row, rays_x[ray], rays_y[ray], reach, begin)
+            brightnesses[ray] = shade
+        return
+    columns, rows = stack_floats(LANES), stack_floats(LANES)
+    for lane in range(LANES):
+        columns[lane], rows[lane], lengths[lane] = column, row, begin
+    cast_fan(sight, columns, rows, rays_x, rays_y, reach, lengths, brightnesses)
+    if parameters.response == REFLECTION:
+        for ray in range(RAY_COUNT):
+            if brightnesses[ray] > 0.0:
+                lengths[ray], cosines[ray] = meet_face(sight, column, row, rays_x[ray], rays_y[ray], lengths[ray])
 
 
 @kernel
@@ -193,16 +218,17 @@ def read_proximity(
     robots, _, kinds, _ = scene
     state = robots[0, robot]
     parameters = kinds[state.kind]
-    found, seen = stack_integers(SEEN_LIMIT), stack_floats(SEEN_SIZE)
-    reach = parameters.radius_mm + parameters.reach_mm
-    near_count = find_near(scene, 0, state.x_mm, state.y_mm, reach + MOVED_MM, robot, found)
+    found, tracks = stack_integers(SEEN_LIMIT), stack_floats(TRACKS_SIZE)
+    reach = parameters.radius_mm + parameters.reach_mm + MOVED_MM
+    track_count = find_near(scene, 0, state.x_mm, state.y_mm, reach + MOVED_MM, robot, found)
+    if track_count > 0:
+        track_count = follow(scene, 0, found, track_count, state.x_mm, state.y_mm, reach, tracks)
     for sensor in range(out.shape[0]):
         turn, instant_ns, x, y, heading = sampled_pose(state, tick_count, time_ns, sensor, is_noisy)
-        seen_count = 0
-        if near_count > 0:
-            moment, view = moment_of(tick_count, instant_ns), view_of(parameters, x, y, heading, sensor)
-            seen_count = see(scene, 0, found, near_count, moment, scale(sight), view, seen)
-        count = expected_count(sight, networks, parameters, seen, seen_count, x, y, heading, sensor)
+        moment = moment_of(tick_count, instant_ns)
+        count = expected_count(
+            sight, networks, parameters, tracks, track_count, moment, x, y, heading, sensor
+        )
         if is_noisy:
             chance = source(seed, 0, robot, STREAM_PROXIMITY, turn)
             sign, size, jitter = draw(chance, sensor * 3), draw(chance, sensor * 3 + 1), draw(chance, sensor * 3 + 2)

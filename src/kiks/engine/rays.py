@@ -35,7 +35,6 @@ _NUDGE = 1e-3  # over the edge of a cell [cells]
 _BACK = 2e-3  # from there back over it [cells]
 _GRAZING = 0.1  # cosine of an incidence below which a surface is not worth finding
 _FAR = 1e30
-_LANES = 32
 
 
 @kernel
@@ -139,60 +138,79 @@ def stride(sight: Any, column: Any, row: Any, cosine: Any, sine: Any, reach: Any
     return reach, np.int64(0)
 
 
-@kernel
-def cast_many(sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, lengths: Any, brightnesses: Any) -> Any:
-    """Follow many rays, each to the first wall: the lengths and brightnesses of `cast` to the bit, in less time.
+def _in_lanes(lane_count: int) -> Any:
+    """Return a kernel that follows many rays, so and so many of them at once."""
 
-    Neighbours step together, one lane each, until the last of them has met its wall; a lane that has stays where it is.
+    @kernel
+    def cast_lanes(
+        sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, reach: Any, lengths: Any, brightnesses: Any
+    ) -> Any:
+        """Follow many rays, each to the first wall: what `cast` returns to the bit, in less time.
 
-    Args:
-        sight: What rays meet.
-        columns: Origins [cells], shape [rays].
-        rows: Origins [cells], shape [rays].
-        cosines: Directions, shape [rays].
-        sines: Directions, shape [rays].
-        lengths: Where the lengths of the rays go [cells], shape [rays].
-        brightnesses: Where the brightnesses of the walls go, shape [rays].
-    """
-    field, surface, _, cell, _ = sight
-    per_cell = 1.0 / cell
-    clearances, width = pointer_to(field), np.int32(field.shape[1])
-    last_column, last_row = np.int32(field.shape[1] - 1), np.int32(field.shape[0] - 1)
-    nought = np.int32(0)
-    column, row = stack_floats(_LANES), stack_floats(_LANES)
-    cosine, sine = stack_floats(_LANES), stack_floats(_LANES)
-    per_column, per_row = stack_floats(_LANES), stack_floats(_LANES)
-    right, up = stack_floats(_LANES), stack_floats(_LANES)
-    length = stack_floats(_LANES)
-    for first in range(0, lengths.shape[0], _LANES):
-        for lane in range(_LANES):
-            ray = min(first + lane, lengths.shape[0] - 1)
-            column[lane], row[lane], cosine[lane], sine[lane] = columns[ray], rows[ray], cosines[ray], sines[ray]
-            per_column[lane] = 1.0 / cosine[lane] if abs(cosine[lane]) > 1e-12 else _FAR
-            per_row[lane] = 1.0 / sine[lane] if abs(sine[lane]) > 1e-12 else _FAR
-            right[lane] = 1.0 if cosine[lane] > 0.0 else 0.0
-            up[lane] = 1.0 if sine[lane] > 0.0 else 0.0
-            length[lane] = 0.0
-        under_way = np.int32(1)
-        while under_way != 0:
-            under_way = nought
-            for lane in range(_LANES):
-                px = column[lane] + length[lane] * cosine[lane]
-                py = row[lane] + length[lane] * sine[lane]
-                i = min(max(np.int32(px), nought), last_column)
-                j = min(max(np.int32(py), nought), last_row)
-                clearance = element(clearances, np.int32(j * width + i)) * per_cell
-                to_column = (i + right[lane] - px) * per_column[lane] if per_column[lane] < _FAR else _FAR
-                to_row = (j + up[lane] - py) * per_row[lane] if per_row[lane] < _FAR else _FAR
-                walk = max(min(to_column, to_row), 0.0) + _NUDGE
-                step = clearance - _DIAGONAL if clearance > _WALK else walk
-                length[lane] += step if clearance > 0.0 else 0.0
-                under_way |= np.int32(clearance > 0.0)
-        for lane in range(min(_LANES, lengths.shape[0] - first)):
-            ray = first + lane
-            i = min(max(np.int32(column[lane] + length[lane] * cosine[lane]), nought), last_column)
-            j = min(max(np.int32(row[lane] + length[lane] * sine[lane]), nought), last_row)
-            lengths[ray], brightnesses[ray] = length[lane], surface[j, i]
+        Neighbours step together, one lane each, until the last of them has met its wall; a lane that has stays where it
+        is.
+
+        Args:
+            sight: What rays meet.
+            columns: Origins [cells], shape [rays].
+            rows: Origins [cells], shape [rays].
+            cosines: Directions, shape [rays].
+            sines: Directions, shape [rays].
+            reach: Longest length followed [cells]: any number that is larger than the arena follows all to a wall.
+            lengths: Lengths that are known to be free [cells], and then the lengths of the rays, shape [rays].
+            brightnesses: Where the brightnesses of the walls go, shape [rays].
+        """
+        field, surface, _, cell, _ = sight
+        per_cell = 1.0 / cell
+        clearances, width = pointer_to(field), np.int32(field.shape[1])
+        last_column, last_row = np.int32(field.shape[1] - 1), np.int32(field.shape[0] - 1)
+        nought = np.int32(0)
+        column, row = stack_floats(lane_count), stack_floats(lane_count)
+        cosine, sine = stack_floats(lane_count), stack_floats(lane_count)
+        per_column, per_row = stack_floats(lane_count), stack_floats(lane_count)
+        right, up = stack_floats(lane_count), stack_floats(lane_count)
+        length = stack_floats(lane_count)
+        for first in range(0, lengths.shape[0], lane_count):
+            for lane in range(lane_count):
+                ray = min(first + lane, lengths.shape[0] - 1)
+                column[lane], row[lane], cosine[lane], sine[lane] = columns[ray], rows[ray], cosines[ray], sines[ray]
+                length[lane] = lengths[ray]
+            for lane in range(lane_count):
+                per_column[lane] = 1.0 / cosine[lane] if abs(cosine[lane]) > 1e-12 else _FAR
+                per_row[lane] = 1.0 / sine[lane] if abs(sine[lane]) > 1e-12 else _FAR
+                right[lane] = 1.0 if cosine[lane] > 0.0 else 0.0
+                up[lane] = 1.0 if sine[lane] > 0.0 else 0.0
+            under_way = np.int32(1)
+            while under_way != 0:
+                under_way = nought
+                for lane in range(lane_count):
+                    px = column[lane] + length[lane] * cosine[lane]
+                    py = row[lane] + length[lane] * sine[lane]
+                    i = min(max(np.int32(px), nought), last_column)
+                    j = min(max(np.int32(py), nought), last_row)
+                    clearance = element(clearances, np.int32(j * width + i)) * per_cell
+                    to_column = (i + right[lane] - px) * per_column[lane] if per_column[lane] < _FAR else _FAR
+                    to_row = (j + up[lane] - py) * per_row[lane] if per_row[lane] < _FAR else _FAR
+                    walk = max(min(to_column, to_row), 0.0) + _NUDGE
+                    step = clearance - _DIAGONAL if clearance > _WALK else walk
+                    goes_on = (clearance > 0.0) & (length[lane] < reach)
+                    length[lane] += step if goes_on else 0.0
+                    under_way |= np.int32(goes_on)
+            for lane in range(min(lane_count, lengths.shape[0] - first)):
+                ray = first + lane
+                i = min(max(np.int32(column[lane] + length[lane] * cosine[lane]), nought), last_column)
+                j = min(max(np.int32(row[lane] + length[lane] * sine[lane]), nought), last_row)
+                is_met = length[lane] < reach
+                lengths[ray], brightnesses[ray] = (length[lane], surface[j, i]) if is_met else (reach, 0.0)
+
+    return cast_lanes
+
+
+cast_many = _in_lanes(32)
+"""For whole pictures."""
+
+cast_fan = _in_lanes(8)
+"""For the seven rays of a proximity sensor, and one over."""
 
 
 @kernel
@@ -243,4 +261,5 @@ def cast_ray(sight: Any, x: Any, y: Any, cosine: Any, sine: Any, reach: Any) -> 
 @entry
 def cast_rays(sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, lengths: Any, brightnesses: Any) -> Any:
     """Follow many rays from Python, each to the first wall; lengths and places in cells."""
-    cast_many(sight, columns, rows, cosines, sines, lengths, brightnesses)
+    lengths[:] = 0.0
+    cast_many(sight, columns, rows, cosines, sines, _FAR, lengths, brightnesses)
