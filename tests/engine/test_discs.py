@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kiks.engine.discs import LANES, meet_disc, meet_discs
+from kiks.engine.discs import meet_disc, meet_discs_all
+from kiks.engine.vectors import LANES
 from kiks.model.arena import Arena
 from kiks.model.places import Ball, Cylinder, Lamp, Pose
 from kiks.model.robot import RobotSpec
@@ -47,8 +48,8 @@ def test_rays_meet_the_first_disc(draw, count):
     seen = np.column_stack([discs, np.arange(1, count + 1)]).ravel()
     angles = rng.uniform(-math.pi, math.pi, LANES)
     reach = rng.uniform(0, 100)
-    lengths, squarely, shades = np.full(LANES, reach), np.ones(LANES), np.zeros(LANES)
-    meet_discs(seen, count, 0.0, 0.0, np.cos(angles), np.sin(angles), lengths, squarely, shades)
+    lengths, squarely, shades = met = np.array([np.full(LANES, reach), np.ones(LANES), np.zeros(LANES)])
+    meet_discs_all(seen, count, np.cos(angles), np.sin(angles), met)
     for lane, angle in enumerate(angles):
         expected, which = meet_by_quadratic(discs, 0.0, 0.0, angle, reach)
         assert lengths[lane] == pytest.approx(expected, abs=1e-6)

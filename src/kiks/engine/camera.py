@@ -104,8 +104,7 @@ def look(sight: Any, seen: Any, seen_count: Any, x: Any, y: Any, heading: Any, g
         begin_columns[p], begin_rows[p] = column + begin * ray_x, row + begin * ray_y
         # Clockwise to the next pixel.
         ray_x, ray_y = ray_x * _PIXEL_COS + ray_y * _PIXEL_SIN, ray_y * _PIXEL_COS - ray_x * _PIXEL_SIN
-        lengths[p] = 0.0
-    cast_many(sight, begin_columns, begin_rows, rays_x, rays_y, _ANYWHERE, lengths, brightnesses)
+    cast_many(sight, begin_columns, begin_rows, rays_x, rays_y, lengths, brightnesses)
     for p in range(PIXEL_COUNT):
         start, length, brightness = begin, lengths[p], brightnesses[p]
         if length == 0.0:  # the view begins inside a wall: what is seen is its surface

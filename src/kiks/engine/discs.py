@@ -16,9 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from kiks.engine.compiling import kernel
+from kiks.engine.compiling import entry, kernel
 from kiks.engine.scene import count_discs, find_near
 from kiks.engine.state import TRAIL_LENGTH
+from kiks.engine.vectors import load, root, store, where_less
 
 SEEN_LIMIT = 64
 """Most discs that a proximity sensor takes into account: more than there is room for within its range."""
@@ -35,10 +36,9 @@ PER_TRACK = 2 * (TRAIL_LENGTH + 1) + 2
 TRACKS_SIZE = 640
 """Numbers of as many tracks as a proximity sensor takes into account."""
 
-LANES = 8
-"""The rays of a proximity sensor, and one over, so that they fill a vector."""
-
 _ANYWHERE_MM = 1e6
+
+_NEVER = 1e30  # cells
 
 _RADIUS, _BRIGHTNESS = 2 * (TRAIL_LENGTH + 1), 2 * (TRAIL_LENGTH + 1) + 1
 
@@ -142,9 +142,9 @@ def meet_disc(seen: Any, count: Any, column: Any, row: Any, cosine: Any, sine: A
     """
     length, squarely, brightness = reach, 1.0, 0.0
     for k in range(count):
-        entry, cosine_in, is_met = enter_disc(seen, k, column, row, cosine, sine)
-        if is_met and entry < length:
-            length, squarely, brightness = entry, cosine_in, seen[PER_DISC * k + 3]
+        begin, cosine_in, is_met = enter_disc(seen, k, column, row, cosine, sine)
+        if is_met and begin < length:
+            length, squarely, brightness = begin, cosine_in, seen[PER_DISC * k + 3]
     return length, squarely, brightness
 
 
@@ -162,27 +162,46 @@ def enter_disc(seen: Any, k: Any, column: Any, row: Any, cosine: Any, sine: Any)
 def meet_discs(
     seen: Any, count: Any, column: Any, row: Any, cosines: Any, sines: Any, lengths: Any, squarely: Any, shades: Any
 ) -> Any:
-    """Shorten a sensor's rays to the first disc that each meets: what `meet_disc` says, for all in lanes.
+    """Follow a sensor's rays to the first disc that each meets: what `meet_disc` says, for all of them at once.
 
     Args:
         seen: The discs.
         count: How many they are.
         column: Origin of all rays [cells].
         row: Origin of all rays [cells].
-        cosines: Directions, an array on the stack [`LANES`], as are the others.
+        cosines: Directions, `Lanes`, as are the others.
         sines: Directions.
-        lengths: Lengths [cells].
-        squarely: Cosines of the angles of incidence.
-        shades: Brightnesses of what the rays meet.
+        lengths: Lengths up to the walls [cells].
+        squarely: Cosines of the angles of incidence there.
+        shades: Brightnesses of what the rays meet there.
+
+    Returns:
+        Lengths, cosines and brightnesses up to walls or discs.
     """
     for k in range(count):
-        shade = seen[PER_DISC * k + 3]
-        for lane in range(LANES):
-            entry, cosine_in, is_met = enter_disc(seen, k, column, row, cosines[lane], sines[lane])
-            is_nearer = is_met & (entry < lengths[lane])
-            lengths[lane] = entry if is_nearer else lengths[lane]
-            squarely[lane] = cosine_in if is_nearer else squarely[lane]
-            shades[lane] = shade if is_nearer else shades[lane]
+        dx, dy, radius = seen[PER_DISC * k] - column, seen[PER_DISC * k + 1] - row, seen[PER_DISC * k + 2]
+        along, aside = cosines * dx + sines * dy, sines * dx - cosines * dy
+        square = radius * radius - aside * aside
+        half = root(where_less(0.0, square, square, 0.0))
+        begin = along - half
+        begin = where_less(0.0, begin, begin, 0.0)
+        begin = where_less(0.0, square, begin, _NEVER)
+        begin = where_less(0.0, along + half, begin, _NEVER)
+        squarely = where_less(begin, lengths, half / radius, squarely)
+        shades = where_less(begin, lengths, seen[PER_DISC * k + 3], shades)
+        lengths = where_less(begin, lengths, begin, lengths)
+    return lengths, squarely, shades
+
+
+@entry
+def meet_discs_all(seen: Any, count: Any, cosines: Any, sines: Any, out: Any) -> Any:
+    """Follow eight rays from (0, 0) from Python: `out`, shape [3, 8], has what they meet of walls, and then of all."""
+    lengths, squarely, shades = meet_discs(
+        seen, count, 0.0, 0.0, load(cosines), load(sines), load(out[0]), load(out[1]), load(out[2])
+    )
+    store(out[0], lengths)
+    store(out[1], squarely)
+    store(out[2], shades)
 
 
 @kernel

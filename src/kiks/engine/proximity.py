@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from kiks.engine.compiling import entry, kernel
-from kiks.engine.discs import LANES, SEEN_LIMIT, SEEN_SIZE, TRACKS_SIZE, follow, meet_discs, see
+from kiks.engine.discs import SEEN_LIMIT, SEEN_SIZE, TRACKS_SIZE, follow, meet_discs, see
 from kiks.engine.lanes import stack_floats, stack_integers
 from kiks.engine.motion import pose_between
 from kiks.engine.numbers import draw, sin_cos, source
@@ -19,6 +19,7 @@ from kiks.engine.parameters import RAY_COUNT
 from kiks.engine.rays import cast_fan, free_cells, meet_face, scale, stride
 from kiks.engine.responses import FAST, REFLECTION, respond
 from kiks.engine.scene import find_near, moment_of
+from kiks.engine.vectors import LANES, is_any, lane_of, load, splat, store
 from kiks.units import SENSOR_ROUND_NS, SENSOR_SLOT_NS, TICK_NS
 
 STREAM_SLIP, STREAM_PROXIMITY = 1, 2
@@ -53,16 +54,6 @@ def sampled_pose(robot: Any, tick_count: Any, time_ns: Any, sensor: Any, is_samp
     turn, instant_ns = sample_instant(time_ns, sensor) if is_sampled else (np.int64(0), time_ns)
     x, y, heading = pose_at(robot, tick_count, instant_ns)
     return turn, instant_ns, x, y, heading
-
-
-@kernel
-def aim(parameters: Any, sine: Any, cosine: Any, sensor: Any, rays_x: Any, rays_y: Any) -> Any:
-    """Write the directions of a sensor's rays, an array on the stack [`LANES`] each; the one over repeats the last."""
-    for lane in range(LANES):
-        ray = min(lane, RAY_COUNT - 1)
-        ray_cos, ray_sin = parameters.ray_cos[sensor, ray], parameters.ray_sin[sensor, ray]
-        rays_x[lane] = ray_cos * cosine - ray_sin * sine
-        rays_y[lane] = ray_cos * sine + ray_sin * cosine
 
 
 @kernel
@@ -101,56 +92,70 @@ def expected_count(
     begin = max(free_cells(sight, column, row), 0.0)
     if begin > reach and track_count == 0:
         return parameters.baseline_counts[sensor]
-    rays_x, rays_y = stack_floats(LANES), stack_floats(LANES)
-    aim(parameters, sine, cosine, sensor, rays_x, rays_y)
+    ray_cos, ray_sin = load(parameters.ray_cos[sensor]), load(parameters.ray_sin[sensor])
+    rays_x, rays_y = ray_cos * cosine - ray_sin * sine, ray_cos * sine + ray_sin * cosine
     seen, seen_count = stack_floats(SEEN_SIZE), 0
     if track_count > 0:
-        view = x, y, (rays_x[0], rays_y[0]), (rays_x[RAY_COUNT - 1], rays_y[RAY_COUNT - 1]), parameters.reach_mm
-        seen_count = see(tracks, track_count, moment, (cell, pad), view, seen)
-    if begin > reach and seen_count == 0:
-        return parameters.baseline_counts[sensor]
-    lengths, cosines, brightnesses = stack_floats(LANES), stack_floats(LANES), stack_floats(LANES)
-    for lane in range(LANES):
-        lengths[lane], cosines[lane], brightnesses[lane] = reach, 1.0, 0.0
+        left = lane_of(rays_x, 0), lane_of(rays_y, 0)
+        right = lane_of(rays_x, RAY_COUNT - 1), lane_of(rays_y, RAY_COUNT - 1)
+        seen_count = see(tracks, track_count, moment, (cell, pad), (x, y, left, right, parameters.reach_mm), seen)
+        if begin > reach and seen_count == 0:
+            return parameters.baseline_counts[sensor]
+    lengths, cosines, brightnesses = splat(reach), splat(1.0), splat(0.0)
     if begin <= reach:
-        meet_walls(sight, parameters, column, row, rays_x, rays_y, begin, lengths, cosines, brightnesses)
+        lengths, cosines, brightnesses = meet_walls(sight, parameters, column, row, rays_x, rays_y, reach, begin)
     if seen_count > 0:
-        meet_discs(seen, seen_count, column, row, rays_x, rays_y, lengths, cosines, brightnesses)
-    for lane in range(LANES):
-        lengths[lane] *= cell
-    counts = respond(networks, parameters, sensor, lengths, cosines, brightnesses)
+        lengths, cosines, brightnesses = meet_discs(
+            seen, seen_count, column, row, rays_x, rays_y, lengths, cosines, brightnesses
+        )
+    counts = respond(networks, parameters, sensor, lengths * cell, cosines, brightnesses)
     return parameters.baseline_counts[sensor] + counts
 
 
 @kernel
 def meet_walls(
-    sight: Any,
-    parameters: Any,
-    column: Any,
-    row: Any,
-    rays_x: Any,
-    rays_y: Any,
-    begin: Any,
-    lengths: Any,
-    cosines: Any,
-    brightnesses: Any,
+    sight: Any, parameters: Any, column: Any, row: Any, rays_x: Any, rays_y: Any, reach: Any, begin: Any
 ) -> Any:
-    """Shorten a sensor's rays to the walls they meet, as exactly as the response needs them."""
-    reach = lengths[0]
+    """Follow a sensor's rays to the walls, as exactly as the response needs them.
+
+    Returns:
+        Lengths [cells], cosines of the angles of incidence, and brightnesses, `Lanes`.
+    """
     if parameters.response == FAST:
-        # The table rounds lengths to 10 mm: for it, rays need not be exact.
-        for ray in range(RAY_COUNT):
-            lengths[ray], shade = stride(sight, column, row, rays_x[ray], rays_y[ray], reach, begin)
-            brightnesses[ray] = shade
-        return
-    columns, rows = stack_floats(LANES), stack_floats(LANES)
-    for lane in range(LANES):
-        columns[lane], rows[lane], lengths[lane] = column, row, begin
-    cast_fan(sight, columns, rows, rays_x, rays_y, reach, lengths, brightnesses)
-    if parameters.response == REFLECTION:
-        for ray in range(RAY_COUNT):
-            if brightnesses[ray] > 0.0:
-                lengths[ray], cosines[ray] = meet_face(sight, column, row, rays_x[ray], rays_y[ray], lengths[ray])
+        return stride_all(sight, column, row, rays_x, rays_y, reach, begin)
+    lengths, brightnesses = cast_fan(sight, splat(column), splat(row), rays_x, rays_y, reach, splat(begin))
+    cosines = splat(1.0)
+    if parameters.response == REFLECTION and is_any(brightnesses):
+        lengths, cosines = meet_faces(sight, column, row, rays_x, rays_y, lengths, brightnesses)
+    return lengths, cosines, brightnesses
+
+
+@kernel
+def meet_faces(
+    sight: Any, column: Any, row: Any, rays_x: Any, rays_y: Any, lengths: Any, brightnesses: Any
+) -> Any:
+    """Return where rays that met a wall meet its smooth surface, and how squarely, `Lanes`."""
+    exact, cosines = stack_floats(LANES), stack_floats(LANES)
+    store(exact, lengths)
+    store(cosines, splat(1.0))
+    for ray in range(RAY_COUNT):
+        if lane_of(brightnesses, ray) > 0.0:
+            exact[ray], cosines[ray] = meet_face(
+                sight, column, row, lane_of(rays_x, ray), lane_of(rays_y, ray), exact[ray]
+            )
+    return load(exact), load(cosines)
+
+
+@kernel
+def stride_all(sight: Any, column: Any, row: Any, rays_x: Any, rays_y: Any, reach: Any, begin: Any) -> Any:
+    """Return what `meet_walls` does for the table, which rounds lengths to 10 mm: for it, rays need not be exact."""
+    lengths, brightnesses = stack_floats(LANES), stack_floats(LANES)
+    store(lengths, splat(reach))
+    store(brightnesses, splat(0.0))
+    for ray in range(RAY_COUNT):
+        lengths[ray], shade = stride(sight, column, row, lane_of(rays_x, ray), lane_of(rays_y, ray), reach, begin)
+        brightnesses[ray] = shade
+    return load(lengths), splat(1.0), load(brightnesses)
 
 
 @kernel

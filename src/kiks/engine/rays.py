@@ -26,7 +26,7 @@ import numpy as np
 
 from kiks.engine.compiling import entry, kernel
 from kiks.engine.discs import hides
-from kiks.engine.lanes import element, pointer_to, stack_floats
+from kiks.engine.vectors import LANES, is_any, load, pick, splat, store, where_less, whole
 
 _DIAGONAL = 1.4142135623730951
 _WALK = 2.5  # up to this clearance a ray goes from cell to cell [cells]
@@ -35,6 +35,7 @@ _NUDGE = 1e-3  # over the edge of a cell [cells]
 _BACK = 2e-3  # from there back over it [cells]
 _GRAZING = 0.1  # cosine of an incidence below which a surface is not worth finding
 _FAR = 1e30
+_FLAT = 1e-24  # square of a direction's part along an axis below which a ray never gets to the next cell there
 
 
 @kernel
@@ -76,8 +77,8 @@ def cast(sight: Any, column: Any, row: Any, cosine: Any, sine: Any, reach: Any, 
     """
     field, surface, _, cell, _ = sight
     per_cell = 1.0 / cell
-    per_column = 1.0 / cosine if abs(cosine) > 1e-12 else _FAR
-    per_row = 1.0 / sine if abs(sine) > 1e-12 else _FAR
+    per_column = 1.0 / cosine if cosine * cosine > _FLAT else _FAR
+    per_row = 1.0 / sine if sine * sine > _FLAT else _FAR
     right = 1 if cosine > 0.0 else 0
     up = 1 if sine > 0.0 else 0
     length = begin
@@ -138,79 +139,69 @@ def stride(sight: Any, column: Any, row: Any, cosine: Any, sine: Any, reach: Any
     return reach, np.int64(0)
 
 
-def _in_lanes(lane_count: int) -> Any:
-    """Return a kernel that follows many rays, so and so many of them at once."""
+@kernel
+def cast_fan(sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, reach: Any, begin: Any) -> Any:
+    """Follow eight rays at once, each to where `cast` would let it end, to the bit.
 
-    @kernel
-    def cast_lanes(
-        sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, reach: Any, lengths: Any, brightnesses: Any
-    ) -> Any:
-        """Follow many rays, each to the first wall: what `cast` returns to the bit, in less time.
+    They step together until the last of them has ended; one that has stays where it is.
 
-        Neighbours step together, one lane each, until the last of them has met its wall; a lane that has stays where it
-        is.
+    Args:
+        sight: What rays meet.
+        columns: Origins [cells], `Lanes`.
+        rows: Origins [cells], `Lanes`.
+        cosines: Directions, `Lanes`.
+        sines: Directions, `Lanes`.
+        reach: Longest length followed [cells].
+        begin: Length that is known to be free [cells], `Lanes`.
 
-        Args:
-            sight: What rays meet.
-            columns: Origins [cells], shape [rays].
-            rows: Origins [cells], shape [rays].
-            cosines: Directions, shape [rays].
-            sines: Directions, shape [rays].
-            reach: Longest length followed [cells]: any number that is larger than the arena follows all to a wall.
-            lengths: Lengths that are known to be free [cells], and then the lengths of the rays, shape [rays].
-            brightnesses: Where the brightnesses of the walls go, shape [rays].
-        """
-        field, surface, _, cell, _ = sight
-        per_cell = 1.0 / cell
-        clearances, width = pointer_to(field), np.int32(field.shape[1])
-        last_column, last_row = np.int32(field.shape[1] - 1), np.int32(field.shape[0] - 1)
-        nought = np.int32(0)
-        column, row = stack_floats(lane_count), stack_floats(lane_count)
-        cosine, sine = stack_floats(lane_count), stack_floats(lane_count)
-        per_column, per_row = stack_floats(lane_count), stack_floats(lane_count)
-        right, up = stack_floats(lane_count), stack_floats(lane_count)
-        length = stack_floats(lane_count)
-        for first in range(0, lengths.shape[0], lane_count):
-            for lane in range(lane_count):
-                ray = min(first + lane, lengths.shape[0] - 1)
-                column[lane], row[lane], cosine[lane], sine[lane] = columns[ray], rows[ray], cosines[ray], sines[ray]
-                length[lane] = lengths[ray]
-            for lane in range(lane_count):
-                per_column[lane] = 1.0 / cosine[lane] if abs(cosine[lane]) > 1e-12 else _FAR
-                per_row[lane] = 1.0 / sine[lane] if abs(sine[lane]) > 1e-12 else _FAR
-                right[lane] = 1.0 if cosine[lane] > 0.0 else 0.0
-                up[lane] = 1.0 if sine[lane] > 0.0 else 0.0
-            under_way = np.int32(1)
-            while under_way != 0:
-                under_way = nought
-                for lane in range(lane_count):
-                    px = column[lane] + length[lane] * cosine[lane]
-                    py = row[lane] + length[lane] * sine[lane]
-                    i = min(max(np.int32(px), nought), last_column)
-                    j = min(max(np.int32(py), nought), last_row)
-                    clearance = element(clearances, np.int32(j * width + i)) * per_cell
-                    to_column = (i + right[lane] - px) * per_column[lane] if per_column[lane] < _FAR else _FAR
-                    to_row = (j + up[lane] - py) * per_row[lane] if per_row[lane] < _FAR else _FAR
-                    walk = max(min(to_column, to_row), 0.0) + _NUDGE
-                    step = clearance - _DIAGONAL if clearance > _WALK else walk
-                    goes_on = (clearance > 0.0) & (length[lane] < reach)
-                    length[lane] += step if goes_on else 0.0
-                    under_way |= np.int32(goes_on)
-            for lane in range(min(lane_count, lengths.shape[0] - first)):
-                ray = first + lane
-                i = min(max(np.int32(column[lane] + length[lane] * cosine[lane]), nought), last_column)
-                j = min(max(np.int32(row[lane] + length[lane] * sine[lane]), nought), last_row)
-                is_met = length[lane] < reach
-                lengths[ray], brightnesses[ray] = (length[lane], surface[j, i]) if is_met else (reach, 0.0)
-
-    return cast_lanes
+    Returns:
+        Lengths of the rays [cells] and brightnesses of what they met, `Lanes`.
+    """
+    field, surface, _, cell, _ = sight
+    per_cell = 1.0 / cell
+    last_column, last_row = field.shape[1] - 1.0, field.shape[0] - 1.0
+    per_column = where_less(_FLAT, cosines * cosines, 1.0 / cosines, _FAR)
+    per_row = where_less(_FLAT, sines * sines, 1.0 / sines, _FAR)
+    right, up = where_less(0.0, cosines, 1.0, splat(0.0)), where_less(0.0, sines, 1.0, splat(0.0))
+    lengths = begin
+    while True:
+        px, py = columns + lengths * cosines, rows + lengths * sines
+        i, j = whole(px), whole(py)
+        i = where_less(i, last_column, where_less(0.0, i, i, 0.0), last_column)
+        j = where_less(j, last_row, where_less(0.0, j, j, 0.0), last_row)
+        clearances = pick(field, i, j) * per_cell
+        goes_on = where_less(0.0, clearances, where_less(lengths, reach, 1.0, splat(0.0)), 0.0)
+        if not is_any(goes_on):
+            break
+        to_column = where_less(per_column, _FAR, (i + right - px) * per_column, _FAR)
+        to_row = where_less(per_row, _FAR, (j + up - py) * per_row, _FAR)
+        walk = where_less(to_column, to_row, to_column, to_row)
+        walk = where_less(0.0, walk, walk, 0.0) + _NUDGE
+        step = where_less(_WALK, clearances, clearances - _DIAGONAL, walk)
+        lengths = where_less(0.0, goes_on, lengths + step, lengths)
+    brightnesses = where_less(lengths, reach, pick(surface, i, j), 0.0)
+    return where_less(lengths, reach, lengths, reach), brightnesses
 
 
-cast_many = _in_lanes(32)
-"""For whole pictures."""
+@kernel
+def cast_many(sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, lengths: Any, brightnesses: Any) -> Any:
+    """Follow many rays, each to the first wall: the lengths and brightnesses of `cast` to the bit, in less time.
 
-cast_fan = _in_lanes(8)
-"""For the seven rays of a proximity sensor, and one over."""
+    Args:
+        sight: What rays meet.
+        columns: Origins [cells], shape [rays], a multiple of `LANES`, as are the others.
+        rows: Origins [cells].
+        cosines: Directions.
+        sines: Directions.
+        lengths: Where the lengths of the rays go [cells].
+        brightnesses: Where the brightnesses of the walls go.
+    """
+    for k in range(0, lengths.shape[0], LANES):
+        far, bright = cast_fan(
+            sight, load(columns[k:]), load(rows[k:]), load(cosines[k:]), load(sines[k:]), _FAR, splat(0.0)
+        )
+        store(lengths[k:], far)
+        store(brightnesses[k:], bright)
 
 
 @kernel
@@ -260,6 +251,5 @@ def cast_ray(sight: Any, x: Any, y: Any, cosine: Any, sine: Any, reach: Any) -> 
 
 @entry
 def cast_rays(sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, lengths: Any, brightnesses: Any) -> Any:
-    """Follow many rays from Python, each to the first wall; lengths and places in cells."""
-    lengths[:] = 0.0
-    cast_many(sight, columns, rows, cosines, sines, _FAR, lengths, brightnesses)
+    """Follow many rays from Python, a multiple of eight, each to the first wall; lengths and places in cells."""
+    cast_many(sight, columns, rows, cosines, sines, lengths, brightnesses)
