@@ -26,7 +26,7 @@ import numpy as np
 
 from kiks.engine.compiling import entry, kernel
 from kiks.engine.discs import hides
-from kiks.engine.vectors import LANES, is_any, load, pick, splat, store, where_less, whole
+from kiks.engine.vectors import LANES, cells_of, is_any, load, pick, splat, store, where_less
 
 _DIAGONAL = 1.4142135623730951
 _WALK = 2.5  # up to this clearance a ray goes from cell to cell [cells]
@@ -159,27 +159,23 @@ def cast_fan(sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, reac
     """
     field, surface, _, cell, _ = sight
     per_cell = 1.0 / cell
-    last_column, last_row = field.shape[1] - 1.0, field.shape[0] - 1.0
     per_column = where_less(_FLAT, cosines * cosines, 1.0 / cosines, _FAR)
     per_row = where_less(_FLAT, sines * sines, 1.0 / sines, _FAR)
     right, up = where_less(0.0, cosines, 1.0, splat(0.0)), where_less(0.0, sines, 1.0, splat(0.0))
     lengths = begin
     while True:
         px, py = columns + lengths * cosines, rows + lengths * sines
-        i, j = whole(px), whole(py)
-        i = where_less(i, last_column, where_less(0.0, i, i, 0.0), last_column)
-        j = where_less(j, last_row, where_less(0.0, j, j, 0.0), last_row)
-        clearances = pick(field, i, j) * per_cell
+        clearances = pick(field, px, py) * per_cell
         goes_on = where_less(0.0, clearances, where_less(lengths, reach, 1.0, splat(0.0)), 0.0)
         if not is_any(goes_on):
             break
-        to_column = where_less(per_column, _FAR, (i + right - px) * per_column, _FAR)
-        to_row = where_less(per_row, _FAR, (j + up - py) * per_row, _FAR)
+        to_column = where_less(per_column, _FAR, (cells_of(px, field.shape[1]) + right - px) * per_column, _FAR)
+        to_row = where_less(per_row, _FAR, (cells_of(py, field.shape[0]) + up - py) * per_row, _FAR)
         walk = where_less(to_column, to_row, to_column, to_row)
         walk = where_less(0.0, walk, walk, 0.0) + _NUDGE
         step = where_less(_WALK, clearances, clearances - _DIAGONAL, walk)
         lengths = where_less(0.0, goes_on, lengths + step, lengths)
-    brightnesses = where_less(lengths, reach, pick(surface, i, j), 0.0)
+    brightnesses = where_less(lengths, reach, pick(surface, px, py), 0.0)
     return where_less(lengths, reach, lengths, reach), brightnesses
 
 

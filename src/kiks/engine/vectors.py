@@ -155,28 +155,40 @@ def lane_of(typing: Any, lanes: Any, index: Any) -> Any:
     return types.float64(lanes, types.int64), generate
 
 
+def _cells(builder: Any, places: Any, count: Any) -> Any:
+    """Return the cells that some places along an axis are in, of so many; those beyond the ends are in the outermost."""
+    cells = builder.fptosi(places, _INTEGERS)
+    last = builder.sub(builder.trunc(count, _INTEGER), ir.Constant(_INTEGER, 1))
+    filled = ir.Constant(_INTEGERS, ir.Undefined)
+    for lane in range(LANES):
+        filled = builder.insert_element(filled, last, ir.Constant(_INTEGER, lane))
+    nought = ir.Constant(_INTEGERS, [0] * LANES)
+    cells = builder.select(builder.icmp_signed("<", cells, nought), nought, cells)
+    return builder.select(builder.icmp_signed("<", cells, filled), cells, filled)
+
+
 @_intrinsic
-def whole(typing: Any, lanes: Any) -> Any:
-    """Return numbers without what stands behind the point; they must fit into 32 bits."""
+def cells_of(typing: Any, places: Any, count: Any) -> Any:
+    """Return the cells that places along an axis are in, of so many [cells]; beyond the ends, the outermost."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.sitofp(builder.fptosi(arguments[0], _INTEGERS), _VECTOR)
+        return builder.sitofp(_cells(builder, *arguments), _VECTOR)
 
-    return _LANES(lanes), generate
+    return _LANES(places, types.int64), generate
 
 
 @_intrinsic
 def pick(typing: Any, raster: Any, columns: Any, rows: Any) -> Any:
-    """Return the numbers of a raster without gaps, float32 or uint8, in some cells; nothing checks that they exist."""
+    """Return the numbers of a raster without gaps, float32 or uint8, at places in it [cells]; beyond it, the nearest."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         array = _arrays.make_array(raster)(context, builder, arguments[0])
-        width = builder.trunc(builder.extract_value(array.shape, 1), _INTEGER)
-        columns, rows = (builder.fptosi(each, _INTEGERS) for each in arguments[1:])
+        height, width = (builder.extract_value(array.shape, axis) for axis in range(2))
+        columns, rows = _cells(builder, arguments[1], width), _cells(builder, arguments[2], height)
         found = ir.Constant(_VECTOR, ir.Undefined)
         for lane in range(LANES):
             number = ir.Constant(_INTEGER, lane)
-            row = builder.mul(builder.extract_element(rows, number), width)
+            row = builder.mul(builder.extract_element(rows, number), builder.trunc(width, _INTEGER))
             place = builder.add(row, builder.extract_element(columns, number))
             value = builder.load(builder.gep(array.data, [place], inbounds=True))
             widen = builder.fpext if raster.dtype == types.float32 else builder.uitofp
