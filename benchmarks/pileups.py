@@ -1,9 +1,9 @@
 """Pile-ups by the thousand: 8 robots, 8 balls and 8 cylinders in a box, 60 s each, and the worst of every tick of them.
 
-Run: python benchmarks/pileups.py [--count 1000] [--jobs 2] [--json]. Robots go at full speed and change their minds now and
-then for 50 s; then they are switched off, and all bodies roll out from up to 1 m/s. Exit code 1: somebody was deeper in
-somebody else or in a wall than 0.5 mm, bodies gained energy, or a robot that was switched off went farther than its share of
-what was left of an overlap. The oracle is `tests/piles.py`.
+Run: python benchmarks/pileups.py [--count 1000] [--jobs 2] [--json]. Robots go at full speed and change their minds now
+and then for 50 s; then they are switched off, and all bodies roll out from up to 1 m/s. Exit code 1: somebody was
+deeper in somebody else or in a wall than 0.5 mm, bodies gained energy, or a robot that was switched off went farther
+than its share of what was left of an overlap. The oracle is `tests/piles.py`.
 """
 
 from __future__ import annotations
@@ -50,7 +50,9 @@ def main() -> int:
     report(rows, as_json=options.json)
     for number, (overlap, depth, moved) in zip(numbers, found, strict=True):
         if max(overlap, depth) > DEEPEST_MM or moved > SHOVED_MM:
-            print(f"pile-up {number}: overlap {overlap:.3f}, in a wall {depth:.3f}, shoved {moved:.3f}", file=sys.stderr)
+            print(
+                f"pile-up {number}: overlap {overlap:.3f}, in a wall {depth:.3f}, shoved {moved:.3f}", file=sys.stderr
+            )
     return int(max(*overlaps_mm, *depths_mm) > DEEPEST_MM or max(moved_mm) > SHOVED_MM)
 
 

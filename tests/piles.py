@@ -82,7 +82,7 @@ class Pile:
 
     @staticmethod
     def make(number: int) -> Pile:
-        """Return pile-up `number`, the same one every time; one in four has things of all sizes, one in four is slow."""
+        """Return pile-up `number`, always the same one; one in four has things of all sizes, one in four is slow."""
         rng = np.random.default_rng([3006, number])
         arena, walls = boxed_arena(rng)
         sim = Simulation(arena, robots=EACH, seed=number)

@@ -84,7 +84,7 @@ class Company:
 
 @pytest.mark.parametrize("number", [*range(8), 95, 97])
 def test_in_a_pile_up_nobody_is_inside_anybody(number):
-    """95 and 97 once left a ball 4 mm deep in a post, which a robot had pushed there; all 1000: benchmarks/pileups.py."""
+    """In 95 and 97 a robot once pushed a ball 4 mm deep into a post. All 1000: benchmarks/pileups.py."""
     pile = Pile.make(number)
     assert max(rush(pile, 5000)) <= DEEPEST_MM
     overlap, depth, moved = calm(pile, 1000)
@@ -313,7 +313,7 @@ def test_a_ball_pushed_along_is_one_contact():
 @pytest.mark.parametrize("body", ["balls", "cylinders"])
 @pytest.mark.parametrize("speed", [5, 20, 100])
 def test_what_cannot_give_way_stops_a_robot(body, speed):
-    """Against a wall: it stands, its wheels turn at 10 to 15 %, and it drives out backwards as if nothing were there."""
+    """Against a wall: it stands, its wheels turn at 10 to 15 %, and it drives out backwards unhindered."""
     radius = BALL_MM if body == "balls" else CYLINDER_MM
     x = 1990.0 - radius
     company = Company(robots=[(x - radius - ROBOT_MM - 20.0, 1000.0, 0.0)], **{body: [(x, 1000.0)]})

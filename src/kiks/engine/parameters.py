@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from kiks.engine.networks import NETWORK_RESPONSES, TABLE_LEVELS
 from kiks.engine.numbers import exponential, logarithm, sin_cos
+from kiks.engine.vectors import LANES
 from kiks.model.network import BODY_RADIUS_MM, NetworkResponse
 from kiks.model.robot import (
     AMBIENT_MODELS,
@@ -25,7 +26,6 @@ from kiks.model.robot import (
     Reflection,
     RobotSpec,
 )
-from kiks.engine.vectors import LANES
 from kiks.units import TICK_NS
 
 RAY_COUNT = 7

@@ -131,18 +131,18 @@ def meet_walls(
 
 
 @kernel
-def meet_faces(
-    sight: Any, column: Any, row: Any, rays_x: Any, rays_y: Any, lengths: Any, brightnesses: Any
-) -> Any:
+def meet_faces(sight: Any, column: Any, row: Any, rays_x: Any, rays_y: Any, lengths: Any, brightnesses: Any) -> Any:
     """Return where rays that met a wall meet its smooth surface, and how squarely, `Lanes`."""
-    exact, cosines = stack_floats(LANES), stack_floats(LANES)
+    exact, cosines, shades = stack_floats(LANES), stack_floats(LANES), stack_floats(LANES)
+    to_x, to_y = stack_floats(LANES), stack_floats(LANES)
     store(exact, lengths)
     store(cosines, splat(1.0))
+    store(shades, brightnesses)
+    store(to_x, rays_x)
+    store(to_y, rays_y)
     for ray in range(RAY_COUNT):
-        if lane_of(brightnesses, ray) > 0.0:
-            exact[ray], cosines[ray] = meet_face(
-                sight, column, row, lane_of(rays_x, ray), lane_of(rays_y, ray), exact[ray]
-            )
+        if shades[ray] > 0.0:
+            exact[ray], cosines[ray] = meet_face(sight, column, row, to_x[ray], to_y[ray], exact[ray])
     return load(exact), load(cosines)
 
 
@@ -150,10 +150,12 @@ def meet_faces(
 def stride_all(sight: Any, column: Any, row: Any, rays_x: Any, rays_y: Any, reach: Any, begin: Any) -> Any:
     """Return what `meet_walls` does for the table, which rounds lengths to 10 mm: for it, rays need not be exact."""
     lengths, brightnesses = stack_floats(LANES), stack_floats(LANES)
-    store(lengths, splat(reach))
-    store(brightnesses, splat(0.0))
+    to_x, to_y = stack_floats(LANES), stack_floats(LANES)
+    store(to_x, rays_x)
+    store(to_y, rays_y)
+    lengths[RAY_COUNT], brightnesses[RAY_COUNT] = reach, 0.0
     for ray in range(RAY_COUNT):
-        lengths[ray], shade = stride(sight, column, row, lane_of(rays_x, ray), lane_of(rays_y, ray), reach, begin)
+        lengths[ray], shade = stride(sight, column, row, to_x[ray], to_y[ray], reach, begin)
         brightnesses[ray] = shade
     return load(lengths), splat(1.0), load(brightnesses)
 
@@ -231,9 +233,7 @@ def read_proximity(
     for sensor in range(out.shape[0]):
         turn, instant_ns, x, y, heading = sampled_pose(state, tick_count, time_ns, sensor, is_noisy)
         moment = moment_of(tick_count, instant_ns)
-        count = expected_count(
-            sight, networks, parameters, tracks, track_count, moment, x, y, heading, sensor
-        )
+        count = expected_count(sight, networks, parameters, tracks, track_count, moment, x, y, heading, sensor)
         if is_noisy:
             chance = source(seed, 0, robot, STREAM_PROXIMITY, turn)
             sign, size, jitter = draw(chance, sensor * 3), draw(chance, sensor * 3 + 1), draw(chance, sensor * 3 + 2)

@@ -111,7 +111,7 @@ def curve_count(parameters: Any, sensor: Any, lengths_mm: Any, brightnesses: Any
 
 @kernel
 def respond(networks: Any, parameters: Any, sensor: Any, lengths_mm: Any, cosines: Any, brightnesses: Any) -> Any:
-    """Return the counts above its baseline that a sensor expects, by the response of the robot's file; rays: `Lanes`."""
+    """Return the counts above its baseline that a sensor expects, by its robot's response; the rays are `Lanes`."""
     if parameters.response == REFLECTION:
         return reflection_count(parameters, sensor, lengths_mm, cosines, brightnesses)
     return respond_one_by_one(networks, parameters, sensor, lengths_mm, brightnesses)

@@ -86,7 +86,7 @@ def square_of(begins: Any, x: Any, y: Any) -> Any:
 
 @kernel
 def enter_all(scene: Any, world: Any) -> Any:
-    """Write down which discs are over which square, for all of a world, in each square in the order of their numbers."""
+    """Write down which discs of a world are over which square, in each square in the order of their numbers."""
     begins, entries, spots, _ = scene[3]
     disc_count = count_discs(scene)[1]
     begins[world] = 0

@@ -27,7 +27,7 @@ class Lanes(types.Type):  # type: ignore[misc, unused-ignore]
     """Numba's type of eight float64 numbers that are calculated with together."""
 
     def __init__(self) -> None:
-        super().__init__(name="Lanes")
+        super().__init__(name="Lanes")  # type: ignore[no-untyped-call, unused-ignore]
 
 
 LANES = 8
@@ -156,7 +156,7 @@ def lane_of(typing: Any, lanes: Any, index: Any) -> Any:
 
 
 def _cells(builder: Any, places: Any, count: Any) -> Any:
-    """Return the cells that some places along an axis are in, of so many; those beyond the ends are in the outermost."""
+    """Return the cells that places along an axis are in, of so many; beyond the ends, the outermost."""
     cells = builder.fptosi(places, _INTEGERS)
     last = builder.sub(builder.trunc(count, _INTEGER), ir.Constant(_INTEGER, 1))
     filled = ir.Constant(_INTEGERS, ir.Undefined)
@@ -179,7 +179,7 @@ def cells_of(typing: Any, places: Any, count: Any) -> Any:
 
 @_intrinsic
 def pick(typing: Any, raster: Any, columns: Any, rows: Any) -> Any:
-    """Return the numbers of a raster without gaps, float32 or uint8, at places in it [cells]; beyond it, the nearest."""
+    """Return the numbers of a raster, float32 or uint8 without gaps, at some places [cells]; beyond it, the nearest."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         array = _arrays.make_array(raster)(context, builder, arguments[0])
