@@ -27,7 +27,7 @@ class Lanes(types.Type):  # type: ignore[misc, unused-ignore]
     """Numba's type of eight float64 numbers that are calculated with together."""
 
     def __init__(self) -> None:
-        super().__init__(name="Lanes")  # type: ignore[no-untyped-call, unused-ignore]
+        super().__init__(name="Lanes")
 
 
 LANES = 8
@@ -41,7 +41,7 @@ _VECTOR, _INTEGERS = ir.VectorType(ir.DoubleType(), LANES), ir.VectorType(_INTEG
 @extending.register_model(Lanes)
 class _LanesModel(models.PrimitiveModel):  # type: ignore[misc, unused-ignore]
     def __init__(self, manager: Any, numba_type: Any) -> None:
-        super().__init__(manager, numba_type, _VECTOR)
+        super().__init__(manager, numba_type, _VECTOR)  # type: ignore[no-untyped-call, unused-ignore]
 
 
 def _splat(builder: Any, value: Any) -> Any:
