@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from calibration import report
 from tests.reply_grammar import allowed, first_violation, kind
-from tests.session_player import turrets
+from tests.session_player import TURRETS
 
 from kiks.model.arena import Arena
 from kiks.sim.simulation import Simulation
@@ -126,7 +126,7 @@ def peak_memory_mb() -> float:
 def fuzz(name: str, batches: Iterator[bytes], rng: random.Random, *, as_json: bool) -> bool:
     """Push batches through one robot and report; say whether every reply was right."""
     sim = Simulation(Arena.box(500, 500), robot="khepera_ii", seed=rng.randrange(2**32))
-    for turret in turrets().values():
+    for turret in TURRETS:
         sim.fit(1, turret)
     counts: Counter[str] = Counter()
     robot_s, byte_count, warm_mb = 0.0, 0, 0.0

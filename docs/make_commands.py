@@ -59,18 +59,6 @@ ERRORS = (
 )
 
 
-class Gripper:
-    """A gripper that says yes to everything."""
-
-    number = 1
-    name = "Gripper"
-    revision = (1, 0)
-
-    def order(self, letter: str, values: tuple[int, ...]) -> tuple[int, ...] | None:
-        """Answer an order to move."""
-        return () if letter in "DE" and len(values) == 1 else None
-
-
 def robot() -> Simulation:
     """Return a robot without noise, with a gripper, 30 mm in front of a wall at its left."""
     quiet = RobotSpec.load("khepera_ii").with_changes(
@@ -81,7 +69,7 @@ def robot() -> Simulation:
     )
     sim = Simulation(Arena.box(1000, 1000), robot=quiet)
     sim.place(1, 300.0, 935.0, math.radians(10))
-    sim.fit(1, Gripper())
+    sim.fit(1, "gripper")
     return sim
 
 

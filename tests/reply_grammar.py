@@ -2,15 +2,13 @@
 
 Method: for each command letter and tool a list of pairs of regular expressions, request and reply; the first request
 that matches the whole rest of the line decides. What no pair matches is a protocol error for a letter and unknown for
-anything else. The robot has all quirks off and the two turrets of `tests.session_player`.
+anything else. The robot has all quirks off and all turrets of `tests.session_player.TURRETS`.
 """
 
 from __future__ import annotations
 
 import re
 from functools import cache
-
-from tests.session_player import turrets
 
 END = rb"\r\n"
 TEXT = rb"[ -~]+" + END
@@ -88,12 +86,50 @@ LETTERS: dict[bytes, Pairs] = {
     b"W": _pairs((b"," + NUMBER + b"," + within(63), b"w")),
 }
 
-for turret in turrets().values():
-    head = rb",[ \t]*\+?0*%d[ \t]*,[ \t]*" % turret.number
-    LETTERS[b"T"] += _pairs((head + rb"B[ \t]*(?:," + NUMBER + rb")*", b"t,%d,b,1,0" % turret.number))
-    for order, (count, answer) in turret.answers.items():
-        reply = ",".join(["t", str(turret.number), order.lower(), *map(str, answer)]).encode()
-        LETTERS[b"T"] += _pairs((head + order.encode() + rb"[ \t]*" + values(NUMBER, count), reply))
+BYTE = at_most(255)
+BITS = at_most(7)
+LEVEL = at_most(255) + b"," + BYTE
+PLACE = b"," + at_most(999)
+ENERGY = b"," + at_most(100) + b"," + at_most(35) + b"," + at_most(9)
+
+ORDERS: dict[int, dict[bytes, tuple[bytes, bytes]]] = {
+    1: {
+        b"D": (b"," + within(1), b""),
+        b"E": (values(NUMBER, 1), b""),
+        b"F": (b"", b"," + BYTE),
+        b"G": (b"", b"," + BYTE),
+        b"H": (b"," + within(1), b"," + BYTE),
+        b"J": (b"", b",0"),
+    },
+    2: {
+        b"L": (b"", b"," + LEVEL),
+        b"M": (b"", values(BYTE, 32)),
+        b"N": (b"", values(BYTE, 64)),
+        b"O": (b"", b"," + at_most(63)),
+        b"P": (b"", b"," + at_most(63)),
+        b"Q": (values(NUMBER, 1), values(BYTE, 8)),
+        b"R": (values(NUMBER, 1), values(BYTE, 16)),
+        b"S": (b"", values(BYTE, 32)),
+        b"T": (b"", values(BYTE, 16)),
+        b"U": (b"," + within(7), b""),
+    },
+    4: {
+        b"F": (b"", b"," + BITS),
+        b"R": (b"", values(BYTE, 18)),
+        b"S": (values(NUMBER, 1) + b"," + within(16) + values(NUMBER, 16), b""),
+    },
+    99: {
+        b"F": (b"", b",-1,(?:-1|" + at_most(9999) + b")"),
+        b"S": (b"", PLACE + PLACE + b"," + at_most(359) + b"," + at_most(9999) + ENERGY),
+    },
+}
+"""For each turret and order the numbers that it takes and the values of its answer."""
+
+for turret, orders in ORDERS.items():
+    head = rb",[ \t]*\+?0*%d[ \t]*,[ \t]*" % turret
+    LETTERS[b"T"] += _pairs((head + rb"B[ \t]*(?:," + NUMBER + rb")*", b"t,%d,b,1,0" % turret))
+    for order, (taken, answer) in orders.items():
+        LETTERS[b"T"] += _pairs((head + order + rb"[ \t]*" + taken, b"t,%d,%s" % (turret, order.lower()) + answer))
     LETTERS[b"T"].append((re.compile(head + rb"[A-Z][ \t]*(?:," + NUMBER + rb")*"), PROTOCOL_ERROR))
 LETTERS[b"T"].append((re.compile(b"," + NUMBER + rb",[ \t]*[A-Z][ \t]*(?:," + NUMBER + rb")*"), NO_TURRET))
 
@@ -108,7 +144,7 @@ def _tools(has_flash: bool) -> dict[bytes, Pairs]:
     tools = {
         b"help": _pairs((b"", lines(count)), (b".+", lines(1))),
         b"list": _pairs((b".*", lines(1 + len(LETTERS) + count + 2))),
-        b"net": _pairs((b".*", lines(len(turrets())))),
+        b"net": _pairs((b".*", lines(len(ORDERS)))),
         b"process": _pairs((b".*", rb"Process 0\. [0-9]{8}  [ -~]+(?:\r\nProcess [1-9]\. [0-9]{8}  [ -~]+){3,4}")),
         b"memory": _pairs((b".*", rb"ROM .*used [0-9]{2}%\r\nRAM 1 .*used [0-9]{2}%\r\nRAM 2 .*used [0-9]{2}%")),
         b"k-team": _pairs((b".*", lines(1))),

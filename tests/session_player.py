@@ -76,38 +76,8 @@ class Session:
         return int(self.settings.get("baud", "9600"))
 
 
-@dataclass
-class TableTurret:
-    """A turret that answers from a table: for each order the counts of numbers it takes, and its answer."""
-
-    number: int
-    name: str
-    answers: dict[str, tuple[int, tuple[int, ...]]]
-    revision: tuple[int, int] = (1, 0)
-
-    def order(self, letter: str, values: tuple[int, ...]) -> tuple[int, ...] | None:
-        """Return the answer to an order, None if it is unknown or takes another count of numbers."""
-        count, answer = self.answers.get(letter, (-1, ()))
-        return answer if len(values) == count else None
-
-
-def turrets() -> dict[str, TableTurret]:
-    """Return a gripper and a linear camera as far as clients ask them (khepera-protocol.md 10.2 and 10.3)."""
-    gripper = {"D": (1, ()), "E": (1, ()), "F": (0, (17,)), "G": (0, (23,)), "H": (1, (127,)), "J": (0, (0,))}
-    pixels = tuple(range(100, 164))
-    vision: dict[str, tuple[int, tuple[int, ...]]] = {
-        "L": (0, (0, 175)),
-        "M": (0, pixels[::2]),
-        "N": (0, pixels),
-        "O": (0, (63,)),
-        "P": (0, (0,)),
-        "Q": (1, pixels[:8]),
-        "R": (1, pixels[:16]),
-        "S": (0, pixels[::2]),
-        "T": (0, pixels[::4]),
-        "U": (1, ()),
-    }
-    return {"gripper": TableTurret(1, "Gripper", gripper), "vision": TableTurret(2, "Linear vision", vision)}
+TURRETS = ("gripper", "k213", "radio", "io", "battle")
+"""Everything that `Simulation.fit` knows by name."""
 
 
 def load(path: Path) -> Session:
@@ -152,7 +122,7 @@ def simulation(session: Session) -> Simulation:
         }
     sim = Simulation(Arena.box(1000, 1000), robot=spec.with_changes(**changes))
     for name in session.settings.get("turrets", "").split():
-        sim.fit(1, turrets()[name])
+        sim.fit(1, name)
     return sim
 
 

@@ -1,11 +1,12 @@
 """The robot's program: what lines do to its state, and the tools that have rules of their own."""
 
 import pytest
-from tests.session_player import turrets
+from tests.session_player import TURRETS
 
 from kiks.firmware.commands import COMMANDS
 from kiks.firmware.khepera import Firmware
 from kiks.firmware.receiver import LINE_LIMIT, Receiver
+from kiks.firmware.turret import Turret
 from kiks.model.arena import Arena
 from kiks.model.robot import RobotSpec
 from kiks.sim.simulation import Simulation
@@ -16,7 +17,7 @@ ERROR = b"z,Protocol error\r\n"
 
 def a_simulation(robot: str = "khepera_ii", **changes: object) -> Simulation:
     sim = Simulation(Arena.box(1000, 1000), robot=RobotSpec.load(robot).with_changes(**changes))
-    for turret in turrets().values():
+    for turret in TURRETS:
         sim.fit(1, turret)
     return sim
 
@@ -172,8 +173,8 @@ def test_status_names_the_mode() -> None:
 
 
 def test_a_turret_gets_numbers_that_fit_64_bits() -> None:
-    class Listener:
-        number, name, revision = 9, "Listener", (1, 0)
+    class Listener(Turret):
+        number, name = 9, "Listener"
         heard: tuple[int, ...] = ()
 
         def order(self, letter: str, values: tuple[int, ...]) -> tuple[int, ...]:

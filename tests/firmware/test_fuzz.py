@@ -6,8 +6,8 @@ from itertools import pairwise
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.reply_grammar import LETTERS, allowed, at_most, first_violation
-from tests.session_player import turrets
+from tests.reply_grammar import LETTERS, ORDERS, allowed, at_most, first_violation
+from tests.session_player import TURRETS
 
 from kiks.model.arena import Arena
 from kiks.sim.simulation import Simulation
@@ -19,8 +19,13 @@ NUMBERS = st.one_of(
 )
 COMMANDS = st.builds(
     lambda letter, numbers: ",".join([letter, *numbers]).encode("latin-1"),
-    st.sampled_from([*(letter.decode() for letter in LETTERS), "M", "a", "T,1,B", "T,1,D", "T,2,N", "T,2,Q", "T,7,B"]),
+    st.sampled_from([*(letter.decode() for letter in LETTERS), "M", "a", "T,1,B", "T,7,B"]),
     st.lists(NUMBERS, max_size=6),
+)
+MESSAGES = st.builds(
+    lambda order, numbers: ",".join([order, *numbers]).encode("latin-1"),
+    st.sampled_from([f"T,{turret},{letter.decode()}" for turret, orders in ORDERS.items() for letter in orders]),
+    st.one_of(st.just([]), st.lists(NUMBERS, max_size=2), st.lists(NUMBERS, min_size=18, max_size=18)),
 )
 TOOLS = st.sampled_from(
     [
@@ -42,14 +47,14 @@ def mutated(draw: st.DrawFn) -> bytes:
     return line * draw(st.sampled_from([1, 1, 1, 1, 100]))
 
 
-LINES = st.one_of(COMMANDS, COMMANDS, TOOLS, mutated(), st.binary(max_size=300))
+LINES = st.one_of(COMMANDS, COMMANDS, MESSAGES, TOOLS, mutated(), st.binary(max_size=300))
 ENDS = st.sampled_from([b"\n", b"\r", b"\r\n", b"\n\n"])
 
 
 def answers(kind: str, data: bytes, cuts: list[int]) -> bytes:
     """Return what a fresh robot answers to some characters that come in pieces."""
     sim = Simulation(Arena.box(300, 300), robot=kind)
-    for turret in turrets().values():
+    for turret in TURRETS:
         sim.fit(1, turret)
     port = sim.port(1)
     places = sorted({cut % (len(data) + 1) for cut in cuts} | {0, len(data)})
@@ -76,7 +81,10 @@ def test_every_reply_is_allowed(kind: str, pairs: list[tuple[bytes, bytes]], cut
 
 
 @settings(max_examples=20, deadline=None)
-@given(pairs=st.lists(st.tuples(COMMANDS, ENDS), min_size=1, max_size=8), cuts=st.lists(st.integers(0, 200)))
+@given(
+    pairs=st.lists(st.tuples(st.one_of(COMMANDS, MESSAGES), ENDS), min_size=1, max_size=8),
+    cuts=st.lists(st.integers(0, 200)),
+)
 def test_pieces_make_no_difference(pairs: list[tuple[bytes, bytes]], cuts: list[int]) -> None:
     data = b"".join(line + end for line, end in pairs)
     assert answers("khepera_ii", data, cuts) == answers("khepera_ii", data, [])

@@ -11,13 +11,13 @@ from pathlib import Path
 import pytest
 from tests.served import GUARD_S, PROGRAMS, Served, ask, fresh, open_plain, read_line, run_python, served
 
+from kiks.clock.line import BACKLOG_LIMIT
 from kiks.clock.pace import Pace
 from kiks.errors import ParameterError
 from kiks.ports.endpoint import READ_SIZE
 from kiks.ports.pty import PtyEndpoint
 from kiks.ports.server import Server
 from kiks.ports.tcp import TcpEndpoint
-from kiks.sim.wire import BACKLOG_LIMIT
 from kiks.units import NS_PER_S, character_ns
 
 

@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import ArenaFile, RobotKind, Robots, Seed, load_arena
+from kiks.cli.log import show_log
+from kiks.cli.options import ArenaFile, PatienceS, RobotKinds, Seed, WhenSilent, load_arena
 from kiks.errors import ParameterError
+
+if TYPE_CHECKING:
+    from kiks.ports.programs import Command
+    from kiks.sim.simulation import Simulation
 
 
 def run(
     program: Annotated[Path, typer.Argument(help="A Python program that talks to a Khepera through pyserial.")],
-    arguments: Annotated[list[str] | None, typer.Argument(help="What the program finds in sys.argv.")] = None,
+    arguments: Annotated[
+        list[str] | None,
+        typer.Argument(help="What the program finds in sys.argv; each .py file among it begins one more program."),
+    ] = None,
     arena: ArenaFile = None,
-    robots: Robots = 1,
-    robot: RobotKind = "khepera",
+    robots: Annotated[int, typer.Option(help="Robots in the arena; at least one a program.", min=1, max=1000)] = 1,
+    robot: RobotKinds = None,
     seed: Seed = 0,
     thinking: Annotated[
         str, typer.Option(help="What the program's computing costs: none, fixed:MS, live, live:FACTOR, replay:FILE.")
@@ -29,42 +38,118 @@ def run(
     save_thinking: Annotated[
         Path | None, typer.Option(help="Write the thinking times of a live run here, for replay:FILE.")
     ] = None,
+    when_silent: WhenSilent = "ignore",
+    patience: PatienceS = 2.0,
 ) -> None:
     """Run a program for a real robot on a simulated one, unchanged; its waits and sleeps cost no time.
 
-    Its serial ports become simulated robots, and its time.sleep, time.time and time.monotonic simulated time.
+    Its serial ports become simulated robots, and its time.sleep, time.time and time.monotonic simulated time. Several
+    programs share a world, each in a process of its own: the first drives robot 1, the second robot 2, and so on.
 
     Example: kiks run --arena examples/arenas/maze.toml --map /dev/ttyUSB0=1 wander.py
     """
     ready_engine()
-    from kiks.ports.unchanged import run_program
+    show_log()
+    kinds = robot or ["khepera"]
+    from kiks.ports.turns import check_policy
     from kiks.sim.simulation import Simulation
 
-    if not program.is_file():
-        raise ParameterError(
-            f"PROGRAM must be a Python file, but {str(program)!r} is none. Give its path before its own arguments."
-        )
+    commands = parse_words([str(program), *(arguments or [])])
     mapping = dict(parse_map(entry) for entry in map_ or [])
+    check_policy(when_silent, patience)
     sim = Simulation(
         load_arena(arena),
-        robots=robots,
+        robots=max(robots, len(kinds), len(commands)),
         seed=seed,
-        thinking=thinking,
-        robot=robot,
+        thinking=thinking if len(commands) == 1 else "none",
+        robot=kinds,
     )
-    code = 1
+    code, doubt = 1, ""
     try:
-        code = run_program(sim, program, arguments or [], mapping)
+        if len(commands) == 1:
+            code = _run_one(sim, commands[0], mapping, save_thinking)
+        else:
+            code, doubt = _run_several(sim, commands, mapping, thinking, save_thinking, when_silent, patience)
     finally:
-        if save_thinking is not None:
-            from kiks.clock.thinking import save_thinking as save
-
-            save(sim.program.measured_ns, save_thinking)
-        repeatable = (
-            f"state {sim.state_hash()}" if not thinking.startswith("live") else "not repeatable: thinking was live"
-        )
+        if thinking.startswith("live"):
+            doubt = "thinking was live"
+        repeatable = f"not repeatable: {doubt}" if doubt else f"state {sim.state_hash()}"
         typer.echo(f"kiks: {sim.time_s:.3f} s simulated, seed {seed}, {repeatable}", err=True)
     raise typer.Exit(code)
+
+
+def _run_one(sim: Simulation, command: Command, told: dict[str, int], record: Path | None) -> int:
+    """Run a program in this process; return its exit code."""
+    from kiks.ports.unchanged import run_here
+
+    try:
+        return run_here(sim, command.program, command.arguments, told)
+    finally:
+        if record is not None:
+            from kiks.clock.thinking import save_thinking
+
+            save_thinking(sim.program.measured_ns, record)
+
+
+def _run_several(
+    sim: Simulation,
+    commands: list[Command],
+    told: dict[str, int],
+    thinking: str,
+    record: Path | None,
+    when_silent: str,
+    patience_s: float,
+) -> tuple[int, str]:
+    """Run programs in processes of their own; return the first exit code that tells, and why it is not repeatable."""
+    from kiks.ports.programs import Programs
+
+    programs = Programs(
+        sim,
+        commands,
+        told=told,
+        thinking=thinking,
+        record=record,
+        when_silent=when_silent,
+        patience_s=patience_s,
+        say=lambda text: typer.echo(f"kiks: {text}", err=True),
+    )
+    code = programs.run()
+    return code, programs.doubt
+
+
+def parse_words(words: list[str]) -> list[Command]:
+    """Return the programs that the words of a command line name, each with its arguments.
+
+    A word that names a file ending in .py begins a program. A word with blanks that is no file is split as a shell
+    does; if it begins with such a file, it is a program with all its arguments, which may then be .py files themselves.
+
+    Raises:
+        ParameterError: If the first word is no file.
+    """
+    from kiks.ports.programs import Command
+
+    commands: list[Command] = []
+    for word in words:
+        parts = _split(word)
+        if Path(word).is_file() and (word.endswith(".py") or not commands):
+            commands.append(Command(Path(word)))
+        elif len(parts) > 1 and parts[0].endswith(".py") and Path(parts[0]).is_file():
+            commands.append(Command(Path(parts[0]), parts[1:]))
+        elif commands:
+            commands[-1].arguments.append(word)
+        else:
+            raise ParameterError(
+                f"PROGRAM must be a Python file, but {word!r} is none. Give its path before its own arguments."
+            )
+    return commands
+
+
+def _split(word: str) -> list[str]:
+    """Return the words of a quoted word; none if its quotes are not closed."""
+    try:
+        return shlex.split(word)
+    except ValueError:
+        return []
 
 
 def parse_map(entry: str) -> tuple[str, int]:

@@ -10,7 +10,8 @@ import typer
 
 from kiks.cli.ending import end_as_with_ctrl_c
 from kiks.cli.engine_start import compile_everything, ready_engine
-from kiks.cli.options import ArenaFile, RobotKind, Robots, Seed, load_arena
+from kiks.cli.log import show_log
+from kiks.cli.options import ArenaFile, PatienceS, RobotKinds, Robots, Seed, WhenSilent, load_arena
 from kiks.errors import LinkError
 
 if TYPE_CHECKING:
@@ -23,12 +24,18 @@ TCP_PORT = 10020
 def serve(
     arena: ArenaFile = None,
     robots: Robots = 1,
-    robot: RobotKind = "khepera",
+    robot: RobotKinds = None,
     seed: Seed = 0,
     speed: Annotated[float, typer.Option(help="Simulated seconds in a real one, for thinking live.")] = 1.0,
     thinking: Annotated[
         str, typer.Option(help="live: the world runs all the time; none or fixed:MS: it waits for each command.")
     ] = "live",
+    programs: Annotated[
+        int | None,
+        typer.Option(help="How many programs begin together if the world waits for them; one a robot if left out."),
+    ] = None,
+    when_silent: WhenSilent = "ignore",
+    patience: PatienceS = 2.0,
     baud: Annotated[int, typer.Option(help="Line speed until a program sets one.", min=75, max=4_000_000)] = 9600,
     pty: Annotated[bool, typer.Option(help="Make a serial port for each robot.")] = True,
     link: Annotated[
@@ -58,8 +65,11 @@ def serve(
         if not quiet:
             typer.echo(text)
 
+    show_log(is_quiet=quiet)
+    kinds = robot or ["khepera"]
+    robots = max(robots, len(kinds))
     ground = load_arena(arena)
-    sim = Simulation(ground, robots=robots, seed=seed, robot=robot)
+    sim = Simulation(ground, robots=robots, seed=seed, robot=kinds)
     for wire in sim.wires:
         wire.set_baud(baud)
     if not quiet:
@@ -79,11 +89,20 @@ def serve(
             if rfc2217 is not None:
                 endpoints.append(_open_rfc2217(number, rfc2217, host))
                 say(f"  RFC 2217     rfc2217://{endpoints[-1].name}")
-        server = Server(sim, ways, speed=speed, thinking=thinking)
-        say(_what_is_repeatable(thinking, speed, robots))
+        server = Server(
+            sim,
+            ways,
+            speed=speed,
+            thinking=thinking,
+            programs=programs,
+            when_silent=when_silent,
+            patience_s=patience,
+        )
+        say(_what_is_repeatable(thinking, speed, robots if programs is None else programs))
         server.serve()
     except KeyboardInterrupt:
-        say(f"Stopped after {sim.time_s:.1f} s of simulated time.")
+        state = "" if thinking == "live" else f" State {sim.state_hash()}."
+        say(f"Stopped after {sim.time_s:.1f} s of simulated time.{state}")
     finally:
         if server is not None:
             server.close()
@@ -121,14 +140,18 @@ def _open_rfc2217(number: int, first: int, host: str) -> Endpoint:
     return Rfc2217Endpoint(first + number - 1 if first else 0, host=host)
 
 
-def _what_is_repeatable(thinking: str, speed: float, robots: int) -> str:
+def _what_is_repeatable(thinking: str, speed: float, programs: int) -> str:
     if thinking == "live":
         return (
             f"The world runs at {speed:g} times real time. Not repeatable: when a program's bytes come depends on this "
             "computer; --thinking none makes it so."
         )
-    others = ", as long as only one program is connected" if robots > 1 else ""
+    if programs == 1:
+        return (
+            "The world waits for each command. Repeatable to the bit for a program that waits for each reply; its "
+            "pauses take no time."
+        )
     return (
-        "The world waits for each command. Repeatable to the bit for a program that waits for each reply"
-        f"{others}; its pauses take no time."
+        f"The world begins when {programs} programs are there, and waits for the commands of each. Repeatable to the "
+        "bit for programs that wait for each reply; their pauses take no time."
     )

@@ -12,7 +12,7 @@ from typing import Any
 
 from kiks.client.khepera import Port, open_port
 from kiks.errors import LinkError, ParameterError
-from kiks.ports.memory import SimPort
+from kiks.ports.port import VirtualPort
 
 
 class Reference(tuple[float, ...]):
@@ -108,7 +108,7 @@ def ksend(text: str, ref: Sequence[float], timeout: float | None = None) -> str:
     port.write(text.encode("latin-1", errors="replace"))
     if not text.endswith(("\n", "\r")):
         return ""
-    holder: Any = port if isinstance(port, SimPort) else getattr(port, "port", port)
+    holder: Any = port if isinstance(port, VirtualPort) else getattr(port, "port", port)
     before = holder.timeout
     if timeout is not None:
         holder.timeout = timeout
@@ -151,7 +151,7 @@ def pause(seconds: float) -> None:
         ParameterError: If the time is negative or not finite.
     """
     reference = _OPENINGS.latest()
-    if reference is not None and isinstance(reference.port, SimPort):
+    if reference is not None and isinstance(reference.port, VirtualPort):
         reference.port.sleep(seconds)
     else:
         time.sleep(seconds)
@@ -175,4 +175,4 @@ def _device(number: int) -> str:
 
 
 def _now_s(port: Port) -> float:
-    return port.time_s if isinstance(port, SimPort) else time.monotonic()
+    return port.time_s if isinstance(port, VirtualPort) else time.monotonic()

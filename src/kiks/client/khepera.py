@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import Any, NamedTuple, Protocol
 
 from kiks.errors import LinkError, ParameterError
-from kiks.ports.memory import SimPort
+from kiks.ports.port import VirtualPort
 
 TIMEOUT_S = 2.0
 """How long a reply may take [s]: the longest, 264 characters at 9600 baud, takes 0.3 s (khepera-protocol.md 2.2)."""
@@ -72,7 +72,7 @@ class Khepera:
             self.port: Port = open_port(port, baud)
         else:
             self.port = port
-        if isinstance(self.port, SimPort) and self.port.timeout is None:
+        if isinstance(self.port, VirtualPort) and self.port.timeout is None:
             self.port.timeout = TIMEOUT_S
 
     def close(self) -> None:
@@ -92,11 +92,11 @@ class Khepera:
     @property
     def time_s(self) -> float:
         """Time of the robot's world [s]: simulated, or the computer's own for a real robot."""
-        return self.port.time_s if isinstance(self.port, SimPort) else time.monotonic()
+        return self.port.time_s if isinstance(self.port, VirtualPort) else time.monotonic()
 
     def pause(self, seconds: float) -> None:
         """Let time pass [s]: at no cost on a simulated robot, by waiting on a real one."""
-        if isinstance(self.port, SimPort):
+        if isinstance(self.port, VirtualPort):
             self.port.sleep(seconds)
         else:
             time.sleep(seconds)

@@ -9,6 +9,9 @@ from collections import deque
 
 from kiks.units import character_ns
 
+BACKLOG_LIMIT = 4096
+"""Characters on the way to the robot beyond which a sender has to wait [bytes]: a serial driver's buffer."""
+
 OUTPUT_LIMIT = 1 << 20
 """Characters that wait for a reader [bytes]; what the robot says beyond them is lost, as in any serial driver."""
 

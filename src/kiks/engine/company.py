@@ -21,6 +21,7 @@ import numpy as np
 from kiks.engine.bodies import collide, kick, roll, speed_of
 from kiks.engine.compiling import kernel
 from kiks.engine.contact import clearance_mm, outward
+from kiks.engine.hold import begin_holds, carry_along, go_back_together, keep_holds, turn_back, way_of_held
 from kiks.engine.lanes import stack_integers
 from kiks.engine.motion import give_way, move, note_contact
 from kiks.engine.scene import count_discs, disc_at, enter_all, find_near, is_on_floor
@@ -125,14 +126,21 @@ def move_together(scene: Any, ground: Any, world: Any, room: Any, neighbour_coun
         way = way_of(scene, world, room, disc)
         fastest_mm = max(fastest_mm, way)
         room.is_near[disc] = disc >= robot_count and way > 0.0
-        room.is_driven[disc] = disc < robot_count and way > 0.0
+        if disc < robot_count:
+            room.is_driven[disc] = way > 0.0
+        else:
+            holder = scene[1][world, disc - robot_count].holder
+            room.is_driven[disc] = holder > 0 and room.is_driven[holder - 1]
         room.is_touching[disc] = False
+    held_mm = way_of_held(scene, world, room)
+    fastest_mm = max(fastest_mm, held_mm)
     nearer_mm = HASTE * fastest_mm + TOUCHING_MM
     if slack_mm < nearer_mm:
         slack_mm = max(SLACK_MM, nearer_mm)
         neighbour_count = find_neighbours(scene, world, room, slack_mm)
     slack_mm -= nearer_mm
     pair_count = find_pairs(scene, world, room, neighbour_count, nearer_mm)
+    begin_holds(scene, world, room)
     fastest_mm = 0.0
     for disc in range(disc_count):
         if room.is_near[disc]:
@@ -140,9 +148,11 @@ def move_together(scene: Any, ground: Any, world: Any, room: Any, neighbour_coun
         elif disc < robot_count:
             left, right, slip_ratio = room.ways[disc, 0], room.ways[disc, 1], room.ways[disc, 2]
             room.is_touching[disc] = move_alone(scene, ground, world, disc, left, right, slip_ratio)
+    fastest_mm = max(fastest_mm, held_mm)
     pieces = max(math.ceil(fastest_mm / PIECE_MM), 1)
     for _ in range(pieces):
         drive_and_roll(scene, ground, world, room, pieces)
+        carry_along(scene, world, room, TICK_S / pieces)
         hit(scene, world, room, pair_count, TICK_S / pieces)
         if not part(scene, ground, world, room, pair_count):
             go_back(scene, ground, world, room, pair_count)
@@ -153,6 +163,7 @@ def move_together(scene: Any, ground: Any, world: Any, room: Any, neighbour_coun
                 if dx != 0.0 or dy != 0.0:
                     parameters = scene[2][robot.kind]
                     give_way(robot, parameters, dx, dy, room.ways[number, :2] / pieces, room.ways[number, 2])
+        turn_back(scene, world, room, pieces)
     for number in range(robot_count):
         note_contact(robots[world, number], room.is_touching[number])
     return neighbour_count, slack_mm
@@ -302,6 +313,7 @@ def part(scene: Any, ground: Any, world: Any, room: Any, pair_count: Any) -> Any
             if overlap > 0.0:
                 push_apart(scene, world, room, sweep, first, second, overlap * nx, overlap * ny)
                 worst = max(worst, overlap)
+        worst = max(worst, keep_holds(scene, ground, world, room))
         for disc in range(disc_count):
             if room.is_pushed[disc]:
                 x, y, radius = disc_at(scene, world, disc)
@@ -359,6 +371,8 @@ def go_back(scene: Any, ground: Any, world: Any, room: Any, pair_count: Any) -> 
                 put_back(scene, world, room, first)
                 put_back(scene, world, room, second)
                 is_done = False
+        if go_back_together(scene, world, room, STUCK_MM):
+            is_done = False
 
 
 @kernel

@@ -20,6 +20,9 @@ TRAIL_LENGTH = 3
 PIXEL_COUNT = 64
 """Pixels in a row of the camera (khepera-protocol.md 10.3)."""
 
+MEMORY_COUNT = 16
+"""Numbers that the turrets of a user's own on one robot share among them: two to four turrets' worth."""
+
 ROBOT = np.dtype(
     [
         # The body. The pose is that of the end of the last tick; `trail` holds the boundaries before it, newest first.
@@ -63,11 +66,40 @@ ROBOT = np.dtype(
         ("led", "u1", (2,)),
         ("bus", "u1", (64,)),
         ("reserved", "u1", (2,)),
+        # What the extension bus brings in, byte by byte, and the free analogue inputs 3 to 5, all set from outside.
+        ("bus_inputs", "u1", (64,)),
+        ("analog_inputs", "i4", (3,)),
+        ("has_gripper", "i4"),
         # The camera, where one is fitted: the code of its reading period, and its last picture.
         ("camera_period", "i4"),
         ("camera_light", "i4"),
         ("camera_taken_ns", "i8"),
         ("camera_pixels", "u1", (PIXEL_COUNT,)),
+        # The gripper, where one is fitted (`kiks.engine.gripper`).
+        ("arm_target", "f8"),
+        ("arm", "f8"),  # 255 down in front, 127 upright, 0 folded back
+        ("jaws", "f8"),  # 200 open, 0 closed
+        ("is_closing", "i4"),
+        ("held_row", "i4"),  # place of the held body in `bodies`, from 1; 0 for none; found anew in each tick
+        ("piece_headings", "f8", (2,)),  # where a piece of a motion began, and where the wheels turned to
+        # The radio (`kiks.firmware.radio`): the message on its way, and the one that waits to be read.
+        ("radio_starts_ns", "i8"),
+        ("radio_ends_ns", "i8"),
+        ("radio_ended_ns", "i8"),
+        ("radio_attempt", "i4"),
+        ("radio_has_failed", "i4"),
+        ("radio_to", "i4"),
+        ("radio_to_length", "i4"),
+        ("radio_from", "i4"),
+        ("radio_from_length", "i4"),
+        ("radio_to_data", "u1", (16,)),
+        ("radio_from_data", "u1", (16,)),
+        # The battle turret (`kiks.firmware.battle`): energy at a time, and hits since they were last read.
+        ("battle_energy", "f8"),
+        ("battle_ns", "i8"),
+        ("battle_hits", "i8"),
+        # Numbers that turrets of a user's own remember.
+        ("turret_memory", "f8", (MEMORY_COUNT,)),
     ],
     align=True,
 )
@@ -90,6 +122,8 @@ BODY = np.dtype(
         ("what", "i4"),
         ("holder", "i4"),  # number of the robot whose gripper holds it, from 1; 0 for none
         ("is_lifted", "i4"),  # above the floor, where nothing meets and nothing sees it
+        ("hold_ahead_mm", "f8"),  # where it is held, as the holder sees it
+        ("hold_aside_mm", "f8"),
     ],
     align=True,
 )

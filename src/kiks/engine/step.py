@@ -7,6 +7,8 @@ from typing import Any
 from kiks.engine.bodies import remember_place
 from kiks.engine.company import make_room, move_alone, move_together
 from kiks.engine.compiling import entry, kernel
+from kiks.engine.gripper import move_gripper, tend_grippers
+from kiks.engine.hold import carry_lifted
 from kiks.engine.motion import note_contact, remember_pose
 from kiks.engine.motor import control_motors, latch_encoders, turn_motors
 from kiks.engine.numbers import uniform
@@ -38,6 +40,8 @@ def advance_one(scene: Any, ground: Any, seed: Any, world: Any, tick: Any, tick_
     """Let time pass in a world of one robot: what is below, without company."""
     for now in range(tick, tick + tick_count):
         left, right, slip_ratio = turn_wheels(scene, seed, world, 0, now)
+        if scene[0][world, 0].has_gripper != 0:
+            move_gripper(scene[0][world, 0], 0.0)
         is_touching = move_alone(scene, ground, world, 0, left, right, slip_ratio)
         note_contact(scene[0][world, 0], is_touching)
 
@@ -54,7 +58,10 @@ def advance_many(scene: Any, ground: Any, seed: Any, world: Any, tick: Any, tick
             room.ways[number, 0], room.ways[number, 1], room.ways[number, 2] = left, right, slip_ratio
         for number in range(bodies.shape[1]):
             remember_place(bodies[world, number])
+        if tend_grippers(scene, ground, world):
+            slack_mm = -1.0
         neighbour_count, slack_mm = move_together(scene, ground, world, room, neighbour_count, slack_mm)
+        carry_lifted(scene, world)
     enter_all(scene, world)
 
 

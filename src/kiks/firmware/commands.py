@@ -6,6 +6,7 @@ of its reply; the letter in lower case, the commas and the line end are put arou
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     from kiks.firmware.khepera import Firmware
 
 Reply = tuple[object, ...]
+
+_log = logging.getLogger("kiks.turrets")
 
 
 class ProtocolError(Exception):
@@ -123,8 +126,8 @@ def read_counters(robot: Firmware) -> Reply:
 def read_analog(robot: Firmware, channel: int) -> Reply:
     """Report an analogue input.
 
-    Channel 0 is the charger, 1 the reflected and 2 the ambient light of the sensor being scanned, 3 to 5 are free, and
-    6 is the current [mA].
+    Channel 0 is the charger, 1 the reflected and 2 the ambient light of the sensor being scanned, 3 to 5 are those of
+    the General I/O turret, and 6 is the current [mA].
     """
     _in_range(channel, 0, 6)
     if channel in (1, 2):
@@ -133,7 +136,7 @@ def read_analog(robot: Firmware, channel: int) -> Reply:
     if channel == 6:
         power = sum(abs(pwm) for pwm in robot.view.pwm.tolist()) / (2 * motor.PWM_MAX)
         return (100 + round(300 * power),)
-    return (0,)
+    return (int(robot.view.analog_inputs[channel - 3]),) if channel >= 3 else (0,)
 
 
 def set_profile(robot: Firmware, max_left: int, acc_left: int, max_right: int, acc_right: int) -> Reply:
@@ -178,7 +181,7 @@ def set_pwm(robot: Firmware, left: int, right: int) -> Reply:
 def read_bus(robot: Firmware, address: int) -> Reply:
     """Read a byte from the extension bus; where nothing is fitted it is 0."""
     _in_range(address, 0, 63)
-    return (0,)
+    return (int(robot.view.bus_inputs[address]),)
 
 
 def send_to_turret(robot: Firmware, turret: int, order: str, *values: int) -> Reply:
@@ -186,10 +189,17 @@ def send_to_turret(robot: Firmware, turret: int, order: str, *values: int) -> Re
     fitted = robot.turrets.get(turret)
     if fitted is None:
         raise NoTurretError
-    answer = fitted.revision if order == "B" else fitted.order(order, tuple(map(_limit, values)))
-    if answer is None:
+    if order == "B":
+        return (turret, "b", *fitted.revision)
+    try:
+        answer = fitted.order(order, tuple(map(_limit, values)))
+        reply = None if answer is None else tuple(map(int, answer))
+    except Exception:  # a turret of a user's own may do anything, but a program on the wire never sees that
+        _log.exception("Turret %d (%s) must not raise, but order %s did.", turret, fitted.name, order)
+        reply = None
+    if reply is None:
         raise ProtocolError
-    return (turret, order.lower(), *answer)
+    return (turret, order.lower(), *reply)
 
 
 def write_bus(robot: Firmware, data: int, address: int) -> Reply:

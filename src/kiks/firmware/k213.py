@@ -6,12 +6,13 @@ asked: two answers between two instants are equal to the bit.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from kiks.engine.state import PIXEL_COUNT, ROBOT
+from kiks.firmware.turret import Orders, Shape, Turret
 
 NUMBER = 2
 """Where K-Team put it among the turrets (khepera-protocol.md 10.1)."""
@@ -21,69 +22,6 @@ PERIODS_NS = tuple(ms * 1_000_000 for ms in (200, 50, 100, 150, 250, 500, 1000, 
 
 Picture = tuple[list[int], int]
 """64 greys 0..255, the leftmost first, and the light level, which is more for a darker scene."""
-
-
-class K213:
-    """A camera on a robot.
-
-    What it remembers (reading period, last picture) stands in the robot's record, so that it is part of every snapshot
-    and hash of the state. A reset of the robot sets the period to that of the power-on; the picture stays.
-
-    Args:
-        take: Takes a picture of what the robot sees at a time [ns], which is the present one.
-        record: The robot's record of `kiks.engine.state.ROBOT`; one of its own if left out.
-
-    Example:
-        >>> camera = K213(lambda time_ns: (list(range(64)), 300))
-        >>> camera.look(0)
-        >>> camera.order("Q", (60,)), camera.order("L", ()), camera.order("X", ())
-        ((56, 57, 58, 59, 60, 61, 62, 63), (1, 44), None)
-    """
-
-    number = NUMBER
-    name = "K213 linear vision"
-    revision = (1, 0)
-
-    def __init__(self, take: Callable[[int], Picture], record: Any = None) -> None:
-        self._take = take
-        self._record = np.zeros(1, ROBOT)[0] if record is None else record
-        self._record["camera_period"] = 0
-        self._record["camera_taken_ns"] = -1
-
-    @property
-    def period_ns(self) -> int:
-        """Pictures are taken when the time is a multiple of this [ns]."""
-        return PERIODS_NS[int(self._record["camera_period"])]
-
-    @property
-    def taken_ns(self) -> int:
-        """When the last picture was taken [ns]."""
-        return int(self._record["camera_taken_ns"])
-
-    @property
-    def pixels(self) -> list[int]:
-        """The last picture's greys, the leftmost first."""
-        greys: list[int] = self._record["camera_pixels"].tolist()
-        return greys
-
-    @property
-    def light(self) -> int:
-        """The last picture's light level."""
-        return int(self._record["camera_light"])
-
-    def look(self, instant_ns: int) -> None:
-        """Take a picture."""
-        self._record["camera_pixels"], self._record["camera_light"] = self._take(instant_ns)
-        self._record["camera_taken_ns"] = instant_ns
-
-    def set_period(self, code: int) -> None:
-        """Set the reading period to that of a code of order U."""
-        self._record["camera_period"] = code
-
-    def order(self, letter: str, values: tuple[int, ...]) -> tuple[int, ...] | None:
-        """Carry out an order and return the values of its answer, None for an order it does not know."""
-        count, act = _ORDERS.get(letter, (-1, _read_all))
-        return act(self, *values) if len(values) == count else None
 
 
 def _read_light(camera: K213) -> tuple[int, ...]:
@@ -148,7 +86,7 @@ def _set_period(camera: K213, code: int) -> tuple[int, ...] | None:
     return ()
 
 
-_ORDERS: dict[str, tuple[int, Callable[..., tuple[int, ...] | None]]] = {
+_ORDERS: Orders = {
     "L": (0, _read_light),
     "M": (0, _read_packed),
     "N": (0, _read_all),
@@ -161,3 +99,70 @@ _ORDERS: dict[str, tuple[int, Callable[..., tuple[int, ...] | None]]] = {
     "U": (1, _set_period),
 }
 """For each order how many numbers it takes, and what it does. B is the firmware's: `revision`."""
+
+
+class K213(Turret):
+    """A camera on a robot.
+
+    What it remembers (reading period, last picture) stands in the robot's record, so that it is part of every snapshot
+    and hash of the state. A reset of the robot sets the period to that of the power-on; the picture stays.
+
+    Args:
+        take: Takes a picture of what the robot sees at a time [ns], which is the present one.
+        record: The robot's record of `kiks.engine.state.ROBOT`; one of its own if left out.
+
+    Example:
+        >>> camera = K213(lambda time_ns: (list(range(64)), 300))
+        >>> camera.look(0)
+        >>> camera.order("Q", (60,)), camera.order("L", ()), camera.order("X", ())
+        ((56, 57, 58, 59, 60, 61, 62, 63), (1, 44), None)
+    """
+
+    number = NUMBER
+    name = "K213 linear vision"
+    orders = _ORDERS
+
+    def __init__(self, take: Callable[[int], Picture], record: Any = None) -> None:
+        self._take = take
+        self._record = np.zeros(1, ROBOT)[0] if record is None else record
+        self._record["camera_period"] = 0
+        self._record["camera_taken_ns"] = -1
+
+    @property
+    def period_ns(self) -> int:
+        """Pictures are taken when the time is a multiple of this [ns]."""
+        return PERIODS_NS[int(self._record["camera_period"])]
+
+    @property
+    def taken_ns(self) -> int:
+        """When the last picture was taken [ns]."""
+        return int(self._record["camera_taken_ns"])
+
+    @property
+    def pixels(self) -> list[int]:
+        """The last picture's greys, the leftmost first."""
+        greys: list[int] = self._record["camera_pixels"].tolist()
+        return greys
+
+    @property
+    def light(self) -> int:
+        """The last picture's light level."""
+        return int(self._record["camera_light"])
+
+    def reset(self) -> None:
+        """Set the reading period to that of the power-on."""
+        self.set_period(0)
+
+    def look(self, instant_ns: int) -> None:
+        """Take a picture."""
+        self._record["camera_pixels"], self._record["camera_light"] = self._take(instant_ns)
+        self._record["camera_taken_ns"] = instant_ns
+
+    def set_period(self, code: int) -> None:
+        """Set the reading period to that of a code of order U."""
+        self._record["camera_period"] = code
+
+    def shapes(self) -> Sequence[Shape]:
+        """Return a box with a lens that looks ahead."""
+        box = ((-10.0, -12.0), (14.0, -12.0), (14.0, 12.0), (-10.0, 12.0))
+        return (Shape(box, "#303030"), Shape(((16.0, 0.0),), "#5080c0", radius_mm=5.0))

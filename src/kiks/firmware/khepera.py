@@ -34,9 +34,10 @@ class Firmware:
         number: Which record, counted from 0.
         sense_proximity: Returns the eight counts latched at this time.
         sense_ambient: The same for light.
-        turrets: What is fitted.
 
     Attributes:
+        fitted: All turrets.
+        turrets: Those that answer orders, by their numbers.
         baud: Speed of the line now [bit/s]; the tool `serial` changes it.
         selected_baud: Speed that the mode selector asks for [bit/s]: the robot reads it at a reset.
     """
@@ -49,7 +50,6 @@ class Firmware:
         *,
         sense_proximity: Callable[[], list[int]],
         sense_ambient: Callable[[], list[int]],
-        turrets: tuple[Turret, ...] = (),
     ) -> None:
         self.spec = spec
         self.robots = state.robots
@@ -57,7 +57,8 @@ class Firmware:
         self.number = number
         self.sense_proximity = sense_proximity
         self.sense_ambient = sense_ambient
-        self.turrets = {turret.number: turret for turret in turrets}
+        self.fitted: list[Turret] = []
+        self.turrets: dict[int, Turret] = {}
         self.receiver = Receiver(keeps_empty_lines=spec.quirks.answer_empty_lines)
         self.now_ns = 0
         self.selected_baud = spec.firmware.baud
@@ -71,6 +72,12 @@ class Firmware:
         self._commands = {command.letter.encode(): (command.act, len(command.parameters)) for command in COMMANDS}
         self.reset()
 
+    def fit(self, turret: Turret) -> None:
+        """Take a turret on; one without a number answers no orders."""
+        self.fitted.append(turret)
+        if turret.number >= 0:
+            self.turrets[turret.number] = turret
+
     # ---- power ----
 
     def reset(self) -> None:
@@ -80,7 +87,6 @@ class Firmware:
             getattr(view, name)[:] = 0
         for name in ("speed_setpoint", "pwm_setpoint", "on_target", "led", "bus", "slip_pulses", "slip_count"):
             getattr(view, name)[:] = 0
-        view.camera_period[:] = 0
         view.motor_mode[:] = MODE_SPEED
         view.counter_offset[:] = -view.pulse_count
         view.speed_gains[:] = reset.speed_gains
@@ -89,6 +95,8 @@ class Firmware:
         view.profile_acceleration[:] = reset.profile_acceleration
         self.baud = self.selected_baud
         self.demo_wakes_ns = None
+        for turret in self.fitted:
+            turret.reset()
 
     def banner(self) -> bytes:
         """Return what the robot prints when it starts in protocol mode (khepera-protocol.md 2.4)."""

@@ -58,14 +58,17 @@ class Channel(ABC):
             data = data[self._put(data) :]
         if len(self._unsent) + len(data) <= OUTPUT_LIMIT:
             self._unsent += data
-        elif not self._has_warned:
-            self._has_warned = True
-            _log.warning(
-                "the client of %s must read its replies, but %d characters wait for it; the rest is lost. "
-                "Read a line after each command.",
-                self.name,
-                len(self._unsent),
+        else:
+            self.warn(
+                f"the client of {self.name} must read its replies, but {len(self._unsent)} characters wait for it; "
+                "the rest is lost. Read a line after each command."
             )
+
+    def warn(self, text: str) -> None:
+        """Tell a person what the client does wrong: once, for one thing mostly comes of the other."""
+        if not self._has_warned:
+            self._has_warned = True
+            _log.warning("%s", text)
 
     def flush(self) -> None:
         """Send what waits, as far as the client takes it."""

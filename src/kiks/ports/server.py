@@ -8,15 +8,17 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
+from kiks.clock.line import BACKLOG_LIMIT
 from kiks.clock.pace import Pace
+from kiks.clock.patience import Patience
 from kiks.clock.thinking import ThinkingFixed, parse_thinking
 from kiks.errors import ParameterError
 from kiks.ports.endpoint import Endpoint
-from kiks.ports.timing import Link, Live, Lockstep, Timing
+from kiks.ports.lockstep import Lockstep
+from kiks.ports.port import BAUD_MAX, BAUD_MIN
+from kiks.ports.timing import Link, Live, Timing
+from kiks.ports.turns import PATIENCE_S
 from kiks.sim.simulation import Simulation
-
-BAUD_MIN = 75
-BAUD_MAX = 4_000_000
 
 _log = logging.getLogger("kiks.serve")
 
@@ -29,8 +31,13 @@ class Server:
         endpoints: The ways in to each robot, by its number from 1. They are closed with the server.
         speed: Simulated seconds in a real one (live only).
         thinking: 'live': the world runs all the time. 'none' or 'fixed:MS': the world waits for each command, before
-            which no or a fixed time passes; repeatable to the bit for one program that waits for its replies.
+            which no or a fixed time passes; repeatable to the bit for programs that wait for their replies.
+        programs: How many programs begin together; as many as there are robots if left out (not live).
+        when_silent: What happens to a program that is silent while others wait for it: 'wait': the world waits for it;
+            'drop': it is hung up on; 'ignore': the world no longer waits for it (not live).
+        patience_s: How long it may be silent [s of real time].
         pace: For tests: a pace with its own wall clock, instead of `speed`.
+        new_patience: For tests: makes patiences with their own wall clock.
 
     Raises:
         ParameterError: If there is no such robot, or a value is out of range.
@@ -49,10 +56,26 @@ class Server:
         *,
         speed: float = 1.0,
         thinking: str = "live",
+        programs: int | None = None,
+        when_silent: str = "ignore",
+        patience_s: float = PATIENCE_S,
         pace: Pace | None = None,
+        new_patience: Callable[[float], Patience] = Patience,
     ) -> None:
         self.sim = sim
-        self._timing = _timing(sim, thinking, Pace(speed) if pace is None else pace)
+        self._timing: Timing
+        if thinking == "live":
+            self._timing = Live(sim, Pace(speed) if pace is None else pace)
+        else:
+            self._timing = Lockstep(
+                sim,
+                _fixed_ns(thinking),
+                programs=_check_programs(len(endpoints) if programs is None else programs, len(endpoints)),
+                missing=self._missing,
+                when_silent=when_silent,
+                patience_s=patience_s,
+                new_patience=new_patience,
+            )
         self._links = {robot: Link(robot, sim.wires[_index(sim, robot)]) for robot in endpoints}
         self._endpoints = {robot: list(ways) for robot, ways in endpoints.items()}
         self._selector = selectors.DefaultSelector()
@@ -69,6 +92,10 @@ class Server:
             with self.sim.lock:
                 wait_s = self._timing.advance(links)
                 for link in links:
+                    if link.is_dropped:
+                        self._leave(link)
+                    if link.is_leaving and self._timing.has_left(link):
+                        self._free(link)
                     self._wait_for(link)
             for key, events in self._selector.select(wait_s):
                 with self.sim.lock:
@@ -80,6 +107,8 @@ class Server:
             for link in self._links.values():
                 if link.channel is not None:
                     self._leave(link)
+                if link.is_leaving:
+                    self._free(link)
         self._selector.close()
         for ways in self._endpoints.values():
             for endpoint in ways:
@@ -94,6 +123,8 @@ class Server:
     def _enter(self, link: Link, endpoint: Endpoint, _events: int) -> None:
         """Let a client in if the robot has none."""
         wire = link.wire
+        if link.is_leaving:
+            return  # Who comes meanwhile waits at the door.
         if wire.holder is not None:
             endpoint.turn_away()
             if endpoint.name not in link.refused:
@@ -114,25 +145,41 @@ class Server:
         link.clear()
         link.channel = channel
         wire.holder = f"the client of {endpoint.name}"
+        self._timing.enter(link)
         _log.info("robot %d has a client at %s", link.robot, endpoint.name)
         self._wait_for(link)
 
     def _leave(self, link: Link) -> None:
-        """Part from a client."""
+        """Part from a client. Who comes next waits at the doors until what it has left behind is done."""
         channel = link.channel
         if channel is None:
             return
         if link.events:
             self._selector.unregister(channel.fileno())
             link.events = 0
+        for endpoint in self._endpoints[link.robot]:
+            if endpoint.fileno() in self._selector.get_map():
+                self._selector.unregister(endpoint.fileno())
         channel.close()
         link.channel = None
+        link.is_dropped = False
+        link.is_leaving = True
+        self._timing.leave(link)
+        _log.info("robot %d has lost its client at %s", link.robot, channel.name)
+        if self._timing.has_left(link):
+            self._free(link)
+
+    def _free(self, link: Link) -> None:
+        """Let the next client come."""
         link.clear()
         link.wire.holder = None
-        _log.info("robot %d has lost its client at %s", link.robot, channel.name)
         for endpoint in self._endpoints[link.robot]:
-            if endpoint.fileno() not in self._selector.get_map():
-                self._open_door(link, endpoint)
+            self._open_door(link, endpoint)
+
+    def _missing(self) -> str:
+        """Return whose programs are not there, for a person."""
+        robots = [str(link.robot) for link in self._links.values() if link.channel is None and not link.is_leaving]
+        return f"that of robot {' or '.join(robots)}"
 
     # ---- bytes come and go ----
 
@@ -162,9 +209,13 @@ class Server:
         channel = link.channel
         if channel is None:
             return
-        events = (0 if self._timing.is_full(link) else selectors.EVENT_READ) | (
-            selectors.EVENT_WRITE if channel.has_unsent else 0
-        )
+        is_full = self._timing.is_full(link)
+        if is_full:
+            channel.warn(
+                f"the client of {channel.name} must wait for its replies, but it is more than {BACKLOG_LIMIT - 1} "
+                "characters ahead of its robot; what it sends now has to wait. Read a line after each command."
+            )
+        events = (0 if is_full else selectors.EVENT_READ) | (selectors.EVENT_WRITE if channel.has_unsent else 0)
         if events == link.events:
             return
         if not events:
@@ -176,16 +227,23 @@ class Server:
         link.events = events
 
 
-def _timing(sim: Simulation, thinking: str, pace: Pace) -> Timing:
-    if thinking == "live":
-        return Live(sim, pace)
+def _fixed_ns(thinking: str) -> int:
     policy = parse_thinking(thinking)
     if not isinstance(policy, ThinkingFixed):
         raise ParameterError(
             f"thinking of a server must be 'live', 'none' or 'fixed:MS', but it was {thinking!r}. "
             "The other policies are for ports in memory."
         )
-    return Lockstep(sim, policy.time_ns)
+    return policy.time_ns
+
+
+def _check_programs(programs: int, robots: int) -> int:
+    if not isinstance(programs, int) or not 1 <= programs <= max(robots, 1):
+        raise ParameterError(
+            f"programs must be a whole number from 1 to {max(robots, 1)}, the number of robots, but it was "
+            f"{programs!r}. Each program has a robot of its own."
+        )
+    return programs
 
 
 def _index(sim: Simulation, robot: int) -> int:

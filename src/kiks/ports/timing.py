@@ -1,21 +1,20 @@
 """How time passes while real programs are connected: live, or in lockstep with them.
 
 Live: the world runs at a multiple of real time, whoever is there, and bytes are sent when they come.
-Lockstep: the world stands still until a whole command is there, and then runs to the end of the reply. How the
-operating system cuts the bytes, and how long the program really took, has no influence.
+Lockstep (`lockstep.py`): the world waits for each command, and then runs to the end of the reply.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from kiks.clock.line import BACKLOG_LIMIT
 from kiks.clock.pace import Pace
 from kiks.ports.endpoint import Channel
 from kiks.sim.simulation import Simulation
-from kiks.sim.wire import BACKLOG_LIMIT, Wire
+from kiks.sim.wire import Wire
 from kiks.units import NS_PER_S
 
 IDLE_S = 0.05
@@ -27,10 +26,6 @@ COALESCE_S = 0.002
 SLICE_NS = NS_PER_S
 """Most simulated time that passes before the ports are looked at again [ns]."""
 
-TERMINATORS = (b"\r", b"\n")
-
-_TERMINATOR = re.compile(rb"[\r\n]")
-
 
 @dataclass(eq=False)
 class Link:
@@ -40,8 +35,8 @@ class Link:
         robot: Number of the robot, from 1.
         wire: Its line in the simulation.
         channel: The client; None while there is none.
-        kept: The beginning of a command, kept back until its end is there (lockstep only).
-        last: The last character that was sent before it (lockstep only).
+        is_leaving: Whether the client has gone, and what it left behind is still being done.
+        is_dropped: Whether the client is to be hung up on.
         events: What the channel's descriptor is being waited for.
         refused: Endpoints at which somebody was turned away since the client came.
     """
@@ -49,15 +44,14 @@ class Link:
     robot: int
     wire: Wire
     channel: Channel | None = None
-    kept: bytearray = field(default_factory=bytearray)
-    last: bytes = b"\n"
+    is_leaving: bool = False
+    is_dropped: bool = False
     events: int = 0
     refused: set[str] = field(default_factory=set)
 
     def clear(self) -> None:
         """Forget what a client has left behind; the robot drives on."""
-        self.kept.clear()
-        self.last = b"\n"
+        self.is_leaving = self.is_dropped = False
         self.refused.clear()
         self.wire.hang_up()
 
@@ -67,6 +61,15 @@ class Timing(Protocol):
 
     def start(self) -> None:
         """Begin now."""
+
+    def enter(self, link: Link) -> None:
+        """Let a client take part."""
+
+    def leave(self, link: Link) -> None:
+        """Let the commands that a client has left behind act."""
+
+    def has_left(self, link: Link) -> bool:
+        """Say whether they have, as far as somebody must wait for that."""
 
     def advance(self, links: Iterable[Link]) -> float:
         """Let pass the time that is due, hand over what has arrived, and return how long nothing will happen [s]."""
@@ -88,6 +91,16 @@ class Live:
     def start(self) -> None:
         """Bind the simulated time of now to the wall clock of now."""
         self._pace.start(self._sim.now_ns)
+
+    def enter(self, link: Link) -> None:
+        """Do nothing: the world runs anyway."""
+
+    def leave(self, link: Link) -> None:
+        """Do nothing: what is on the line will act."""
+
+    def has_left(self, link: Link) -> bool:
+        """Say yes: nobody waits for the client."""
+        return True
 
     def _catch_up(self) -> bool:
         """Let time pass up to now, a slice at most; say whether that was all."""
@@ -126,60 +139,3 @@ class Live:
         """Say whether as many characters are on the line as a serial driver holds."""
         line = link.wire.line
         return line.sending_until_ns - self._sim.now_ns > BACKLOG_LIMIT * line.character_ns
-
-
-class Lockstep:
-    """The world moves while a command and its reply are on the line, and for the thinking time before it."""
-
-    def __init__(self, sim: Simulation, thinking_ns: int) -> None:
-        self._sim = sim
-        self._thinking_ns = thinking_ns
-
-    def start(self) -> None:
-        """Do nothing: time passes with the first command."""
-
-    def advance(self, links: Iterable[Link]) -> float:
-        """Let no time pass."""
-        return IDLE_S
-
-    def receive(self, link: Link, data: bytes) -> None:
-        """Carry out the commands that are complete; keep the rest."""
-        kept = link.kept
-        kept += data
-        begin = 0
-        while begin < len(kept):
-            match = _TERMINATOR.search(kept, begin, begin + BACKLOG_LIMIT)
-            if match is not None:
-                end = match.end()
-            elif len(kept) - begin >= BACKLOG_LIMIT:
-                # No command is as long as that: the robot may drop it, so that it is not kept for ever.
-                end = begin + BACKLOG_LIMIT
-            else:
-                break
-            self._exchange(link, bytes(kept[begin:end]))
-            begin = end
-        del kept[:begin]
-
-    def _exchange(self, link: Link, piece: bytes) -> None:
-        """Send a command, let time pass up to the last character of its reply, and hand that over."""
-        sim, wire, line = self._sim, link.wire, link.wire.line
-        last, link.last = link.last, piece[-1:]
-        if piece in TERMINATORS and last in TERMINATORS:
-            # The LF of CR LF left right behind the CR. The robot is silent about an empty line, so nobody waits for it.
-            wire.send(piece, line.sending_until_ns if last + piece == b"\r\n" else sim.now_ns)
-            if not wire.firmware.spec.quirks.answer_empty_lines:
-                return
-        else:
-            sim.advance_to(sim.now_ns + self._thinking_ns)
-            wire.send(piece, sim.now_ns)
-        while wire.pending and (next_ns := wire.next_ns) is not None:
-            sim.advance_to(next_ns)
-        if line.waiting:
-            count = len(line.waiting)
-            sim.advance_to(line.arrival_ns(count) or sim.now_ns)
-            if link.channel is not None:
-                link.channel.write(line.take(count))
-
-    def is_full(self, link: Link) -> bool:
-        """Say no: a command is carried out before the next one is read."""
-        return False

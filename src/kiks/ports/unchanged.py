@@ -5,60 +5,36 @@ from __future__ import annotations
 import runpy
 import sys
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from kiks.clock.virtual import virtual_time
-from kiks.errors import KiksError, LinkError
-from kiks.ports.memory import SimPort
-from kiks.sim.simulation import Simulation
+from kiks.errors import KiksError
 
-
-class Assignment:
-    """Which robot answers on which port name: as told, and otherwise in the order in which new names are opened."""
-
-    def __init__(self, sim: Simulation, told: dict[str, int]) -> None:
-        for robot in told.values():
-            sim.port(robot)
-        self.sim = sim
-        self._robots = dict(told)
-
-    def port(self, name: str) -> SimPort:
-        """Return the port behind a name.
-
-        Raises:
-            LinkError: If every robot has a name already.
-        """
-        if name.startswith("kiks:"):
-            from kiks.ports.url import find_port
-
-            return find_port(name)
-        if name not in self._robots:
-            taken = set(self._robots.values())
-            free = [robot for robot in range(1, self.sim.robot_count + 1) if robot not in taken]
-            if not free:
-                raise LinkError(
-                    f"a port must belong to a robot, but {name!r} is one more than there are: {self._robots}. "
-                    f"Run it with --robots {self.sim.robot_count + 1}, or map two names to one robot with --map."
-                )
-            self._robots[name] = free[0]
-        return SimPort(self.sim, self._robots[name])
+if TYPE_CHECKING:
+    from kiks.ports.port import VirtualPort
+    from kiks.sim.simulation import Simulation
 
 
 @contextmanager
-def simulated_ports(assignment: Assignment) -> Iterator[None]:
-    """Let `serial.Serial` and `serial.serial_for_url` open simulated ports, whatever name they are given."""
+def simulated_ports(open_port: Callable[[str], VirtualPort]) -> Iterator[None]:
+    """Let `serial.Serial` and `serial.serial_for_url` open simulated ports, whatever name they are given.
+
+    Args:
+        open_port: Returns the port behind a name.
+    """
     import serial
 
+    from kiks.ports import url as urls
     from kiks.ports.pyserial import protocol_kiks
 
     class Serial(protocol_kiks.Serial):
         """What a program gets that asks for a serial port."""
 
-        def find(self, name: str) -> SimPort:
-            return assignment.port(name)
+        def find(self, name: str) -> VirtualPort:
+            return open_port(name)
 
     def serial_for_url(url: str, *args: Any, do_not_open: bool = False, **settings: Any) -> Serial:
         port = Serial(None, *args, **settings)
@@ -67,16 +43,18 @@ def simulated_ports(assignment: Assignment) -> Iterator[None]:
             port.open()
         return port
 
-    originals = serial.Serial, serial.serial_for_url
+    originals = serial.Serial, serial.serial_for_url, urls.find_port
     serial.Serial, serial.serial_for_url = Serial, serial_for_url  # type: ignore[misc, assignment]
+    # `kiks.Khepera` and `kiks.kopen` find their ports by this one.
+    urls.find_port = open_port  # type: ignore[assignment]
     try:
         yield
     finally:
-        serial.Serial, serial.serial_for_url = originals  # type: ignore[misc]
+        serial.Serial, serial.serial_for_url, urls.find_port = originals  # type: ignore[misc]
 
 
-def run_program(sim: Simulation, program: Path, arguments: list[str], told: dict[str, int]) -> int:
-    """Run a program to its end; return its exit code.
+def run_here(sim: Simulation, program: Path, arguments: list[str], told: dict[str, int]) -> int:
+    """Run a program in this process to its end; return its exit code.
 
     Args:
         sim: The simulation behind its ports.
@@ -87,13 +65,34 @@ def run_program(sim: Simulation, program: Path, arguments: list[str], told: dict
     Raises:
         ParameterError: If `told` names a robot that is not there.
     """
-    assignment = Assignment(sim, told)
-    clock = sim.port(1)
+    from kiks.ports.memory import SimPort
+    from kiks.ports.names import Names
+    from kiks.ports.url import find_port
+
+    names = Names(sim, told)
+
+    def open_port(name: str) -> VirtualPort:
+        return find_port(name) if name.startswith("kiks:") else SimPort(sim, names.robot(name))
+
+    return run_program(program, arguments, open_port, sim.port(1))
+
+
+def run_program(
+    program: Path, arguments: list[str], open_port: Callable[[str], VirtualPort], clock: VirtualPort
+) -> int:
+    """Run a program to its end with simulated ports and simulated time; return its exit code.
+
+    Args:
+        program: The Python file.
+        arguments: What it finds in `sys.argv` after its name.
+        open_port: Returns the port behind a name.
+        clock: A port of its own, for the time.
+    """
     argv_before, path_before = sys.argv, sys.path[:]
     sys.argv = [str(program), *arguments]
     sys.path.insert(0, str(program.resolve().parent))
     try:
-        with simulated_ports(assignment), virtual_time(clock.ask_ns, clock.sleep):
+        with simulated_ports(open_port), virtual_time(clock.ask_ns, clock.sleep):
             runpy.run_path(str(program), run_name="__main__")
     except SystemExit as leaving:
         return (

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl, urlsplit
 
 from kiks.errors import LinkError, ParameterError, nearest
-from kiks.model.arena import Arena
-from kiks.ports.memory import SimPort
-from kiks.sim.simulation import Simulation
 from kiks.sim.table import TABLE
+
+if TYPE_CHECKING:
+    from kiks.ports.memory import SimPort
+    from kiks.sim.simulation import Simulation
 
 _OPTIONS = ("arena", "robots", "robot", "seed", "thinking")
 
@@ -28,6 +29,9 @@ def find_port(url: str) -> SimPort:
         ParameterError: If an option is unknown or out of range.
         ArenaError: If the arena cannot be read.
     """
+    from kiks.ports.memory import SimPort
+    from kiks.sim.simulation import Simulation
+
     parts = urlsplit(url)
     path = parts.path.strip("/")
     name, number = (parts.netloc, path) if path else ("", parts.netloc)
@@ -53,6 +57,9 @@ def find_port(url: str) -> SimPort:
 
 
 def _fresh(options: dict[str, str], url: str) -> Simulation:
+    from kiks.model.arena import Arena
+    from kiks.sim.simulation import Simulation
+
     settings: dict[str, Any] = {}
     for key, value in options.items():
         if key not in _OPTIONS:

@@ -31,11 +31,14 @@ class Cameras:
     def __bool__(self) -> bool:
         return bool(self._fitted)
 
-    def fit(self, index: int) -> K213:
-        """Return a new camera for a robot, with a first picture."""
-        fitted = self._fitted[index] = K213(partial(self._take, index), self._sim.state.robots[0, index])
-        fitted.look(self._sim.now_ns)
-        return fitted
+    def camera(self, index: int) -> K213:
+        """Return a new camera for a robot."""
+        return K213(partial(self._take, index), self._sim.state.robots[0, index])
+
+    def fit(self, index: int, camera: K213) -> None:
+        """Let a robot's camera take its pictures from now on, and the first at once."""
+        self._fitted[index] = camera
+        camera.look(self._sim.now_ns)
 
     def sync(self) -> None:
         """Let each camera take the last of its pictures that is due; the earlier ones nobody can ask for.

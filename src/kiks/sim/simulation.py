@@ -13,12 +13,15 @@ from numpy.typing import NDArray
 from kiks.clock.program import Program
 from kiks.engine import ambient, proximity
 from kiks.engine.networks import networks_for
-from kiks.errors import ParameterError, nearest
+from kiks.errors import ParameterError
+from kiks.firmware.k213 import K213
 from kiks.firmware.khepera import Firmware
+from kiks.firmware.radio import Radio, deliver
 from kiks.firmware.turret import Turret
 from kiks.model.arena import Arena
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
 from kiks.sim.cameras import Cameras
+from kiks.sim.sites import Place, first_memory, named
 from kiks.sim.table import TABLE
 from kiks.sim.things import Things
 from kiks.sim.wire import Wire
@@ -88,6 +91,7 @@ class Simulation(Things):
         self._counts = np.zeros(SENSOR_COUNT, np.int64)
         self._expected = np.zeros(SENSOR_COUNT, np.float64)
         self._cameras = Cameras(self)
+        self._radios: dict[int, Radio] = {}
         self.wires = [Wire(self._firmware(index)) for index in range(self.robot_count)]
         self._ports: dict[int, SimPort] = {}
         self.name = TABLE.enter(self)
@@ -167,10 +171,12 @@ class Simulation(Things):
         return first
 
     def sync(self) -> None:
-        """Do the ticks that have begun, and let cameras take the pictures that are due on the way."""
+        """Do the ticks that have begun; let cameras take the pictures that are due on the way, and messages arrive."""
         if self._cameras:
             self._cameras.sync()
         super().sync()
+        if self._radios:
+            deliver(self._radios, self.now_ns)
 
     # ---- robots ----
 
@@ -198,34 +204,45 @@ class Simulation(Things):
         """
         return f"kiks://{self.name}/{self.index_of(robot) + 1}"
 
-    def fit(self, robot: int, turret: str | Turret) -> None:
-        r"""Put a turret on a robot; it answers to `T,<its number>,...` from now on.
+    def fit(self, robot: int, turret: str | Turret) -> Turret:
+        r"""Put a turret on a robot; it answers to `T,<its number>,...` from now on (docs/turrets.md).
 
         Args:
             robot: Number of the robot, from 1.
-            turret: 'k213', the linear camera, or an object of your own.
+            turret: 'k213' (the linear camera), 'gripper', 'radio', 'io' (General I/O), 'battle', or one of your own.
+
+        Returns:
+            The turret, which 'io' and some of your own are set and read by.
 
         Raises:
-            ParameterError: If there is no such robot or turret.
+            ParameterError: If there is no such robot or turret, or the robot has one of its number already.
 
         Example:
             >>> sim = Simulation()
-            >>> sim.fit(1, "k213")
+            >>> camera = sim.fit(1, "k213")
             >>> port = sim.port(1)
             >>> port.write(b"T,2,B\n"); port.readline()
             6
             b't,2,b,1,0\r\n'
         """
         index = self.index_of(robot)
-        if isinstance(turret, str) and turret != "k213":
-            raise ParameterError(
-                f"turret must be 'k213' or an object of your own, but it was {turret!r}.{nearest(turret, ['k213'])} "
-                f"kiks.firmware.turret.Turret says what such an object must be able to do."
-            )
         with self.lock:
             self.sync()
-            fitted = self._cameras.fit(index) if isinstance(turret, str) else turret
-            self.wires[index].firmware.turrets[fitted.number] = fitted
+            firmware = self.wires[index].firmware
+            fitted = named(turret, partial(self._cameras.camera, index))
+            there = [each for each in firmware.fitted if each.number == fitted.number]
+            if there:
+                raise ParameterError(
+                    f"turret must be one that robot {robot} has not got, but {there[0].name!r} has its number, "
+                    f"{fitted.number}. Give a turret of your own another, 24 to 31."
+                )
+            fitted.fit(Place(self, index, fitted, first_memory(fitted, firmware.fitted)))
+            firmware.fit(fitted)
+            if isinstance(fitted, Radio):
+                self._radios = fitted.site.turrets(Radio)
+            elif isinstance(fitted, K213):
+                self._cameras.fit(index, fitted)
+        return fitted
 
     def place(self, robot: int, x_mm: float, y_mm: float, heading_rad: float) -> None:
         """Lift a robot and put it down somewhere else; its wheels and counters do not notice.

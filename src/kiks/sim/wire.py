@@ -8,9 +8,6 @@ from kiks.clock.line import SerialLine
 from kiks.firmware.khepera import Firmware
 from kiks.units import ns_from_s
 
-BACKLOG_LIMIT = 4096
-"""Characters on the way to the robot beyond which a sender has to wait [bytes]: a serial driver's buffer."""
-
 
 class Wire:
     """One robot's line, its firmware, and the commands that have been sent but have not acted yet.

@@ -18,6 +18,7 @@ from kiks.engine.state import BALL, State
 from kiks.errors import ArenaError, ParameterError
 from kiks.model.arena import PAD, Arena
 from kiks.model.robot import RobotSpec
+from kiks.sim.paths import Paths
 from kiks.units import TICK_NS, s_from_ns
 
 STREAM_PLACE = 4
@@ -59,6 +60,7 @@ class World:
         self._kinds = np.concatenate([pack(spec) for spec in kinds])
         self.ground = (arena.clearance, float(arena.mm_per_cell), PAD)
         self.sight = (arena.clearance, arena.surface, arena.faces, float(arena.mm_per_cell), PAD)
+        self._paths: Paths | None = None
         self._enter()
         for index in range(self.robot_count):
             self._put(index, *self._start(index))
@@ -81,9 +83,13 @@ class World:
     def tick_to(self, time_ns: int) -> None:
         """Do the ticks that have begun up to a time [ns]."""
         ticks = -(-time_ns // TICK_NS) - self.state.tick_count
-        if ticks > 0:
-            step.advance(self.scene, self.ground, self.seed, self.state.tick_count, ticks)
-            self.state.tick_count += ticks
+        while ticks > 0:
+            count = ticks if self._paths is None else min(ticks, self._paths.ticks_left(self.state.tick_count))
+            step.advance(self.scene, self.ground, self.seed, self.state.tick_count, count)
+            self.state.tick_count += count
+            ticks -= count
+            if self._paths is not None:
+                self._paths.look(self.state)
 
     # ---- robots ----
 
@@ -191,6 +197,34 @@ class World:
             robots: Any = self.state.robots[0]
             straight = np.hypot(robots["x_mm"] - robots["start_x_mm"], robots["y_mm"] - robots["start_y_mm"])
             return np.column_stack([robots["forwards_mm"], robots["backwards_mm"], straight])
+
+    def record_paths(self, every_s: float = 0.1) -> None:
+        """Keep the poses of all robots from now on, for `paths`; what was kept before is dropped.
+
+        Args:
+            every_s: Time between two points [s]: whole hundredths, at least one.
+
+        Raises:
+            ParameterError: If it is none of these.
+        """
+        ticks = every_s * 100 if isinstance(every_s, int | float) else math.nan
+        if not 1 - 1e-9 <= ticks <= 1e9 or abs(ticks - round(ticks)) > 1e-6:
+            raise ParameterError(f"every_s must be a multiple of 0.01 s, but it was {every_s!r}. Take 0.1.")
+        with self.lock:
+            self.sync()
+            self._paths = Paths(round(ticks), self.state)
+
+    def paths(self) -> NDArray[np.float64]:
+        """Return the paths since `record_paths`, float64 [robot, point, 4]: time_s, x_mm, y_mm, heading_rad.
+
+        Raises:
+            ParameterError: If none were recorded.
+        """
+        with self.lock:
+            self.sync()
+            if self._paths is None:
+                raise ParameterError("paths must be recorded before they are asked for. Call record_paths() first.")
+            return self._paths.array()
 
     def contacts(self, robot: int) -> int:
         """Return how often a robot has met something so far: a wall, a robot, a ball or a cylinder.

@@ -8,18 +8,18 @@ from typing import Any
 from serial import PortNotOpenError, SerialBase, SerialException  # noqa: TID253
 
 from kiks.errors import KiksError
-from kiks.ports.memory import SimPort
-from kiks.ports.url import find_port
+from kiks.ports import url
+from kiks.ports.port import VirtualPort
 
 
 class Serial(SerialBase):  # type: ignore[misc, unused-ignore]
     """A serial port at whose other end a simulated robot sits."""
 
-    _sim_port: SimPort | None = None
+    _sim_port: VirtualPort | None = None
 
-    def find(self, name: str) -> SimPort:
+    def find(self, name: str) -> VirtualPort:
         """Return the simulated port behind a name; `kiks run` puts its own mapping here."""
-        return find_port(name)
+        return url.find_port(name)
 
     def open(self) -> None:
         """Open the port.
@@ -59,7 +59,7 @@ class Serial(SerialBase):  # type: ignore[misc, unused-ignore]
             raise ValueError(str(error)) from None
 
     @property
-    def _open_port(self) -> SimPort:
+    def _open_port(self) -> VirtualPort:
         if self._sim_port is None:
             raise PortNotOpenError
         return self._sim_port

@@ -1,0 +1,61 @@
+"""How fast several programs in one world run: each sends D and N in a loop at 9600 baud, each in its own process.
+
+Run: python benchmarks/programs.py [--json]. Each figure is a median, from the first command to the last end.
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import statistics
+import tempfile
+import time
+from pathlib import Path
+
+from calibration import report
+
+import kiks
+from kiks.ports.programs import Command, Programs
+
+SOURCE = """
+import sys, serial
+port = serial.Serial("/dev/ttyUSB0", 9600, stopbits=2, timeout=2)
+for loop in range(int(sys.argv[1])):
+    port.write(b"D,5,%d\\n" % (loop % 9)); port.readline()
+    port.write(b"N\\n"); port.readline()
+"""
+
+
+def run(program: Path, count: int, loops: int) -> tuple[float, float]:
+    """Return simulated and real time [s] of some programs, their start left out."""
+    sim = kiks.Simulation(robots=count, seed=1)
+    programs = Programs(sim, [Command(program, [str(loops)])] * count)
+    while sim.now_ns == 0:
+        programs._round()
+    start_s = time.perf_counter()
+    programs.run()
+    return sim.time_s, time.perf_counter() - start_s
+
+
+def main() -> None:
+    """Measure and report."""
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("--json", action="store_true", help="one JSON object a line")
+    arguments.add_argument("--loops", type=int, default=5000, help="loops of each program")
+    options = arguments.parse_args()
+    logging.getLogger("kiks.run").setLevel(logging.ERROR)
+    figures = []
+    with tempfile.TemporaryDirectory() as folder:
+        program = Path(folder) / "program.py"
+        program.write_text(SOURCE)
+        for count in (2, 4):
+            runs = [run(program, count, options.loops) for _ in range(5)]
+            speedup = statistics.median(simulated / real for simulated, real in runs)
+            exchanges = statistics.median(2 * count * options.loops / real for _, real in runs)
+            figures.append((f"programs.{count}_speedup", speedup, "x real time"))
+            figures.append((f"programs.{count}_exchanges_per_s", exchanges, "1/s"))
+    report(figures, as_json=options.json)
+
+
+if __name__ == "__main__":
+    main()

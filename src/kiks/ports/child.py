@@ -1,0 +1,55 @@
+"""A program in a process of its own; `programs.py` starts it by `python -m kiks.ports.child`."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import socket
+import sys
+from pathlib import Path
+
+from kiks.clock.program import Program
+from kiks.clock.thinking import save_thinking
+from kiks.ports.far import Connection, FarLine
+from kiks.ports.messages import Kind
+from kiks.ports.port import VirtualPort
+from kiks.ports.unchanged import run_program
+
+DIE_WITH_PARENT = 1
+"""PR_SET_PDEATHSIG of Linux (linux/prctl.h)."""
+
+
+def main(descriptor: int, thinking: str, record: str, program: Path, arguments: list[str]) -> int:
+    """Run the program to its end; return its exit code.
+
+    Args:
+        descriptor: The socket at whose other end the world is.
+        thinking: What the program's computing costs.
+        record: File for the thinking times that were measured; none if empty.
+        program: The Python file.
+        arguments: What it finds in `sys.argv` after its name.
+    """
+    if sys.platform == "linux":
+        # A program that never talks to the world would not notice that it has gone.
+        ctypes.CDLL(None).prctl(DIE_WITH_PARENT, signal.SIGKILL)
+    # A process that the program starts has no business with the world.
+    os.set_inheritable(descriptor, False)
+    connection = Connection(socket.socket(fileno=descriptor))
+    policy = Program(thinking)
+
+    def open_port(name: str) -> VirtualPort:
+        return VirtualPort(FarLine(connection, connection.ask(Kind.FIND, data=name.encode()).number), policy)
+
+    try:
+        return run_program(program, arguments, open_port, VirtualPort(FarLine(connection, 0), policy))
+    except KeyboardInterrupt:
+        return 130
+    finally:
+        connection.tell(Kind.REACHED)
+        if record:
+            save_thinking(policy.measured_ns, record)
+
+
+if __name__ == "__main__":
+    sys.exit(main(int(sys.argv[1]), sys.argv[2], sys.argv[3], Path(sys.argv[4]), sys.argv[5:]))

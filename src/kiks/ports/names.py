@@ -1,0 +1,71 @@
+"""Which robot answers on which port name."""
+
+from __future__ import annotations
+
+from kiks.errors import LinkError
+from kiks.sim.simulation import Simulation
+
+
+class Names:
+    """Robots by port name: as told, and otherwise in the order in which new names are opened.
+
+    Each program has the robot of its number first; what is left belongs to whoever opens one more name.
+
+    Args:
+        sim: The simulation.
+        told: Robots by port name, for every program.
+        programs: How many programs there are.
+
+    Raises:
+        ParameterError: If `told` names a robot that is not there.
+    """
+
+    def __init__(self, sim: Simulation, told: dict[str, int], programs: int = 1) -> None:
+        for robot in told.values():
+            sim.port(robot)
+        self._sim = sim
+        self._told = dict(told)
+        self._programs = programs
+        self._found: dict[tuple[int, str], int] = {}
+
+    def robot(self, name: str, program: int = 1) -> int:
+        """Return the robot behind a name that a program opens.
+
+        Args:
+            name: Any name; those that begin with `kiks:` are this simulation's own.
+            program: Number of the program, from 1.
+
+        Raises:
+            LinkError: If every robot has a name already, or there is no such robot.
+        """
+        if name.startswith("kiks:"):
+            return self._of_url(name)
+        if name in self._told:
+            return self._told[name]
+        if (program, name) not in self._found:
+            taken = {*self._told.values(), *self._found.values()}
+            candidates = (program, *range(self._programs + 1, self._sim.robot_count + 1))
+            free = [robot for robot in candidates if robot not in taken]
+            if not free:
+                known = self._told | {found: robot for (who, found), robot in self._found.items() if who == program}
+                raise LinkError(
+                    f"a port must belong to a robot, but {name!r} is one more than there are: {known}. "
+                    f"Run it with --robots {self._sim.robot_count + 1}, or map two names to one robot with --map."
+                )
+            self._found[program, name] = free[0]
+        return self._found[program, name]
+
+    def _of_url(self, name: str) -> int:
+        from kiks.ports.url import find_port
+
+        if "?" in name:
+            raise LinkError(
+                f"a port's name must be without options where several programs share a world, but it was {name!r}. "
+                f"Give the options to kiks run."
+            )
+        port = find_port(name)
+        if port.sim is not self._sim:
+            raise LinkError(
+                f"a port must belong to the world that the programs share, but it was {name!r}. Open 'kiks://1'."
+            )
+        return port.robot

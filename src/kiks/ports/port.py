@@ -1,0 +1,244 @@
+"""A serial port in simulated time: what a program sees of it, wherever the simulation runs.
+
+It has the methods of a pyserial port, so that a program cannot tell the difference. What lies between it and the robot
+is its line: in this process (`memory.py`) or in the one that runs several programs (`far.py`). The port knows what a
+program's thinking, asking and waiting cost; the line lets that time pass and carries the characters.
+"""
+
+from __future__ import annotations
+
+import math
+from contextlib import AbstractContextManager
+from typing import Any, Protocol
+
+from kiks.clock.program import Program
+from kiks.errors import ParameterError
+from kiks.units import ns_from_s, s_from_ns
+
+BAUD_MIN = 75
+BAUD_MAX = 4_000_000
+
+
+class Line(Protocol):
+    """The way from a port to its robot. The program's time is `now_ns`; every method may let it go on, never back."""
+
+    @property
+    def lock(self) -> AbstractContextManager[Any]:
+        """What is held while the line is used, if several threads may do so."""
+
+    @property
+    def baud(self) -> int:
+        """Speed of the line [bit/s]."""
+
+    @property
+    def now_ns(self) -> int:
+        """The program's time [ns]."""
+
+    def pass_to(self, time_ns: int) -> None:
+        """Let time pass up to a time [ns]."""
+
+    def send(self, data: bytes) -> None:
+        """Put characters on the line; wait while it is full."""
+
+    def read(self, size: int | None, terminator: bytes | None, timeout_ns: int | None, poll_ns: int) -> bytes:
+        """Wait for `size` characters or a terminator, whichever comes first, until the time-out is over.
+
+        Args:
+            size: How many at most; None: up to the terminator.
+            terminator: What ends the read; None: the size alone.
+            timeout_ns: Longest wait [ns]; None: for ever.
+            poll_ns: What it costs at least if the time-out is over first [ns].
+
+        Raises:
+            LinkError: If it could wait for ever.
+        """
+
+    def arrived_count(self) -> int:
+        """Return how many characters have arrived and were not read."""
+
+    def finish_sending(self) -> None:
+        """Let time pass until everything has been sent."""
+
+    def drop_arrived(self) -> None:
+        """Forget the characters that have arrived and were not read."""
+
+    def set_baud(self, baud: int) -> None:
+        """Set both ends to a speed [bit/s]."""
+
+    def claim(self, holder: str) -> None:
+        """Take the line for one alone.
+
+        Raises:
+            LinkError: If somebody holds it already.
+        """
+
+    def hang_up(self) -> None:
+        """Give the line back and forget what nobody read."""
+
+
+class VirtualPort:
+    """The computer's end of a simulated robot's line.
+
+    Args:
+        line: The way to the robot.
+        program: The program whose port this is: what its thinking and its waiting cost.
+
+    Attributes:
+        timeout: Longest time a read waits [s] of simulated time; None waits for ever.
+    """
+
+    def __init__(self, line: Line, program: Program) -> None:
+        self.timeout: float | None = None
+        self._line = line
+        self._program = program
+        self._has_read = True
+
+    # ---- what pyserial's ports have ----
+
+    @property
+    def baudrate(self) -> int:
+        """Speed of the line [bit/s]; setting it sets the robot's end too, as its mode selector would."""
+        return self._line.baud
+
+    @baudrate.setter
+    def baudrate(self, baud: int) -> None:
+        if not isinstance(baud, int) or not BAUD_MIN <= baud <= BAUD_MAX:
+            raise ParameterError(
+                f"baudrate must be a whole number from {BAUD_MIN} to {BAUD_MAX} bit/s, but it was {baud!r}. "
+                "Usual: 9600."
+            )
+        with self._line.lock:
+            self._line.set_baud(baud)
+
+    def write(self, data: bytes) -> int:
+        """Send characters; return how many. They leave one after the other while the program goes on."""
+        line, program = self._line, self._program
+        with line.lock:
+            if program.thinks:
+                self._think(is_command=self._has_read)
+            self._has_read = False
+            line.send(data)
+            program.leave(has_acted=True)
+        return len(data)
+
+    def read(self, size: int = 1) -> bytes:
+        """Return `size` characters, fewer if the time-out is over first.
+
+        Raises:
+            LinkError: If there is no time-out and no reply can come any more.
+        """
+        return self._read(size, None)
+
+    def read_until(self, expected: bytes = b"\n", size: int | None = None) -> bytes:
+        """Return everything up to and including a terminator, less if the time-out is over first.
+
+        Raises:
+            LinkError: If there is no time-out and no reply can come any more.
+        """
+        return self._read(size, expected)
+
+    def readline(self, size: int | None = -1) -> bytes:
+        """Return a line with its end, or what came of it before the time-out.
+
+        Raises:
+            LinkError: If there is no time-out and no reply can come any more.
+        """
+        return self._read(None if size is None or size < 0 else size, b"\n")
+
+    @property
+    def in_waiting(self) -> int:
+        """Characters that have arrived and were not read. Asking again and again lets time pass."""
+        with self._line.lock:
+            self._ask()
+            return self._line.arrived_count()
+
+    def flush(self) -> None:
+        """Wait until everything has been sent."""
+        with self._line.lock:
+            self._line.finish_sending()
+
+    def reset_input_buffer(self) -> None:
+        """Drop the characters that have arrived and were not read."""
+        with self._line.lock:
+            self._line.drop_arrived()
+
+    def reset_output_buffer(self) -> None:
+        """Do nothing: what was written is on the line already."""
+
+    def claim(self, holder: str) -> None:
+        """Take the line for this port alone, as opening it by name does; `close` gives it back.
+
+        Args:
+            holder: Who it is, in words for the next one who tries.
+
+        Raises:
+            LinkError: If somebody holds it already.
+        """
+        self._line.claim(holder)
+
+    def close(self) -> None:
+        """Hang up: forget what nobody read. The robot drives on, and the port may be opened again."""
+        with self._line.lock:
+            self._line.hang_up()
+
+    # ---- time, as the program lives it ----
+
+    def ask_ns(self) -> int:
+        """Return the simulated time [ns]; asking again and again lets time pass, so that a loop may wait for it."""
+        with self._line.lock:
+            self._ask()
+            return self._line.now_ns
+
+    @property
+    def time_s(self) -> float:
+        """The simulated time [s], asked for in the same way."""
+        return s_from_ns(self.ask_ns())
+
+    def sleep(self, seconds: float) -> None:
+        """Let simulated time pass [s] without waiting for it.
+
+        Raises:
+            ParameterError: If it is negative or not finite.
+        """
+        if not (isinstance(seconds, int | float) and math.isfinite(seconds) and seconds >= 0):
+            raise ParameterError(
+                f"seconds must be a finite number of at least 0, but it was {seconds!r}. Time never runs backwards."
+            )
+        with self._line.lock:
+            if self._program.thinks:
+                self._think(is_command=False)
+            self._line.pass_to(self._line.now_ns + ns_from_s(seconds))
+            self._program.leave(has_acted=True)
+
+    # ---- inside ----
+
+    def _think(self, *, is_command: bool) -> None:
+        """Let the time pass that the program has thought."""
+        time_ns = self._program.enter(is_command=is_command)
+        if time_ns:
+            self._line.pass_to(self._line.now_ns + time_ns)
+
+    def _ask(self) -> None:
+        """Let the time pass that a question costs."""
+        if self._program.thinks:
+            self._think(is_command=False)
+        cost_ns = self._program.ask()
+        if cost_ns:
+            self._line.pass_to(self._line.now_ns + cost_ns)
+        self._program.leave(has_acted=False)
+
+    def _read(self, size: int | None, terminator: bytes | None) -> bytes:
+        line, program, timeout_s = self._line, self._program, self.timeout
+        with line.lock:
+            if program.thinks:
+                self._think(is_command=False)
+            self._has_read = True
+            timeout_ns, poll_ns = None, 0
+            if timeout_s is not None:
+                timeout_ns = ns_from_s(timeout_s)
+                # A read that does not wait is a question like any other.
+                if timeout_s == 0 and size != 0:
+                    poll_ns = program.ask()
+            data = line.read(size, terminator, timeout_ns, poll_ns)
+            program.leave(has_acted=bool(data))
+        return data

@@ -1,0 +1,63 @@
+"""When a read ends: what the port in memory and a program in another process have in common."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from kiks.errors import LinkError
+
+if TYPE_CHECKING:
+    from kiks.sim.wire import Wire
+
+NEVER_NS = 1 << 63
+"""A time [ns] that no simulation reaches."""
+
+
+def end_of_read(
+    wire: Wire, size: int | None, terminator: bytes | None, deadline_ns: int, asked_until_ns: int
+) -> tuple[int, int] | None:
+    """Return when a read ends [ns] and with how many characters; None as long as that hangs on a command to come.
+
+    It is known as soon as the robot has answered, before the characters arrive: nobody else can send to this robot.
+
+    Args:
+        wire: The robot's line, with every command carried out that acts up to now.
+        size: How many characters at most; None: up to the terminator.
+        terminator: What ends the read; None: the size alone.
+        deadline_ns: When it ends at the latest [ns]; `NEVER_NS` if it has no time-out, and is returned if it would
+            never end.
+        asked_until_ns: When a read that was in vain ends at the earliest [ns].
+    """
+    line = wire.line
+    count = _complete(line.waiting, size, terminator)
+    if count:
+        arrival_ns = line.arrival_ns(count)
+        if arrival_ns is not None and arrival_ns <= deadline_ns:
+            return arrival_ns, count
+    elif size == 0:
+        return 0, 0
+    end_ns = max(deadline_ns, asked_until_ns)
+    if wire.pending and wire.next_ns is not None and wire.next_ns <= end_ns:
+        return None
+    if end_ns >= NEVER_NS:
+        return NEVER_NS, 0
+    arrived = line.arrived_count(end_ns)
+    return end_ns, arrived if size is None else min(arrived, size)
+
+
+def never_ends(robot: int) -> LinkError:
+    """Return the error of a read without time-out to which no answer can come."""
+    return LinkError(
+        f"robot {robot} must have been asked something before its answer is read, but no command is "
+        f"on the line, so the read would never end. Send one that ends in a line feed, or set a timeout."
+    )
+
+
+def _complete(waiting: bytearray, size: int | None, terminator: bytes | None) -> int:
+    """Return how many of the waiting characters make a read complete, 0 while they do not."""
+    if terminator is not None:
+        found = waiting.find(terminator)
+        if found >= 0:
+            end = found + len(terminator)
+            return end if size is None or end < size else size
+    return size if size is not None and size <= len(waiting) else 0

@@ -1,0 +1,437 @@
+"""Several programs on real ports, in true time."""
+
+from __future__ import annotations
+
+import hashlib
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.served import GUARD_S, PROGRAMS, Served, fresh, served
+
+from kiks.clock.line import BACKLOG_LIMIT
+from kiks.clock.pace import Pace
+from kiks.clock.patience import Patience
+from kiks.errors import ParameterError
+from kiks.ports.endpoint import READ_SIZE, Endpoint
+from kiks.ports.pty import PtyEndpoint
+from kiks.ports.server import Server
+from kiks.ports.tcp import TcpEndpoint
+from kiks.units import NS_PER_S
+
+BUSY = [sys.executable, "-c", "while True: pass"]
+
+
+class Wall:
+    """A wall clock that a test sets."""
+
+    def __init__(self) -> None:
+        self.time_ns = 0
+
+    def __call__(self) -> int:
+        return self.time_ns
+
+    def pass_s(self, time_s: float) -> None:
+        self.time_ns += round(time_s * NS_PER_S)
+
+
+class Client:
+    """A program on a TCP port."""
+
+    def __init__(self, endpoint: Endpoint) -> None:
+        self.socket = socket.create_connection(tuple(endpoint.name.rsplit(":", 1)), timeout=GUARD_S)
+        self.lines = self.socket.makefile("rb")
+
+    def send(self, data: bytes) -> None:
+        self.socket.sendall(data)
+
+    def ask(self, command: bytes) -> bytes:
+        self.send(command)
+        return self.lines.readline()
+
+    def has_heard_nothing(self) -> bool:
+        self.socket.setblocking(False)
+        try:
+            self.socket.recv(1, socket.MSG_PEEK)
+        except BlockingIOError:
+            return True
+        finally:
+            self.socket.settimeout(GUARD_S)
+        return False
+
+    def hang_up(self) -> None:
+        self.socket.shutdown(socket.SHUT_RDWR)
+        self.close()
+
+    def close(self) -> None:
+        self.lines.close()
+        self.socket.close()
+
+
+@contextmanager
+def clients(count: int = 2, **options: Any) -> Iterator[tuple[Served, list[Client], Wall]]:
+    """Serve robots over TCP to a client each, with a wall clock that stands still."""
+    wall = Wall()
+    if options.get("thinking") == "live":
+        options["pace"] = Pace(wall_ns=wall)
+    ways = {robot: [TcpEndpoint(0)] for robot in range(1, count + 1)}
+    with ExitStack() as stack:
+        run = stack.enter_context(served(ways, new_patience=partial(Patience, wall_ns=wall), **options))
+        every = []
+        for robot in range(1, count + 1):
+            every.append(Client(ways[robot][0]))
+            stack.callback(every[-1].close)
+            run.wait_held(robot)
+        yield run, every, wall
+
+
+def said(caplog: pytest.LogCaptureFixture) -> list[str]:
+    return [record.getMessage() for record in caplog.records if record.levelname == "WARNING"]
+
+
+# ---- the same again ----
+
+
+@contextmanager
+def busy_computer(processes: int = 2) -> Iterator[None]:
+    """Keep the computer busy, so that the operating system runs the programs in ever another order."""
+    with ExitStack() as stack:
+        for _ in range(processes):
+            process = stack.enter_context(subprocess.Popen(BUSY))
+            stack.callback(process.kill)
+        yield
+
+
+def ways_in(folder: Path, robots: int) -> dict[int, Sequence[Endpoint]]:
+    """Return a serial port for robots with an odd number and a TCP port for the others."""
+    return {
+        robot: [PtyEndpoint(folder / f"robot{robot}") if robot % 2 else TcpEndpoint(0)]
+        for robot in range(1, robots + 1)
+    }
+
+
+def drive_all(folder: Path, thinking: str, robots: int = 4, **options: Any) -> tuple[str, int, str]:
+    """Let processes drive a robot each; return state, time and what all of them have been answered."""
+    ways = ways_in(folder, robots)
+    with served(ways, thinking=thinking, **options) as run:
+        processes = []
+        for robot in range(1, robots + 1):
+            (way,) = ways[robot]
+            name = way.name if isinstance(way, PtyEndpoint) else f"socket://{way.name}"
+            words = [name, str(12 + robot), str(3 * robot), "7"]
+            processes.append(
+                subprocess.Popen([sys.executable, str(PROGRAMS / "drive.py"), *words], stdout=subprocess.PIPE)
+            )
+        told = hashlib.sha256()
+        for process in processes:
+            out, _ = process.communicate(timeout=GUARD_S)
+            assert process.returncode == 0
+            told.update(out)
+        for robot in range(1, robots + 1):
+            run.wait_free(robot)
+        return run.sim.state_hash(), run.sim.now_ns, told.hexdigest()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("thinking", ["none", "fixed:3.5"])
+def test_four_programs_do_the_same_again_on_a_busy_computer(tmp_path: Path, thinking: str) -> None:
+    with busy_computer():
+        assert len({drive_all(tmp_path, thinking, patience_s=GUARD_S) for _ in range(20)}) == 1
+
+
+def test_two_programs_do_the_same_again(tmp_path: Path) -> None:
+    assert len({drive_all(tmp_path, "none", robots=2, patience_s=GUARD_S) for _ in range(3)}) == 1
+
+
+@pytest.mark.parametrize("thinking", ["none", "fixed:2"])
+def test_order_in_real_time_does_not_matter(thinking: str) -> None:
+    ends = set()
+    for order in ((0, 1), (1, 0)):
+        for leaving in ((0, 1), (1, 0)):
+            with clients(thinking=thinking) as (run, programs, _):
+                for command in (b"D,5,5\n", b"N\n", b"D,1,-3\r\n", b"\n\nO\n", b"K\n"):
+                    for who in order:
+                        programs[who].send(command)
+                        run.wait_rounds(2)
+                    for who in order:
+                        programs[who].lines.readline()
+                # Whole commands of a program that does not wait for their replies act in their time.
+                programs[0].send(b"D,9,9\nN\nG,1,1\nH")
+                run.wait_rounds(2)
+                for who in leaving:
+                    programs[who].hang_up()
+                    run.wait_rounds(2)
+                for robot in (1, 2):
+                    run.wait_free(robot)
+                ends.add((run.sim.now_ns, run.sim.state_hash()))
+    assert len(ends) == 1
+
+
+def test_world_does_not_pass_a_program_that_thinks() -> None:
+    with clients(thinking="fixed:1") as (run, (one, two), _):
+        one.send(b"H\n")
+        run.wait_rounds(5)
+        assert one.has_heard_nothing()
+        assert run.sim.now_ns == 0
+        assert two.ask(b"H\n") == b"h,0,0\r\n"
+        assert one.lines.readline() == b"h,0,0\r\n"
+
+
+def test_programs_after_those_that_left_begin_together_again() -> None:
+    with clients() as (run, programs, _):
+        for program in programs:
+            program.send(b"D,3,3\n")
+        for who, program in enumerate(programs):
+            assert program.lines.readline() == b"d\r\n"
+            program.hang_up()
+            run.wait_free(who + 1)
+        now_ns = run.sim.now_ns
+        again = Client(run.server._endpoints[1][0])
+        run.wait_held(1)
+        again.send(b"H\n")
+        run.wait_rounds(5)
+        assert again.has_heard_nothing()
+        assert run.sim.now_ns == now_ns
+        other = Client(run.server._endpoints[2][0])
+        assert other.ask(b"H\n").startswith(b"h,")
+        assert again.lines.readline().startswith(b"h,")
+        again.close()
+        other.close()
+
+
+# ---- who does not come, hangs, dies or babbles ----
+
+
+def test_missing_program_is_named_and_then_done_without(caplog: pytest.LogCaptureFixture) -> None:
+    wall = Wall()
+    ways = {robot: [TcpEndpoint(0)] for robot in (1, 2, 3)}
+    with served(ways, new_patience=partial(Patience, wall_ns=wall)) as run:
+        one = Client(ways[1][0])
+        one.send(b"H\n")
+        run.wait_held(1)
+        run.wait_rounds(3)
+        assert not said(caplog)
+        wall.pass_s(1.5)
+        run.wait_rounds(3)
+        assert said(caplog) == [
+            "the world begins when 3 programs are there, but that of robot 2 or 3 is missing. It waits 8 s more."
+        ]
+        assert one.has_heard_nothing()
+        wall.pass_s(9)
+        assert one.lines.readline() == b"h,0,0\r\n"
+        assert said(caplog)[1:] == [
+            "the world has begun without that of robot 2 or 3, which did not come within 10 s. Who comes now acts from "
+            "now on, and the run is not repeatable."
+        ]
+        late = Client(ways[3][0])
+        late.send(b"H\n")
+        run.wait_held(3)
+        assert one.ask(b"B\n").startswith(b"b,")
+        assert late.lines.readline() == b"h,0,0\r\n"
+        late.close()
+        one.close()
+
+
+def test_program_that_looks_in_and_goes_does_not_count() -> None:
+    with served({robot: [TcpEndpoint(0)] for robot in (1, 2)}) as run:
+        ways = run.server._endpoints
+        for _ in range(2):
+            glance = Client(ways[1][0])
+            run.wait_held(1)
+            glance.hang_up()
+            run.wait_free(1)
+        one = Client(ways[1][0])
+        one.send(b"H\n")
+        run.wait_rounds(5)
+        assert one.has_heard_nothing()
+        other = Client(ways[2][0])
+        assert other.ask(b"H\n") == one.lines.readline() == b"h,0,0\r\n"
+        one.close()
+        other.close()
+
+
+def test_commands_left_behind_act_before_the_next_client_is_let_in() -> None:
+    with clients() as (run, (one, two), _):
+        one.send(b"G,1,2\nN\nG,3,4\nG,5")
+        run.wait_rounds(3)
+        one.hang_up()
+        run.wait_rounds(3)
+        again = Client(run.server._endpoints[1][0])
+        again.send(b"H\n")
+        run.wait_rounds(3)
+        assert again.has_heard_nothing()
+        # The clock of the wall stands still: the world waits for the other program.
+        assert run.sim.now_ns == 0
+        for _ in range(9):
+            two.send(b"B\n")
+            run.wait_rounds(2)
+        assert again.lines.readline() == b"h,3,4\r\n"
+        again.close()
+
+
+def test_fewer_programs_than_robots_may_begin() -> None:
+    with served({1: [TcpEndpoint(0)], 2: [TcpEndpoint(0)]}, programs=1) as run:
+        one = Client(run.server._endpoints[2][0])
+        assert one.ask(b"H\n") == b"h,0,0\r\n"
+        one.close()
+
+
+def test_silent_program_is_ignored_until_it_comes_again(caplog: pytest.LogCaptureFixture) -> None:
+    with clients() as (run, (one, mute), wall):
+        one.send(b"H\n")
+        run.wait_rounds(3)
+        wall.pass_s(1.9)
+        run.wait_rounds(3)
+        assert one.has_heard_nothing()
+        wall.pass_s(0.2)
+        assert one.lines.readline() == b"h,0,0\r\n"
+        for _ in range(50):
+            assert one.ask(b"N\n").startswith(b"n,")
+        assert said(caplog) == [
+            "the client of robot 2 must act while others wait, but it did nothing for 2.1 s: from now on the world "
+            "does not wait for it, and the run is not repeatable. --patience gives it more time, --when-silent wait "
+            "all it wants."
+        ]
+        # It is a program like any other, but nobody waits for it.
+        mute.send(b"B\n")
+        run.wait_rounds(3)
+        assert one.ask(b"N\n").startswith(b"n,")
+        assert mute.lines.readline() == b"b,5.02,5.01\r\n"
+        mute.hang_up()
+        run.wait_free(2)
+        again = Client(run.server._endpoints[2][0])
+        run.wait_held(2)
+        one.send(b"H\n")
+        run.wait_rounds(3)
+        assert one.has_heard_nothing()
+        assert again.ask(b"H\n") == b"h,0,0\r\n"
+        again.close()
+
+
+def test_world_waits_for_a_program_in_a_debugger_and_says_so(caplog: pytest.LogCaptureFixture) -> None:
+    with clients(when_silent="wait", patience_s=5) as (run, (one, mute), wall):
+        one.send(b"H\n")
+        for _ in range(3):
+            run.wait_rounds(3)
+            wall.pass_s(5.5)
+        run.wait_rounds(3)
+        assert one.has_heard_nothing()
+        assert said(caplog) == [
+            "the world waits for the client of robot 2: it has done nothing for 5.5 s while others wait. Continue it, "
+            "or end it."
+        ]
+        assert mute.ask(b"H\n") == b"h,0,0\r\n"
+        assert one.lines.readline() == b"h,0,0\r\n"
+
+
+def test_silent_program_is_dropped(caplog: pytest.LogCaptureFixture) -> None:
+    with clients(when_silent="drop") as (run, (one, mute), wall):
+        one.send(b"H\n")
+        run.wait_rounds(3)
+        wall.pass_s(2.5)
+        assert one.lines.readline() == b"h,0,0\r\n"
+        assert mute.lines.readline() == b""
+        assert one.ask(b"H\n") == b"h,0,0\r\n"
+        assert said(caplog) == [
+            "the client of robot 2 must act within 2 s while others wait, but it did not: the world parts from it. "
+            "--patience gives it more time."
+        ]
+        run.wait_free(2)
+
+
+def test_program_that_talks_to_four_robots_in_turn_loses_one_patience() -> None:
+    with clients(4) as (run, ports, wall):
+        ports[0].send(b"H\n")
+        run.wait_rounds(3)
+        wall.pass_s(2)
+        assert ports[0].lines.readline() == b"h,0,0\r\n"
+        ports[1].send(b"H\n")
+        run.wait_rounds(3)
+        wall.pass_s(0.2)
+        assert ports[1].lines.readline() == b"h,0,0\r\n"
+        # The clock stands still: what follows waits for nobody.
+        for _ in range(10):
+            for port in ports:
+                assert port.ask(b"N\n").startswith(b"n,")
+
+
+@pytest.mark.parametrize("thinking", ["none", "live"])
+def test_client_that_dies_hinders_nobody(thinking: str, caplog: pytest.LogCaptureFixture) -> None:
+    with clients(thinking=thinking) as (run, (one, dying), wall):
+        dying.send(b"L,0,1\nH")
+        one.send(b"H\n")
+        run.wait_rounds(3)
+        wall.pass_s(1)
+        assert one.lines.readline() == b"h,0,0\r\n"
+        dying.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
+        dying.close()
+        run.wait_free(2)
+        for _ in range(20):
+            one.send(b"H\n")
+            run.wait_rounds(3)
+            wall.pass_s(0.1)
+            assert one.lines.readline() == b"h,0,0\r\n"
+        assert run.sim.state.robots["led"][0, 1, 0] == 1
+        assert not said(caplog)
+
+
+@contextmanager
+def babbling(client: Client, babble: bytes) -> Iterator[list[int]]:
+    """Send the same again and again and never read; yield how many characters have been taken, as the one item."""
+    sent, is_over = [0], threading.Event()
+
+    def send() -> None:
+        with suppress(OSError):
+            while not is_over.is_set():
+                sent[0] += client.socket.send(babble * (READ_SIZE // len(babble)))
+
+    thread = threading.Thread(target=send)
+    thread.start()
+    try:
+        yield sent
+    finally:
+        is_over.set()
+        client.socket.shutdown(socket.SHUT_RDWR)
+        thread.join(GUARD_S)
+
+
+@pytest.mark.parametrize("thinking", ["none", "live"])
+@pytest.mark.parametrize("babble", [b"H\n", b"x", b"\n", b"\r\n"])
+def test_client_that_babbles_hinders_nobody(thinking: str, babble: bytes, caplog: pytest.LogCaptureFixture) -> None:
+    with clients(thinking=thinking) as (run, (one, babbler), wall), babbling(babbler, babble) as sent:
+        exchanges = 0
+        while exchanges < 40 or sent[0] < 4 * BACKLOG_LIMIT:
+            one.send(b"N\n")
+            if thinking == "live":
+                run.wait_rounds(3)
+                wall.pass_s(0.1)
+            assert one.lines.readline().startswith(b"n,")
+            exchanges += 1
+        run.wait_for(lambda: said(caplog))
+        run.wait_rounds(3)
+        assert said(caplog) == [
+            f"the client of {run.server._endpoints[2][0].name} must wait for its replies, but it is more than "
+            f"{BACKLOG_LIMIT - 1} characters ahead of its robot; what it sends now has to wait. Read a line after each "
+            "command."
+        ]
+        line = run.sim.wires[1].line
+        assert line.sending_until_ns - run.sim.now_ns < 3 * BACKLOG_LIMIT * line.character_ns
+        assert len(run.sim.wires[1].pending) <= BACKLOG_LIMIT
+
+
+def test_bad_choices_are_explained() -> None:
+    options: dict[str, Any]
+    for options, words in (
+        ({"when_silent": "wiat"}, "when_silent must be 'wait', 'drop' or 'ignore', but it was 'wiat'. Did you mean 'w"),
+        ({"patience_s": 0}, "patience must be a number of seconds above 0 and up to 86400, but it was 0"),
+        ({"programs": 3}, "programs must be a whole number from 1 to 2, the number of robots, but it was 3"),
+    ):
+        with pytest.raises(ParameterError, match=words):
+            Server(fresh(2), {1: [], 2: []}, thinking="none", **options)

@@ -1,0 +1,258 @@
+"""The world from outside: what stands in it is placed, moved, taken away, looked at and put back."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from kiks import Arena, ParameterError, Simulation
+from kiks.errors import ArenaError
+from kiks.model.arena import Ball, Cylinder, Lamp, Pose
+from kiks.model.robot import RobotSpec
+
+
+@pytest.fixture
+def sim() -> Simulation:
+    return Simulation(Arena.box(1000, 600), robots=2, seed=3)
+
+
+def test_what_an_arena_holds_is_there(tmp_path):
+    box = Arena.box(500, 500)
+    arena = Arena(
+        box.brightness,
+        1.0,
+        "full",
+        balls=(Ball(100, 100), Ball(400, 100, radius_mm=20, brightness="grey")),
+        cylinders=(Cylinder(100, 400),),
+        lamps=(Lamp(10, 20, 2.0, False),),
+    )
+    sim = Simulation(arena)
+    bodies = sim.bodies()
+    assert bodies["number"].tolist() == [1, 2, 3]
+    assert bodies["what"].tolist() == [3, 3, 4]
+    assert bodies["radius_mm"].tolist() == [32, 20, 16]
+    assert bodies["friction_mm_s2"].tolist() == [20, 20, 160]
+    assert bodies["brightness"].tolist() == [255, 21, 190]
+    assert sim.lamps.tolist() == [[10, 20, 2, 0]]
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"balls": (Ball(30, 250),)}, "a wall is 12.0 mm inside it"),
+        ({"balls": (Ball(100, 100), Ball(150, 100))}, "ball 1 is 14.0 mm inside it"),
+        ({"starts": (Pose(100, 100, 0),), "cylinders": (Cylinder(100, 130),)}, "robot 1 is 13.5 mm inside it"),
+        ({"starts": (Pose(100, 100, 0), Pose(100, 140, 0))}, "start 2 at .* robot 1 is 15.0 mm inside it"),
+    ],
+)
+def test_nothing_may_stand_in_something_else(changes, words):
+    box = Arena.box(500, 500)
+    arena = Arena(box.brightness, 1.0, "crowded", **changes)
+    with pytest.raises(ArenaError, match=words):
+        Simulation(arena, robots=2 if "starts" in changes else 1)
+
+
+def test_an_arena_too_small_for_so_many_robots_says_so():
+    with pytest.raises(ArenaError, match=r"must have room for 9 robots, but .* for robot \d were all taken"):
+        Simulation(Arena.box(180, 180), robots=9)
+
+
+def test_random_starts_are_apart():
+    sim = Simulation(Arena.box(700, 700), robots=30, seed=5)
+    poses = sim.poses()
+    apart = np.hypot(*(poses[:, None, :2] - poses[None, :, :2]).transpose(2, 0, 1)) + 1000 * np.eye(30)
+    assert apart.min() >= 55 - 0.01
+
+
+def test_a_thing_comes_and_goes_and_keeps_its_number(sim):
+    first, second = sim.add_ball(100, 100), sim.add_cylinder(100, 300, brightness="white", radius_mm=12)
+    assert (first, second) == (1, 2)
+    sim.remove_body(first)
+    assert sim.bodies()["number"].tolist() == [2]
+    assert sim.add_ball(100, 100) == 3
+    sim.move_body(second, 200, 300)
+    assert sim.bodies()[["number", "x_mm"]].tolist() == [(2, 200.0), (3, 100.0)]
+
+
+@pytest.mark.parametrize(
+    ("act", "words"),
+    [
+        (lambda sim: sim.add_ball(20, 300), "ball must be free, but at .* a wall is 22.0 mm inside it"),
+        (lambda sim: sim.add_cylinder(500, 300), "robot 1 is 4[23].. mm inside it"),
+        (lambda sim: sim.add_ball(-5, 300), "must lie inside the arena"),
+        (lambda sim: sim.add_ball(math.nan, 300), "finite numbers"),
+        (lambda sim: sim.add_ball("x", 300), "finite numbers"),
+        (lambda sim: sim.add_ball(100, 100, colour=1), r"radius_mm, friction_mm_s2 or brightness, .* \['colour'\]"),
+        (lambda sim: sim.add_ball(100, 100, radius_mm=5), "radius_mm must be a number from 10.0 to 100"),
+        (lambda sim: sim.add_ball(100, 100, brightness=0), "brightness must be a whole number from 1 to 255"),
+        (lambda sim: sim.add_ball(100, 100, brightness="gold"), "one of .*'white'"),
+        (lambda sim: sim.add_ball(100, 100, friction_mm_s2=-1), "friction_mm_s2 must be"),
+        (lambda sim: sim.move_body(1, 100, 100), r"body must be the number of one .* but it was 1. There are \[\]"),
+        (lambda sim: sim.remove_body("ball"), "body must be the number"),
+        (lambda sim: sim.add_lamp(2000, 3), "lamp 1 must lie inside"),
+        (lambda sim: sim.add_lamp(20, 3, 0), "power_w must be positive"),
+        (lambda sim: sim.remove_lamp(1), "lamp must be a row of lamps from 1 to 0"),
+        (lambda sim: sim.place(1, *sim.poses()[1]), "the place of robot 1 must be free, .* robot 2 is 55.0 mm inside"),
+        (lambda sim: sim.record_paths(0.015), "every_s must be a multiple of 0.01 s"),
+        (lambda sim: sim.paths(), "paths must be recorded"),
+    ],
+)
+def test_a_mistake_is_explained_and_changes_nothing(sim, act, words):
+    before = sim.state_hash()
+    with pytest.raises(ParameterError, match=words):
+        act(sim)
+    assert sim.state_hash() == before
+    assert len(sim.lamps) == 0
+
+
+def test_a_speed_of_a_body_out_of_range(sim):
+    ball = sim.add_ball(100, 100)
+    with pytest.raises(ParameterError, match="speed_mm_s must be a number from 0 to 1000"):
+        sim.move_body(ball, 100, 100, speed_mm_s=1500)
+
+
+def test_lamps_are_added_moved_switched_and_removed(sim):
+    dark = sim.ambient(1)
+    x_mm, y_mm, heading_rad = sim.pose(1)
+    ahead = x_mm + 150 * math.cos(heading_rad), y_mm + 150 * math.sin(heading_rad)
+    lamp = sim.add_lamp(*ahead, 9.0)
+    lit = sim.ambient(1)
+    assert min(lit) < 200 < min(dark)
+    sim.lamps[lamp - 1, 3] = 0
+    assert sim.ambient(1) == dark
+    sim.lamps[lamp - 1, 3] = 1
+    assert sim.ambient(1) == lit
+    sim.remove_lamp(lamp)
+    assert sim.ambient(1) == dark
+
+
+@pytest.mark.parametrize("add", ["add_ball", "add_cylinder"])
+def test_a_body_hides_a_lamp_and_so_does_a_robot(sim, add):
+    sim.place(1, 300, 300, 0)
+    sim.place(2, 800, 500, 0)
+    sim.add_lamp(600, 300, 25.0)
+    lit = sim.ambient(1)
+    body = getattr(sim, add)(450, 300)
+    assert min(sim.ambient(1)) > min(lit) + 100
+    sim.remove_body(body)
+    assert sim.ambient(1) == lit
+    sim.place(2, 450, 300, 0)
+    assert min(sim.ambient(1)) > min(lit) + 100
+
+
+def test_brightness_shows_in_proximity_and_camera(sim):
+    sim.place(1, 300, 300, 0)
+    sim.fit(1, "k213")
+    alone = sim.proximity(1)
+    counts, greys = [], []
+    for brightness in (255, 120, 40):
+        body = sim.add_cylinder(300 + 27.5 + 16 + 15, 300, brightness=brightness)
+        counts.append(max(sim.proximity(1)))
+        greys.append(sim.image(1)[32])
+        sim.remove_body(body)
+    assert counts == sorted(counts, reverse=True)
+    assert counts[0] > counts[2] + 200
+    assert greys == sorted(greys, reverse=True)
+    assert sim.proximity(1) == alone
+
+
+def test_poses_paths_and_distances_are_arrays(sim):
+    sim.place(1, 200, 300, 0)
+    sim.record_paths(0.1)
+    sim.port(1).write(b"D,10,10\n")
+    sim.run(2.0)
+    sim.port(1).write(b"D,-10,-10\n")
+    sim.run(0.5)
+    paths = sim.paths()
+    assert paths.shape == (2, 26, 4)
+    assert paths[0, :, 0] == pytest.approx(np.arange(26) * 0.1)
+    # A point holds the pose of its tick, and the present pose lies within the tick after the last one.
+    assert paths[0, -1, 1] == pytest.approx(sim.pose(1)[0], abs=0.8)
+    assert (paths[1] == paths[1, 0] + (paths[1] - paths[1, 0]) * [1, 0, 0, 0]).all()
+    forwards, backwards, straight = sim.distances_mm()[0]
+    assert forwards > 130
+    assert 20 < backwards < 45
+    assert straight == pytest.approx(forwards - backwards)
+    assert sim.travelled_mm(1) == pytest.approx(forwards + backwards)
+    assert sim.poses().shape == (2, 3)
+    assert sim.poses()[0].tolist() == list(sim.pose(1))
+
+
+def test_recording_paths_changes_nothing():
+    hashes = []
+    for is_recorded in (False, True):
+        sim = Simulation(Arena.box(400, 400), robots=3, seed=9)
+        sim.add_ball(60, 60)
+        if is_recorded:
+            sim.record_paths(0.05)
+        for robot in (1, 2, 3):
+            sim.port(robot).write(b"D,20,17\n")
+        sim.run(7.3)
+        hashes.append(sim.state_hash())
+    assert hashes[0] == hashes[1]
+
+
+def test_a_checkpoint_brings_back_every_place(sim):
+    ball, cylinder = sim.add_ball(100, 100), sim.add_cylinder(100, 300)
+    sim.add_lamp(500, 500)
+    sim.move_body(ball, 100, 100, speed_mm_s=100)
+    saved = sim.checkpoint()
+    poses, bodies = sim.poses(), sim.bodies()
+    sim.port(1).write(b"D,20,15\n")
+    sim.run(3)
+    sim.remove_body(cylinder)
+    sim.add_ball(900, 500)
+    sim.lamps[0, 0] = 3
+    sim.remove_lamp(1)
+    sim.reset(saved)
+    assert (sim.poses() == poses).all()
+    assert (sim.bodies() == bodies).all()
+    assert sim.lamps.tolist() == [[500, 500, 1, 1]]
+    assert sim.time_s == pytest.approx(3)
+    assert sim.add_cylinder(900, 500) == 4
+    with pytest.raises(ParameterError, match="checkpoint must be of 1 robots, but it was of 2"):
+        Simulation().reset(saved)
+
+
+def test_robots_of_mixed_kinds():
+    large = RobotSpec.load("khepera").with_changes(body__diameter_mm=70.0)
+    sim = Simulation(Arena.box(600, 600), robot=["khepera", "khepera_ii", large], seed=1)
+    assert [spec.name for spec in sim.specs] == ["Khepera", "Khepera II", "Khepera"]
+    # The large one is stopped farther from a wall.
+    for robot, y_mm in ((1, 100), (3, 300)):
+        sim.place(robot, 500, y_mm, 0)
+        sim.port(robot).write(b"D,10,10\n")
+        assert sim.port(robot).readline() == b"d\r\n"
+    sim.run(3)
+    assert sim.pose(1)[0] == pytest.approx(590 - 27.5, abs=0.01)
+    assert sim.pose(3)[0] == pytest.approx(590 - 35, abs=0.01)
+    # Each answers with its own firmware and its own sensors.
+    versions = []
+    for robot in (1, 2):
+        port = sim.port(robot)
+        port.write(b"B\n")
+        versions.append(port.readline())
+    assert versions[0] != versions[1]
+    for robot in (1, 2, 3):
+        port = sim.port(robot)
+        port.write(b"N\n")
+        assert port.readline().startswith(b"n,")
+
+
+def test_kinds_must_be_as_many_as_robots():
+    with pytest.raises(ParameterError, match="one for each of 3 robots, but it named 2"):
+        Simulation(robots=3, robot=["khepera", "khepera_ii"])
+    with pytest.raises(ParameterError, match="robots must be a whole number from 1 to 1000, but it was 0"):
+        Simulation(robot=[])
+
+
+def test_the_contacts_of_each_robot_are_counted(sim):
+    sim.place(1, 300, 300, 0)
+    sim.place(2, 500, 300, 0)
+    assert (sim.contacts(1), sim.contacts(2)) == (0, 0)
+    sim.port(1).write(b"D,20,20\n")
+    sim.run(3)
+    assert (sim.contacts(1), sim.contacts(2)) == (1, 1)
+    assert sim.pose(2)[0] > 510
