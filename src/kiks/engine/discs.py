@@ -30,17 +30,17 @@ PER_DISC = 4
 SEEN_SIZE = 256
 """Numbers that describe as many discs as that."""
 
-PER_TRACK = 2 * (TRAIL_LENGTH + 1) + 2
-"""Numbers of a track: x and y [mm] now and at the tick boundaries before, radius [mm], brightness."""
+PER_TRACK = 2 * (TRAIL_LENGTH + 1) + 3
+"""Numbers of a track: x and y [mm] now and at the tick boundaries before, radius [mm], brightness, and whose it is."""
 
-TRACKS_SIZE = 640
+TRACKS_SIZE = 704
 """Numbers of as many tracks as a proximity sensor takes into account."""
 
 _ANYWHERE_MM = 1e6
 
 _NEVER = 1e30  # cells
 
-_RADIUS, _BRIGHTNESS = 2 * (TRAIL_LENGTH + 1), 2 * (TRAIL_LENGTH + 1) + 1
+_RADIUS, _BRIGHTNESS, _DISC = (2 * (TRAIL_LENGTH + 1) + k for k in range(3))
 
 ALL_AROUND = (0.0, 0.0, (0.0, 0.0), (0.0, 0.0), _ANYWHERE_MM)
 """The view of everything there is."""
@@ -72,9 +72,15 @@ def follow(scene: Any, world: Any, found: Any, count: Any, x: Any, y: Any, reach
             body = bodies[world, disc - robots.shape[1]]
             radius, brightness = body.radius_mm, np.float64(body.brightness)
             nearest = note_track(body, x, y, place, tracks)
-        tracks[place + _RADIUS], tracks[place + _BRIGHTNESS] = radius, brightness
+        tracks[place + _RADIUS], tracks[place + _BRIGHTNESS], tracks[place + _DISC] = radius, brightness, disc
         track_count += nearest < (reach_mm + radius) * (reach_mm + radius)
     return track_count
+
+
+@kernel
+def disc_of(tracks: Any, k: Any) -> Any:
+    """Return which disc a track is of."""
+    return np.int64(tracks[PER_TRACK * k + _DISC])
 
 
 @kernel
