@@ -30,6 +30,7 @@ from kiks.demos.follow import Follow
 from kiks.engine import ambient, camera, proximity
 from kiks.engine.networks import networks_for
 from kiks.engine.parameters import pack
+from kiks.engine.scene import Scene, make_scene
 from kiks.engine.state import PIXEL_COUNT
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
 from kiks.units import TICK_NS
@@ -48,11 +49,10 @@ PLACES, NEAREST_MM, FARTHEST_MM = 1000, 2.0, 25.0
 
 @dataclass(frozen=True)
 class Ride:
-    """Moments of one robot's ride: its records of the state side by side, as if each were a robot of its own."""
+    """Moments of one robot's ride, each a scene of its own with a record of the state."""
 
     name: str
-    robots: Any
-    kinds: Any
+    scenes: list[Scene]
     sight: Any
     networks: Any
     lamps: Any
@@ -62,36 +62,33 @@ class Ride:
         """Let a robot drive through an arena and remember it every few loops."""
         sim = kiks.Simulation(kiks.Arena.load(ARENAS / f"{arena}.toml"), seed=1)
         robot, program = kiks.Khepera(sim.port(1)), behaviour()
-        moments = []
+        scenes = []
         for _ in range(MOMENTS):
             for _ in range(LOOPS_BETWEEN):
                 program.step(robot)
             sim.sync()
-            moments.append(sim.state.robots[0, 0].copy())
-        kinds = np.repeat(pack(sim.spec), MOMENTS)
+            scenes.append(make_scene(sim.state.snapshot(), pack(sim.spec), sim.arena.width_mm, sim.arena.height_mm))
         name = f"{arena}_{behaviour.__name__.lower()}"
         networks = networks_for(sim.spec.proximity.response)
-        return Ride(name, np.array(moments).reshape(1, -1), kinds, sim.sight, networks, sim.lamps)
+        return Ride(name, scenes, sim.sight, networks, sim.lamps)
 
 
 def read_proximity(ride: Ride) -> None:
     out = np.zeros(SENSOR_COUNT, np.int64)
-    for k in range(MOMENTS):
-        proximity.read_proximity(
-            ride.robots, ride.kinds, ride.sight, ride.networks, TICK, TICK * TICK_NS, 1, k, True, out
-        )
+    for scene in ride.scenes:
+        proximity.read_proximity(scene, ride.sight, ride.networks, TICK, TICK * TICK_NS, 1, 0, True, out)
 
 
 def read_ambient(ride: Ride) -> None:
     out = np.zeros(SENSOR_COUNT, np.int64)
-    for k in range(MOMENTS):
-        ambient.read_ambient(ride.robots, ride.kinds, ride.sight, ride.lamps, TICK, TICK * TICK_NS, 1, k, True, out)
+    for scene in ride.scenes:
+        ambient.read_ambient(scene, ride.sight, ride.lamps, TICK, TICK * TICK_NS, 1, 0, True, out)
 
 
 def take_images(ride: Ride) -> None:
     out = np.zeros(PIXEL_COUNT, np.float64)
-    for k in range(MOMENTS):
-        camera.take_image(ride.robots, ride.sight, TICK, TICK * TICK_NS, 1, k, True, out)
+    for scene in ride.scenes:
+        camera.take_image(scene, ride.sight, TICK, TICK * TICK_NS, 1, 0, True, out)
 
 
 @dataclass(frozen=True)
@@ -121,10 +118,12 @@ def readings_s(case: Case, ride: Ride) -> float:
 @njit(error_model="numpy")  # type: ignore[untyped-decorator, unused-ignore]
 def expect_all(sight: Any, networks: Any, kinds: Any, poses: Any, out: Any) -> None:
     """Write what all sensors expect at each pose into `out`, shape [pose, 8]."""
+    tracks, now = np.empty(0), (0, 0.0)
     for k in range(poses.shape[0]):
         for sensor in range(out.shape[1]):
             x, y, heading = poses[k, 0], poses[k, 1], poses[k, 2]
-            out[k, sensor] = proximity.expected_count(sight, networks, kinds[0], x, y, heading, sensor)
+            count = proximity.expected_count(sight, networks, kinds[0], tracks, 0, now, x, y, heading, sensor)
+            out[k, sensor] = count
 
 
 def poses_by_walls(arena: kiks.Arena, radius_mm: float) -> Any:

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from kiks.engine.motion import CONTACT_TICKS
 from kiks.model.arena import Arena
 
 PULSE, HALF_BASE = 0.08, 26.5
@@ -240,10 +241,10 @@ def test_rolling_around_a_post_is_smooth(make_world, offset_mm):
     world.tick(20)
     touched = 0
     while world.pose[0] < 400:
-        was_touching = world.robot["is_touching"]
+        was_touching = world.robot["is_touching"] == CONTACT_TICKS
         before = world.pose
         world.tick()
-        if was_touching and world.robot["is_touching"]:
+        if was_touching and world.robot["is_touching"] == CONTACT_TICKS:
             touched += 1
             middle = np.add(before[:2], world.pose[:2]) / 2 - (300.5, 149.5)
             expected = 1.6 * middle[1] / np.hypot(*middle)

@@ -7,23 +7,30 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from llvmlite import binding
 
 from kiks.model.arena import Arena
+from kiks.model.places import Ball, Cylinder, Pose
 from kiks.model.robot import RESPONSES
 from kiks.sim.simulation import Simulation
 
 SCRIPT = (b"D,60,57\n", b"P,-255,200\n", b"D,-5,90\n", b"G,0,0\n", b"C,3000,-2000\n", b"D,127,127\n", b"C,-900,-900\n")
 LAMPS = ((60.0, 250.0, 1.0), (330.0, 90.0, 4.0), (200.0, 5.0, 2.0))
+BALLS, CYLINDERS = ((150.0, 90.0), (320.0, 200.0, 25.0)), ((90.0, 150.0), (250.0, 90.0), (300.0, 130.0, 12.0))
+STARTS = ((200.0, 160.0, 0.3), (90.0, 230.0, -1.0))
 ORDERS = (b"N\n", b"O\n", b"T,2,N\n", b"T,2,L\n")
 
 
 def run_record() -> str:
-    """Drive two robots with all sensors about; return every reply and the state hash after each."""
+    """Drive two robots with all sensors among balls and cylinders; return every reply and the state hash after each."""
     plain = Arena.box(400, 300, rounded_mm=60)
-    sim = Simulation(Arena(plain.brightness, plain.mm_per_cell, "lit", lamps=LAMPS), seed=5, robots=2)
+    things: dict[str, Any] = {"lamps": LAMPS, "balls": tuple(Ball(*each) for each in BALLS)}
+    things["cylinders"] = tuple(Cylinder(*each) for each in CYLINDERS)
+    things["starts"] = tuple(Pose(*each) for each in STARTS)
+    sim = Simulation(Arena(plain.brightness, plain.mm_per_cell, "full", **things), seed=5, robots=2)
     sim.fit(1, "k213")
     sim.fit(2, "k213")
     lines = []
@@ -40,6 +47,7 @@ def run_record() -> str:
     lines += every_response(plain)
     assert sim.contacts(1) > 3
     assert sim.contacts(2) > 3
+    assert (sim.bodies()["number"] == (1, 2, 3, 4, 5)).all()
     return "".join(lines)
 
 

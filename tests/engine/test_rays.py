@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kiks.engine.rays import cast_ray, cast_rays
+from kiks.engine.rays import cast_eight, cast_ray, cast_rays
 from kiks.model.arena import PAD, Arena
 
 TOLERANCE_MM = 0.02
@@ -92,7 +92,7 @@ def test_a_wall_more_never_lengthens_a_ray(make_random_arena, number, draw):
 
 
 @settings(derandomize=True, deadline=None, max_examples=30)
-@given(number=st.integers(0, 300), draw=st.integers(0, 2**32), count=st.integers(1, 100))
+@given(number=st.integers(0, 300), draw=st.integers(0, 2**32), count=st.integers(8, 100))
 def test_rays_in_lanes_are_rays_one_by_one(make_random_arena, number, draw, count):
     """To the bit, from floor, from walls and from outside, along the axes too."""
     arena = make_random_arena(number)
@@ -110,6 +110,10 @@ def test_rays_in_lanes_are_rays_one_by_one(make_random_arena, number, draw, coun
     cast_rays(sight, columns, rows, cosine, sine, lengths, brightnesses)
     alone = [cast_ray(sight, *ray, 1e6) for ray in zip(x, y, cosine, sine, strict=True)]
     assert list(zip(lengths * cell, brightnesses, strict=True)) == alone
+    out, reach = np.empty((2, 8)), float(rng.uniform(0.0, 200.0))
+    cast_eight(sight, columns[:8], rows[:8], np.array([cosine[:8], sine[:8]]), reach / cell, out)
+    near = [cast_ray(sight, *ray, reach) for ray in list(zip(x, y, cosine, sine, strict=True))[:8]]
+    assert [(length * cell if shade else reach, shade) for length, shade in out.T] == near
 
 
 @pytest.mark.parametrize("mm_per_pixel", [0.5, 1.0, 2.5])

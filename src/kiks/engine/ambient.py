@@ -136,10 +136,10 @@ def read_ambient(
     robots, _, kinds, _ = scene
     state = robots[0, robot]
     parameters = kinds[state.kind]
-    found, count, seen = everybody_else(scene, 0, robot)
+    tracks, count, seen = everybody_else(scene, 0, robot)
     for sensor in range(out.shape[0]):
         turn, instant_ns, x, y, heading = sampled_pose(state, tick_count, time_ns, sensor, is_noisy)
-        seen_count = see(scene, 0, found, count, moment_of(tick_count, instant_ns), scale(sight), ALL_AROUND, seen)
+        seen_count = see(tracks, count, moment_of(tick_count, instant_ns), scale(sight), ALL_AROUND, seen)
         counts = expected_ambient(sight, lamps, parameters, seen, seen_count, x, y, heading, sensor)
         if is_noisy:
             jitter = uniform(seed, 0, robot, STREAM_AMBIENT, turn, sensor)

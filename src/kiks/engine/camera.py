@@ -112,7 +112,7 @@ def look(sight: Any, seen: Any, seen_count: Any, x: Any, y: Any, heading: Any, g
             length, brightness = cast(sight, column, row, rays_x[p], rays_y[p], _ANYWHERE)
         if seen_count > 0:
             to_disc, _, shade = meet_disc(seen, seen_count, column, row, rays_x[p], rays_y[p], start + length)
-            if shade > 0:
+            if shade > 0.0:
                 start, length, brightness = 0.0, to_disc, shade
         grey[p] = _BLACK + brightness * ((_WHITE - _BLACK) / 255.0)
         distance_mm[p] = (start + length) * cell
@@ -180,8 +180,8 @@ def take_image(
                 chance[kind, p] = draw(origin, kind * PIXEL_COUNT + p)
 
     distance_mm, half_width = stack_floats(PIXEL_COUNT), stack_floats(PIXEL_COUNT)
-    found, count, seen = everybody_else(scene, 0, robot)
-    seen_count = see(scene, 0, found, count, moment_of(tick_count, time_ns), scale(sight), ALL_AROUND, seen)
+    tracks, count, seen = everybody_else(scene, 0, robot)
+    seen_count = see(tracks, count, moment_of(tick_count, time_ns), scale(sight), ALL_AROUND, seen)
     look(sight, seen, seen_count, x, y, heading, out, distance_mm)
     for p in range(PIXEL_COUNT):
         half_width[p] = 0.5 + _DEFOCUS_PIXELS * max(1.0 - _SHARP_MM / distance_mm[p], 0.0)

@@ -60,7 +60,8 @@ HASTE = 4.0
 """How much nearer two things come in a tick at most, in ways of the fastest: what is hit may be faster than that."""
 
 Room: Any = namedtuple(
-    "Room", ("ways", "starts", "moved", "neighbours", "pairs", "is_near", "is_touching", "is_pushed", "is_back")
+    "Room",
+    ("ways", "starts", "moved", "neighbours", "pairs", "is_near", "is_touching", "is_driven", "is_pushed", "is_back"),
 )
 """What a tick writes down about its discs.
 
@@ -71,6 +72,7 @@ Room: Any = namedtuple(
 * pairs: those of them that may meet in this tick, int64 [pair, 2];
 * is_near: whether a disc may meet another in this tick or rolls, bool [disc_count];
 * is_touching: whether it touched something, bool [disc_count];
+* is_driven: whether a wheel drives it, or something that a wheel drives has pushed it, bool [disc_count];
 * is_pushed: whether it was pushed since a wall last had its say, bool [disc_count];
 * is_back: whether it has gone back to where the piece began, bool [disc_count].
 """
@@ -86,6 +88,7 @@ def make_room(scene: Any) -> Any:
         np.empty((disc_count, 2)),
         np.empty((PAIRS_PER_DISC * disc_count, 2), np.int64),
         np.empty((PAIRS_PER_DISC * disc_count, 2), np.int64),
+        np.zeros(disc_count, np.bool_),
         np.zeros(disc_count, np.bool_),
         np.zeros(disc_count, np.bool_),
         np.zeros(disc_count, np.bool_),
@@ -123,6 +126,11 @@ def move_together(scene: Any, ground: Any, world: Any, room: Any, neighbour_coun
         way = way_of(scene, world, room, disc)
         fastest_mm = max(fastest_mm, way)
         room.is_near[disc] = disc >= robot_count and way > 0.0
+        if disc < robot_count:
+            room.is_driven[disc] = way > 0.0
+        else:
+            holder = scene[1][world, disc - robot_count].holder
+            room.is_driven[disc] = holder > 0 and room.is_driven[holder - 1]
         room.is_touching[disc] = False
     held_mm = way_of_held(scene, world, room)
     fastest_mm = max(fastest_mm, held_mm)
@@ -173,18 +181,34 @@ def way_of(scene: Any, world: Any, room: Any, disc: Any) -> Any:
 
 @kernel
 def find_neighbours(scene: Any, world: Any, room: Any, reach_mm: Any) -> Any:
-    """Write down all pairs of discs with a gap of at most a reach [mm]; return how many there are."""
+    """Write down all pairs of discs with a gap of at most a reach [mm]; return how many there are.
+
+    They stand in the order of their numbers, so that it does not matter when they were looked for.
+    """
     enter_all(scene, world)
     found = stack_integers(NEAR_LIMIT)
     neighbour_count = 0
     for disc in range(count_discs(scene)[1]):
         if is_on_floor(scene, world, disc):
             x, y, radius = disc_at(scene, world, disc)
-            for k in range(find_near(scene, world, x, y, radius + reach_mm, disc, found)):
+            count = find_near(scene, world, x, y, radius + reach_mm, disc, found)
+            put_in_order(found, count)
+            for k in range(count):
                 if found[k] > disc and neighbour_count < room.neighbours.shape[0]:
                     room.neighbours[neighbour_count, 0], room.neighbours[neighbour_count, 1] = disc, found[k]
                     neighbour_count += 1
     return neighbour_count
+
+
+@kernel
+def put_in_order(numbers: Any, count: Any) -> Any:
+    """Sort the first few of some numbers."""
+    for k in range(1, count):
+        number, place = numbers[k], k
+        while place > 0 and numbers[place - 1] > number:
+            numbers[place] = numbers[place - 1]
+            place -= 1
+        numbers[place] = number
 
 
 @kernel
@@ -279,37 +303,49 @@ def shift(scene: Any, world: Any, disc: Any, dx: Any, dy: Any) -> Any:
 def part(scene: Any, ground: Any, world: Any, room: Any, pair_count: Any) -> Any:
     """Part everybody who overlaps, until all are free; say whether that was reached."""
     field, cell, pad = ground
-    robot_count, disc_count = count_discs(scene)
+    disc_count = count_discs(scene)[1]
+    room.is_pushed[:] = False
     for sweep in range(SWEEPS):
         worst = 0.0
         for pair in range(pair_count):
             first, second = room.pairs[pair, 0], room.pairs[pair, 1]
             overlap, nx, ny = overlap_of(scene, world, first, second)
-            if overlap <= 0.0:
-                continue
-            room.is_touching[first] = room.is_touching[second] = True
-            room.is_pushed[first] = room.is_pushed[second] = True
-            is_yielding = sweep < YIELDING_SWEEPS and first < robot_count and second >= robot_count
-            back = 0.0 if is_yielding else 0.5 * overlap
-            shift(scene, world, first, -back * nx, -back * ny)
-            shift(scene, world, second, (overlap - back) * nx, (overlap - back) * ny)
-            worst = max(worst, overlap)
+            if overlap > 0.0:
+                push_apart(scene, world, room, sweep, first, second, overlap * nx, overlap * ny)
+                worst = max(worst, overlap)
         worst = max(worst, keep_holds(scene, ground, world, room))
-        if worst == 0.0:
-            return True
         for disc in range(disc_count):
             if room.is_pushed[disc]:
-                room.is_pushed[disc] = False
                 x, y, radius = disc_at(scene, world, disc)
                 depth = radius - clearance_mm(field, cell, pad, x, y)
+                room.is_pushed[disc] = depth > 0.0
                 if depth > 0.0:
-                    room.is_pushed[disc] = True
                     nx, ny = outward(field, cell, pad, x, y)
                     shift(scene, world, disc, depth * nx, depth * ny)
                     worst = max(worst, depth)
         if worst <= PARTED_MM:
             return True
     return False
+
+
+@kernel
+def push_apart(
+    scene: Any, world: Any, room: Any, sweep: Any, first: Any, second: Any, overlap_x: Any, overlap_y: Any
+) -> Any:
+    """Part two discs by their overlap (overlap_x, overlap_y) [mm], the way from the first to the second.
+
+    Each gives way by half, but a body by all of it before a robot: in the first sweeps, and in all of them if nothing
+    that drives has a part in it, for a robot that stands is not moved by what rolls.
+    """
+    robot_count = scene[0].shape[1]
+    room.is_touching[first] = room.is_touching[second] = True
+    room.is_pushed[first] = room.is_pushed[second] = True
+    is_driven = room.is_driven[first] or room.is_driven[second]
+    room.is_driven[first] = room.is_driven[second] = is_driven
+    is_yielding = first < robot_count and second >= robot_count and (sweep < YIELDING_SWEEPS or not is_driven)
+    back = 0.0 if is_yielding else 0.5
+    shift(scene, world, first, -back * overlap_x, -back * overlap_y)
+    shift(scene, world, second, (1.0 - back) * overlap_x, (1.0 - back) * overlap_y)
 
 
 @kernel

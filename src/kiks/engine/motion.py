@@ -13,6 +13,9 @@ from kiks.engine.compiling import kernel
 from kiks.engine.contact import PIECE_MM, clearance_mm, resolve
 from kiks.engine.numbers import sin_cos, sinc
 
+CONTACT_TICKS = 20
+"""Ticks without a touch after which a contact is over: what touches again within 0.2 s is the same one."""
+
 
 @kernel
 def remember_pose(robot: Any) -> Any:
@@ -86,10 +89,16 @@ def count_path(robot: Any, way_mm: Any) -> Any:
 
 @kernel
 def note_contact(robot: Any, is_touching: Any) -> Any:
-    """Phase: count the contacts; one that lasts counts once."""
-    if is_touching and robot.is_touching == 0:
-        robot.contact_count += 1
-    robot.is_touching = 1 if is_touching else 0
+    """Phase: count the contacts; one that lasts counts once, with gaps in it, too.
+
+    A ball that is pushed along runs ahead by hundredths of a millimetre whenever the motors falter.
+    """
+    if is_touching:
+        if robot.is_touching == 0:
+            robot.contact_count += 1
+        robot.is_touching = CONTACT_TICKS
+    elif robot.is_touching > 0:
+        robot.is_touching -= 1
 
 
 @kernel

@@ -46,14 +46,12 @@ def sin_cos(angle_rad: Any) -> Any:
     cosine = cosine * q - 1.0 / 720.0
     cosine = cosine * q + 1.0 / 24.0
     cosine = 1.0 - q * 0.5 + q * q * cosine
+    # Which quarter it is no processor can guess: these are choices without a jump.
     quarter = np.int64(turns) & 3
-    if quarter == 0:
-        return sine, cosine
-    if quarter == 1:
-        return cosine, -sine
-    if quarter == 2:
-        return -sine, -cosine
-    return -cosine, sine
+    is_swapped = (quarter & 1) != 0
+    first = cosine if is_swapped else sine
+    second = sine if is_swapped else cosine
+    return (-first if quarter >= 2 else first), (-second if quarter == 1 or quarter == 2 else second)
 
 
 @kernel

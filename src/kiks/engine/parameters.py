@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from kiks.engine.networks import NETWORK_RESPONSES, TABLE_LEVELS
 from kiks.engine.numbers import exponential, logarithm, sin_cos
+from kiks.engine.vectors import LANES
 from kiks.model.network import BODY_RADIUS_MM, NetworkResponse
 from kiks.model.robot import (
     AMBIENT_MODELS,
@@ -63,10 +64,10 @@ PARAMETERS = np.dtype(
         ("response", "i8"),
         ("ray_x_mm", "f8", (SENSOR_COUNT,)),  # where the response lets its rays begin
         ("ray_y_mm", "f8", (SENSOR_COUNT,)),
-        ("ray_cos", "f8", (SENSOR_COUNT, RAY_COUNT)),
-        ("ray_sin", "f8", (SENSOR_COUNT, RAY_COUNT)),
+        ("ray_cos", "f8", (SENSOR_COUNT, LANES)),  # the lane over repeats the last ray
+        ("ray_sin", "f8", (SENSOR_COUNT, LANES)),
         ("reach_mm", "f8"),  # longest length of a ray
-        ("ray_weight", "f8", (SENSOR_COUNT, RAY_COUNT)),
+        ("ray_weight", "f8", (SENSOR_COUNT, LANES)),  # 0 for the lane over
         ("curve_counts", "f4", (CURVE_POINT_COUNT,)),
         ("behind_mm", "f8"),
         ("threshold", "f8", (SENSOR_COUNT,)),
@@ -161,8 +162,8 @@ def _pack_response(robot: Any, spec: RobotSpec) -> None:
     for sensor in range(SENSOR_COUNT):
         for ray, offset_deg in enumerate(ray_offsets_deg(geometry.field_of_view_deg)):
             sine, cosine = sin_cos(math.radians(geometry.direction_deg[sensor] + offset_deg))
-            robot["ray_cos"][sensor, ray] = cosine
-            robot["ray_sin"][sensor, ray] = sine
+            robot["ray_cos"][sensor, ray:] = cosine
+            robot["ray_sin"][sensor, ray:] = sine
     if proximity.response == "curve" and spec.curve is not None:
         _pack_curve(robot, spec.curve, proximity)
     if proximity.response == "reflection" and spec.reflection is not None:
@@ -205,7 +206,7 @@ def _pack_curve(robot: Any, curve: Curve, proximity: Proximity) -> None:
     middle = RAY_COUNT // 2
     cosines = [sin_cos(math.radians(step_deg * abs(ray - middle)))[1] for ray in range(RAY_COUNT)]
     whole = sum(curve.ray_weight[abs(ray - middle)] * cosines[ray] ** 2 for ray in range(RAY_COUNT))
-    robot["ray_weight"][:] = [curve.ray_weight[abs(ray - middle)] / whole for ray in range(RAY_COUNT)]
+    robot["ray_weight"][:, :RAY_COUNT] = [curve.ray_weight[abs(ray - middle)] / whole for ray in range(RAY_COUNT)]
 
 
 def _pack_ambient(robot: Any, spec: RobotSpec) -> None:

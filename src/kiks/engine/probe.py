@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from kiks.engine.compiling import entry
-from kiks.engine.discs import ALL_AROUND, PER_DISC, everybody_else, meet_disc, see
+from kiks.engine.discs import ALL_AROUND, PER_DISC, disc_of, everybody_else, meet_disc, see
 from kiks.engine.numbers import sin_cos, uniform
 from kiks.engine.proximity import pose_at
 from kiks.engine.rays import cast, scale
@@ -38,12 +40,12 @@ def probe(scene: Any, sight: Any, tick_count: Any, time_ns: Any, robot: Any, ang
     column, row = x / cell + pad, y / cell + pad
     length, brightness = cast(sight, column, row, cosine, sine, _ANYWHERE_MM / cell)
     met = WALL
-    found, count, seen = everybody_else(scene, 0, robot)
-    see(scene, 0, found, count, moment_of(tick_count, time_ns), (cell, pad), ALL_AROUND, seen)
+    tracks, count, seen = everybody_else(scene, 0, robot)
+    see(tracks, count, moment_of(tick_count, time_ns), (cell, pad), ALL_AROUND, seen)
     for k in range(count):
         way, _, shade = meet_disc(seen[PER_DISC * k :], 1, column, row, cosine, sine, length)
-        if shade > 0:
-            length, brightness, met = way, shade, found[k]
+        if shade > 0.0:
+            length, brightness, met = way, np.int64(shade), disc_of(tracks, k)
     return length * cell, met, brightness
 
 

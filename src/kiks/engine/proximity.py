@@ -11,21 +11,22 @@ from typing import Any
 import numpy as np
 
 from kiks.engine.compiling import entry, kernel
-from kiks.engine.discs import SEEN_LIMIT, SEEN_SIZE, meet_disc, see
+from kiks.engine.discs import SEEN_LIMIT, SEEN_SIZE, TRACKS_SIZE, follow, meet_discs, see
 from kiks.engine.lanes import stack_floats, stack_integers
 from kiks.engine.motion import pose_between
 from kiks.engine.numbers import draw, sin_cos, source
-from kiks.engine.parameters import AHEAD, RAY_COUNT
-from kiks.engine.rays import cast, free_cells, meet_face, scale, stride
+from kiks.engine.parameters import RAY_COUNT
+from kiks.engine.rays import cast_fan, free_cells, meet_face, scale, stride
 from kiks.engine.responses import FAST, REFLECTION, respond
 from kiks.engine.scene import find_near, moment_of
+from kiks.engine.vectors import LANES, is_any, lane_of, load, splat, store
 from kiks.units import SENSOR_ROUND_NS, SENSOR_SLOT_NS, TICK_NS
 
 STREAM_SLIP, STREAM_PROXIMITY = 1, 2
 """Random streams: whoever draws has a number of his own."""
 
-MOVED_MM = 40.0
-"""How much farther a thing may have been from a robot when its sensors were sampled: 20 ms, both at 1 m/s."""
+MOVED_MM = 30.0
+"""How far a robot or a thing moves between the first sensor's sample and a reading, at most: 20 ms at 1.5 m/s."""
 
 
 @kernel
@@ -56,28 +57,13 @@ def sampled_pose(robot: Any, tick_count: Any, time_ns: Any, sensor: Any, is_samp
 
 
 @kernel
-def view_of(parameters: Any, x: Any, y: Any, heading: Any, sensor: Any) -> Any:
-    """Return the view of a sensor of a robot at a pose, for `kiks.engine.discs.see`."""
-    sine, cosine = sin_cos(heading)
-    ray_x, ray_y = parameters.ray_x_mm[sensor], parameters.ray_y_mm[sensor]
-    ahead_x, ahead_y = parameters.ray_cos[sensor, AHEAD], parameters.ray_sin[sensor, AHEAD]
-    return (
-        x + ray_x * cosine - ray_y * sine,
-        y + ray_x * sine + ray_y * cosine,
-        ahead_x * cosine - ahead_y * sine,
-        ahead_x * sine + ahead_y * cosine,
-        parameters.reach_mm,
-        True,
-    )
-
-
-@kernel
 def expected_count(
     sight: Any,
     networks: Any,
     parameters: Any,
-    seen: Any,
-    seen_count: Any,
+    tracks: Any,
+    track_count: Any,
+    moment: Any,
     x: Any,
     y: Any,
     heading: Any,
@@ -89,8 +75,9 @@ def expected_count(
         sight: What rays meet of the arena.
         networks: What the response needs besides.
         parameters: Record of the robot's constants.
-        seen: The discs that are in its view (`kiks.engine.discs`).
-        seen_count: How many they are.
+        tracks: Where the discs about have been (`kiks.engine.discs`).
+        track_count: How many they are.
+        moment: When (`kiks.engine.scene.moment_of`).
         x: Where the robot is [mm].
         y: Where the robot is [mm].
         heading: Where it looks [rad].
@@ -98,34 +85,79 @@ def expected_count(
     """
     sine, cosine = sin_cos(heading)
     ray_x, ray_y = parameters.ray_x_mm[sensor], parameters.ray_y_mm[sensor]
+    x, y = x + ray_x * cosine - ray_y * sine, y + ray_x * sine + ray_y * cosine
     cell, pad = scale(sight)
     per_cell = 1.0 / cell
-    column = (x + ray_x * cosine - ray_y * sine) * per_cell + pad
-    row = (y + ray_x * sine + ray_y * cosine) * per_cell + pad
-    reach = parameters.reach_mm * per_cell
+    column, row, reach = x * per_cell + pad, y * per_cell + pad, parameters.reach_mm * per_cell
     begin = max(free_cells(sight, column, row), 0.0)
-    if begin > reach and seen_count == 0:
+    if begin > reach and track_count == 0:
         return parameters.baseline_counts[sensor]
-    lengths_mm, cosines, brightnesses = stack_floats(RAY_COUNT), stack_floats(RAY_COUNT), stack_floats(RAY_COUNT)
-    for ray in range(RAY_COUNT):
-        ray_cos, ray_sin = parameters.ray_cos[sensor, ray], parameters.ray_sin[sensor, ray]
-        direction_x = ray_cos * cosine - ray_sin * sine
-        direction_y = ray_cos * sine + ray_sin * cosine
-        # The table rounds lengths to 10 mm: for it, rays need not be exact.
-        if parameters.response == FAST:
-            length, brightness = stride(sight, column, row, direction_x, direction_y, reach, begin)
-        else:
-            length, brightness = cast(sight, column, row, direction_x, direction_y, reach, begin)
-        cosines[ray] = 1.0
-        if parameters.response == REFLECTION and brightness > 0:
-            length, cosines[ray] = meet_face(sight, column, row, direction_x, direction_y, length)
-        if seen_count > 0:
-            to_disc, squarely, shade = meet_disc(seen, seen_count, column, row, direction_x, direction_y, length)
-            if shade > 0:
-                length, cosines[ray], brightness = to_disc, squarely, shade
-        lengths_mm[ray], brightnesses[ray] = length * cell, brightness
-    counts = respond(networks, parameters, sensor, lengths_mm, cosines, brightnesses)
+    ray_cos, ray_sin = load(parameters.ray_cos[sensor]), load(parameters.ray_sin[sensor])
+    rays_x, rays_y = ray_cos * cosine - ray_sin * sine, ray_cos * sine + ray_sin * cosine
+    seen, seen_count = stack_floats(SEEN_SIZE), 0
+    if track_count > 0:
+        left = lane_of(rays_x, 0), lane_of(rays_y, 0)
+        right = lane_of(rays_x, RAY_COUNT - 1), lane_of(rays_y, RAY_COUNT - 1)
+        seen_count = see(tracks, track_count, moment, (cell, pad), (x, y, left, right, parameters.reach_mm), seen)
+        if begin > reach and seen_count == 0:
+            return parameters.baseline_counts[sensor]
+    lengths, cosines, brightnesses = splat(reach), splat(1.0), splat(0.0)
+    if begin <= reach:
+        lengths, cosines, brightnesses = meet_walls(sight, parameters, column, row, rays_x, rays_y, reach, begin)
+    if seen_count > 0:
+        lengths, cosines, brightnesses = meet_discs(
+            seen, seen_count, column, row, rays_x, rays_y, lengths, cosines, brightnesses
+        )
+    counts = respond(networks, parameters, sensor, lengths * cell, cosines, brightnesses)
     return parameters.baseline_counts[sensor] + counts
+
+
+@kernel
+def meet_walls(
+    sight: Any, parameters: Any, column: Any, row: Any, rays_x: Any, rays_y: Any, reach: Any, begin: Any
+) -> Any:
+    """Follow a sensor's rays to the walls, as exactly as the response needs them.
+
+    Returns:
+        Lengths [cells], cosines of the angles of incidence, and brightnesses, `Lanes`.
+    """
+    if parameters.response == FAST:
+        return stride_all(sight, column, row, rays_x, rays_y, reach, begin)
+    lengths, brightnesses = cast_fan(sight, splat(column), splat(row), rays_x, rays_y, reach, splat(begin))
+    cosines = splat(1.0)
+    if parameters.response == REFLECTION and is_any(brightnesses):
+        lengths, cosines = meet_faces(sight, column, row, rays_x, rays_y, lengths, brightnesses)
+    return lengths, cosines, brightnesses
+
+
+@kernel
+def meet_faces(sight: Any, column: Any, row: Any, rays_x: Any, rays_y: Any, lengths: Any, brightnesses: Any) -> Any:
+    """Return where rays that met a wall meet its smooth surface, and how squarely, `Lanes`."""
+    exact, cosines, shades = stack_floats(LANES), stack_floats(LANES), stack_floats(LANES)
+    to_x, to_y = stack_floats(LANES), stack_floats(LANES)
+    store(exact, lengths)
+    store(cosines, splat(1.0))
+    store(shades, brightnesses)
+    store(to_x, rays_x)
+    store(to_y, rays_y)
+    for ray in range(RAY_COUNT):
+        if shades[ray] > 0.0:
+            exact[ray], cosines[ray] = meet_face(sight, column, row, to_x[ray], to_y[ray], exact[ray])
+    return load(exact), load(cosines)
+
+
+@kernel
+def stride_all(sight: Any, column: Any, row: Any, rays_x: Any, rays_y: Any, reach: Any, begin: Any) -> Any:
+    """Return what `meet_walls` does for the table, which rounds lengths to 10 mm: for it, rays need not be exact."""
+    lengths, brightnesses = stack_floats(LANES), stack_floats(LANES)
+    to_x, to_y = stack_floats(LANES), stack_floats(LANES)
+    store(to_x, rays_x)
+    store(to_y, rays_y)
+    lengths[RAY_COUNT], brightnesses[RAY_COUNT] = reach, 0.0
+    for ray in range(RAY_COUNT):
+        lengths[ray], shade = stride(sight, column, row, to_x[ray], to_y[ray], reach, begin)
+        brightnesses[ray] = shade
+    return load(lengths), splat(1.0), load(brightnesses)
 
 
 @kernel
@@ -193,16 +225,15 @@ def read_proximity(
     robots, _, kinds, _ = scene
     state = robots[0, robot]
     parameters = kinds[state.kind]
-    found, seen = stack_integers(SEEN_LIMIT), stack_floats(SEEN_SIZE)
-    reach = parameters.radius_mm + parameters.reach_mm
-    near_count = find_near(scene, 0, state.x_mm, state.y_mm, reach + MOVED_MM, robot, found)
+    found, tracks = stack_integers(SEEN_LIMIT), stack_floats(TRACKS_SIZE)
+    reach = parameters.radius_mm + parameters.reach_mm + MOVED_MM
+    track_count = find_near(scene, 0, state.x_mm, state.y_mm, reach + MOVED_MM, robot, found)
+    if track_count > 0:
+        track_count = follow(scene, 0, found, track_count, state.x_mm, state.y_mm, reach, tracks)
     for sensor in range(out.shape[0]):
         turn, instant_ns, x, y, heading = sampled_pose(state, tick_count, time_ns, sensor, is_noisy)
-        seen_count = 0
-        if near_count > 0:
-            moment, view = moment_of(tick_count, instant_ns), view_of(parameters, x, y, heading, sensor)
-            seen_count = see(scene, 0, found, near_count, moment, scale(sight), view, seen)
-        count = expected_count(sight, networks, parameters, seen, seen_count, x, y, heading, sensor)
+        moment = moment_of(tick_count, instant_ns)
+        count = expected_count(sight, networks, parameters, tracks, track_count, moment, x, y, heading, sensor)
         if is_noisy:
             chance = source(seed, 0, robot, STREAM_PROXIMITY, turn)
             sign, size, jitter = draw(chance, sensor * 3), draw(chance, sensor * 3 + 1), draw(chance, sensor * 3 + 2)

@@ -27,6 +27,7 @@ import numpy as np
 from kiks.engine.compiling import entry, kernel
 from kiks.engine.discs import hides
 from kiks.engine.lanes import element, pointer_to, stack_floats
+from kiks.engine.vectors import cells_of, is_any, load, pick, splat, store, where_less
 
 _DIAGONAL = 1.4142135623730951
 _WALK = 2.5  # up to this clearance a ray goes from cell to cell [cells]
@@ -35,7 +36,8 @@ _NUDGE = 1e-3  # over the edge of a cell [cells]
 _BACK = 2e-3  # from there back over it [cells]
 _GRAZING = 0.1  # cosine of an incidence below which a surface is not worth finding
 _FAR = 1e30
-_LANES = 32
+_LANES = 32  # of whole pictures: while some wait for the memory, others go on
+_FLAT = 1e-24  # square of a direction's part along an axis below which a ray never gets to the next cell there
 
 
 @kernel
@@ -77,8 +79,8 @@ def cast(sight: Any, column: Any, row: Any, cosine: Any, sine: Any, reach: Any, 
     """
     field, surface, _, cell, _ = sight
     per_cell = 1.0 / cell
-    per_column = 1.0 / cosine if abs(cosine) > 1e-12 else _FAR
-    per_row = 1.0 / sine if abs(sine) > 1e-12 else _FAR
+    per_column = 1.0 / cosine if cosine * cosine > _FLAT else _FAR
+    per_row = 1.0 / sine if sine * sine > _FLAT else _FAR
     right = 1 if cosine > 0.0 else 0
     up = 1 if sine > 0.0 else 0
     length = begin
@@ -140,6 +142,46 @@ def stride(sight: Any, column: Any, row: Any, cosine: Any, sine: Any, reach: Any
 
 
 @kernel
+def cast_fan(sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, reach: Any, begin: Any) -> Any:
+    """Follow eight rays at once, each to where `cast` would let it end, to the bit.
+
+    They step together until the last of them has ended; one that has stays where it is.
+
+    Args:
+        sight: What rays meet.
+        columns: Origins [cells], `Lanes`.
+        rows: Origins [cells], `Lanes`.
+        cosines: Directions, `Lanes`.
+        sines: Directions, `Lanes`.
+        reach: Longest length followed [cells].
+        begin: Length that is known to be free [cells], `Lanes`.
+
+    Returns:
+        Lengths of the rays [cells] and brightnesses of what they met, `Lanes`.
+    """
+    field, surface, _, cell, _ = sight
+    per_cell = 1.0 / cell
+    per_column = where_less(_FLAT, cosines * cosines, 1.0 / cosines, _FAR)
+    per_row = where_less(_FLAT, sines * sines, 1.0 / sines, _FAR)
+    right, up = where_less(0.0, cosines, 1.0, splat(0.0)), where_less(0.0, sines, 1.0, splat(0.0))
+    lengths = begin
+    while True:
+        px, py = columns + lengths * cosines, rows + lengths * sines
+        clearances = pick(field, px, py) * per_cell
+        goes_on = where_less(0.0, clearances, where_less(lengths, reach, 1.0, splat(0.0)), 0.0)
+        if not is_any(goes_on):
+            break
+        to_column = where_less(per_column, _FAR, (cells_of(px, field.shape[1]) + right - px) * per_column, _FAR)
+        to_row = where_less(per_row, _FAR, (cells_of(py, field.shape[0]) + up - py) * per_row, _FAR)
+        walk = where_less(to_column, to_row, to_column, to_row)
+        walk = where_less(0.0, walk, walk, 0.0) + _NUDGE
+        step = where_less(_WALK, clearances, clearances - _DIAGONAL, walk)
+        lengths = where_less(0.0, goes_on, lengths + step, lengths)
+    brightnesses = where_less(lengths, reach, pick(surface, px, py), 0.0)
+    return where_less(lengths, reach, lengths, reach), brightnesses
+
+
+@kernel
 def cast_many(sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, lengths: Any, brightnesses: Any) -> Any:
     """Follow many rays, each to the first wall: the lengths and brightnesses of `cast` to the bit, in less time.
 
@@ -168,8 +210,8 @@ def cast_many(sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, len
         for lane in range(_LANES):
             ray = min(first + lane, lengths.shape[0] - 1)
             column[lane], row[lane], cosine[lane], sine[lane] = columns[ray], rows[ray], cosines[ray], sines[ray]
-            per_column[lane] = 1.0 / cosine[lane] if abs(cosine[lane]) > 1e-12 else _FAR
-            per_row[lane] = 1.0 / sine[lane] if abs(sine[lane]) > 1e-12 else _FAR
+            per_column[lane] = 1.0 / cosine[lane] if cosine[lane] * cosine[lane] > _FLAT else _FAR
+            per_row[lane] = 1.0 / sine[lane] if sine[lane] * sine[lane] > _FLAT else _FAR
             right[lane] = 1.0 if cosine[lane] > 0.0 else 0.0
             up[lane] = 1.0 if sine[lane] > 0.0 else 0.0
             length[lane] = 0.0
@@ -244,3 +286,22 @@ def cast_ray(sight: Any, x: Any, y: Any, cosine: Any, sine: Any, reach: Any) -> 
 def cast_rays(sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, lengths: Any, brightnesses: Any) -> Any:
     """Follow many rays from Python, each to the first wall; lengths and places in cells."""
     cast_many(sight, columns, rows, cosines, sines, lengths, brightnesses)
+
+
+@entry
+def cast_eight(sight: Any, columns: Any, rows: Any, directions: Any, reach: Any, out: Any) -> Any:
+    """Follow eight rays from Python as a proximity sensor does; all in cells.
+
+    Args:
+        sight: What rays meet.
+        columns: Origins, shape [8].
+        rows: Origins, shape [8].
+        directions: Cosines and sines, shape [2, 8].
+        reach: Longest length followed.
+        out: Where lengths and brightnesses go, shape [2, 8].
+    """
+    lengths, brightnesses = cast_fan(
+        sight, load(columns), load(rows), load(directions[0]), load(directions[1]), reach, splat(0.0)
+    )
+    store(out[0], lengths)
+    store(out[1], brightnesses)

@@ -27,6 +27,7 @@ from kiks.engine.lanes import stack_floats
 from kiks.engine.networks import network_count, table_count
 from kiks.engine.numbers import exponential, power
 from kiks.engine.parameters import CURVE_POINT_COUNT, RAY_COUNT, STANDIN_REACH
+from kiks.engine.vectors import LANES, lane_of, load, splat, store, where_less
 from kiks.model.materials import BLACK_REFLECTANCE
 
 REFLECTION, THESIS, FAST, STANDIN, CURVE = 0, 1, 2, 3, 4
@@ -57,11 +58,14 @@ def ramp(share: Any, rounding: Any) -> Any:
 
 @kernel
 def reflection_count(parameters: Any, sensor: Any, lengths_mm: Any, cosines: Any, brightnesses: Any) -> Any:
-    """Return the count for the light that comes back to a sensor."""
+    """Return the count for the light that comes back to a sensor; its rays are `Lanes`."""
+    near = cosines / (lengths_mm + parameters.behind_mm)
+    shares = BLACK_REFLECTANCE + brightnesses * ((1.0 - BLACK_REFLECTANCE) / 255.0)
+    shares = where_less(0.0, brightnesses, shares, 0.0)
+    returned = load(parameters.ray_weight[sensor]) * shares * near * near * near
     light = 0.0
     for ray in range(RAY_COUNT):
-        near = cosines[ray] / (lengths_mm[ray] + parameters.behind_mm)
-        light += parameters.ray_weight[sensor, ray] * reflectance(brightnesses[ray]) * near * near * near
+        light += lane_of(returned, ray)
     threshold = parameters.threshold[sensor]
     share = (1.0 + threshold) * parameters.gain[sensor] * light - threshold
     rounded = ramp(share, parameters.faint) - ramp(share - 1.0, parameters.bright)
@@ -107,9 +111,18 @@ def curve_count(parameters: Any, sensor: Any, lengths_mm: Any, brightnesses: Any
 
 @kernel
 def respond(networks: Any, parameters: Any, sensor: Any, lengths_mm: Any, cosines: Any, brightnesses: Any) -> Any:
-    """Return the counts above its baseline that a sensor expects, by the response of the robot's file."""
+    """Return the counts above its baseline that a sensor expects, by its robot's response; the rays are `Lanes`."""
     if parameters.response == REFLECTION:
         return reflection_count(parameters, sensor, lengths_mm, cosines, brightnesses)
+    return respond_one_by_one(networks, parameters, sensor, lengths_mm, brightnesses)
+
+
+@kernel
+def respond_one_by_one(networks: Any, parameters: Any, sensor: Any, lengths: Any, shades: Any) -> Any:
+    """Return the same for the responses that take ray by ray."""
+    lengths_mm, brightnesses = stack_floats(LANES), stack_floats(LANES)
+    store(lengths_mm, lengths)
+    store(brightnesses, shades)
     gain = parameters.gain[sensor]
     if parameters.response == STANDIN:
         return gain * standin_count(parameters.range_mm, lengths_mm, brightnesses)
@@ -132,11 +145,11 @@ def respond_all(kinds: Any, lengths_mm: Any, cosines: Any, out: Any) -> Any:
         cosines: Of the angles of incidence, 0 for a ray that meets nothing, shape [samples, 8, 7].
         out: Shape [samples, 8].
     """
-    brightnesses = stack_floats(RAY_COUNT)
+    padded_mm, padded = stack_floats(LANES), stack_floats(LANES)
+    padded_mm[RAY_COUNT], padded[RAY_COUNT] = 1.0, 0.0
     for sample in range(out.shape[0]):
         for sensor in range(out.shape[1]):
             for ray in range(RAY_COUNT):
-                brightnesses[ray] = 255.0 if cosines[sample, sensor, ray] > 0.0 else 0.0
-            out[sample, sensor] = reflection_count(
-                kinds[0], sensor, lengths_mm[sample, sensor], cosines[sample, sensor], brightnesses
-            )
+                padded_mm[ray], padded[ray] = lengths_mm[sample, sensor, ray], cosines[sample, sensor, ray]
+            shades = where_less(0.0, load(padded), 255.0, splat(0.0))
+            out[sample, sensor] = reflection_count(kinds[0], sensor, load(padded_mm), load(padded), shades)

@@ -5,13 +5,14 @@ Discs are counted through: robots first, from 0, then bodies. All of it is one a
 * robots: records of `ROBOT`, shape [world_count, robot_count];
 * bodies: records of `BODY`, shape [world_count, body_count];
 * kinds: records of `PARAMETERS`, one for each kind of robot; a robot's `kind` says which is its own;
-* near: `heads` int32 [world_count, rows, columns], `links` int32 [world_count, disc_count], and the largest
-  radius [mm].
+* near: `begins` int32 [world_count, rows, columns + 1], `entries` int32 and `spots` float64 [3], both [world_count,
+  disc_count], and the largest radius [mm].
 
 Need: a robot among a thousand must not cost much more than one alone, so nobody may look at all the others.
-Method: squares of 64 mm lie over the arena. `heads` has the first disc of each square and `links` the next one behind
-each disc, -1 for none; `find_near` looks at the squares that a circle touches. Both follow from the places of the
-discs and are no part of the state: `enter_all` writes them afresh whenever something has moved.
+Method: squares of 64 mm lie over the arena. `entries` has the discs square by square, row by row, and `spots` beside it
+their x, y and radius [mm]; `begins` says where each square begins, and where a row ends. So what a row of squares holds
+is one stretch of memory, and `find_near` reads one for each row that a circle touches. All of it follows from the
+places of the discs and is no part of the state: `enter_all` writes it afresh whenever something has moved.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from kiks.units import TICK_NS
 SQUARE_MM = 64.0
 """Edge of a square of the grid [mm]: somewhat more than a robot, so that a square holds one or two."""
 
-Scene = tuple[Any, Any, Any, tuple[Any, Any, float]]
+Scene = tuple[Any, Any, Any, tuple[Any, Any, Any, float]]
 
 
 def make_scene(state: State, kinds: NDArray[np.void], width_mm: float, height_mm: float) -> Scene:
@@ -42,10 +43,11 @@ def make_scene(state: State, kinds: NDArray[np.void], width_mm: float, height_mm
     """
     world_count, robot_count = state.robots.shape
     rows, columns = (int(size_mm // SQUARE_MM) + 1 for size_mm in (height_mm, width_mm))
-    heads = np.full((world_count, rows, columns), -1, np.int32)
-    links = np.full((world_count, robot_count + state.bodies.shape[1]), -1, np.int32)
+    disc_count = robot_count + state.bodies.shape[1]
+    begins = np.zeros((world_count, rows, columns + 1), np.int32)
+    entries, spots = np.zeros((world_count, disc_count), np.int32), np.zeros((world_count, disc_count, 3))
     widest_mm = max(kinds["radius_mm"].max(), state.bodies["radius_mm"].max(initial=0.0))
-    scene = (state.robots, state.bodies, kinds, (heads, links, float(widest_mm)))
+    scene = (state.robots, state.bodies, kinds, (begins, entries, spots, float(widest_mm)))
     enter_everybody(scene)
     return scene
 
@@ -76,23 +78,37 @@ def is_on_floor(scene: Any, world: Any, disc: Any) -> Any:
 
 
 @kernel
-def square_of(heads: Any, x: Any, y: Any) -> Any:
+def square_of(begins: Any, x: Any, y: Any) -> Any:
     """Return column and row of the square over a place [mm], of the nearest one outside the arena."""
-    column = min(max(np.int64(x * (1.0 / SQUARE_MM)), 0), heads.shape[2] - 1)
-    return column, min(max(np.int64(y * (1.0 / SQUARE_MM)), 0), heads.shape[1] - 1)
+    column = min(max(np.int64(x * (1.0 / SQUARE_MM)), 0), begins.shape[2] - 2)
+    return column, min(max(np.int64(y * (1.0 / SQUARE_MM)), 0), begins.shape[1] - 1)
 
 
 @kernel
 def enter_all(scene: Any, world: Any) -> Any:
-    """Write down which disc is over which square, for all of a world, so that each chain counts upwards."""
-    heads, links, _ = scene[3]
-    heads[world] = -1
-    for disc in range(count_discs(scene)[1] - 1, -1, -1):
+    """Write down which discs of a world are over which square, in each square in the order of their numbers."""
+    begins, entries, spots, _ = scene[3]
+    disc_count = count_discs(scene)[1]
+    begins[world] = 0
+    for disc in range(disc_count):
         if is_on_floor(scene, world, disc):
             x, y, _ = disc_at(scene, world, disc)
-            column, row = square_of(heads, x, y)
-            links[world, disc] = heads[world, row, column]
-            heads[world, row, column] = disc
+            column, row = square_of(begins, x, y)
+            begins[world, row, column] += 1
+    # From how many there are to where each square ends, and from there, disc by disc, to where it begins.
+    total = np.int32(0)
+    for row in range(begins.shape[1]):
+        for column in range(begins.shape[2]):
+            total += begins[world, row, column]
+            begins[world, row, column] = total
+    for disc in range(disc_count - 1, -1, -1):
+        if is_on_floor(scene, world, disc):
+            x, y, radius = disc_at(scene, world, disc)
+            column, row = square_of(begins, x, y)
+            place = begins[world, row, column] - 1
+            begins[world, row, column] = place
+            entries[world, place] = disc
+            spots[world, place, 0], spots[world, place, 1], spots[world, place, 2] = x, y, radius
 
 
 @entry
@@ -115,23 +131,19 @@ def find_near(scene: Any, world: Any, x: Any, y: Any, reach_mm: Any, itself: Any
         itself: The disc that does not count.
         found: int64 [limit]; what is beyond its end is left out.
     """
-    heads, links, widest = scene[3]
-    if links.shape[1] == 1 and itself == 0:
+    begins, entries, spots, widest = scene[3]
+    if entries.shape[1] == 1 and itself == 0:
         return 0
     farthest = reach_mm + widest
     count = 0
-    first_column, first_row = square_of(heads, x - farthest, y - farthest)
-    last_column, last_row = square_of(heads, x + farthest, y + farthest)
+    first_column, first_row = square_of(begins, x - farthest, y - farthest)
+    last_column, last_row = square_of(begins, x + farthest, y + farthest)
     for row in range(first_row, last_row + 1):
-        for column in range(first_column, last_column + 1):
-            disc = heads[world, row, column]
-            while disc >= 0:
-                disc_x, disc_y, radius = disc_at(scene, world, disc)
-                dx, dy, far = disc_x - x, disc_y - y, reach_mm + radius
-                if dx * dx + dy * dy < far * far and disc != itself and count < found.shape[0]:
-                    found[count] = disc
-                    count += 1
-                disc = links[world, disc]
+        for place in range(begins[world, row, first_column], begins[world, row, last_column + 1]):
+            dx, dy, far = spots[world, place, 0] - x, spots[world, place, 1] - y, reach_mm + spots[world, place, 2]
+            if dx * dx + dy * dy < far * far and entries[world, place] != itself and count < found.shape[0]:
+                found[count] = entries[world, place]
+                count += 1
     return count
 
 
@@ -145,12 +157,3 @@ def moment_of(tick_count: Any, time_ns: Any) -> Any:
     age_ns = max(tick_count * TICK_NS - time_ns, 0)
     ticks_ago = min(age_ns // TICK_NS, TRAIL_LENGTH - 1)
     return ticks_ago, min((age_ns - ticks_ago * TICK_NS) * (1.0 / TICK_NS), 1.0)
-
-
-@kernel
-def place_at(thing: Any, ticks_ago: Any, back: Any) -> Any:
-    """Return where the centre of a robot or body was at a moment of `moment_of` [mm]."""
-    x, y = thing.x_mm, thing.y_mm
-    if ticks_ago > 0:
-        x, y = thing.trail[ticks_ago - 1, 0], thing.trail[ticks_ago - 1, 1]
-    return x + back * (thing.trail[ticks_ago, 0] - x), y + back * (thing.trail[ticks_ago, 1] - y)
