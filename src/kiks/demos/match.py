@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.demos import pitch
+from kiks.engine.numbers import uniform
 from kiks.errors import ParameterError
 from kiks.model.robot import RobotSpec
 from kiks.ports.programs import Command, Programs
@@ -26,6 +27,16 @@ LOOK_S = 0.1
 
 STILL_MM, STILL_S = 40.0, 10.0
 """A ball that has come no farther than that in this time is taken back to the middle."""
+
+
+DROP_MM = 40.0, 120.0
+"""How far from the middle mark the ball may fall, along the pitch and across it [mm]."""
+
+ATTEMPTS = 100
+"""Places that are tried for it."""
+
+STREAM_REFEREE = 101
+"""Random stream of these places."""
 
 
 class FullTime(Exception):  # noqa: N818 - nothing went wrong
@@ -87,8 +98,7 @@ class Match(Simulation):
         for robot in (1, 2):
             self.fit(robot, "k213")
         self.report = Report()
-        self._rest_s = 0.0
-        self._rest = (pitch.MIDDLE_X_MM, pitch.MIDDLE_Y_MM)
+        self._drop()
 
     def advance_to(self, time_ns: int) -> None:
         """Let time pass, and let the referee look at each of his instants on the way.
@@ -127,23 +137,25 @@ class Match(Simulation):
         side = scorer(x_mm, radius_mm)
         if side is not None:
             self.report.goals.append(Goal(self.time_s, side))
-            self._to_the_middle()
+            self._drop()
         elif math.hypot(x_mm - self._rest[0], y_mm - self._rest[1]) > STILL_MM:
             self._rest, self._rest_s = (x_mm, y_mm), self.time_s
-        elif math.hypot(x_mm - pitch.MIDDLE_X_MM, y_mm - pitch.MIDDLE_Y_MM) > STILL_MM and self.time_s - self._rest_s > STILL_S:
+        elif self.time_s - self._rest_s > STILL_S:
             self.report.drops_s.append(self.time_s)
-            self._to_the_middle()
+            self._drop()
 
-    def _to_the_middle(self) -> None:
-        """Put the ball on the middle mark, or as near to it on the middle line as robots leave room."""
-        for offset_mm in range(0, 300, 20):
-            for y_mm in (pitch.MIDDLE_Y_MM + offset_mm, pitch.MIDDLE_Y_MM - offset_mm):
-                try:
-                    self.move_body(self.ball, pitch.MIDDLE_X_MM, y_mm)
-                except ParameterError:
-                    continue  # somebody stands there
-                self._rest, self._rest_s = (pitch.MIDDLE_X_MM, y_mm), self.time_s
-                return
+    def _drop(self) -> None:
+        """Drop the ball near the middle mark: a little to one side, as a hand does, and not onto a robot."""
+        for attempt in range(ATTEMPTS):
+            x_share, y_share = (uniform(self.seed, 0, 0, STREAM_REFEREE, self.now_ns + attempt, axis) for axis in (0, 1))
+            x_mm = pitch.MIDDLE_X_MM + DROP_MM[0] * (2.0 * x_share - 1.0)
+            y_mm = pitch.MIDDLE_Y_MM + DROP_MM[1] * (2.0 * y_share - 1.0)
+            try:
+                self.move_body(self.ball, x_mm, y_mm)
+            except ParameterError:
+                continue  # somebody stands there
+            self._rest, self._rest_s = (x_mm, y_mm), self.time_s
+            return
 
     def trail(self) -> NDArray[np.float64]:
         """Return where everybody was at each look, float64 [look, left, right or ball, x or y] [mm]."""

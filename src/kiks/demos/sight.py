@@ -34,6 +34,12 @@ TOUCHING_MM = 62.0
 UNKNOWN_MM = 150.0
 """How far a ball is taken to be of which only one edge is seen."""
 
+FLAT = 50.0
+"""Most difference of greys in a picture that the ball fills."""
+
+BLUR_RAD = 0.05
+"""By how much motion may widen the ball."""
+
 LENS_MARGIN = 15.0
 """What is so near to the brightest that the lens lets through may in truth be brighter."""
 
@@ -67,7 +73,7 @@ class Sighting:
         if left is None and right is None:
             return TOUCHING_MM, 0.0
         shown = (EDGE_RAD if left is None else left) - (-EDGE_RAD if right is None else right)
-        nearer_mm = max(TOUCHING_MM, min(distance_mm or UNKNOWN_MM, self._distance_mm(shown)))
+        nearer_mm = max(TOUCHING_MM, min(distance_mm or UNKNOWN_MM, self._distance_mm(shown - BLUR_RAD)))
         half = math.asin(BALL_MM / nearer_mm)
         return nearer_mm, left - half if left is not None else (right or 0.0) + half
 
@@ -160,6 +166,8 @@ def find_ball(greys: Sequence[float]) -> Sighting | None:
         beside = greys[max(i - 4, 0) : i + 1] if step < 0 else greys[i : i + 5]
         ends.append(crossing(greys, top, step, (peak + min(beside)) / 2) if beside else None)
     left, right = (None if end is None else bearing(end) for end in ends)
+    if left is None and right is None and min(greys) < peak - FLAT:
+        return None  # the light level was that of another picture
     return Sighting(left, right)
 
 
@@ -198,9 +206,10 @@ class Eye:
 
     def look(self) -> View:
         """Take a picture and say what it shows."""
+        # In this order: the picture follows so soon that it is nearly always the one that the light level is of.
+        high, low = self.robot.turret(2, "L")
         greys = smooth(self.robot.turret(2, "S"))
         undarken(greys)
-        high, low = self.robot.turret(2, "L")
         shift = exposure(greys, 256 * high + low)
         true = [grey - shift for grey in greys]
         return View(find_ball(true), find_edges(true, shift))

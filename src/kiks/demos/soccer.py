@@ -98,6 +98,8 @@ class Player:
         self.search_s = 0.0
         self.now_s = robot.time_s
         self.turn_sign = 1
+        self.wanted = 0.0
+        self.speeds = (0, 0)
 
     def step(self) -> None:
         """Look once, and set the speeds."""
@@ -120,8 +122,10 @@ class Player:
     def _see_ball(self, sighting: Sighting | None) -> None:
         """Note where the ball is; forget it when it is not where it should be."""
         place = self.place
-        if sighting is not None and (self.ball is not None or sighting.is_whole):
+        if sighting is not None:
             distance, bearing = sighting.where(None if self.ball is None else self._way_to(self.ball)[0])
+            if self.ball is None and not sighting.is_whole and abs(bearing) > 0.15:
+                return  # it might be anywhere behind that edge: turn to it first
             angle = place.heading + bearing
             self.ball = Point(
                 _within(place.x + distance * math.cos(angle), LENGTH_MM / 2),
@@ -212,11 +216,14 @@ class Player:
         """Set the speeds of the wheels: forwards [pulses/10 ms] and turning."""
         turn = _within(turn_rad_s, 3.0) * self.place.BASE_MM / 2 / PULSE_MM_S
         self.wanted = speed
-        self.robot.set_speed(speed - turn, speed + turn)
+        speeds = round(speed - turn), round(speed + turn)
+        if speeds != self.speeds:
+            self.robot.set_speed(*speeds)
+            self.speeds = speeds
 
     def _notice_block(self, way_mm: float, passed_s: float) -> None:
         """Back off when the wheels hardly turn."""
-        wanted_mm = getattr(self, "wanted", 0.0) * PULSE_MM_S * passed_s
+        wanted_mm = self.wanted * PULSE_MM_S * passed_s
         is_blocked = wanted_mm > 3.0 and way_mm < 0.35 * wanted_mm
         self.blocked_s = self.blocked_s + passed_s if is_blocked else 0.0
         if self.blocked_s > 0.5:
