@@ -91,8 +91,8 @@ class Match(Simulation):
         if not (math.isfinite(seconds) and seconds >= LOOK_S):
             raise ParameterError(f"seconds must be a number of at least {LOOK_S}, but it was {seconds!r}. Take 300.")
         jersey = RobotSpec.load("khepera").with_changes(body__brightness=pitch.JERSEY)
-        self._look_ns = 0
-        self._end_ns = ns_from_s(seconds)
+        self._period_ns, self._end_ns = ns_from_s(LOOK_S), ns_from_s(seconds)
+        self._next_ns = 0
         super().__init__(pitch.arena(), robots=2, seed=seed, robot=jersey)
         self.ball = self.add_ball(pitch.MIDDLE_X_MM, pitch.MIDDLE_Y_MM, brightness=pitch.BALL)
         for robot in (1, 2):
@@ -108,13 +108,14 @@ class Match(Simulation):
         Raises:
             FullTime: At the end.
         """
-        while self._look_ns <= min(time_ns, self._end_ns):
-            super().advance_to(self._look_ns)
-            self._look_ns += ns_from_s(LOOK_S)
-            self._look()
-        super().advance_to(min(time_ns, self._end_ns))
-        if time_ns >= self._end_ns:
-            raise FullTime
+        while self._next_ns <= time_ns:
+            super().advance_to(self._next_ns)
+            if self._next_ns % self._period_ns == 0:
+                self._look()
+            if self._next_ns == self._end_ns:
+                raise FullTime
+            self._next_ns = min(self._next_ns + self._period_ns, self._end_ns)
+        super().advance_to(time_ns)
 
     def finish(self) -> None:
         """Let time pass to the end.

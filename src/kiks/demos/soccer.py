@@ -24,6 +24,9 @@ from kiks.demos.whereabouts import Whereabouts
 BAUD = 38400
 """A picture takes 41 ms on this line, and 165 ms at 9600 baud: the ball would be gone."""
 
+PAUSE_S = 0.02
+"""How long to wait after each step [s]: the wheels need some time to follow, and the next picture to be another."""
+
 LENGTH_MM, WIDTH_MM = 1050.0, 680.0
 """The pitch between the goal lines, and between the side walls."""
 
@@ -243,6 +246,7 @@ def play(name: str, side: str = "left", style: str = "attacker") -> None:
         player = Player(robot, side, STYLES[style])
         while True:
             player.step()
+            robot.pause(PAUSE_S)
 
 
 if __name__ == "__main__":
