@@ -11,7 +11,10 @@ if TYPE_CHECKING:
 
 ArenaFile = Annotated[str | None, typer.Option(help="Arena file (.toml) or picture; the classic box if left out.")]
 Robots = Annotated[int, typer.Option(help="Robots in the arena.", min=1, max=1000)]
-RobotKind = Annotated[str, typer.Option(help="Kind of robot: khepera, khepera_ii, or a file.")]
+RobotKinds = Annotated[
+    list[str] | None,
+    typer.Option("--robot", help="Kind of robot: khepera, khepera_ii, or a file; once for all, or once for each."),
+]
 WhenSilent = Annotated[
     str,
     typer.Option(help="A program that is silent while others wait: wait for it, drop it, or ignore: go on without it."),

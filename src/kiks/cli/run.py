@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import ArenaFile, PatienceS, RobotKind, Seed, WhenSilent, load_arena
+from kiks.cli.log import show_log
+from kiks.cli.options import ArenaFile, PatienceS, RobotKinds, Seed, WhenSilent, load_arena
 from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ def run(
     ] = None,
     arena: ArenaFile = None,
     robots: Annotated[int, typer.Option(help="Robots in the arena; at least one a program.", min=1, max=1000)] = 1,
-    robot: RobotKind = "khepera",
+    robot: RobotKinds = None,
     seed: Seed = 0,
     thinking: Annotated[
         str, typer.Option(help="What the program's computing costs: none, fixed:MS, live, live:FACTOR, replay:FILE.")
@@ -48,6 +49,8 @@ def run(
     Example: kiks run --arena examples/arenas/maze.toml --map /dev/ttyUSB0=1 wander.py
     """
     ready_engine()
+    show_log()
+    kinds = robot or ["khepera"]
     from kiks.ports.turns import check_policy
     from kiks.sim.simulation import Simulation
 
@@ -56,10 +59,10 @@ def run(
     check_policy(when_silent, patience)
     sim = Simulation(
         load_arena(arena),
-        robots=max(robots, len(commands)),
+        robots=max(robots, len(kinds), len(commands)),
         seed=seed,
         thinking=thinking if len(commands) == 1 else "none",
-        robot=robot,
+        robot=kinds,
     )
     code, doubt = 1, ""
     try:

@@ -10,7 +10,8 @@ import typer
 
 from kiks.cli.ending import end_as_with_ctrl_c
 from kiks.cli.engine_start import compile_everything, ready_engine
-from kiks.cli.options import ArenaFile, PatienceS, RobotKind, Robots, Seed, WhenSilent, load_arena
+from kiks.cli.log import show_log
+from kiks.cli.options import ArenaFile, PatienceS, RobotKinds, Robots, Seed, WhenSilent, load_arena
 from kiks.errors import LinkError
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ TCP_PORT = 10020
 def serve(
     arena: ArenaFile = None,
     robots: Robots = 1,
-    robot: RobotKind = "khepera",
+    robot: RobotKinds = None,
     seed: Seed = 0,
     speed: Annotated[float, typer.Option(help="Simulated seconds in a real one, for thinking live.")] = 1.0,
     thinking: Annotated[
@@ -64,8 +65,11 @@ def serve(
         if not quiet:
             typer.echo(text)
 
+    show_log(is_quiet=quiet)
+    kinds = robot or ["khepera"]
+    robots = max(robots, len(kinds))
     ground = load_arena(arena)
-    sim = Simulation(ground, robots=robots, seed=seed, robot=robot)
+    sim = Simulation(ground, robots=robots, seed=seed, robot=kinds)
     for wire in sim.wires:
         wire.set_baud(baud)
     if not quiet:
@@ -97,7 +101,8 @@ def serve(
         say(_what_is_repeatable(thinking, speed, robots if programs is None else programs))
         server.serve()
     except KeyboardInterrupt:
-        say(f"Stopped after {sim.time_s:.1f} s of simulated time.")
+        state = "" if thinking == "live" else f" State {sim.state_hash()}."
+        say(f"Stopped after {sim.time_s:.1f} s of simulated time.{state}")
     finally:
         if server is not None:
             server.close()
