@@ -1,65 +1,102 @@
-"""A picture of a run: the arena from above, the robot's path and the robot at its end."""
+"""Pictures of a run, from above: walls, lamps, robots, balls and cylinders, where they began, and their paths."""
 
 from __future__ import annotations
 
+import colorsys
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kiks.engine.state import BALL
 from kiks.errors import ParameterError
 from kiks.model.arena import PAD, Arena
+from kiks.sim.simulation import Simulation
 
 if TYPE_CHECKING:
     from PIL.Image import Image
 
+Colour = tuple[int, ...]
+Place = tuple[float, float]
+
 _FLOOR = (246, 243, 236)
-_BODY = (38, 84, 60)
-_PATH_BEGIN = (66, 135, 245)
-_PATH_END = (220, 60, 60)
+_INK = (30, 34, 40)
+_WHITE = (255, 255, 255)
+_ONE_ROBOT = (38, 84, 60)
+_PATH_BEGIN, _PATH_END = (66, 135, 245), (220, 60, 60)
+_BALL, _CYLINDER = (245, 130, 40), (172, 118, 66)
+_LIGHT = (255, 205, 40)
+_LAMP_OFF = (165, 160, 150)
 _LONGEST_SIDE = 1200
 _FINER = 2  # drawn that much larger and shrunk, which smooths the lines
+_GOLDEN = 0.618034  # hues that differ by this share of the circle stay apart, however many there are
 
 
-def draw_run(arena: Arena, path: Sequence[tuple[float, float, float]], *, diameter_mm: float) -> Image:
-    """Return a picture of a run.
+class Trace:
+    """The way of a simulation to where it stands: the paths of robots, and places of balls and cylinders.
 
     Args:
-        arena: Where it took place.
-        path: Poses x_mm, y_mm, heading_rad in their order; the robot is drawn at the last one.
-        diameter_mm: The robot's.
+        sim: The simulation; from now on it records the paths of its robots.
+        every_s: Time between two points of a path [s], whole hundredths.
+
+    Attributes:
+        bodies: The places of each ball and cylinder at each note, by its number.
     """
-    from PIL import Image, ImageDraw
 
-    scale = _FINER * min(_LONGEST_SIDE / max(arena.width_mm, arena.height_mm), 2.0)
-    size = (max(round(arena.width_mm * scale), 1), max(round(arena.height_mm * scale), 1))
-    cells = np.flipud(arena.surface[PAD:-PAD, PAD:-PAD])
-    # Walls are shown darker than they are: on paper a white wall would be taken for floor.
-    shade = (40 + cells.astype(np.uint16) * 150 // 255).astype(np.uint8)
-    colours = np.where((cells == 0)[..., None], np.array(_FLOOR, np.uint8), shade[..., None])
-    image = Image.fromarray(colours.astype(np.uint8), "RGB").resize(size, Image.Resampling.LANCZOS)
-    draw = ImageDraw.Draw(image)
+    def __init__(self, sim: Simulation, every_s: float = 0.1) -> None:
+        self.sim = sim
+        self.sim.record_paths(every_s)
+        self.bodies: dict[int, list[Place]] = {}
+        self.note()
 
-    def point(x_mm: float, y_mm: float) -> tuple[float, float]:
-        return x_mm * scale, (arena.height_mm - y_mm) * scale
+    def note(self) -> None:
+        """Write down where balls and cylinders are now; robots need no notes."""
+        for body in self.sim.bodies():
+            self.bodies.setdefault(int(body["number"]), []).append((float(body["x_mm"]), float(body["y_mm"])))
 
-    steps = max(len(path) - 1, 1)
-    for k in range(len(path) - 1):
-        share = k / steps
-        colour = tuple(round(a + (b - a) * share) for a, b in zip(_PATH_BEGIN, _PATH_END, strict=True))
-        draw.line(
-            [point(*path[k][:2]), point(*path[k + 1][:2])], fill=colour, width=max(round(scale), 2), joint="curve"
-        )
-    if path:
-        x_mm, y_mm, heading = path[-1]
-        radius = diameter_mm / 2
-        (left, top), (right, bottom) = point(x_mm - radius, y_mm + radius), point(x_mm + radius, y_mm - radius)
-        draw.ellipse((left, top, right, bottom), fill=_BODY)
-        nose = point(x_mm + radius * math.cos(heading), y_mm + radius * math.sin(heading))
-        draw.line([point(x_mm, y_mm), nose], fill=(255, 255, 255), width=max(round(scale * 3), 1))
-    return image.resize((size[0] // _FINER, size[1] // _FINER), Image.Resampling.LANCZOS)
+    def paths(self) -> list[list[list[float]]]:
+        """Return the poses of each robot on its way: x_mm, y_mm, heading_rad."""
+        poses: list[list[list[float]]] = self.sim.paths()[:, :, 1:].tolist()
+        return poses
+
+
+def draw_simulation(sim: Simulation, trace: Trace | None = None) -> Image:
+    """Return a picture of a simulation as it stands.
+
+    Args:
+        sim: The simulation.
+        trace: The way there: paths are drawn, and faintly what stood where at the beginning.
+
+    Example:
+        >>> sim = Simulation(Arena.box(300, 200))
+        >>> draw_simulation(sim).size
+        (600, 400)
+    """
+    from PIL import Image
+
+    sheet = _Sheet(sim.arena)
+    radii_mm = [spec.body.radius_mm for spec in sim.specs]
+    for x_mm, y_mm, power_w, is_on in sim.lamps.tolist():
+        sheet.lamp((x_mm, y_mm), power_w, is_on=bool(is_on))
+    bodies = sim.bodies()
+    if trace is not None:
+        for index, (radius_mm, poses) in enumerate(zip(radii_mm, trace.paths(), strict=True)):
+            sheet.path(poses, _colours(index, sim.robot_count, len(poses)), 1.2 if sim.robot_count == 1 else 1.6)
+            sheet.ring(poses[0][:2], radius_mm, (*_robot_colour(index, sim.robot_count), 90))
+        for body in bodies:
+            places = trace.bodies.get(int(body["number"]), [])
+            sheet.line(places, (*_tint(body), 200), 2.4)
+            if places:
+                sheet.ring(places[0], float(body["radius_mm"]), (*_tint(body), 190))
+    for body in bodies:
+        place, radius_mm = (float(body["x_mm"]), float(body["y_mm"])), float(body["radius_mm"])
+        sheet.body(place, radius_mm, _tint(body), is_ball=bool(body["what"] == BALL))
+    for index, pose in enumerate(sim.poses().tolist()):
+        sheet.robot(pose, radii_mm[index], _robot_colour(index, sim.robot_count), str(index + 1))
+    width, height = sheet.image.size
+    return sheet.image.resize((width // _FINER, height // _FINER), Image.Resampling.LANCZOS)
 
 
 def save_picture(image: Image, path: str | Path) -> None:
@@ -74,3 +111,122 @@ def save_picture(image: Image, path: str | Path) -> None:
         raise ParameterError(
             f"a picture must go to a writable file like 'run.png', but {str(path)!r} failed: {error}."
         ) from None
+
+
+def _robot_colour(index: int, robot_count: int) -> Colour:
+    """Return the colour of a robot: one has a green of its own, of several each another hue."""
+    if robot_count == 1:
+        return _ONE_ROBOT
+    red, green, blue = colorsys.hls_to_rgb((0.6 + index * _GOLDEN) % 1.0, 0.36, 0.72)
+    return round(255 * red), round(255 * green), round(255 * blue)
+
+
+def _colours(index: int, robot_count: int, count: int) -> Iterable[Colour]:
+    """Return the colours along a path: of one robot from blue to red, of several from faint to full."""
+    for k in range(count):
+        share = k / max(count - 1, 1)
+        begin: Colour = (*_PATH_BEGIN, 170)
+        end: Colour = (*_PATH_END, 200)
+        if robot_count > 1:
+            begin, end = ((*_robot_colour(index, robot_count), opacity) for opacity in (90, 200))
+        yield tuple(round(a + (b - a) * share) for a, b in zip(begin, end, strict=True))
+
+
+def _tint(body: Any) -> Colour:
+    """Return the colour of a body: that of its kind, and the darker, the less light it sends back."""
+    full = _BALL if body["what"] == BALL else _CYLINDER
+    share = 0.35 + 0.65 * min(int(body["brightness"]) / 190, 1.0)
+    return tuple(round(part * share) for part in full)
+
+
+class _Sheet:
+    """A picture in the making, in millimetres; later strokes lie over earlier ones.
+
+    Args:
+        arena: What is drawn on it first.
+    """
+
+    def __init__(self, arena: Arena) -> None:
+        from PIL import Image, ImageDraw
+
+        self.height_mm = arena.height_mm
+        self.scale = _FINER * min(_LONGEST_SIDE / max(arena.width_mm, arena.height_mm), 2.0)
+        size = (max(round(arena.width_mm * self.scale), _FINER), max(round(arena.height_mm * self.scale), _FINER))
+        cells = np.flipud(arena.surface[PAD:-PAD, PAD:-PAD])
+        # Walls are shown darker than they are: on paper a white wall would be taken for floor.
+        shade = (40 + cells.astype(np.uint16) * 150 // 255).astype(np.uint8)
+        colours = np.where((cells == 0)[..., None], np.array(_FLOOR, np.uint8), shade[..., None])
+        self.image = Image.fromarray(colours.astype(np.uint8), "RGB").resize(size, Image.Resampling.LANCZOS)
+        self.pen = ImageDraw.Draw(self.image, "RGBA")
+
+    def point(self, place: Sequence[float]) -> Place:
+        """Return the pixel of a place [mm]."""
+        return place[0] * self.scale, (self.height_mm - place[1]) * self.scale
+
+    def disc(self, place: Sequence[float], radius_mm: float, fill: Colour | None, **outline: Any) -> None:
+        x, y = self.point(place)
+        radius = radius_mm * self.scale
+        self.pen.ellipse((x - radius, y - radius, x + radius, y + radius), fill=fill, **outline)
+
+    def ring(self, place: Sequence[float], radius_mm: float, colour: Colour) -> None:
+        """Draw where something stood: faint, for it is no more."""
+        self.disc(place, radius_mm, (*colour[:3], colour[3] // 5), outline=colour, width=self.pixels(1.2))
+
+    def pixels(self, length_mm: float) -> int:
+        return max(round(length_mm * self.scale), _FINER)
+
+    def line(self, places: Sequence[Sequence[float]], colour: Colour, width_mm: float) -> None:
+        if len(places) > 1:
+            points = [self.point(place) for place in places]
+            self.pen.line(points, fill=colour, width=self.pixels(width_mm), joint="curve")
+
+    def path(self, poses: Sequence[Sequence[float]], colours: Iterable[Colour], width_mm: float) -> None:
+        points = [self.point(pose) for pose in poses]
+        for begin, end, colour in zip(points, points[1:], colours, strict=False):
+            self.pen.line([begin, end], fill=colour, width=self.pixels(width_mm))
+
+    def lamp(self, place: Place, power_w: float, *, is_on: bool) -> None:
+        """Draw a lamp, and its light as far as a sensor that looks at it would read less than half of darkness."""
+        if is_on:
+            reach_mm = 90.0 * math.sqrt(power_w)
+            rings = 24
+            for k in range(rings):
+                self.disc(place, reach_mm * (1 - k / rings), (*_LIGHT, 7))
+        colour = _LIGHT if is_on else _LAMP_OFF
+        for k in range(8):
+            turn = k * math.pi / 4
+            ends = [(place[0] + r * math.cos(turn), place[1] + r * math.sin(turn)) for r in (11.0, 18.0)]
+            self.line(ends, _INK if is_on else _LAMP_OFF, 2.0)
+        self.disc(place, 8.0, colour, outline=_INK, width=self.pixels(1.2))
+
+    def body(self, place: Place, radius_mm: float, colour: Colour, *, is_ball: bool) -> None:
+        """Draw a ball with a glint, or a cylinder with its rim."""
+        self.disc(place, radius_mm, colour, outline=_INK, width=self.pixels(1.2))
+        if is_ball:
+            self.disc((place[0] - radius_mm / 3, place[1] + radius_mm / 3), radius_mm / 4, (*_WHITE, 170))
+        else:
+            self.disc(place, 0.62 * radius_mm, None, outline=(*_WHITE, 110), width=self.pixels(1.2))
+
+    def robot(self, pose: Sequence[float], radius_mm: float, colour: Colour, name: str) -> None:
+        """Draw a robot from above: two wheels, a nose that shows its heading, and its number."""
+        from PIL import ImageFont
+
+        x_mm, y_mm, heading = pose
+        ahead, aside = (math.cos(heading), math.sin(heading)), (-math.sin(heading), math.cos(heading))
+
+        def at(forwards: float, sideways: float) -> Place:
+            """Return the pixel of a place on the robot, in radii."""
+            along_mm, across_mm = forwards * radius_mm, sideways * radius_mm
+            x = x_mm + along_mm * ahead[0] + across_mm * aside[0]
+            return self.point((x, y_mm + along_mm * ahead[1] + across_mm * aside[1]))
+
+        self.disc((x_mm, y_mm), radius_mm, colour, outline=_INK, width=self.pixels(1.0))
+        for side in (-1, 1):
+            wheel = [at(0.35, 0.92 * side), at(0.35, 0.72 * side), at(-0.35, 0.72 * side), at(-0.35, 0.92 * side)]
+            self.pen.polygon(wheel, fill=_INK)
+        self.pen.polygon([at(0.98, 0.0), at(0.5, 0.42), at(0.5, -0.42)], fill=_WHITE)
+        font = ImageFont.load_default(max(radius_mm * self.scale * 0.72, 8.0))
+        self.pen.text(at(-0.16, 0.0), name, fill=_WHITE, font=font, anchor="mm", stroke_width=1, stroke_fill=_WHITE)
+
+
+__all__ = ["Trace", "draw_simulation", "save_picture"]

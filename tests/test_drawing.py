@@ -1,0 +1,80 @@
+"""Pictures of a run show what there is, where it is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+import kiks
+from kiks.drawing import Trace, draw_simulation, save_picture
+from kiks.errors import ParameterError
+from kiks.model.arena import Pose
+
+FLOOR = (246, 243, 236)
+SCALE = 2  # pixels a millimetre, in arenas of less than 600 mm
+
+
+def world() -> kiks.Simulation:
+    arena = replace(kiks.Arena.box(400, 300), starts=(Pose(100, 100, 0.0), Pose(300, 100, math.pi / 2)))
+    sim = kiks.Simulation(arena, robots=2)
+    sim.add_ball(100, 220)
+    sim.add_cylinder(200, 220)
+    sim.add_lamp(300, 220)
+    return sim
+
+
+def pixel(image, x_mm: float, y_mm: float) -> tuple[int, int, int]:
+    return image.getpixel((round(x_mm * SCALE), image.height - 1 - round(y_mm * SCALE)))
+
+
+def test_everything_is_where_it_is() -> None:
+    image = draw_simulation(world())
+    assert image.size == (800, 600)
+    assert pixel(image, 200, 50) == FLOOR
+    assert max(pixel(image, 4, 150)) < 200  # a wall
+    red, _, blue = pixel(image, 100, 210)
+    assert red > blue + 100  # the ball
+    assert pixel(image, 211, 220)[0] < 200  # the cylinder
+    assert pixel(image, 300, 220)[2] < 100  # the lamp
+    assert pixel(image, 300, 280)[2] < FLOOR[2]  # its light
+    assert min(pixel(image, 121, 100)) > 240  # noses, of which one looks right and the other up
+    assert min(pixel(image, 300, 121)) > 240
+    one, other = pixel(image, 100, 120), pixel(image, 320, 107)
+    assert max(one) < 200
+    assert max(other) < 200
+    assert one != other
+
+
+def test_a_trace_shows_where_everything_was() -> None:
+    sim = world()
+    trace = Trace(sim)
+    before = pixel(draw_simulation(sim), 200, 190)
+    sim.place(1, 200, 100, 0.0)
+    sim.move_body(2, 200, 160)
+    sim.run(0.2)
+    trace.note()
+    image = draw_simulation(sim, trace)
+    assert before == FLOOR
+    assert pixel(image, 200, 190) != FLOOR  # the cylinder's path
+    assert pixel(image, 150, 100) != FLOOR  # the robot's
+    assert pixel(image, 90, 110) != FLOOR  # where it began, faintly
+    assert min(pixel(image, 90, 110)) > 180
+
+
+def test_what_came_later_or_went_is_no_trouble() -> None:
+    sim = world()
+    trace = Trace(sim)
+    sim.remove_body(1)
+    sim.add_ball(200, 50)
+    sim.lamps[:, 3] = 0
+    assert draw_simulation(sim, trace).size == (800, 600)
+    trace.note()
+    assert draw_simulation(sim, trace).size == (800, 600)
+
+
+@pytest.mark.parametrize("name", ["no/such/folder/x.png", "x.nothing"])
+def test_a_picture_that_cannot_be_written_says_so(name: str, tmp_path) -> None:
+    with pytest.raises(ParameterError, match=r"a picture must go to a writable file like 'run.png'"):
+        save_picture(draw_simulation(world()), tmp_path / name)
