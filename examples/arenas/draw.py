@@ -13,6 +13,8 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
+from kiks.demos import pitch
+
 Picture = npt.NDArray[np.uint8]
 
 WALL_MM = 10
@@ -127,31 +129,12 @@ def _oval(picture: Picture, radius_mm: int, brightness: int) -> None:
     fill(picture, 250, 250 - radius_mm, 100, 2 * radius_mm, brightness)
 
 
-def pitch() -> Picture:
-    """Draw a soccer pitch of 1050 x 680 mm with round corners, and at each end a goal of 300 x 80 mm.
-
-    The goals are lined in greys of their own. Their lining begins 6 mm behind the goal line, so that the posts, which
-    are what a camera takes its bearings from, are the edges of the wall.
-    """
-    wall, left_goal, right_goal, corner_mm = 40, 100, 165, 140
-    picture = np.full((700, 1230), wall, np.uint8)
-    fill(picture, 90 + corner_mm, 10, 1050 - 2 * corner_mm, 680, 0)
-    fill(picture, 90, 10 + corner_mm, 1050, 680 - 2 * corner_mm, 0)
-    for x_mm in (90 + corner_mm, 1140 - corner_mm):
-        for y_mm in (10 + corner_mm, 690 - corner_mm):
-            disc(picture, x_mm, y_mm, corner_mm, 0)
-    for lining_mm, floor_mm, brightness in ((0, 10, left_goal), (1146, 1140, right_goal)):
-        fill(picture, lining_mm, 190, 84, 320, brightness)
-        fill(picture, floor_mm, 200, 80, 300, 0)
-    return picture
-
-
 PICTURES = {
     "default.png": default,
     "maze.png": maze,
     "office.png": office,
     "pillars.tif": pillars,
-    "pitch.png": pitch,
+    "pitch.png": pitch.picture,
     "track.png": track,
 }
 

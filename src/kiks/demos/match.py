@@ -82,12 +82,15 @@ class Match(Simulation):
     Args:
         seconds: How long it lasts [s of simulated time].
         seed: Seed of all random numbers.
+        on_goal: Called after each goal.
 
     Attributes:
         report: What the referee has written down so far.
     """
 
-    def __init__(self, seconds: float = 300.0, seed: int = 0) -> None:
+    def __init__(
+        self, seconds: float = 300.0, seed: int = 0, on_goal: Callable[[Report], None] = lambda report: None
+    ) -> None:
         if not (math.isfinite(seconds) and seconds >= LOOK_S):
             raise ParameterError(f"seconds must be a number of at least {LOOK_S}, but it was {seconds!r}. Take 300.")
         jersey = RobotSpec.load("khepera").with_changes(body__brightness=pitch.JERSEY)
@@ -98,6 +101,7 @@ class Match(Simulation):
         for robot in (1, 2):
             self.fit(robot, "k213")
         self.report = Report()
+        self._on_goal = on_goal
         self._drop()
 
     def advance_to(self, time_ns: int) -> None:
@@ -138,6 +142,7 @@ class Match(Simulation):
         side = scorer(x_mm, radius_mm)
         if side is not None:
             self.report.goals.append(Goal(self.time_s, side))
+            self._on_goal(self.report)
             self._drop()
         elif math.hypot(x_mm - self._rest[0], y_mm - self._rest[1]) > STILL_MM:
             self._rest, self._rest_s = (x_mm, y_mm), self.time_s
