@@ -30,8 +30,8 @@ PAUSE_S = 0.02
 LENGTH_MM, WIDTH_MM = 1050.0, 680.0
 """The pitch between the goal lines, and between the side walls."""
 
-GOAL_MM = 300.0
-"""Width of a goal."""
+CORNER_MM = 140.0
+"""Radius of the pitch's corners."""
 
 MARK_MM = 250.0
 """How far from the middle a player stands at the kick-off."""
@@ -72,6 +72,9 @@ STYLES = {"attacker": Style(), "defender": Style(cruise=14.0, shot=24.0, zone_mm
 MEMORY_S = 2.5
 """How long the ball is believed to be where it was seen last."""
 
+START_MM = 140.0
+"""How far behind the ball a shot begins."""
+
 PASSING_MM = 85.0
 """How far from the middle of the ball a player passes it that wants to get behind it."""
 
@@ -101,6 +104,7 @@ class Player:
         self.search_s = 0.0
         self.now_s = robot.time_s
         self.turn_sign = 1
+        self.is_shooting = False
         self.wanted = 0.0
         self.speeds = (0, 0)
 
@@ -166,14 +170,20 @@ class Player:
                 self._drive(0.0, 2.0 * self._way_to(ball)[1])
             return
         aim = self._aim(ball)
-        behind = (ball.x - self.place.x) * aim.x + (ball.y - self.place.y) * aim.y
-        beside = (ball.x - self.place.x) * aim.y - (ball.y - self.place.y) * aim.x  # positive: robot is to the left
-        if behind > 20.0 and abs(beside) < max(0.45 * (behind - BALL_MM), 12.0):
-            # Behind it: come onto the line through ball and goal, and shoot along it.
+        to_x, to_y = ball.x - self.place.x, ball.y - self.place.y
+        behind, beside = to_x * aim.x + to_y * aim.y, abs(to_x * aim.y - to_y * aim.x)
+        start = self._inside(Point(ball.x - START_MM * aim.x, ball.y - START_MM * aim.y))
+        # Whoever has begun goes on, unless the ball gets away to the side.
+        cone = 0.9 if self.is_shooting else 0.45
+        is_behind = behind > 20.0 and beside < max(cone * (behind - BALL_MM), 12.0)
+        self.is_shooting = is_behind or (self._way_to(start)[0] < 30.0 and behind > 0.0)
+        if self.is_shooting:
+            # Come onto the line through ball and goal, and shoot along it.
             lead = 0.4 * behind if behind > 90.0 else -60.0
-            self._go(Point(ball.x - lead * aim.x, ball.y - lead * aim.y), self.style.shot if behind < 200 else self.style.cruise)
+            speed = self.style.shot if behind < 200.0 else self.style.cruise
+            self._go(Point(ball.x - lead * aim.x, ball.y - lead * aim.y), speed)
         else:
-            self._go_round(ball, self._inside(Point(ball.x - 140.0 * aim.x, ball.y - 140.0 * aim.y)))
+            self._go_round(ball, start)
 
     def _aim(self, ball: Point) -> Point:
         """Return the direction in which the ball should go: into the goal, but along a wall that it lies at."""
@@ -195,8 +205,14 @@ class Player:
 
     @staticmethod
     def _inside(point: Point) -> Point:
-        """Return the nearest point where a robot has room."""
-        return Point(_within(point.x, LENGTH_MM / 2 - 40.0), _within(point.y, WIDTH_MM / 2 - 40.0))
+        """Return a point near by where a robot has room; corners are round."""
+        x, y = _within(point.x, LENGTH_MM / 2 - 40.0), _within(point.y, WIDTH_MM / 2 - 40.0)
+        into_x, into_y = abs(x) - LENGTH_MM / 2 + CORNER_MM, abs(y) - WIDTH_MM / 2 + CORNER_MM
+        too_far = math.hypot(into_x, into_y) / (CORNER_MM - 35.0)
+        if into_x <= 0.0 or into_y <= 0.0 or too_far <= 1.0:
+            return Point(x, y)
+        shrunk_x, shrunk_y = into_x * (1.0 - 1.0 / too_far), into_y * (1.0 - 1.0 / too_far)
+        return Point(x - math.copysign(shrunk_x, x), y - math.copysign(shrunk_y, y))
 
     # ---- driving ----
 
