@@ -97,11 +97,14 @@ class Match(Simulation):
         self._period_ns, self._end_ns = ns_from_s(LOOK_S), ns_from_s(seconds)
         self._next_ns = 0
         super().__init__(pitch.arena(), robots=2, seed=seed, robot=jersey)
-        self.ball = self.add_ball(pitch.MIDDLE_X_MM, pitch.MIDDLE_Y_MM, brightness=pitch.BALL)
+        self.ball = self.add_ball(
+            pitch.MIDDLE_X_MM, pitch.MIDDLE_Y_MM, brightness=pitch.BALL, friction_mm_s2=pitch.FRICTION_MM_S2
+        )
         for robot in (1, 2):
             self.fit(robot, "k213")
         self.report = Report()
         self._on_goal = on_goal
+        self._rest, self._rest_s = (pitch.MIDDLE_X_MM, pitch.MIDDLE_Y_MM), 0.0
         self._drop()
 
     def advance_to(self, time_ns: int) -> None:
@@ -153,7 +156,9 @@ class Match(Simulation):
     def _drop(self) -> None:
         """Drop the ball near the middle mark: a little to one side, as a hand does, and not onto a robot."""
         for attempt in range(ATTEMPTS):
-            x_share, y_share = (uniform(self.seed, 0, 0, STREAM_REFEREE, self.now_ns + attempt, axis) for axis in (0, 1))
+            x_share, y_share = (
+                uniform(self.seed, 0, 0, STREAM_REFEREE, self.now_ns + attempt, axis) for axis in (0, 1)
+            )
             x_mm = pitch.MIDDLE_X_MM + DROP_MM[0] * (2.0 * x_share - 1.0)
             y_mm = pitch.MIDDLE_Y_MM + DROP_MM[1] * (2.0 * y_share - 1.0)
             try:

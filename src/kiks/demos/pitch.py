@@ -22,6 +22,9 @@ MIDDLE_X_MM, MIDDLE_Y_MM = 615.0, 350.0
 WALL, LEFT_GOAL, RIGHT_GOAL, JERSEY, BALL = 40, 95, 150, 20, 255
 """Brightnesses."""
 
+FRICTION_MM_S2 = 60.0
+"""What felt takes off the speed of a ball, three times as much as a smooth floor: a shot comes half across."""
+
 _CORNER_MM = 140
 
 

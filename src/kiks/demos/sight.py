@@ -113,7 +113,7 @@ def bearing(index: float) -> float:
 def ceiling(index: int) -> float:
     """Return the brightest that the lens lets a pixel of order S be: it darkens towards the edges."""
     share = abs(bearing(index)) / EDGE_RAD
-    return 240.0 - 108.0 * share**2.5
+    return 240.0 - 108.0 * share * share * math.sqrt(share)
 
 
 def exposure(greys: Sequence[float], light: int) -> float:

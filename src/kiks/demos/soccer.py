@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from kiks.client.khepera import Khepera
-from kiks.demos.sight import Eye, Sighting
+from kiks.demos.sight import BALL_MM, Eye, Sighting
 from kiks.demos.whereabouts import Whereabouts
 
 BAUD = 38400
@@ -36,9 +36,6 @@ CORNER_MM = 140.0
 MARK_MM = 250.0
 """How far from the middle a player stands at the kick-off."""
 
-BALL_MM, ROBOT_MM = 32.0, 27.5
-"""Radii."""
-
 PULSE_MM_S = 8.0
 """Speed of a wheel at one pulse in 10 ms [mm/s]."""
 
@@ -48,6 +45,10 @@ class Point(NamedTuple):
 
     x: float
     y: float
+
+
+HOME = Point(-150.0, 0.0)
+"""Where to look for the ball from, if it is nowhere."""
 
 
 @dataclass(frozen=True)
@@ -64,10 +65,11 @@ class Style:
     cruise: float = 16.0
     shot: float = 24.0
     zone_mm: float = 1000.0
-    home: Point = Point(-150.0, 0.0)
+    home: Point = HOME
 
 
-STYLES = {"attacker": Style(), "defender": Style(cruise=14.0, shot=24.0, zone_mm=60.0, home=Point(-380.0, 0.0))}
+STYLES = {"attacker": Style(), "defender": Style(zone_mm=60.0, home=Point(-380.0, 0.0))}
+"""The attacker goes for every ball, the defender waits before his goal until it comes over the middle."""
 
 MEMORY_S = 2.5
 """How long the ball is believed to be where it was seen last."""
@@ -163,8 +165,7 @@ class Player:
     def _play(self, ball: Point) -> None:
         """Go for the ball, or wait for it at home."""
         if ball.x > self.style.zone_mm:
-            distance, bearing = self._way_to(self.style.home)
-            if distance > 50.0:
+            if self._way_to(self.style.home)[0] > 50.0:
                 self._go(self.style.home, self.style.cruise)
             else:
                 self._drive(0.0, 2.0 * self._way_to(ball)[1])
@@ -256,8 +257,14 @@ def _within(value: float, limit: float) -> float:
     return max(-limit, min(limit, value))
 
 
-def play(name: str, side: str = "left", style: str = "attacker") -> None:
-    """Play until somebody switches the robot off."""
+def play(name: str = "kiks://1", side: str = "left", style: str = "attacker") -> None:
+    """Play until somebody switches the robot off.
+
+    Args:
+        name: Of the port.
+        side: 'left' or 'right'.
+        style: One of `STYLES`.
+    """
     with Khepera(name, baud=BAUD) as robot:
         player = Player(robot, side, STYLES[style])
         while True:
@@ -266,4 +273,4 @@ def play(name: str, side: str = "left", style: str = "attacker") -> None:
 
 
 if __name__ == "__main__":
-    play(*(sys.argv[1:] or ["kiks://1"]))
+    play(*sys.argv[1:])
