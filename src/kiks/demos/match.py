@@ -180,6 +180,16 @@ def scorer(x_mm: float, radius_mm: float) -> str | None:
     return "right" if x_mm < pitch.LEFT_LINE_MM - radius_mm else None
 
 
+class _Players(Programs):
+    """Programs that are ended from within the world, by the final whistle: their connections are ours to close."""
+
+    def close(self) -> None:
+        """End all processes that still run."""
+        super().close()
+        for run in self._runs:
+            run.guest._here.close()
+
+
 def play(match: Match, players: Sequence[Command], say: Callable[[str], None] = lambda text: None) -> str:
     """Let two programs play to the end; return why they might not play the same again, nothing if they would.
 
@@ -188,11 +198,11 @@ def play(match: Match, players: Sequence[Command], say: Callable[[str], None] = 
         players: The program of the left and of the right side.
         say: Where a person is told if a program ends before its time.
     """
-    programs = Programs(match, players, when_silent="wait", say=say)
+    programs = _Players(match, players, when_silent="wait", say=say)
     try:
         programs.run()
-        # Nobody plays any more, but the ball may still roll.
-        match.finish()
+        if not programs.doubt:
+            match.finish()  # nobody plays any more, but the ball may still roll
     except FullTime:
         pass
     return programs.doubt
