@@ -30,6 +30,9 @@ PAUSE_S = 0.02
 LENGTH_MM, WIDTH_MM = 1050.0, 680.0
 """The pitch between the goal lines, and between the side walls."""
 
+GOAL_MM = 300.0
+"""Width of a goal."""
+
 CORNER_MM = 140.0
 """Radius of the pitch's corners."""
 
@@ -137,7 +140,7 @@ class Player:
                 return  # it might be anywhere behind that edge: turn to it first
             angle = place.heading + bearing
             self.ball = Point(
-                _within(place.x + distance * math.cos(angle), LENGTH_MM / 2),
+                _within(place.x + distance * math.cos(angle), LENGTH_MM / 2 + BALL_MM),
                 _within(place.y + distance * math.sin(angle), WIDTH_MM / 2 - BALL_MM),
             )
             self.ball_s = self.now_s
@@ -186,10 +189,16 @@ class Player:
         else:
             self._go_round(ball, start)
 
-    def _aim(self, ball: Point) -> Point:
-        """Return the direction in which the ball should go: into the goal, but along a wall that it lies at."""
-        to_x, to_y = LENGTH_MM / 2 + 40.0 - ball.x, -ball.y
-        if abs(ball.y) > WIDTH_MM / 2 - 75.0:
+    @staticmethod
+    def _aim(ball: Point) -> Point:
+        """Return the direction in which the ball should go.
+
+        That is into the nearest part of the goal; along a wall that it lies at; and away from the own goal line.
+        """
+        to_x, to_y = LENGTH_MM / 2 + 80.0 - ball.x, _within(ball.y, GOAL_MM / 2 - 70.0) - ball.y
+        if ball.x < 90.0 - LENGTH_MM / 2:
+            to_x, to_y = 0.3, math.copysign(1.0, ball.y)
+        elif abs(ball.y) > WIDTH_MM / 2 - 75.0:
             to_y = 0.0
         length = math.hypot(to_x, to_y)
         return Point(to_x / length, to_y / length)
