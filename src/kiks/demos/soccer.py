@@ -159,7 +159,7 @@ class Player:
         lost_s = (self.now_s - self.search_s) % 8.0
         distance, bearing = self._way_to(self.style.home)
         if lost_s < 4.0 or distance < 60.0:
-            self._drive(0.0, 1.8 * self.turn_sign)
+            self._drive(0.0, 2.4 * self.turn_sign)
         else:
             self._drive(self.style.cruise * max(math.cos(bearing), 0.0), 2.5 * bearing)
 

@@ -39,6 +39,9 @@ class Whereabouts:
     SIGHT_RAD = 0.05
     """Error of a post's direction."""
 
+    DOUBT = (10.0, 10.0, 0.0005)
+    """What each post that cannot be it adds to the spread [mm^2, mm^2, rad^2]."""
+
     def __init__(self, robot: Khepera, x: float, y: float, heading: float) -> None:
         self.robot = robot
         self.x, self.y, self.heading = x, y, heading
@@ -92,6 +95,9 @@ class Whereabouts:
         share = [sum(p[row][k] * slope[k] for k in range(3)) for row in range(3)]
         variance = sum(slope[k] * share[k] for k in range(3)) + self.SIGHT_RAD**2 + self.turn**2
         if off * off > 9.0 * variance:
+            # One such post is a mistake. If it goes on, the mistake is ours, and sooner or later they are believed.
+            for k, doubt in enumerate(self.DOUBT):
+                p[k][k] += doubt
             return False
         gain = [value / variance for value in share]
         self.x += gain[0] * off
