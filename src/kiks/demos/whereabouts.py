@@ -39,7 +39,7 @@ class Whereabouts:
     SIGHT_RAD = 0.05
     """Error of a post's direction."""
 
-    DOUBT = (10.0, 10.0, 0.0005)
+    DOUBT = (2.0, 2.0, 0.0001)
     """What each post that cannot be it adds to the spread [mm^2, mm^2, rad^2]."""
 
     def __init__(self, robot: Khepera, x: float, y: float, heading: float) -> None:
