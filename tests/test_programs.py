@@ -190,7 +190,7 @@ def test_program_that_is_left_hanging_is_named(tmp_path: Path) -> None:
         told = b""
         while b"Ctrl-C" not in told:
             told = errors.readline()
-    assert told == b"program 1 (hangs.py), which the world does not wait for, still runs. Ctrl-C ends it.\n"
+    assert told == b"kiks: program 1 (hangs.py), which the world does not wait for, still runs. Ctrl-C ends it.\n"
 
 
 def test_hanging_program_is_dropped(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

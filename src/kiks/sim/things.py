@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kiks.engine.numbers import sin_cos
 from kiks.engine.scene import enter_everybody
 from kiks.engine.state import BALL, CYLINDER
 from kiks.errors import ArenaError, KiksError, ParameterError
@@ -189,8 +189,8 @@ class Things(World):
             self._check_free(f"the place of body {body}", x_mm, y_mm, radius_mm, but=self.robot_count + index)
             self._release(index)
             record["x_mm"], record["y_mm"], record["trail"][:] = x_mm, y_mm, (x_mm, y_mm)
-            record["velocity_x"] = speed_mm_s * math.cos(heading_rad)
-            record["velocity_y"] = speed_mm_s * math.sin(heading_rad)
+            sine, cosine = sin_cos(heading_rad)
+            record["velocity_x"], record["velocity_y"] = speed_mm_s * cosine, speed_mm_s * sine
             enter_everybody(self.scene)
 
     def remove_body(self, body: int) -> None:
