@@ -116,6 +116,12 @@ def ceiling(index: int) -> float:
     return 240.0 - 108.0 * share * share * math.sqrt(share)
 
 
+_OUTWARDS = [(i + 1, i, ceiling(i) - LENS_MARGIN) for i in range(COUNT // 2 - 2, -1, -1)] + [
+    (i - 1, i, ceiling(i) - LENS_MARGIN) for i in range(COUNT // 2 + 1, COUNT)
+]
+"""Pixels from the middle to either edge, each with the one before it and the brightest that can be relied on."""
+
+
 def exposure(greys: Sequence[float], light: int) -> float:
     """Return by how much the exposure has brightened a picture.
 
@@ -127,18 +133,18 @@ def exposure(greys: Sequence[float], light: int) -> float:
 
 def smooth(greys: Sequence[int]) -> list[float]:
     """Return a picture with less chance in it: a tenth of each grey is chance, whose mean is taken off."""
-    last = len(greys) - 1
+    around = [greys[0], *greys, greys[-1]]
     return [
-        ((greys[max(i - 1, 0)] + 2 * greys[i] + greys[min(i + 1, last)]) / 4 - 12.75) / 0.9 for i in range(last + 1)
+        (left + 2 * here + right) / 3.6 - 12.75 / 0.9
+        for left, here, right in zip(around[:-2], around[1:-1], around[2:], strict=True)
     ]
 
 
 def undarken(greys: list[float]) -> None:
     """Give pixels that are as bright as the lens lets them be the grey of their neighbour towards the middle."""
-    for middle, step in ((COUNT // 2 - 1, -1), (COUNT // 2, 1)):
-        for i in range(middle + step, -1 if step < 0 else COUNT, step):
-            if greys[i] > ceiling(i) - LENS_MARGIN:
-                greys[i] = max(greys[i], greys[i - step])
+    for inner, outer, limit in _OUTWARDS:
+        if greys[outer] > limit:
+            greys[outer] = max(greys[outer], greys[inner])
 
 
 def crossing(greys: Sequence[float], start: int, step: int, level: float) -> float | None:

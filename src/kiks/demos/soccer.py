@@ -24,7 +24,7 @@ from kiks.demos.whereabouts import Whereabouts
 BAUD = 38400
 """A picture takes 41 ms on this line, and 165 ms at 9600 baud: the ball would be gone."""
 
-PAUSE_S = 0.02
+PAUSE_S = 0.03
 """How long to wait after each step [s]: the wheels need some time to follow, and the next picture to be another."""
 
 LENGTH_MM, WIDTH_MM = 1050.0, 680.0
