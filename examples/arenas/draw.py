@@ -13,6 +13,8 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
+from kiks.demos import pitch
+
 Picture = npt.NDArray[np.uint8]
 
 WALL_MM = 10
@@ -127,7 +129,14 @@ def _oval(picture: Picture, radius_mm: int, brightness: int) -> None:
     fill(picture, 250, 250 - radius_mm, 100, 2 * radius_mm, brightness)
 
 
-PICTURES = {"default.png": default, "maze.png": maze, "office.png": office, "pillars.tif": pillars, "track.png": track}
+PICTURES = {
+    "default.png": default,
+    "maze.png": maze,
+    "office.png": office,
+    "pillars.tif": pillars,
+    "pitch.png": pitch.picture,
+    "track.png": track,
+}
 
 
 def draw_all(folder: Path) -> None:

@@ -9,7 +9,9 @@ from typing import Annotated
 import typer
 
 from kiks.cli.engine_start import ready_engine
+from kiks.cli.match import show_match
 from kiks.cli.options import Seed, load_arena
+from kiks.errors import ParameterError
 
 REPORT_S = 2.0
 """Simulated time between two updates of the display [s]: more of them would cost more than the simulation."""
@@ -25,6 +27,7 @@ class Behaviour(enum.StrEnum):
     CAMERA = "camera"
     RACE = "race"
     SWARM = "swarm"
+    SOCCER = "soccer"
 
 
 def demo(
@@ -41,15 +44,27 @@ def demo(
         typer.Option(help="Speed of the simulated serial line [bit/s]; each demonstration's own if left out."),
     ] = None,
     picture: Annotated[Path | None, typer.Option(help="Where the picture goes; kiks-NAME.png if left out.")] = None,
+    left: Annotated[
+        str | None, typer.Option(help="soccer: the Python program of the left side; its arguments behind it in quotes.")
+    ] = None,
+    right: Annotated[str | None, typer.Option(help="soccer: that of the right side.")] = None,
 ) -> None:
     """Show robots at work, as fast as this computer can, and leave a picture of it.
 
     avoid: wander about and touch nothing. follow: along the walls. clean: push cylinders to the walls. maze: find the
     way out. camera: watch a moving ball. race: round a track. swarm: twenty robots spread out.
+    soccer: a match of two programs.
 
     Example: kiks demo follow --arena examples/arenas/office.toml --seconds 300
     """
+    is_soccer = behaviour is Behaviour.SOCCER
+    for name, value in (("--arena", arena), ("--baud", baud)) if is_soccer else (("--left", left), ("--right", right)):
+        if value is not None:
+            raise ParameterError(f"{name} must be left out with {behaviour}, but it was {value!r}. It is for others.")
     ready_engine()
+    if is_soccer:
+        show_match(seconds, seed, picture, left, right)
+        return
     from time import perf_counter
 
     from rich.console import Console

@@ -1,0 +1,83 @@
+"""`kiks demo soccer`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import typer
+
+from kiks.errors import ParameterError
+
+if TYPE_CHECKING:
+    from kiks.demos.match import Report
+    from kiks.ports.programs import Command
+
+SECONDS = 300.0
+"""How long a match takes if nobody says otherwise [s]."""
+
+
+def show_match(seconds: float | None, seed: int, picture: Path | None, left: str | None, right: str | None) -> None:
+    """Let two programs play, say when goals fall, and leave a picture.
+
+    Args:
+        seconds: How long [s]; five minutes if left out.
+        seed: Seed of all random numbers.
+        picture: Where the picture goes.
+        left: The program of the left side with its arguments; KiKS's own player if left out.
+        right: That of the right side.
+
+    Raises:
+        ParameterError: If one of them is no program, or a value is out of range.
+    """
+    from kiks.cli.match_picture import draw_match
+    from kiks.demos.match import Match, play
+    from kiks.drawing import save_picture
+
+    players = [player(left, 1, "left"), player(right, 2, "right")]
+
+    def tell(report: Report) -> None:
+        goal, (left_count, right_count) = report.goals[-1], report.score()
+        typer.echo(f"{goal.time_s:6.1f} s   {left_count}:{right_count}   {goal.side}")
+
+    match = Match(SECONDS if seconds is None else seconds, seed, on_goal=tell)
+    start_s = perf_counter()
+    doubt = play(match, players, say=lambda text: typer.echo(f"kiks: {text}", err=True))
+    speedup = match.time_s / (perf_counter() - start_s)
+    target = picture or Path("kiks-soccer.png")
+    save_picture(draw_match(match), target)
+    left_count, right_count = match.report.score()
+    typer.echo(
+        f"soccer: left {left_count}, right {right_count}   {match.time_s:.1f} s   {speedup:.0f} x real time   "
+        f"{len(match.report.drops_s)} dropped balls"
+    )
+    repeatable = f"not repeatable: {doubt}" if doubt else f"state {match.state_hash()}: the same on every computer"
+    typer.echo(f"Picture: {target}   Seed {seed}, {repeatable}.")
+
+
+def player(words: str | None, robot: int, side: str) -> Command:
+    """Return the program that drives a robot; it finds its port's name and its side before its own arguments.
+
+    Raises:
+        ParameterError: If the words name no program, or more than one.
+
+    Example:
+        >>> player(None, 2, "right").arguments
+        ['kiks://2', 'right']
+    """
+    from kiks.cli.run import parse_words
+    from kiks.demos import soccer
+    from kiks.ports.programs import Command
+
+    given = [f"kiks://{robot}", side]
+    if words is None:
+        return Command(Path(soccer.__file__), given)
+    is_program = bool(words.split()) and (Path(words).is_file() or Path(words.split()[0]).is_file())
+    if not is_program:
+        raise ParameterError(
+            f"--{side} must be a Python file, with its arguments behind it in quotes, but it was {words!r}. "
+            f"Example: --{side} 'mine.py --fast'."
+        )
+    command = parse_words([words])[0]
+    return Command(command.program, [*given, *command.arguments])

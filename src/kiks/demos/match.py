@@ -1,0 +1,208 @@
+"""A soccer match: two programs, each in a process of its own, one world, and a referee who stands outside.
+
+The programs know what their robots tell them, no more. The referee sees everything. He counts the goals, and after each
+puts the ball back on the middle mark; he does the same when it has not moved for long. He never touches a robot: a
+player is told nothing, and notices what a real one would, that the ball is gone.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.demos import pitch
+from kiks.engine.numbers import uniform
+from kiks.errors import ParameterError
+from kiks.model.robot import RobotSpec
+from kiks.ports.programs import Command, Programs
+from kiks.sim.simulation import Simulation
+from kiks.units import ns_from_s
+
+LOOK_S = 0.1
+"""Simulated time between two looks of the referee [s]: a ball moves 30 mm at most."""
+
+STILL_MM, STILL_S = 40.0, 10.0
+"""A ball that has come no farther than that in this time is taken back to the middle."""
+
+
+DROP_MM = 40.0, 120.0
+"""How far from the middle mark the ball may fall, along the pitch and across it [mm]."""
+
+ATTEMPTS = 100
+"""Places that are tried for it."""
+
+STREAM_REFEREE = 101
+"""Random stream of these places."""
+
+
+class FullTime(Exception):  # noqa: N818 - nothing went wrong
+    """The match is over."""
+
+
+@dataclass(frozen=True)
+class Goal:
+    """A goal.
+
+    Attributes:
+        time_s: When.
+        side: For whom, 'left' or 'right'.
+    """
+
+    time_s: float
+    side: str
+
+
+@dataclass
+class Report:
+    """What the referee writes down.
+
+    Attributes:
+        goals: The goals, in their order.
+        drops_s: When the ball was taken back to the middle because it lay still [s].
+        trail: Places of robots and ball at each look: left x, y, right x, y, ball x, y [mm].
+    """
+
+    goals: list[Goal] = field(default_factory=list)
+    drops_s: list[float] = field(default_factory=list)
+    trail: list[tuple[float, ...]] = field(default_factory=list)
+
+    def score(self) -> tuple[int, int]:
+        """Return the goals of the left and of the right side."""
+        left = sum(goal.side == "left" for goal in self.goals)
+        return left, len(self.goals) - left
+
+
+class Match(Simulation):
+    """A pitch with two robots on their marks, a ball, and a referee who looks at fixed instants.
+
+    Args:
+        seconds: How long it lasts [s of simulated time].
+        seed: Seed of all random numbers.
+        on_goal: Called after each goal.
+
+    Attributes:
+        report: What the referee has written down so far.
+    """
+
+    def __init__(
+        self, seconds: float = 300.0, seed: int = 0, on_goal: Callable[[Report], None] = lambda report: None
+    ) -> None:
+        if not (math.isfinite(seconds) and seconds >= LOOK_S):
+            raise ParameterError(f"seconds must be a number of at least {LOOK_S}, but it was {seconds!r}. Take 300.")
+        jersey = RobotSpec.load("khepera").with_changes(body__brightness=pitch.JERSEY)
+        self._period_ns, self._end_ns = ns_from_s(LOOK_S), ns_from_s(seconds)
+        self._next_ns = 0
+        super().__init__(pitch.arena(), robots=2, seed=seed, robot=jersey)
+        self.ball = self.add_ball(
+            pitch.MIDDLE_X_MM, pitch.MIDDLE_Y_MM, brightness=pitch.BALL, friction_mm_s2=pitch.FRICTION_MM_S2
+        )
+        for robot in (1, 2):
+            self.fit(robot, "k213")
+        self.report = Report()
+        self._on_goal = on_goal
+        self._rest, self._rest_s = (pitch.MIDDLE_X_MM, pitch.MIDDLE_Y_MM), 0.0
+        self._drop()
+
+    def advance_to(self, time_ns: int) -> None:
+        """Let time pass, and let the referee look at each of his instants on the way.
+
+        What happens at such an instant, happens before he looks; so it does not matter who lets time pass, and how far.
+
+        Raises:
+            FullTime: At the end.
+        """
+        while self._next_ns <= time_ns:
+            super().advance_to(self._next_ns)
+            if self._next_ns % self._period_ns == 0:
+                self._look()
+            if self._next_ns == self._end_ns:
+                raise FullTime
+            self._next_ns = min(self._next_ns + self._period_ns, self._end_ns)
+        super().advance_to(time_ns)
+
+    def finish(self) -> None:
+        """Let time pass to the end.
+
+        Raises:
+            FullTime: Always.
+        """
+        self.advance_to(self._end_ns)
+
+    # ---- the referee ----
+
+    def _look(self) -> None:
+        """See where everything is, and do what a referee does."""
+        self.sync()
+        ball = self.state.bodies[0, 0]
+        x_mm, y_mm, radius_mm = float(ball["x_mm"]), float(ball["y_mm"]), float(ball["radius_mm"])
+        robots = self.state.robots[0]
+        places = [float(robots[axis][index]) for index in (0, 1) for axis in ("x_mm", "y_mm")]
+        self.report.trail.append((*places, x_mm, y_mm))
+        side = scorer(x_mm, radius_mm)
+        if side is not None:
+            self.report.goals.append(Goal(self.time_s, side))
+            self._on_goal(self.report)
+            self._drop()
+        elif math.hypot(x_mm - self._rest[0], y_mm - self._rest[1]) > STILL_MM:
+            self._rest, self._rest_s = (x_mm, y_mm), self.time_s
+        elif self.time_s - self._rest_s > STILL_S:
+            self.report.drops_s.append(self.time_s)
+            self._drop()
+
+    def _drop(self) -> None:
+        """Drop the ball near the middle mark: a little to one side, as a hand does, and not onto a robot."""
+        for attempt in range(ATTEMPTS):
+            x_share, y_share = (
+                uniform(self.seed, 0, 0, STREAM_REFEREE, self.now_ns + attempt, axis) for axis in (0, 1)
+            )
+            x_mm = pitch.MIDDLE_X_MM + DROP_MM[0] * (2.0 * x_share - 1.0)
+            y_mm = pitch.MIDDLE_Y_MM + DROP_MM[1] * (2.0 * y_share - 1.0)
+            try:
+                self.move_body(self.ball, x_mm, y_mm)
+            except ParameterError:
+                continue  # somebody stands there
+            self._rest, self._rest_s = (x_mm, y_mm), self.time_s
+            return
+
+    def trail(self) -> NDArray[np.float64]:
+        """Return where everybody was at each look, float64 [look, left, right or ball, x or y] [mm]."""
+        return np.array(self.report.trail, np.float64).reshape(-1, 3, 2)
+
+
+def scorer(x_mm: float, radius_mm: float) -> str | None:
+    """Return for whom a ball at x counts: all of it must be behind the line."""
+    if x_mm > pitch.RIGHT_LINE_MM + radius_mm:
+        return "left"
+    return "right" if x_mm < pitch.LEFT_LINE_MM - radius_mm else None
+
+
+class _Players(Programs):
+    """Programs that are ended from within the world, by the final whistle: their connections are ours to close."""
+
+    def close(self) -> None:
+        """End all processes that still run."""
+        super().close()
+        for run in self._runs:
+            run.guest._here.close()
+
+
+def play(match: Match, players: Sequence[Command], say: Callable[[str], None] = lambda text: None) -> str:
+    """Let two programs play to the end; return why they might not play the same again, nothing if they would.
+
+    Args:
+        match: The match.
+        players: The program of the left and of the right side.
+        say: Where a person is told if a program ends before its time.
+    """
+    programs = _Players(match, players, when_silent="wait", say=say)
+    try:
+        programs.run()
+        if not programs.doubt:
+            match.finish()  # nobody plays any more, but the ball may still roll
+    except FullTime:
+        pass
+    return programs.doubt
