@@ -11,6 +11,8 @@ after the other. So 1000 differ from 100 by what does not fit into the processor
 
 `crowd.steps_per_s_N` is the median of robot-steps a second; the numbers of robots take turns, and
 `crowd.cost_N_over_1` is the median of what a robot-step costs among N over what it costs alone in the same round.
+`crowd.wire_...` are the same for programs: each robot at the end of a line of 9600 baud in memory, one program that
+sends `N` to all, reads all replies, sends `D` to all and reads those. A step is what that takes, some 60 ms.
 `crowd.steps_1_over_calibration` compares with a fixed piece of plain Python.
 """
 
@@ -36,11 +38,13 @@ BOXES = ((300, 500, 20, 400), (700, 500, 20, 400), (500, 250, 300, 20), (500, 75
 """Centre and size [mm]."""
 POSTS, POST_RADIUS_MM = ((150, 150), (850, 150), (150, 850), (850, 850)), 30.0
 TICKS_PER_STEP = 5
-WARM_STEPS, STEPS = 200, 20_000
-"""Steps before anything is measured, and robot-steps of a measurement."""
+WARM_STEPS, STEPS, WIRE_STEPS = 200, 20_000, 2_000
+"""Steps before anything is measured, and robot-steps of a measurement, compiled and by the wire."""
 
 WEIGHTS = np.array([(4, 6, -6, -18, -6, -4, 0, 0), (-4, -6, -14, -8, 6, 4, 0, 0)], np.float64)
 """Of the left and of the right wheel [cm/s] for a full reading of each sensor."""
+
+WIRE_WEIGHTS = WEIGHTS.tolist()
 
 
 @njit(error_model="numpy", nogil=True)  # type: ignore[untyped-decorator, unused-ignore]
@@ -136,6 +140,42 @@ class Crowd:
         return (time.perf_counter() - start_s) / step_count / self.count
 
 
+class WireCrowd(Crowd):
+    """The same robots at the ends of serial lines.
+
+    Args:
+        count: How many.
+    """
+
+    def __init__(self, count: int) -> None:
+        super().__init__(count)
+        self.sim.advance_to(self.tick * TICK_NS)
+        self.sim.state.tick_count = self.tick
+        self._ports = [self.sim.port(robot) for robot in range(1, count + 1)]
+
+    def step_s(self) -> float:
+        """Return what a step of one robot takes [s]."""
+        step_count = max(WIRE_STEPS // self.count, 1)
+        start_s = time.perf_counter()
+        for _ in range(step_count):
+            for port in self._ports:
+                port.write(b"N\n")
+            commands = [self._command(port.readline()) for port in self._ports]
+            for port, command in zip(self._ports, commands, strict=True):
+                port.write(command)
+            for port in self._ports:
+                port.readline()
+        return (time.perf_counter() - start_s) / step_count / self.count
+
+    @staticmethod
+    def _command(reply: bytes) -> bytes:
+        readings = [min(float(word) / 600.0, 1.0) for word in reply.split(b",")[1:]]
+        speeds = (
+            8.0 + sum(weight * reading for weight, reading in zip(row, readings, strict=True)) for row in WIRE_WEIGHTS
+        )
+        return b"D,%d,%d\n" % tuple(int(speed_cm_s * 1.25) for speed_cm_s in speeds)
+
+
 def main() -> None:
     """Measure and report."""
     arguments = argparse.ArgumentParser(description=__doc__)
@@ -144,15 +184,17 @@ def main() -> None:
     options = arguments.parse_args()
 
     calibration = calibration_loops_per_s()
-    crowds = [Crowd(count) for count in COUNTS]
-    rounds = [[crowd.step_s() for crowd in crowds] for _ in range(options.repeats)]
-    alone, *others = zip(*rounds, strict=True)
-    rates = [1.0 / statistics.median(steps_s) for steps_s in (alone, *others)]
-    rows = [(f"crowd.steps_per_s_{count}", rate, "1/s") for count, rate in zip(COUNTS, rates, strict=True)]
-    for count, steps_s in zip(COUNTS[1:], others, strict=True):
-        ratio = statistics.median(own / first for own, first in zip(steps_s, alone, strict=True))
-        rows.append((f"crowd.cost_{count}_over_1", ratio, "of the cost of a robot alone"))
-    rows.append(("crowd.steps_1_over_calibration", rates[0] / calibration, "steps a calibration loop"))
+    rows: list[tuple[str, float, str]] = []
+    for name, kind in (("", Crowd), ("wire_", WireCrowd)):
+        crowds = [kind(count) for count in COUNTS]
+        rounds = [[crowd.step_s() for crowd in crowds] for _ in range(options.repeats)]
+        alone, *others = zip(*rounds, strict=True)
+        for count, steps_s in zip(COUNTS, (alone, *others), strict=True):
+            rows.append((f"crowd.{name}steps_per_s_{count}", 1.0 / statistics.median(steps_s), "1/s"))
+        for count, steps_s in zip(COUNTS[1:], others, strict=True):
+            ratio = statistics.median(own / first for own, first in zip(steps_s, alone, strict=True))
+            rows.append((f"crowd.{name}cost_{count}_over_1", ratio, "of the cost of a robot alone"))
+    rows.append(("crowd.steps_1_over_calibration", rows[0][1] / calibration, "steps a calibration loop"))
     report(rows, as_json=options.json)
 
 

@@ -23,13 +23,13 @@ SEEDS = range(10)
 
 # The state after the first twenty seconds with seed 1. To renew: python tests/test_demos.py
 HASHES = {
-    "avoid": "33448649fdb9868d",
-    "follow": "2a4a73e492070243",
-    "clean": "cd038af8729d3a38",
-    "maze": "d8264838f16fdf46",
-    "camera": "f8f0e8327c418d71",
-    "race": "e82262bb943bd87c",
-    "swarm": "f21ebf459a2cda66",
+    "avoid": "a06c9cd61940109c",
+    "follow": "626750f4979c3b6d",
+    "clean": "55a860905ec835bb",
+    "maze": "4a86ab4836f34f20",
+    "camera": "3c3e9c7f9ab38718",
+    "race": "d83fd9b1bce91555",
+    "swarm": "bdb07fe26158484c",
 }
 
 

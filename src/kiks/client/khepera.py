@@ -285,13 +285,16 @@ def open_port(name: str, baud: int = 9600, timeout_s: float | None = TIMEOUT_S) 
         return sim_port
     import serial
 
+    from kiks.ports.pyserial import protocol_kiks
+
     try:
         port: Any = serial.serial_for_url(name, baudrate=baud, timeout=timeout_s, stopbits=2)
     except (serial.SerialException, ValueError, OSError) as error:
         raise LinkError(
             f"port {name!r} must be one that can be opened, but: {error}. A simulated robot is 'kiks://1'."
         ) from None
-    return QuickLines(port)
+    # A simulated port, as under `kiks run`, has quick lines of its own.
+    return port if isinstance(port, protocol_kiks.Serial) else QuickLines(port)
 
 
 class QuickLines:

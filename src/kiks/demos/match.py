@@ -180,16 +180,6 @@ def scorer(x_mm: float, radius_mm: float) -> str | None:
     return "right" if x_mm < pitch.LEFT_LINE_MM - radius_mm else None
 
 
-class _Players(Programs):
-    """Programs that are ended from within the world, by the final whistle: their connections are ours to close."""
-
-    def close(self) -> None:
-        """End all processes that still run."""
-        super().close()
-        for run in self._runs:
-            run.guest._here.close()
-
-
 def play(match: Match, players: Sequence[Command], say: Callable[[str], None] = lambda text: None) -> str:
     """Let two programs play to the end; return why they might not play the same again, nothing if they would.
 
@@ -198,7 +188,7 @@ def play(match: Match, players: Sequence[Command], say: Callable[[str], None] = 
         players: The program of the left and of the right side.
         say: Where a person is told if a program ends before its time.
     """
-    programs = _Players(match, players, when_silent="wait", say=say)
+    programs = Programs(match, players, when_silent="wait", say=say)
     try:
         programs.run()
         if not programs.doubt:

@@ -51,6 +51,10 @@ class Guest(Player):
         self._has_made_room = False
         self._has_been_warned = False
 
+    def close(self) -> None:
+        """Close the connection."""
+        self._here.close()
+
     def fileno(self) -> int:
         """Return the socket, to wait on."""
         return self._here.fileno()
@@ -231,7 +235,7 @@ class Guest(Player):
             wire.holder = None
             wire.hang_up()
         self._turns.see(self.acts_from_ns)
-        self._here.close()
+        self.close()
         self.has_left = True
 
     def _answer(self, now_ns: int, *, robot: int = 0, number: int = 0, is_good: bool = True, data: bytes = b"") -> None:

@@ -132,11 +132,12 @@ class Programs:
         return INTERRUPTED if self._signals else next((run.code for run in self._runs if run.code), 0)
 
     def close(self) -> None:
-        """End all processes that still run."""
+        """End all processes that still run, and close their connections."""
         for run in self._runs:
             if run.process.poll() is None:
                 run.process.kill()
                 run.process.wait()
+            run.guest.close()
         self._selector.close()
 
     # ---- inside ----

@@ -24,7 +24,7 @@ from kiks.sim.cameras import Cameras
 from kiks.sim.sites import Place, first_memory, named
 from kiks.sim.table import TABLE
 from kiks.sim.things import Things
-from kiks.sim.wire import Wire
+from kiks.sim.wire import Agenda, Wire
 from kiks.units import ns_from_s
 
 if TYPE_CHECKING:
@@ -92,7 +92,8 @@ class Simulation(Things):
         self._expected = np.zeros(SENSOR_COUNT, np.float64)
         self._cameras = Cameras(self)
         self._radios: dict[int, Radio] = {}
-        self.wires = [Wire(self._firmware(index)) for index in range(self.robot_count)]
+        self._agenda = Agenda()
+        self.wires = [Wire(self._firmware(index), self._agenda, index) for index in range(self.robot_count)]
         self._ports: dict[int, SimPort] = {}
         self.name = TABLE.enter(self)
 
@@ -147,28 +148,19 @@ class Simulation(Things):
 
     def advance_to(self, time_ns: int) -> None:
         """Let time pass up to a time [ns]; nothing happens if it is over already."""
-        wire = self._next_wire()
+        wire = self._agenda.first(self.wires)
         while wire.next_ns is not None and wire.next_ns <= time_ns:
             if wire.next_ns > self.now_ns:
                 self.now_ns = wire.next_ns
             self.sync()
             wire.act(self.now_ns)
-            wire = self._next_wire()
+            wire = self._agenda.first(self.wires)
         if time_ns > self.now_ns:
             self.now_ns = time_ns
 
     def next_event_ns(self) -> int | None:
         """Return when a robot does something next [ns], None while all of them wait for characters."""
-        return self._next_wire().next_ns
-
-    def _next_wire(self) -> Wire:
-        """Return the wire that acts first; of two at the same instant the one with the lower number."""
-        first = self.wires[0]
-        if self.robot_count > 1:
-            for wire in self.wires:
-                if wire.next_ns is not None and (first.next_ns is None or wire.next_ns < first.next_ns):
-                    first = wire
-        return first
+        return self._agenda.first(self.wires).next_ns
 
     def sync(self) -> None:
         """Do the ticks that have begun; let cameras take the pictures that are due on the way, and messages arrive."""

@@ -3,14 +3,39 @@
 from __future__ import annotations
 
 from collections import deque
+from heapq import heappop, heappush
 
 from kiks.clock.line import SerialLine
 from kiks.firmware.khepera import Firmware
 from kiks.units import ns_from_s
 
 
+class Agenda:
+    """Which of many wires acts first, without a look at each of them."""
+
+    def __init__(self) -> None:
+        self._entries: list[tuple[int, int]] = []
+
+    def note(self, time_ns: int, index: int) -> None:
+        """Note that a wire is going to act at a time [ns]."""
+        heappush(self._entries, (time_ns, index))
+
+    def first(self, wires: list[Wire]) -> Wire:
+        """Return the wire that acts first, of two at the same instant the one with the lower number."""
+        entries = self._entries
+        # A wire that has acted, or acts sooner than it was noted for, has left an entry behind.
+        while entries and wires[entries[0][1]].next_ns != entries[0][0]:
+            heappop(entries)
+        return wires[entries[0][1] if entries else 0]
+
+
 class Wire:
     """One robot's line, its firmware, and the commands that have been sent but have not acted yet.
+
+    Args:
+        firmware: The robot's.
+        agenda: Where it notes when it acts next.
+        index: The robot's index.
 
     Attributes:
         holder: Who has opened the robot's port, in words for the next one who tries; None while nobody has.
@@ -18,8 +43,10 @@ class Wire:
         next_ns: When the robot does something next [ns], or None while it only waits for characters.
     """
 
-    def __init__(self, firmware: Firmware) -> None:
+    def __init__(self, firmware: Firmware, agenda: Agenda, index: int) -> None:
         self.firmware = firmware
+        self._agenda = agenda
+        self._index = index
         self.line = SerialLine(firmware.baud)
         self.holder: str | None = None
         self.next_ns: int | None = None
@@ -43,6 +70,7 @@ class Wire:
             self.pending.append((self._last_act_ns, line))
             if self.next_ns is None or self._last_act_ns < self.next_ns:
                 self.next_ns = self._last_act_ns
+                self._agenda.note(self.next_ns, self._index)
 
     def act(self, now_ns: int) -> None:
         """Do what is due."""
@@ -63,6 +91,8 @@ class Wire:
             self.next_ns = command_ns if demo_ns is None else demo_ns
         else:
             self.next_ns = min(command_ns, demo_ns)
+        if self.next_ns is not None:
+            self._agenda.note(self.next_ns, self._index)
 
     def hang_up(self) -> None:
         """Forget what the host left behind: an unfinished command, and replies that nobody will read.
