@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from kiks.engine.numbers import sin_cos
 from kiks.engine.scene import enter_everybody
-from kiks.engine.state import BALL, CYLINDER
+from kiks.engine.state import BALL, BODY, CYLINDER
 from kiks.errors import ArenaError, KiksError, ParameterError
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp
 from kiks.model.robot import RobotSpec
@@ -116,12 +116,14 @@ class Things(World):
         what, name = (BALL, "ball") if isinstance(body, Ball) else (CYLINDER, "cylinder")
         self._check_free(f"the place of a {name}", body.x_mm, body.y_mm, body.radius_mm)
         self._body_count += 1
-        record = np.zeros(1, self.state.bodies.dtype)
+        record = np.zeros(1, BODY)
         record["number"], record["what"] = self._body_count, what
         record["x_mm"], record["y_mm"], record["trail"][:] = body.x_mm, body.y_mm, (body.x_mm, body.y_mm)
         record["radius_mm"], record["brightness"] = body.radius_mm, body.brightness
         record["friction_mm_s2"], record["kick_share"] = body.friction_mm_s2, 1.0 if what == BALL else 0.0
-        self.state.bodies = np.concatenate([self.state.bodies, record[None]], axis=1)
+        bodies = np.zeros((1, self.state.bodies.shape[1] + 1), BODY)
+        bodies[:, :-1], bodies[:, -1] = self.state.bodies, record
+        self.state.bodies = bodies
         self._enter()
         return self._body_count
 

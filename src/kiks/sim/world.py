@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from kiks.engine import contact, proximity, step
 from kiks.engine.numbers import uniform
-from kiks.engine.parameters import pack
+from kiks.engine.parameters import PARAMETERS, pack
 from kiks.engine.scene import enter_everybody, make_scene
 from kiks.engine.state import BALL, State
 from kiks.errors import ArenaError, ParameterError
@@ -57,7 +57,10 @@ class World:
         self.state = State.empty(world_count=1, robot_count=self.robot_count)
         kinds = list(dict.fromkeys(self.specs))
         self.state.robots["kind"][0] = [kinds.index(spec) for spec in self.specs]
-        self._kinds = np.concatenate([pack(spec) for spec in kinds])
+        # Of that very type, not of an equal one: compiled functions would compare the two field by field at each call.
+        self._kinds = np.zeros(len(kinds), PARAMETERS)
+        for kind, spec in enumerate(kinds):
+            self._kinds[kind : kind + 1] = pack(spec)
         self.ground = (arena.clearance, float(arena.mm_per_cell), PAD)
         self.sight = (arena.clearance, arena.surface, arena.faces, float(arena.mm_per_cell), PAD)
         self._paths: Paths | None = None
