@@ -35,7 +35,7 @@ docs: setup
 	$(BIN)/python docs/make_commands.py
 
 benchmarks: setup
-	$(BIN)/python benchmarks/wire.py
+	for name in wire sensors crowd programs; do $(BIN)/python benchmarks/$$name.py; done
 
 clean:
 	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from kiks import Arena, ParameterError, Simulation
+from kiks import Arena, Khepera, ParameterError, Simulation
 from kiks.errors import ArenaError
 from kiks.model.arena import Ball, Cylinder, Lamp, Pose
 from kiks.model.robot import RobotSpec
@@ -156,6 +156,16 @@ def test_brightness_shows_in_proximity_and_camera(sim):
     assert counts[0] > counts[2] + 200
     assert greys == sorted(greys, reverse=True)
     assert sim.proximity(1) == alone
+
+
+def test_a_picture_shows_what_was_put_there_at_its_instant():
+    sim = Simulation(Arena.box(1000, 600, brightness=40), robots=2, seed=3)
+    sim.fit(1, "k213")
+    sim.place(1, 300, 300, 0)
+    sim.add_ball(450, 300)
+    greys = Khepera(sim.port(1)).image()
+    assert max(greys[28:36]) > 200
+    assert max(greys[:8]) < 150
 
 
 def test_poses_paths_and_distances_are_arrays(sim):

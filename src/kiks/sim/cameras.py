@@ -53,11 +53,11 @@ class Cameras:
                 sim.tick_to(instant_ns)
                 fitted.look(instant_ns)
 
-    def replace(self, index: int) -> None:
-        """Take a picture again whose robot was put elsewhere at the very instant of the picture."""
-        fitted = self._fitted.get(index)
-        if fitted is not None and fitted.taken_ns == self._sim.now_ns:
-            fitted.look(self._sim.now_ns)
+    def look_again(self) -> None:
+        """Take those pictures again that were taken at this very instant: something was put elsewhere since."""
+        for fitted in self._fitted.values():
+            if fitted.taken_ns == self._sim.now_ns:
+                fitted.look(fitted.taken_ns)
 
     def expect(self, index: int) -> list[float]:
         """Return what a camera would see now, without noise or rounding."""

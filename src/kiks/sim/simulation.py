@@ -85,12 +85,12 @@ class Simulation(Things):
             )
         self.thinking = thinking
         self.program = Program(thinking)
+        self._cameras = Cameras(self)
         super().__init__(Arena.default() if arena is None else arena, _specs(robot, robots, response), seed)
         self.spec = self.specs[0]
         self._networks = networks_for(*(spec.proximity.response for spec in self.specs))
         self._counts = np.zeros(SENSOR_COUNT, np.int64)
         self._expected = np.zeros(SENSOR_COUNT, np.float64)
-        self._cameras = Cameras(self)
         self._radios: dict[int, Radio] = {}
         self._agenda = Agenda()
         self.wires = [Wire(self._firmware(index), self._agenda, index) for index in range(self.robot_count)]
@@ -236,21 +236,9 @@ class Simulation(Things):
                 self._cameras.fit(index, fitted)
         return fitted
 
-    def place(self, robot: int, x_mm: float, y_mm: float, heading_rad: float) -> None:
-        """Lift a robot and put it down somewhere else; its wheels and counters do not notice.
-
-        Args:
-            robot: Number of the robot, from 1.
-            x_mm: From the arena's lower left corner to the right.
-            y_mm: From the arena's lower left corner upwards.
-            heading_rad: Counter-clockwise from the x axis.
-
-        Raises:
-            ParameterError: If there is no such robot, a number is not finite, or something is in the way.
-        """
-        with self.lock:
-            super().place(robot, x_mm, y_mm, heading_rad)
-            self._cameras.replace(self.index_of(robot))
+    def _look_again(self) -> None:
+        super()._look_again()
+        self._cameras.look_again()
 
     def proximity(self, robot: int, *, noise: bool = False) -> list[float]:
         """Return what the eight proximity sensors would read at this instant and pose, without waiting for their round.

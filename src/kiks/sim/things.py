@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.engine.numbers import sin_cos
-from kiks.engine.scene import enter_everybody
 from kiks.engine.state import BALL, BODY, CYLINDER
 from kiks.errors import ArenaError, KiksError, ParameterError
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp
@@ -193,7 +192,7 @@ class Things(World):
             record["x_mm"], record["y_mm"], record["trail"][:] = x_mm, y_mm, (x_mm, y_mm)
             sine, cosine = sin_cos(heading_rad)
             record["velocity_x"], record["velocity_y"] = speed_mm_s * cosine, speed_mm_s * sine
-            enter_everybody(self.scene)
+            self._look_again()
 
     def remove_body(self, body: int) -> None:
         """Take a ball or cylinder away.

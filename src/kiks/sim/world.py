@@ -71,6 +71,11 @@ class World:
     def _enter(self) -> None:
         """Make the scene anew, as must be when the arrays of the state were replaced."""
         self.scene = make_scene(self.state, self._kinds, self.arena.width_mm, self.arena.height_mm)
+        self._look_again()
+
+    def _look_again(self) -> None:
+        """Let everybody see that something has come, gone, or been put elsewhere."""
+        enter_everybody(self.scene)
 
     # ---- time ----
 
@@ -150,7 +155,7 @@ class World:
         robot["x_mm"], robot["y_mm"], robot["heading_rad"] = x_mm, y_mm, heading_rad
         robot["trail"][:] = (x_mm, y_mm, heading_rad)
         robot["start_x_mm"], robot["start_y_mm"] = x_mm, y_mm
-        enter_everybody(self.scene)
+        self._look_again()
 
     def _start(self, index: int) -> tuple[float, float, float]:
         """Return the arena's start pose for a robot, else a free place: the roomiest for the first.
