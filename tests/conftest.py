@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+
 import pytest
 
 # Programs to be run as processes, not modules to be imported.
@@ -9,6 +11,8 @@ collect_ignore_glob = ["programs/*"]
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    # A shell that starts something in the background has it ignore Ctrl-C, and all that this starts: tests send it.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     if not hasattr(config, "workerinput") and not config.option.collectonly:
         from kiks.cli.engine_start import compile_everything
 
