@@ -18,6 +18,9 @@ from kiks.demos import scenes
 from kiks.demos.scenes import SCENES
 from kiks.demos.swarm import Swarm
 
+# Whole demonstrations.
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[1]
 SEEDS = range(10)
 

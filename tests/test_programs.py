@@ -40,6 +40,9 @@ while True: pass
 
 ENDS = """
 import serial, sys
+
+# Each test starts processes.
+pytestmark = pytest.mark.slow
 port = serial.Serial('COM1', timeout=1)
 for _ in range(400):
     port.write(b'N\\n')

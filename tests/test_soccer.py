@@ -21,6 +21,9 @@ from kiks.demos.match import FullTime, Match, play, scorer
 from kiks.demos.soccer import BAUD, Player
 from kiks.demos.whereabouts import Whereabouts
 
+# Whole matches.
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[1]
 CHASER = str(ROOT / "examples/players/chaser.py")
 
