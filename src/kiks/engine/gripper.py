@@ -69,9 +69,15 @@ def half_gap_mm(jaws: Any) -> Any:
 
 
 @kernel
+def move_arm(robot: Any) -> Any:
+    """Let the arm go a tick's way."""
+    robot.arm += min(max(robot.arm_target - robot.arm, -ARM_STEP), ARM_STEP)
+
+
+@kernel
 def move_gripper(robot: Any, least_jaws: Any) -> Any:
     """Phase: let the arm and the jaws go a tick's way; the jaws stop at a width."""
-    robot.arm += min(max(robot.arm_target - robot.arm, -ARM_STEP), ARM_STEP)
+    move_arm(robot)
     target = least_jaws if robot.is_closing != 0 else JAWS_MAX
     robot.jaws += min(max(target - robot.jaws, -JAWS_STEP), JAWS_STEP)
 
@@ -123,7 +129,7 @@ def tend_held(scene: Any, ground: Any, world: Any, number: Any) -> Any:
     robot.jaws = max(robot.jaws, width)
     arm = robot.arm
     if is_waiting:  # there is no room below: the jaws stay as they are
-        robot.arm += min(max(robot.arm_target - robot.arm, -ARM_STEP), ARM_STEP)
+        move_arm(robot)
     else:
         move_gripper(robot, width)
         centre(scene, world, number, body)

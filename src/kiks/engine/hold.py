@@ -16,6 +16,7 @@ from typing import Any
 
 from kiks.engine.compiling import kernel
 from kiks.engine.contact import clearance_mm, outward
+from kiks.engine.motion import between_nought_and
 from kiks.engine.numbers import sin_cos
 
 REACH = 3.0
@@ -181,12 +182,6 @@ def turn_back(scene: Any, world: Any, room: Any, pieces: Any) -> Any:
             robot.wheel_pulses[wheel] -= (1.0 - room.ways[number, 2]) * lost
             robot.slip_pulses[wheel] += (1.0 - room.ways[number, 2]) * lost
         robot.piece_headings[0] = robot.heading_rad
-
-
-@kernel
-def between_nought_and(limit: Any, value: Any) -> Any:
-    """Return a value, or 0 or the limit if it is beyond one of them."""
-    return min(max(value, 0.0), limit) if limit > 0.0 else max(min(value, 0.0), limit)
 
 
 @kernel

@@ -102,6 +102,12 @@ def note_contact(robot: Any, is_touching: Any) -> Any:
 
 
 @kernel
+def between_nought_and(limit: Any, value: Any) -> Any:
+    """Return a value, or 0 or the limit if it is beyond one of them."""
+    return min(max(value, 0.0), limit) if limit > 0.0 else max(min(value, 0.0), limit)
+
+
+@kernel
 def give_way(robot: Any, parameters: Any, dx: Any, dy: Any, wheels: Any, slip_ratio: Any) -> Any:
     """Let a robot that something has pushed by (dx, dy) [mm] count what its rims did.
 
@@ -119,7 +125,7 @@ def give_way(robot: Any, parameters: Any, dx: Any, dy: Any, wheels: Any, slip_ra
     pushed = (dx * cosine + dy * sine) / parameters.pulse_mm
     for wheel in range(2):
         path = wheels[wheel]
-        lost = min(max(-pushed, 0.0), path) if path > 0.0 else max(min(-pushed, 0.0), path)
+        lost = between_nought_and(path, -pushed)
         robot.wheel_pulses[wheel] -= (1.0 - slip_ratio) * lost
         robot.slip_pulses[wheel] += (1.0 - slip_ratio) * lost
         # What was counted as driven and was not is taken off again.

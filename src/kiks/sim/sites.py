@@ -104,7 +104,7 @@ class Place:
 
     def poses(self) -> list[tuple[float, float, float]]:
         """Return where all robots are, robot 1 first."""
-        return [self._sim.pose(robot) for robot in range(1, self._sim.robot_count + 1)]
+        return [(x_mm, y_mm, heading_rad) for x_mm, y_mm, heading_rad in self._sim.poses().tolist()]
 
     def bodies(self) -> Any:
         """Return the balls and cylinders, records of `kiks.engine.state.BODY`."""

@@ -239,6 +239,6 @@ class Things(World):
             self.sync()
             self.state.bodies = checkpoint.bodies.copy()
             self.lamps = checkpoint.lamps.copy()
-            self._enter()
             for index, pose in enumerate(checkpoint.poses.tolist()):
                 self._put(index, *pose)
+            self._enter()

@@ -64,9 +64,9 @@ class World:
         self.ground = (arena.clearance, float(arena.mm_per_cell), PAD)
         self.sight = (arena.clearance, arena.surface, arena.faces, float(arena.mm_per_cell), PAD)
         self._paths: Paths | None = None
-        self._enter()
         for index in range(self.robot_count):
             self._put(index, *self._start(index))
+        self._enter()
 
     def _enter(self) -> None:
         """Make the scene anew, as must be when the arrays of the state were replaced."""
@@ -149,13 +149,13 @@ class World:
             radius_mm = self.specs[index].body.radius_mm
             self._check_free(f"the place of robot {robot}", x_mm, y_mm, radius_mm, but=index)
             self._put(index, float(x_mm), float(y_mm), float(heading_rad))
+            self._look_again()
 
     def _put(self, index: int, x_mm: float, y_mm: float, heading_rad: float) -> None:
         robot: Any = self.state.robots[0, index]
         robot["x_mm"], robot["y_mm"], robot["heading_rad"] = x_mm, y_mm, heading_rad
         robot["trail"][:] = (x_mm, y_mm, heading_rad)
         robot["start_x_mm"], robot["start_y_mm"] = x_mm, y_mm
-        self._look_again()
 
     def _start(self, index: int) -> tuple[float, float, float]:
         """Return the arena's start pose for a robot, else a free place: the roomiest for the first.
