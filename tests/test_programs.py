@@ -25,6 +25,9 @@ from kiks.ports.names import Names
 from kiks.ports.programs import Command, Programs
 from kiks.ports.unchanged import run_here
 
+# Each test starts processes.
+pytestmark = pytest.mark.slow
+
 DRIVE, SLEEPER, WATCHER, WANDER, ANY, INTO_FILE = (
     str(PROGRAMS / f"{name}.py") for name in ("drive", "sleeper", "watcher", "wander", "any_port", "into_file")
 )
@@ -40,9 +43,6 @@ while True: pass
 
 ENDS = """
 import serial, sys
-
-# Each test starts processes.
-pytestmark = pytest.mark.slow
 port = serial.Serial('COM1', timeout=1)
 for _ in range(400):
     port.write(b'N\\n')
