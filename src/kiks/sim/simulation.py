@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kiks.clock.gate import Gate
 from kiks.clock.program import Program
 from kiks.engine import ambient, proximity
 from kiks.engine.networks import networks_for
@@ -47,6 +48,7 @@ class Simulation(Things):
             the robot's file says if left out.
 
     Attributes:
+        gate: Where its time passes while somebody watches; None while nobody does.
         lamps: The lamps, float64 [lamp, 4]: x_mm, y_mm, power_w, and 1 for on or 0 for off. Write to it to move or
             switch them.
 
@@ -85,6 +87,7 @@ class Simulation(Things):
             )
         self.thinking = thinking
         self.program = Program(thinking)
+        self.gate: Gate | None = None
         self._cameras = Cameras(self)
         super().__init__(Arena.default() if arena is None else arena, _specs(robot, robots, response), seed)
         self.spec = self.specs[0]
@@ -148,6 +151,13 @@ class Simulation(Things):
 
     def advance_to(self, time_ns: int) -> None:
         """Let time pass up to a time [ns]; nothing happens if it is over already."""
+        gate = self.gate
+        if gate is not None and gate.is_up:
+            while (until_ns := gate.admit(self.now_ns, time_ns)) < time_ns:
+                self._advance_to(until_ns)
+        self._advance_to(time_ns)
+
+    def _advance_to(self, time_ns: int) -> None:
         wire = self._agenda.first(self.wires)
         while wire.next_ns is not None and wire.next_ns <= time_ns:
             if wire.next_ns > self.now_ns:
