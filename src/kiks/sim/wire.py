@@ -9,6 +9,9 @@ from kiks.clock.line import SerialLine
 from kiks.firmware.khepera import Firmware
 from kiks.units import ns_from_s
 
+STOP = b"D,0,0\n"
+"""The command that stops the wheels."""
+
 
 class Agenda:
     """Which of many wires acts first, without a look at each of them."""
@@ -93,6 +96,12 @@ class Wire:
             self.next_ns = min(command_ns, demo_ns)
         if self.next_ns is not None:
             self._agenda.note(self.next_ns, self._index)
+
+    def halt(self, now_ns: int) -> None:
+        """Hang up and stop the wheels, as is done for a program that a person has stopped."""
+        self.hang_up()
+        self.send(STOP, now_ns)
+        self.hang_up()
 
     def hang_up(self) -> None:
         """Forget what the host left behind: an unfinished command, and replies that nobody will read.
