@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 
 from kiks.engine.ambient import read_ambient
 from kiks.engine.compiling import entry, inlined, kernel
