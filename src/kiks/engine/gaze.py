@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from typing import Any
 
-
 from kiks.engine.ambient import read_ambient
 from kiks.engine.compiling import entry, inlined, kernel
 from kiks.engine.discs import PER_TRACK, SEEN_SIZE, TRACKS_SIZE, disc_of, meet_discs, see
