@@ -22,6 +22,7 @@ from kiks.firmware.turret import Turret
 from kiks.model.arena import Arena
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
 from kiks.sim.cameras import Cameras
+from kiks.sim.look import Look, look, trace_rays
 from kiks.sim.sites import Place, first_memory, named
 from kiks.sim.table import TABLE
 from kiks.sim.things import Things
@@ -246,6 +247,14 @@ class Simulation(Things):
                 self._cameras.fit(index, fitted)
         return fitted
 
+    def turrets(self, robot: int) -> tuple[Turret, ...]:
+        """Return the turrets that a robot carries, in the order in which they were fitted.
+
+        Raises:
+            ParameterError: If there is no such robot.
+        """
+        return tuple(self.wires[self.index_of(robot)].firmware.fitted)
+
     def _look_again(self) -> None:
         super()._look_again()
         self._cameras.look_again()
@@ -279,6 +288,27 @@ class Simulation(Things):
         with self.lock:
             self.sync()
             return [float(count) for count in self._sense_ambient(index, noise)]
+
+    def rays(self, robot: int) -> NDArray[np.float64]:
+        """Return how far each ray of a robot's proximity sensors goes at this instant and pose, float64 [8, 7] [mm].
+
+        The leftmost ray is first; lengths are counted from the sensor, and infinite where nothing is within its reach.
+        They are exact, however roughly the robot's response takes them.
+
+        Raises:
+            ParameterError: If there is no such robot.
+        """
+        index = self.index_of(robot)
+        with self.lock:
+            self.sync()
+            lengths_mm, _, _, _ = trace_rays(self, index, 1)
+            return np.ascontiguousarray(lengths_mm[0])
+
+    def look(self) -> Look:
+        """Return where everybody is at this instant, and what all sensors see; looking changes nothing."""
+        with self.lock:
+            self.sync()
+            return look(self, self._networks)
 
     def image(self, robot: int) -> list[float]:
         """Return what a K213 would see at this instant and pose, 64 greys from the left, without noise or rounding.
