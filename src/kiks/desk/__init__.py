@@ -1,0 +1,1 @@
+"""The desk: a browser's view of the simulation."""
