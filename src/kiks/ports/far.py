@@ -34,6 +34,7 @@ class Connection:
         self._is_to_meet = is_late
         self._there = there
         self._told_ns = 0
+        self._thought_ns = 0
         self._unanswered_count = 0
         self._ticket = 0
         self._received = bytearray()
@@ -51,9 +52,15 @@ class Connection:
         if self._now_ns - self._told_ns >= TELL_NS:
             self.tell(Kind.REACHED)
 
+    def think(self, time_ns: int) -> None:
+        """Let the time pass that the program has thought [ns]."""
+        now_ns = self.now_ns
+        self._thought_ns += time_ns
+        self.pass_to(now_ns + time_ns)
+
     def tell(self, kind: Kind, robot: int = 0, *, first: int = 0, data: bytes = b"") -> None:
         """Say something and go on."""
-        self._send(Request(kind, robot, self._now_ns, first=first, data=data))
+        self._send(Request(kind, robot, self._now_ns, 0, first, 0, 0, self._thought_ns, data))
         self._unanswered_count += 1
         if self._unanswered_count >= WINDOW:
             self.ask(Kind.MEET)
@@ -68,7 +75,7 @@ class Connection:
         """
         # The answer to a question that Ctrl-C has interrupted is still to come: it has another ticket.
         self._ticket = (self._ticket + 1) % (1 << 32)
-        self._send(Request(kind, robot, self._now_ns, self._ticket, first, second, third, data))
+        self._send(Request(kind, robot, self._now_ns, self._ticket, first, second, third, self._thought_ns, data))
         while (answer := take_answer(self._received)) is None or answer.ticket != self._ticket:
             if answer is None:
                 self._receive()
@@ -90,6 +97,7 @@ class Connection:
 
     def _send(self, request: Request) -> None:
         self._told_ns = self._now_ns
+        self._thought_ns = 0
         try:
             self._there.sendall(request.pack())
         except OSError:
@@ -115,6 +123,10 @@ class FarLine:
     def pass_to(self, time_ns: int) -> None:
         """Let time pass up to a time [ns]."""
         self._connection.pass_to(time_ns)
+
+    def think(self, time_ns: int) -> None:
+        """Let the time pass that the program has thought [ns]."""
+        self._connection.think(time_ns)
 
     def send(self, data: bytes) -> None:
         """Put characters on the line; wait while it is full."""

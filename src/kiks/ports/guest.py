@@ -107,6 +107,7 @@ class Guest(Player):
             self.acts_from_ns = self._sim.now_ns
         self.patience.renew()
         if request.kind is Kind.REACHED and not self._requests and not self.waits:
+            self._note_thinking(request)
             self.acts_from_ns = max(self.acts_from_ns, request.at_ns)
         else:
             self._requests.append(request)
@@ -147,8 +148,10 @@ class Guest(Player):
         """Do it."""
         at_ns = self.next_ns()
         assert at_ns is not None
-        self.acts_from_ns = at_ns
         request = self._requests[0]
+        if not self._has_made_room:
+            self._note_thinking(request)
+        self.acts_from_ns = at_ns
         if request.kind in (Kind.SEND, Kind.SEND_AND_MEET) and not self._has_room(request.robot):
             return
         self._requests.popleft()
@@ -202,6 +205,13 @@ class Guest(Player):
                 robot,
             )
         return False
+
+    def _note_thinking(self, request: Request) -> None:
+        """Let those who watch its robots know how long it has thought."""
+        if request.thought_ns:
+            until_ns = min(self.acts_from_ns + request.thought_ns, request.at_ns)
+            for robot in self._robots:
+                self._sim.wires[robot - 1].think(self.acts_from_ns, until_ns)
 
     def _do(self, request: Request) -> None:
         """Do what the program has said, at the instant at which it acts."""
