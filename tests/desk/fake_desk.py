@@ -235,7 +235,6 @@ def make_app(robot_count: int) -> FastAPI:
 
         with ui.element("div").style("width: 100vw; height: 100vh"):
             arena_view = ArenaView(view=view, on_pick=pick, on_draw=draw)  # type: ignore[arg-type]
-        arena_view.set_dark(dark)
         arena_view.set_show({"trails": True})
         arena_view.set_follow(follow)
         arena_view.set_tool(Tool(tool, brush_mm=10, snap_mm=10, label="wall"))  # type: ignore[arg-type]
