@@ -1,1 +1,1 @@
-"""The desk: a browser's view of the simulation."""
+"""The desk: a world in a browser, to see, touch and understand it."""

@@ -160,15 +160,26 @@ class Arena:
 
     @classmethod
     def load(cls, path: str | Path) -> Arena:
-        """Read an arena file (.toml), or a picture at 1 mm per pixel.
+        """Read an arena file (.toml), a project's arena (.kiks), one of the Matlab KiKS (.kad), or a 1 mm picture.
 
         Raises:
             ArenaError: If the file is missing, damaged or no arena.
         """
-        from kiks.model.arena_file import load_arena
-
         path = Path(path)
-        return load_arena(path) if path.suffix.lower() == ".toml" else cls.from_image(path)
+        match path.suffix.lower():
+            case ".toml":
+                from kiks.model.arena_file import load_arena
+
+                return load_arena(path)
+            case ".kiks":
+                from kiks.model.project import Project
+
+                return Project.load(path).arena
+            case ".kad":
+                from kiks.model.kad import load_kad
+
+                return load_kad(path)
+        return cls.from_image(path)
 
     @classmethod
     def default(cls) -> Arena:

@@ -6,6 +6,7 @@ Black is floor. Whatever is not black must stay wall, so every conversion below 
 from __future__ import annotations
 
 import warnings
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
 
 PICTURE_TYPES = ("PNG", "TIFF", "PPM", "BMP")
 """The types that are read, in Pillow's words; PPM includes PGM and PBM."""
+
+PICTURE_BYTES_MAX = 64 << 20
+"""Most bytes of a picture that comes from elsewhere than a file of one's own."""
 
 _LOSSY = "Lossy compression smears walls into the floor. "
 _LOSSY_TYPES = ("JPEG", "MPO", "JPEG2000", "WEBP", "AVIF")
@@ -40,15 +44,39 @@ def read_picture(path: Path, mm_per_pixel: float) -> npt.NDArray[np.uint8]:
         ParameterError: If `mm_per_pixel` is out of range.
         ArenaError: If the file is missing, damaged, of another type, or too small or too large for an arena.
     """
-    from PIL import Image, UnidentifiedImageError
-
     what = f"Picture {str(path)!r}"
     check_is_file(path, what)
+    return _read(path, what, mm_per_pixel)
+
+
+def decode_picture(data: bytes, mm_per_pixel: float, what: str = "The picture") -> npt.NDArray[np.uint8]:
+    """Read the brightness of a picture that is in memory, by the rules of `read_picture`.
+
+    Args:
+        data: The bytes of the picture's file.
+        mm_per_pixel: Edge of a pixel [mm].
+        what: What messages call it.
+
+    Raises:
+        ParameterError: If `mm_per_pixel` is out of range.
+        ArenaError: If it is damaged, of another type, too small or too large for an arena, or has too many bytes.
+    """
+    if len(data) > PICTURE_BYTES_MAX:
+        raise ArenaError(
+            f"{what} must have at most {PICTURE_BYTES_MAX >> 20} MiB, but has {len(data) / 2**20:.1f}. "
+            "Save it as PNG, or draw a smaller one."
+        )
+    return _read(BytesIO(data), what, mm_per_pixel)
+
+
+def _read(source: Path | BytesIO, what: str, mm_per_pixel: float) -> npt.NDArray[np.uint8]:
+    from PIL import Image, UnidentifiedImageError
+
     with warnings.catch_warnings():
         # Pillow warns about large pictures and odd metadata: the size is checked here, and metadata do not matter.
         warnings.simplefilter("ignore")
         try:
-            image = Image.open(path)
+            image = Image.open(source)
         except Image.DecompressionBombError as error:
             raise ArenaError(f"{what} must have at most 64 million pixels, but: {error} Draw a smaller one.") from None
         except UnidentifiedImageError:

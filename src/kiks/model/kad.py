@@ -1,0 +1,233 @@
+"""Arena files of the Matlab KiKS, `.kad`: walls as rectangles in the variable `walls` of a MATLAB file.
+
+Source: kiks-behaviour.md, section 5. `walls` is width and height [mm], then for each piece: a count n of corners, their
+n columns and n rows, counted from 1 with row 1 on top and both ends included, and a grey. What else an arena has is in
+variables that the Matlab KiKS does not ask for: `starts`, `lamps`, `balls` and `cylinders`, a row for each, in the
+order of the fields of `kiks.model.places` and with y upwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from kiks.errors import ArenaError, KiksError
+from kiks.model.arena import Arena
+from kiks.model.files import replace_file
+from kiks.model.mat import FILE_BYTES_MAX, read_numbers
+from kiks.model.picture import check_is_file
+from kiks.model.places import Ball, Cylinder, Lamp, Pose
+from kiks.model.raster import cells_per_pixel
+
+PIECES_MAX = 200_000
+"""Most rectangles of a file."""
+
+PAINTED_MAX = 16
+"""How often all the pieces of a file together may paint over the whole arena."""
+
+_THINGS: dict[str, tuple[type[Any], int]] = {
+    "starts": (Pose, 3),
+    "lamps": (Lamp, 4),
+    "balls": (Ball, 5),
+    "cylinders": (Cylinder, 5),
+}
+
+
+def load_kad(path: str | Path) -> Arena:
+    """Read a `.kad` file.
+
+    Raises:
+        ArenaError: If it is missing, damaged, too large, or no arena.
+    """
+    path = Path(path)
+    what = f"Arena file {str(path)!r}"
+    check_is_file(path, what)
+    try:
+        with path.open("rb") as file:
+            data = file.read(FILE_BYTES_MAX + 1)
+    except OSError as error:
+        raise ArenaError(f"{what} must be readable, but: {error}. Check its rights.") from None
+    return decode_kad(data, path.stem, what)
+
+
+def decode_kad(data: bytes, name: str = "arena", what: str = "The arena file") -> Arena:
+    """Read the bytes of a `.kad` file.
+
+    Args:
+        data: The bytes.
+        name: What people call the arena.
+        what: What messages call the file.
+
+    Raises:
+        ArenaError: If it is damaged, too large, or no arena.
+    """
+    found = read_numbers(data, what)
+    if "walls" not in found:
+        raise ArenaError(f"{what} must have a variable 'walls', but has {sorted(found)[:9]}. Is it an arena of KiKS?")
+    try:
+        raster = _raster(_whole(found["walls"]))
+        things = {label: _entries(label, kind, count, found) for label, (kind, count) in _THINGS.items()}
+        return Arena(raster, 1.0, name, **things)
+    except KiksError as error:
+        raise ArenaError(f"{what}: {error}") from None
+
+
+def save_kad(arena: Arena, path: str | Path) -> None:
+    """Write a `.kad` file; an earlier one of that name is replaced in one step.
+
+    Raises:
+        ArenaError: If the arena has no cells of 1 mm, too many pieces, or the file cannot be written.
+    """
+    replace_file(Path(path), encode_kad(arena))
+
+
+def encode_kad(arena: Arena) -> bytes:
+    """Return the bytes of a `.kad` file.
+
+    Raises:
+        ArenaError: If the arena has no cells of 1 mm, is too long, or has too many pieces.
+    """
+    from io import BytesIO
+
+    from scipy.io import savemat
+
+    if arena.mm_per_cell != 1.0 or max(arena.brightness.shape) > 65535:
+        raise ArenaError(
+            f"A .kad file has cells of 1 mm, at most 65535 side by side, but arena {arena.name!r} has "
+            f"{arena.brightness.shape[1]} x {arena.brightness.shape[0]} of {arena.mm_per_cell:g} mm. Save it as .kiks."
+        )
+    variables: dict[str, npt.NDArray[Any]] = {"walls": _walls(arena.brightness)}
+    for label, (_, count) in _THINGS.items():
+        if entries := getattr(arena, label):
+            variables[label] = np.array(entries, np.float64).reshape(-1, count)
+    file = BytesIO()
+    savemat(file, variables, format="5", do_compression=False)
+    return file.getvalue()
+
+
+def _walls(brightness: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint16]:
+    """Return the numbers of `walls`: a row, in the order in which the Matlab KiKS writes them.
+
+    There the first cell that is not floor, column by column from the left and from the top, grows down while the grey
+    is the same, then right while all of that piece is, and goes; and so on. A piece never grows into cells that are
+    gone while its own are not, because those went with all between: so how far it grows right is to be read off the
+    picture as it was, and all pieces that begin in a column are found together.
+    """
+    height, width = brightness.shape
+    columns = np.ascontiguousarray(brightness[::-1].T)
+    alike = np.ones((width, height), np.uint16)  # cells of the same grey from here to the right
+    for column in range(width - 2, -1, -1):
+        np.add(alike[column], alike[column + 1], out=alike[column], where=columns[column] == columns[column + 1])
+    pieces: list[npt.NDArray[np.uint16]] = []
+    gone_to = np.zeros(height, np.int64)  # the column up to which a row is gone
+    total = 0
+    for column in range(width):
+        grey = np.where(gone_to > column, 0, columns[column])
+        begins = np.flatnonzero(np.diff(grey, prepend=np.uint8(0)) != 0)
+        begins = begins[grey[begins] > 0]
+        if not len(begins):
+            continue
+        ends = np.append(np.flatnonzero(np.diff(grey) != 0), height - 1)
+        ends = ends[grey[ends] > 0]
+        across = np.array(
+            [alike[column, first : last + 1].min() for first, last in zip(begins, ends, strict=True)], dtype=np.int64
+        )
+        for first, last, count in zip(begins, ends, across, strict=True):
+            gone_to[first : last + 1] = column + count
+        left, right = np.full_like(begins, column + 1), column + across
+        top, bottom = begins + 1, ends + 1
+        four = np.full_like(begins, 4)
+        piece = (four, left, right, right, left, top, top, bottom, bottom, grey[begins].astype(np.int64))
+        pieces.append(np.column_stack(piece).astype(np.uint16).ravel())
+        total += len(begins)
+        if total > PIECES_MAX:
+            raise ArenaError(
+                f"A .kad file must have at most {PIECES_MAX} rectangles, but this arena has more. Save it as .kiks."
+            )
+    return np.concatenate([np.array([width, height], np.uint16), *pieces])[None, :]
+
+
+def _whole(walls: npt.NDArray[np.float64]) -> npt.NDArray[np.int64]:
+    if walls.ndim != 2 or min(walls.shape) > 1:
+        raise ArenaError(f"walls must be a row of numbers, but it has {' x '.join(map(str, walls.shape))}.")
+    row = walls.ravel()
+    if not ((row >= 0) & (row <= 65535) & (row == np.floor(row))).all():
+        raise ArenaError("walls must be whole numbers from 0 to 65535, but holds others. Is it an arena of KiKS?")
+    return row.astype(np.int64)
+
+
+def _raster(walls: npt.NDArray[np.int64]) -> npt.NDArray[np.uint8]:
+    if len(walls) < 2:
+        raise ArenaError(f"walls must begin with width and height, but it has {len(walls)} numbers.")
+    width, height = walls[:2].tolist()
+    cells_per_pixel(height, width, 1.0)
+    picture = np.zeros((height, width), np.uint8)
+    budget = PAINTED_MAX * picture.size
+    for number, (x, y, grey) in enumerate(_pieces(walls), start=1):
+        who = f"piece {number} of walls"
+        if number > PIECES_MAX:
+            raise ArenaError(f"walls must have at most {PIECES_MAX} pieces, but it has more. Draw a simpler arena.")
+        left, right, top, bottom = (int(end) for end in (x.min(), x.max(), y.min(), y.max()))
+        if left < 1 or right > width or top < 1 or bottom > height or grey > 255:
+            raise ArenaError(
+                f"{who} must lie within {width} x {height} mm and have a grey up to 255, but its columns are {left} to "
+                f"{right}, its rows {top} to {bottom}, its grey {grey}. Save the arena again."
+            )
+        box = picture[top - 1 : bottom, left - 1 : right]
+        is_rectangle = set(zip(x.tolist(), y.tolist(), strict=True)) == {
+            (column, row) for column in (left, right) for row in (top, bottom)
+        }
+        budget -= box.size * (1 if is_rectangle else len(x))
+        if budget < 0:
+            raise ArenaError(f"walls must not be painted over again and again, but up to {who} it was. Save it again.")
+        box[...] = grey if is_rectangle else np.where(_polygon(x - left, y - top, box.shape), grey, 0)
+    return np.ascontiguousarray(picture[::-1])
+
+
+def _pieces(
+    walls: npt.NDArray[np.int64],
+) -> Iterator[tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], int]]:
+    """Yield columns and rows of the corners of each piece, and its grey."""
+    position = 2
+    while position < len(walls):
+        count = int(walls[position])
+        last = position + 2 * count + 1
+        if count < 1 or last >= len(walls):
+            raise ArenaError(
+                f"walls must consist of whole pieces, but at its number {position + 1} {count} corners are announced "
+                f"and {len(walls) - position - 1} numbers follow. The file was cut short."
+            )
+        yield walls[position + 1 : position + 1 + count], walls[position + 1 + count : last], int(walls[last])
+        position = last + 1
+
+
+def _polygon(x: npt.NDArray[np.int64], y: npt.NDArray[np.int64], shape: tuple[int, ...]) -> npt.NDArray[np.bool_]:
+    """Tell which whole places lie in a polygon or on its edge."""
+    rows, columns = np.arange(shape[0])[:, None], np.arange(shape[1])
+    is_inside, is_edge = np.zeros(shape, np.bool_), np.zeros(shape, np.bool_)
+    for x0, y0, x1, y1 in zip(x.tolist(), y.tolist(), np.roll(x, -1).tolist(), np.roll(y, -1).tolist(), strict=True):
+        aside = (columns - x0) * (y1 - y0) - (rows - y0) * (x1 - x0)
+        within = (rows >= min(y0, y1)) & (rows <= max(y0, y1)) & (columns >= min(x0, x1)) & (columns <= max(x0, x1))
+        is_edge |= (aside == 0) & within
+        if y0 != y1:
+            is_inside ^= (rows >= min(y0, y1)) & (rows < max(y0, y1)) & ((aside > 0) == (y1 > y0))
+    return is_inside | is_edge
+
+
+def _entries(label: str, kind: type[Any], count: int, found: dict[str, npt.NDArray[np.float64]]) -> tuple[Any, ...]:
+    rows = found.get(label)
+    if rows is None or not rows.size:
+        return ()
+    if rows.ndim != 2 or rows.shape[1] != count or len(rows) > 1000:
+        raise ArenaError(f"{label} must have up to 1000 rows of {count} numbers, but it has {rows.shape}.")
+    if not np.isfinite(rows).all():
+        raise ArenaError(f"{label} must be finite numbers, but holds others.")
+    if kind is Ball or kind is Cylinder:
+        if (rows[:, -1] != np.floor(rows[:, -1])).any():
+            raise ArenaError(f"{label}: brightness must be whole, but it was {rows[:, -1].tolist()[:9]}.")
+        return tuple(kind(*row[:-1], int(row[-1])) for row in rows.tolist())
+    return tuple(kind(*row) for row in rows.tolist())

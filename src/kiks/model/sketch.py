@@ -1,0 +1,420 @@
+"""An arena while it is drawn: a raster to paint in, what stands in it, and the way back and forth.
+
+Every operation checks before it changes anything, or takes back what it did: a sketch is always an arena. Lengths are
+millimetres, y points up, headings are radians; brightness 0 is floor, so drawing with 0 erases.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from kiks.errors import ArenaError, KiksError, ParameterError
+from kiks.model.arena import Arena
+from kiks.model.brush import Area, Point, rectangle_cells, stroke_cells
+from kiks.model.materials import brightness_of
+from kiks.model.picture import decode_picture
+from kiks.model.places import Ball, Cylinder, Lamp, Pose, checked_places
+from kiks.model.raster import is_number
+from kiks.model.room import OVERLAP_MM, free_place, room_mm
+from kiks.model.sketch_history import BoxPatch, Canvas, History, Patch, ThingPatch, WholePatch
+from kiks.model.sketch_things import AnyThing, SketchRobot, Thing, name_of, radius_of, robot_radius_mm
+
+WIDTH_MAX_MM = 1000.0
+"""Widest brush [mm]."""
+
+POINTS_MAX = 10_000
+"""Most points of one stroke."""
+
+THINGS_MAX = 1000
+"""Most robots, and most other things."""
+
+_FAR_MM = 1e5
+
+
+class Sketch:
+    """An arena that is drawn.
+
+    Args:
+        arena: What there is to begin with.
+        kinds: What each robot is; those beyond the arena's starts are put where there is room.
+
+    Attributes:
+        things: What stands or hangs in it, by numbers that stay the same; numbers rise with time.
+
+    Raises:
+        ArenaError: If there is no room for a robot.
+
+    Example:
+        >>> sketch = Sketch(Arena.box(400, 300))
+        >>> sketch.line([(100, 50), (100, 250)], width_mm=10, brightness="wood")
+        >>> int(sketch.arena().brightness[150, 100])
+        190
+        >>> sketch.undo(), int(sketch.arena().brightness[150, 100])
+        (True, 0)
+    """
+
+    def __init__(self, arena: Arena, kinds: Sequence[str] = ("khepera",)) -> None:
+        self.things: dict[int, Thing] = {}
+        self._next, self._history = 1, History()
+        self._canvas = Canvas(arena.brightness.copy(), arena.mm_per_cell, arena.name)
+        self._enter(arena, kinds)
+
+    @property
+    def brightness(self) -> npt.NDArray[np.uint8]:
+        """The raster as it is now, uint8 [row, column], row 0 at the bottom; not to be written to."""
+        view = self._canvas.brightness.view()
+        view.setflags(write=False)
+        return view
+
+    @property
+    def width_mm(self) -> float:
+        """Width of the raster [mm]."""
+        return self._shape[1] * self._canvas.mm_per_cell
+
+    @property
+    def height_mm(self) -> float:
+        """Height of the raster [mm]."""
+        return self._shape[0] * self._canvas.mm_per_cell
+
+    @property
+    def can_undo(self) -> bool:
+        """Whether there is a step to take back."""
+        return bool(self._history.undoable)
+
+    @property
+    def can_redo(self) -> bool:
+        """Whether a step was taken back and nothing has been done since."""
+        return bool(self._history.redoable)
+
+    def of(self, kind: type[AnyThing]) -> dict[int, AnyThing]:
+        """Return all things of a kind by their numbers, in the order of these."""
+        return {number: thing for number, thing in sorted(self.things.items()) if isinstance(thing, kind)}
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """What each robot is."""
+        return tuple(robot.kind for robot in self.of(SketchRobot).values())
+
+    def arena(self) -> Arena:
+        """Return what is drawn.
+
+        Raises:
+            ArenaError: If it is no arena.
+        """
+        return Arena(
+            self._canvas.brightness.copy(),
+            self._canvas.mm_per_cell,
+            self._canvas.name,
+            starts=tuple(Pose(robot.x_mm, robot.y_mm, robot.heading_rad) for robot in self.of(SketchRobot).values()),
+            lamps=tuple(self.of(Lamp).values()),
+            balls=tuple(self.of(Ball).values()),
+            cylinders=tuple(self.of(Cylinder).values()),
+        )
+
+    # ---- all of it ----
+
+    def picture(self, data: bytes, *, mm_per_pixel: float = 1.0, name: str = "picture") -> None:
+        """Begin with a picture; robots stay, where there is room. See `Arena.from_image`.
+
+        Args:
+            data: The bytes of a PNG, TIF, PGM or BMP file.
+            mm_per_pixel: Edge of a pixel [mm].
+            name: What people call the arena.
+
+        Raises:
+            ParameterError: If `mm_per_pixel` is out of range.
+            ArenaError: If it is no such picture, too large, or has no room for the robots.
+        """
+        self.begin(Arena.from_array(decode_picture(data, mm_per_pixel), mm_per_pixel=mm_per_pixel, name=name))
+
+    def begin(self, arena: Arena) -> None:
+        """Begin with another arena, a box or a maze, as one step.
+
+        Robots go to its starts; those beyond stay where they are, or go to the nearest place with room.
+
+        Raises:
+            ArenaError: If it has no room for the robots.
+        """
+        before, canvas = WholePatch(self._canvas, self.things), self._canvas
+        robots = list(self.of(SketchRobot).values())
+        wanted = [
+            SketchRobot(*arena.starts[index], robot.kind) if index < len(arena.starts) else robot
+            for index, robot in enumerate(robots)
+        ]
+        self._canvas = Canvas(arena.brightness.copy(), arena.mm_per_cell, arena.name)
+        try:
+            self._enter(replace(arena, starts=()), self.kinds, wanted)
+        except KiksError:
+            self._canvas = canvas
+            before.swap(canvas, self.things)
+            raise
+        self._history.push(before)
+
+    def _enter(self, arena: Arena, kinds: Sequence[str], wanted: Sequence[SketchRobot] = ()) -> None:
+        """Put everything into an empty raster: robots where they are wanted, or else at the nearest free place."""
+        self.things.clear()
+        others: list[Thing] = [*arena.balls, *arena.cylinders, *arena.lamps]
+        for index, kind in enumerate(kinds):
+            if index < len(arena.starts):
+                robot = SketchRobot(*arena.starts[index], kind)
+            else:
+                near = wanted[index] if index < len(wanted) else None
+                robot = self._seat(index + 1, kind, near, others)
+            self._add(robot)
+        for thing in others:
+            self._add(thing)
+
+    def _seat(self, number: int, kind: str, near: SketchRobot | None, others: Iterable[Thing]) -> SketchRobot:
+        """Return a free place for a robot: its own, the one nearest to it, or else the roomiest."""
+        radius_mm = robot_radius_mm(kind)
+        if near is not None and self._obstacle(near) is None:
+            return near
+        arena = Arena(self._canvas.brightness.copy(), self._canvas.mm_per_cell, self._canvas.name)
+        there = [thing for thing in [*self.things.values(), *others] if not isinstance(thing, Lamp)]
+        discs = [(thing.x_mm, thing.y_mm, radius_of(thing)) for thing in there]
+        place = free_place(arena, discs, radius_mm, None if near is None else (near.x_mm, near.y_mm))
+        if place is None:
+            raise ArenaError(
+                f"There must be room for robot {number}, {2 * radius_mm:g} mm across, but there is none. "
+                "Take a larger arena, or take a robot away."
+            )
+        return SketchRobot(*place, math.pi / 2 if near is None else near.heading_rad, kind)
+
+    # ---- walls ----
+
+    def rectangle(self, x0_mm: float, y0_mm: float, x1_mm: float, y1_mm: float, brightness: int | str = 255) -> None:
+        """Fill a rectangle between two corners.
+
+        Raises:
+            ParameterError: If a number is out of range.
+            ArenaError: If something stands there, or no floor would remain.
+        """
+        corner, opposite = self._cells([(x0_mm, y0_mm), (x1_mm, y1_mm)])
+        self._paint(rectangle_cells(self._shape, corner, opposite), brightness)
+
+    def line(self, points_mm: Sequence[Point], *, width_mm: float, brightness: int | str = 255) -> None:
+        """Draw a line through points with a round brush: from one to another, freehand through many, a dot at one.
+
+        Raises:
+            ParameterError: If a number is out of range, or there is no point, or too many.
+            ArenaError: If something stands there, or no floor would remain.
+        """
+        if not is_number(width_mm) or not 0 < width_mm <= WIDTH_MAX_MM:
+            raise ParameterError(f"width_mm must be above 0 and up to {WIDTH_MAX_MM:g}, but it was {width_mm!r}.")
+        if not 1 <= len(points_mm) <= POINTS_MAX:
+            raise ParameterError(
+                f"points_mm must be 1 to {POINTS_MAX} points, but they were {len(points_mm)}. Draw in shorter strokes."
+            )
+        points = self._cells(points_mm)
+        self._paint(stroke_cells(self._shape, points, width_mm / self._canvas.mm_per_cell), brightness)
+
+    def clear(self) -> None:
+        """Make all of it floor; what stands in it stays."""
+        self.rectangle(0, 0, self.width_mm, self.height_mm, 0)
+
+    @property
+    def _shape(self) -> tuple[int, int]:
+        rows, columns = self._canvas.brightness.shape
+        return rows, columns
+
+    def _cells(self, points_mm: Sequence[Point]) -> list[Point]:
+        for point in points_mm:
+            if len(point) != 2 or not all(is_number(value) and abs(value) <= _FAR_MM for value in point):
+                raise ParameterError(f"A point must be x and y, up to {_FAR_MM:g} mm away, but it was {point!r}.")
+        return [(x_mm / self._canvas.mm_per_cell, y_mm / self._canvas.mm_per_cell) for x_mm, y_mm in points_mm]
+
+    def _paint(self, areas: Iterable[Area], brightness: int | str) -> None:
+        grey = brightness_of(brightness)
+        if isinstance(grey, bool) or not isinstance(grey, int) or not 0 <= grey <= 255:
+            raise ParameterError(f"brightness must be 0 (floor) to 255 or a material, but it was {brightness!r}.")
+        covered = list(areas)
+        if not covered:
+            return
+        box = (
+            slice(min(area.rows.start for area in covered), max(area.rows.stop for area in covered)),
+            slice(min(area.columns.start for area in covered), max(area.columns.stop for area in covered)),
+        )
+        raster = self._canvas.brightness
+        before = raster[box].copy()
+        for rows, columns, mask in covered:
+            raster[rows, columns][... if mask is None else mask] = grey
+        if np.array_equal(before, raster[box]):
+            return
+        try:
+            if grey:
+                self._check_walls(box)
+        except ArenaError:
+            raster[box] = before
+            raise
+        self._history.push(BoxPatch(box, before))
+
+    def _check_walls(self, box: tuple[slice, slice]) -> None:
+        """Check that after a wall was drawn there is floor, and nothing stands in it."""
+        if self._canvas.brightness.all():
+            raise ArenaError("An arena must have floor, but nothing but wall would remain. Leave a place for a robot.")
+        rows, columns = (
+            (piece.start * self._canvas.mm_per_cell, piece.stop * self._canvas.mm_per_cell) for piece in box
+        )
+        for number, thing in self.things.items():
+            if isinstance(thing, Lamp):
+                continue
+            reach_mm = radius_of(thing) + 3 * self._canvas.mm_per_cell
+            is_near = rows[0] - reach_mm <= thing.y_mm <= rows[1] + reach_mm
+            if is_near and columns[0] - reach_mm <= thing.x_mm <= columns[1] + reach_mm:
+                gap_mm = self._gap_mm(thing)
+                if gap_mm < -OVERLAP_MM:
+                    raise ArenaError(
+                        f"A wall must leave room for what stands in the arena, but it would be {-gap_mm:.1f} mm inside "
+                        f"{self._name(number)} at ({thing.x_mm:g}, {thing.y_mm:g}) mm. Move that first."
+                    )
+
+    # ---- things ----
+
+    def add(self, thing: Thing) -> int:
+        """Put a robot, ball, cylinder or lamp into the arena; return its number.
+
+        Raises:
+            ParameterError: If one of its numbers is out of range, or there are too many.
+            ArenaError: If something is in the way.
+        """
+        checked = self._checked(thing)
+        alike = [
+            each for each in self.things.values() if isinstance(each, SketchRobot) == isinstance(thing, SketchRobot)
+        ]
+        if len(alike) >= THINGS_MAX:
+            raise ParameterError(f"There must be at most {THINGS_MAX} of these, but there are {len(alike)} already.")
+        self._history.push(ThingPatch(self._next, None))
+        self._add(checked)
+        return self._next - 1
+
+    def change(self, number: int, thing: Thing) -> None:
+        """Put something in the place of a thing: the same one elsewhere, or with other numbers.
+
+        Raises:
+            ParameterError: If there is no such thing, or a number is out of range.
+            ArenaError: If something is in the way.
+        """
+        before = self._thing(number)
+        checked = self._checked(thing, but=number)
+        self._history.push(ThingPatch(number, before))
+        self.things[number] = checked
+
+    def move(self, number: int, x_mm: float, y_mm: float) -> None:
+        """Put a thing elsewhere.
+
+        Raises:
+            ParameterError: If there is no such thing, or a number is out of range.
+            ArenaError: If something is in the way.
+        """
+        self.change(number, self._thing(number)._replace(x_mm=x_mm, y_mm=y_mm))
+
+    def remove(self, number: int) -> None:
+        """Take a thing away.
+
+        Raises:
+            ParameterError: If there is no such thing, or it is the only robot.
+        """
+        thing = self._thing(number)
+        if isinstance(thing, SketchRobot) and len(self.kinds) == 1:
+            raise ParameterError("There must be at least one robot, but this is the only one. Add another one first.")
+        self._history.push(ThingPatch(number, thing))
+        del self.things[number]
+
+    def note(self, number: int, thing: Thing) -> None:
+        """Take over where a thing has gone by itself, which is no step to take back.
+
+        Raises:
+            ParameterError: If there is no such thing.
+        """
+        self._thing(number)
+        self.things[number] = thing
+
+    def _thing(self, number: int) -> Thing:
+        if number not in self.things:
+            raise ParameterError(f"number must be that of a thing, but it was {number!r}. There are {[*self.things]}.")
+        return self.things[number]
+
+    def _add(self, thing: Thing) -> None:
+        self.things[self._next] = thing
+        self._next += 1
+
+    def _checked(self, thing: Thing, but: int = 0) -> Thing:
+        raster, cell = self._canvas.brightness, self._canvas.mm_per_cell
+        checked: Thing
+        if isinstance(thing, SketchRobot):
+            robot_radius_mm(thing.kind)
+            (pose,) = checked_places("start", Pose, [(thing.x_mm, thing.y_mm, thing.heading_rad)], raster, cell)
+            checked = SketchRobot(*pose, thing.kind)
+        else:
+            (checked,) = checked_places(name_of(type(thing)), type(thing), [thing], raster, cell)  # type: ignore[assignment]
+        if (obstacle := self._obstacle(checked, but)) is not None:
+            raise ArenaError(
+                f"The place must be free, but at ({thing.x_mm:g}, {thing.y_mm:g}) mm {obstacle}. Take another place."
+            )
+        return checked
+
+    def _obstacle(self, thing: Thing, but: int = 0) -> str | None:
+        """Say what is in the way of a thing, None if it may be there."""
+        if isinstance(thing, Lamp):
+            return None
+        gap_mm = self._gap_mm(thing)
+        if gap_mm < -OVERLAP_MM:
+            return f"a wall is {-gap_mm:.1f} mm inside it"
+        for number, other in self.things.items():
+            if number == but or isinstance(other, Lamp):
+                continue
+            together_mm = radius_of(thing) + radius_of(other)
+            overlap_mm = together_mm - math.hypot(thing.x_mm - other.x_mm, thing.y_mm - other.y_mm)
+            if overlap_mm > OVERLAP_MM:
+                return f"{self._name(number)} is {overlap_mm:.1f} mm inside it"
+        return None
+
+    def _gap_mm(self, thing: SketchRobot | Ball | Cylinder) -> float:
+        radius_mm = radius_of(thing)
+        canvas = self._canvas
+        return room_mm(canvas.brightness, canvas.mm_per_cell, thing.x_mm, thing.y_mm, radius_mm) - radius_mm
+
+    def _name(self, number: int) -> str:
+        kind = type(self.things[number])
+        alike = [each for each, thing in sorted(self.things.items()) if isinstance(thing, kind)]
+        return f"{name_of(kind)} {alike.index(number) + 1}"
+
+    # ---- steps ----
+
+    def undo(self) -> bool:
+        """Take the last step back; return whether there was one.
+
+        Raises:
+            ArenaError: If something has gone to where it needs room since.
+        """
+        return self._swap(self._history.undoable, self._history.redoable)
+
+    def redo(self) -> bool:
+        """Do again what was taken back last; return whether there was something.
+
+        Raises:
+            ArenaError: If something has gone to where it needs room since.
+        """
+        return self._swap(self._history.redoable, self._history.undoable)
+
+    def _swap(self, source: list[Patch], target: list[Patch]) -> bool:
+        if not source:
+            return False
+        patch = source[-1]
+        other = patch.swap(self._canvas, self.things)
+        try:
+            if isinstance(patch, BoxPatch):
+                self._check_walls(patch.box)
+            elif isinstance(patch, ThingPatch) and patch.number in self.things:
+                self._checked(self.things[patch.number], but=patch.number)
+        except ArenaError:
+            other.swap(self._canvas, self.things)
+            raise
+        source.pop()
+        target.append(other)
+        return True
