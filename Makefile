@@ -9,10 +9,10 @@ BIN    := $(VENV)/bin
 demo: setup
 	$(BIN)/kiks demo follow --arena examples/arenas/office.toml --seconds 300 --picture kiks-demo.png
 
-test: setup
+test: setup system
 	$(BIN)/python -m pytest -n auto
 
-quick: setup
+quick: setup system
 	$(BIN)/python -m pytest -n auto -m "not slow"
 
 setup: $(VENV)/.ready
@@ -23,6 +23,9 @@ $(VENV)/.ready: pyproject.toml tools/system-packages.sh
 	$(or $(PYTHON),python3) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
 	@touch $@
+
+system:
+	@PYTHON="$(PYTHON)" sh tools/system-packages.sh tests
 
 lint: setup
 	$(BIN)/ruff check .

@@ -22,7 +22,8 @@ import kiks as package
 from kiks.cli.run import parse_words
 from kiks.errors import LinkError, ParameterError
 from kiks.ports.names import Names
-from kiks.ports.programs import Command, Programs
+from kiks.ports.process import Command
+from kiks.ports.programs import Programs
 from kiks.ports.unchanged import run_here
 
 # Each test starts processes.

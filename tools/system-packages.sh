@@ -1,13 +1,18 @@
 #!/bin/sh
-# What KiKS needs of the system: Python's venv module, and a C compiler for the test that drives a robot from C.
+# What KiKS needs of the system: Python's venv module, and for the tests a C compiler (a robot is driven from C) and
+# Chromium (the desk is used in a real browser): system-packages.sh [tests].
 # As root on Debian this installs what is missing; otherwise it names it.
 set -eu
 
 python="${PYTHON:-python3}"
 missing=""
-command -v "$python" >/dev/null 2>&1 || missing="$missing python3"
-"$python" -c 'import sys, ensurepip, venv; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 || missing="$missing python3-venv"
-command -v gcc >/dev/null 2>&1 || missing="$missing gcc libc6-dev"
+if [ "${1:-}" = tests ]; then
+    command -v gcc >/dev/null 2>&1 || missing="$missing gcc libc6-dev"
+    command -v chromium >/dev/null 2>&1 || missing="$missing chromium fonts-dejavu-core"
+else
+    command -v "$python" >/dev/null 2>&1 || missing="$missing python3"
+    "$python" -c 'import sys, ensurepip, venv; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 || missing="$missing python3-venv"
+fi
 [ -z "$missing" ] && exit 0
 
 if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null 2>&1; then
@@ -18,5 +23,5 @@ if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null 2>&1; then
 else
     echo "KiKS needs these system packages: $missing"
     echo "On Debian or Ubuntu: sudo apt-get install$missing"
-    case "$missing" in *python3*) exit 1 ;; esac  # without a compiler one test is skipped, no more
+    [ "${1:-}" = tests ] || exit 1  # without them some tests are skipped, no more
 fi

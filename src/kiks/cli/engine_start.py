@@ -31,6 +31,7 @@ def compile_everything() -> None:
     robot.ambient()
     sim.proximity(1)
     sim.ambient(1)
+    sim.look()
     sim.fit(1, "k213")
     robot.image()
     sim.image(1)

@@ -12,7 +12,7 @@ from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
     from kiks.demos.match import Report
-    from kiks.ports.programs import Command
+    from kiks.ports.process import Command
 
 SECONDS = 300.0
 """How long a match takes if nobody says otherwise [s]."""
@@ -68,7 +68,7 @@ def player(words: str | None, robot: int, side: str) -> Command:
     """
     from kiks.cli.run import parse_words
     from kiks.demos import soccer
-    from kiks.ports.programs import Command
+    from kiks.ports.process import Command
 
     given = [f"kiks://{robot}", side]
     if words is None:

@@ -14,7 +14,7 @@ from kiks.cli.options import ArenaFile, PatienceS, RobotKinds, Seed, Turrets, Wh
 from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
-    from kiks.ports.programs import Command
+    from kiks.ports.process import Command
     from kiks.sim.simulation import Simulation
 
 
@@ -128,7 +128,7 @@ def parse_words(words: list[str]) -> list[Command]:
     Raises:
         ParameterError: If the first word is no file.
     """
-    from kiks.ports.programs import Command
+    from kiks.ports.process import Command
 
     commands: list[Command] = []
     for word in words:

@@ -46,17 +46,23 @@ class SerialLine:
         self.sending_until_ns = start_ns + count * self.character_ns
         return start_ns
 
-    def answer(self, data: bytes, at_ns: int) -> None:
-        """Put a reply on the way to the host."""
+    def carry(self, count: int, at_ns: int) -> int:
+        """Put characters that somebody else keeps on the way to the host; return when the first sets out [ns]."""
+        start_ns = max(at_ns, self._answering_until_ns)
+        self._answering_until_ns = start_ns + count * self.character_ns
+        return start_ns
+
+    def answer(self, data: bytes, at_ns: int) -> int | None:
+        """Put a reply on the way to the host; return when it sets out [ns], None if it is empty or lost."""
         if not data:
-            return
+            return None
         if len(self.waiting) + len(data) > OUTPUT_LIMIT:
             self.lost_count += len(data)
-            return
-        start_ns = max(at_ns, self._answering_until_ns)
-        self._answering_until_ns = start_ns + len(data) * self.character_ns
+            return None
+        start_ns = self.carry(len(data), at_ns)
         self.waiting += data
         self._pieces.append([start_ns, self.character_ns, len(data)])
+        return start_ns
 
     def arrived_count(self, now_ns: int) -> int:
         """Return how many of the waiting characters have arrived."""

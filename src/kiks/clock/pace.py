@@ -16,6 +16,9 @@ SPEED_MAX = 1e3
 LAG_LIMIT_NS = NS_PER_S // 4
 """How far behind the simulation must be for a warning [ns of the wall clock]; a busy computer often is for a moment."""
 
+ALWAYS_NS = 2**62
+"""Later than any simulated time [ns]."""
+
 _log = logging.getLogger("kiks.serve")
 
 
@@ -23,8 +26,12 @@ class Pace:
     """What simulated time it ought to be now.
 
     Args:
-        speed: Simulated seconds in a real one.
+        speed: Simulated seconds in a real one; None for as many as can be done.
         wall_ns: A clock that only goes forwards [ns]; a test hands in its own.
+
+    Attributes:
+        speed: The same; `set_speed` changes it.
+        is_held: Whether simulated time stands still.
 
     Raises:
         ParameterError: If the speed is out of range.
@@ -38,36 +45,64 @@ class Pace:
         2100
         >>> round(pace.wall_wait_s(4_100) * 1e9)
         1000
+        >>> pace.hold(2_100)
+        >>> wall[0] += 1_000
+        >>> pace.now_ns()
+        2100
     """
 
-    def __init__(self, speed: float = 1.0, *, wall_ns: Callable[[], int] = time.monotonic_ns) -> None:
-        if not (isinstance(speed, int | float) and math.isfinite(speed) and SPEED_MIN <= speed <= SPEED_MAX):
-            raise ParameterError(
-                f"speed must be a number from {SPEED_MIN:g} to {SPEED_MAX:g}, but it was {speed!r}. "
-                "1 is real time; a program that waits for its replies runs as fast as it can with thinking 'none'."
-            )
-        self.speed = speed
+    def __init__(self, speed: float | None = 1.0, *, wall_ns: Callable[[], int] = time.monotonic_ns) -> None:
+        self.speed = _check_speed(speed)
+        self.is_held = False
         self._wall_ns = wall_ns
         self._has_warned = False
         self.start(0)
 
     def start(self, time_ns: int) -> None:
-        """Let simulated time be `time_ns` at this moment."""
+        """Let simulated time be `time_ns` at this moment; if it stands still, there."""
         self._wall_start_ns = self._wall_ns()
         self._start_ns = time_ns
 
+    def set_speed(self, speed: float | None, time_ns: int) -> None:
+        """Go on at another speed from a simulated time [ns].
+
+        Raises:
+            ParameterError: If it is out of range.
+        """
+        self.speed = _check_speed(speed)
+        self.start(time_ns)
+
+    def hold(self, time_ns: int) -> None:
+        """Let simulated time stand still from `time_ns` on, until `go_on`."""
+        self.is_held = True
+        self.start(time_ns)
+
+    def go_on(self) -> None:
+        """Let it pass again, from where it stands still."""
+        self.is_held = False
+        self.start(self._start_ns)
+
     def now_ns(self) -> int:
         """Return the simulated time that the wall clock stands for [ns]."""
+        if self.is_held:
+            return self._start_ns
+        if self.speed is None:
+            return ALWAYS_NS
         return self._start_ns + round((self._wall_ns() - self._wall_start_ns) * self.speed)
 
     def wall_wait_s(self, time_ns: int) -> float:
         """Return how long it really takes until a simulated time [s]; 0 if it is over."""
-        return max(s_from_ns(time_ns - self.now_ns()) / self.speed, 0.0)
+        left_s = s_from_ns(time_ns - self.now_ns())
+        if left_s <= 0 or self.speed is None:
+            return 0.0 if left_s <= 0 else math.inf
+        return math.inf if self.is_held else left_s / self.speed
 
     def report(self, time_ns: int) -> None:
         """Note how far the simulation has got [ns]; say so, once, if that is far behind."""
+        if self._has_warned or self.speed is None:
+            return
         lag_ns = (self.now_ns() - time_ns) / self.speed
-        if lag_ns > LAG_LIMIT_NS and not self._has_warned:
+        if lag_ns > LAG_LIMIT_NS:
             self._has_warned = True
             _log.warning(
                 "the simulation must keep up with %g times real time, but it is %.1f s behind. Ask for a lower speed; "
@@ -75,3 +110,14 @@ class Pace:
                 self.speed,
                 lag_ns / NS_PER_S,
             )
+
+
+def _check_speed(speed: float | None) -> float | None:
+    if speed is not None and not (
+        isinstance(speed, int | float) and math.isfinite(speed) and SPEED_MIN <= speed <= SPEED_MAX
+    ):
+        raise ParameterError(
+            f"speed must be a number from {SPEED_MIN:g} to {SPEED_MAX:g}, but it was {speed!r}. "
+            "1 is real time; a program that waits for its replies runs as fast as it can with thinking 'none'."
+        )
+    return speed

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from kiks.engine.compiling import entry, kernel
+from kiks.engine.compiling import entry, inlined, kernel
 from kiks.engine.discs import ALL_AROUND, everybody_else, see
 from kiks.engine.numbers import power, sin_cos, uniform
 from kiks.engine.proximity import quantize, sampled_pose
@@ -32,6 +32,9 @@ STREAM_AMBIENT = 3
 
 MODEL_FLUX, MODEL_THESIS = 0, 1
 """Lamps add up, or the thesis's formula for the strongest."""
+
+FACING, BEHIND, BEHIND_BODY = 0, 1, 2
+"""How a lamp lies: before a sensor, behind it (or nowhere), or behind the edge of the robot's own body."""
 
 THESIS_DARK = 500.0
 """What a sensor reads without light in the thesis's formula [counts]."""
@@ -77,27 +80,16 @@ def expected_ambient(
         heading: Where it looks [rad].
         sensor: Index of the sensor.
     """
-    sine, cosine = sin_cos(heading)
-    out_x = parameters.mount_x_mm[sensor] * cosine - parameters.mount_y_mm[sensor] * sine
-    out_y = parameters.mount_x_mm[sensor] * sine + parameters.mount_y_mm[sensor] * cosine
-    axis_x = parameters.axis_cos[sensor] * cosine - parameters.axis_sin[sensor] * sine
-    axis_y = parameters.axis_cos[sensor] * sine + parameters.axis_sin[sensor] * cosine
+    mount = mount_of(parameters, x, y, heading, sensor)
     flux = parameters.background_flux
     lowest = parameters.background_counts if flux > 0.0 else THESIS_DARK
     for number in range(lamps.shape[0]):
         watts = lamps[number, 2]
-        dx, dy = lamps[number, 0] - (x + out_x), lamps[number, 1] - (y + out_y)
-        distance = math.sqrt(dx * dx + dy * dy)
-        along = dx * axis_x + dy * axis_y
-        # Behind the sensor, behind the body's edge, switched off or without power: no light.
-        if not (along > 0.0 and dx * out_x + dy * out_y > 0.0 and distance < _FARTHEST_MM):
+        is_facing, distance, cos_angle = face(mount, lamps, number)
+        if is_facing != FACING or not is_burning(lamps, number):
             continue
-        if not (lamps[number, 3] > 0.0 and watts > 0.0):
+        if not is_lit(sight, seen, seen_count, mount[0], mount[1], lamps[number, 0], lamps[number, 1]):
             continue
-        if not is_lit(sight, seen, seen_count, x + out_x, y + out_y, lamps[number, 0], lamps[number, 1]):
-            continue
-        distance = max(distance, _NEAREST_MM)
-        cos_angle = min(along / distance, 1.0)
         if parameters.ambient_model == MODEL_THESIS:
             on_axis = curve(parameters, distance / math.sqrt(watts))
             lowest = min(lowest, on_axis + (1.0 - cos_angle) * (THESIS_DARK - on_axis))
@@ -106,6 +98,39 @@ def expected_ambient(
     if parameters.ambient_model == MODEL_THESIS:
         return lowest
     return curve(parameters, 1.0 / math.sqrt(flux)) if flux > 0.0 else parameters.dark_counts
+
+
+@inlined
+def mount_of(parameters: Any, x: Any, y: Any, heading: Any, sensor: Any) -> Any:
+    """Return where a sensor is [mm], how that lies from the robot's centre [mm], and the direction of its axis."""
+    sine, cosine = sin_cos(heading)
+    out_x = parameters.mount_x_mm[sensor] * cosine - parameters.mount_y_mm[sensor] * sine
+    out_y = parameters.mount_x_mm[sensor] * sine + parameters.mount_y_mm[sensor] * cosine
+    axis_x = parameters.axis_cos[sensor] * cosine - parameters.axis_sin[sensor] * sine
+    axis_y = parameters.axis_cos[sensor] * sine + parameters.axis_sin[sensor] * cosine
+    return x + out_x, y + out_y, out_x, out_y, axis_x, axis_y
+
+
+@inlined
+def face(mount: Any, lamps: Any, number: Any) -> Any:
+    """Return how a lamp lies before a sensor (`FACING` or why not), its distance [mm] and the cosine of its angle."""
+    x, y, out_x, out_y, axis_x, axis_y = mount
+    dx, dy = lamps[number, 0] - x, lamps[number, 1] - y
+    distance = math.sqrt(dx * dx + dy * dy)
+    along = dx * axis_x + dy * axis_y
+    how = FACING
+    if not (along > 0.0 and distance < _FARTHEST_MM):
+        how = BEHIND
+    elif not dx * out_x + dy * out_y > 0.0:
+        how = BEHIND_BODY
+    distance = max(distance, _NEAREST_MM)
+    return how, distance, min(along / distance, 1.0)
+
+
+@inlined
+def is_burning(lamps: Any, number: Any) -> Any:
+    """Say whether a lamp is on and has power."""
+    return lamps[number, 3] > 0.0 and lamps[number, 2] > 0.0
 
 
 @entry

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from kiks.engine.compiling import entry, kernel
+from kiks.engine.compiling import entry, inlined, kernel
 from kiks.engine.discs import SEEN_LIMIT, SEEN_SIZE, TRACKS_SIZE, follow, meet_discs, see
 from kiks.engine.lanes import stack_floats, stack_integers
 from kiks.engine.motion import pose_between
@@ -83,49 +83,83 @@ def expected_count(
         heading: Where it looks [rad].
         sensor: Index of the sensor.
     """
+    view = view_of(parameters, x, y, heading, sensor)
+    seen = stack_floats(SEEN_SIZE)
+    is_near, begin, seen_count = survey(sight, parameters, tracks, track_count, moment, view, seen)
+    if not is_near:
+        return parameters.baseline_counts[sensor]
+    lengths_mm, cosines, brightnesses = trace(
+        sight, parameters.response, view, parameters.reach_mm, begin, seen, seen_count
+    )
+    counts = respond(networks, parameters, sensor, lengths_mm, cosines, brightnesses)
+    return parameters.baseline_counts[sensor] + counts
+
+
+@inlined
+def view_of(parameters: Any, x: Any, y: Any, heading: Any, sensor: Any) -> Any:
+    """Return where a sensor's rays begin, x and y [mm], and their directions, cosines and sines, `Lanes`."""
     sine, cosine = sin_cos(heading)
     ray_x, ray_y = parameters.ray_x_mm[sensor], parameters.ray_y_mm[sensor]
     x, y = x + ray_x * cosine - ray_y * sine, y + ray_x * sine + ray_y * cosine
+    ray_cos, ray_sin = load(parameters.ray_cos[sensor]), load(parameters.ray_sin[sensor])
+    return x, y, ray_cos * cosine - ray_sin * sine, ray_cos * sine + ray_sin * cosine
+
+
+@inlined
+def survey(sight: Any, parameters: Any, tracks: Any, track_count: Any, moment: Any, view: Any, seen: Any) -> Any:
+    """Find out what is about a sensor; write the discs in its view into `seen`, float64 [`SEEN_SIZE`].
+
+    Returns:
+        Whether anything is within its reach; if not, it reads its baseline. A length that its rays may go freely
+        [cells]. How many discs are in view.
+    """
+    x, y, rays_x, rays_y = view
     cell, pad = scale(sight)
     per_cell = 1.0 / cell
-    column, row, reach = x * per_cell + pad, y * per_cell + pad, parameters.reach_mm * per_cell
-    begin = max(free_cells(sight, column, row), 0.0)
-    if begin > reach and track_count == 0:
-        return parameters.baseline_counts[sensor]
-    ray_cos, ray_sin = load(parameters.ray_cos[sensor]), load(parameters.ray_sin[sensor])
-    rays_x, rays_y = ray_cos * cosine - ray_sin * sine, ray_cos * sine + ray_sin * cosine
-    seen, seen_count = stack_floats(SEEN_SIZE), 0
+    begin = max(free_cells(sight, x * per_cell + pad, y * per_cell + pad), 0.0)
+    seen_count = 0
     if track_count > 0:
         left = lane_of(rays_x, 0), lane_of(rays_y, 0)
         right = lane_of(rays_x, RAY_COUNT - 1), lane_of(rays_y, RAY_COUNT - 1)
         seen_count = see(tracks, track_count, moment, (cell, pad), (x, y, left, right, parameters.reach_mm), seen)
-        if begin > reach and seen_count == 0:
-            return parameters.baseline_counts[sensor]
+    return begin <= parameters.reach_mm * per_cell or seen_count > 0, begin, seen_count
+
+
+@inlined
+def trace(sight: Any, response: Any, view: Any, reach_mm: Any, begin: Any, seen: Any, seen_count: Any) -> Any:
+    """Follow the rays of a sensor to what they meet, as exactly as a response needs them.
+
+    Returns:
+        Lengths of the rays [mm], cosines of the angles of incidence, and brightnesses, 0 for nothing, `Lanes`.
+    """
+    x, y, rays_x, rays_y = view
+    cell, pad = scale(sight)
+    per_cell = 1.0 / cell
+    column, row, reach = x * per_cell + pad, y * per_cell + pad, reach_mm * per_cell
     lengths, cosines, brightnesses = splat(reach), splat(1.0), splat(0.0)
     if begin <= reach:
-        lengths, cosines, brightnesses = meet_walls(sight, parameters, column, row, rays_x, rays_y, reach, begin)
+        lengths, cosines, brightnesses = meet_walls(sight, response, column, row, rays_x, rays_y, reach, begin)
     if seen_count > 0:
         lengths, cosines, brightnesses = meet_discs(
             seen, seen_count, column, row, rays_x, rays_y, lengths, cosines, brightnesses
         )
-    counts = respond(networks, parameters, sensor, lengths * cell, cosines, brightnesses)
-    return parameters.baseline_counts[sensor] + counts
+    return lengths * cell, cosines, brightnesses
 
 
 @kernel
 def meet_walls(
-    sight: Any, parameters: Any, column: Any, row: Any, rays_x: Any, rays_y: Any, reach: Any, begin: Any
+    sight: Any, response: Any, column: Any, row: Any, rays_x: Any, rays_y: Any, reach: Any, begin: Any
 ) -> Any:
-    """Follow a sensor's rays to the walls, as exactly as the response needs them.
+    """Follow a sensor's rays to the walls, as exactly as a response needs them.
 
     Returns:
         Lengths [cells], cosines of the angles of incidence, and brightnesses, `Lanes`.
     """
-    if parameters.response == FAST:
+    if response == FAST:
         return stride_all(sight, column, row, rays_x, rays_y, reach, begin)
     lengths, brightnesses = cast_fan(sight, splat(column), splat(row), rays_x, rays_y, reach, splat(begin))
     cosines = splat(1.0)
-    if parameters.response == REFLECTION and is_any(brightnesses):
+    if response == REFLECTION and is_any(brightnesses):
         lengths, cosines = meet_faces(sight, column, row, rays_x, rays_y, lengths, brightnesses)
     return lengths, cosines, brightnesses
 
@@ -177,17 +211,28 @@ def quantile(values: Any, count: Any, share: Any) -> Any:
     return values[i] + (place - i) * (values[i + 1] - values[i])
 
 
-@kernel
-def add_noise(parameters: Any, count: Any, sign: Any, size: Any, jitter: Any) -> Any:
-    """Return a count with noise, from three random numbers 0..1.
+@inlined
+def scatter(parameters: Any, count: Any, sign: Any, size: Any) -> Any:
+    """Return a count with that noise that is a share of it, from two random numbers 0..1.
 
-    A share of the reading, at most 25 % of small and 10 % of large ones and seldom that much, to either side; and
-    what is there with nothing near, too, drawn from the robot's own distribution.
+    It is at most 25 % of small and 10 % of large counts and seldom that much, to either side.
     """
     largest = parameters.noise_small - count / 1000.0 * (parameters.noise_small - parameters.noise_large)
     deviation = largest * integer_power(size, parameters.noise_exponent)
-    noisy = count * (1.0 + deviation) if sign < 0.5 else count * (1.0 - parameters.noise_down * deviation)
-    return noisy + quantile(parameters.jitter_counts, parameters.jitter_point_count, jitter)
+    return count * (1.0 + deviation) if sign < 0.5 else count * (1.0 - parameters.noise_down * deviation)
+
+
+@inlined
+def jitter_of(parameters: Any, chance: Any) -> Any:
+    """Return the noise that is there with nothing near, too, from the robot's own distribution."""
+    return quantile(parameters.jitter_counts, parameters.jitter_point_count, chance)
+
+
+@inlined
+def chances(seed: Any, robot: Any, turn: Any, sensor: Any) -> Any:
+    """Return the three random numbers 0..1 of a sensor's reading in a round: sign and size of the share, and jitter."""
+    chance = source(seed, 0, robot, STREAM_PROXIMITY, turn)
+    return draw(chance, sensor * 3), draw(chance, sensor * 3 + 1), draw(chance, sensor * 3 + 2)
 
 
 @kernel
@@ -195,6 +240,24 @@ def quantize(parameters: Any, count: Any) -> Any:
     """Return a count as the converter gives it: whole steps, within its range."""
     steps = np.floor(count / parameters.step_counts + 0.5)
     return np.int64(min(max(steps * parameters.step_counts, 0.0), parameters.maximum_counts))
+
+
+@inlined
+def follow_near(scene: Any, robot: Any, tracks: Any) -> Any:
+    """Write down the tracks of the discs that a robot's proximity sensors may see; return how many.
+
+    Args:
+        scene: What there is.
+        robot: Index of the robot.
+        tracks: float64 [`TRACKS_SIZE`].
+    """
+    robots, _, kinds, _ = scene
+    state = robots[0, robot]
+    parameters = kinds[state.kind]
+    found = stack_integers(SEEN_LIMIT)
+    reach = parameters.radius_mm + parameters.reach_mm + MOVED_MM
+    count = find_near(scene, 0, state.x_mm, state.y_mm, reach + MOVED_MM, robot, found)
+    return follow(scene, 0, found, count, state.x_mm, state.y_mm, reach, tracks) if count > 0 else 0
 
 
 @entry
@@ -225,19 +288,16 @@ def read_proximity(
     robots, _, kinds, _ = scene
     state = robots[0, robot]
     parameters = kinds[state.kind]
-    found, tracks = stack_integers(SEEN_LIMIT), stack_floats(TRACKS_SIZE)
-    reach = parameters.radius_mm + parameters.reach_mm + MOVED_MM
-    track_count = find_near(scene, 0, state.x_mm, state.y_mm, reach + MOVED_MM, robot, found)
-    if track_count > 0:
-        track_count = follow(scene, 0, found, track_count, state.x_mm, state.y_mm, reach, tracks)
+    tracks = stack_floats(TRACKS_SIZE)
+    track_count = follow_near(scene, robot, tracks)
     for sensor in range(out.shape[0]):
         turn, instant_ns, x, y, heading = sampled_pose(state, tick_count, time_ns, sensor, is_noisy)
         moment = moment_of(tick_count, instant_ns)
         count = expected_count(sight, networks, parameters, tracks, track_count, moment, x, y, heading, sensor)
         if is_noisy:
-            chance = source(seed, 0, robot, STREAM_PROXIMITY, turn)
-            sign, size, jitter = draw(chance, sensor * 3), draw(chance, sensor * 3 + 1), draw(chance, sensor * 3 + 2)
-            out[sensor] = quantize(parameters, add_noise(parameters, count, sign, size, jitter))
+            sign, size, jitter = chances(seed, robot, turn, sensor)
+            noisy = scatter(parameters, count, sign, size) + jitter_of(parameters, jitter)
+            out[sensor] = quantize(parameters, noisy)
         else:
             out[sensor] = min(count, parameters.maximum_counts)
 

@@ -16,15 +16,19 @@ from kiks.ports.messages import Kind
 from kiks.ports.port import VirtualPort
 from kiks.ports.unchanged import run_program
 
+LATE, PUNCTUAL = "late", "punctual"
+"""When a program was started: after the world had begun, or before."""
+
 DIE_WITH_PARENT = 1
 """PR_SET_PDEATHSIG of Linux (linux/prctl.h)."""
 
 
-def main(descriptor: int, thinking: str, record: str, program: Path, arguments: list[str]) -> int:
+def main(descriptor: int, is_late: bool, thinking: str, record: str, program: Path, arguments: list[str]) -> int:
     """Run the program to its end; return its exit code.
 
     Args:
         descriptor: The socket at whose other end the world is.
+        is_late: Whether the world may have begun already.
         thinking: What the program's computing costs.
         record: File for the thinking times that were measured; none if empty.
         program: The Python file.
@@ -33,9 +37,12 @@ def main(descriptor: int, thinking: str, record: str, program: Path, arguments: 
     if sys.platform == "linux":
         # A program that never talks to the world would not notice that it has gone.
         ctypes.CDLL(None).prctl(DIE_WITH_PARENT, signal.SIGKILL)
+    if os.getpgrp() == os.getpid():
+        # Whoever started KiKS may have had Ctrl-C ignored; the desk interrupts a program by it.
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     # A process that the program starts has no business with the world.
     os.set_inheritable(descriptor, False)
-    connection = Connection(socket.socket(fileno=descriptor))
+    connection = Connection(socket.socket(fileno=descriptor), is_late=is_late)
     policy = Program(thinking)
 
     def open_port(name: str) -> VirtualPort:
@@ -52,4 +59,5 @@ def main(descriptor: int, thinking: str, record: str, program: Path, arguments: 
 
 
 if __name__ == "__main__":
-    sys.exit(main(int(sys.argv[1]), sys.argv[2], sys.argv[3], Path(sys.argv[4]), sys.argv[5:]))
+    descriptor, lateness, thinking, record, program, *arguments = sys.argv[1:]
+    sys.exit(main(int(descriptor), lateness == LATE, thinking, record, Path(program), arguments))

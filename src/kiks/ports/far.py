@@ -25,29 +25,42 @@ class Connection:
 
     Args:
         there: The socket at whose other end the world is.
-
-    Attributes:
-        now_ns: The program's time [ns].
+        is_late: Whether the world may have begun already: then the program's time begins when it first needs it.
     """
 
-    def __init__(self, there: socket.socket) -> None:
+    def __init__(self, there: socket.socket, *, is_late: bool = False) -> None:
         self.lock = threading.RLock()
-        self.now_ns = 0
+        self._now_ns = 0
+        self._is_to_meet = is_late
         self._there = there
         self._told_ns = 0
+        self._thought_ns = 0
         self._unanswered_count = 0
         self._ticket = 0
         self._received = bytearray()
 
+    @property
+    def now_ns(self) -> int:
+        """The program's time [ns]."""
+        if self._is_to_meet:
+            self.ask(Kind.MEET)
+        return self._now_ns
+
     def pass_to(self, time_ns: int) -> None:
         """Let time pass up to a time [ns]."""
-        self.now_ns = max(self.now_ns, time_ns)
-        if self.now_ns - self._told_ns >= TELL_NS:
+        self._now_ns = max(self.now_ns, time_ns)
+        if self._now_ns - self._told_ns >= TELL_NS:
             self.tell(Kind.REACHED)
+
+    def think(self, time_ns: int) -> None:
+        """Let the time pass that the program has thought [ns]."""
+        now_ns = self.now_ns
+        self._thought_ns += time_ns
+        self.pass_to(now_ns + time_ns)
 
     def tell(self, kind: Kind, robot: int = 0, *, first: int = 0, data: bytes = b"") -> None:
         """Say something and go on."""
-        self._send(Request(kind, robot, self.now_ns, first=first, data=data))
+        self._send(Request(kind, robot, self._now_ns, 0, first, 0, 0, self._thought_ns, data))
         self._unanswered_count += 1
         if self._unanswered_count >= WINDOW:
             self.ask(Kind.MEET)
@@ -62,12 +75,13 @@ class Connection:
         """
         # The answer to a question that Ctrl-C has interrupted is still to come: it has another ticket.
         self._ticket = (self._ticket + 1) % (1 << 32)
-        self._send(Request(kind, robot, self.now_ns, self._ticket, first, second, third, data))
+        self._send(Request(kind, robot, self._now_ns, self._ticket, first, second, third, self._thought_ns, data))
         while (answer := take_answer(self._received)) is None or answer.ticket != self._ticket:
             if answer is None:
                 self._receive()
         self._unanswered_count = 0
-        self.now_ns = self._told_ns = answer.now_ns
+        self._now_ns = self._told_ns = answer.now_ns
+        self._is_to_meet = False
         if not answer.is_good:
             raise LinkError(answer.data.decode())
         return answer
@@ -82,7 +96,8 @@ class Connection:
         self._received += received
 
     def _send(self, request: Request) -> None:
-        self._told_ns = self.now_ns
+        self._told_ns = self._now_ns
+        self._thought_ns = 0
         try:
             self._there.sendall(request.pack())
         except OSError:
@@ -108,6 +123,10 @@ class FarLine:
     def pass_to(self, time_ns: int) -> None:
         """Let time pass up to a time [ns]."""
         self._connection.pass_to(time_ns)
+
+    def think(self, time_ns: int) -> None:
+        """Let the time pass that the program has thought [ns]."""
+        self._connection.think(time_ns)
 
     def send(self, data: bytes) -> None:
         """Put characters on the line; wait while it is full."""

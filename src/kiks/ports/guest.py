@@ -24,6 +24,7 @@ class Guest(Player):
     Args:
         name: Who it is, for a person.
         rank: Its number, from 1.
+        robot: Number of the robot that is its own.
         here: The socket at whose other end it is.
         sim: The world.
         turns: Where it takes its turn.
@@ -31,12 +32,17 @@ class Guest(Player):
 
     Attributes:
         is_silenced: Whether the world has parted from it because it was silent.
+        is_stopped: Whether a person has stopped it: then its robots stop, too, when it has gone.
     """
 
-    def __init__(self, name: str, rank: int, here: socket.socket, sim: Simulation, turns: Turns, names: Names) -> None:
+    def __init__(
+        self, name: str, rank: int, robot: int, here: socket.socket, sim: Simulation, turns: Turns, names: Names
+    ) -> None:
         super().__init__(name, rank)
+        self.robot = robot
         self.is_here = False
         self.is_silenced = False
+        self.is_stopped = False
         self._here = here
         self._here.setblocking(False)
         self._sim = sim
@@ -47,6 +53,7 @@ class Guest(Player):
         self._requests: deque[Request] = deque()
         self._read: Request | None = None
         self._robots: set[int] = set()
+        self._used: set[int] = set()
         self._ticket = 0
         self._has_made_room = False
         self._has_been_warned = False
@@ -81,13 +88,26 @@ class Guest(Player):
         """Let what the program has said still be done, then part from it."""
         self._hear(Request(Kind.END, 0, self.acts_from_ns))
 
+    def part(self) -> None:
+        """Part from it at once: what it has said and is not done yet is forgotten."""
+        if self.has_left:
+            return
+        self._requests.clear()
+        self._read = None
+        self.waits = False
+        self._free_robots()
+        self.has_left = True
+
     def _hear(self, request: Request) -> None:
+        if self.has_left:
+            return
         if not self.is_here:
             self.is_here = True
             self.is_waited_for = not self.is_silenced
             self.acts_from_ns = self._sim.now_ns
         self.patience.renew()
         if request.kind is Kind.REACHED and not self._requests and not self.waits:
+            self._note_thinking(request)
             self.acts_from_ns = max(self.acts_from_ns, request.at_ns)
         else:
             self._requests.append(request)
@@ -128,8 +148,10 @@ class Guest(Player):
         """Do it."""
         at_ns = self.next_ns()
         assert at_ns is not None
-        self.acts_from_ns = at_ns
         request = self._requests[0]
+        if not self._has_made_room:
+            self._note_thinking(request)
+        self.acts_from_ns = at_ns
         if request.kind in (Kind.SEND, Kind.SEND_AND_MEET) and not self._has_room(request.robot):
             return
         self._requests.popleft()
@@ -184,6 +206,13 @@ class Guest(Player):
             )
         return False
 
+    def _note_thinking(self, request: Request) -> None:
+        """Let those who watch its robots know how long it has thought."""
+        if request.thought_ns:
+            until_ns = min(self.acts_from_ns + request.thought_ns, request.at_ns)
+            for robot in self._robots:
+                self._sim.wires[robot - 1].think(self.acts_from_ns, until_ns)
+
     def _do(self, request: Request) -> None:
         """Do what the program has said, at the instant at which it acts."""
         at_ns, kind, robot = self.acts_from_ns, request.kind, request.robot
@@ -192,7 +221,7 @@ class Guest(Player):
         elif kind is Kind.MEET:
             self._answer(at_ns)
         elif kind is Kind.FIND:
-            self._answer(at_ns, number=self._names.robot(request.data.decode(), self.rank))
+            self._answer(at_ns, number=self._names.robot(request.data.decode(), self.robot))
         elif kind is not Kind.REACHED:
             self._use(request, robot, at_ns)
 
@@ -221,6 +250,7 @@ class Guest(Player):
         elif kind is Kind.CLAIM:
             claim(wire, robot, request.data.decode())
             self._robots.add(robot)
+            self._used.add(robot)
             self._answer(at_ns, robot=robot)
         elif kind is Kind.HANG_UP:
             if request.first:
@@ -230,13 +260,22 @@ class Guest(Player):
 
     def _end(self) -> None:
         """Hang up for the program, which has gone."""
-        for robot in self._robots:
-            wire = self._sim.wires[robot - 1]
-            wire.holder = None
-            wire.hang_up()
+        self._free_robots()
         self._turns.see(self.acts_from_ns)
         self.close()
         self.has_left = True
+
+    def _free_robots(self) -> None:
+        """Let others have its robots; they drive on, unless a person has stopped the program."""
+        wires = self._sim.wires
+        for robot in self._robots:
+            wires[robot - 1].holder = None
+            wires[robot - 1].hang_up()
+        self._robots.clear()
+        if self.is_stopped:
+            for robot in {self.robot, *self._used}:
+                if wires[robot - 1].holder is None:
+                    wires[robot - 1].halt(self._sim.now_ns)
 
     def _answer(self, now_ns: int, *, robot: int = 0, number: int = 0, is_good: bool = True, data: bytes = b"") -> None:
         """Let the program go on."""

@@ -50,6 +50,15 @@ class NearLine:
         """Let time pass up to a time [ns]."""
         self._sim.advance_to(time_ns)
 
+    def think(self, time_ns: int) -> None:
+        """Let the time pass that the program has thought [ns]; it is one program, whichever of its ports it uses."""
+        sim = self._sim
+        from_ns = sim.now_ns
+        sim.advance_to(from_ns + time_ns)
+        for wire in sim.wires:
+            if wire.log is not None and (wire is self._wire or wire.holder is not None):
+                wire.log.think(from_ns, from_ns + time_ns)
+
     def send(self, data: bytes) -> None:
         """Put characters on the line; wait while it is full."""
         sim, wire = self._sim, self._wire

@@ -16,7 +16,7 @@ RECEIVE_SIZE = 1 << 16
 WINDOW = 64
 """Requests that a program may send without an answer: nobody runs farther ahead of the world than that."""
 
-_REQUEST = struct.Struct("<BHqIqqqI")
+_REQUEST = struct.Struct("<BHqIqqqqI")
 _ANSWER = struct.Struct("<I?qqqI")
 
 
@@ -59,7 +59,12 @@ ASKING = frozenset(Kind) - {Kind.REACHED, Kind.HANG_UP, Kind.SEND, Kind.DROP, Ki
 
 
 class Request(NamedTuple):
-    """What a program says; `robot` is 0 where it does not matter, and the answer has the same ticket."""
+    """What a program says; `robot` is 0 where it does not matter, and the answer has the same ticket.
+
+    Attributes:
+        at_ns: The program's time [ns].
+        thought_ns: How much of it the program has thought since the last request [ns].
+    """
 
     kind: Kind
     robot: int
@@ -68,11 +73,12 @@ class Request(NamedTuple):
     first: int = 0
     second: int = 0
     third: int = 0
+    thought_ns: int = 0
     data: bytes = b""
 
     def pack(self) -> bytes:
         """Return it as bytes."""
-        return _REQUEST.pack(*self[:7], len(self.data)) + self.data
+        return _REQUEST.pack(*self[:8], len(self.data)) + self.data
 
 
 class Answer(NamedTuple):
@@ -103,13 +109,13 @@ def take_request(buffer: bytearray) -> Request | None:
     """Remove and return the first request of a buffer, None while it is not complete."""
     if len(buffer) < _REQUEST.size:
         return None
-    kind, robot, at_ns, ticket, first, second, third, length = _REQUEST.unpack_from(buffer)
+    kind, robot, at_ns, ticket, first, second, third, thought_ns, length = _REQUEST.unpack_from(buffer)
     end = _REQUEST.size + length
     if len(buffer) < end:
         return None
     data = bytes(buffer[_REQUEST.size : end])
     del buffer[:end]
-    return Request(Kind(kind), robot, at_ns, ticket, first, second, third, data)
+    return Request(Kind(kind), robot, at_ns, ticket, first, second, third, thought_ns, data)
 
 
 def take_answer(buffer: bytearray) -> Answer | None:

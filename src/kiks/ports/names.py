@@ -9,12 +9,12 @@ from kiks.sim.simulation import Simulation
 class Names:
     """Robots by port name: as told, and otherwise in the order in which new names are opened.
 
-    Each program has the robot of its number first; what is left belongs to whoever opens one more name.
+    Each program has a robot of its own first; what is left belongs to whoever opens one more name.
 
     Args:
         sim: The simulation.
         told: Robots by port name, for every program.
-        programs: How many programs there are.
+        programs: How many programs there are; the first has robot 1, and so on.
 
     Raises:
         ParameterError: If `told` names a robot that is not there.
@@ -25,15 +25,25 @@ class Names:
             sim.port(robot)
         self._sim = sim
         self._told = dict(told)
-        self._programs = programs
+        self._own = set(range(1, programs + 1))
         self._found: dict[tuple[int, str], int] = {}
+
+    def own(self, robot: int) -> None:
+        """Give a robot to a program that comes, as its own; nothing is left of the one that had it."""
+        self._own.add(robot)
+        self._found = {(who, name): found for (who, name), found in self._found.items() if who != robot}
+
+    def disown(self, robot: int) -> None:
+        """Let a program's robots belong to others again: it has gone."""
+        self.own(robot)
+        self._own.discard(robot)
 
     def robot(self, name: str, program: int = 1) -> int:
         """Return the robot behind a name that a program opens.
 
         Args:
             name: Any name; those that begin with `kiks:` are this simulation's own.
-            program: Number of the program, from 1.
+            program: The program, by the number of its own robot.
 
         Raises:
             LinkError: If every robot has a name already, or there is no such robot.
@@ -44,8 +54,8 @@ class Names:
             return self._told[name]
         if (program, name) not in self._found:
             taken = {*self._told.values(), *self._found.values()}
-            candidates = (program, *range(self._programs + 1, self._sim.robot_count + 1))
-            free = [robot for robot in candidates if robot not in taken]
+            others = (robot for robot in range(1, self._sim.robot_count + 1) if robot not in self._own)
+            free = [robot for robot in (program, *others) if robot not in taken]
             if not free:
                 known = self._told | {found: robot for (who, found), robot in self._found.items() if who == program}
                 raise LinkError(

@@ -37,6 +37,9 @@ class Line(Protocol):
     def pass_to(self, time_ns: int) -> None:
         """Let time pass up to a time [ns]."""
 
+    def think(self, time_ns: int) -> None:
+        """Let the time pass that the program has thought [ns]."""
+
     def send(self, data: bytes) -> None:
         """Put characters on the line; wait while it is full."""
 
@@ -216,7 +219,7 @@ class VirtualPort:
         """Let the time pass that the program has thought."""
         time_ns = self._program.enter(is_command=is_command)
         if time_ns:
-            self._line.pass_to(self._line.now_ns + time_ns)
+            self._line.think(time_ns)
 
     def _ask(self) -> None:
         """Let the time pass that a question costs."""

@@ -1,4 +1,4 @@
-"""Several unchanged Python programs in one world, each in a process of its own."""
+"""Unchanged Python programs in one world, each in a process of its own. They come and go."""
 
 from __future__ import annotations
 
@@ -7,29 +7,27 @@ import logging
 import selectors
 import signal
 import socket
-import subprocess
-import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
 
 from kiks.clock.patience import Patience
 from kiks.clock.thinking import parse_thinking
+from kiks.errors import KiksError, ParameterError
+from kiks.ports.child import LATE, PUNCTUAL
 from kiks.ports.guest import Guest
 from kiks.ports.names import Names
+from kiks.ports.process import Command, OutputLine, Process
 from kiks.ports.turns import PATIENCE_S, Turns
 from kiks.sim.simulation import Simulation
+from kiks.sim.tail import Tail
 
 IDLE_S = 0.05
-"""Longest sleep [s]: the end of a process is noticed within it."""
-
-ENDING_S = 0.002
-"""The same for a process whose connection has ended [s]."""
+"""Longest sleep [s]: a second Ctrl-C is noticed within it."""
 
 GRACE_S = 1.0
-"""How long the programs may tidy up after Ctrl-C [s of real time]."""
+"""How long a program may tidy up after Ctrl-C [s of real time]."""
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C."""
@@ -37,30 +35,70 @@ INTERRUPTED = 130
 _log = logging.getLogger("kiks.run")
 
 
-@dataclass(frozen=True)
-class Command:
-    """A program and what it finds in `sys.argv` after its name."""
+class Handle:
+    """A program that was started.
 
-    program: Path
-    arguments: list[str] = field(default_factory=list)
+    Attributes:
+        command: What was started.
+        number: Its number, from 1 in the order in which they were started.
+        robot: Number of the robot that is its own.
+        name: Who it is, for a person.
+    """
 
+    def __init__(self, command: Command, guest: Guest) -> None:
+        self.command = command
+        self.number = guest.rank
+        self.robot = guest.robot
+        self.name = guest.name
+        self.has_hung_up = False
+        self.has_been_noticed = False
+        self.has_ended = threading.Event()
+        self.guest = guest
+        self.process: Process
 
-@dataclass(eq=False)
-class _Run:
-    """A program that runs: its process, its turn in the world, and how it ended."""
+    @property
+    def is_running(self) -> bool:
+        """Whether it still runs; when not, its output is complete, and its robots are free if it was stopped."""
+        return not self.has_ended.is_set()
 
-    process: subprocess.Popen[bytes]
-    guest: Guest
-    has_hung_up: bool = False
-    code: int | None = None
+    @property
+    def code(self) -> int | None:
+        """The exit code with which it has ended, 128 and its number after a signal; None while it runs."""
+        code = None if self.is_running else self.process.code
+        return code if code is None or code >= 0 else 128 - code
+
+    @property
+    def output(self) -> Tail[OutputLine] | None:
+        """What it has printed; None if the terminal has it."""
+        return self.process.output
+
+    @property
+    def state(self) -> str:
+        """What it does, in a word or two: 'running', 'stopping', 'stopped', 'silenced', or how it has ended."""
+        if self.is_running:
+            return "stopping" if self.guest.is_stopped else "running"
+        if self.guest.is_stopped:
+            return "stopped"
+        return "silenced" if self.guest.is_silenced else f"ended {self.how}"
+
+    @property
+    def how(self) -> str:
+        """How it has ended, in words; nothing while it runs."""
+        code = self.process.code
+        if code is None:
+            return ""
+        return f"with exit code {code}" if code >= 0 else f"by signal {-code}"
 
 
 class Programs:
     """Programs that share a world.
 
+    `round` moves the world for them; who calls it again and again is the driver, in one thread. `start` and `stop` may
+    be called by other threads at any time, and with the simulation's lock held.
+
     Args:
         sim: The world.
-        commands: The programs; the first one drives robot 1, whatever port it opens, and so on.
+        commands: Programs that begin together; the first one drives robot 1, whatever port it opens, and so on.
         told: Robots by port name, for whichever program opens it.
         thinking: What the computing of each costs: 'none', 'fixed:MS', 'live', 'live:FACTOR', or 'replay:FILE' with
             the number of the program appended: FILE.1.
@@ -69,15 +107,22 @@ class Programs:
             or 'ignore'.
         patience_s: How long it may be [s of real time].
         say: Where a person is told how each program ended.
+        is_heard: Whether what they print is kept, in their handles; else it goes where that of this process goes. What
+            a heard program starts ends with it.
+        new_patience: Makes patiences with another wall clock: one that stands still while the world does.
+
+    Attributes:
+        handles: The programs; of those that have ended the last one of each robot.
 
     Raises:
         ParameterError: If a value is out of range or unknown.
+        KiksError: If the computer does not let a program start.
     """
 
     def __init__(
         self,
         sim: Simulation,
-        commands: Sequence[Command],
+        commands: Sequence[Command] = (),
         *,
         told: dict[str, int] | None = None,
         thinking: str = "none",
@@ -85,115 +130,259 @@ class Programs:
         when_silent: str = "ignore",
         patience_s: float = PATIENCE_S,
         say: Callable[[str], None] = lambda text: None,
+        is_heard: bool = False,
+        new_patience: Callable[[float], Patience] = Patience,
     ) -> None:
         self.sim = sim
+        self.handles: list[Handle] = []
         self._say = say
+        self._thinking = thinking
+        self._record = record
+        self._is_heard = is_heard
         self._signals = 0
-        numbers = range(1, len(commands) + 1)
-        policies = [f"{thinking}.{number}" if thinking.startswith("replay:") else thinking for number in numbers]
-        for policy in policies:
-            parse_thinking(policy)
+        self._was_touched = False
+        self._is_closed = False
+        self._count = 0
+        for number in range(1, len(commands) + 1):
+            parse_thinking(self._policy(number))
         self._turns = Turns(
             sim,
             expected=len(commands),
             missing=self._missing,
             log=_log,
+            is_once=True,
             when_silent=when_silent,
             patience_s=patience_s,
+            new_patience=new_patience,
         )
-        names = Names(sim, told or {}, len(commands))
+        self._names = Names(sim, told or {}, len(commands))
+        self._bell, self._bell_rope = socket.socketpair()
+        self._bell.setblocking(False)
+        self._bell_rope.setblocking(False)
         self._selector = selectors.DefaultSelector()
-        self._runs: list[_Run] = []
-        for number, command, policy in zip(numbers, commands, policies, strict=True):
-            here, there = socket.socketpair()
-            with there:
-                process = _start(command, there, policy, f"{record}.{number}" if record is not None else "")
-            guest = Guest(f"program {number} ({command.program.name})", number, here, sim, self._turns, names)
-            self._turns.join(guest)
-            self._runs.append(_Run(process, guest))
-            self._selector.register(guest, selectors.EVENT_READ, self._runs[-1])
+        self._selector.register(self._bell, selectors.EVENT_READ)
+        try:
+            for robot, command in enumerate(commands, 1):
+                self._add(command, robot)
+        except KiksError:
+            self.close()
+            raise
+
+    @property
+    def drive(self) -> bool:
+        """Say whether programs move the world's time: then nobody else may."""
+        return self._turns.drive
 
     @property
     def doubt(self) -> str:
         """Say why the same programs might not do the same again; nothing if they would, but for live thinking."""
         if self._signals:
             return "it was interrupted"
+        if self._was_touched:
+            return "a program was started or stopped while the world was there"
         return "" if self._turns.is_repeatable else "the world did not wait for every program"
+
+    # ---- they come and go ----
+
+    def start(self, command: Command, robot: int = 1) -> Handle:
+        """Start a program; it takes part from the simulated time on at which its first word comes.
+
+        Args:
+            command: The program.
+            robot: Number of the robot that is its own, whatever port it opens.
+
+        Raises:
+            ParameterError: If there is no such file or robot, or another program has that robot.
+            KiksError: If the computer does not let it start.
+        """
+        if not command.program.is_file():
+            raise ParameterError(
+                f"a program must be a Python file, but there is none at {str(command.program)!r}. Save it first."
+            )
+        with self.sim.lock:
+            self.sim.index_of(robot)
+            there = [handle for handle in self.handles if handle.robot == robot]
+            for handle in there:
+                if handle.is_running:
+                    raise ParameterError(
+                        f"robot {robot} must be free for another program, but {handle.name} has it. Stop that one "
+                        "first, or take another robot."
+                    )
+                handle.guest.part()
+            parse_thinking(self._policy(self._count + 1))
+            for each in self.handles:
+                if not each.is_running:
+                    self._names.disown(each.robot)
+            self._names.own(robot)
+            handle = self._add(command, robot)
+            self.handles = [each for each in self.handles if each not in there or not each.has_been_noticed]
+            self._was_touched = True
+        self._ring()
+        return handle
+
+    def stop(self, handle: Handle) -> None:
+        """End a program, as Ctrl-C would; if it does not end within a second, or this is said again, at once.
+
+        One that has not used a port yet ends at once. When it has ended its robots stop, and are free.
+        """
+        if not handle.is_running:
+            return
+        is_tidying, handle.guest.is_stopped = handle.guest.is_stopped, True
+        self._was_touched = True
+        if is_tidying or not handle.guest.is_here:
+            handle.process.kill()
+            return
+        handle.process.interrupt()
+        grace = threading.Timer(GRACE_S, handle.process.kill)
+        grace.daemon = True
+        grace.start()
 
     def run(self) -> int:
         """Let them run until the last has ended; return 0 if all went well, else the first exit code that tells."""
         try:
             with self._signals_noted():
-                while any(run.code is None for run in self._runs) or self._turns.players:
-                    if not self._round():
+                while any(not handle.has_been_noticed for handle in self.handles) or self._turns.players:
+                    if self._signals and (self._signals > 1 or self._grace.left_s() == 0):
                         return INTERRUPTED
+                    self.round(IDLE_S)
         finally:
             self.close()
-        return INTERRUPTED if self._signals else next((run.code for run in self._runs if run.code), 0)
+        return INTERRUPTED if self._signals else next((handle.code for handle in self.handles if handle.code), 0)
+
+    def round(self, wait_limit_s: float) -> None:
+        """Do what may be done now, and listen to the programs.
+
+        Args:
+            wait_limit_s: Longest time that is waited for a word of theirs [s of real time].
+        """
+        with self.sim.lock:
+            wait_s = self._turns.advance()
+            over = self._look_around()
+        wait_s = wait_limit_s if wait_s is None else min(wait_s, wait_limit_s)
+        ready = self._selector.select(wait_s)
+        with self.sim.lock:
+            for key, events in ready:
+                if key.data is None:
+                    self._quieten()
+                elif events & selectors.EVENT_WRITE:
+                    key.data.guest.flush()
+                if key.data is not None and events & selectors.EVENT_READ and not key.data.guest.receive():
+                    self._hang_up(key.data)
+            heard = [key.data for key, _ in ready]
+            for handle in over:
+                # A process that the program has started may still hold the connection.
+                if handle not in heard and not handle.has_hung_up:
+                    handle.guest.leave()
+                    self._hang_up(handle)
+            noticed = self._notice_ends()
+        for handle in noticed:
+            self._tell_end(handle)
 
     def close(self) -> None:
         """End all processes that still run, and close their connections."""
-        for run in self._runs:
-            if run.process.poll() is None:
-                run.process.kill()
-                run.process.wait()
-            run.guest.close()
+        self._is_closed = True
+        for handle in self.handles:
+            handle.process.kill()
+        for handle in self.handles:
+            handle.process.wait()
+            handle.guest.close()
         self._selector.close()
+        self._bell.close()
+        self._bell_rope.close()
 
     # ---- inside ----
 
-    def _round(self) -> bool:
-        """Do what may be done and listen to the programs; return False if that is to be the end."""
-        if self._signals and (self._signals > 1 or self._grace.left_s() == 0):
-            return False
-        with self.sim.lock:
-            wait_s = self._turns.advance()
-        wait_s = IDLE_S if wait_s is None else min(wait_s, IDLE_S)
-        for run in self._runs:
-            if run.guest.is_silenced and run.code is None:
-                run.process.kill()
-            if run.has_hung_up and run.code is None:
-                wait_s = min(wait_s, ENDING_S)
-                self._notice_end(run)
-            elif not run.has_hung_up:
-                events = selectors.EVENT_READ | (selectors.EVENT_WRITE if run.guest.has_unsent else 0)
-                if self._selector.get_key(run.guest).events != events:
-                    self._selector.modify(run.guest, events, run)
-        ready = self._selector.select(wait_s)
-        for key, events in ready:
-            if events & selectors.EVENT_WRITE:
-                key.data.guest.flush()
-            if events & selectors.EVENT_READ and not key.data.guest.receive():
-                self._hang_up(key.data)
-        if not ready:
-            for run in self._runs:
-                # A process that the program has started may still hold the connection.
-                if not run.has_hung_up and run.process.poll() is not None:
-                    run.guest.leave()
-                    self._hang_up(run)
-        return True
+    def _policy(self, number: int) -> str:
+        return f"{self._thinking}.{number}" if self._thinking.startswith("replay:") else self._thinking
 
-    def _hang_up(self, run: _Run) -> None:
-        self._selector.unregister(run.guest)
-        run.has_hung_up = True
-        self._notice_end(run)
+    def _add(self, command: Command, robot: int) -> Handle:
+        """Start a program's process and let it take part."""
+        number = self._count + 1
+        name = f"program {number} ({command.program.name})"
+        here, there = socket.socketpair()
+        guest = Guest(name, number, robot, here, self.sim, self._turns, self._names)
+        handle = Handle(command, guest)
+        lateness = LATE if self._turns.has_begun else PUNCTUAL
+        record = f"{self._record}.{number}" if self._record is not None else ""
+        with there:
+            try:
+                handle.process = Process(
+                    [lateness, self._policy(number), record],
+                    command,
+                    there,
+                    is_heard=self._is_heard,
+                    ended=lambda: self._end(handle),
+                )
+            except KiksError:
+                guest.close()
+                raise
+        # A world that runs already does not stand still until somebody's imports are done.
+        guest.is_waited_for = not self._turns.has_begun
+        self._count = number
+        self._turns.join(guest)
+        self.handles.append(handle)
+        return handle
 
-    def _notice_end(self, run: _Run) -> None:
-        """Say how a process has ended, if it has."""
-        code = run.process.poll()
-        if code is None:
-            return
-        run.code = code if code >= 0 else 128 - code
-        how = f"with exit code {code}" if code >= 0 else f"by signal {-code}"
-        self._say(f"{run.guest.name} has ended {how}.")
-        left = [other.guest for other in self._runs if other.code is None]
+    def _end(self, handle: Handle) -> None:
+        """Free the robots of a program that a person has stopped, even while time stands still: in its own thread."""
+        if handle.guest.is_stopped and not self._is_closed:
+            with self.sim.lock:
+                handle.guest.part()
+        handle.has_ended.set()
+        self._ring()
+
+    def _look_around(self) -> list[Handle]:
+        """See to it that every connection is listened to for what matters; return whose process has ended."""
+        over = []
+        for handle in self.handles:
+            guest = handle.guest
+            if guest.is_silenced and handle.is_running:
+                handle.process.kill()
+            if handle.has_hung_up:
+                continue
+            if not handle.is_running:
+                over.append(handle)
+            events = selectors.EVENT_READ | (selectors.EVENT_WRITE if guest.has_unsent else 0)
+            if guest not in self._selector.get_map():
+                self._selector.register(guest, events, handle)
+            elif self._selector.get_key(guest).events != events:
+                self._selector.modify(guest, events, handle)
+        return over
+
+    def _hang_up(self, handle: Handle) -> None:
+        self._selector.unregister(handle.guest)
+        handle.has_hung_up = True
+        if handle.guest.has_left:
+            handle.guest.close()
+
+    def _notice_ends(self) -> list[Handle]:
+        """Return the programs that have ended since the last time."""
+        ended = [handle for handle in self.handles if handle.has_hung_up and not handle.is_running]
+        noticed = [handle for handle in ended if not handle.has_been_noticed]
+        for handle in noticed:
+            handle.has_been_noticed = True
+        return noticed
+
+    def _tell_end(self, handle: Handle) -> None:
+        """Say how a program has ended."""
+        self._say(f"{handle.name} has ended {handle.how}.")
+        left = [other.guest for other in self.handles if other.is_running and other.guest.is_here]
         if left and not any(guest.is_waited_for for guest in left):
             names = ", ".join(guest.name for guest in left)
             _log.warning("%s, which the world does not wait for, still runs. Ctrl-C ends it.", names)
 
     def _missing(self) -> str:
         """Return who has not taken part yet."""
-        return ", ".join(run.guest.name for run in self._runs if not run.guest.is_here)
+        return ", ".join(handle.name for handle in self.handles if not handle.guest.is_here)
+
+    def _ring(self) -> None:
+        """Let `round` look up."""
+        with contextlib.suppress(OSError):
+            self._bell_rope.send(b"!")
+
+    def _quieten(self) -> None:
+        with contextlib.suppress(OSError):
+            self._bell.recv(1 << 10)
 
     @contextlib.contextmanager
     def _signals_noted(self) -> Iterator[None]:
@@ -213,10 +402,3 @@ class Programs:
         finally:
             for name, handler in before.items():
                 signal.signal(name, handler)
-
-
-def _start(command: Command, there: socket.socket, thinking: str, record: str) -> subprocess.Popen[bytes]:
-    """Start a program with its end of the connection."""
-    words = [str(there.fileno()), thinking, record, str(command.program), *command.arguments]
-    # -P: the folder in which KiKS was started is none of the program's.
-    return subprocess.Popen([sys.executable, "-P", "-m", "kiks.ports.child", *words], pass_fds=[there.fileno()])

@@ -144,7 +144,7 @@ class Server:
             self._selector.unregister(endpoint.fileno())
         link.clear()
         link.channel = channel
-        wire.holder = f"the client of {endpoint.name}"
+        wire.enter_client(f"the client of {endpoint.name}", self.sim.now_ns)
         self._timing.enter(link)
         _log.info("robot %d has a client at %s", link.robot, endpoint.name)
         self._wait_for(link)
@@ -172,7 +172,7 @@ class Server:
     def _free(self, link: Link) -> None:
         """Let the next client come."""
         link.clear()
-        link.wire.holder = None
+        link.wire.leave_client(self.sim.now_ns)
         for endpoint in self._endpoints[link.robot]:
             self._open_door(link, endpoint)
 

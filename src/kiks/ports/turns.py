@@ -112,9 +112,10 @@ class Turns:
 
     Args:
         sim: The world.
-        expected: How many programs begin together.
+        expected: How many programs begin together; 0: the world has begun already.
         missing: Returns who of them is not there yet, in words for a person.
         log: Where a person is told.
+        is_once: Whether those who come after them act from when they come; else as many begin together again.
         when_silent: What happens to a program that is silent while others wait: 'wait', 'drop' or 'ignore'.
         patience_s: How long it may be [s of real time].
         new_patience: For tests: makes patiences with their own wall clock.
@@ -135,16 +136,18 @@ class Turns:
         expected: int,
         missing: Callable[[], str],
         log: logging.Logger,
+        is_once: bool = False,
         when_silent: str = "ignore",
         patience_s: float = PATIENCE_S,
         new_patience: Callable[[float], Patience] = Patience,
     ) -> None:
         check_policy(when_silent, patience_s)
         self.players: list[Player] = []
-        self.has_begun = False
+        self.has_begun = expected == 0
         self.is_repeatable = True
         self._sim = sim
         self._expected = expected
+        self._is_once = is_once
         self._missing = missing
         self._when_silent = when_silent
         self._patience_s = patience_s
@@ -158,6 +161,11 @@ class Turns:
         """Let a program take part from now on."""
         player.patience = self._new_patience(self._patience_s)
         self.players.append(player)
+
+    @property
+    def drive(self) -> bool:
+        """Say whether the world's time is moved here: some program holds it, or waits for it."""
+        return any(not player.has_left and (player.is_waited_for or player.is_held_up) for player in self.players)
 
     def see(self, time_ns: int) -> None:
         """Note that a program has been told of an instant [ns]."""
@@ -243,7 +251,7 @@ class Turns:
         if not self.players:
             self.finish()
             # The next programs begin together, too, unless one alone may begin.
-            self.has_begun = self._expected == 1
+            self.has_begun = self._is_once or self._expected <= 1
 
     # ---- those who keep others waiting ----
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kiks.clock.gate import Gate
 from kiks.clock.program import Program
 from kiks.engine import ambient, proximity
 from kiks.engine.networks import networks_for
@@ -21,6 +22,7 @@ from kiks.firmware.turret import Turret
 from kiks.model.arena import Arena
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
 from kiks.sim.cameras import Cameras
+from kiks.sim.look import Look, look, trace_rays
 from kiks.sim.sites import Place, first_memory, named
 from kiks.sim.table import TABLE
 from kiks.sim.things import Things
@@ -47,6 +49,7 @@ class Simulation(Things):
             the robot's file says if left out.
 
     Attributes:
+        gate: Where its time passes while somebody watches; None while nobody does.
         lamps: The lamps, float64 [lamp, 4]: x_mm, y_mm, power_w, and 1 for on or 0 for off. Write to it to move or
             switch them.
 
@@ -85,6 +88,7 @@ class Simulation(Things):
             )
         self.thinking = thinking
         self.program = Program(thinking)
+        self.gate: Gate | None = None
         self._cameras = Cameras(self)
         super().__init__(Arena.default() if arena is None else arena, _specs(robot, robots, response), seed)
         self.spec = self.specs[0]
@@ -148,6 +152,13 @@ class Simulation(Things):
 
     def advance_to(self, time_ns: int) -> None:
         """Let time pass up to a time [ns]; nothing happens if it is over already."""
+        gate = self.gate
+        if gate is not None and gate.is_up:
+            while (until_ns := gate.admit(self.now_ns, time_ns)) < time_ns:
+                self._advance_to(until_ns)
+        self._advance_to(time_ns)
+
+    def _advance_to(self, time_ns: int) -> None:
         wire = self._agenda.first(self.wires)
         while wire.next_ns is not None and wire.next_ns <= time_ns:
             if wire.next_ns > self.now_ns:
@@ -236,6 +247,14 @@ class Simulation(Things):
                 self._cameras.fit(index, fitted)
         return fitted
 
+    def turrets(self, robot: int) -> tuple[Turret, ...]:
+        """Return the turrets that a robot carries, in the order in which they were fitted.
+
+        Raises:
+            ParameterError: If there is no such robot.
+        """
+        return tuple(self.wires[self.index_of(robot)].firmware.fitted)
+
     def _look_again(self) -> None:
         super()._look_again()
         self._cameras.look_again()
@@ -269,6 +288,27 @@ class Simulation(Things):
         with self.lock:
             self.sync()
             return [float(count) for count in self._sense_ambient(index, noise)]
+
+    def rays(self, robot: int) -> NDArray[np.float64]:
+        """Return how far each ray of a robot's proximity sensors goes at this instant and pose, float64 [8, 7] [mm].
+
+        The leftmost ray is first; lengths are counted from the sensor, and infinite where nothing is within its reach.
+        They are exact, however roughly the robot's response takes them.
+
+        Raises:
+            ParameterError: If there is no such robot.
+        """
+        index = self.index_of(robot)
+        with self.lock:
+            self.sync()
+            lengths_mm, _, _, _ = trace_rays(self, index, 1)
+            return np.ascontiguousarray(lengths_mm[0])
+
+    def look(self) -> Look:
+        """Return where everybody is at this instant, and what all sensors see; looking changes nothing."""
+        with self.lock:
+            self.sync()
+            return look(self, self._networks)
 
     def image(self, robot: int) -> list[float]:
         """Return what a K213 would see at this instant and pose, 64 greys from the left, without noise or rounding.

@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from heapq import heappop, heappush
 
 from kiks.clock.line import SerialLine
 from kiks.firmware.khepera import Firmware
+from kiks.sim.wire_log import TimeShares, WireLog
 from kiks.units import ns_from_s
+
+STOP = b"D,0,0\n"
+"""The command that stops the wheels."""
+
+Hear = Callable[[bytes, int], None]
+"""Takes a reply, and when its last character arrives [ns]."""
 
 
 class Agenda:
@@ -39,7 +47,9 @@ class Wire:
 
     Attributes:
         holder: Who has opened the robot's port, in words for the next one who tries; None while nobody has.
-        pending: Commands on their way: when each acts [ns] and its line.
+        log: Remembers what goes over the line; None unless somebody watches it.
+        pending: Commands on their way: when each acts [ns], its line, and who hears the reply instead of the host.
+        thinks_since_ns: Since when a real program is at the port, whose every gap counts as thinking [ns]; else None.
         next_ns: When the robot does something next [ns], or None while it only waits for characters.
     """
 
@@ -51,7 +61,9 @@ class Wire:
         self.holder: str | None = None
         self.next_ns: int | None = None
         self._processing_ns = ns_from_s(firmware.spec.firmware.processing_ms * 1e-3)
-        self.pending: deque[tuple[int, bytes]] = deque()
+        self.pending: deque[tuple[int, bytes, Hear | None]] = deque()
+        self.log: WireLog | None = None
+        self.thinks_since_ns: int | None = None
         self._last_act_ns = 0
         self._orphan_count = 0
 
@@ -60,27 +72,43 @@ class Wire:
         self.firmware.baud = self.firmware.selected_baud = baud
         self.line.set_baud(baud)
 
-    def send(self, data: bytes, at_ns: int) -> None:
-        """Put characters on the line; each command acts when its terminator has arrived and been processed."""
+    def send(self, data: bytes, at_ns: int, hear: Hear | None = None) -> None:
+        """Put characters on the line; each command acts when its terminator has arrived and been processed.
+
+        Args:
+            data: The characters.
+            at_ns: When they are sent [ns].
+            hear: Who takes the replies; the host if left out.
+        """
         start_ns = self.line.send(len(data), at_ns)
         character_ns = self.line.character_ns
-        for index, line in self.firmware.receiver.feed(data):
+        lines = self.firmware.receiver.feed(data)
+        for index, line in lines:
             arrival_ns = start_ns + (index + 1) * character_ns
             self._last_act_ns = max(arrival_ns, self._last_act_ns) + self._processing_ns
-            self.pending.append((self._last_act_ns, line))
+            self.pending.append((self._last_act_ns, line, hear))
             if self.next_ns is None or self._last_act_ns < self.next_ns:
                 self.next_ns = self._last_act_ns
                 self._agenda.note(self.next_ns, self._index)
+        if self.log is not None:
+            due = list(self.pending)[len(self.pending) - len(lines) :]
+            acts = [(index, act_ns) for (index, _), (act_ns, _, _) in zip(lines, due, strict=True)]
+            self.log.send(data, start_ns, character_ns, acts)
 
     def act(self, now_ns: int) -> None:
         """Do what is due."""
         if self.pending and self.pending[0][0] <= now_ns:
-            _, line = self.pending.popleft()
+            _, line, hear = self.pending.popleft()
             reply = self.firmware.execute(line, now_ns)
-            if self._orphan_count:
-                self._orphan_count -= 1
-            else:
-                self.line.answer(reply, now_ns)
+            start_ns = None
+            if hear is not None:
+                start_ns = self.line.carry(len(reply), now_ns)
+                hear(reply, start_ns + len(reply) * self.line.character_ns)
+            elif not self._orphan_count:
+                start_ns = self.line.answer(reply, now_ns)
+            self._orphan_count = max(self._orphan_count - 1, 0)
+            if self.log is not None and start_ns is not None:
+                self.log.answer(reply, start_ns, self.line.character_ns, now_ns)
             if self.firmware.baud != self.line.baud:
                 self.line.set_baud(self.firmware.baud)
         else:
@@ -93,6 +121,39 @@ class Wire:
             self.next_ns = min(command_ns, demo_ns)
         if self.next_ns is not None:
             self._agenda.note(self.next_ns, self._index)
+
+    def watch(self, now_ns: int) -> WireLog:
+        """Remember what goes over the line from now [ns] on, if nobody does yet."""
+        if self.log is None:
+            self.log = WireLog(now_ns)
+        return self.log
+
+    def think(self, from_ns: int, until_ns: int) -> None:
+        """Note that the program has thought, for whoever watches."""
+        if self.log is not None:
+            self.log.think(from_ns, until_ns)
+
+    def shares(self, from_ns: int, until_ns: int) -> TimeShares | None:
+        """Return where the time of a window went; None if nobody watches."""
+        return None if self.log is None else self.log.shares(from_ns, until_ns, thinks_since_ns=self.thinks_since_ns)
+
+    def enter_client(self, holder: str, now_ns: int) -> None:
+        """Let a real program have the line: all that it does between a reply and a command is thinking."""
+        self.holder = holder
+        self.thinks_since_ns = now_ns
+
+    def leave_client(self, now_ns: int) -> None:
+        """Let the line be free again."""
+        self.holder = None
+        if self.thinks_since_ns is not None:
+            self.think(self.thinks_since_ns, now_ns)
+        self.thinks_since_ns = None
+
+    def halt(self, now_ns: int) -> None:
+        """Hang up and stop the wheels, as is done for a program that a person has stopped."""
+        self.hang_up()
+        self.send(STOP, now_ns)
+        self.hang_up()
 
     def hang_up(self) -> None:
         """Forget what the host left behind: an unfinished command, and replies that nobody will read.

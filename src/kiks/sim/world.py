@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -311,6 +311,15 @@ class World:
         if len(overlaps_mm) and overlaps_mm.max() > OVERLAP_MM:
             return f"{self._name(int(overlaps_mm.argmax()))} is {overlaps_mm.max():.1f} mm inside it"
         return None
+
+    def freedom(self, disc: int) -> Callable[[float, float], bool]:
+        """Return a function that says whether a disc, robots counted first, from 0, could lie at a place [mm].
+
+        It holds as long as nothing else moves.
+        """
+        discs = self._discs()
+        radius_mm = float(discs[disc, 2])
+        return lambda x_mm, y_mm: self._obstacle(x_mm, y_mm, radius_mm, discs, disc) is None
 
     def _check_free(self, what: str, x_mm: float, y_mm: float, radius_mm: float, but: int = -1) -> None:
         """Raise a ParameterError if a disc [mm] would be in a wall or, but for one disc, in something else."""

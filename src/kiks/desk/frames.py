@@ -1,0 +1,248 @@
+"""What browsers see of a world: frames of what moves, the scene of what stays, and a picture of the walls.
+
+A frame is packed by arrays, without a loop over robots. Its layout, little endian, is that of `HEAD`, then a record of
+`ROBOT` for each robot, three numbers for each ball or cylinder, four for each lamp, a record of `CAMERA` for each
+camera, and the lengths of all rays; `web/frame.js` reads it.
+
+All functions look only; they are called with the simulation's lock held.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.engine.parameters import AHEAD, RAY_COUNT
+from kiks.engine.state import BALL, MODE_POSITION, MODE_SPEED, PIXEL_COUNT
+from kiks.firmware.gripper import Gripper
+from kiks.firmware.k213 import K213
+from kiks.model.arena import PAD, Arena
+from kiks.model.robot import SENSOR_COUNT
+from kiks.sim.simulation import Simulation
+
+VERSION, KIND = 1, 1
+"""Of the frames."""
+
+PAUSED, PROGRAM_DRIVES = 1, 2
+"""Flags of a frame."""
+
+TOUCHING, LED_0, LED_1, HELD, LINE_IN_USE = 1, 2, 4, 8, 16
+"""Flags of a robot."""
+
+GRIPPED, LIFTED = 1.0, 2.0
+"""What a gripper does with a ball or cylinder."""
+
+NO_HIT = 65535
+"""Length of a ray that meets nothing."""
+
+RAY_UNIT_MM = 0.01
+"""Unit of the other lengths [mm]."""
+
+HEAD = np.dtype(
+    [
+        ("version", "u1"),
+        ("kind", "u1"),
+        ("flags", "<u2"),
+        ("scene", "<u4"),
+        ("time_s", "<f8"),
+        ("speed_now", "<f4"),
+        ("speed_average", "<f4"),
+        ("robot_count", "<u2"),
+        ("body_count", "<u2"),
+        ("lamp_count", "<u2"),
+        ("camera_count", "<u2"),
+    ]
+)
+
+ROBOT = np.dtype(
+    [
+        ("pose", "<f4", (3,)),  # x_mm, y_mm, heading_rad
+        ("measured_speed", "<f4", (2,)),  # left, right [pulses/10 ms]
+        ("commanded_speed", "<f4", (2,)),  # no number where a motor is given a voltage (PWM)
+        ("flags", "<u4"),
+        ("arm", "<f4"),
+        ("jaws", "<f4"),
+        ("contact_count", "<u4"),
+        ("encoders", "<i4", (2,)),  # left, right [pulses]
+        ("distances_mm", "<f4", (3,)),  # forwards, backwards, straight from where it was put
+        ("proximity", "<f4", (SENSOR_COUNT,)),
+        ("ambient", "<f4", (SENSOR_COUNT,)),
+    ]
+)
+
+CAMERA = np.dtype([("robot", "<u2"), ("light", "<u2"), ("pixels", "u1", (PIXEL_COUNT,))])
+
+
+def pack_frame(
+    sim: Simulation,
+    *,
+    scene: int,
+    is_paused: bool = False,
+    is_driven: bool = False,
+    speed_now: float = 0.0,
+    speed_average: float = 0.0,
+    is_held: Callable[[str, int], bool] | None = None,
+) -> bytes:
+    """Return a frame of a world as it stands.
+
+    Args:
+        sim: The world, its lock held.
+        scene: Number of the scene that the frame belongs to.
+        is_paused: Whether its time stands still.
+        is_driven: Whether a program lets its time pass.
+        speed_now: Simulated seconds in a real one, of late.
+        speed_average: The same since the beginning.
+        is_held: Says of "robot" and an index whether a hand holds it; nobody does if left out.
+    """
+    seen = sim.look()
+    records: Any = sim.state.robots[0]
+    robots: Any = np.zeros(sim.robot_count, ROBOT)
+    robots["pose"] = seen.poses
+    robots["measured_speed"] = records["measured_speed"]
+    robots["commanded_speed"] = _commanded(records)
+    robots["flags"] = (records["is_touching"] != 0) * TOUCHING + (records["led"] != 0) @ (LED_0, LED_1)
+    for index, wire in enumerate(sim.wires):
+        if wire.holder is not None:
+            robots["flags"][index] |= LINE_IN_USE
+        if is_held is not None and is_held("robot", index):
+            robots["flags"][index] |= HELD
+    robots["arm"], robots["jaws"] = records["arm"], records["jaws"]
+    robots["contact_count"] = records["contact_count"]
+    # The robot's own counters wrap as 32 bits do, and so does this.
+    robots["encoders"] = (records["pulse_count"] + records["counter_offset"]).astype(np.int32)
+    robots["distances_mm"] = sim.distances_mm()
+    robots["proximity"], robots["ambient"] = seen.proximity, seen.ambient
+    bodies, lamps, cameras = _pack_bodies(sim, seen.places), sim.lamps.astype("<f4"), _pack_cameras(sim)
+    head: Any = np.zeros(1, HEAD)
+    head["version"], head["kind"] = VERSION, KIND
+    head["flags"] = PAUSED * is_paused + PROGRAM_DRIVES * is_driven
+    head["scene"], head["time_s"] = scene, sim.time_s
+    # A world that stands still for nobody may be infinitely fast: what has no figure is shown as 0.
+    head["speed_now"], head["speed_average"] = (
+        speed if math.isfinite(speed) else 0.0 for speed in (speed_now, speed_average)
+    )
+    head["robot_count"], head["body_count"] = len(robots), len(bodies)
+    head["lamp_count"], head["camera_count"] = len(lamps), len(cameras)
+    rays = np.where(np.isinf(seen.lengths_mm), NO_HIT, np.rint(seen.lengths_mm / RAY_UNIT_MM).clip(0, NO_HIT - 1))
+    return b"".join(part.tobytes() for part in (head, robots, bodies, lamps, cameras, rays.astype("<u2")))
+
+
+def _commanded(records: Any) -> NDArray[np.float64]:
+    """Return the speeds that controllers are given [pulses/10 ms], [robot, 2]; no number for a motor on PWM."""
+    mode = records["motor_mode"]
+    planned = np.where(mode == MODE_POSITION, records["trajectory_speed"], np.nan)
+    speeds: NDArray[np.float64] = np.where(mode == MODE_SPEED, records["speed_setpoint"], planned)
+    return speeds
+
+
+def _pack_bodies(sim: Simulation, places: NDArray[np.float64]) -> NDArray[np.float32]:
+    records: Any = sim.state.bodies[0]
+    bodies = np.empty((len(records), 3), "<f4")
+    bodies[:, :2] = places
+    bodies[:, 2] = np.where(records["is_lifted"] != 0, LIFTED, np.where(records["holder"] != 0, GRIPPED, 0.0))
+    return bodies
+
+
+def _pack_cameras(sim: Simulation) -> NDArray[np.void]:
+    who = [
+        index for index, wire in enumerate(sim.wires) if any(isinstance(each, K213) for each in wire.firmware.fitted)
+    ]
+    records: Any = sim.state.robots[0, who]
+    cameras: Any = np.zeros(len(who), CAMERA)
+    cameras["robot"], cameras["light"], cameras["pixels"] = who, records["camera_light"], records["camera_pixels"]
+    packed: NDArray[np.void] = cameras
+    return packed
+
+
+def describe_scene(sim: Simulation, scene: int, names: Sequence[str] | None = None) -> dict[str, Any]:
+    """Return what frames take for known, as a message to browsers.
+
+    Positions of sensors, directions of rays and shapes are as the robot sees them, x ahead and y to the left.
+
+    Args:
+        sim: The world, its lock held.
+        scene: A number that no other scene has.
+        names: Of the robots; their numbers if left out.
+    """
+    arena = sim.arena
+    return {
+        "kind": "scene",
+        "scene": scene,
+        "arena": {
+            "name": arena.name,
+            "width_mm": float(arena.width_mm),
+            "height_mm": float(arena.height_mm),
+            "mm_per_cell": float(arena.mm_per_cell),
+            "picture": f"/desk/arena/{scene}.png",
+        },
+        "robots": [
+            _describe_robot(sim, index, str(index + 1) if names is None else names[index])
+            for index in range(sim.robot_count)
+        ],
+        "bodies": [
+            {
+                "number": int(body["number"]),
+                "what": "ball" if body["what"] == BALL else "cylinder",
+                "radius_mm": float(body["radius_mm"]),
+                "brightness": int(body["brightness"]),
+            }
+            for body in sim.bodies()
+        ],
+    }
+
+
+def _describe_robot(sim: Simulation, index: int, name: str) -> dict[str, Any]:
+    spec, turrets = sim.specs[index], sim.turrets(index + 1)
+    parameters = sim.scene[2][int(sim.state.robots["kind"][0, index])]
+    # A thousandth of a millimetre and of a radian's hundredth: more digits would only make the message longer.
+    angles_rad = np.arctan2(parameters["ray_sin"], parameters["ray_cos"])[:, :RAY_COUNT].round(5).tolist()
+    x_mm, y_mm = (parameters[name].round(3).tolist() for name in ("ray_x_mm", "ray_y_mm"))
+    return {
+        "name": name,
+        "kind": spec.name,
+        "radius_mm": spec.body.radius_mm,
+        "wheel_base_mm": spec.body.wheel_base_mm,
+        "reach_mm": float(parameters["reach_mm"]),
+        "sensors": [
+            {
+                "x_mm": x_mm[sensor],
+                "y_mm": y_mm[sensor],
+                "angle_rad": angles_rad[sensor][AHEAD],
+                "rays_rad": angles_rad[sensor],
+            }
+            for sensor in range(SENSOR_COUNT)
+        ],
+        "turrets": [turret.name for turret in turrets],
+        "has_gripper": any(isinstance(turret, Gripper) for turret in turrets),
+        "shapes": _shapes(sim, index),
+    }
+
+
+def describe_shapes(sim: Simulation) -> dict[str, Any]:
+    """Return what turrets look like now, as a message to browsers, for when that has changed."""
+    return {"kind": "shapes", "robots": [_shapes(sim, index) for index in range(sim.robot_count)]}
+
+
+def _shapes(sim: Simulation, index: int) -> list[dict[str, Any]]:
+    """Return what to draw of a robot's turrets; a gripper's arm and jaws are in the frames."""
+    return [
+        {"points": [list(point) for point in shape.points], "colour": shape.colour, "radius_mm": shape.radius_mm}
+        for turret in sim.turrets(index + 1)
+        if not isinstance(turret, Gripper)
+        for shape in turret.shapes()
+    ]
+
+
+def arena_picture(arena: Arena) -> bytes:
+    """Return the walls of an arena as a PNG: a pixel a cell, the top row first; greys are brightnesses, 0 is floor."""
+    from PIL import Image
+
+    with io.BytesIO() as file:
+        # A few large areas: the least effort makes a small file of them, too.
+        Image.fromarray(np.flipud(arena.surface[PAD:-PAD, PAD:-PAD])).save(file, "PNG", compress_level=3)
+        return file.getvalue()

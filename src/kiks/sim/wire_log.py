@@ -1,0 +1,172 @@
+"""What went over a robot's line and when, and where the time went."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from kiks.sim.tail import Tail
+
+PIECE_LIMIT = 4096
+"""Pieces that are remembered: a second of a robot at 115200 bit/s to whom one talks without a break has about 300."""
+
+THOUGHT_LIMIT = 4096
+"""Times of thinking that are remembered."""
+
+_TERMINATORS = b"\r\n"
+
+Span = tuple[int, int]
+"""From when until when [ns]."""
+
+
+class Piece(NamedTuple):
+    """Characters that belong together: a command with its end, a reply, or a part of a command.
+
+    Attributes:
+        is_sent: Whether they went to the robot; else they came from it.
+        data: The characters.
+        first_ns: When the first one set out [ns].
+        last_ns: When the last one has arrived [ns].
+        acted_ns: When the command acts whose end this is, or whose reply [ns]; None for a part of a command.
+    """
+
+    is_sent: bool
+    data: bytes
+    first_ns: int
+    last_ns: int
+    acted_ns: int | None
+
+
+class TimeShares(NamedTuple):
+    """Where the time of a window went [ns]: each instant counts once, for the first of these that it belongs to.
+
+    Attributes:
+        link_ns: Characters were on the line, either way.
+        robot_ns: The robot had a command and no answer yet.
+        thinking_ns: The program thought.
+        waiting_ns: All else: the program waited on purpose, or nobody wanted anything.
+    """
+
+    link_ns: int
+    robot_ns: int
+    thinking_ns: int
+    waiting_ns: int
+
+    @property
+    def window_ns(self) -> int:
+        """The whole [ns]."""
+        return sum(self)
+
+
+class WireLog:
+    """Remembers the newest of what goes over one robot's line.
+
+    Args:
+        now_ns: When it begins [ns].
+
+    Attributes:
+        pieces: What went over the line. A piece is known as soon as it is certain, which is before it has arrived.
+    """
+
+    def __init__(self, now_ns: int) -> None:
+        self.pieces: Tail[Piece] = Tail(PIECE_LIMIT)
+        self._thoughts: Tail[Span] = Tail(THOUGHT_LIMIT)
+        self._begin_ns = now_ns
+
+    def send(self, data: bytes, start_ns: int, character_ns: int, acts: list[tuple[int, int]]) -> None:
+        """Note characters for the robot.
+
+        Args:
+            data: The characters.
+            start_ns: When the first one sets out [ns].
+            character_ns: How long each takes [ns].
+            acts: For each command that they complete: the index of its terminator, and when it acts [ns].
+        """
+        begin = 0
+        pieces: list[tuple[int, int, int | None]] = []
+        for index, acted_ns in acts:
+            end = index + 1
+            # The LF of CR LF belongs to the command before it.
+            while end < len(data) and data[end] in _TERMINATORS and all(end != other for other, _ in acts):
+                end += 1
+            pieces.append((begin, end, acted_ns))
+            begin = end
+        if begin < len(data):
+            pieces.append((begin, len(data), None))
+        self.pieces.add(
+            Piece(True, data[first:end], start_ns + first * character_ns, start_ns + end * character_ns, acted_ns)
+            for first, end, acted_ns in pieces
+        )
+
+    def answer(self, data: bytes, start_ns: int, character_ns: int, acted_ns: int) -> None:
+        """Note a reply."""
+        self.pieces.add([Piece(False, data, start_ns, start_ns + len(data) * character_ns, acted_ns)])
+
+    def think(self, from_ns: int, until_ns: int) -> None:
+        """Note that the program of this line has thought."""
+        self._thoughts.add([(from_ns, until_ns)])
+
+    @property
+    def since_ns(self) -> int:
+        """From when on everything is remembered [ns]."""
+        first, pieces = self.pieces.since(0)
+        first_thought, thoughts = self._thoughts.since(0)
+        return max(
+            self._begin_ns,
+            pieces[0].first_ns if first and pieces else 0,
+            thoughts[0][0] if first_thought and thoughts else 0,
+        )
+
+    def shares(self, from_ns: int, until_ns: int, *, thinks_since_ns: int | None = None) -> TimeShares:
+        """Return where the time of a window went; of a later one, if its beginning is forgotten.
+
+        Args:
+            from_ns: When the window begins [ns].
+            until_ns: When it ends [ns].
+            thinks_since_ns: Since when all that is not the line's or the robot's counts as thinking [ns].
+        """
+        pieces, thoughts = self.pieces.since(0)[1], self._thoughts.since(0)[1]
+        if thinks_since_ns is not None:
+            thoughts.append((thinks_since_ns, until_ns))
+        return share_time(
+            (max(from_ns, self.since_ns), until_ns),
+            link=[(piece.first_ns, piece.last_ns) for piece in pieces],
+            robot=[(piece.last_ns, piece.acted_ns) for piece in pieces if piece.is_sent and piece.acted_ns is not None],
+            thinking=thoughts,
+        )
+
+
+def share_time(window: Span, *, link: Iterable[Span], robot: Iterable[Span], thinking: Iterable[Span]) -> TimeShares:
+    """Give each instant of a window to the first that claims it.
+
+    Each claim adds to what is taken already, so the shares add up to the window exactly.
+
+    Example:
+        >>> share_time((0, 10), link=[(0, 2), (5, 8)], robot=[(1, 6)], thinking=[(9, 20)])
+        TimeShares(link_ns=5, robot_ns=3, thinking_ns=1, waiting_ns=1)
+    """
+    taken: list[Span] = []
+    taken_ns = [0]
+    for spans in (link, robot, thinking):
+        taken = _union(taken, spans, window)
+        taken_ns.append(sum(until_ns - from_ns for from_ns, until_ns in taken))
+    _, link_ns, robot_ns, thinking_ns = taken_ns
+    whole_ns = max(window[1] - window[0], 0)
+    return TimeShares(link_ns, robot_ns - link_ns, thinking_ns - robot_ns, whole_ns - thinking_ns)
+
+
+def _union(taken: list[Span], spans: Iterable[Span], window: Span) -> list[Span]:
+    """Return what is covered within a window: spans in their order that do not meet."""
+    begin_ns, end_ns = window
+    inside = [
+        (max(from_ns, begin_ns), min(until_ns, end_ns))
+        for from_ns, until_ns in spans
+        if max(from_ns, begin_ns) < min(until_ns, end_ns)
+    ]
+    union: list[Span] = []
+    for from_ns, until_ns in sorted([*taken, *inside]):
+        if union and from_ns <= union[-1][1]:
+            union[-1] = (union[-1][0], max(union[-1][1], until_ns))
+        else:
+            union.append((from_ns, until_ns))
+    return union

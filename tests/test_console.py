@@ -1,0 +1,98 @@
+"""Commands that a person types."""
+
+from __future__ import annotations
+
+import pytest
+import serial
+from tests.served import fresh
+
+from kiks.errors import LinkError, ParameterError
+from kiks.sim.console import type_lines
+
+
+def test_typed_command_acts_and_is_answered_when_time_has_got_there() -> None:
+    sim = fresh()
+    sim.run(1)
+    (typed,) = type_lines(sim, 1, "D,10,15")
+    assert (typed.robot, typed.text, typed.time_s, typed.reply, typed.reply_s) == (1, "D,10,15", 1.0, None, None)
+    before = sim.pose(1)
+    sim.run(0.5)
+    assert typed.reply == "d"
+    assert typed.reply_s is not None
+    assert 1.0 < typed.reply_s < 1.1
+    assert sim.pose(1) != before
+
+
+def test_reply_has_arrived_with_its_last_character() -> None:
+    sim, clock = fresh(), fresh()
+    (typed,) = type_lines(sim, 1, "N")
+    port = clock.port(1)
+    port.write(b"N\n")
+    reply = port.readline()
+    sim.advance_to(clock.now_ns - 1)
+    assert typed.reply is None
+    sim.advance_to(clock.now_ns)
+    assert typed.reply == reply.decode().strip()
+
+
+def test_several_lines_are_answered_in_their_order() -> None:
+    sim = fresh()
+    sent = type_lines(sim, 1, "G,7,8\n\n  H \nX\nD,5\n")
+    sim.run(1)
+    assert [(typed.text, typed.reply) for typed in sent] == [
+        ("G,7,8", "g"),
+        ("H", "h,7,8"),
+        ("X", "Command not found"),
+        ("D,5", "z,Protocol error"),
+    ]
+
+
+def test_line_of_a_program_is_its_own() -> None:
+    sim = fresh(2)
+    with serial.serial_for_url(sim.url(1)):
+        with pytest.raises(LinkError, match=r"line of robot 1 must be free .* but the program that opened .* has it"):
+            type_lines(sim, 1, "D,1,1")
+        assert len(type_lines(sim, 2, "D,1,1")) == 1
+    assert len(type_lines(sim, 1, "D,1,1")) == 1
+
+
+def test_program_that_comes_hears_nothing_of_what_was_typed() -> None:
+    sim = fresh()
+    (typed,) = type_lines(sim, 1, "B")
+    with serial.serial_for_url(sim.url(1), timeout=1) as port:
+        port.write(b"H\n")
+        assert port.readline() == b"h,0,0\r\n"
+    assert typed.reply is not None
+    assert typed.reply.startswith("b,")
+
+
+def test_program_that_goes_takes_no_reply_with_it() -> None:
+    sim = fresh()
+    (typed,) = type_lines(sim, 1, "B")
+    with serial.serial_for_url(sim.url(1), timeout=1) as port:
+        port.write(b"H\n")
+    sim.run(0.1)
+    assert typed.reply is not None
+    with serial.serial_for_url(sim.url(1), timeout=1) as port:
+        port.write(b"E\n")
+        assert port.readline() == b"e,0,0\r\n"
+
+
+@pytest.mark.parametrize("text", ["", " \n ", "D,5,5 ☺", "D" * 257, "D,5\t,5"])
+def test_nonsense_is_refused_before_it_is_sent(text: str) -> None:
+    sim = fresh()
+    with pytest.raises(ParameterError, match=r"a command must"):
+        type_lines(sim, 1, text)
+    assert sim.next_event_ns() is None
+
+
+def test_full_line_is_told() -> None:
+    sim = fresh()
+    for _ in range(2):
+        type_lines(sim, 1, "\n".join(["D,1,1"] * 300))
+    with pytest.raises(LinkError, match=r"must have room .* Let time pass first"):
+        type_lines(sim, 1, "\n".join(["D,1,1"] * 100))
+    sim.run(5)
+    assert len(type_lines(sim, 1, "D,0,0")) == 1
+    with pytest.raises(ParameterError, match=r"robot must be the number of one there is"):
+        type_lines(sim, 2, "D,0,0")
