@@ -98,9 +98,20 @@ class World:
             {"number": 1, "what": "ball", "radius_mm": 20, "brightness": 200},
             {"number": 2, "what": "cylinder", "radius_mm": 14, "brightness": 200},
         ]
-        sizes = {"width_mm": WIDTH_MM, "height_mm": HEIGHT_MM, "mm_per_cell": 1, "picture": f"/desk/arena/{self.scene}.png"}
+        sizes = {
+            "width_mm": WIDTH_MM,
+            "height_mm": HEIGHT_MM,
+            "mm_per_cell": 1,
+            "picture": f"/desk/arena/{self.scene}.png",
+        }
         return json.dumps(
-            {"kind": "scene", "scene": self.scene, "arena": {"name": "Test", **sizes}, "robots": robots, "bodies": bodies}
+            {
+                "kind": "scene",
+                "scene": self.scene,
+                "arena": {"name": "Test", **sizes},
+                "robots": robots,
+                "bodies": bodies,
+            }
         )
 
     def frame(self) -> bytes:
@@ -116,7 +127,9 @@ class World:
             parts.append(words + struct.pack("<16f", *readings, *[450.0] * 8))
         parts += [struct.pack("<3f", *body, 0) for body in self.bodies]
         parts += [struct.pack("<4f", *lamp) for lamp in self.lamps]
-        parts.append(struct.pack("<HH", 0, 100) + bytes(int(128 + 100 * math.sin(k / 6 + self.time_s)) for k in range(64)))
+        parts.append(
+            struct.pack("<HH", 0, 100) + bytes(int(128 + 100 * math.sin(k / 6 + self.time_s)) for k in range(64))
+        )
         parts.append(np.where(lengths < REACH_MM, lengths * 100, 65535).astype("<u2").tobytes())
         return b"".join(parts)
 
@@ -127,7 +140,9 @@ class World:
         y = y_mm + spots[:, 0] * math.sin(heading_rad) + spots[:, 1] * math.cos(heading_rad)
         way = np.arange(0.0, REACH_MM + 1)
         columns = (x[:, None] + way * np.cos(spots[:, 2:] + heading_rad)).astype(int).clip(0, WIDTH_MM - 1)
-        rows = (HEIGHT_MM - 1 - (y[:, None] + way * np.sin(spots[:, 2:] + heading_rad)).astype(int)).clip(0, HEIGHT_MM - 1)
+        rows = (HEIGHT_MM - 1 - (y[:, None] + way * np.sin(spots[:, 2:] + heading_rad)).astype(int)).clip(
+            0, HEIGHT_MM - 1
+        )
         is_wall = self.cells[rows, columns] > 0
         return np.where(is_wall.any(axis=1), is_wall.argmax(axis=1), REACH_MM).astype(float)
 

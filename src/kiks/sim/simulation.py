@@ -30,6 +30,7 @@ from kiks.sim.wire import Agenda, Wire
 from kiks.units import ns_from_s
 
 if TYPE_CHECKING:
+    from kiks.desk.showing import Shown
     from kiks.ports.memory import SimPort
 
 
@@ -180,6 +181,32 @@ class Simulation(Things):
         super().sync()
         if self._radios:
             deliver(self._radios, self.now_ns)
+
+    # ---- to be seen ----
+
+    def show(
+        self, *, speed: float | None = 1.0, is_alive: bool = False, port: int | None = None, browser: bool = True
+    ) -> Shown:
+        """Show this world in a browser, where it may be watched, paused and touched; in a notebook, below the cell.
+
+        Looking changes nothing: the run is the same, to the bit, unless somebody reaches in.
+
+        Args:
+            speed: Simulated seconds in a real one from now on; None for as fast as possible.
+            is_alive: Whether time passes by itself, in a thread; else it does when the program lets it.
+            port: TCP port of the page, on this computer only; 8123, or a free one, if left out.
+            browser: Whether a browser is opened.
+
+        Returns:
+            What is shown, with its `url`; `close()` ends it.
+
+        Raises:
+            LinkError: If the page cannot be served there.
+            ParameterError: If the speed is out of range, or the desk is open on another port.
+        """
+        from kiks.desk.showing import show
+
+        return show(self, speed=speed, is_alive=is_alive, port=port, browser=browser)
 
     # ---- robots ----
 

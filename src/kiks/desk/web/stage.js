@@ -154,7 +154,7 @@ export class Stage {
     this.hand.forget();
     this.topView.setScene(scene);
     this.solidView?.setScene(scene);
-    this._isWanted = true;
+    this._resize();
     const raster = await loadRaster(scene.arena).catch(() => null);
     if (this._isOver || scene !== this.feed.scene) return;
     if (!raster) return this._notice("The arena's picture did not arrive. Reload the page to try again.");
@@ -209,11 +209,17 @@ export class Stage {
   _resize() {
     const { width, height } = this.root.getBoundingClientRect();
     this.root.dataset.view = this.view;
-    this.root.dataset.split = width >= height ? "beside" : "below";
+    this.root.dataset.split = this._isRoomierBeside(width, height) ? "beside" : "below";
     const fit = (pane, act) => pane.clientWidth && pane.clientHeight && act(pane.clientWidth, pane.clientHeight);
     fit(this.topPane, (wide, high) => this.topView.resize(wide, high, devicePixelRatio || 1));
     if (this.solidView) fit(this.solidPane, (wide, high) => this.solidView.resize(wide, high));
     this._isWanted = true;
+  }
+
+  /** Say whether two views show the arena larger beside each other than below. */
+  _isRoomierBeside(width, height) {
+    const { width_mm, height_mm } = this.feed.scene?.arena ?? { width_mm: 1, height_mm: 1 };
+    return Math.min(width / 2 / width_mm, height / height_mm) >= Math.min(width / width_mm, height / 2 / height_mm);
   }
 
   /** One picture of the screen: send what the hand has done, and draw what has changed. */
