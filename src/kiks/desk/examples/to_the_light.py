@@ -1,4 +1,4 @@
-"""To the light: turn to the side that is brighter and drive there (Braitenberg's vehicle). Put a strong lamp near it."""
+"""To the light: turn to the brighter side and drive there (Braitenberg's vehicle). Put a strong lamp near it."""
 
 import sys
 
