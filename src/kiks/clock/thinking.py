@@ -6,17 +6,15 @@ nanosecond, what an earlier `live` run measured.
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 # Bound here once: a program under `kiks run` lives with a `time` module that is simulated.
 from time import perf_counter_ns
 from typing import Protocol
 
-from kiks.errors import ParameterError, nearest
+from kiks.errors import ParameterError
+from kiks.model.policy import split_thinking
 from kiks.units import NS_PER_S
-
-FORMS = "'none', 'fixed:MS', 'live', 'live:FACTOR' or 'replay:FILE'"
 
 
 class Thinking(Protocol):
@@ -98,28 +96,10 @@ def parse_thinking(text: str) -> Thinking:
         >>> parse_thinking("fixed:2.5").enter(is_command=True)
         2500000
     """
-    name, _, value = text.partition(":")
-    if name == "none" and not value:
-        return ThinkingFixed(0)
-    if name == "fixed":
-        return ThinkingFixed(round(_number(text, value, "milliseconds", 3600e3) * 1e6))
-    if name == "live":
-        return ThinkingLive(_number(text, value, "a factor", 1e6) if value else 1.0)
-    if name == "replay" and value:
+    name, value = split_thinking(text)
+    if isinstance(value, str):
         return ThinkingReplay(_read_times(Path(value)))
-    raise ParameterError(
-        f"thinking must be {FORMS}, but it was {text!r}.{nearest(name, ['none', 'fixed', 'live', 'replay'])}"
-    )
-
-
-def _number(text: str, value: str, meaning: str, most: float) -> float:
-    try:
-        number = float(value)
-    except ValueError:
-        number = math.nan
-    if not 0 <= number <= most:
-        raise ParameterError(f"thinking must give {meaning} from 0 to {most:g} after the colon, but it was {text!r}.")
-    return number
+    return ThinkingLive(value) if name == "live" else ThinkingFixed(round(value * 1e6))
 
 
 def save_thinking(measured_ns: list[int], path: str | Path) -> None:

@@ -19,15 +19,15 @@ from kiks.model.places import Ball, Cylinder, Lamp, Pose
 from kiks.model.raster import is_number
 
 _PICTURE_KEYS = ("picture", "mm_per_pixel")
-_BOX_KEYS = ("size_mm", "wall_mm", "rounded_mm", "brightness")
-_ENTRY_KEYS = {
+BOX_KEYS = ("size_mm", "wall_mm", "rounded_mm", "brightness")
+ENTRY_KEYS = {
     "start": ("at_mm", "heading_deg"),
     "lamp": ("at_mm", "power_w", "is_on"),
     "ball": ("at_mm", "radius_mm", "friction_mm_s2", "brightness"),
     "cylinder": ("at_mm", "radius_mm", "friction_mm_s2", "brightness"),
 }
 _Body = TypeVar("_Body", Ball, Cylinder)
-_TOP_KEYS = (*_PICTURE_KEYS, *_BOX_KEYS, "name", *_ENTRY_KEYS)
+_TOP_KEYS = (*_PICTURE_KEYS, *BOX_KEYS, "name", *ENTRY_KEYS)
 
 
 def load_arena(path: Path) -> Arena:
@@ -79,8 +79,8 @@ def save_arena(arena: Arena, path: str | Path) -> None:
 
 
 def _arena_of(table: dict[str, Any], path: Path) -> Arena:
-    _check_keys(table, _TOP_KEYS, "the file")
-    for keys, rival in ((_PICTURE_KEYS, "size_mm"), (_BOX_KEYS, "picture")):
+    check_keys(table, _TOP_KEYS, "the file")
+    for keys, rival in ((_PICTURE_KEYS, "size_mm"), (BOX_KEYS, "picture")):
         if rival in table and (given := [key for key in keys if key in table]):
             raise ArenaError(
                 f"an arena must be either a picture or a box, but {rival} came with {given[0]}. Remove one of them."
@@ -88,26 +88,35 @@ def _arena_of(table: dict[str, Any], path: Path) -> Arena:
     if "picture" in table:
         arena = _picture_arena(table, path)
     elif "size_mm" in table:
-        width_mm, height_mm = _pair(table, "size_mm", "the box")
-        box_keys = {key: table[key] for key in _BOX_KEYS[1:] if key in table}
+        width_mm, height_mm = pair_of(table, "size_mm", "the box")
+        box_keys = {key: table[key] for key in BOX_KEYS[1:] if key in table}
         arena = Arena.box(width_mm, height_mm, **box_keys)
     else:
         raise ArenaError(
             "an arena must have a picture or a size, but it has neither. "
             'Give picture = "name.png" or size_mm = [width, height].'
         )
-    return replace(
-        arena,
-        name=_typed(table, "name", str, path.stem, "the file"),
-        starts=tuple(_starts(table)),
-        lamps=tuple(_lamps(table)),
-        balls=tuple(_body(Ball, who, entry) for who, entry in _entries(table, "ball")),
-        cylinders=tuple(_body(Cylinder, who, entry) for who, entry in _entries(table, "cylinder")),
-    )
+    return replace(arena, name=typed(table, "name", str, path.stem, "the file"), **places_of(table))
+
+
+def places_of(table: dict[str, Any]) -> dict[str, Any]:
+    """Return what the entries of a file say of starts, lamps, balls and cylinders, for `dataclasses.replace`.
+
+    Raises:
+        ArenaError: If an entry has unknown keys or values of another type.
+    """
+    return {
+        "starts": tuple(_starts(table)),
+        "lamps": tuple(_lamps(table)),
+        "balls": tuple(_body(Ball, who, entry) for who, entry in entries_of(table, "ball", ENTRY_KEYS["ball"])),
+        "cylinders": tuple(
+            _body(Cylinder, who, entry) for who, entry in entries_of(table, "cylinder", ENTRY_KEYS["cylinder"])
+        ),
+    }
 
 
 def _picture_arena(table: dict[str, Any], path: Path) -> Arena:
-    given = _typed(table, "picture", str, "", "the file")
+    given = typed(table, "picture", str, "", "the file")
     folder = path.parent.resolve()
     try:
         picture = (folder / given).resolve()
@@ -125,39 +134,49 @@ def _picture_arena(table: dict[str, Any], path: Path) -> Arena:
 
 
 def _starts(table: dict[str, Any]) -> Iterable[Pose]:
-    for who, entry in _entries(table, "start"):
+    for who, entry in entries_of(table, "start", ENTRY_KEYS["start"]):
         heading_deg = entry.get("heading_deg", 90)
         if not is_number(heading_deg):
             raise ArenaError(f"{who}: heading_deg must be a number, but it was {heading_deg!r}. 0 looks right, 90 up.")
-        x_mm, y_mm = _pair(entry, "at_mm", who)
+        x_mm, y_mm = pair_of(entry, "at_mm", who)
         yield Pose(x_mm, y_mm, math.radians(heading_deg))
 
 
 def _lamps(table: dict[str, Any]) -> Iterable[Lamp]:
-    for who, entry in _entries(table, "lamp"):
+    for who, entry in entries_of(table, "lamp", ENTRY_KEYS["lamp"]):
         power_w = entry.get("power_w", 1.0)
         if not is_number(power_w):
             raise ArenaError(f"{who}: power_w must be a number, but it was {power_w!r}. A Khepera lamp has 1 W.")
-        x_mm, y_mm = _pair(entry, "at_mm", who)
-        yield Lamp(x_mm, y_mm, power_w, _typed(entry, "is_on", bool, True, who))
+        x_mm, y_mm = pair_of(entry, "at_mm", who)
+        yield Lamp(x_mm, y_mm, power_w, typed(entry, "is_on", bool, True, who))
 
 
 def _body(kind: type[_Body], who: str, entry: dict[str, Any]) -> _Body:
-    x_mm, y_mm = _pair(entry, "at_mm", who)
+    x_mm, y_mm = pair_of(entry, "at_mm", who)
     return kind(x_mm, y_mm, **{key: value for key, value in entry.items() if key != "at_mm"})
 
 
-def _entries(table: dict[str, Any], label: str) -> Iterable[tuple[str, dict[str, Any]]]:
+def entries_of(table: dict[str, Any], label: str, keys: tuple[str, ...]) -> Iterable[tuple[str, dict[str, Any]]]:
+    """Yield each entry of a list of tables, with what messages call it.
+
+    Raises:
+        ArenaError: If it is no such list, or an entry has other keys.
+    """
     entries = table.get(label, [])
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
         raise ArenaError(f"{label} must be a list of tables, but it was {entries!r}. Head each with [[{label}]].")
     for number, entry in enumerate(entries, start=1):
         who = f"{label} {number}"
-        _check_keys(entry, _ENTRY_KEYS[label], who)
+        check_keys(entry, keys, who)
         yield who, entry
 
 
-def _check_keys(table: dict[str, Any], known: tuple[str, ...], who: str) -> None:
+def check_keys(table: dict[str, Any], known: tuple[str, ...], who: str) -> None:
+    """Check that a table has known keys only.
+
+    Raises:
+        ArenaError: If it has another one; the message has the nearest.
+    """
     for key in table:
         if key not in known:
             raise ArenaError(
@@ -165,8 +184,12 @@ def _check_keys(table: dict[str, Any], known: tuple[str, ...], who: str) -> None
             )
 
 
-def _pair(table: dict[str, Any], key: str, who: str) -> Any:
-    """Return the two numbers of a key, unconverted: whole numbers stay whole."""
+def pair_of(table: dict[str, Any], key: str, who: str) -> Any:
+    """Return the two numbers of a key, unconverted: whole numbers stay whole.
+
+    Raises:
+        ArenaError: If there are none.
+    """
     if key not in table:
         raise ArenaError(f"{who} must have {key}, but has none. Give {key} = [x, y].")
     pair = table[key]
@@ -175,7 +198,12 @@ def _pair(table: dict[str, Any], key: str, who: str) -> Any:
     return pair
 
 
-def _typed(table: dict[str, Any], key: str, kind: type, default: Any, who: str) -> Any:
+def typed(table: dict[str, Any], key: str, kind: type, default: Any, who: str) -> Any:
+    """Return the value of a key.
+
+    Raises:
+        ArenaError: If it is of another type.
+    """
     value = table.get(key, default)
     if not isinstance(value, kind):
         form = "true or false" if kind is bool else 'a text in "quotes"'
@@ -185,25 +213,40 @@ def _typed(table: dict[str, Any], key: str, kind: type, default: Any, who: str) 
 
 def _toml_of(arena: Arena, picture: str) -> str:
     lines = [
-        f"picture = {_quoted(picture)}",
+        f"picture = {quoted(picture)}",
         f"mm_per_pixel = {arena.mm_per_cell!r}",
-        f"name = {_quoted(arena.name)}",
+        f"name = {quoted(arena.name)}",
+        *place_lines(arena),
     ]
+    return "\n".join(lines) + "\n"
+
+
+def place_lines(arena: Arena) -> list[str]:
+    """Return the lines of a file that `places_of` reads."""
+    lines = []
     for start in arena.starts:
-        lines += ["", "[[start]]", _at(start), f"heading_deg = {math.degrees(start.heading_rad)!r}"]
+        lines += ["", "[[start]]", _at(start), f"heading_deg = {_degrees(start.heading_rad)!r}"]
     for lamp in arena.lamps:
         lines += ["", "[[lamp]]", _at(lamp), f"power_w = {lamp.power_w!r}", f"is_on = {str(lamp.is_on).lower()}"]
     for label, bodies in (("ball", arena.balls), ("cylinder", arena.cylinders)):
         for body in bodies:
             lines += ["", f"[[{label}]]", _at(body), f"radius_mm = {body.radius_mm!r}"]
             lines += [f"friction_mm_s2 = {body.friction_mm_s2!r}", f"brightness = {body.brightness!r}"]
-    return "\n".join(lines) + "\n"
+    return lines
+
+
+def _degrees(angle_rad: float) -> float:
+    """Return an angle in the fewest digits that give it back."""
+    angle_deg = math.degrees(angle_rad)
+    short = (round(angle_deg, digits) for digits in range(13))
+    return next((each for each in short if math.radians(each) == angle_rad), angle_deg)
 
 
 def _at(place: Pose | Lamp | Ball | Cylinder) -> str:
     return f"at_mm = [{place.x_mm!r}, {place.y_mm!r}]"
 
 
-def _quoted(text: str) -> str:
+def quoted(text: str) -> str:
+    """Return a text as TOML has it."""
     # TOML quotes as JSON does, save for one control character that JSON leaves bare.
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -83,11 +83,10 @@ class RobotSpec:
         Raises:
             ParameterError: If there is no such robot, the file is no TOML, or a key is missing, unknown or wrong.
         """
-        folder = resources.files("kiks.model") / "robots"
-        known = sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml"))
+        known = robot_names()
         if str(name_or_path) in known:
             source = str(name_or_path)
-            text = (folder / f"{source}.toml").read_text(encoding="utf-8")
+            text = (_FOLDER / f"{source}.toml").read_text(encoding="utf-8")
         else:
             source = str(name_or_path)
             try:
@@ -105,6 +104,21 @@ class RobotSpec:
             ) from None
         spec = _robot_from_table(table, source)
         return spec if response is None else spec.with_changes(proximity__response=response)
+
+    @property
+    def is_noisy(self) -> bool:
+        """Whether chance has a say in what its sensors and its camera read."""
+        chance = self.proximity
+        return any((chance.noise_small, chance.noise_large, self.ambient.noise_counts, *chance.jitter_counts))
+
+    def without_noise(self) -> RobotSpec:
+        """Return a copy whose sensors and camera read the same again as long as nothing moves."""
+        return self.with_changes(
+            proximity__noise_small=0.0,
+            proximity__noise_large=0.0,
+            proximity__jitter_counts=(0.0,),
+            ambient__noise_counts=0.0,
+        )
 
     def with_changes(self, **changes: Any) -> RobotSpec:
         """Return a copy with some values changed, named 'section__key'.
@@ -133,6 +147,14 @@ class RobotSpec:
             spec = replace(spec, **{section: replace(part, **values)})
         check(spec, spec.name)
         return spec
+
+
+_FOLDER = resources.files("kiks.model") / "robots"
+
+
+def robot_names() -> list[str]:
+    """Return the names of the robots that come with KiKS."""
+    return sorted(entry.name[:-5] for entry in _FOLDER.iterdir() if entry.name.endswith(".toml"))
 
 
 _SECTIONS: dict[str, type[Any]] = {

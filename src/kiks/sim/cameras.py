@@ -65,8 +65,8 @@ class Cameras:
         return [float(grey) for grey in self._pixels]
 
     def _take(self, index: int, time_ns: int) -> Picture:
-        light = self._kernel(index, time_ns, is_noisy=True)
-        return self._pixels.astype(np.int64).tolist(), light
+        light = self._kernel(index, time_ns, is_noisy=self._sim.specs[index].is_noisy)
+        return np.clip(np.rint(self._pixels), 0, 255).astype(np.int64).tolist(), light
 
     def _kernel(self, index: int, time_ns: int, *, is_noisy: bool) -> int:
         sim = self._sim

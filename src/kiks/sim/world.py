@@ -48,7 +48,7 @@ class World:
     """
 
     def __init__(self, arena: Arena, specs: Sequence[RobotSpec], seed: int) -> None:
-        self.arena = arena
+        self._take(arena)
         self.specs = list(specs)
         self.seed = seed
         self.robot_count = len(self.specs)
@@ -61,12 +61,43 @@ class World:
         self._kinds = np.zeros(len(kinds), PARAMETERS)
         for kind, spec in enumerate(kinds):
             self._kinds[kind : kind + 1] = pack(spec)
-        self.ground = (arena.clearance, float(arena.mm_per_cell), PAD)
-        self.sight = (arena.clearance, arena.surface, arena.faces, float(arena.mm_per_cell), PAD)
         self._paths: Paths | None = None
         for index in range(self.robot_count):
             self._put(index, *self._start(index))
         self._enter()
+
+    def _take(self, arena: Arena) -> None:
+        """Take the walls of an arena for those that there are."""
+        self.arena = arena
+        self.ground = (arena.clearance, float(arena.mm_per_cell), PAD)
+        self.sight = (arena.clearance, arena.surface, arena.faces, float(arena.mm_per_cell), PAD)
+
+    def set_arena(self, arena: Arena) -> None:
+        """Put other walls around everything; time, robots, programs, balls, cylinders and lamps stay as they are.
+
+        Args:
+            arena: The walls; what else the arena holds is only kept in `arena`.
+
+        Raises:
+            ParameterError: If a robot, ball or cylinder would be deeper in a wall than it is.
+        """
+        # What follows from the walls may take a while: it is found before anybody has to wait.
+        ground = (arena.clearance, float(arena.mm_per_cell), PAD)
+        assert arena.faces is not None
+        with self.lock:
+            self.sync()
+            for disc, (x_mm, y_mm, radius_mm) in enumerate(self._discs().tolist()):
+                if radius_mm < 0:
+                    continue
+                gap_mm = contact.clearance_of_disc(*ground, x_mm, y_mm, radius_mm)
+                before_mm = contact.clearance_of_disc(*self.ground, x_mm, y_mm, radius_mm)
+                if gap_mm < min(before_mm, -OVERLAP_MM):
+                    raise ParameterError(
+                        f"The walls must leave room for all that is there, but one would be {-gap_mm:.1f} mm inside "
+                        f"{self._name(disc)} at ({x_mm:.0f}, {y_mm:.0f}) mm. Move that away first."
+                    )
+            self._take(arena)
+            self._enter()
 
     def _enter(self) -> None:
         """Make the scene anew, as must be when the arrays of the state were replaced."""
@@ -164,9 +195,9 @@ class World:
             ArenaError: If there is no free place for it.
         """
         radius_mm = self.specs[index].body.radius_mm
-        if index == 0:
-            return self.arena.find_start(radius_mm)
         others = self._discs()[:index]
+        if index == 0 and not self.arena.starts:
+            return self.arena.find_start(radius_mm)
         if index < len(self.arena.starts):
             start = self.arena.starts[index]
             if (obstacle := self._obstacle(start.x_mm, start.y_mm, radius_mm, others)) is not None:

@@ -1,0 +1,63 @@
+/* The arena as a component of the page: the view from above, the 3-D view, or both (see stage.js).
+   It is served from another address than the modules beside it, so it imports them by the name "kiks-desk" only. */
+
+import { KEYS_HELP, Stage } from "kiks-desk";
+
+export default {
+  template: `
+    <div ref="root" class="kiks-arena" :class="{'kiks-dark': dark}" data-testid="arena" @keydown="press">
+      <div ref="topPane" class="kiks-pane kiks-top">
+        <canvas ref="top" class="kiks-canvas" tabindex="0" role="application" :aria-label="label" data-testid="arena-top"></canvas>
+      </div>
+      <div ref="solidPane" class="kiks-pane kiks-solid" data-testid="arena-solid"></div>
+      <div ref="notice" class="kiks-notice" role="status" data-testid="arena-notice" hidden></div>
+      <div ref="live" class="kiks-live" aria-live="polite"></div>
+    </div>`,
+  props: {
+    feed: { type: String, default: "/desk/feed" },
+    tool: { type: Object, default: () => ({ kind: "hand" }) },
+    show: { type: Object, default: () => ({}) },
+    view: { type: String, default: "top" },
+    follow: { type: Number, default: -1 },
+    dark: { type: Boolean, default: false },
+  },
+  emits: ["pick", "draw"],
+  computed: {
+    label: () => `Arena from above. ${KEYS_HELP}`,
+  },
+  watch: {
+    tool: { deep: true, handler(tool) { this.stage.setTool(tool); } },
+    show: { deep: true, handler(show) { this.stage.setShow({ ...show }); } },
+    view(view) { this.stage.setView(view); },
+    follow(follow) { this.stage.setFollow(follow); },
+    dark(isDark) { this.stage.setDark(isDark); },
+  },
+  mounted() {
+    const { root, top, topPane, solidPane, notice, live } = this.$refs;
+    const parts = { root, top, topPane, solidPane, notice, live };
+    const stage = new Stage(parts, this.feed, (event, detail) => this.$emit(event, detail));
+    this.stage = stage;
+    stage.setTool(this.tool);
+    stage.setShow({ ...this.show });
+    stage.setFollow(this.follow);
+    stage.setDark(this.dark);
+    stage.setView(this.view);
+    window.kiksDesk = {
+      pose: (index) => stage.feed.frame?.pose(index),
+      stats: () => stage.stats(),
+      toClient: (x_mm, y_mm) => stage.toClient(x_mm, y_mm),
+      scene: () => stage.feed.scene,
+      isSolid: () => stage.solidView !== null && stage.solid_frames > 0,
+    };
+  },
+  unmounted() {
+    this.stage.dispose();
+    delete window.kiksDesk;
+  },
+  methods: {
+    press(event) { this.stage.press(event); },
+    fit() { this.stage.fit(); },
+    clear_trails() { this.stage.clearTrails(); },
+    select(what, index) { this.stage.select(what, index); },
+  },
+};

@@ -1,0 +1,61 @@
+/* All colours of both views, in light and dark. Robots have a hue of their own, so that many can be told apart. */
+
+const LIGHT = {
+  outside: "#c9ced6", floor: [226, 222, 211], floorEdge: "#6f6a60", wallEdge: [92, 88, 80], shade: 0.16,
+  gridFine: "rgba(70,62,40,.10)", gridCoarse: "rgba(70,62,40,.26)",
+  ruler: "rgba(244,245,247,.94)", rulerInk: "#30353d", rulerTick: "#7a818c",
+  ink: "#14181d", halo: "rgba(255,255,255,.9)", accent: "#0b62d6", ghost: "rgba(11,98,214,.9)", touch: "#e0261b",
+  lampOff: "#8d8a80", tool: "rgba(11,98,214,.35)", rayAlpha: 0.62, fanAlpha: 0.12, sky: 0xc9ced6, wallFrom: 22, wallTo: 255,
+};
+
+const DARK = {
+  outside: "#101317", floor: [49, 55, 64], floorEdge: "#a7b0bd", wallEdge: [20, 23, 27], shade: 0.3,
+  gridFine: "rgba(220,230,255,.07)", gridCoarse: "rgba(220,230,255,.18)",
+  ruler: "rgba(24,28,33,.94)", rulerInk: "#d5dbe4", rulerTick: "#7d8794",
+  ink: "#f2f5f8", halo: "rgba(0,0,0,.8)", accent: "#6db1ff", ghost: "rgba(109,177,255,.95)", touch: "#ff5a4d",
+  lampOff: "#77736a", tool: "rgba(109,177,255,.35)", rayAlpha: 0.7, fanAlpha: 0.14, sky: 0x14181d, wallFrom: 4, wallTo: 246,
+};
+
+export function palette(isDark) {
+  return isDark ? DARK : LIGHT;
+}
+
+/** The grey on the screen of a wall of a brightness from 1 to 255: all of them differ from the floor by shade or by hue. */
+export function wallGrey(brightness, colours) {
+  return Math.round(colours.wallFrom + (colours.wallTo - colours.wallFrom) * (brightness / 255));
+}
+
+/** Colours of rays by their sensor's reading, from nothing near to very near; the number of buckets is their number. */
+export const READING_COLOURS = [
+  [70, 140, 200], [38, 168, 150], [92, 176, 66], [214, 176, 30], [236, 122, 28], [226, 42, 34],
+];
+const READING_LIMITS = [20, 100, 250, 450, 750];
+
+export function readingBucket(counts) {
+  let bucket = 0;
+  while (bucket < READING_LIMITS.length && counts >= READING_LIMITS[bucket]) bucket++;
+  return bucket;
+}
+
+export function rgba([red, green, blue], alpha = 1) {
+  return `rgba(${red},${green},${blue},${alpha})`;
+}
+
+/** The colour of a robot's number and trail: hues that differ by the golden share stay apart, however many there are. */
+export function robotHue(index) {
+  return (212 + 222.5 * index) % 360;
+}
+
+export function robotColour(index, isDark, alpha = 1) {
+  return `hsla(${robotHue(index)},${isDark ? 80 : 72}%,${isDark ? 66 : 40}%,${alpha})`;
+}
+
+/** Balls are orange and cylinders wooden; the darker, the less light they send back. */
+export function bodyColour(body) {
+  const share = 0.4 + 0.6 * Math.min(body.brightness / 190, 1);
+  const full = body.what === "ball" ? [245, 130, 40] : [176, 122, 70];
+  return full.map((part) => Math.round(part * share));
+}
+
+/** A lamp's light [red, green, blue]. */
+export const LAMPLIGHT = [255, 214, 96];

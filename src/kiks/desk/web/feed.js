@@ -1,0 +1,126 @@
+/* The feed: one WebSocket a page, shared by all its components.
+
+       import { pageFeed } from "kiks-desk";
+       const feed = pageFeed();
+       const stop = feed.on("frame", (frame) => console.log(frame.time_s, frame.robot(0).proximity));
+
+   feed.scene       the newest scene message (arena, robots, bodies) or null
+   feed.frame       the newest frame (see frame.js) or null; it always belongs to feed.scene
+   feed.connection  "connecting", "open", "lost" (it tries again by itself) or "gone" (the server has ended)
+   feed.on(what, callback) tells of "scene", "shapes", "frame" and "connection", and returns a function that ends that.
+   feed.send(object) sends a message, and says whether there was a connection to send it on.
+
+   A hidden page does not acknowledge: the server then rests, and the newest frame comes when the page is looked at again. */
+
+import { Frame } from "./frame.js";
+
+const FIRST_PAUSE_MS = 250;
+const LONGEST_PAUSE_MS = 5000;
+/** Longest way between two frames that is stretched on the screen: beyond it, things would seem to lag. */
+const LONGEST_INTERVAL_MS = 120;
+
+export class Feed {
+  constructor(path = "/desk/feed") {
+    this.path = path;
+    this.scene = null;
+    this.frame = null;
+    this.connection = "connecting";
+    this.frames_received = 0;
+    this.bytes_received = 0;
+    this._listeners = { scene: new Set(), shapes: new Set(), frame: new Set(), connection: new Set() };
+    this._pause_ms = FIRST_PAUSE_MS;
+    this._owed = 0;
+    document.addEventListener("visibilitychange", () => this._wake());
+    addEventListener("online", () => this._wake());
+    this._connect();
+  }
+
+  on(what, callback) {
+    this._listeners[what].add(callback);
+    return () => this._listeners[what].delete(callback);
+  }
+
+  send(message) {
+    if (this._socket?.readyState !== WebSocket.OPEN) return false;
+    this._socket.send(JSON.stringify(message));
+    return true;
+  }
+
+  _connect() {
+    this._timer = null;
+    const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}${this.path}`);
+    socket.binaryType = "arraybuffer";
+    this._socket = socket;
+    socket.onopen = () => {
+      this._pause_ms = FIRST_PAUSE_MS;
+      this._owed = 0;
+      this._say("open");
+    };
+    socket.onmessage = (event) => (typeof event.data === "string" ? this._hear(event.data) : this._see(event.data));
+    socket.onclose = () => {
+      if (this.connection !== "gone") this._say("lost");
+      this._timer = setTimeout(() => this._connect(), this._pause_ms);
+      this._pause_ms = Math.min(2 * this._pause_ms, LONGEST_PAUSE_MS);
+    };
+  }
+
+  _hear(text) {
+    const message = JSON.parse(text);
+    if (message.kind === "scene") {
+      this.scene = message;
+      this.frame = null;
+      this._tell("scene", message);
+    } else if (message.kind === "shapes" && this.scene) {
+      this.scene.robots.forEach((robot, index) => (robot.shapes = message.robots[index] ?? robot.shapes));
+      this._tell("shapes", this.scene);
+    } else if (message.kind === "gone") {
+      this._say("gone");
+    }
+  }
+
+  _see(buffer) {
+    this.frames_received++;
+    this.bytes_received += buffer.byteLength;
+    this._owed++;
+    if (!document.hidden) this._acknowledge();
+    const frame = new Frame(buffer, performance.now());
+    if (!this.scene || frame.scene !== this.scene.scene) return;
+    const before = this.frame;
+    if (before) {
+      before.previous = null;
+      frame.previous = before;
+      frame.interval_ms = Math.min(frame.arrived_ms - before.arrived_ms, LONGEST_INTERVAL_MS);
+    }
+    this.frame = frame;
+    this._tell("frame", frame);
+  }
+
+  _acknowledge() {
+    for (; this._owed > 0; this._owed--) this.send({ kind: "ack" });
+  }
+
+  _wake() {
+    if (document.hidden) return;
+    this._acknowledge();
+    if (this._timer === null || this._timer === undefined) return;
+    clearTimeout(this._timer);
+    this._connect();
+  }
+
+  _say(connection) {
+    this.connection = connection;
+    this._tell("connection", connection);
+  }
+
+  _tell(what, news) {
+    for (const callback of [...this._listeners[what]]) callback(news);
+  }
+}
+
+let feed = null;
+
+/** Return the feed of this page; the first caller's path counts. */
+export function pageFeed(path) {
+  feed ??= new Feed(path);
+  return feed;
+}

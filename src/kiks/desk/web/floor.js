@@ -1,0 +1,107 @@
+/* What stands still in the top view: floor, light, walls and grid. The same picture is the floor of the 3-D view. */
+
+import { LAMPLIGHT, rgba, wallGrey } from "./colours.js";
+import { lightMap } from "./light_map.js";
+
+const SHADE_CELLS_MM = 4;
+/** From this scale on, the fine grid is drawn [pixels/mm], and cells of the raster show their edges. */
+const FINE_GRID_SCALE = 1.6;
+
+export class Floor {
+  constructor() {
+    this.raster = null;
+    this._walls = null;
+    this._light = null;
+    this._light_key = "";
+  }
+
+  setRaster(raster, colours) {
+    this.raster = raster;
+    this._walls = raster ? paintWalls(raster, colours) : null;
+    this._light_key = "";
+  }
+
+  /** Learn where lamps are; says whether the light has changed. */
+  setLamps(lamps, isDark) {
+    const key = isDark + lamps.map((lamp) => `${lamp.x_mm},${lamp.y_mm},${lamp.power_w},${lamp.isOn}`).join(";");
+    if (!this.raster || key === this._light_key) return false;
+    this._light_key = key;
+    this._light = lightMap(this.raster, lamps, LAMPLIGHT, isDark ? 0.62 : 0.85);
+    return true;
+  }
+
+  /** Draw everything; `context` takes CSS pixels. */
+  paint(context, viewport, { isGrid, isLight, isEdged = true }, colours) {
+    context.fillStyle = colours.outside;
+    context.fillRect(0, 0, viewport.width_px, viewport.height_px);
+    if (!this.raster) return;
+    const { width_mm, height_mm } = this.raster;
+    const [left, top] = viewport.toScreen(0, height_mm), [right, bottom] = viewport.toScreen(width_mm, 0);
+    const width = right - left, height = bottom - top;
+    context.fillStyle = rgba(colours.floor);
+    context.fillRect(left, top, width, height);
+    if (isLight && this._light) {
+      context.imageSmoothingEnabled = true;
+      context.drawImage(this._light, left, top, width, height);
+    }
+    if (isGrid) this._grid(context, viewport, left, top, right, bottom, colours);
+    context.imageSmoothingEnabled = viewport.scale * this.raster.mm_per_cell < 4;
+    context.imageSmoothingQuality = "medium";
+    context.drawImage(this._walls, left, top, width, height);
+    if (!isEdged) return;
+    context.strokeStyle = colours.floorEdge;
+    context.lineWidth = 2;
+    context.strokeRect(left - 1, top - 1, width + 2, height + 2);
+  }
+
+  _grid(context, viewport, left, top, right, bottom, colours) {
+    const draw = (step_mm, colour) => {
+      const step = step_mm * viewport.scale;
+      context.beginPath();
+      for (let x = left + step * Math.max(1, Math.ceil(-left / step)); x < Math.min(right, viewport.width_px); x += step) {
+        context.moveTo(Math.round(x) + 0.5, Math.max(top, 0));
+        context.lineTo(Math.round(x) + 0.5, Math.min(bottom, viewport.height_px));
+      }
+      for (let y = bottom - step * Math.max(1, Math.ceil((bottom - viewport.height_px) / step)); y > Math.max(top, 0); y -= step) {
+        context.moveTo(Math.max(left, 0), Math.round(y) + 0.5);
+        context.lineTo(Math.min(right, viewport.width_px), Math.round(y) + 0.5);
+      }
+      context.strokeStyle = colour;
+      context.lineWidth = 1;
+      context.stroke();
+    };
+    if (viewport.scale >= FINE_GRID_SCALE) draw(10, colours.gridFine);
+    if (viewport.scale >= 0.08) draw(100, colours.gridCoarse);
+  }
+}
+
+/** Return a canvas of a pixel a cell: walls with their edges, and a shade on the floor below and to the right of them. */
+function paintWalls({ cells, columns, rows, mm_per_cell }, colours) {
+  const canvas = document.createElement("canvas");
+  canvas.width = columns;
+  canvas.height = rows;
+  const context = canvas.getContext("2d"), picture = context.createImageData(columns, rows), pixels = picture.data;
+  const shade_cells = Math.max(1, Math.round(SHADE_CELLS_MM / mm_per_cell));
+  const [red, green, blue] = colours.wallEdge;
+  for (let row = 0, k = 0; row < rows; row++)
+    for (let column = 0; column < columns; column++, k++) {
+      if (cells[k]) {
+        const isEdge =
+          (column > 0 && !cells[k - 1]) || (column < columns - 1 && !cells[k + 1]) ||
+          (row > 0 && !cells[k - columns]) || (row < rows - 1 && !cells[k + columns]);
+        const grey = wallGrey(cells[k], colours);
+        pixels[4 * k] = isEdge ? red : grey;
+        pixels[4 * k + 1] = isEdge ? green : grey;
+        pixels[4 * k + 2] = isEdge ? blue : grey;
+        pixels[4 * k + 3] = 255;
+        continue;
+      }
+      for (let way = 1; way <= shade_cells; way++)
+        if (row >= way && column >= way && cells[k - way * (columns + 1)]) {
+          pixels[4 * k + 3] = 255 * colours.shade * (2 - way / shade_cells);
+          break;
+        }
+    }
+  context.putImageData(picture, 0, 0);
+  return canvas;
+}

@@ -1,0 +1,61 @@
+/* The light of all lamps on the floor, with the shadows of walls: a small picture to be stretched over the arena.
+
+   Method: for each lamp, rays in all directions say how far its light gets; a cell is lit when it is nearer than that.
+   It is a picture for the eye, soft and coarse; what sensors measure is the engine's business. */
+
+const LONGEST_SIDE = 220;
+const DIRECTIONS = 720;
+/** Lamps hang above the floor, so that the light below them stays finite [mm]. */
+const HEIGHT_MM = 60;
+/** The light that shows at its full strength [W/mm^2]. */
+const FULL = 1 / (160 * 160);
+
+/** Return a canvas of the raster's proportions, or null when no lamp is on. Row 0 is on top. */
+export function lightMap(raster, lamps, rgb, strongest) {
+  const lit = lamps.filter((lamp) => lamp.isOn && lamp.power_w > 0);
+  if (!lit.length) return null;
+  const cell_mm = Math.max(raster.width_mm, raster.height_mm) / LONGEST_SIDE;
+  const columns = Math.max(1, Math.round(raster.width_mm / cell_mm)), rows = Math.max(1, Math.round(raster.height_mm / cell_mm));
+  const light = new Float32Array(columns * rows);
+  for (const lamp of lit) shine(lamp, raster, light, columns, rows, cell_mm);
+  const canvas = document.createElement("canvas");
+  canvas.width = columns;
+  canvas.height = rows;
+  const context = canvas.getContext("2d"), picture = context.createImageData(columns, rows);
+  for (let k = 0; k < light.length; k++) {
+    picture.data.set(rgb, 4 * k);
+    picture.data[4 * k + 3] = 255 * strongest * Math.min(1, Math.sqrt(light[k] / FULL));
+  }
+  context.putImageData(picture, 0, 0);
+  return canvas;
+}
+
+function shine(lamp, raster, light, columns, rows, cell_mm) {
+  const reach = reaches(lamp, raster, cell_mm);
+  for (let row = 0; row < rows; row++) {
+    const y = raster.height_mm - (row + 0.5) * cell_mm - lamp.y_mm;
+    for (let column = 0; column < columns; column++) {
+      const x = (column + 0.5) * cell_mm - lamp.x_mm, square = x * x + y * y;
+      const turn = (Math.atan2(y, x) / (2 * Math.PI) + 1) * DIRECTIONS, before = Math.floor(turn), share = turn - before;
+      const seen = (reach[before % DIRECTIONS] >= square ? 1 - share : 0) + (reach[(before + 1) % DIRECTIONS] >= square ? share : 0);
+      light[row * columns + column] += (seen * lamp.power_w) / (square + HEIGHT_MM * HEIGHT_MM);
+    }
+  }
+}
+
+/** Return the square of the way to the first wall in each direction [mm^2], a cell more so that walls' faces are lit. */
+function reaches(lamp, raster, step_mm) {
+  const reach = new Float32Array(DIRECTIONS), { cells, columns, rows, mm_per_cell } = raster;
+  for (let k = 0; k < DIRECTIONS; k++) {
+    const angle = (2 * Math.PI * k) / DIRECTIONS, x_step = Math.cos(angle), y_step = Math.sin(angle);
+    const stride = Math.max(mm_per_cell, step_mm / 2);
+    let way_mm = 0;
+    for (; ; way_mm += stride) {
+      const column = Math.floor((lamp.x_mm + way_mm * x_step) / mm_per_cell);
+      const row = rows - 1 - Math.floor((lamp.y_mm + way_mm * y_step) / mm_per_cell);
+      if (column < 0 || row < 0 || column >= columns || row >= rows || cells[row * columns + column]) break;
+    }
+    reach[k] = (way_mm + step_mm) ** 2;
+  }
+  return reach;
+}

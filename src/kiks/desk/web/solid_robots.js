@@ -1,0 +1,187 @@
+/* Kheperas in three dimensions: a base with two wheels, two round boards, eight sensors, lamps, turrets and a gripper.
+   What all robots of a kind share is one geometry, drawn for all of them at once. */
+
+import { THREE } from "nicegui-scene";
+import { box, column, empty, merge, plate } from "./solid_parts.js";
+import { readingBucket, READING_COLOURS, robotHue } from "./colours.js";
+import { armAngle, jawsOf, PIVOT_MM } from "./gripper.js";
+
+/** Heights above the floor [mm]. */
+const LOWER_BOARD = 15, UPPER_BOARD = 26, TURRET_STEP = 10, PIVOT = 20;
+const BOARD = 1.6;
+const LED_PLACES = [[-4, 18], [15, 9.5]];
+const NAME_MM = 20;
+const GREEN = "#1f6b42", GREEN_ABOVE = "#2a7f50";
+
+export class SolidRobots {
+  constructor() {
+    this.group = new THREE.Group();
+    this._material = new THREE.MeshLambertMaterial({ vertexColors: true });
+  }
+
+  setScene(scene) {
+    empty(this.group);
+    this._material = new THREE.MeshLambertMaterial({ vertexColors: true });
+    const count = scene.robots.length;
+    this._robots = scene.robots;
+    this._matrix = new THREE.Matrix4();
+    this._part = new THREE.Matrix4();
+    this._tint = new THREE.Color();
+    if (!count) return;
+    this._bodies = this._many(bodyGeometry(scene.robots[0]), this._material, count);
+    this._caps = this._many(column(9, 1.2), new THREE.MeshLambertMaterial(), count);
+    this._sensors = this._many(box(4, 6, 5), new THREE.MeshLambertMaterial(), 8 * count);
+    this._leds = this._many(new THREE.SphereGeometry(2, 8, 6), new THREE.MeshBasicMaterial(), 2 * count);
+    scene.robots.forEach((_, index) =>
+      this._caps.setColorAt(index, this._tint.setHSL(robotHue(index) / 360, 0.72, 0.42, THREE.SRGBColorSpace)));
+    this._tops = scene.robots.map((robot, index) => this._top(robot, index));
+    this._grippers = scene.robots.map((robot) => (robot.has_gripper ? this._gripper(robot) : null));
+    this.setShapes(scene);
+  }
+
+  setShapes(scene) {
+    this._tops?.forEach((top, index) => {
+      const { turrets } = top.userData;
+      turrets.geometry.dispose();
+      turrets.geometry = turretGeometry(scene.robots[index]);
+    });
+  }
+
+  _many(geometry, material, count) {
+    const mesh = new THREE.InstancedMesh(geometry, material, count);
+    mesh.frustumCulled = false;
+    this.group.add(mesh);
+    return mesh;
+  }
+
+  /** What a robot alone has: turrets and a name. */
+  _top(robot, index) {
+    const top = new THREE.Group(), turrets = new THREE.Mesh(new THREE.BufferGeometry(), this._material);
+    const name = nameSprite(robot.name, index);
+    name.position.z = topOf(robot) + 30;
+    top.add(turrets, name);
+    top.userData = { turrets, name };
+    this.group.add(top);
+    return top;
+  }
+
+  _gripper(robot) {
+    const arm = new THREE.Group(), { from_mm, to_mm, width_mm } = jawsOf({ jaws: 0 }, robot.radius_mm);
+    const bars = [-20, 20].map((y) => [box(from_mm, 3, 4), "#8a929c", [from_mm / 2, y, 0]]);
+    arm.add(new THREE.Mesh(merge([...bars, [box(4, 58, 6), "#8a929c", [from_mm, 0, 0]]]), this._material));
+    const jaws = [-1, 1].map(() => {
+      const jaw = new THREE.Mesh(merge([[box(to_mm - from_mm, width_mm, 18), "#2c3138", [(from_mm + to_mm) / 2, 0, -5]]]), this._material);
+      arm.add(jaw);
+      return jaw;
+    });
+    arm.userData = { jaws };
+    this.group.add(arm);
+    return arm;
+  }
+
+  /** Put everything where a frame has it. */
+  update(frame, poses, show) {
+    if (!this._robots?.length) return;
+    for (const mesh of [this._bodies, this._caps]) mesh.count = poses.length;
+    this._sensors.count = 8 * poses.length;
+    this._leds.count = 2 * poses.length;
+    poses.forEach((pose, index) => this._put(frame.robot(index), pose, index, show));
+    for (const mesh of [this._bodies, this._caps, this._sensors, this._leds]) {
+      mesh.instanceMatrix.needsUpdate = true;
+      if (mesh.instanceColor) mesh.instanceColor.needsUpdate = true;
+    }
+    this._tops.forEach((top, index) => (top.visible = index < poses.length));
+  }
+
+  _put(robot, pose, index, show) {
+    const spec = this._robots[index], matrix = this._matrix.makeRotationZ(pose.heading_rad).setPosition(pose.x_mm, pose.y_mm, 0);
+    this._bodies.setMatrixAt(index, matrix);
+    const place = (mesh, k, x, y, z, turn = 0) =>
+      mesh.setMatrixAt(k, this._part.makeRotationZ(turn).setPosition(x, y, z).premultiply(matrix));
+    place(this._caps, index, 0, 0, topOf(spec) + 0.6);
+    const readings = robot.proximity;
+    spec.sensors.forEach(({ x_mm, y_mm, angle_rad }, k) => {
+      place(this._sensors, 8 * index + k, 0.95 * x_mm, 0.95 * y_mm, LOWER_BOARD - 3, angle_rad);
+      const bucket = readingBucket(readings[k]), [red, green, blue] = bucket ? READING_COLOURS[bucket] : [48, 54, 62];
+      this._sensors.setColorAt(8 * index + k, this._tint.setRGB(red / 255, green / 255, blue / 255, THREE.SRGBColorSpace));
+    });
+    robot.leds.forEach((isOn, k) => {
+      place(this._leds, 2 * index + k, ...LED_PLACES[k], UPPER_BOARD + 2.5);
+      this._leds.setColorAt(2 * index + k, this._tint.set(isOn ? "#ff4030" : "#4a1210"));
+    });
+    const top = this._tops[index], arm = this._grippers[index];
+    top.position.set(pose.x_mm, pose.y_mm, 0);
+    top.rotation.z = pose.heading_rad;
+    top.userData.name.visible = Boolean(show.names);
+    if (arm) putArm(arm, robot, spec, pose);
+  }
+
+  dispose() { empty(this.group); }
+}
+
+function putArm(arm, robot, spec, pose) {
+  const { gap_mm, width_mm } = jawsOf(robot, spec.radius_mm);
+  const cosine = Math.cos(pose.heading_rad), sine = Math.sin(pose.heading_rad);
+  arm.position.set(pose.x_mm + PIVOT_MM * cosine, pose.y_mm + PIVOT_MM * sine, PIVOT);
+  arm.rotation.set(0, -Math.max(0, armAngle(robot)), pose.heading_rad, "ZYX");
+  arm.userData.jaws.forEach((jaw, k) => (jaw.position.y = (k ? 1 : -1) * (gap_mm + width_mm / 2)));
+}
+
+/** The height of a robot's topmost board: each turret but the gripper's arm is one more. */
+function topOf(robot) {
+  return UPPER_BOARD + BOARD + TURRET_STEP * robot.turrets.length;
+}
+
+function bodyGeometry(robot) {
+  const radius = robot.radius_mm, wheel_y = robot.wheel_base_mm / 2 - 1.5;
+  const parts = [
+    [box(40, 36, 11), "#2a2e33", [0, 0, 8.5]],
+    [column(radius, BOARD, 28), GREEN, [0, 0, LOWER_BOARD + BOARD / 2]],
+    [column(radius, BOARD, 28), GREEN_ABOVE, [0, 0, UPPER_BOARD + BOARD / 2]],
+    [box(11, 12, 2.4), "#15191c", [-11.5, 0, UPPER_BOARD + 2.6]],
+    [box(14, 5, 2), "#15191c", [1, 15, UPPER_BOARD + 2.4]],
+    [box(14, 5, 2), "#15191c", [1, -15, UPPER_BOARD + 2.4]],
+    [plate([[radius - 3, 0], [radius - 11, 6], [radius - 9, 0], [radius - 11, -6]], 1), "#ffffff", [0, 0, UPPER_BOARD + BOARD]],
+  ];
+  for (const side of [-1, 1]) {
+    parts.push([box(26, 2.6, UPPER_BOARD - LOWER_BOARD), "#caa64a", [0, side * 20.6, (LOWER_BOARD + UPPER_BOARD) / 2]]);
+    parts.push([column(8, 4.8, 16), "#131517", [0, side * wheel_y, 8], [Math.PI / 2, 0, 0]]);
+    parts.push([column(4.5, 5.4, 10), "#9aa1aa", [0, side * wheel_y, 8], [Math.PI / 2, 0, 0]]);
+  }
+  return merge(parts);
+}
+
+/** Boards of the turrets, and on the topmost one what their shapes say. */
+function turretGeometry(robot) {
+  const top = topOf(robot), parts = [];
+  for (let z = UPPER_BOARD + BOARD + TURRET_STEP; z <= top + 0.1; z += TURRET_STEP) {
+    parts.push([column(robot.radius_mm, BOARD, 28), GREEN_ABOVE, [0, 0, z - BOARD / 2]]);
+    for (const side of [-1, 1]) parts.push([box(26, 2.6, TURRET_STEP - BOARD), "#caa64a", [0, side * 20.6, z - TURRET_STEP / 2]]);
+  }
+  (robot.shapes ?? []).forEach(({ points, colour, radius_mm }, k) => {
+    const height = 8 + 1.2 * k;
+    if (points.length === 1) parts.push([column(radius_mm || 1, height, 16), colour, [...points[0], top + height / 2]]);
+    else if (points.length > 2) parts.push([plate(points, height), colour, [0, 0, top]]);
+  });
+  return parts.length ? merge(parts) : new THREE.BufferGeometry();
+}
+
+function nameSprite(name, index) {
+  const canvas = document.createElement("canvas"), context = canvas.getContext("2d");
+  context.font = "700 44px system-ui, sans-serif";
+  canvas.width = Math.ceil(context.measureText(name).width) + 40;
+  canvas.height = 60;
+  context.fillStyle = `hsla(${robotHue(index)},72%,34%,.92)`;
+  context.roundRect(2, 2, canvas.width - 4, 56, 26);
+  context.fill();
+  context.font = "700 44px system-ui, sans-serif";
+  context.textAlign = "center";
+  context.textBaseline = "middle";
+  context.fillStyle = "#ffffff";
+  context.fillText(name, canvas.width / 2, 32);
+  const map = new THREE.CanvasTexture(canvas);
+  map.colorSpace = THREE.SRGBColorSpace;
+  const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map, depthTest: false }));
+  sprite.scale.set((NAME_MM * canvas.width) / canvas.height, NAME_MM, 1);
+  return sprite;
+}

@@ -1,0 +1,102 @@
+/* Walls for the 3-D view: as few faces as the raster allows. Tops are rectangles of equal brightness, found greedily; sides
+   are runs along the edges between wall and floor. Light is painted on: faces of one direction have one shade. */
+
+import { THREE } from "nicegui-scene";
+import { wallGrey } from "./colours.js";
+
+export const WALL_HEIGHT_MM = 40;
+/** Brightnesses that look alike are one: pictures of drawn or photographed walls would else fall to pieces. */
+const LEVELS = 16;
+const MOST_FACES = 40000;
+const TOP = 1, NORTH = 0.62, SOUTH = 0.8, EAST = 0.72, WEST = 0.55;
+
+/** Return a mesh of all walls of a raster. */
+export function wallMesh(raster, colours) {
+  let grid = levelsOf(raster), faces = facesOf(grid);
+  while (faces.length > MOST_FACES && grid.columns > 1) {
+    grid = coarser(grid);
+    faces = facesOf(grid);
+  }
+  const geometry = geometryOf(faces, grid, colours);
+  return new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({ vertexColors: true, side: THREE.DoubleSide }));
+}
+
+function levelsOf({ cells, columns, rows, mm_per_cell }) {
+  const levels = new Uint8Array(cells.length);
+  for (let k = 0; k < cells.length; k++) levels[k] = cells[k] && 1 + Math.floor((cells[k] * LEVELS) / 256);
+  return { levels, columns, rows, cell_mm: mm_per_cell, height_mm: rows * mm_per_cell };
+}
+
+/** Return the grid with cells of twice the size: wall where any of the four was. */
+function coarser({ levels, columns, rows, cell_mm, height_mm }) {
+  const wide = Math.ceil(columns / 2), high = Math.ceil(rows / 2), next = new Uint8Array(wide * high);
+  for (let row = 0, k = 0; row < rows; row++)
+    for (let column = 0; column < columns; column++, k++) {
+      const to = (row >> 1) * wide + (column >> 1);
+      if (levels[k] > next[to]) next[to] = levels[k];
+    }
+  return { levels: next, columns: wide, rows: high, cell_mm: 2 * cell_mm, height_mm };
+}
+
+/** Return faces [shade, level, column from, row from, column to, row to]; those with no width stand upright. */
+function facesOf({ levels, columns, rows }) {
+  const faces = [], isDone = new Uint8Array(levels.length);
+  for (let row = 0, k = 0; row < rows; row++)
+    for (let column = 0; column < columns; column++, k++) {
+      if (!levels[k] || isDone[k]) continue;
+      const level = levels[k];
+      let right = column + 1, below = row + 1;
+      while (right < columns && levels[row * columns + right] === level && !isDone[row * columns + right]) right++;
+      while (below < rows && isFree(below * columns + column, right - column, level)) below++;
+      for (let y = row; y < below; y++) isDone.fill(1, y * columns + column, y * columns + right);
+      faces.push([TOP, level, column, row, right, below]);
+    }
+  const levelAt = (column, row) => (column < 0 || row < 0 || column >= columns || row >= rows ? 0 : levels[row * columns + column]);
+  const runs = (lines, length, sideOf, face) => {
+    for (let line = 0; line <= lines; line++)
+      for (const [shade, ownAt] of sideOf(line)) {
+        let from = 0, level = 0;
+        for (let k = 0; k <= length; k++) {
+          const next = k < length ? ownAt(k) : 0;
+          if (next === level) continue;
+          if (level) faces.push(face(shade, level, line, from, k));
+          [from, level] = [k, next];
+        }
+      }
+  };
+  const open = (own, other) => (other ? 0 : own);
+  runs(rows, columns, (row) => [
+    [NORTH, (k) => open(levelAt(k, row), levelAt(k, row - 1))],
+    [SOUTH, (k) => open(levelAt(k, row - 1), levelAt(k, row))],
+  ], (shade, level, row, from, to) => [shade, level, from, row, to, row]);
+  runs(columns, rows, (column) => [
+    [WEST, (k) => open(levelAt(column, k), levelAt(column - 1, k))],
+    [EAST, (k) => open(levelAt(column - 1, k), levelAt(column, k))],
+  ], (shade, level, column, from, to) => [shade, level, column, from, column, to]);
+  return faces;
+
+  function isFree(from, count, level) {
+    for (let k = from; k < from + count; k++) if (levels[k] !== level || isDone[k]) return false;
+    return true;
+  }
+}
+
+function geometryOf(faces, { cell_mm, height_mm }, colours) {
+  const positions = new Float32Array(12 * faces.length), tints = new Float32Array(12 * faces.length);
+  const indices = new Uint32Array(6 * faces.length), tint = new THREE.Color();
+  faces.forEach(([shade, level, left, above, right, below], k) => {
+    const x0 = left * cell_mm, x1 = right * cell_mm, y0 = height_mm - above * cell_mm, y1 = height_mm - below * cell_mm;
+    const top = WALL_HEIGHT_MM;
+    positions.set(
+      shade === TOP ? [x0, y0, top, x1, y0, top, x1, y1, top, x0, y1, top] : [x0, y0, 0, x1, y1, 0, x1, y1, top, x0, y0, top], 12 * k);
+    const grey = ((12 + 0.92 * wallGrey((level - 0.5) * (256 / LEVELS), colours)) * shade) / 255;
+    tint.setRGB(grey, grey, grey * 1.01, THREE.SRGBColorSpace);
+    for (let corner = 0; corner < 4; corner++) tints.set([tint.r, tint.g, tint.b], 12 * k + 3 * corner);
+    indices.set([0, 1, 2, 0, 2, 3].map((corner) => 4 * k + corner), 6 * k);
+  });
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute("position", new THREE.BufferAttribute(positions, 3));
+  geometry.setAttribute("color", new THREE.BufferAttribute(tints, 3));
+  geometry.setIndex(new THREE.BufferAttribute(indices, 1));
+  return geometry;
+}

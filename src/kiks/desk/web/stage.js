@@ -1,0 +1,266 @@
+/* The stage: both views of the arena in one element, with pointer and keyboard, drawn as the screen asks for pictures.
+   It knows nothing of Vue; arena_view.js is its component. */
+
+import { pageFeed } from "./feed.js";
+import { Hand } from "./hand.js";
+import { KEYS_HELP, pressKey } from "./keys.js";
+import { Pointer } from "./pointer.js";
+import { loadRaster } from "./raster.js";
+import { nameOf, placeOf } from "./things.js";
+import { Drawing } from "./tools.js";
+import { TopView } from "./top_view.js";
+
+const SAY = {
+  connecting: "Connecting to KiKS …",
+  lost: "No connection to KiKS. Trying again …",
+  gone: "KiKS has ended. Start it again, and this page goes on.",
+};
+
+export class Stage {
+  /** `parts` is {root, top, topPane, solidPane, notice, live}, elements of arena_view.js; `tell` is (event, detail). */
+  constructor(parts, path, tell) {
+    Object.assign(this, parts);
+    this.feed = pageFeed(path);
+    this.hand = new Hand(this.feed);
+    this.drawing = new Drawing(this.feed);
+    this.topView = new TopView(this.top, this.feed);
+    this.solidView = null;
+    this.view = "top";
+    this.show = {};
+    this.follow = -1;
+    this.frames_drawn = this.solid_frames = 0;
+    this._times_ms = [];
+    this._isWanted = true;
+    this._picture = 0;
+    this._tell = {
+      pick: (pick) => tell("pick", pick),
+      draw: (stroke) => tell("draw", stroke),
+      view: () => this.topView.keepView(),
+      fit: () => this.fit(),
+    };
+    new Pointer(this._topSurface(), this.feed, this.hand, this.drawing, this._tell);
+    this.hand.onSelect = (thing) => this._announce(thing);
+    this._listen();
+    this._sizes = new ResizeObserver(() => this._resize());
+    for (const pane of [this.root, this.topPane, this.solidPane]) this._sizes.observe(pane);
+    this._resize();
+    if (this.feed.scene) this._takeScene(this.feed.scene);
+    this._say(this.feed.connection);
+    this._beat = requestAnimationFrame((now_ms) => this._tick(now_ms));
+  }
+
+  setTool(tool) {
+    this.drawing.setTool(tool);
+    this.top.style.cursor = this.drawing.isActive ? "crosshair" : "";
+  }
+
+  setShow(show) {
+    this.show = this.topView.show = show;
+    if (this.solidView) this.solidView.show = show;
+    this._isWanted = true;
+  }
+
+  setFollow(follow) {
+    this.follow = this.topView.follow = follow;
+    if (this.solidView) this.solidView.follow = follow;
+    this._isWanted = true;
+  }
+
+  setDark(isDark) {
+    this.isDark = isDark;
+    this.topView.setDark(isDark);
+    this.solidView?.setDark(isDark);
+    this._isWanted = true;
+  }
+
+  setView(view) {
+    this.view = view;
+    this._resize();
+    if (view !== "top") this._openSolid();
+  }
+
+  fit() {
+    this.topView.fit();
+    this.solidView?.fit();
+    this._isWanted = true;
+  }
+
+  clearTrails() {
+    this.topView.trails.clear();
+    this._isWanted = true;
+  }
+
+  select(what, index) { this.hand.select({ what, index }); }
+
+  press(event) {
+    if (!pressKey(event, this.feed, this.hand, this.drawing, this.topView.viewport, this._tell)) return;
+    event.preventDefault();
+    event.stopPropagation();
+  }
+
+  stats() {
+    return {
+      frames_drawn: this.frames_drawn, frames_received: this.feed.frames_received, bytes: this.feed.bytes_received,
+      fps: this._fps(), solid_frames: this.solid_frames,
+    };
+  }
+
+  /** Where a place of the arena is on the page. */
+  toClient(x_mm, y_mm) {
+    const { left, top } = this.top.getBoundingClientRect(), [x, y] = this.topView.viewport.toScreen(x_mm, y_mm);
+    return [left + x, top + y];
+  }
+
+  dispose() {
+    cancelAnimationFrame(this._beat);
+    this._isOver = true;
+    this._sizes.disconnect();
+    for (const stop of this._stops) stop();
+    this.hand.drop();
+    this.solidView?.dispose();
+  }
+
+  _topSurface() {
+    const { top, topView } = this;
+    return {
+      element: top,
+      viewport: topView.viewport,
+      get scale() { return topView.viewport.scale; },
+      toArena(clientX, clientY) {
+        const box = top.getBoundingClientRect();
+        return topView.viewport.toArena(clientX - box.left, clientY - box.top);
+      },
+      claim() {},
+    };
+  }
+
+  _listen() {
+    this._stops = [
+      this.feed.on("scene", (scene) => this._takeScene(scene)),
+      this.feed.on("shapes", (scene) => {
+        this.topView.setShapes(scene);
+        this.solidView?.setShapes(scene);
+        this._isWanted = true;
+      }),
+      this.feed.on("frame", (frame) => this.topView.trails.add(frame)),
+      this.feed.on("connection", (connection) => {
+        if (connection !== "open") this.hand.forget();
+        this._say(connection);
+      }),
+    ];
+  }
+
+  async _takeScene(scene) {
+    this.hand.forget();
+    this.topView.setScene(scene);
+    this.solidView?.setScene(scene);
+    this._isWanted = true;
+    const raster = await loadRaster(scene.arena).catch(() => null);
+    if (this._isOver || scene !== this.feed.scene) return;
+    if (!raster) return this._notice("The arena's picture did not arrive. Reload the page to try again.");
+    this._raster = raster;
+    this.topView.setRaster(raster);
+    this.solidView?.setRaster(raster);
+    this._isWanted = true;
+  }
+
+  async _openSolid() {
+    if (this._isOpening) return;
+    this._isOpening = true;
+    try {
+      const { SolidView } = await import("./solid_view.js");
+      if (this._isOver) return;
+      const canvas = document.createElement("canvas");
+      canvas.className = "kiks-canvas";
+      canvas.tabIndex = 0;
+      canvas.setAttribute("role", "application");
+      canvas.setAttribute("aria-label", `Arena in three dimensions. ${KEYS_HELP}`);
+      const solid = new SolidView(canvas, this.feed, Boolean(this.isDark));
+      this.solidPane.replaceChildren(canvas);
+      new Pointer(solid, this.feed, this.hand, this.drawing, this._tell);
+      solid.control();
+      canvas.addEventListener("webglcontextlost", () => this._loseSolid());
+      solid.show = this.show;
+      solid.follow = this.follow;
+      this.solidView = solid;
+      this._resize();
+      if (this.feed.scene) solid.setScene(this.feed.scene);
+      if (this._raster) solid.setRaster(this._raster);
+      this._isWanted = true;
+    } catch (error) {
+      this._tellSolid(error.message);
+    }
+  }
+
+  _loseSolid() {
+    if (this._isOver) return;
+    this.solidView = null;
+    this._tellSolid("The graphics card has lost the 3-D view. Reload the page to have it back; the view from above goes on.");
+  }
+
+  _tellSolid(text) {
+    const message = document.createElement("div");
+    message.className = "kiks-message";
+    message.setAttribute("role", "status");
+    message.textContent = text;
+    this.solidPane.replaceChildren(message);
+  }
+
+  _resize() {
+    const { width, height } = this.root.getBoundingClientRect();
+    this.root.dataset.view = this.view;
+    this.root.dataset.split = width >= height ? "beside" : "below";
+    const fit = (pane, act) => pane.clientWidth && pane.clientHeight && act(pane.clientWidth, pane.clientHeight);
+    fit(this.topPane, (wide, high) => this.topView.resize(wide, high, devicePixelRatio || 1));
+    if (this.solidView) fit(this.solidPane, (wide, high) => this.solidView.resize(wide, high));
+    this._isWanted = true;
+  }
+
+  /** One picture of the screen: send what the hand has done, and draw what has changed. */
+  _tick(now_ms) {
+    this._beat = requestAnimationFrame((next_ms) => this._tick(next_ms));
+    this.hand.flush();
+    if (!this._hasChanged(now_ms)) return;
+    const { selected, hovered, ghost } = this.hand, isFocused = document.activeElement === this.top;
+    const marks = { selected, hovered, ghost, preview: this.drawing.preview, isFocused };
+    if (this.view !== "solid") this.topView.draw(marks, now_ms);
+    this._picture++;
+    if (this.view !== "top" && this.solidView && this._picture % 2 === 0) {
+      this.solidView.draw(marks, now_ms);
+      this.solid_frames++;
+    }
+    this.frames_drawn++;
+    this._times_ms.push(now_ms);
+    if (this._times_ms.length > 60) this._times_ms.shift();
+  }
+
+  /** Say whether there is anything new to see; a world that stands still costs nothing. */
+  _hasChanged(now_ms) {
+    const { frame } = this.feed, isChasing = this.solidView && this.view !== "top";
+    const key = `${frame?.share(now_ms)} ${this.hand.changes} ${this.drawing.changes} ${this.topView.viewport.changes}`;
+    const hasChanged = this._isWanted || frame !== this._seen || key !== this._key || isChasing;
+    [this._isWanted, this._seen, this._key] = [false, frame, key];
+    return hasChanged;
+  }
+
+  _fps() {
+    const now_ms = performance.now(), times = this._times_ms.filter((time_ms) => now_ms - time_ms < 2000);
+    return times.length < 2 ? 0 : (1000 * (times.length - 1)) / (times.at(-1) - times[0]);
+  }
+
+  _say(connection) { this._notice(SAY[connection] ?? ""); }
+
+  _notice(text) {
+    this.notice.textContent = text;
+    this.notice.hidden = !text;
+  }
+
+  _announce(thing) {
+    if (!thing || !this.feed.frame) {
+      this.live.textContent = "Nothing chosen";
+      return;
+    }
+    const { x_mm, y_mm } = placeOf(this.feed.frame, thing.what, thing.index);
+    this.live.textContent = `${nameOf(this.feed.scene, thing)} chosen, at ${Math.round(x_mm)}, ${Math.round(y_mm)} mm`;
+  }
+}

@@ -1,0 +1,103 @@
+/* What the pointer and the keyboard add to the top view: what is chosen, handles, ghosts, and previews of the tools. */
+
+import { countOf, handleOf, placeOf, radiusOf } from "./things.js";
+
+/** Draw the marks {selected, hovered, ghost, preview}; `context` takes CSS pixels. */
+export function paintMarks(context, viewport, feed, { selected, hovered, ghost, preview, isFocused }, colours) {
+  if (hovered && hovered.index < countOf(feed, hovered.what)) paintRing(context, viewport, feed, hovered, colours, false, false);
+  if (selected && selected.index < countOf(feed, selected.what)) paintRing(context, viewport, feed, selected, colours, true, isFocused);
+  if (ghost) paintGhost(context, viewport, ghost, colours);
+  if (preview) paintPreview(context, viewport, preview, colours);
+}
+
+function paintRing(context, viewport, feed, thing, colours, isSelected, isFocused) {
+  const place = placeOf(feed.frame, thing.what, thing.index), radius_mm = radiusOf(feed.scene, thing.what, thing.index);
+  const [x, y] = viewport.toScreen(place.x_mm, place.y_mm), radius = radius_mm * viewport.scale;
+  const ring = radius + Math.max(0.12 * radius, 4);
+  context.beginPath();
+  context.arc(x, y, ring, 0, 2 * Math.PI);
+  context.lineWidth = isSelected ? 3 : 1.5;
+  context.strokeStyle = colours.accent;
+  context.stroke();
+  if (isSelected && isFocused) {
+    context.beginPath();
+    context.arc(x, y, ring + 4, 0, 2 * Math.PI);
+    context.lineWidth = 1.5;
+    context.setLineDash([5, 4]);
+    context.stroke();
+    context.setLineDash([]);
+  }
+  if (thing.what !== "robot") return;
+  const [hand_x, hand_y] = viewport.toScreen(...handleOf(place, radius_mm, viewport.scale));
+  context.beginPath();
+  context.arc(hand_x, hand_y, 7, 0, 2 * Math.PI);
+  context.fillStyle = colours.accent;
+  context.fill();
+  context.lineWidth = 2;
+  context.strokeStyle = colours.halo;
+  context.stroke();
+}
+
+/** A thin outline where the pointer holds a thing; the thing itself is where frames say. */
+function paintGhost(context, viewport, { x_mm, y_mm, heading_rad, radius_mm }, colours) {
+  const [x, y] = viewport.toScreen(x_mm, y_mm), radius = radius_mm * viewport.scale;
+  context.beginPath();
+  context.arc(x, y, radius, 0, 2 * Math.PI);
+  if (heading_rad !== undefined) {
+    context.moveTo(x, y);
+    context.lineTo(x + 1.35 * radius * Math.cos(heading_rad), y - 1.35 * radius * Math.sin(heading_rad));
+  }
+  context.lineWidth = 1.5;
+  context.strokeStyle = colours.ghost;
+  context.setLineDash([6, 4]);
+  context.stroke();
+  context.setLineDash([]);
+}
+
+function paintPreview(context, viewport, { kind, points, brush_mm, isDrawing, text }, colours) {
+  const places = points.map(([x_mm, y_mm]) => viewport.toScreen(x_mm, y_mm)), width = Math.max(1, brush_mm * viewport.scale);
+  const [x, y] = places.at(-1);
+  context.strokeStyle = context.fillStyle = colours.tool;
+  context.lineCap = context.lineJoin = "round";
+  context.lineWidth = width;
+  context.beginPath();
+  if (kind === "rectangle" && isDrawing) {
+    const box = [Math.min(places[0][0], x), Math.min(places[0][1], y), Math.abs(x - places[0][0]), Math.abs(y - places[0][1])];
+    context.fillRect(...box);
+    context.lineWidth = 1.5;
+    context.strokeStyle = colours.accent;
+    context.strokeRect(...box);
+  } else if (places.length > 1) {
+    places.forEach(([to_x, to_y], k) => (k ? context.lineTo(to_x, to_y) : context.moveTo(to_x, to_y)));
+    context.stroke();
+  }
+  context.beginPath();
+  context.arc(x, y, Math.max(3, width / 2), 0, 2 * Math.PI);
+  context.lineWidth = 1.5;
+  context.strokeStyle = colours.accent;
+  context.stroke();
+  if (kind === "rectangle" || kind === "line") {
+    context.beginPath();
+    context.moveTo(x - 9, y);
+    context.lineTo(x + 9, y);
+    context.moveTo(x, y - 9);
+    context.lineTo(x, y + 9);
+    context.stroke();
+  }
+  paintText(context, viewport, text, x, y, colours);
+}
+
+function paintText(context, viewport, lines, x, y, colours) {
+  context.font = "600 13px system-ui, sans-serif";
+  context.textAlign = "left";
+  context.textBaseline = "middle";
+  const width = Math.max(...lines.map((line) => context.measureText(line).width)) + 14, height = 18 * lines.length + 6;
+  const left = Math.max(4, x + 18 + width > viewport.width_px ? x - 18 - width : x + 18);
+  const top = Math.max(4, Math.min(y + 14, viewport.height_px - height - 4));
+  context.fillStyle = colours.ruler;
+  context.beginPath();
+  context.roundRect(left, top, width, height, 5);
+  context.fill();
+  context.fillStyle = colours.ink;
+  lines.forEach((line, k) => context.fillText(line, left + 7, top + 12 + 18 * k));
+}

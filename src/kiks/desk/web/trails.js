@@ -1,0 +1,60 @@
+/* Where robots have been: kept in the browser from the frames it saw, thinned and bounded. */
+
+const THIN_MM = 4;
+const MOST_POINTS = 1500;
+/** A robot that is farther from one frame to the next was put there by a hand or a reset: its trail begins anew. */
+const LEAP_MM = 250;
+
+export class Trails {
+  constructor() {
+    this.clear();
+  }
+
+  clear() {
+    /** For each robot [x_mm, y_mm, x_mm, ...]; NaN, NaN parts two ways. */
+    this.ways = [];
+    /** Counts what makes all that was drawn wrong. */
+    this.changes = (this.changes ?? 0) + 1;
+  }
+
+  /** Note the places of a frame. */
+  add(frame) {
+    for (let index = 0; index < frame.robot_count; index++) {
+      const way = (this.ways[index] ??= []), { x_mm, y_mm } = frame.robot(index), end = way.length;
+      if (end) {
+        const step_mm = Math.hypot(x_mm - way[end - 2], y_mm - way[end - 1]);
+        if (step_mm < THIN_MM) continue;
+        if (step_mm > LEAP_MM) way.push(NaN, NaN);
+      }
+      way.push(x_mm, y_mm);
+      if (way.length <= 2 * MOST_POINTS) continue;
+      way.splice(0, MOST_POINTS / 2);
+      this.changes++;
+    }
+  }
+
+  /** Draw the ways from the given points on, and return how far they are drawn now. */
+  paint(context, viewport, drawn, colourOf) {
+    context.lineWidth = Math.min(4, Math.max(1.5, 3 * viewport.scale));
+    context.lineJoin = context.lineCap = "round";
+    return this.ways.map((way, index) => {
+      const from = Math.max(0, (drawn[index] ?? 0) - 2);
+      if (way.length - from < 4) return drawn[index] ?? 0;
+      context.strokeStyle = colourOf(index);
+      context.beginPath();
+      let isPenUp = true;
+      for (let k = from; k < way.length; k += 2) {
+        if (Number.isNaN(way[k])) {
+          isPenUp = true;
+          continue;
+        }
+        const [x, y] = viewport.toScreen(way[k], way[k + 1]);
+        if (isPenUp) context.moveTo(x, y);
+        else context.lineTo(x, y);
+        isPenUp = false;
+      }
+      context.stroke();
+      return way.length;
+    });
+  }
+}

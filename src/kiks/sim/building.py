@@ -1,0 +1,115 @@
+"""From a project to a simulation and back."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from kiks.engine.state import BALL
+from kiks.errors import ArenaError
+from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
+from kiks.model.files import inside
+from kiks.model.policy import split_thinking
+from kiks.model.project import Project
+from kiks.model.robot import RobotSpec
+from kiks.model.room import free_place
+from kiks.sim.simulation import Simulation
+
+
+def simulation_of(project: Project, folder: str | Path = ".") -> Simulation:
+    """Return the world of a project at its start, with turrets fitted and lines set; programs are not begun.
+
+    Args:
+        project: The project.
+        folder: Where it lies: robot files and replays are looked up from there.
+
+    Raises:
+        ParameterError: If a robot's file is none, or a path leads out of the folder.
+        ArenaError: If something has no free place.
+
+    Example:
+        >>> from kiks.model.project import ProjectRobot
+        >>> sim = simulation_of(Project(robots=(ProjectRobot(turrets=("k213",)),), baud=38400))
+        >>> sim.wires[0].line.baud, len(sim.image(1))
+        (38400, 64)
+    """
+    home = Path(folder)
+    kind, file = split_thinking(project.thinking)
+    thinking = f"{kind}:{inside(home, file, 'replay')}" if isinstance(file, str) else project.thinking
+    sim = Simulation(
+        project.arena,
+        seed=project.seed,
+        thinking=thinking,
+        robot=[_spec(robot.kind, project, home) for robot in project.robots],
+    )
+    for number, (robot, wire) in enumerate(zip(project.robots, sim.wires, strict=True), start=1):
+        for turret in robot.turrets:
+            sim.fit(number, turret)
+        if project.baud is not None:
+            wire.set_baud(project.baud)
+    return sim
+
+
+def _spec(kind: str, project: Project, home: Path) -> RobotSpec:
+    path = inside(home, kind, "kind") if kind.lower().endswith(".toml") else kind
+    spec = RobotSpec.load(path, response=project.response)
+    return spec if project.noise else spec.without_noise()
+
+
+def project_of(sim: Simulation, project: Project) -> Project:
+    """Return the project with everything where it is now: robots start there, bodies and lamps too.
+
+    Places are rounded to a thousandth of a millimetre, headings to a thousandth of a degree. What a gripper holds up
+    goes to the nearest place with room.
+
+    Args:
+        sim: A simulation of the project, or of one with as many robots.
+        project: Where all the rest comes from.
+
+    Raises:
+        ArenaError: If there is no room for what a gripper holds up.
+    """
+    with sim.lock:
+        poses, bodies, lamps = sim.poses(), sim.bodies(), sim.lamps.copy()
+        arena, radii_mm = sim.arena, [spec.body.radius_mm for spec in sim.specs]
+    starts = [
+        Pose(round(x_mm, 3), round(y_mm, 3), math.radians(round(math.degrees(heading_rad) % 360, 3)))
+        for x_mm, y_mm, heading_rad in poses.tolist()
+    ]
+    discs = [(pose.x_mm, pose.y_mm, radius_mm) for pose, radius_mm in zip(starts, radii_mm, strict=True)]
+    discs += [_disc(body) for body in bodies if not body["is_lifted"]]
+    balls: list[Ball] = []
+    cylinders: list[Cylinder] = []
+    for body in bodies:
+        x_mm, y_mm, radius_mm = _disc(body)
+        if body["is_lifted"]:
+            x_mm, y_mm = _free_place(arena, discs, x_mm, y_mm, radius_mm)
+            discs.append((x_mm, y_mm, radius_mm))
+        place = (round(x_mm, 3), round(y_mm, 3), radius_mm, float(body["friction_mm_s2"]), int(body["brightness"]))
+        if body["what"] == BALL:
+            balls.append(Ball(*place))
+        else:
+            cylinders.append(Cylinder(*place))
+    hung = [Lamp(round(x_mm, 3), round(y_mm, 3), power_w, is_on != 0) for x_mm, y_mm, power_w, is_on in lamps.tolist()]
+    return replace(
+        project,
+        arena=replace(arena, starts=tuple(starts), lamps=tuple(hung), balls=tuple(balls), cylinders=tuple(cylinders)),
+    )
+
+
+def _disc(body: Any) -> tuple[float, float, float]:
+    return float(body["x_mm"]), float(body["y_mm"]), float(body["radius_mm"])
+
+
+def _free_place(
+    arena: Arena, discs: list[tuple[float, float, float]], x_mm: float, y_mm: float, radius_mm: float
+) -> tuple[float, float]:
+    place = free_place(arena, discs, radius_mm, (x_mm, y_mm))
+    if place is None:
+        raise ArenaError(
+            f"There must be room for what a gripper holds, {2 * radius_mm:g} mm across, but arena {arena.name!r} has "
+            "none. Let the robot put it down first."
+        )
+    return place
