@@ -128,7 +128,7 @@ def test_reflections_contributions_are_those_of_its_formula():
         why = sim.explain(1, sensor)
         assert why.response_counts == pytest.approx(expect(why.rays, sensor), abs=1e-6)
         for k, ray in enumerate(why.rays):
-            without = expect(why.rays[:k] + (replace(ray, brightness=0),) + why.rays[k + 1 :], sensor)
+            without = expect((*why.rays[:k], replace(ray, brightness=0), *why.rays[k + 1 :]), sensor)
             assert why.response_counts - ray.contribution_counts == pytest.approx(without, abs=1e-6)
 
 
