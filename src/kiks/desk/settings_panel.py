@@ -1,4 +1,4 @@
-"""The settings of a world: seed, thinking, line, sensors, and what robots there are, each with a sentence of its own."""
+"""The settings of a world: seed, thinking, line, sensors and robots, each with a sentence of its own."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ class SettingsPanel:
         self._noise = ui.switch("Noise").props("data-testid=noise")
         with self._noise:
             ui.tooltip(
-                "Real sensors never read the same twice. Off, they do: good for finding mistakes, bad for trust."
+                "Real sensors never read the same twice; without noise they do, which helps to find mistakes."
             )
 
     def _name_amount(self) -> None:
