@@ -1,5 +1,6 @@
-"""A desk without a simulation: a page with the arena view, and a feed that obeys hands. Run as a program, in a process of
-its own, because NiceGUI keeps one application a process; it prints its address when it listens.
+"""A desk without a simulation: a page with the arena view, and a feed that obeys hands.
+
+It runs as a program, because NiceGUI keeps one application a process; it prints its address when it listens.
 
 `/received` tells what browsers sent, `/ask/WHAT` makes it do something: see `ask`.
 """
@@ -50,13 +51,17 @@ class World:
     """What moves: it goes where hands put it, and robots drive when they are told to."""
 
     def __init__(self, robot_count: int) -> None:
-        self.scene, self.time_s, self.is_driving = 1, 0.0, False
+        self.scene, self.time_s, self.cells = 1, 0.0, arena()
+        self.held: dict[int, tuple[str, int]] = {}
+        self.reset(robot_count)
+
+    def reset(self, robot_count: int) -> None:
+        """Put everything where it begins, and let it stand."""
+        self.is_driving = False
         columns = max(2, math.ceil(math.sqrt(1.5 * robot_count)))
         places = [(150 + 600 * (k % columns) / (columns - 1), 90 + 95 * (k // columns)) for k in range(robot_count)]
         self.robots = [[x, y, 0.7 * k] for k, (x, y) in enumerate(places)]
         self.bodies, self.lamps = [[420.0, 320.0], [500.0, 320.0]], [[700.0, 500.0, 1.0, 1.0], [80.0, 300.0, 1.0, 0.0]]
-        self.held: dict[int, tuple[str, int]] = {}
-        self.cells = arena()
 
     def obey(self, hand: int, message: dict[str, Any]) -> None:
         kind = message["kind"]
@@ -98,9 +103,20 @@ class World:
             {"number": 1, "what": "ball", "radius_mm": 20, "brightness": 200},
             {"number": 2, "what": "cylinder", "radius_mm": 14, "brightness": 200},
         ]
-        sizes = {"width_mm": WIDTH_MM, "height_mm": HEIGHT_MM, "mm_per_cell": 1, "picture": f"/desk/arena/{self.scene}.png"}
+        sizes = {
+            "width_mm": WIDTH_MM,
+            "height_mm": HEIGHT_MM,
+            "mm_per_cell": 1,
+            "picture": f"/desk/arena/{self.scene}.png",
+        }
         return json.dumps(
-            {"kind": "scene", "scene": self.scene, "arena": {"name": "Test", **sizes}, "robots": robots, "bodies": bodies}
+            {
+                "kind": "scene",
+                "scene": self.scene,
+                "arena": {"name": "Test", **sizes},
+                "robots": robots,
+                "bodies": bodies,
+            }
         )
 
     def frame(self) -> bytes:
@@ -116,7 +132,9 @@ class World:
             parts.append(words + struct.pack("<16f", *readings, *[450.0] * 8))
         parts += [struct.pack("<3f", *body, 0) for body in self.bodies]
         parts += [struct.pack("<4f", *lamp) for lamp in self.lamps]
-        parts.append(struct.pack("<HH", 0, 100) + bytes(int(128 + 100 * math.sin(k / 6 + self.time_s)) for k in range(64)))
+        parts.append(
+            struct.pack("<HH", 0, 100) + bytes(int(128 + 100 * math.sin(k / 6 + self.time_s)) for k in range(64))
+        )
         parts.append(np.where(lengths < REACH_MM, lengths * 100, 65535).astype("<u2").tobytes())
         return b"".join(parts)
 
@@ -127,7 +145,9 @@ class World:
         y = y_mm + spots[:, 0] * math.sin(heading_rad) + spots[:, 1] * math.cos(heading_rad)
         way = np.arange(0.0, REACH_MM + 1)
         columns = (x[:, None] + way * np.cos(spots[:, 2:] + heading_rad)).astype(int).clip(0, WIDTH_MM - 1)
-        rows = (HEIGHT_MM - 1 - (y[:, None] + way * np.sin(spots[:, 2:] + heading_rad)).astype(int)).clip(0, HEIGHT_MM - 1)
+        rows = (HEIGHT_MM - 1 - (y[:, None] + way * np.sin(spots[:, 2:] + heading_rad)).astype(int)).clip(
+            0, HEIGHT_MM - 1
+        )
         is_wall = self.cells[rows, columns] > 0
         return np.where(is_wall.any(axis=1), is_wall.argmax(axis=1), REACH_MM).astype(float)
 
@@ -146,6 +166,8 @@ def make_app(robot_count: int) -> FastAPI:
     async def ask(what: str) -> str:
         if what == "drive":
             world.is_driving = True
+        elif what == "reset":
+            world.reset(len(world.robots))
         elif what == "cut":
             for socket in list(sockets):
                 await socket.close()
@@ -213,7 +235,6 @@ def make_app(robot_count: int) -> FastAPI:
 
         with ui.element("div").style("width: 100vw; height: 100vh"):
             arena_view = ArenaView(view=view, on_pick=pick, on_draw=draw)  # type: ignore[arg-type]
-        arena_view.set_dark(dark)
         arena_view.set_show({"trails": True})
         arena_view.set_follow(follow)
         arena_view.set_tool(Tool(tool, brush_mm=10, snap_mm=10, label="wall"))  # type: ignore[arg-type]

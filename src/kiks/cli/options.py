@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from kiks.model.arena import Arena
     from kiks.sim.simulation import Simulation
 
-ArenaFile = Annotated[str | None, typer.Option(help="Arena file (.toml) or picture; the classic box if left out.")]
+ArenaFile = Annotated[str | None, typer.Option(help="Arena (.toml, .kiks, .kad) or picture; the classic box if left out.")]
 Robots = Annotated[int, typer.Option(help="Robots in the arena.", min=1, max=1000)]
 RobotKinds = Annotated[
     list[str] | None,
@@ -50,11 +50,27 @@ def fit_turrets(sim: Simulation, entries: list[str] | None) -> None:
         ParameterError: If an entry is no turret, or names no robot.
     """
     for entry in entries or []:
-        name, equals, number = entry.partition("=")
-        if equals and not (number.isascii() and number.isdigit()):
-            raise ParameterError(
-                f"--turret must be a turret, or one with = and a robot's number, but it was {entry!r}. "
-                "Example: gripper=2."
-            )
-        for robot in [int(number)] if equals else range(1, sim.robot_count + 1):
+        name, number = parse_turret(entry, sim.robot_count)
+        for robot in range(1, sim.robot_count + 1) if number is None else [number]:
             sim.fit(robot, name)
+
+
+def parse_turret(entry: str, robot_count: int) -> tuple[str, int | None]:
+    """Return the turret and the robot's number of 'gripper=2'; no number for all robots.
+
+    Raises:
+        ParameterError: If it has another form, or there is no such robot.
+
+    Example:
+        >>> parse_turret("gripper=2", 2), parse_turret("k213", 1)
+        (('gripper', 2), ('k213', None))
+    """
+    name, equals, number = entry.partition("=")
+    if not equals:
+        return name, None
+    if not (number.isascii() and number.isdigit() and 1 <= int(number) <= robot_count):
+        raise ParameterError(
+            f"--turret must be a turret, or one with = and a robot's number from 1 to {robot_count}, but it was "
+            f"{entry!r}. Example: gripper=2."
+        )
+    return name, int(number)

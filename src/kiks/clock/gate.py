@@ -137,8 +137,9 @@ class Gate:
         self._settle()
 
     def leave(self, keeper: Callable[[], None]) -> None:
-        """Have it done no longer."""
-        self._keepers.remove(keeper)
+        """Have it done no longer, if it is."""
+        if keeper in self._keepers:
+            self._keepers.remove(keeper)
         self._settle()
 
     def close(self) -> None:

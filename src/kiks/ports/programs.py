@@ -98,7 +98,8 @@ class Programs:
 
     Args:
         sim: The world.
-        commands: Programs that begin together; the first one drives robot 1, whatever port it opens, and so on.
+        commands: Programs that begin together; the first one drives robot 1, whatever port it opens, and so on. None
+            where a robot has none.
         told: Robots by port name, for whichever program opens it.
         thinking: What the computing of each costs: 'none', 'fixed:MS', 'live', 'live:FACTOR', or 'replay:FILE' with
             the number of the program appended: FILE.1.
@@ -122,7 +123,7 @@ class Programs:
     def __init__(
         self,
         sim: Simulation,
-        commands: Sequence[Command] = (),
+        commands: Sequence[Command | None] = (),
         *,
         told: dict[str, int] | None = None,
         thinking: str = "none",
@@ -143,11 +144,12 @@ class Programs:
         self._was_touched = False
         self._is_closed = False
         self._count = 0
-        for number in range(1, len(commands) + 1):
+        begin = [(robot, command) for robot, command in enumerate(commands, 1) if command is not None]
+        for number in range(1, len(begin) + 1):
             parse_thinking(self._policy(number))
         self._turns = Turns(
             sim,
-            expected=len(commands),
+            expected=len(begin),
             missing=self._missing,
             log=_log,
             is_once=True,
@@ -155,14 +157,16 @@ class Programs:
             patience_s=patience_s,
             new_patience=new_patience,
         )
-        self._names = Names(sim, told or {}, len(commands))
+        self._names = Names(sim, told or {}, 0)
+        for robot, _ in begin:
+            self._names.own(robot)
         self._bell, self._bell_rope = socket.socketpair()
         self._bell.setblocking(False)
         self._bell_rope.setblocking(False)
         self._selector = selectors.DefaultSelector()
         self._selector.register(self._bell, selectors.EVENT_READ)
         try:
-            for robot, command in enumerate(commands, 1):
+            for robot, command in begin:
                 self._add(command, robot)
         except KiksError:
             self.close()

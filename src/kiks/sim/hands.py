@@ -123,6 +123,10 @@ class Hands:
         """Let go of what a hand holds."""
         self._held.pop(owner, None)
 
+    def drop_all(self) -> None:
+        """Let go of everything."""
+        self._held.clear()
+
     def keep(self) -> None:
         """Put everything that is held back where its hand is; what has gone meanwhile is held no longer."""
         for owner, held in list(self._held.items()):

@@ -22,6 +22,7 @@ from kiks.firmware.turret import Turret
 from kiks.model.arena import Arena
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
 from kiks.sim.cameras import Cameras
+from kiks.sim.explanation import Explanation, LightExplanation, explain_ambient, explain_proximity
 from kiks.sim.look import Look, look, trace_rays
 from kiks.sim.sites import Place, first_memory, named
 from kiks.sim.table import TABLE
@@ -30,6 +31,7 @@ from kiks.sim.wire import Agenda, Wire
 from kiks.units import ns_from_s
 
 if TYPE_CHECKING:
+    from kiks.desk.showing import Shown
     from kiks.ports.memory import SimPort
 
 
@@ -181,6 +183,32 @@ class Simulation(Things):
         if self._radios:
             deliver(self._radios, self.now_ns)
 
+    # ---- to be seen ----
+
+    def show(
+        self, *, speed: float | None = 1.0, is_alive: bool = False, port: int | None = None, browser: bool = True
+    ) -> Shown:
+        """Show this world in a browser, where it may be watched, paused and touched; in a notebook, below the cell.
+
+        Looking changes nothing: the run is the same, to the bit, unless somebody reaches in.
+
+        Args:
+            speed: Simulated seconds in a real one from now on; None for as fast as possible.
+            is_alive: Whether time passes by itself, in a thread; else it does when the program lets it.
+            port: TCP port of the page, on this computer only; 8123, or a free one, if left out.
+            browser: Whether a browser is opened.
+
+        Returns:
+            What is shown, with its `url`; `close()` ends it.
+
+        Raises:
+            LinkError: If the page cannot be served there.
+            ParameterError: If the speed is out of range, or the desk is open on another port.
+        """
+        from kiks.desk.showing import show
+
+        return show(self, speed=speed, is_alive=is_alive, port=port, browser=browser)
+
     # ---- robots ----
 
     def port(self, robot: int) -> SimPort:
@@ -303,6 +331,43 @@ class Simulation(Things):
             self.sync()
             lengths_mm, _, _, _ = trace_rays(self, index, 1)
             return np.ascontiguousarray(lengths_mm[0])
+
+    def explain(self, robot: int, sensor: int) -> Explanation:
+        """Return why command `N` returns what it returns for a proximity sensor at this instant.
+
+        Args:
+            robot: Number of the robot, from 1.
+            sensor: Index of the sensor in the answer to `N`, from 0.
+
+        Raises:
+            ParameterError: If there is no such robot or sensor.
+
+        Example:
+            >>> sim = Simulation(Arena.box(200, 200))
+            >>> sim.place(1, 40.0, 100.0, 3.14159)
+            >>> why = sim.explain(1, 2)
+            >>> why.count == sim.proximity(1, noise=True)[2]
+            True
+            >>> why.rays[3].met, why.rays[3].brightness
+            ('wall', 255)
+        """
+        with self.lock:
+            self.sync()
+            return explain_proximity(self, self._networks, robot, sensor)
+
+    def explain_light(self, robot: int, sensor: int) -> LightExplanation:
+        """Return why command `O` returns what it returns for a light sensor at this instant.
+
+        Args:
+            robot: Number of the robot, from 1.
+            sensor: Index of the sensor in the answer to `O`, from 0.
+
+        Raises:
+            ParameterError: If there is no such robot or sensor.
+        """
+        with self.lock:
+            self.sync()
+            return explain_ambient(self, robot, sensor)
 
     def look(self) -> Look:
         """Return where everybody is at this instant, and what all sensors see; looking changes nothing."""

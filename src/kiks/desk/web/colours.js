@@ -5,7 +5,7 @@ const LIGHT = {
   gridFine: "rgba(70,62,40,.10)", gridCoarse: "rgba(70,62,40,.26)",
   ruler: "rgba(244,245,247,.94)", rulerInk: "#30353d", rulerTick: "#7a818c",
   ink: "#14181d", halo: "rgba(255,255,255,.9)", accent: "#0b62d6", ghost: "rgba(11,98,214,.9)", touch: "#e0261b",
-  lampOff: "#8d8a80", tool: "rgba(11,98,214,.35)", rayAlpha: 0.62, fanAlpha: 0.12, sky: 0xc9ced6, wallFrom: 22, wallTo: 255,
+  lampOff: "#8d8a80", tool: "rgba(11,98,214,.35)", rayAlpha: 0.8, fanAlpha: 0.16, sky: 0xc9ced6, wallFrom: 22, wallTo: 255,
 };
 
 const DARK = {
@@ -13,7 +13,7 @@ const DARK = {
   gridFine: "rgba(220,230,255,.07)", gridCoarse: "rgba(220,230,255,.18)",
   ruler: "rgba(24,28,33,.94)", rulerInk: "#d5dbe4", rulerTick: "#7d8794",
   ink: "#f2f5f8", halo: "rgba(0,0,0,.8)", accent: "#6db1ff", ghost: "rgba(109,177,255,.95)", touch: "#ff5a4d",
-  lampOff: "#77736a", tool: "rgba(109,177,255,.35)", rayAlpha: 0.7, fanAlpha: 0.14, sky: 0x14181d, wallFrom: 4, wallTo: 246,
+  lampOff: "#77736a", tool: "rgba(109,177,255,.35)", rayAlpha: 0.8, fanAlpha: 0.16, sky: 0x14181d, wallFrom: 4, wallTo: 246,
 };
 
 export function palette(isDark) {
@@ -27,7 +27,7 @@ export function wallGrey(brightness, colours) {
 
 /** Colours of rays by their sensor's reading, from nothing near to very near; the number of buckets is their number. */
 export const READING_COLOURS = [
-  [70, 140, 200], [38, 168, 150], [92, 176, 66], [214, 176, 30], [236, 122, 28], [226, 42, 34],
+  [58, 128, 200], [20, 160, 140], [92, 176, 66], [214, 176, 30], [236, 122, 28], [226, 42, 34],
 ];
 const READING_LIMITS = [20, 100, 250, 450, 750];
 

@@ -3,12 +3,12 @@
    Method: for each lamp, rays in all directions say how far its light gets; a cell is lit when it is nearer than that.
    It is a picture for the eye, soft and coarse; what sensors measure is the engine's business. */
 
-const LONGEST_SIDE = 220;
+const LONGEST_SIDE = 240;
 const DIRECTIONS = 720;
 /** Lamps hang above the floor, so that the light below them stays finite [mm]. */
 const HEIGHT_MM = 60;
-/** The light that shows at its full strength [W/mm^2]. */
-const FULL = 1 / (160 * 160);
+/** The light that shows at two thirds of its full strength [W/mm^2]. */
+const BRIGHT = 1 / (220 * 220);
 
 /** Return a canvas of the raster's proportions, or null when no lamp is on. Row 0 is on top. */
 export function lightMap(raster, lamps, rgb, strongest) {
@@ -18,16 +18,29 @@ export function lightMap(raster, lamps, rgb, strongest) {
   const columns = Math.max(1, Math.round(raster.width_mm / cell_mm)), rows = Math.max(1, Math.round(raster.height_mm / cell_mm));
   const light = new Float32Array(columns * rows);
   for (const lamp of lit) shine(lamp, raster, light, columns, rows, cell_mm);
-  const canvas = document.createElement("canvas");
+  const soft = blurred(light, columns, rows), canvas = document.createElement("canvas");
   canvas.width = columns;
   canvas.height = rows;
   const context = canvas.getContext("2d"), picture = context.createImageData(columns, rows);
   for (let k = 0; k < light.length; k++) {
     picture.data.set(rgb, 4 * k);
-    picture.data[4 * k + 3] = 255 * strongest * Math.min(1, Math.sqrt(light[k] / FULL));
+    picture.data[4 * k + 3] = 255 * strongest * (1 - Math.exp(-Math.sqrt(soft[k] / BRIGHT)));
   }
   context.putImageData(picture, 0, 0);
   return canvas;
+}
+
+/** Return the mean of each cell and those around it: shadows get soft edges. */
+function blurred(light, columns, rows) {
+  const soft = new Float32Array(light.length);
+  for (let row = 0, k = 0; row < rows; row++)
+    for (let column = 0; column < columns; column++, k++) {
+      let sum = 0;
+      for (let y = Math.max(0, row - 1); y <= Math.min(rows - 1, row + 1); y++)
+        for (let x = Math.max(0, column - 1); x <= Math.min(columns - 1, column + 1); x++) sum += light[y * columns + x];
+      soft[k] = sum / ((1 + (row > 0) + (row < rows - 1)) * (1 + (column > 0) + (column < columns - 1)));
+    }
+  return soft;
 }
 
 function shine(lamp, raster, light, columns, rows, cell_mm) {

@@ -30,7 +30,7 @@ export class SolidRobots {
     if (!count) return;
     this._bodies = this._many(bodyGeometry(scene.robots[0]), this._material, count);
     this._caps = this._many(column(9, 1.2), new THREE.MeshLambertMaterial(), count);
-    this._sensors = this._many(box(4, 6, 5), new THREE.MeshLambertMaterial(), 8 * count);
+    this._sensors = this._many(box(5, 7, 8), new THREE.MeshLambertMaterial(), 8 * count);
     this._leds = this._many(new THREE.SphereGeometry(2, 8, 6), new THREE.MeshBasicMaterial(), 2 * count);
     scene.robots.forEach((_, index) =>
       this._caps.setColorAt(index, this._tint.setHSL(robotHue(index) / 360, 0.72, 0.42, THREE.SRGBColorSpace)));
@@ -101,7 +101,7 @@ export class SolidRobots {
     place(this._caps, index, 0, 0, topOf(spec) + 0.6);
     const readings = robot.proximity;
     spec.sensors.forEach(({ x_mm, y_mm, angle_rad }, k) => {
-      place(this._sensors, 8 * index + k, 0.95 * x_mm, 0.95 * y_mm, LOWER_BOARD - 3, angle_rad);
+      place(this._sensors, 8 * index + k, 1.02 * x_mm, 1.02 * y_mm, LOWER_BOARD - 2, angle_rad);
       const bucket = readingBucket(readings[k]), [red, green, blue] = bucket ? READING_COLOURS[bucket] : [48, 54, 62];
       this._sensors.setColorAt(8 * index + k, this._tint.setRGB(red / 255, green / 255, blue / 255, THREE.SRGBColorSpace));
     });
@@ -141,7 +141,7 @@ function bodyGeometry(robot) {
     [box(11, 12, 2.4), "#15191c", [-11.5, 0, UPPER_BOARD + 2.6]],
     [box(14, 5, 2), "#15191c", [1, 15, UPPER_BOARD + 2.4]],
     [box(14, 5, 2), "#15191c", [1, -15, UPPER_BOARD + 2.4]],
-    [plate([[radius - 3, 0], [radius - 11, 6], [radius - 9, 0], [radius - 11, -6]], 1), "#ffffff", [0, 0, UPPER_BOARD + BOARD]],
+    noseOf(robot, UPPER_BOARD + BOARD),
   ];
   for (const side of [-1, 1]) {
     parts.push([box(26, 2.6, UPPER_BOARD - LOWER_BOARD), "#caa64a", [0, side * 20.6, (LOWER_BOARD + UPPER_BOARD) / 2]]);
@@ -151,9 +151,15 @@ function bodyGeometry(robot) {
   return merge(parts);
 }
 
+/** A white arrow on a board: where the robot's front is. */
+function noseOf({ radius_mm }, height) {
+  const outline = [[radius_mm - 3, 0], [radius_mm - 11, 6], [radius_mm - 9, 0], [radius_mm - 11, -6]];
+  return [plate(outline, 1), "#ffffff", [0, 0, height]];
+}
+
 /** Boards of the turrets, and on the topmost one what their shapes say. */
 function turretGeometry(robot) {
-  const top = topOf(robot), parts = [];
+  const top = topOf(robot), parts = robot.turrets.length ? [noseOf(robot, top)] : [];
   for (let z = UPPER_BOARD + BOARD + TURRET_STEP; z <= top + 0.1; z += TURRET_STEP) {
     parts.push([column(robot.radius_mm, BOARD, 28), GREEN_ABOVE, [0, 0, z - BOARD / 2]]);
     for (const side of [-1, 1]) parts.push([box(26, 2.6, TURRET_STEP - BOARD), "#caa64a", [0, side * 20.6, z - TURRET_STEP / 2]]);

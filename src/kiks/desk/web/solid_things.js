@@ -90,7 +90,7 @@ function lampOf(isReal) {
   const pole = new THREE.Mesh(column(1.2, LAMP_MM, 6), new THREE.MeshBasicMaterial({ color: "#8b8f96" }));
   pole.position.z = LAMP_MM / 2;
   bulb.position.z = LAMP_MM;
-  const glow = new THREE.Sprite(new THREE.SpriteMaterial({ map: glowTexture(), blending: THREE.AdditiveBlending, depthWrite: false }));
+  const glow = new THREE.Sprite(new THREE.SpriteMaterial({ map: glowTexture(), depthWrite: false }));
   glow.scale.set(110, 110, 1);
   glow.position.z = LAMP_MM;
   lamp.add(pole, bulb, glow);

@@ -7,12 +7,14 @@ import { Floor } from "./floor.js";
 import { SolidRobots } from "./solid_robots.js";
 import { SolidThings } from "./solid_things.js";
 import { empty } from "./solid_parts.js";
-import { wallMesh } from "./solid_walls.js";
+import { WALL_HEIGHT_MM, wallMesh } from "./solid_walls.js";
 import { countOf, placeOf, radiusOf } from "./things.js";
 import { Viewport } from "./viewport.js";
 
 const FIELD_OF_VIEW_DEG = 42;
 const FLOOR_PX = 1024;
+/** The share of the pane that the whole arena fills. */
+const FILLED = 0.95;
 /** Height of the plane on which the pointer moves things [mm]. */
 const GRIP_MM = 14;
 const CHASE_BEHIND_MM = 260, CHASE_ABOVE_MM = 170;
@@ -126,13 +128,26 @@ export class SolidView {
   fit() {
     const arena = this.feed.scene?.arena;
     if (!arena || !this._controls) return;
-    const { width_mm, height_mm } = arena, narrow = Math.min(1, this._camera.aspect);
-    const way_mm = Math.max(0.62 * height_mm, (0.56 * width_mm) / this._camera.aspect, 0.4 * Math.max(width_mm, height_mm)) + 60 / narrow;
-    const far_mm = way_mm / Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360);
+    const { width_mm, height_mm } = arena, [x, y, up] = [width_mm / 2, 0.48 * height_mm, new THREE.Vector3(0, -0.62, 0.78)];
     this._isMoved = false;
-    this._controls.target.set(width_mm / 2, 0.47 * height_mm, 0);
-    this._camera.position.set(width_mm / 2, 0.47 * height_mm - 0.62 * far_mm, 0.78 * far_mm);
-    this._controls.update();
+    this._controls.target.set(x, y, 0);
+    const look = (way_mm) => {
+      this._camera.position.copy(up).multiplyScalar(way_mm).add(this._controls.target);
+      this._controls.update();
+      this._camera.updateMatrixWorld();
+    };
+    const isSeen = () => [0, width_mm].every((corner_x) => [0, height_mm].every((corner_y) => {
+      const place = new THREE.Vector3(corner_x, corner_y, WALL_HEIGHT_MM).project(this._camera);
+      return Math.max(Math.abs(place.x), Math.abs(place.y)) < FILLED;
+    }));
+    let [near_mm, far_mm] = [0, 20 * Math.max(width_mm, height_mm)];
+    for (let step = 0; step < 20; step++) {
+      const middle_mm = (near_mm + far_mm) / 2;
+      look(middle_mm);
+      if (isSeen()) far_mm = middle_mm;
+      else near_mm = middle_mm;
+    }
+    look(far_mm);
   }
 
   draw({ selected, ghost }, now_ms) {

@@ -1,5 +1,6 @@
 /* Walls for the 3-D view: as few faces as the raster allows. Tops are rectangles of equal brightness, found greedily; sides
-   are runs along the edges between wall and floor. Light is painted on: faces of one direction have one shade. */
+   are runs along the edges between wall and floor. Light is painted on, by the way the wall around a side's middle faces: so
+   walls that are round in the picture look round, though their sides all run along the raster. */
 
 import { THREE } from "nicegui-scene";
 import { wallGrey } from "./colours.js";
@@ -8,7 +9,13 @@ export const WALL_HEIGHT_MM = 40;
 /** Brightnesses that look alike are one: pictures of drawn or photographed walls would else fall to pieces. */
 const LEVELS = 16;
 const MOST_FACES = 40000;
-const TOP = 1, NORTH = 0.62, SOUTH = 0.8, EAST = 0.72, WEST = 0.55;
+/** How much light a side gets at least, and more the more it faces south and a little east. */
+const DIM = 0.56, LIT = 0.2, TOWARDS = [0.35, -0.94];
+/** What is looked at around a side's middle [cells]. */
+const AROUND = 3;
+/** Tops reach a little under each other, or the sides below would glint through where they meet [cells]. */
+const OVERLAP = 0.04;
+const TOP = 0, SIDE = 1;
 
 /** Return a mesh of all walls of a raster. */
 export function wallMesh(raster, colours) {
@@ -38,7 +45,7 @@ function coarser({ levels, columns, rows, cell_mm, height_mm }) {
   return { levels: next, columns: wide, rows: high, cell_mm: 2 * cell_mm, height_mm };
 }
 
-/** Return faces [shade, level, column from, row from, column to, row to]; those with no width stand upright. */
+/** Return faces [TOP or SIDE, level, column from, row from, column to, row to]. */
 function facesOf({ levels, columns, rows }) {
   const faces = [], isDone = new Uint8Array(levels.length);
   for (let row = 0, k = 0; row < rows; row++)
@@ -52,27 +59,21 @@ function facesOf({ levels, columns, rows }) {
       faces.push([TOP, level, column, row, right, below]);
     }
   const levelAt = (column, row) => (column < 0 || row < 0 || column >= columns || row >= rows ? 0 : levels[row * columns + column]);
-  const runs = (lines, length, sideOf, face) => {
+  /** Go along each line of the raster and make a face of each stretch of wall of one brightness with floor beside it. */
+  const runs = (lines, length, cellAt, face) => {
     for (let line = 0; line <= lines; line++)
-      for (const [shade, ownAt] of sideOf(line)) {
+      for (const [own, other] of [[line, line - 1], [line - 1, line]]) {
         let from = 0, level = 0;
         for (let k = 0; k <= length; k++) {
-          const next = k < length ? ownAt(k) : 0;
+          const next = k < length && !cellAt(other, k) ? cellAt(own, k) : 0;
           if (next === level) continue;
-          if (level) faces.push(face(shade, level, line, from, k));
+          if (level) faces.push(face(level, line, from, k));
           [from, level] = [k, next];
         }
       }
   };
-  const open = (own, other) => (other ? 0 : own);
-  runs(rows, columns, (row) => [
-    [NORTH, (k) => open(levelAt(k, row), levelAt(k, row - 1))],
-    [SOUTH, (k) => open(levelAt(k, row - 1), levelAt(k, row))],
-  ], (shade, level, row, from, to) => [shade, level, from, row, to, row]);
-  runs(columns, rows, (column) => [
-    [WEST, (k) => open(levelAt(column, k), levelAt(column - 1, k))],
-    [EAST, (k) => open(levelAt(column - 1, k), levelAt(column, k))],
-  ], (shade, level, column, from, to) => [shade, level, column, from, column, to]);
+  runs(rows, columns, (row, k) => levelAt(k, row), (level, row, from, to) => [SIDE, level, from, row, to, row]);
+  runs(columns, rows, levelAt, (level, column, from, to) => [SIDE, level, column, from, column, to]);
   return faces;
 
   function isFree(from, count, level) {
@@ -81,14 +82,30 @@ function facesOf({ levels, columns, rows }) {
   }
 }
 
-function geometryOf(faces, { cell_mm, height_mm }, colours) {
+/** Return the shade of a side: the wall's cells around its middle say which way it faces. */
+function shadeOf({ levels, columns, rows }, column, row) {
+  let east = 0, north = 0;
+  for (let y = Math.ceil(row - AROUND - 0.5); y < row + AROUND; y++)
+    for (let x = Math.ceil(column - AROUND - 0.5); x < column + AROUND; x++) {
+      if (x < 0 || y < 0 || x >= columns || y >= rows || !levels[y * columns + x]) continue;
+      east -= x + 0.5 - column;
+      north += y + 0.5 - row;
+    }
+  const length = Math.hypot(east, north) || 1;
+  return DIM + LIT * Math.max(-0.5, (east * TOWARDS[0] + north * TOWARDS[1]) / length);
+}
+
+function geometryOf(faces, grid, colours) {
+  const { cell_mm, height_mm } = grid;
   const positions = new Float32Array(12 * faces.length), tints = new Float32Array(12 * faces.length);
   const indices = new Uint32Array(6 * faces.length), tint = new THREE.Color();
-  faces.forEach(([shade, level, left, above, right, below], k) => {
-    const x0 = left * cell_mm, x1 = right * cell_mm, y0 = height_mm - above * cell_mm, y1 = height_mm - below * cell_mm;
-    const top = WALL_HEIGHT_MM;
+  faces.forEach(([kind, level, left, above, right, below], k) => {
+    const more = kind === TOP ? OVERLAP : 0;
+    const x0 = (left - more) * cell_mm, x1 = (right + more) * cell_mm;
+    const y0 = height_mm - (above - more) * cell_mm, y1 = height_mm - (below + more) * cell_mm;
+    const top = WALL_HEIGHT_MM, shade = kind === TOP ? 1 : shadeOf(grid, (left + right) / 2, (above + below) / 2);
     positions.set(
-      shade === TOP ? [x0, y0, top, x1, y0, top, x1, y1, top, x0, y1, top] : [x0, y0, 0, x1, y1, 0, x1, y1, top, x0, y0, top], 12 * k);
+      kind === TOP ? [x0, y0, top, x1, y0, top, x1, y1, top, x0, y1, top] : [x0, y0, 0, x1, y1, 0, x1, y1, top, x0, y0, top], 12 * k);
     const grey = ((12 + 0.92 * wallGrey((level - 0.5) * (256 / LEVELS), colours)) * shade) / 255;
     tint.setRGB(grey, grey, grey * 1.01, THREE.SRGBColorSpace);
     for (let corner = 0; corner < 4; corner++) tints.set([tint.r, tint.g, tint.b], 12 * k + 3 * corner);

@@ -43,6 +43,8 @@ export class Stage {
     this._listen();
     this._sizes = new ResizeObserver(() => this._resize());
     for (const pane of [this.root, this.topPane, this.solidPane]) this._sizes.observe(pane);
+    this._dresses = new MutationObserver(() => this._dress());
+    this._dresses.observe(document.body, { attributeFilter: ["class"] });
     this._resize();
     if (this.feed.scene) this._takeScene(this.feed.scene);
     this._say(this.feed.connection);
@@ -66,8 +68,17 @@ export class Stage {
     this._isWanted = true;
   }
 
+  /** Draw in dark colours or in light ones; null follows the page, which Quasar marks. */
   setDark(isDark) {
+    this._asked = isDark;
+    this._dress();
+  }
+
+  _dress() {
+    const isDark = this._asked ?? document.body.classList.contains("body--dark");
+    if (isDark === this.isDark) return;
     this.isDark = isDark;
+    this.root.classList.toggle("kiks-dark", isDark);
     this.topView.setDark(isDark);
     this.solidView?.setDark(isDark);
     this._isWanted = true;
@@ -115,6 +126,7 @@ export class Stage {
     cancelAnimationFrame(this._beat);
     this._isOver = true;
     this._sizes.disconnect();
+    this._dresses.disconnect();
     for (const stop of this._stops) stop();
     this.hand.drop();
     this.solidView?.dispose();
@@ -135,6 +147,8 @@ export class Stage {
   }
 
   _listen() {
+    this.root.addEventListener("keyup", () => this.root.classList.add("kiks-keys"));
+    this.root.addEventListener("pointerdown", () => this.root.classList.remove("kiks-keys"));
     this._stops = [
       this.feed.on("scene", (scene) => this._takeScene(scene)),
       this.feed.on("shapes", (scene) => {
@@ -154,7 +168,7 @@ export class Stage {
     this.hand.forget();
     this.topView.setScene(scene);
     this.solidView?.setScene(scene);
-    this._isWanted = true;
+    this._resize();
     const raster = await loadRaster(scene.arena).catch(() => null);
     if (this._isOver || scene !== this.feed.scene) return;
     if (!raster) return this._notice("The arena's picture did not arrive. Reload the page to try again.");
@@ -209,11 +223,17 @@ export class Stage {
   _resize() {
     const { width, height } = this.root.getBoundingClientRect();
     this.root.dataset.view = this.view;
-    this.root.dataset.split = width >= height ? "beside" : "below";
+    this.root.dataset.split = this._isRoomierBeside(width, height) ? "beside" : "below";
     const fit = (pane, act) => pane.clientWidth && pane.clientHeight && act(pane.clientWidth, pane.clientHeight);
     fit(this.topPane, (wide, high) => this.topView.resize(wide, high, devicePixelRatio || 1));
     if (this.solidView) fit(this.solidPane, (wide, high) => this.solidView.resize(wide, high));
     this._isWanted = true;
+  }
+
+  /** Say whether two views show the arena larger beside each other than below. */
+  _isRoomierBeside(width, height) {
+    const { width_mm, height_mm } = this.feed.scene?.arena ?? { width_mm: 1, height_mm: 1 };
+    return Math.min(width / 2 / width_mm, height / height_mm) >= Math.min(width / width_mm, height / 2 / height_mm);
   }
 
   /** One picture of the screen: send what the hand has done, and draw what has changed. */
@@ -221,7 +241,7 @@ export class Stage {
     this._beat = requestAnimationFrame((next_ms) => this._tick(next_ms));
     this.hand.flush();
     if (!this._hasChanged(now_ms)) return;
-    const { selected, hovered, ghost } = this.hand, isFocused = document.activeElement === this.top;
+    const { selected, hovered, ghost } = this.hand, isFocused = this.root.classList.contains("kiks-keys") && this.root.contains(document.activeElement);
     const marks = { selected, hovered, ghost, preview: this.drawing.preview, isFocused };
     if (this.view !== "solid") this.topView.draw(marks, now_ms);
     this._picture++;

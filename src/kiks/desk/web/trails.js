@@ -36,7 +36,8 @@ export class Trails {
   /** Draw the ways from the given points on, and return how far they are drawn now. */
   paint(context, viewport, drawn, colourOf) {
     context.lineWidth = Math.min(4, Math.max(1.5, 3 * viewport.scale));
-    context.lineJoin = context.lineCap = "round";
+    context.lineJoin = "round";
+    context.lineCap = "butt"; // strokes that go on where the last one ended must not lie over it
     return this.ways.map((way, index) => {
       const from = Math.max(0, (drawn[index] ?? 0) - 2);
       if (way.length - from < 4) return drawn[index] ?? 0;

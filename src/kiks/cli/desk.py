@@ -1,0 +1,171 @@
+"""`kiks desk`, and what `--desk` means for other commands."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from kiks.cli.ending import end_as_with_ctrl_c
+from kiks.cli.engine_start import ready_engine
+from kiks.cli.log import show_log
+from kiks.errors import ParameterError
+
+if TYPE_CHECKING:
+    from kiks.desk.desk import Desk
+    from kiks.model.project import Project, ProjectRobot
+    from kiks.sim.simulation import Simulation
+
+WithDesk = Annotated[bool, typer.Option("--desk", help="Show it in a browser, at real speed to begin with.")]
+
+
+def desk(
+    program: Annotated[
+        list[str] | None, typer.Argument(help="Programs to begin with: the first drives robot 1, and so on.")
+    ] = None,
+    arena: Annotated[
+        str | None,
+        typer.Option(help="Project (.kiks), arena file (.toml, .kad) or picture; the classic box if left out."),
+    ] = None,
+    robots: Annotated[int | None, typer.Option(help="Robots in the arena.", min=1, max=1000)] = None,
+    robot: Annotated[
+        list[str] | None,
+        typer.Option("--robot", help="Kind of robot: khepera, khepera_ii, or a file; once for all, or once for each."),
+    ] = None,
+    turret: Annotated[
+        list[str] | None,
+        typer.Option("--turret", help="k213, gripper, radio, io or battle, for all robots; gripper=2 for that one."),
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed: the same seed, the same run.", min=0)] = None,
+    thinking: Annotated[
+        str | None, typer.Option(help="What programs' computing costs: none, fixed:MS, live, live:FACTOR.")
+    ] = None,
+    speed: Annotated[
+        float | None, typer.Option(help="Simulated seconds in a real one; 0 for as fast as possible.")
+    ] = None,
+    folder: Annotated[
+        Path | None,
+        typer.Option(help="Folder of projects and programs; no file outside it is opened or saved."),
+    ] = None,
+    port: Annotated[
+        int | None, typer.Option(help="TCP port of the page, 0 for a free one; 8123 if left out.", min=0, max=65535)
+    ] = None,
+    host: Annotated[
+        str, typer.Option(help="Address to serve the page at. Any but this computer's own needs a token.")
+    ] = "127.0.0.1",
+    run_programs: Annotated[
+        bool, typer.Option("--run-programs", help="Let browsers on other computers start programs, too.")
+    ] = False,
+    browser: Annotated[bool, typer.Option(help="Open a browser.")] = True,
+) -> None:
+    """Open the desk: a world in the browser, to watch, to touch and to understand.
+
+    Drag robots, watch their sensors and their lines, type commands, draw arenas, write programs and let them run.
+    Ctrl-C ends it.
+
+    Example: kiks desk --arena examples/arenas/maze.toml
+    """
+    ready_engine()
+    show_log(is_quiet=True)
+    from kiks.cli.run import parse_words
+    from kiks.desk.desk import Desk, commands_of
+    from kiks.desk.guard import LOOPBACK
+    from kiks.model.project import Project
+    from kiks.sim.building import simulation_of
+
+    project = Project() if arena is None else Project.load(arena)
+    home = folder or (Path(arena).parent if arena is not None and arena.lower().endswith(".kiks") else Path())
+    if not home.is_dir():
+        raise ParameterError(f"--folder must be a folder, but {str(home)!r} is none. Make it first.")
+    begin = parse_words(program) if program else []
+    project = replace(
+        project,
+        robots=_robots(project, robots, robot or [], turret or [], len(begin)),
+        seed=project.seed if seed is None else seed,
+        thinking=thinking or project.thinking,
+        speed=project.speed if speed is None else speed or None,
+    )
+    commands = commands_of(project, home)
+    commands[: len(begin)] = begin
+    open_desk(
+        Desk(
+            simulation_of(project, home),
+            project=project,
+            speed=project.speed,
+            folder=home,
+            owns_world=True,
+            may_run_programs=run_programs or host in LOOPBACK,
+            commands=commands,
+        ),
+        host=host,
+        port=port,
+        browser=browser,
+    )
+
+
+def _robots(
+    project: Project, count: int | None, kinds: list[str], turrets: list[str], least: int
+) -> tuple[ProjectRobot, ...]:
+    """Return a project's robots with what the command line says of them."""
+    from kiks.cli.options import parse_turret
+    from kiks.model.project import ProjectRobot
+
+    robots = list(project.robots)
+    count = max(len(robots) if count is None else count, len(kinds), least)
+    robots = robots[:count] + [ProjectRobot(kind=robots[-1].kind)] * (count - len(robots))
+    if kinds and len(kinds) not in (1, count):
+        raise ParameterError(
+            f"--robot must name one kind for all or one for each of {count} robots, but it named {len(kinds)}."
+        )
+    if kinds:
+        kinds = kinds * count if len(kinds) == 1 else kinds
+        robots = [replace(each, kind=kind) for each, kind in zip(robots, kinds, strict=True)]
+    for entry in turrets:
+        name, number = parse_turret(entry, count)
+        for index in range(count) if number is None else [number - 1]:
+            robots[index] = replace(robots[index], turrets=(*robots[index].turrets, name))
+    return tuple(robots)
+
+
+def open_desk(
+    desk: Desk,
+    *,
+    host: str = "127.0.0.1",
+    port: int | None = None,
+    browser: bool = True,
+    work: Callable[[], None] = lambda: None,
+    goes_on: bool = True,
+    programs_ended: Callable[[Simulation], None] = lambda sim: None,
+) -> None:
+    """Show a desk until Ctrl-C.
+
+    Args:
+        desk: The desk.
+        host: Address to serve the page at.
+        port: TCP port of the page.
+        browser: Whether a browser is opened.
+        work: What moves the world at first.
+        goes_on: Whether the world goes on by itself after that; else it stands still.
+        programs_ended: Called with the world, locked, when its programs have ended.
+    """
+    from kiks.desk.driver import Driver
+    from kiks.desk.showing import Shown
+
+    end_as_with_ctrl_c()
+    shown = Shown(desk, host=host, port=port)
+    typer.echo(f"The desk: {shown.url}   Ctrl-C ends it.")
+    try:
+        if browser:
+            shown.browse()
+        work()
+        if goes_on:
+            Driver(desk, programs_ended).run()
+        threading.Event().wait()
+    except KeyboardInterrupt:
+        typer.echo(f"Stopped after {desk.sim.time_s:.1f} s of simulated time.")
+    finally:
+        shown.close()

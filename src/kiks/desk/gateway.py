@@ -1,0 +1,236 @@
+"""The gateway: what there is to be seen goes to the browsers, what their hands do comes back.
+
+Flow control: a browser has at most `IN_FLIGHT` frames that it has not acknowledged. The newest frame wins; none queues.
+So a slow browser, or a page that sleeps, gets fewer frames, and costs neither memory nor anybody else's time.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+from typing import Any
+
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from kiks.desk.desk import Desk
+from kiks.desk.frames import arena_picture, describe_scene, pack_frame
+from kiks.errors import KiksError, ParameterError
+from kiks.sim.simulation import Simulation
+
+FRAME_S = 0.04
+"""Time between two frames [s]."""
+
+DRAG_FRAME_S = 0.015
+"""The same while somebody moves something [s]."""
+
+IN_FLIGHT = 3
+"""Most frames on their way to one browser."""
+
+TEXTS = 16
+"""Most other messages that wait for one browser: who is that far behind is parted from, and comes back."""
+
+
+class Viewer:
+    """One browser.
+
+    Attributes:
+        name: Whose hand it is.
+        in_flight: Frames that it has not acknowledged.
+        scene: Number of the scene that it has been told of.
+        newest: The frame that it gets next.
+        texts: Messages that it gets before that.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.in_flight = 0
+        self.scene = -1
+        self.newest: bytes | None = None
+        self.texts: list[str] = []
+        self._news = asyncio.Event()
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether it can use another frame."""
+        return self.in_flight < IN_FLIGHT
+
+    def show(self, frame: bytes) -> None:
+        """Let this be what it sees next."""
+        self.newest = frame
+        self._news.set()
+
+    def tell(self, message: dict[str, Any]) -> None:
+        """Send it a message."""
+        self.texts.append(json.dumps(message))
+        self._news.set()
+
+    async def send_all(self, socket: WebSocket) -> None:
+        """Send what there is, for ever."""
+        while len(self.texts) <= TEXTS:
+            await self._news.wait()
+            self._news.clear()
+            while self.texts:
+                await socket.send_text(self.texts.pop(0))
+            if self.newest is not None and self.is_ready:
+                frame, self.newest = self.newest, None
+                self.in_flight += 1
+                await socket.send_bytes(frame)
+
+
+class Gateway:
+    """Serves the browsers of a desk.
+
+    Args:
+        desk: The desk.
+        number: Its number in this process.
+
+    Attributes:
+        sent_bytes: What frames and scenes have come to so far [bytes].
+    """
+
+    def __init__(self, desk: Desk, number: int) -> None:
+        self.sent_bytes = 0
+        self._number = number
+        self._is_closed = False
+        self._desk = desk
+        self._viewers: set[Viewer] = set()
+        self._count = 0
+        self._moved = asyncio.Event()
+        self._seen: tuple[Any, ...] = ()
+        self._scene: dict[str, Any] = {}
+        self._picture: tuple[Any, bytes] = (None, b"")
+
+    # ---- out ----
+
+    async def run(self) -> None:
+        """Take a picture of the world again and again and show it to all who can use one, until it is closed."""
+        loop = asyncio.get_running_loop()
+        due_s = loop.time()
+        while not self._is_closed:
+            due_s = max(due_s + FRAME_S, loop.time())
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._moved.wait(), due_s - loop.time())
+                await asyncio.sleep(DRAG_FRAME_S)
+            self._moved.clear()
+            if any(viewer.is_ready for viewer in self._viewers):
+                self._show(await self._desk.do(self._look))
+
+    def _look(self, sim: Simulation) -> bytes:
+        desk = self._desk
+        sim.sync()
+        seen = (sim, sim.arena, desk.scene, len(sim.lamps), *sim.state.bodies["number"][0].tolist())
+        turrets = sum(len(wire.firmware.fitted) for wire in sim.wires)
+        if (*seen, turrets) != self._seen:
+            self._seen = (*seen, turrets)
+            self._scene = describe_scene(sim, self._scene.get("scene", 0) + 1, desk.names())
+            self._scene["arena"]["picture"] = f"/desk/{self._number}/arena/{self._scene['scene']}.png"
+            if self._picture[0] is not sim.arena:
+                self._picture = sim.arena, arena_picture(sim.arena)
+        desk.meter.note(sim.now_ns, is_paused=desk.gate.is_paused)
+        return pack_frame(
+            sim,
+            scene=self._scene["scene"],
+            is_paused=desk.gate.is_paused,
+            is_driven=desk.programs.drive,
+            speed_now=desk.meter.momentary,
+            speed_average=desk.meter.average,
+            is_held=desk.hands.holds,
+        )
+
+    def _show(self, frame: bytes) -> None:
+        number = self._scene["scene"]
+        for viewer in self._viewers:
+            if viewer.scene != number:
+                viewer.scene = number
+                viewer.tell(self._scene)
+            if viewer.is_ready:
+                self.sent_bytes += len(frame)
+                viewer.show(frame)
+
+    def close(self) -> None:
+        """Tell the browsers that there is nothing more to see."""
+        self._is_closed = True
+        for viewer in self._viewers:
+            viewer.tell({"kind": "gone"})
+
+    def picture(self) -> bytes:
+        """Return the walls of the arena, a PNG."""
+        return self._picture[1]
+
+    # ---- in ----
+
+    async def serve(self, socket: WebSocket) -> None:
+        """Serve a browser until it goes."""
+        await socket.accept()
+        self._count += 1
+        viewer = Viewer(f"browser {self._count}")
+        self._viewers.add(viewer)
+        sending = asyncio.create_task(viewer.send_all(socket))
+        hearing = asyncio.create_task(self._hear(viewer, socket))
+        try:
+            await asyncio.wait([sending, hearing], return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            self._viewers.discard(viewer)
+            for task in (sending, hearing):
+                task.cancel()
+            await asyncio.gather(sending, hearing, return_exceptions=True)
+            await self._desk.drop(viewer.name)
+            with contextlib.suppress(RuntimeError, WebSocketDisconnect):
+                await socket.close()
+
+    async def _hear(self, viewer: Viewer, socket: WebSocket) -> None:
+        with contextlib.suppress(WebSocketDisconnect):
+            while True:
+                text = await socket.receive_text()
+                try:
+                    await self._obey(viewer, text)
+                except KiksError as error:
+                    viewer.tell({"kind": "error", "text": str(error)})
+
+    async def _obey(self, viewer: Viewer, text: str) -> None:
+        """Do what a message says.
+
+        Raises:
+            ParameterError: If it says nothing that can be done.
+        """
+        message = _parse(text)
+        kind = message["kind"]
+        if kind == "ack":
+            viewer.in_flight = max(viewer.in_flight - 1, 0)
+            return
+        desk, name = self._desk, viewer.name
+        if kind == "grab":
+            await desk.grab(name, str(message.get("what")), message.get("index", -1))
+        elif kind == "move":
+            x_mm, y_mm = _number(message, "x_mm"), _number(message, "y_mm")
+            await desk.do(lambda sim: desk.hands.move(name, x_mm, y_mm))
+        elif kind == "turn":
+            heading_rad = _number(message, "heading_rad")
+            await desk.do(lambda sim: desk.hands.turn(name, heading_rad))
+        elif kind == "drop":
+            await desk.drop(name)
+        else:
+            raise ParameterError(
+                f"a message must be one of ack, grab, move, turn and drop, but it was {kind!r}. Load the page anew."
+            )
+        self._moved.set()
+
+
+def _parse(text: str) -> dict[str, Any]:
+    try:
+        message = json.loads(text)
+    except (ValueError, RecursionError):
+        message = None
+    if not isinstance(message, dict) or not isinstance(message.get("kind"), str):
+        raise ParameterError(
+            f"a message must be a JSON object with a kind, but it was {text[:80]!r}. Load the page anew."
+        )
+    return message
+
+
+def _number(message: dict[str, Any], name: str) -> float:
+    value = message.get(name)
+    if not isinstance(value, int | float):
+        raise ParameterError(f"{name} must be a number, but it was {value!r}. Load the page anew.")
+    return float(value)

@@ -1,0 +1,195 @@
+"""The server of this process's desks: a web server in a thread of its own, which the first desk starts."""
+
+from __future__ import annotations
+
+import asyncio
+import secrets
+import socket
+import threading
+from dataclasses import dataclass
+
+import uvicorn
+from fastapi import FastAPI, Response, WebSocket
+from nicegui import app as nicegui_app
+from nicegui import ui
+from starlette.responses import RedirectResponse
+
+from kiks.desk.desk import Desk
+from kiks.desk.gateway import Gateway
+from kiks.desk.guard import LOOPBACK, Guard
+from kiks.desk.page import Page
+from kiks.errors import LinkError, ParameterError
+
+PORT = 8123
+"""Where the desk is found, if nobody else is there."""
+
+START_S = 30.0
+"""How long the server may take to begin [s]; a computer that is very busy needs seconds."""
+
+MESSAGE_LIMIT = 1 << 20
+"""Largest message on a socket [bytes]: a program that is edited in the page comes in one."""
+
+CLOSED = "KiKS: this desk is closed. Open it again where it was opened."
+
+
+@dataclass(frozen=True)
+class Served:
+    """A desk that browsers can see.
+
+    Attributes:
+        desk: The desk.
+        gateway: Who sends its frames.
+        number: Its number in this process.
+    """
+
+    desk: Desk
+    gateway: Gateway
+    number: int
+
+
+class DeskServer:
+    """Serves desks to browsers.
+
+    NiceGUI is one application a process, so there is one of these a process, `SERVER`.
+
+    Attributes:
+        desks: What is served, by number.
+        token: What browsers must know; None if only those of this computer can come.
+    """
+
+    def __init__(self) -> None:
+        self.desks: dict[int, Served] = {}
+        self.token: str | None = None
+        self._count = 0
+        self._socket: socket.socket | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._lock = threading.Lock()
+
+    def start(self, *, host: str = "127.0.0.1", port: int | None = None) -> None:
+        """Begin to serve, unless that is so already.
+
+        Args:
+            host: Address to listen at. Any but one of this computer's own makes a token necessary.
+            port: TCP port, 0 for a free one; `PORT`, or a free one if that is taken, if left out.
+
+        Raises:
+            LinkError: If it cannot listen there.
+            ParameterError: If it serves already, somewhere else.
+        """
+        with self._lock:
+            if self._socket is not None:
+                if port not in (None, 0, self._socket.getsockname()[1]):
+                    raise ParameterError(
+                        f"port must be that of the desk that is open, {self.url()}, but it was {port}."
+                    )
+                return
+            self.token = None if host in LOOPBACK else secrets.token_urlsafe(24)
+            self._socket = _listen(host, PORT, or_free=True) if port is None else _listen(host, port)
+            begun = threading.Event()
+            threading.Thread(target=self._serve, args=(begun,), name="kiks desk", daemon=True).start()
+            if not begun.wait(START_S):
+                raise LinkError(f"the desk must begin to serve within {START_S:g} s, but it did not. Try again.")
+
+    def open(self, desk: Desk) -> Served:
+        """Show a desk to browsers; `start` must have been called."""
+        with self._lock:
+            self._count += 1
+            served = Served(desk, Gateway(desk, self._count), self._count)
+            self.desks[self._count] = served
+            assert self._loop is not None
+            asyncio.run_coroutine_threadsafe(served.gateway.run(), self._loop)
+        return served
+
+    def close(self, served: Served) -> None:
+        """Show it no longer, and let its world go its way."""
+        self.desks.pop(served.number, None)
+        assert self._loop is not None
+        self._loop.call_soon_threadsafe(served.gateway.close)
+        served.desk.close()
+
+    def url(self, number: int | None = None) -> str:
+        """Return where a browser finds a desk, or the newest one."""
+        assert self._socket is not None
+        host, port = self._socket.getsockname()[:2]
+        host = f"[{host}]" if ":" in host else host
+        path = "" if number is None else f"desk/{number}"
+        return f"http://{host}:{port}/{path}" + (f"?token={self.token}" if self.token is not None else "")
+
+    # ---- inside ----
+
+    def _serve(self, begun: threading.Event) -> None:
+        """Run the web server, in a thread of its own."""
+        app = FastAPI(openapi_url=None)
+        self._add_routes(app)
+        ui.run_with(app, title="KiKS", dark=None, show_welcome_message=False, reconnect_timeout=10.0)
+        nicegui_app.on_startup(begun.set)
+        config = uvicorn.Config(
+            Guard(app, self.token),
+            log_level="warning",
+            access_log=False,
+            lifespan="on",
+            ws="websockets-sansio",
+            ws_max_size=MESSAGE_LIMIT,
+            ws_per_message_deflate=False,
+            timeout_graceful_shutdown=1,
+        )
+
+        async def serve() -> None:
+            self._loop = asyncio.get_running_loop()
+            await uvicorn.Server(config).serve(sockets=[self._socket] if self._socket else None)
+
+        asyncio.run(serve())
+
+    def _add_routes(self, app: FastAPI) -> None:
+        """Say what is found where."""
+
+        @app.get("/")
+        def newest() -> Response:
+            number = max(self.desks, default=None)
+            if number is None:
+                return Response(CLOSED, media_type="text/plain")
+            return RedirectResponse(f"/desk/{number}")
+
+        @app.get("/desk/{number}/arena/{scene}.png")
+        def picture(number: int, scene: int) -> Response:
+            served = self.desks.get(number)
+            if served is None:
+                return Response(status_code=404)
+            return Response(served.gateway.picture(), media_type="image/png", headers={"cache-control": "no-store"})
+
+        @app.websocket("/desk/{number}/feed")
+        async def feed(socket: WebSocket, number: int) -> None:
+            served = self.desks.get(number)
+            if served is None:
+                await socket.close()
+            else:
+                await served.gateway.serve(socket)
+
+        @ui.page("/desk/{number}")
+        def page(number: int) -> None:
+            served = self.desks.get(number)
+            if served is None:
+                ui.label(CLOSED)
+            else:
+                Page(served.desk, number)
+
+
+def _listen(host: str, port: int, *, or_free: bool = False) -> socket.socket:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    listening = socket.socket(family)
+    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listening.bind((host, port))
+        listening.listen(128)
+    except (OSError, OverflowError) as error:
+        listening.close()
+        if or_free:
+            return _listen(host, 0)
+        raise LinkError(
+            f"the desk must be able to listen at {host}:{port}, but it cannot ({error}). Give another --port."
+        ) from None
+    return listening
+
+
+SERVER = DeskServer()
+"""The process's server."""

@@ -1,0 +1,94 @@
+"""A desk that browsers can see, and a world that lives in a program on it: `sim.show()`."""
+
+from __future__ import annotations
+
+import html
+import logging
+import os
+import sys
+import threading
+import webbrowser
+
+from kiks.desk.desk import Desk, NewsHandler
+from kiks.desk.driver import Driver
+from kiks.desk.serving import SERVER
+from kiks.sim.simulation import Simulation
+
+
+class Shown:
+    """A desk that browsers can see.
+
+    In a notebook it is shown below the cell.
+
+    Args:
+        desk: The desk.
+        host: Address to listen at.
+        port: TCP port, 0 for a free one; 8123, or a free one if that is taken, if left out.
+
+    Attributes:
+        desk: The desk.
+        url: Where a browser finds it.
+
+    Raises:
+        LinkError: If it cannot listen there.
+        ParameterError: If another port is served already.
+    """
+
+    def __init__(self, desk: Desk, *, host: str = "127.0.0.1", port: int | None = None) -> None:
+        self.desk = desk
+        SERVER.start(host=host, port=port)
+        self._served = SERVER.open(desk)
+        self.url = SERVER.url(self._served.number)
+        self._driver: Driver | None = None
+        self._thread: threading.Thread | None = None
+        self._news = NewsHandler(desk)
+        logging.getLogger("kiks").addHandler(self._news)
+
+    def drive(self) -> None:
+        """Let the world go on by itself from now on, in a thread."""
+        if self._driver is None:
+            self._driver = Driver(self.desk)
+            self._thread = threading.Thread(target=self._driver.run, name="kiks driver", daemon=True)
+            self._thread.start()
+
+    def browse(self) -> None:
+        """Open it in a browser, where there is a screen."""
+        if sys.platform in ("win32", "darwin") or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"):
+            webbrowser.open(self.url)
+
+    def close(self) -> None:
+        """Show it no longer; the world goes its way."""
+        logging.getLogger("kiks").removeHandler(self._news)
+        if self._driver is not None:
+            self._driver.stop()
+        if self._thread is not None:
+            self._thread.join()
+        SERVER.close(self._served)
+
+    def __repr__(self) -> str:
+        return f"<KiKS desk at {self.url}>"
+
+    def _repr_html_(self) -> str:
+        return f'<iframe src="{html.escape(self.url)}" style="width: 100%; height: 640px; border: 0"></iframe>'
+
+
+def show(
+    sim: Simulation,
+    *,
+    speed: float | None = 1.0,
+    is_alive: bool = False,
+    port: int | None = None,
+    browser: bool = True,
+) -> Shown:
+    """Show a world in a browser; see `Simulation.show`.
+
+    Raises:
+        LinkError: If the desk cannot listen there.
+        ParameterError: If the speed is out of range, or another port is served already.
+    """
+    shown = Shown(Desk(sim, speed=speed, may_run_programs=is_alive), port=port)
+    if is_alive:
+        shown.drive()
+    if browser:
+        shown.browse()
+    return shown

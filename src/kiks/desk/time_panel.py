@@ -1,0 +1,134 @@
+"""Time: run, pause, step, how fast, what the clock says, and back to where it was."""
+
+from __future__ import annotations
+
+from nicegui import ui
+from nicegui.events import KeyEventArguments
+
+from kiks.desk.desk import Desk
+from kiks.desk.feedback import told
+
+SPEEDS: dict[float, str] = {
+    0.1: "0.1 x",
+    0.25: "0.25 x",
+    0.5: "0.5 x",
+    1.0: "real time",
+    2.0: "2 x",
+    5.0: "5 x",
+    10.0: "10 x",
+    50.0: "50 x",
+    0.0: "as fast as it can",
+}
+"""How fast time may pass, with 0 for no limit."""
+
+STEPS: dict[float, str] = {0.01: "10 ms", 0.1: "100 ms", 1.0: "1 s", 10.0: "10 s"}
+"""How much a step is [s]."""
+
+REFRESH_S = 0.2
+"""How often clock and speed are shown anew [s]."""
+
+
+class TimePanel:
+    """The row of controls above the arena.
+
+    Args:
+        desk: The desk.
+    """
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+        self._run = ui.button(on_click=self._toggle).props("round unelevated color=accent data-testid=run")
+        with self._run:
+            self._run_tip = ui.tooltip("")
+        with _flat("skip_next", "Step", "step", self._step):
+            self._step_tip = ui.tooltip("Let some time pass, then stand still (key: .)")
+        self._step_s = _select(STEPS, 0.01, "How much a step is", "step-size", "5.5rem")
+        self._speed = _select(SPEEDS, self._shown_speed(), "How fast time passes", "speed", "9.5rem")
+        self._speed.on_value_change(self._set_speed)
+        with self._speed:
+            ui.tooltip("How much simulated time passes in real time; it never changes what robots do")
+        with ui.column().classes("gap-0 q-mx-sm").style("line-height: 1.15; white-space: nowrap"):
+            self._clock = ui.label().classes("text-subtitle1 text-weight-medium").props("data-testid=clock")
+            self._rate = ui.label().classes("text-caption gt-sm").props("data-testid=rate")
+            for label in (self._clock, self._rate):
+                label.style("font-variant-numeric: tabular-nums")
+        with _flat("bookmark_add", "Checkpoint", "mark", self._mark):
+            ui.tooltip("Checkpoint: remember where everything stands")
+        with _flat("settings_backup_restore", "Reset", "reset", self._reset):
+            ui.tooltip("Reset: put everything back where it stood at the checkpoint, or at the start; time goes on")
+        ui.timer(REFRESH_S, self._refresh)
+        ui.keyboard(on_key=self._press)
+        self._refresh()
+
+    def _shown_speed(self) -> float:
+        speed = self._desk.gate.speed
+        return 0.0 if speed is None else min((each for each in SPEEDS if each), key=lambda each: abs(each - speed))
+
+    def _refresh(self) -> None:
+        """Show how time stands; somebody else may have changed it."""
+        desk = self._desk
+        word, icon = ("Run", "play_arrow") if desk.gate.is_paused else ("Pause", "pause")
+        self._run.props(f'icon={icon} aria-label="{word}"')
+        self._run_tip.text = f"{word} (space)"
+        self._clock.text = clock_text(desk.sim.now_ns)
+        self._rate.text = f"{desk.meter.average:.1f} x on average, {desk.meter.momentary:.1f} x now"
+        if self._speed.value != self._shown_speed():
+            self._speed.value = self._shown_speed()
+
+    @told
+    async def _toggle(self) -> None:
+        await (self._desk.go_on() if self._desk.gate.is_paused else self._desk.pause())
+        self._refresh()
+
+    @told
+    async def _step(self) -> None:
+        await self._desk.step(self._step_s.value)
+        self._refresh()
+
+    @told
+    async def _set_speed(self) -> None:
+        if self._speed.value != self._shown_speed():
+            await self._desk.set_speed(self._speed.value or None)
+
+    @told
+    async def _mark(self) -> None:
+        await self._desk.mark()
+        ui.notify("Remembered where everything stands.")
+
+    @told
+    async def _reset(self) -> None:
+        await self._desk.reset()
+        ui.notify("Everything is back where it stood.")
+
+    async def _press(self, event: KeyEventArguments) -> None:
+        if not event.action.keydown or event.modifiers.ctrl or event.modifiers.alt or event.modifiers.meta:
+            return
+        if event.key == " " and not event.action.repeat:
+            await self._toggle()
+        elif event.key == ".":
+            await self._step()
+
+
+def _flat(icon: str, word: str, name: str, act: object) -> ui.button:
+    return ui.button(icon=icon, on_click=act).props(  # type: ignore[arg-type]
+        f'round dense flat color=white aria-label="{word}" data-testid={name}'
+    )
+
+
+def _select(choices: dict[float, str], value: float, word: str, name: str, width: str) -> ui.select:
+    return (
+        ui.select(choices, value=value)
+        .props(f'dense dark borderless options-dense aria-label="{word}" data-testid={name}')
+        .style(f"min-width: {width}")
+    )
+
+
+def clock_text(now_ns: int) -> str:
+    """Return a simulated time for a person.
+
+    Example:
+        >>> clock_text(83_456_000_000)
+        '1:23.45'
+    """
+    hundredths = now_ns // 10_000_000
+    return f"{hundredths // 6000}:{hundredths // 100 % 60:02d}.{hundredths % 100:02d}"

@@ -1,0 +1,225 @@
+"""Frames to browsers and hands back, over a real socket."""
+
+from __future__ import annotations
+
+import gc
+import json
+import struct
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+
+import kiks
+from kiks.desk.gateway import IN_FLIGHT, Viewer
+from kiks.desk.showing import Shown, show
+from kiks.errors import ParameterError
+
+GUARD_S = 20.0
+
+
+@pytest.fixture
+def shown() -> Iterator[Shown]:
+    sim = kiks.Simulation(kiks.Arena.box(600, 400), robots=2, seed=1)
+    sim.place(1, 100, 100, 0)
+    sim.place(2, 300, 100, 0)
+    sim.add_lamp(50, 350)
+    shown = show(sim, port=0, browser=False)
+    yield shown
+    shown.close()
+
+
+class Browser:
+    """A browser without a screen."""
+
+    def __init__(self, socket: ClientConnection) -> None:
+        self.socket = socket
+        self.scene: dict[str, Any] = {}
+
+    def say(self, kind: str, **words: object) -> None:
+        self.socket.send(json.dumps({"kind": kind, **words}))
+
+    def hear(self) -> bytes | dict[str, Any]:
+        """Return the next frame or message."""
+        message = self.socket.recv(GUARD_S)
+        if isinstance(message, bytes):
+            return message
+        told: dict[str, Any] = json.loads(message)
+        if told["kind"] == "scene":
+            self.scene = told
+        return told
+
+    def frame(self) -> bytes:
+        """Return the next frame, and acknowledge it."""
+        while not isinstance(heard := self.hear(), bytes):
+            pass
+        self.say("ack")
+        return heard
+
+    def wait_for(self, fact: Any) -> bytes:
+        """Return the first frame of which something is so."""
+        while not fact(frame := self.frame()):
+            pass
+        return frame
+
+
+@contextmanager
+def browsing(shown: Shown, **options: Any) -> Iterator[Browser]:
+    url = shown.url.replace("http:", "ws:") + "/feed"
+    with connect(url, compression=None, open_timeout=GUARD_S, **options) as socket:
+        yield Browser(socket)
+
+
+def pose(frame: bytes, robot: int = 0) -> tuple[float, float, float]:
+    return struct.unpack_from("<3f", frame, 32 + 128 * robot)
+
+
+def test_scene_comes_before_its_frames(shown: Shown) -> None:
+    with browsing(shown) as browser:
+        first = browser.hear()
+        assert isinstance(first, dict)
+        assert first["kind"] == "scene"
+        frame = browser.frame()
+        assert struct.unpack_from("<I", frame, 4)[0] == first["scene"]
+        assert pose(frame) == (100, 100, 0)
+        shown.desk.sim.add_ball(500, 300)
+        browser.wait_for(lambda frame: struct.unpack_from("<I", frame, 4)[0] > first["scene"])
+        assert [body["what"] for body in browser.scene["bodies"]] == ["ball"]
+
+
+def test_who_does_not_acknowledge_gets_three_frames_and_hinders_nobody(shown: Shown) -> None:
+    with browsing(shown) as sleeper, browsing(shown) as other:
+        got = []
+        while len(got) < IN_FLIGHT:
+            heard = sleeper.hear()
+            got += [heard] if isinstance(heard, bytes) else []
+        for _ in range(10):
+            other.frame()
+        with pytest.raises(TimeoutError):
+            sleeper.socket.recv(0.01)
+        sleeper.say("ack")
+        assert isinstance(sleeper.hear(), bytes)
+
+
+def test_who_does_not_read_is_parted_from() -> None:
+    async def far_behind() -> Viewer:
+        viewer = Viewer("somebody")
+        for _ in range(100):
+            viewer.tell({})
+        await viewer.send_all(None)  # type: ignore[arg-type]
+        return viewer
+
+    import asyncio
+
+    asyncio.run(far_behind())
+
+
+def test_hands_move_things_in_the_engine(shown: Shown) -> None:
+    with browsing(shown) as browser:
+        browser.say("grab", what="robot", index=0)
+        browser.say("move", x_mm=900, y_mm=200)
+        frame = browser.wait_for(lambda frame: pose(frame)[0] > 200)
+        assert shown.desk.sim.pose(1)[:2] == pytest.approx(pose(frame)[:2])
+        flags = struct.unpack_from("<I", frame, 32 + 28)[0]
+        assert flags & 8
+        browser.say("turn", heading_rad=1.0)
+        browser.wait_for(lambda frame: pose(frame)[2] == 1.0)
+        browser.say("drop")
+        browser.wait_for(lambda frame: not struct.unpack_from("<I", frame, 32 + 28)[0] & 8)
+        assert shown.desk.hands.are_empty
+
+
+def test_two_browsers_may_drag_at_once(shown: Shown) -> None:
+    with browsing(shown) as one, browsing(shown) as two:
+        one.say("grab", what="robot", index=0)
+        one.wait_for(lambda frame: struct.unpack_from("<I", frame, 32 + 28)[0] & 8)
+        two.say("grab", what="robot", index=0)
+        while not (isinstance(heard := two.hear(), dict) and heard["kind"] == "error"):
+            pass
+        assert "one hand must let go" in heard["text"]
+        two.say("grab", what="robot", index=1)
+        two.say("move", x_mm=500, y_mm=300)
+        one.say("move", x_mm=100, y_mm=300)
+        one.wait_for(lambda frame: pose(frame, 1)[1] == 300 and pose(frame)[1] == 300)
+    while not shown.desk.hands.are_empty:
+        pass
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("", "{", "[]", "7", "[" * 100_000, '{"kind": 3}', '{"kind": "fly"}'),
+        *('{"kind": "grab"}', '{"kind": "grab", "what": "robot"}', '{"kind": "grab", "what": "robot", "index": "0"}'),
+        *('{"kind": "move"}', '{"kind": "move", "x_mm": NaN, "y_mm": 3}', '{"kind": "turn", "heading_rad": null}'),
+    ],
+    ids=lambda text: text[:40],
+)
+def test_nonsense_gets_an_answer(shown: Shown, text: str) -> None:
+    with browsing(shown) as browser:
+        browser.say("grab", what="robot", index=0)
+        browser.socket.send(text)
+        while not (isinstance(heard := browser.hear(), dict) and heard["kind"] == "error"):
+            pass
+        assert "must" in heard["text"]
+        browser.frame()
+
+
+def test_other_pages_are_refused(shown: Shown) -> None:
+    with pytest.raises(InvalidStatus, match="403"), browsing(shown, origin="http://evil.example"):
+        pass
+
+
+def course(sim: kiks.Simulation) -> str:
+    with kiks.Khepera(sim.port(1)) as robot:
+        robot.set_speed(6, 3)
+        for _ in range(300):
+            robot.proximity()
+        robot.set_speed(0, 0)
+    return sim.state_hash()
+
+
+def test_run_is_the_same_with_a_desk_and_fifty_visitors() -> None:
+    alone = course(kiks.Simulation(robots=3, seed=4))
+    sim = kiks.Simulation(robots=3, seed=4)
+    shown = show(sim, speed=50.0, port=0, browser=False)
+    hashes: list[str] = []
+    running = threading.Thread(target=lambda: hashes.append(course(sim)))
+    running.start()
+    try:
+        for _ in range(50):
+            with browsing(shown) as browser:
+                browser.frame()
+        shown.desk.gate.set_speed(None, sim.now_ns)
+        running.join(GUARD_S)
+        assert hashes == [alone]
+        with browsing(shown) as browser:
+            browser.frame()
+            gc.collect()
+            # Those who have gone are forgotten; the last one may just be going.
+            assert sum(isinstance(each, Viewer) for each in gc.get_objects()) <= 2
+    finally:
+        shown.close()
+        running.join(GUARD_S)
+
+
+def test_closed_desk_says_so_and_lets_its_world_go() -> None:
+    sim = kiks.Simulation()
+    shown = show(sim, port=0, browser=False, is_alive=True)
+    with browsing(shown) as browser:
+        browser.wait_for(lambda frame: struct.unpack_from("<d", frame, 8)[0] > 0.1)
+        shown.close()
+        while browser.hear() != {"kind": "gone"}:
+            pass
+    assert sim.gate is None
+    now_ns = sim.now_ns
+    sim.run(100.0)
+    assert sim.now_ns == now_ns + 100_000_000_000
+
+
+def test_speed_must_make_sense() -> None:
+    with pytest.raises(ParameterError, match="speed must be a number from"):
+        kiks.Simulation().show(speed=-1, browser=False)
