@@ -11,6 +11,7 @@ WIDTH, HEIGHT = 360, 236
 _EYE = (180.0, 206.0)
 _REACH = 150.0
 _COLOURS = {"wall": "#8a6d3b", "robot": "#2f9e44", "ball": "#f08c00", "cylinder": "#c77d3c"}
+_RANGES_MM = (6.0, 15.0, 30.0, 60.0)
 _THIN, _THICK = 1.5, 6.0
 
 
@@ -18,10 +19,11 @@ def draw_rays(why: Explanation) -> str:
     """Return an SVG of the rays of an explanation, the sensor's axis upwards; it takes the page's own text colour."""
     axis_deg = why.rays[len(why.rays) // 2].angle_deg
     most = max((abs(ray.contribution_counts) for ray in why.rays), default=0.0)
-    parts = [_ring(share, why.reach_mm) for share in (1 / 3, 2 / 3, 1.0)]
+    reach_mm = _range_mm(why)
+    parts = [_ring(share, reach_mm) for share in (1 / 3, 2 / 3, 1.0)]
     for number, ray in enumerate(why.rays, 1):
         share = abs(ray.contribution_counts) / most if most >= 0.5 else 0.0
-        parts.append(_ray(number, ray, _turn_deg(ray.angle_deg - axis_deg), why.reach_mm, share))
+        parts.append(_ray(number, ray, _turn_deg(ray.angle_deg - axis_deg), reach_mm, share))
     x, y = _EYE
     parts.append(f'<rect x="{x - 12}" y="{y}" width="24" height="12" rx="2" fill="currentColor"/>')
     parts.append(_words(x, y + 26, f"sensor {why.sensor}", size=12))
@@ -30,6 +32,14 @@ def draw_rays(why: Explanation) -> str:
         f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{label}" '
         f'style="width: 100%; max-width: 460px; display: block; margin: 0 auto">{"".join(parts)}</svg>'
     )
+
+
+def _range_mm(why: Explanation) -> float:
+    """Return how far the drawing goes: all of the sensor's reach, or what is needed if all rays end near by."""
+    longest_mm = max(ray.length_mm for ray in why.rays)
+    if math.isinf(longest_mm):
+        return why.reach_mm
+    return min((range_mm for range_mm in _RANGES_MM if range_mm >= longest_mm), default=why.reach_mm)
 
 
 def _turn_deg(angle_deg: float) -> float:

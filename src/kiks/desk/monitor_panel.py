@@ -20,6 +20,7 @@ AGAIN_S = 0.5
 
 _RAY_COLUMNS = ("Ray", "Length [mm]", "Met", "Bright", "Angle [°]", "Counts")
 _LAMP_COLUMNS = ("Lamp", "Distance [mm]", "Angle [°]", "Power [W]", "What it is", "Counts")
+_WORDS = ("Met", "What it is")
 
 
 class MonitorPanel:
@@ -43,33 +44,35 @@ class MonitorPanel:
                 .mark("monitor-robot")
                 .tooltip("Which robot is watched here")
             )
-            self._view = MonitorView(feed, on_explain=self._explain, on_seen=self._see).classes("w-full")
+            with MonitorView(feed, on_explain=self._explain, on_seen=self._see).classes("w-full") as self._view:
+                self._build_answer()
             self._turrets = ui.label().style("white-space: pre-line").props('data-testid="turret-words"')
-            self._build_answer()
         ui.timer(AGAIN_S, self._renew)
 
     def _build_answer(self) -> None:
-        ui.separator()
-        self._title = ui.label("Why does it read so?").classes("text-h6").props('role="heading" aria-level="2"')
-        self._prompt = ui.label(
-            "Click a number at one of the robot's sensors above, and its reading is taken apart here."
-        )
-        with ui.column().classes("w-full gap-2").props('data-testid="explanation"') as self._answer:
-            ui.switch("Keep looking", on_change=lambda event: self._keep(bool(event.value))).props(
-                'dense data-testid="keep-looking"'
-            ).mark("keep-looking").tooltip("Take the reading apart anew twice a second")
+        """Build what says why a reading is what it is; it is there once somebody has asked."""
+        with ui.column().classes("kiks-answer w-full gap-2").props('data-testid="explanation"') as self._answer:
+            with ui.row().classes("w-full items-center justify-between no-wrap"):
+                self._title = ui.label().classes("text-h6").props('role="heading" aria-level="2" aria-live="polite"')
+                ui.button(icon="close", on_click=self._forget).props(
+                    'flat round dense aria-label="Close the explanation" data-testid="close-explanation"'
+                ).tooltip("Close the explanation")
             self._drawing = ui.html(sanitize=False).classes("w-full").props('data-testid="explanation-drawing"')
             self._words = ui.label().style("white-space: pre-line").props('data-testid="explanation-text"')
+            self._keeps = (
+                ui.switch("Keep looking")
+                .props('dense data-testid="keep-looking"')
+                .mark("keep-looking")
+                .tooltip("Take the reading apart anew twice a second")
+            )
             self._table = (
                 ui.table(rows=[], columns=[], row_key="0")
                 .classes("w-full")
-                .props(
-                    'dense flat bordered hide-pagination :rows-per-page-options="[0]" data-testid="explanation-table"'
-                )
+                .props('dense flat bordered hide-pagination :rows-per-page-options="[0]"')
+                .props('data-testid="explanation-table"')
             )
             self._note = ui.label().classes("text-caption")
         self._answer.set_visibility(False)
-        self._is_kept = False
 
     # ---- what is watched ----
 
@@ -84,7 +87,7 @@ class MonitorPanel:
         await self._explain(Asked(sensor, "proximity"))
 
     def _names(self) -> dict[int, str]:
-        return {index: f"Robot {index + 1}" for index in range(self._desk.sim.robot_count)}
+        return {index: f"Robot {name}" for index, name in enumerate(self._desk.names())}
 
     def _choose(self, index: int) -> None:
         self._index = index
@@ -95,26 +98,20 @@ class MonitorPanel:
         self._asked = None
         self._view.set_chosen(None)
         self._answer.set_visibility(False)
-        self._prompt.set_visibility(True)
-        self._title.set_text("Why does it read so?")
 
     def _see(self, is_seen: bool) -> None:
         self._is_seen = is_seen
-
-    def _keep(self, is_kept: bool) -> None:
-        self._is_kept = is_kept
 
     # ---- what is said of it ----
 
     async def _renew(self) -> None:
         if not self._is_seen:
             return
-        if len(self._choice.options) != self._desk.sim.robot_count:
-            index = min(self._index, self._desk.sim.robot_count - 1)
-            self._choice.set_options(self._names(), value=index)
+        if self._choice.options != (names := self._names()):
+            self._choice.set_options(names, value=min(self._index, len(names) - 1))
         number = self._index + 1
         self._turrets.set_text(await self._desk.do(lambda sim: _turret_words(sim, number)))
-        if self._is_kept and self._asked is not None:
+        if self._keeps.value and self._asked is not None:
             await self._explain(self._asked)
 
     async def _explain(self, asked: Asked) -> None:
@@ -132,7 +129,6 @@ class MonitorPanel:
         if asked != self._asked:
             self._asked = asked
             self._view.set_chosen(asked)
-        self._prompt.set_visibility(False)
         self._answer.set_visibility(True)
         self._title.set_text(f"Why does it read {why.count}?")
         self._words.set_text(why.text())
@@ -146,7 +142,7 @@ class MonitorPanel:
         self._drawing.set_content(draw_rays(why))
         rows = [
             (number, _figure(ray.length_mm), ray.met, ray.brightness or "–", _figure(ray.incidence_deg, 0),
-             f"{ray.contribution_counts:+.1f}")
+             _signed(ray.contribution_counts))
             for number, ray in enumerate(why.rays, 1)
         ]  # fmt: skip
         self._fill(_RAY_COLUMNS, rows)
@@ -159,7 +155,7 @@ class MonitorPanel:
         self._drawing.set_visibility(False)
         rows = [
             (lamp.lamp, _figure(lamp.distance_mm, 0), _figure(lamp.angle_deg, 0), f"{lamp.power_w:g}", lamp.state,
-             f"{-lamp.contribution_counts:+.1f}")
+             _signed(-lamp.contribution_counts))
             for lamp in why.lamps
         ]  # fmt: skip
         self._fill(_LAMP_COLUMNS, rows)
@@ -169,12 +165,7 @@ class MonitorPanel:
 
     def _fill(self, names: tuple[str, ...], rows: list[tuple[Any, ...]]) -> None:
         columns = [
-            {
-                "name": str(k),
-                "field": str(k),
-                "label": name,
-                "align": "left" if name in ("Met", "What it is") else "right",
-            }
+            {"name": str(k), "field": str(k), "label": name, "align": "left" if name in _WORDS else "right"}
             for k, name in enumerate(names)
         ]
         if self._table.columns != columns:
@@ -184,6 +175,10 @@ class MonitorPanel:
 
 def _figure(value: float, digits: int = 1) -> str:
     return f"{value:.{digits}f}" if math.isfinite(value) else "–"
+
+
+def _signed(value: float) -> str:
+    return f"{value:+.1f}" if abs(value) >= 0.05 else "0"
 
 
 def _turret_words(sim: Simulation, number: int) -> str:

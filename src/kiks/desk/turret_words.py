@@ -33,8 +33,8 @@ def _state_of(turret: Turret) -> str:
         return f"inputs {turret.inputs:08b}, outputs {turret.outputs:08b}"
     if isinstance(turret, K213):
         return (
-            f"a picture every {1000 * s_from_ns(turret.period_ns):g} ms, the last one at {s_from_ns(turret.taken_ns):.3f} s, "
-            f"light level {turret.light}"
+            f"a picture every {1000 * s_from_ns(turret.period_ns):g} ms, the last one at "
+            f"{s_from_ns(turret.taken_ns):.3f} s, light level {turret.light}"
         )
     return "its own kind"
 

@@ -33,6 +33,7 @@ function rangeOf(kind, history) {
       const value = Math.abs(history.value(back, KINDS.speeds.first + line));
       if (value > most) most = value;
     }
+  most *= 1.08;
   return [-most, most, most > 40 ? 25 : most > 16 ? 10 : 5];
 }
 

@@ -134,7 +134,7 @@ export class Monitor {
       fill.style.width = `${Math.abs((50 * speed) / most)}%`;
       mark.style.display = isFree ? "none" : "";
       if (!isFree) mark.style.left = `${50 + (50 * wanted) / most}%`;
-      text.textContent = isFree ? `${speed}, by voltage` : `${speed} of ${Math.round(10 * wanted) / 10}`;
+      text.textContent = isFree ? `${speed}, by voltage` : `${speed}, set ${Math.round(10 * wanted) / 10}`;
     });
   }
 }

@@ -22,6 +22,7 @@ export default {
           </div>
         </div>
         <p class="kiks-monitor-hint">Upper number: proximity, 0 to 1023. Lower one: light, less is brighter. Click one to ask why.</p>
+        <slot></slot>
 
         <div class="kiks-wheels" role="group" aria-label="Wheels: measured and commanded speed">
           <template v-for="side in ['left', 'right']" :key="side">

@@ -19,7 +19,7 @@ export function placeOfNumber(sensor) {
 export function paintLargeRobot(context, width, height, ratio, look, scene, frame, index, chosen, isDark) {
   const robot = frame.robot(index), known = scene.robots[index];
   const middle = [width / 2, height / 2];
-  const scale = Math.min(width, height) / (2 * (known.radius_mm + 0.92 * known.reach_mm));
+  const scale = Math.min(width, height) / (2 * (known.radius_mm + known.reach_mm));
   const at = (x_mm, y_mm) => [middle[0] - y_mm * scale, middle[1] - x_mm * scale];
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
   context.clearRect(0, 0, width, height);
@@ -112,4 +112,10 @@ function paintCompass(context, heading_rad, isDark) {
   context.lineTo(...tip(heading_rad - 2.5, 0.7));
   context.closePath();
   context.fill();
+  context.font = "600 12px system-ui, sans-serif";
+  context.textAlign = "center";
+  context.textBaseline = "top";
+  context.fillStyle = ink;
+  const degrees = Math.round((heading_rad * 180) / Math.PI) % 360;
+  context.fillText(`${(degrees + 360) % 360}°`, x + 1, y + radius + 5);
 }
