@@ -94,9 +94,7 @@ class SettingsPanel:
         self._model = _choice("Sensor model", MODELS, "What makes a count of what a sensor's rays meet.", "model")
         self._noise = ui.switch("Noise").props("data-testid=noise")
         with self._noise:
-            ui.tooltip(
-                "Real sensors never read the same twice; without noise they do, which helps to find mistakes."
-            )
+            ui.tooltip("Real sensors never read the same twice; without noise they do, which helps to find mistakes.")
 
     def _name_amount(self) -> None:
         label, hint = (
