@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import math
 import os
 import subprocess
@@ -16,15 +15,9 @@ import pytest
 pytest.importorskip("nicegui", reason="the desk needs NiceGUI: install kiks[desk]")
 pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
 
-from PIL import Image
-from playwright.sync_api import Browser, Page, Playwright, sync_playwright
+from playwright.sync_api import Browser, Playwright, sync_playwright
+from tests.desk.visits import ARGUMENTS, CHROMIUM, Visit
 
-CHROMIUM = Path("/usr/bin/chromium")
-ARGUMENTS = [
-    *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync"),
-    *("--disable-background-networking", "--disable-component-update", "--enable-unsafe-swiftshader"),
-]
-GUARD_MS = 20_000
 SENSOR_RAD = math.radians(66.4)
 
 pytestmark = [
@@ -61,66 +54,6 @@ def browser(playwright: Playwright) -> Iterator[Browser]:
     browser.close()
 
 
-class Visit:
-    """A page with the arena on it, and what the server hears of it."""
-
-    def __init__(self, page: Page, address: str, query: str) -> None:
-        self.page, self.address = page, address
-        page.set_default_timeout(GUARD_MS)
-        self.faults: list[str] = []
-        page.on("pageerror", lambda error: self.faults.append(str(error)))
-        self.ask("reset")
-        self.mark = len(page.request.get(f"{address}/received").json())
-        page.goto(f"{address}/?{query}")
-        page.wait_for_function("() => window.kiksDesk?.stats().frames_drawn > 3 && kiksDesk.pose(0)")
-
-    def ask(self, what: str) -> None:
-        self.page.request.get(f"{self.address}/ask/{what}")
-
-    def wait(self, fact: str, argument: object = None) -> Any:
-        return self.page.wait_for_function(fact, arg=argument).json_value()
-
-    def heard(self, fact: str) -> list[dict[str, Any]]:
-        """Wait until a fact of all that was said since the visit began is so, and return that."""
-        said: list[dict[str, Any]] = self.wait(
-            """async ([mark, fact]) => {
-                const said = (await (await fetch('/received')).json()).slice(mark);
-                return eval(fact)(said) ? said : null;
-            }""",
-            [self.mark, fact],
-        )
-        return said
-
-    def feed(self, expression: str) -> Any:
-        return self.page.evaluate(
-            f"import('kiks-desk').then(({{ pageFeed }}) => {{ const feed = pageFeed(); return {expression}; }})"
-        )
-
-    def pose(self, robot: int = 0) -> tuple[float, float, float]:
-        frame = self.feed(f"(({{x_mm, y_mm, heading_rad}}) => [x_mm, y_mm, heading_rad])(feed.frame.robot({robot}))")
-        return frame[0], frame[1], frame[2]
-
-    def on_page(self, x_mm: float, y_mm: float) -> tuple[float, float]:
-        x, y = self.page.evaluate("([x, y]) => kiksDesk.toClient(x, y)", [x_mm, y_mm])
-        return x, y
-
-    def drag(self, start: tuple[float, float], end: tuple[float, float], button: Any = "left") -> None:
-        mouse = self.page.mouse
-        mouse.move(*self.on_page(*start))
-        mouse.down(button=button)
-        mouse.move(*self.on_page(*end), steps=8)
-        mouse.up(button=button)
-
-    def click(self, x_mm: float, y_mm: float) -> None:
-        self.page.mouse.click(*self.on_page(x_mm, y_mm))
-
-    def colour(self, x_mm: float, y_mm: float) -> tuple[int, ...]:
-        x, y = self.on_page(x_mm, y_mm)
-        pixel = Image.open(io.BytesIO(self.page.screenshot())).convert("RGB").getpixel((round(x), round(y)))
-        assert isinstance(pixel, tuple)
-        return pixel
-
-
 @pytest.fixture
 def visit(browser: Browser, address: str) -> Iterator[Callable[..., Visit]]:
     """Open pages; at the end, none of them may have had a fault."""
@@ -146,6 +79,7 @@ def last(said: list[dict[str, Any]], kind: str) -> dict[str, Any]:
 def test_both_views_draw(visit: Callable[..., Visit], dark: str) -> None:
     here = visit(f"view=both&dark={dark}")
     here.wait("() => kiksDesk.isSolid() && kiksDesk.stats().solid_frames > 3")
+    assert ("kiks-dark" in here.page.locator("[data-testid=arena]").get_attribute("class")) == (dark == "true")
     here.ask("drive")
     drawn = here.page.evaluate("kiksDesk.stats().frames_drawn")
     here.wait("(drawn) => kiksDesk.stats().frames_drawn > drawn + 10", drawn)
@@ -400,6 +334,17 @@ def test_another_scene_takes_the_place_of_the_first(visit: Callable[..., Visit])
     drawn = here.page.evaluate("kiksDesk.stats().solid_frames")
     here.wait("(drawn) => kiksDesk.stats().solid_frames > drawn + 3", drawn)
     assert here.feed("feed.frame.scene === feed.scene.scene")
+
+
+def test_things_are_dragged_in_three_dimensions_too(visit: Callable[..., Visit]) -> None:
+    here = visit("view=solid")
+    here.wait("() => kiksDesk.isSolid()")
+    x_mm, y_mm, _ = here.pose(1)
+    here.drag((x_mm, y_mm), (x_mm + 50, y_mm + 30))
+    said = here.heard("(said) => said.some((message) => message.kind === 'drop')")
+    assert said[0] == {"kind": "grab", "what": "robot", "index": 1}
+    moved = last(said, "move")
+    assert (moved["x_mm"], moved["y_mm"]) == pytest.approx((x_mm + 50, y_mm + 30), abs=1)
 
 
 def test_without_webgl_the_top_view_goes_on(playwright: Playwright, address: str) -> None:

@@ -7,7 +7,8 @@ export default {
   template: `
     <div ref="root" class="kiks-arena" data-testid="arena" @keydown="press">
       <div ref="topPane" class="kiks-pane kiks-top">
-        <canvas ref="top" class="kiks-canvas" tabindex="0" role="application" :aria-label="label" data-testid="arena-top"></canvas>
+        <canvas ref="top" class="kiks-canvas" tabindex="0" role="application" :aria-label="label"
+                data-testid="arena-top"></canvas>
       </div>
       <div ref="solidPane" class="kiks-pane kiks-solid" data-testid="arena-solid"></div>
       <div ref="notice" class="kiks-notice" role="status" data-testid="arena-notice" hidden></div>

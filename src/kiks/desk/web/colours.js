@@ -5,7 +5,8 @@ const LIGHT = {
   gridFine: "rgba(70,62,40,.10)", gridCoarse: "rgba(70,62,40,.26)",
   ruler: "rgba(244,245,247,.94)", rulerInk: "#30353d", rulerTick: "#7a818c",
   ink: "#14181d", halo: "rgba(255,255,255,.9)", accent: "#0b62d6", ghost: "rgba(11,98,214,.9)", touch: "#e0261b",
-  lampOff: "#8d8a80", tool: "rgba(11,98,214,.35)", rayAlpha: 0.8, fanAlpha: 0.16, sky: 0xc9ced6, wallFrom: 22, wallTo: 255,
+  lampOff: "#8d8a80", tool: "rgba(11,98,214,.35)", rayAlpha: 0.8, fanAlpha: 0.16,
+  sky: 0xc9ced6, wallFrom: 22, wallTo: 255,
 };
 
 const DARK = {
@@ -13,14 +14,16 @@ const DARK = {
   gridFine: "rgba(220,230,255,.07)", gridCoarse: "rgba(220,230,255,.18)",
   ruler: "rgba(24,28,33,.94)", rulerInk: "#d5dbe4", rulerTick: "#7d8794",
   ink: "#f2f5f8", halo: "rgba(0,0,0,.8)", accent: "#6db1ff", ghost: "rgba(109,177,255,.95)", touch: "#ff5a4d",
-  lampOff: "#77736a", tool: "rgba(109,177,255,.35)", rayAlpha: 0.8, fanAlpha: 0.16, sky: 0x14181d, wallFrom: 4, wallTo: 246,
+  lampOff: "#77736a", tool: "rgba(109,177,255,.35)", rayAlpha: 0.8, fanAlpha: 0.16,
+  sky: 0x14181d, wallFrom: 4, wallTo: 246,
 };
 
 export function palette(isDark) {
   return isDark ? DARK : LIGHT;
 }
 
-/** The grey on the screen of a wall of a brightness from 1 to 255: all of them differ from the floor by shade or by hue. */
+/** The grey on the screen of a wall of a brightness from 1 to 255: all of them differ from the floor by shade or by
+    hue. */
 export function wallGrey(brightness, colours) {
   return Math.round(colours.wallFrom + (colours.wallTo - colours.wallFrom) * (brightness / 255));
 }
@@ -41,7 +44,8 @@ export function rgba([red, green, blue], alpha = 1) {
   return `rgba(${red},${green},${blue},${alpha})`;
 }
 
-/** The colour of a robot's number and trail: hues that differ by the golden share stay apart, however many there are. */
+/** The colour of a robot's number and trail: hues that differ by the golden share stay apart, however many there
+    are. */
 export function robotHue(index) {
   return (212 + 222.5 * index) % 360;
 }

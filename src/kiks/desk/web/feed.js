@@ -10,7 +10,8 @@
    feed.on(what, callback) tells of "scene", "shapes", "frame" and "connection", and returns a function that ends that.
    feed.send(object) sends a message, and says whether there was a connection to send it on.
 
-   A hidden page does not acknowledge: the server then rests, and the newest frame comes when the page is looked at again. */
+   A hidden page does not acknowledge: the server then rests, and the newest frame comes when the page is looked at
+   again. */
 
 import { Frame } from "./frame.js";
 

@@ -58,11 +58,13 @@ export class Floor {
     const draw = (step_mm, colour) => {
       const step = step_mm * viewport.scale;
       context.beginPath();
-      for (let x = left + step * Math.max(1, Math.ceil(-left / step)); x < Math.min(right, viewport.width_px); x += step) {
+      const first_x = left + step * Math.max(1, Math.ceil(-left / step)), last_x = Math.min(right, viewport.width_px);
+      for (let x = first_x; x < last_x; x += step) {
         context.moveTo(Math.round(x) + 0.5, Math.max(top, 0));
         context.lineTo(Math.round(x) + 0.5, Math.min(bottom, viewport.height_px));
       }
-      for (let y = bottom - step * Math.max(1, Math.ceil((bottom - viewport.height_px) / step)); y > Math.max(top, 0); y -= step) {
+      const first_y = bottom - step * Math.max(1, Math.ceil((bottom - viewport.height_px) / step));
+      for (let y = first_y; y > Math.max(top, 0); y -= step) {
         context.moveTo(Math.max(left, 0), Math.round(y) + 0.5);
         context.lineTo(Math.min(right, viewport.width_px), Math.round(y) + 0.5);
       }
@@ -75,7 +77,8 @@ export class Floor {
   }
 }
 
-/** Return a canvas of a pixel a cell: walls with their edges, and a shade on the floor below and to the right of them. */
+/** Return a canvas of a pixel a cell: walls with their edges, and a shade on the floor below and to the right of
+    them. */
 function paintWalls({ cells, columns, rows, mm_per_cell }, colours) {
   const canvas = document.createElement("canvas");
   canvas.width = columns;

@@ -1,7 +1,9 @@
-/* One frame of the feed: what moves, as typed views into the bytes that came. Nothing is copied and nothing is drawn here.
+/* One frame of the feed: what moves, as typed views into the bytes that came. Nothing is copied and nothing is drawn
+   here.
 
-   The layout is that of kiks/desk/frames.py: a head of 32 bytes, then 32 words for each robot, 3 for each body, 4 for each
-   lamp, 68 bytes for each camera and 56 ray lengths for each robot. Little endian, as every browser's own arrays are. */
+   The layout is that of kiks/desk/frames.py: a head of 32 bytes, then 32 words for each robot, 3 for each body, 4
+   for each lamp, 68 bytes for each camera and 56 ray lengths for each robot. Little endian, as every browser's own
+   arrays are. */
 
 const HEAD_BYTES = 32;
 const ROBOT_WORDS = 32;
@@ -123,10 +125,10 @@ export class Frame {
 
   /** The camera of a robot: {light, pixels}, 64 greys from the left; null for a robot without one. */
   camera(index) {
-    const head = new DataView(this.buffer, this._cameras_at, this.camera_count * CAMERA_BYTES);
-    for (let at = 0; at < head.byteLength; at += CAMERA_BYTES)
+    const head = new DataView(this.buffer), end = this._cameras_at + this.camera_count * CAMERA_BYTES;
+    for (let at = this._cameras_at; at < end; at += CAMERA_BYTES)
       if (head.getUint16(at, true) === index)
-        return { light: head.getUint16(at + 2, true), pixels: new Uint8Array(this.buffer, this._cameras_at + at + 4, PIXELS) };
+        return { light: head.getUint16(at + 2, true), pixels: new Uint8Array(this.buffer, at + 4, PIXELS) };
     return null;
   }
 

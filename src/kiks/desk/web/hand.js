@@ -109,7 +109,8 @@ export class Hand {
     const isFresh = this._key && isSame(this._key, this.selected) && now_ms - this._key.at_ms < KEY_MEMORY_MS;
     const isNear = isFresh && Math.hypot(this._key.x_mm - there.x_mm, this._key.y_mm - there.y_mm) < KEY_LEAD_MM;
     const from = isNear ? this._key : there;
-    const next = { x_mm: from.x_mm + x_mm, y_mm: from.y_mm + y_mm, heading_rad: wrap((from.heading_rad ?? 0) + turn_rad) };
+    const heading_rad = wrap((from.heading_rad ?? 0) + turn_rad);
+    const next = { x_mm: from.x_mm + x_mm, y_mm: from.y_mm + y_mm, heading_rad };
     this._key = { what, index, ...next, at_ms: now_ms };
     if (!this.feed.send({ kind: "grab", what, index })) return false;
     if (turn_rad) this.feed.send({ kind: "turn", heading_rad: next.heading_rad });

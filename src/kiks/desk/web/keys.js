@@ -1,4 +1,5 @@
-/* The keyboard: Tab or n goes through all things, arrows move the chosen one (or the view), q and e turn it, + and - zoom. */
+/* The keyboard: Tab or n goes through all things, arrows move the chosen one (or the view), q and e turn it, + and -
+   zoom. */
 
 import { allThings, isSame } from "./things.js";
 

@@ -15,7 +15,8 @@ export function lightMap(raster, lamps, rgb, strongest) {
   const lit = lamps.filter((lamp) => lamp.isOn && lamp.power_w > 0);
   if (!lit.length) return null;
   const cell_mm = Math.max(raster.width_mm, raster.height_mm) / LONGEST_SIDE;
-  const columns = Math.max(1, Math.round(raster.width_mm / cell_mm)), rows = Math.max(1, Math.round(raster.height_mm / cell_mm));
+  const columns = Math.max(1, Math.round(raster.width_mm / cell_mm));
+  const rows = Math.max(1, Math.round(raster.height_mm / cell_mm));
   const light = new Float32Array(columns * rows);
   for (const lamp of lit) shine(lamp, raster, light, columns, rows, cell_mm);
   const soft = blurred(light, columns, rows), canvas = document.createElement("canvas");
@@ -37,7 +38,8 @@ function blurred(light, columns, rows) {
     for (let column = 0; column < columns; column++, k++) {
       let sum = 0;
       for (let y = Math.max(0, row - 1); y <= Math.min(rows - 1, row + 1); y++)
-        for (let x = Math.max(0, column - 1); x <= Math.min(columns - 1, column + 1); x++) sum += light[y * columns + x];
+        for (let x = Math.max(0, column - 1); x <= Math.min(columns - 1, column + 1); x++)
+          sum += light[y * columns + x];
       soft[k] = sum / ((1 + (row > 0) + (row < rows - 1)) * (1 + (column > 0) + (column < columns - 1)));
     }
   return soft;
@@ -49,14 +51,18 @@ function shine(lamp, raster, light, columns, rows, cell_mm) {
     const y = raster.height_mm - (row + 0.5) * cell_mm - lamp.y_mm;
     for (let column = 0; column < columns; column++) {
       const x = (column + 0.5) * cell_mm - lamp.x_mm, square = x * x + y * y;
-      const turn = (Math.atan2(y, x) / (2 * Math.PI) + 1) * DIRECTIONS, before = Math.floor(turn), share = turn - before;
-      const seen = (reach[before % DIRECTIONS] >= square ? 1 - share : 0) + (reach[(before + 1) % DIRECTIONS] >= square ? share : 0);
+      const turn = (Math.atan2(y, x) / (2 * Math.PI) + 1) * DIRECTIONS;
+      const before = Math.floor(turn);
+      const share = turn - before;
+      const isSeen = (direction) => reach[direction % DIRECTIONS] >= square;
+      const seen = (isSeen(before) ? 1 - share : 0) + (isSeen(before + 1) ? share : 0);
       light[row * columns + column] += (seen * lamp.power_w) / (square + HEIGHT_MM * HEIGHT_MM);
     }
   }
 }
 
-/** Return the square of the way to the first wall in each direction [mm^2], a cell more so that walls' faces are lit. */
+/** Return the square of the way to the first wall in each direction [mm^2], a cell more so that walls' faces are
+    lit. */
 function reaches(lamp, raster, step_mm) {
   const reach = new Float32Array(DIRECTIONS), { cells, columns, rows, mm_per_cell } = raster;
   for (let k = 0; k < DIRECTIONS; k++) {

@@ -1,8 +1,8 @@
 /* Mouse, pen and fingers: drags things, turns robots by their rim, pans, pinches, draws with a tool, and picks.
 
-   It works on a surface: {element, toArena(clientX, clientY) -> [x_mm, y_mm] or null, scale (pixels/mm), viewport or null,
-   claim(isClaimed)}. The top view has a viewport to pan and zoom; the 3-D view moves its camera by itself while the pointer
-   is not claimed. */
+   It works on a surface: {element, toArena(clientX, clientY) -> [x_mm, y_mm] or null, scale (pixels/mm), viewport or
+   null, claim(isClaimed)}. The top view has a viewport to pan and zoom; the 3-D view moves its camera by itself
+   while the pointer is not claimed. */
 
 import { thingAt } from "./things.js";
 
@@ -11,12 +11,14 @@ const CLICK_PX = { mouse: 4, pen: 6, touch: 9 };
 const MIDDLE = 1, RIGHT = 2;
 
 export class Pointer {
-  /** `tell` is {pick(pick), draw(stroke), view(), fit()}: a click, a stroke, a view moved by hand, a wish to see all. */
+  /** `tell` is {pick(pick), draw(stroke), view(), fit()}: a click, a stroke, a view moved by hand, a wish to see
+      all. */
   constructor(surface, feed, hand, drawing, tell) {
     Object.assign(this, { surface, feed, hand, drawing, tell });
     this._fingers = new Map();
     this._press = null;
-    const { element } = surface, listen = (name, act, options) => element.addEventListener(name, act.bind(this), options);
+    const { element } = surface;
+    const listen = (name, act, options) => element.addEventListener(name, act.bind(this), options);
     listen("pointerdown", this._down);
     listen("pointermove", this._move);
     listen("pointerup", this._up);

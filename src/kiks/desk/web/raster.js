@@ -1,4 +1,5 @@
-/* The arena's raster: brightness of each cell (0 floor, 1 black wall to 255 white wall), row 0 on top, read from its picture. */
+/* The arena's raster: brightness of each cell (0 floor, 1 black wall to 255 white wall), row 0 on top, read from its
+   picture. */
 
 /** Read the raster of a scene's arena: {columns, rows, cells: Uint8Array, mm_per_cell, width_mm, height_mm}. */
 export async function loadRaster(arena) {

@@ -11,7 +11,9 @@ export function merge(parts) {
     return { piece: piece.applyMatrix4(matrix), colour: new THREE.Color(colour) };
   });
   const count = pieces.reduce((sum, { piece }) => sum + piece.attributes.position.count, 0);
-  const positions = new Float32Array(3 * count), normals = new Float32Array(3 * count), colours = new Float32Array(3 * count);
+  const positions = new Float32Array(3 * count);
+  const normals = new Float32Array(3 * count);
+  const colours = new Float32Array(3 * count);
   let at = 0;
   for (const { piece, colour } of pieces) {
     positions.set(piece.attributes.position.array, at);

@@ -70,7 +70,8 @@ export class SolidRobots {
     const bars = [-20, 20].map((y) => [box(from_mm, 3, 4), "#8a929c", [from_mm / 2, y, 0]]);
     arm.add(new THREE.Mesh(merge([...bars, [box(4, 58, 6), "#8a929c", [from_mm, 0, 0]]]), this._material));
     const jaws = [-1, 1].map(() => {
-      const jaw = new THREE.Mesh(merge([[box(to_mm - from_mm, width_mm, 18), "#2c3138", [(from_mm + to_mm) / 2, 0, -5]]]), this._material);
+      const block = box(to_mm - from_mm, width_mm, 18), middle = [(from_mm + to_mm) / 2, 0, -5];
+      const jaw = new THREE.Mesh(merge([[block, "#2c3138", middle]]), this._material);
       arm.add(jaw);
       return jaw;
     });
@@ -94,7 +95,8 @@ export class SolidRobots {
   }
 
   _put(robot, pose, index, show) {
-    const spec = this._robots[index], matrix = this._matrix.makeRotationZ(pose.heading_rad).setPosition(pose.x_mm, pose.y_mm, 0);
+    const spec = this._robots[index];
+    const matrix = this._matrix.makeRotationZ(pose.heading_rad).setPosition(pose.x_mm, pose.y_mm, 0);
     this._bodies.setMatrixAt(index, matrix);
     const place = (mesh, k, x, y, z, turn = 0) =>
       mesh.setMatrixAt(k, this._part.makeRotationZ(turn).setPosition(x, y, z).premultiply(matrix));
@@ -103,7 +105,8 @@ export class SolidRobots {
     spec.sensors.forEach(({ x_mm, y_mm, angle_rad }, k) => {
       place(this._sensors, 8 * index + k, 1.02 * x_mm, 1.02 * y_mm, LOWER_BOARD - 2, angle_rad);
       const bucket = readingBucket(readings[k]), [red, green, blue] = bucket ? READING_COLOURS[bucket] : [48, 54, 62];
-      this._sensors.setColorAt(8 * index + k, this._tint.setRGB(red / 255, green / 255, blue / 255, THREE.SRGBColorSpace));
+      this._tint.setRGB(red / 255, green / 255, blue / 255, THREE.SRGBColorSpace);
+      this._sensors.setColorAt(8 * index + k, this._tint);
     });
     robot.leds.forEach((isOn, k) => {
       place(this._leds, 2 * index + k, ...LED_PLACES[k], UPPER_BOARD + 2.5);
@@ -162,7 +165,8 @@ function turretGeometry(robot) {
   const top = topOf(robot), parts = robot.turrets.length ? [noseOf(robot, top)] : [];
   for (let z = UPPER_BOARD + BOARD + TURRET_STEP; z <= top + 0.1; z += TURRET_STEP) {
     parts.push([column(robot.radius_mm, BOARD, 28), GREEN_ABOVE, [0, 0, z - BOARD / 2]]);
-    for (const side of [-1, 1]) parts.push([box(26, 2.6, TURRET_STEP - BOARD), "#caa64a", [0, side * 20.6, z - TURRET_STEP / 2]]);
+    for (const side of [-1, 1])
+      parts.push([box(26, 2.6, TURRET_STEP - BOARD), "#caa64a", [0, side * 20.6, z - TURRET_STEP / 2]]);
   }
   (robot.shapes ?? []).forEach(({ points, colour, radius_mm }, k) => {
     const height = 8 + 1.2 * k;

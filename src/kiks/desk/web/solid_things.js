@@ -53,7 +53,9 @@ export class SolidThings {
   _putBodies(frame) {
     this._balls.count = this._cylinders.count = Math.min(this._bodies.length, frame.body_count);
     for (let index = 0; index < this._balls.count; index++) {
-      const { what, radius_mm } = this._bodies[index], { x_mm, y_mm, isLifted } = frame.body(index), lift = isLifted ? LIFT_MM : 0;
+      const { what, radius_mm } = this._bodies[index];
+      const { x_mm, y_mm, isLifted } = frame.body(index);
+      const lift = isLifted ? LIFT_MM : 0;
       const put = (mesh, isShown, height, middle) => {
         this._size.set(radius_mm, radius_mm, height).multiplyScalar(isShown ? 1 : 0);
         this._matrix.compose(this._place.set(x_mm, y_mm, middle + lift), this._upright, this._size);
@@ -86,7 +88,8 @@ export class SolidThings {
 }
 
 function lampOf(isReal) {
-  const lamp = new THREE.Group(), bulb = new THREE.Mesh(new THREE.SphereGeometry(9, 14, 10), new THREE.MeshBasicMaterial());
+  const lamp = new THREE.Group();
+  const bulb = new THREE.Mesh(new THREE.SphereGeometry(9, 14, 10), new THREE.MeshBasicMaterial());
   const pole = new THREE.Mesh(column(1.2, LAMP_MM, 6), new THREE.MeshBasicMaterial({ color: "#8b8f96" }));
   pole.position.z = LAMP_MM / 2;
   bulb.position.z = LAMP_MM;
@@ -117,9 +120,12 @@ function glowTexture() {
 
 function rayLines(robot_count) {
   const geometry = new THREE.BufferGeometry(), corners = 2 * RAYS_PER_ROBOT * robot_count;
-  for (const name of ["position", "color"])
-    geometry.setAttribute(name, new THREE.BufferAttribute(new Float32Array(3 * corners), 3).setUsage(THREE.DynamicDrawUsage));
-  return new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ vertexColors: true, transparent: true, opacity: 0.6 }));
+  for (const name of ["position", "color"]) {
+    const numbers = new THREE.BufferAttribute(new Float32Array(3 * corners), 3);
+    geometry.setAttribute(name, numbers.setUsage(THREE.DynamicDrawUsage));
+  }
+  const material = new THREE.LineBasicMaterial({ vertexColors: true, transparent: true, opacity: 0.6 });
+  return new THREE.LineSegments(geometry, material);
 }
 
 const RAY_TINTS = READING_COLOURS.map(([red, green, blue]) => {
@@ -135,10 +141,12 @@ function putRays(geometry, frame, scene, poses) {
     const cosine = Math.cos(heading_rad), sine = Math.sin(heading_rad);
     for (let sensor = 0; sensor < SENSORS; sensor++) {
       const spec = robot.sensors[sensor], [red, green, blue] = RAY_TINTS[readingBucket(readings[sensor])];
-      const from_x = x_mm + spec.x_mm * cosine - spec.y_mm * sine, from_y = y_mm + spec.x_mm * sine + spec.y_mm * cosine;
+      const from_x = x_mm + spec.x_mm * cosine - spec.y_mm * sine;
+      const from_y = y_mm + spec.x_mm * sine + spec.y_mm * cosine;
       for (let ray = 0; ray < RAYS_PER_SENSOR; ray++, at += 6) {
         const length = lengths[sensor * RAYS_PER_SENSOR + ray];
-        const length_mm = length === NO_HIT ? robot.reach_mm : length * RAY_UNIT_MM, angle = heading_rad + spec.rays_rad[ray];
+        const length_mm = length === NO_HIT ? robot.reach_mm : length * RAY_UNIT_MM;
+        const angle = heading_rad + spec.rays_rad[ray];
         places[at] = from_x;
         places[at + 1] = from_y;
         places[at + 3] = from_x + length_mm * Math.cos(angle);

@@ -1,5 +1,6 @@
-/* The arena in three dimensions, with three.js. It orbits, pans, zooms and follows a robot from behind; no shadows, few
-   triangles: it has to run without a graphics card too. Making one throws an Error that says why there is no 3-D here. */
+/* The arena in three dimensions, with three.js. It orbits, pans, zooms and follows a robot from behind; no shadows,
+   few triangles: it has to run without a graphics card too. Making one throws an Error that says why there is no 3-D
+   here. */
 
 import { OrbitControls, THREE } from "nicegui-scene";
 import { palette } from "./colours.js";
@@ -19,8 +20,8 @@ const FILLED = 0.95;
 const GRIP_MM = 14;
 const CHASE_BEHIND_MM = 260, CHASE_ABOVE_MM = 170;
 const NO_WEBGL =
-  "The 3-D view needs WebGL 2, which this browser does not offer or has switched off. Allow hardware acceleration in its " +
-  "settings, or use another browser. The view from above works without it.";
+  "The 3-D view needs WebGL 2, which this browser does not offer or has switched off. Allow hardware acceleration in " +
+  "its settings, or use another browser. The view from above works without it.";
 
 export class SolidView {
   constructor(canvas, feed, isDark) {
@@ -31,6 +32,8 @@ export class SolidView {
     this.follow = -1;
     this.show = {};
     this.viewport = null;
+    /** Counts how often the camera has moved, for those who draw. */
+    this.changes = 0;
     this._renderer = new THREE.WebGLRenderer({ canvas, context });
     this._renderer.setPixelRatio(1);
     this._scene = new THREE.Scene();
@@ -56,6 +59,7 @@ export class SolidView {
     this._controls.maxPolarAngle = 0.49 * Math.PI;
     this._controls.minDistance = 60;
     this._controls.addEventListener("start", () => (this._isMoved = true));
+    this._controls.addEventListener("change", () => this.changes++);
     this.fit();
   }
 
@@ -71,8 +75,16 @@ export class SolidView {
     const { left, top, width, height } = this.canvas.getBoundingClientRect();
     const at = new THREE.Vector2((2 * (clientX - left)) / width - 1, 1 - (2 * (clientY - top)) / height);
     this._raycaster.setFromCamera(at, this._camera);
-    const hit = this._raycaster.ray.intersectPlane(new THREE.Plane(new THREE.Vector3(0, 0, 1), -GRIP_MM), new THREE.Vector3());
+    const level = new THREE.Plane(new THREE.Vector3(0, 0, 1), -GRIP_MM);
+    const hit = this._raycaster.ray.intersectPlane(level, new THREE.Vector3());
     return hit ? [hit.x, hit.y] : null;
+  }
+
+  /** Where a place of the arena, at the height where the pointer holds things, is on the page. */
+  toClient(x_mm, y_mm) {
+    const { left, top, width, height } = this.canvas.getBoundingClientRect();
+    const { x, y } = new THREE.Vector3(x_mm, y_mm, GRIP_MM).project(this._camera);
+    return [left + ((x + 1) / 2) * width, top + ((1 - y) / 2) * height];
   }
 
   claim(isClaimed) { this._controls.enabled = !isClaimed; }
@@ -128,7 +140,8 @@ export class SolidView {
   fit() {
     const arena = this.feed.scene?.arena;
     if (!arena || !this._controls) return;
-    const { width_mm, height_mm } = arena, [x, y, up] = [width_mm / 2, 0.48 * height_mm, new THREE.Vector3(0, -0.62, 0.78)];
+    const { width_mm, height_mm } = arena;
+    const [x, y, up] = [width_mm / 2, 0.48 * height_mm, new THREE.Vector3(0, -0.62, 0.78)];
     this._isMoved = false;
     this._controls.target.set(x, y, 0);
     const look = (way_mm) => {
@@ -158,8 +171,7 @@ export class SolidView {
       this._robots.update(frame, poses, this.show);
       this._things.update(frame, scene, poses, this.show);
       this._chase(poses[this.follow]);
-      this._mark(this._ring, selected && selected.index < countOf(this.feed, selected.what)
-        ? { ...placeOf(frame, selected.what, selected.index), radius_mm: radiusOf(scene, selected.what, selected.index) } : null);
+      this._mark(this._ring, this._markOf(selected));
       this._mark(this._ghost, ghost);
     }
     this._renderer.render(this._scene, this._camera);
@@ -168,12 +180,19 @@ export class SolidView {
   _paintFloor(frame) {
     if (!this._floor.raster) return;
     const lamps = this.show.light ? Array.from({ length: frame.lamp_count }, (_, index) => frame.lamp(index)) : [];
-    const isLit = this._floor.setLamps(lamps, this._isDark), key = `${this.show.grid} ${this.show.light} ${this._isDark}`;
+    const isLit = this._floor.setLamps(lamps, this._isDark);
+    const key = `${this.show.grid} ${this.show.light} ${this._isDark}`;
     if (!isLit && key === this._floor_key) return;
     this._floor_key = key;
     const show = { isGrid: this.show.grid, isLight: this.show.light, isEdged: false };
     this._floor.paint(this._paper.getContext("2d", { alpha: false }), this._flat, show, this._colours);
     this._map.needsUpdate = true;
+  }
+
+  _markOf(thing) {
+    if (!thing || thing.index >= countOf(this.feed, thing.what)) return null;
+    const { frame, scene } = this.feed, { what, index } = thing;
+    return { ...placeOf(frame, what, index), radius_mm: radiusOf(scene, what, index) };
   }
 
   _mark(ring, place) {
@@ -216,7 +235,8 @@ export class SolidView {
 }
 
 function ringMesh() {
-  const ring = new THREE.Mesh(new THREE.RingGeometry(0.92, 1.08, 40), new THREE.MeshBasicMaterial({ transparent: true, opacity: 0.9 }));
+  const material = new THREE.MeshBasicMaterial({ transparent: true, opacity: 0.9 });
+  const ring = new THREE.Mesh(new THREE.RingGeometry(0.92, 1.08, 40), material);
   ring.visible = false;
   return ring;
 }

@@ -1,6 +1,7 @@
-/* Walls for the 3-D view: as few faces as the raster allows. Tops are rectangles of equal brightness, found greedily; sides
-   are runs along the edges between wall and floor. Light is painted on, by the way the wall around a side's middle faces: so
-   walls that are round in the picture look round, though their sides all run along the raster. */
+/* Walls for the 3-D view: as few faces as the raster allows. Tops are rectangles of equal brightness, found
+   greedily; sides are runs along the edges between wall and floor. Light is painted on, by the way the wall around a
+   side's middle faces: so walls that are round in the picture look round, though their sides all run along the
+   raster. */
 
 import { THREE } from "nicegui-scene";
 import { wallGrey } from "./colours.js";
@@ -58,8 +59,10 @@ function facesOf({ levels, columns, rows }) {
       for (let y = row; y < below; y++) isDone.fill(1, y * columns + column, y * columns + right);
       faces.push([TOP, level, column, row, right, below]);
     }
-  const levelAt = (column, row) => (column < 0 || row < 0 || column >= columns || row >= rows ? 0 : levels[row * columns + column]);
-  /** Go along each line of the raster and make a face of each stretch of wall of one brightness with floor beside it. */
+  const isInside = (column, row) => column >= 0 && row >= 0 && column < columns && row < rows;
+  const levelAt = (column, row) => (isInside(column, row) ? levels[row * columns + column] : 0);
+  /** Go along each line of the raster and make a face of each stretch of wall of one brightness with floor beside
+      it. */
   const runs = (lines, length, cellAt, face) => {
     for (let line = 0; line <= lines; line++)
       for (const [own, other] of [[line, line - 1], [line - 1, line]]) {
@@ -104,8 +107,9 @@ function geometryOf(faces, grid, colours) {
     const x0 = (left - more) * cell_mm, x1 = (right + more) * cell_mm;
     const y0 = height_mm - (above - more) * cell_mm, y1 = height_mm - (below + more) * cell_mm;
     const top = WALL_HEIGHT_MM, shade = kind === TOP ? 1 : shadeOf(grid, (left + right) / 2, (above + below) / 2);
-    positions.set(
-      kind === TOP ? [x0, y0, top, x1, y0, top, x1, y1, top, x0, y1, top] : [x0, y0, 0, x1, y1, 0, x1, y1, top, x0, y0, top], 12 * k);
+    const flat = [x0, y0, top, x1, y0, top, x1, y1, top, x0, y1, top];
+    const upright = [x0, y0, 0, x1, y1, 0, x1, y1, top, x0, y0, top];
+    positions.set(kind === TOP ? flat : upright, 12 * k);
     const grey = ((12 + 0.92 * wallGrey((level - 0.5) * (256 / LEVELS), colours)) * shade) / 255;
     tint.setRGB(grey, grey, grey * 1.01, THREE.SRGBColorSpace);
     for (let corner = 0; corner < 4; corner++) tints.set([tint.r, tint.g, tint.b], 12 * k + 3 * corner);

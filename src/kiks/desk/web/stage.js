@@ -31,7 +31,7 @@ export class Stage {
     this.frames_drawn = this.solid_frames = 0;
     this._times_ms = [];
     this._isWanted = true;
-    this._picture = 0;
+    this._beats = 0;
     this._tell = {
       pick: (pick) => tell("pick", pick),
       draw: (stroke) => tell("draw", stroke),
@@ -116,8 +116,9 @@ export class Stage {
     };
   }
 
-  /** Where a place of the arena is on the page. */
+  /** Where a place of the arena is on the page: from above, unless the 3-D view is alone. */
   toClient(x_mm, y_mm) {
+    if (this.view === "solid" && this.solidView) return this.solidView.toClient(x_mm, y_mm);
     const { left, top } = this.top.getBoundingClientRect(), [x, y] = this.topView.viewport.toScreen(x_mm, y_mm);
     return [left + x, top + y];
   }
@@ -209,7 +210,7 @@ export class Stage {
   _loseSolid() {
     if (this._isOver) return;
     this.solidView = null;
-    this._tellSolid("The graphics card has lost the 3-D view. Reload the page to have it back; the view from above goes on.");
+    this._tellSolid("The graphics card has lost the 3-D view. Reload the page to have it back.");
   }
 
   _tellSolid(text) {
@@ -240,25 +241,34 @@ export class Stage {
   _tick(now_ms) {
     this._beat = requestAnimationFrame((next_ms) => this._tick(next_ms));
     this.hand.flush();
-    if (!this._hasChanged(now_ms)) return;
-    const { selected, hovered, ghost } = this.hand, isFocused = this.root.classList.contains("kiks-keys") && this.root.contains(document.activeElement);
-    const marks = { selected, hovered, ghost, preview: this.drawing.preview, isFocused };
-    if (this.view !== "solid") this.topView.draw(marks, now_ms);
-    this._picture++;
-    if (this.view !== "top" && this.solidView && this._picture % 2 === 0) {
-      this.solidView.draw(marks, now_ms);
+    this._beats++;
+    const hasChanged = this._hasChanged(now_ms), isSolidShown = this.view !== "top" && this.solidView;
+    this._isSolidDue ||= hasChanged;
+    if (hasChanged && this.view !== "solid") this.topView.draw(this._marks(), now_ms);
+    if (isSolidShown && this._isSolidDue && this._beats % 2 === 0) {
+      this.solidView.draw(this._marks(), now_ms);
       this.solid_frames++;
+      this._isSolidDue = false;
     }
+    if (!hasChanged) return;
     this.frames_drawn++;
     this._times_ms.push(now_ms);
     if (this._times_ms.length > 60) this._times_ms.shift();
   }
 
+  /** What the hand adds to both views. */
+  _marks() {
+    const { selected, hovered, ghost } = this.hand;
+    const isFocused = this.root.classList.contains("kiks-keys") && this.root.contains(document.activeElement);
+    return { selected, hovered, ghost, preview: this.drawing.preview, isFocused };
+  }
+
   /** Say whether there is anything new to see; a world that stands still costs nothing. */
   _hasChanged(now_ms) {
-    const { frame } = this.feed, isChasing = this.solidView && this.view !== "top";
-    const key = `${frame?.share(now_ms)} ${this.hand.changes} ${this.drawing.changes} ${this.topView.viewport.changes}`;
-    const hasChanged = this._isWanted || frame !== this._seen || key !== this._key || isChasing;
+    const { frame } = this.feed;
+    const counts = [this.hand, this.drawing, this.topView.viewport, this.solidView].map((part) => part?.changes);
+    const key = `${frame?.share(now_ms)} ${counts}`;
+    const hasChanged = this._isWanted || frame !== this._seen || key !== this._key;
     [this._isWanted, this._seen, this._key] = [false, frame, key];
     return hasChanged;
   }

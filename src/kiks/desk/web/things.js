@@ -1,4 +1,5 @@
-/* What can be picked, dragged and turned: robots, bodies, lamps and the sensors of the chosen robot, and where they are. */
+/* What can be picked, dragged and turned: robots, bodies, lamps and the sensors of the chosen robot, and where they
+   are. */
 
 /** Radius of the mark of a lamp [mm]. */
 export const LAMP_RADIUS_MM = 11;
@@ -75,7 +76,8 @@ export function thingAt(feed, x_mm, y_mm, scale, withHandle) {
   for (let index = countOf(feed, "body") - 1; index >= 0; index--)
     if (isWithin(frame.body(index), Math.max(scene.bodies[index].radius_mm, finger_mm))) return found("body", index);
   for (let index = countOf(feed, "robot") - 1; index >= 0; index--) {
-    const reach_mm = scene.robots[index].radius_mm + Math.max(RIM_BEYOND * scene.robots[index].radius_mm, RIM_LEAST_PX / scale);
+    const { radius_mm } = scene.robots[index];
+    const reach_mm = radius_mm + Math.max(RIM_BEYOND * radius_mm, RIM_LEAST_PX / scale);
     if (isWithin(frame.pose(index), reach_mm)) return found("robot", index, { isRim: true });
   }
   return floor;

@@ -1,5 +1,5 @@
-/* Drawing on the arena: rectangle, line, freehand and point, snapped to a grid and kept within the arena. What is drawn is
-   only shown here, as a preview; the editor does it. */
+/* Drawing on the arena: rectangle, line, freehand and point, snapped to a grid and kept within the arena. What is
+   drawn is only shown here, as a preview; the editor does it. */
 
 const LEAST_STEP_MM = 0.5;
 
@@ -37,7 +37,8 @@ export class Drawing {
   /** End the stroke and return it: {kind, points}; null when none was begun. */
   end() {
     if (!this.isDrawing) return null;
-    const { kind } = this.tool, points = kind === "line" || kind === "rectangle" ? [this.points[0], this.points.at(-1)] : this.points;
+    const { kind } = this.tool;
+    const points = kind === "line" || kind === "rectangle" ? [this.points[0], this.points.at(-1)] : this.points;
     this.cancel();
     this.points = [points.at(-1)];
     return { kind, points };

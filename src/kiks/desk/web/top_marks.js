@@ -4,8 +4,9 @@ import { countOf, handleOf, placeOf, radiusOf } from "./things.js";
 
 /** Draw the marks {selected, hovered, ghost, preview}; `context` takes CSS pixels. */
 export function paintMarks(context, viewport, feed, { selected, hovered, ghost, preview, isFocused }, colours) {
-  if (hovered && hovered.index < countOf(feed, hovered.what)) paintRing(context, viewport, feed, hovered, colours, false, false);
-  if (selected && selected.index < countOf(feed, selected.what)) paintRing(context, viewport, feed, selected, colours, true, isFocused);
+  const isThere = (thing) => thing && thing.index < countOf(feed, thing.what);
+  if (isThere(hovered)) paintRing(context, viewport, feed, hovered, colours, false, false);
+  if (isThere(selected)) paintRing(context, viewport, feed, selected, colours, true, isFocused);
   if (ghost) paintGhost(context, viewport, ghost, colours);
   if (preview) paintPreview(context, viewport, preview, colours);
 }
@@ -55,14 +56,15 @@ function paintGhost(context, viewport, { x_mm, y_mm, heading_rad, radius_mm }, c
 }
 
 function paintPreview(context, viewport, { kind, points, brush_mm, isDrawing, text }, colours) {
-  const places = points.map(([x_mm, y_mm]) => viewport.toScreen(x_mm, y_mm)), width = Math.max(1, brush_mm * viewport.scale);
+  const places = points.map(([x_mm, y_mm]) => viewport.toScreen(x_mm, y_mm));
+  const width = Math.max(1, brush_mm * viewport.scale);
   const [x, y] = places.at(-1);
   context.strokeStyle = context.fillStyle = colours.tool;
   context.lineCap = context.lineJoin = "round";
   context.lineWidth = width;
   context.beginPath();
   if (kind === "rectangle" && isDrawing) {
-    const box = [Math.min(places[0][0], x), Math.min(places[0][1], y), Math.abs(x - places[0][0]), Math.abs(y - places[0][1])];
+    const [[left, top]] = places, box = [Math.min(left, x), Math.min(top, y), Math.abs(x - left), Math.abs(y - top)];
     context.fillRect(...box);
     context.lineWidth = 1.5;
     context.strokeStyle = colours.accent;

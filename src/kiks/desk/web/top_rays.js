@@ -1,4 +1,5 @@
-/* Rays of the proximity sensors and the cameras' fields of view, from above. One path for each colour holds all rays. */
+/* Rays of the proximity sensors and the cameras' fields of view, from above. One path for each colour holds all
+   rays. */
 
 import { NO_HIT, RAY_UNIT_MM, RAYS_PER_SENSOR, SENSORS } from "./frame.js";
 import { READING_COLOURS, readingBucket, rgba } from "./colours.js";

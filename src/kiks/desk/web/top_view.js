@@ -1,5 +1,5 @@
-/* The arena from above on a canvas. What stands still (floor, walls, grid, trails) is drawn ahead, off screen, and again only
-   when the view, the scene or the light changes; each picture then draws what moves over it. */
+/* The arena from above on a canvas. What stands still (floor, walls, grid, trails) is drawn ahead, off screen, and
+   again only when the view, the scene or the light changes; each picture then draws what moves over it. */
 
 import { bodyColour, LAMPLIGHT, palette, rgba, robotColour } from "./colours.js";
 import { Floor } from "./floor.js";
@@ -28,7 +28,7 @@ export class TopView {
     this._looks = [];
     this._still_key = this._rulers_key = "";
     this._drawn = [];
-    this._isFitted = false;
+    this._isMoved = false;
     this.setDark(false);
   }
 
@@ -44,11 +44,11 @@ export class TopView {
   /** Take a scene; the raster comes later, with setRaster. The view stays where it is when the arena keeps its size. */
   setScene(scene) {
     const size = `${scene.arena.width_mm},${scene.arena.height_mm}`;
-    if (size !== this._size) this._isFitted = false;
+    if (size !== this._size) this._isMoved = false;
     this._size = size;
     this._looks = scene.robots.map((robot) => new RobotLook(robot));
     this.trails.clear();
-    if (!this._isFitted) this.fit();
+    if (!this._isMoved) this.fit();
   }
 
   setShapes(scene) {
@@ -67,23 +67,23 @@ export class TopView {
       canvas.height = Math.max(1, Math.round(height_px * ratio));
     }
     this.viewport.resize(width_px, height_px);
-    if (!this._isFitted) this.fit();
+    if (!this._isMoved) this.fit();
   }
 
   fit() {
     const arena = this.feed.scene?.arena;
     if (!arena) return;
     this.viewport.fit(arena.width_mm, arena.height_mm, MARGIN_PX);
-    this._isFitted = this.viewport.width_px > 1;
+    this._isMoved = false;
   }
 
-  /** What a finger or a key has moved stays as it was put. */
-  keepView() { this._isFitted = true; }
+  /** What a finger or a key has moved stays as it was put, until all of the arena is asked for. */
+  keepView() { this._isMoved = true; }
 
   /** Draw a picture. `marks` is what the pointer adds: {selected, hovered, ghost, preview}. */
   draw(marks, now_ms) {
     const { frame, scene } = this.feed, context = this._context, { viewport } = this;
-    const poses = frame ? Array.from({ length: countOf(this.feed, "robot") }, (_, index) => frame.pose(index, now_ms)) : [];
+    const poses = Array.from({ length: countOf(this.feed, "robot") }, (_, index) => frame.pose(index, now_ms));
     if (poses[this.follow]) viewport.centreOn(poses[this.follow].x_mm, poses[this.follow].y_mm);
     this._drawStill(frame);
     context.setTransform(1, 0, 0, 1, 0, 0);
@@ -106,7 +106,8 @@ export class TopView {
       this._drawn = [];
       this._still_key = key;
     }
-    if (show.trails) this._drawn = this.trails.paint(context, viewport, this._drawn, (index) => robotColour(index, this._isDark, 0.55));
+    const colourOf = (index) => robotColour(index, this._isDark, 0.55);
+    if (show.trails) this._drawn = this.trails.paint(context, viewport, this._drawn, colourOf);
   }
 
   _drawRulers(context) {
@@ -131,7 +132,9 @@ export class TopView {
     if (show.rays) paintRays(context, viewport, scene, frame, poses, colours);
     const bodies = Array.from({ length: countOf(this.feed, "body") }, (_, index) => frame.body(index));
     const paint = (isLifted) =>
-      bodies.forEach((place, index) => place.isLifted === isLifted && this._drawBody(context, scene.bodies[index], place));
+      bodies.forEach((place, index) => {
+        if (place.isLifted === isLifted) this._drawBody(context, scene.bodies[index], place);
+      });
     paint(false);
     poses.forEach((pose, index) => {
       const [x, y] = viewport.toScreen(pose.x_mm, pose.y_mm), reach = 3 * scene.robots[index].radius_mm * scale;
@@ -153,7 +156,8 @@ export class TopView {
   }
 
   _drawBody(context, body, place) {
-    const [x, y] = this.viewport.toScreen(place.x_mm, place.y_mm), radius = Math.max(2, body.radius_mm * this.viewport.scale);
+    const [x, y] = this.viewport.toScreen(place.x_mm, place.y_mm);
+    const radius = Math.max(2, body.radius_mm * this.viewport.scale);
     const rgb = bodyColour(body), grow = place.isLifted ? 1.12 : 1;
     context.beginPath();
     context.arc(x, y, radius * grow, 0, 2 * Math.PI);
@@ -180,7 +184,8 @@ export class TopView {
   }
 
   _drawLamp(context, lamp) {
-    const [x, y] = this.viewport.toScreen(lamp.x_mm, lamp.y_mm), radius = Math.max(5, LAMP_RADIUS_MM * this.viewport.scale * 0.6);
+    const [x, y] = this.viewport.toScreen(lamp.x_mm, lamp.y_mm);
+    const radius = Math.max(5, LAMP_RADIUS_MM * this.viewport.scale * 0.6);
     if (lamp.isOn) {
       const reach = radius * 4.2, glow = context.createRadialGradient(x, y, 0, x, y, reach);
       glow.addColorStop(0, rgba([255, 250, 225], 1));

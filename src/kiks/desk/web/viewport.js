@@ -58,7 +58,8 @@ export class Viewport {
 
   /** Show all of an arena, with a margin for the rulers. */
   fit(width_mm, height_mm, margin_px) {
-    const width_px = Math.max(this.width_px - 2 * margin_px, 20), height_px = Math.max(this.height_px - 2 * margin_px, 20);
+    const width_px = Math.max(this.width_px - 2 * margin_px, 20);
+    const height_px = Math.max(this.height_px - 2 * margin_px, 20);
     this.scale = Math.min(MOST_SCALE, Math.max(LEAST_SCALE, Math.min(width_px / width_mm, height_px / height_mm)));
     this.x_mm = width_mm / 2;
     this.y_mm = height_mm / 2;

@@ -1,0 +1,83 @@
+"""A page of the desk in a real browser, and what a test asks of it: nothing sleeps, all waiting is for a fact."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+from PIL import Image
+from playwright.sync_api import Page
+
+CHROMIUM = Path("/usr/bin/chromium")
+ARGUMENTS = [
+    *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync"),
+    *("--disable-background-networking", "--disable-component-update", "--enable-unsafe-swiftshader"),
+]
+GUARD_MS = 20_000
+
+
+class Visit:
+    """A page with the arena on it, and what the server hears of it."""
+
+    def __init__(self, page: Page, address: str, query: str) -> None:
+        self.page, self.address = page, address
+        page.set_default_timeout(GUARD_MS)
+        self.faults: list[str] = []
+        page.on("pageerror", lambda error: self.faults.append(str(error)))
+        self.ask("reset")
+        self.mark = len(page.request.get(f"{address}/received").json())
+        page.goto(f"{address}/?{query}")
+        page.wait_for_function("() => window.kiksDesk?.stats().frames_drawn > 3 && kiksDesk.pose(0)")
+
+    def ask(self, what: str) -> None:
+        self.page.request.get(f"{self.address}/ask/{what}")
+
+    def wait(self, fact: str, argument: object = None) -> Any:
+        return self.page.wait_for_function(fact, arg=argument).json_value()
+
+    def heard(self, fact: str) -> list[dict[str, Any]]:
+        """Wait until a fact of all that was said since the visit began is so, and return that."""
+        self.page.evaluate(
+            """([mark, fact]) => {
+                window.said = null;
+                const ask = async () => {
+                    const said = (await (await fetch('/received')).json()).slice(mark);
+                    if (eval(fact)(said)) window.said = said;
+                    else requestAnimationFrame(ask);
+                };
+                ask();
+            }""",
+            [self.mark, fact],
+        )
+        said: list[dict[str, Any]] = self.wait("() => window.said")
+        return said
+
+    def feed(self, expression: str) -> Any:
+        return self.page.evaluate(
+            f"import('kiks-desk').then(({{ pageFeed }}) => {{ const feed = pageFeed(); return {expression}; }})"
+        )
+
+    def pose(self, robot: int = 0) -> tuple[float, float, float]:
+        frame = self.feed(f"(({{x_mm, y_mm, heading_rad}}) => [x_mm, y_mm, heading_rad])(feed.frame.robot({robot}))")
+        return frame[0], frame[1], frame[2]
+
+    def on_page(self, x_mm: float, y_mm: float) -> tuple[float, float]:
+        x, y = self.page.evaluate("([x, y]) => kiksDesk.toClient(x, y)", [x_mm, y_mm])
+        return x, y
+
+    def drag(self, start: tuple[float, float], end: tuple[float, float], button: Any = "left") -> None:
+        mouse = self.page.mouse
+        mouse.move(*self.on_page(*start))
+        mouse.down(button=button)
+        mouse.move(*self.on_page(*end), steps=8)
+        mouse.up(button=button)
+
+    def click(self, x_mm: float, y_mm: float) -> None:
+        self.page.mouse.click(*self.on_page(x_mm, y_mm))
+
+    def colour(self, x_mm: float, y_mm: float) -> tuple[int, ...]:
+        x, y = self.on_page(x_mm, y_mm)
+        pixel = Image.open(io.BytesIO(self.page.screenshot())).convert("RGB").getpixel((round(x), round(y)))
+        assert isinstance(pixel, tuple)
+        return pixel
