@@ -1,5 +1,6 @@
-"""A desk without a simulation: a page with the arena view, and a feed that obeys hands. Run as a program, in a process of
-its own, because NiceGUI keeps one application a process; it prints its address when it listens.
+"""A desk without a simulation: a page with the arena view, and a feed that obeys hands.
+
+It runs as a program, because NiceGUI keeps one application a process; it prints its address when it listens.
 
 `/received` tells what browsers sent, `/ask/WHAT` makes it do something: see `ask`.
 """
@@ -50,13 +51,17 @@ class World:
     """What moves: it goes where hands put it, and robots drive when they are told to."""
 
     def __init__(self, robot_count: int) -> None:
-        self.scene, self.time_s, self.is_driving = 1, 0.0, False
+        self.scene, self.time_s, self.cells = 1, 0.0, arena()
+        self.held: dict[int, tuple[str, int]] = {}
+        self.reset(robot_count)
+
+    def reset(self, robot_count: int) -> None:
+        """Put everything where it begins, and let it stand."""
+        self.is_driving = False
         columns = max(2, math.ceil(math.sqrt(1.5 * robot_count)))
         places = [(150 + 600 * (k % columns) / (columns - 1), 90 + 95 * (k // columns)) for k in range(robot_count)]
         self.robots = [[x, y, 0.7 * k] for k, (x, y) in enumerate(places)]
         self.bodies, self.lamps = [[420.0, 320.0], [500.0, 320.0]], [[700.0, 500.0, 1.0, 1.0], [80.0, 300.0, 1.0, 0.0]]
-        self.held: dict[int, tuple[str, int]] = {}
-        self.cells = arena()
 
     def obey(self, hand: int, message: dict[str, Any]) -> None:
         kind = message["kind"]
@@ -161,6 +166,8 @@ def make_app(robot_count: int) -> FastAPI:
     async def ask(what: str) -> str:
         if what == "drive":
             world.is_driving = True
+        elif what == "reset":
+            world.reset(len(world.robots))
         elif what == "cut":
             for socket in list(sockets):
                 await socket.close()
@@ -228,7 +235,6 @@ def make_app(robot_count: int) -> FastAPI:
 
         with ui.element("div").style("width: 100vw; height: 100vh"):
             arena_view = ArenaView(view=view, on_pick=pick, on_draw=draw)  # type: ignore[arg-type]
-        arena_view.set_dark(dark)
         arena_view.set_show({"trails": True})
         arena_view.set_follow(follow)
         arena_view.set_tool(Tool(tool, brush_mm=10, snap_mm=10, label="wall"))  # type: ignore[arg-type]

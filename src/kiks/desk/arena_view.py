@@ -119,7 +119,7 @@ class ArenaView(
         self.set_view(view)
         self.set_tool(Tool())
         self.set_follow(-1)
-        self.set_dark(False)
+        self.set_dark(None)
         if on_pick is not None:
             self.on("pick", lambda event: on_pick(_pick(event)))
         if on_draw is not None:
@@ -158,8 +158,8 @@ class ArenaView(
         self._props["follow"] = robot
         self.update()
 
-    def set_dark(self, is_dark: bool) -> None:
-        """Draw for a dark page, or for a light one."""
+    def set_dark(self, is_dark: bool | None) -> None:
+        """Draw for a dark page, or for a light one; None follows the page."""
         self._props["dark"] = is_dark
         self.update()
 

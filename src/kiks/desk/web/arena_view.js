@@ -5,7 +5,7 @@ import { KEYS_HELP, Stage } from "kiks-desk";
 
 export default {
   template: `
-    <div ref="root" class="kiks-arena" :class="{'kiks-dark': dark}" data-testid="arena" @keydown="press">
+    <div ref="root" class="kiks-arena" data-testid="arena" @keydown="press">
       <div ref="topPane" class="kiks-pane kiks-top">
         <canvas ref="top" class="kiks-canvas" tabindex="0" role="application" :aria-label="label" data-testid="arena-top"></canvas>
       </div>
@@ -19,7 +19,8 @@ export default {
     show: { type: Object, default: () => ({}) },
     view: { type: String, default: "top" },
     follow: { type: Number, default: -1 },
-    dark: { type: Boolean, default: false },
+    /** null: as the page is. */
+    dark: { type: Boolean, default: null },
   },
   emits: ["pick", "draw"],
   computed: {

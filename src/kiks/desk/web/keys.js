@@ -12,7 +12,7 @@ const TURNS = { q: 1, "<": 1, e: -1, ">": -1 };
 
 export const KEYS_HELP =
   "Tab chooses the next thing, arrow keys move it by 10 mm (with Shift 1 mm), q and e turn it, Escape lets go; " +
-  "plus and minus zoom, f shows everything.";
+  "plus and minus zoom, 0 shows everything.";
 
 /** Act on a key; says whether it was one of ours. `tell` is that of the pointer. */
 export function pressKey(event, feed, hand, drawing, viewport, tell) {
@@ -38,7 +38,7 @@ export function pressKey(event, feed, hand, drawing, viewport, tell) {
     tell.view();
     return true;
   }
-  if (key === "f") {
+  if (key === "f" || key === "0") {
     tell.fit();
     return true;
   }

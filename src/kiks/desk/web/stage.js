@@ -43,6 +43,8 @@ export class Stage {
     this._listen();
     this._sizes = new ResizeObserver(() => this._resize());
     for (const pane of [this.root, this.topPane, this.solidPane]) this._sizes.observe(pane);
+    this._dresses = new MutationObserver(() => this._dress());
+    this._dresses.observe(document.body, { attributeFilter: ["class"] });
     this._resize();
     if (this.feed.scene) this._takeScene(this.feed.scene);
     this._say(this.feed.connection);
@@ -66,8 +68,17 @@ export class Stage {
     this._isWanted = true;
   }
 
+  /** Draw in dark colours or in light ones; null follows the page, which Quasar marks. */
   setDark(isDark) {
+    this._asked = isDark;
+    this._dress();
+  }
+
+  _dress() {
+    const isDark = this._asked ?? document.body.classList.contains("body--dark");
+    if (isDark === this.isDark) return;
     this.isDark = isDark;
+    this.root.classList.toggle("kiks-dark", isDark);
     this.topView.setDark(isDark);
     this.solidView?.setDark(isDark);
     this._isWanted = true;
@@ -115,6 +126,7 @@ export class Stage {
     cancelAnimationFrame(this._beat);
     this._isOver = true;
     this._sizes.disconnect();
+    this._dresses.disconnect();
     for (const stop of this._stops) stop();
     this.hand.drop();
     this.solidView?.dispose();
@@ -135,6 +147,8 @@ export class Stage {
   }
 
   _listen() {
+    this.root.addEventListener("keyup", () => this.root.classList.add("kiks-keys"));
+    this.root.addEventListener("pointerdown", () => this.root.classList.remove("kiks-keys"));
     this._stops = [
       this.feed.on("scene", (scene) => this._takeScene(scene)),
       this.feed.on("shapes", (scene) => {
@@ -227,7 +241,7 @@ export class Stage {
     this._beat = requestAnimationFrame((next_ms) => this._tick(next_ms));
     this.hand.flush();
     if (!this._hasChanged(now_ms)) return;
-    const { selected, hovered, ghost } = this.hand, isFocused = document.activeElement === this.top;
+    const { selected, hovered, ghost } = this.hand, isFocused = this.root.classList.contains("kiks-keys") && this.root.contains(document.activeElement);
     const marks = { selected, hovered, ghost, preview: this.drawing.preview, isFocused };
     if (this.view !== "solid") this.topView.draw(marks, now_ms);
     this._picture++;

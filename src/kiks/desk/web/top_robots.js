@@ -145,7 +145,7 @@ export function paintName(context, name, index, x, y, radius_px, colours) {
   context.textAlign = "center";
   context.textBaseline = "middle";
   if (isInside) {
-    const size = Math.min(30, Math.max(9, 0.62 * radius_px)) / (name.length === 2 ? 1.15 : 1);
+    const size = Math.max(9, 0.6 * radius_px) / (name.length === 2 ? 1.15 : 1);
     context.beginPath();
     context.arc(x, y, 0.42 * radius_px, 0, 2 * Math.PI);
     context.fillStyle = `hsl(${robotHue(index)},72%,36%)`;

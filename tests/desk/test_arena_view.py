@@ -1,0 +1,416 @@
+"""The arena view in a real browser, against a desk without a simulation (fake_desk.py)."""
+
+from __future__ import annotations
+
+import io
+import math
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("nicegui", reason="the desk needs NiceGUI: install kiks[desk]")
+pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
+
+from PIL import Image
+from playwright.sync_api import Browser, Page, Playwright, sync_playwright
+
+CHROMIUM = Path("/usr/bin/chromium")
+ARGUMENTS = [
+    *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync"),
+    *("--disable-background-networking", "--disable-component-update", "--enable-unsafe-swiftshader"),
+]
+GUARD_MS = 20_000
+SENSOR_RAD = math.radians(66.4)
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not CHROMIUM.exists(), reason="tests in a browser need Chromium at /usr/bin/chromium"),
+]
+
+
+@pytest.fixture(scope="module")
+def address() -> Iterator[str]:
+    """Serve the desk of fake_desk.py in a process of its own."""
+    import kiks
+
+    environment = {**os.environ, "PYTHONPATH": str(Path(kiks.__file__).parents[1])}
+    command = [sys.executable, str(Path(__file__).with_name("fake_desk.py"))]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
+        assert process.stdout is not None
+        line = process.stdout.readline().strip()
+        assert line.startswith("http"), "the desk did not start"
+        yield line
+        process.terminate()
+
+
+@pytest.fixture(scope="module")
+def playwright() -> Iterator[Playwright]:
+    with sync_playwright() as playwright:
+        yield playwright
+
+
+@pytest.fixture(scope="module")
+def browser(playwright: Playwright) -> Iterator[Browser]:
+    browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+    yield browser
+    browser.close()
+
+
+class Visit:
+    """A page with the arena on it, and what the server hears of it."""
+
+    def __init__(self, page: Page, address: str, query: str) -> None:
+        self.page, self.address = page, address
+        page.set_default_timeout(GUARD_MS)
+        self.faults: list[str] = []
+        page.on("pageerror", lambda error: self.faults.append(str(error)))
+        self.ask("reset")
+        self.mark = len(page.request.get(f"{address}/received").json())
+        page.goto(f"{address}/?{query}")
+        page.wait_for_function("() => window.kiksDesk?.stats().frames_drawn > 3 && kiksDesk.pose(0)")
+
+    def ask(self, what: str) -> None:
+        self.page.request.get(f"{self.address}/ask/{what}")
+
+    def wait(self, fact: str, argument: object = None) -> Any:
+        return self.page.wait_for_function(fact, arg=argument).json_value()
+
+    def heard(self, fact: str) -> list[dict[str, Any]]:
+        """Wait until a fact of all that was said since the visit began is so, and return that."""
+        said: list[dict[str, Any]] = self.wait(
+            """async ([mark, fact]) => {
+                const said = (await (await fetch('/received')).json()).slice(mark);
+                return eval(fact)(said) ? said : null;
+            }""",
+            [self.mark, fact],
+        )
+        return said
+
+    def feed(self, expression: str) -> Any:
+        return self.page.evaluate(
+            f"import('kiks-desk').then(({{ pageFeed }}) => {{ const feed = pageFeed(); return {expression}; }})"
+        )
+
+    def pose(self, robot: int = 0) -> tuple[float, float, float]:
+        frame = self.feed(f"(({{x_mm, y_mm, heading_rad}}) => [x_mm, y_mm, heading_rad])(feed.frame.robot({robot}))")
+        return frame[0], frame[1], frame[2]
+
+    def on_page(self, x_mm: float, y_mm: float) -> tuple[float, float]:
+        x, y = self.page.evaluate("([x, y]) => kiksDesk.toClient(x, y)", [x_mm, y_mm])
+        return x, y
+
+    def drag(self, start: tuple[float, float], end: tuple[float, float], button: Any = "left") -> None:
+        mouse = self.page.mouse
+        mouse.move(*self.on_page(*start))
+        mouse.down(button=button)
+        mouse.move(*self.on_page(*end), steps=8)
+        mouse.up(button=button)
+
+    def click(self, x_mm: float, y_mm: float) -> None:
+        self.page.mouse.click(*self.on_page(x_mm, y_mm))
+
+    def colour(self, x_mm: float, y_mm: float) -> tuple[int, ...]:
+        x, y = self.on_page(x_mm, y_mm)
+        pixel = Image.open(io.BytesIO(self.page.screenshot())).convert("RGB").getpixel((round(x), round(y)))
+        assert isinstance(pixel, tuple)
+        return pixel
+
+
+@pytest.fixture
+def visit(browser: Browser, address: str) -> Iterator[Callable[..., Visit]]:
+    """Open pages; at the end, none of them may have had a fault."""
+    visits = []
+
+    def open_page(query: str = "", **context: Any) -> Visit:
+        page = browser.new_page(viewport={"width": 1200, "height": 800}, **context)
+        visits.append(Visit(page, address, query))
+        return visits[-1]
+
+    yield open_page
+    faults = [fault for one in visits for fault in one.faults]
+    for one in visits:
+        one.page.close()
+    assert not faults
+
+
+def last(said: list[dict[str, Any]], kind: str) -> dict[str, Any]:
+    return [message for message in said if message["kind"] == kind][-1]
+
+
+@pytest.mark.parametrize("dark", ["true", "false"])
+def test_both_views_draw(visit: Callable[..., Visit], dark: str) -> None:
+    here = visit(f"view=both&dark={dark}")
+    here.wait("() => kiksDesk.isSolid() && kiksDesk.stats().solid_frames > 3")
+    here.ask("drive")
+    drawn = here.page.evaluate("kiksDesk.stats().frames_drawn")
+    here.wait("(drawn) => kiksDesk.stats().frames_drawn > drawn + 10", drawn)
+    shades = {here.colour(115 + 90 * k, 195)[0] // 8 for k in range(5)} | {here.colour(300, 300)[0] // 8}
+    assert len(shades) == 6, "walls of five brightnesses and the floor look different"
+    assert here.page.evaluate("kiksDesk.stats().bytes") > 1000
+
+
+def test_a_frame_is_read_as_it_was_written(visit: Callable[..., Visit]) -> None:
+    here = visit()
+    robot = here.feed(
+        """(({ speeds, commanded, encoders, ambient, arm, jaws, leds, straight_mm }) => ({
+            speeds: [...speeds], commanded: [...commanded], encoders: [...encoders], ambient: [...ambient],
+            arm, jaws, leds, straight_mm,
+        }))(feed.frame.robot(1))"""
+    )
+    assert robot["speeds"] == robot["commanded"] == [10, 10]
+    assert robot["encoders"] == [5, 6]
+    assert robot["ambient"] == [450] * 8
+    assert (robot["arm"], robot["jaws"], robot["straight_mm"], robot["leds"]) == (230, 120, 3, [False, False])
+    assert here.feed("feed.frame.lamp(1).isOn") is False
+    assert here.feed("feed.frame.body(0)") == {"x_mm": 420, "y_mm": 320, "isGripped": False, "isLifted": False}
+    assert here.feed("[feed.frame.camera(0).pixels.length, feed.frame.camera(1), feed.frame.rays(2).length]") == [
+        64,
+        None,
+        56,
+    ]
+    assert here.feed("[feed.frame.speed_now, feed.frame.isPaused, feed.connection]") == [1, False, "open"]
+
+
+def test_a_robot_is_dragged(visit: Callable[..., Visit]) -> None:
+    here = visit()
+    x_mm, y_mm, _ = here.pose(1)
+    here.drag((x_mm + 3, y_mm), (x_mm + 63, y_mm + 40))
+    said = here.heard("(said) => said.some((message) => message.kind === 'drop')")
+    assert said[0] == {"kind": "grab", "what": "robot", "index": 1}
+    moved = last(said, "move")
+    assert (moved["x_mm"], moved["y_mm"]) == pytest.approx((x_mm + 60, y_mm + 40), abs=0.1)
+    assert said[-1]["kind"] == "drop"
+
+
+@pytest.mark.parametrize("how", ["rim", "right button", "shift"])
+def test_a_robot_is_turned(visit: Callable[..., Visit], how: str) -> None:
+    here = visit()
+    x_mm, y_mm, heading_rad = here.pose(2)
+    arm = 25.5 if how == "rim" else 15.0
+    if how == "shift":
+        here.page.keyboard.down("Shift")
+    here.drag((x_mm + arm, y_mm), (x_mm, y_mm + 60), "right" if how == "right button" else "left")
+    said = here.heard("(said) => said.some((message) => message.kind === 'drop')")
+    assert {message["kind"] for message in said} == {"grab", "turn", "drop"}
+    turned = last(said, "turn")["heading_rad"] - heading_rad
+    assert math.remainder(turned - math.pi / 2, 2 * math.pi) == pytest.approx(0, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("what", "index", "place"), [("body", 0, (420, 320)), ("body", 1, (500, 320)), ("lamp", 1, (80, 300))]
+)
+def test_bodies_and_lamps_are_dragged(
+    visit: Callable[..., Visit], what: str, index: int, place: tuple[float, float]
+) -> None:
+    here = visit()
+    here.drag(place, (place[0] + 20, place[1] + 30))
+    said = here.heard("(said) => said.some((message) => message.kind === 'drop')")
+    assert said[0] == {"kind": "grab", "what": what, "index": index}
+    assert (last(said, "move")["x_mm"], last(said, "move")["y_mm"]) == pytest.approx(
+        (place[0] + 20, place[1] + 30), abs=0.1
+    )
+    here.drag((place[0] + 20, place[1] + 30), place)
+    here.heard("(said) => said.filter((message) => message.kind === 'drop').length === 2")
+
+
+def test_escape_puts_back_what_is_dragged(visit: Callable[..., Visit]) -> None:
+    here = visit()
+    here.page.mouse.move(*here.on_page(420, 320))
+    here.page.mouse.down()
+    here.page.mouse.move(*here.on_page(460, 350), steps=4)
+    here.page.keyboard.press("Escape")
+    here.page.mouse.up()
+    said = here.heard("(said) => said.some((message) => message.kind === 'drop')")
+    assert (last(said, "move")["x_mm"], last(said, "move")["y_mm"]) == (420, 320)
+
+
+def test_keys_choose_move_and_turn(visit: Callable[..., Visit]) -> None:
+    here = visit()
+    here.page.locator("[data-testid=arena-top]").focus()
+    here.page.keyboard.press("n")
+    assert "robot 1 chosen" in here.page.locator("[aria-live]").inner_text()
+    x_mm, y_mm, heading_rad = here.pose(0)
+    for key in ("ArrowRight", "Shift+ArrowUp", "q"):
+        here.page.keyboard.press(key)
+    said = here.heard("(said) => said.filter((message) => message.kind === 'drop').length === 3")
+    assert [message["kind"] for message in said] == [
+        "grab",
+        "move",
+        "drop",
+        "grab",
+        "move",
+        "drop",
+        "grab",
+        "turn",
+        "drop",
+    ]
+    assert (last(said, "move")["x_mm"], last(said, "move")["y_mm"]) == pytest.approx((x_mm + 10, y_mm + 1), abs=0.01)
+    assert math.remainder(said[7]["heading_rad"] - heading_rad, 2 * math.pi) == pytest.approx(math.radians(5), abs=1e-3)
+    here.page.keyboard.press("Escape")
+    assert here.page.locator("[aria-live]").inner_text() == "Nothing chosen"
+
+
+def test_tab_leaves_the_view_after_the_last_thing(visit: Callable[..., Visit]) -> None:
+    here = visit()
+    here.page.locator("[data-testid=arena-top]").focus()
+    count = here.feed("feed.frame.robot_count + feed.frame.body_count + feed.frame.lamp_count")
+    for _ in range(count):
+        here.page.keyboard.press("Tab")
+    assert here.page.evaluate("document.activeElement.dataset.testid") == "arena-top"
+    here.page.keyboard.press("Tab")
+    assert here.page.evaluate("document.activeElement.dataset.testid") is None
+
+
+def test_a_click_picks_and_chooses(visit: Callable[..., Visit]) -> None:
+    here = visit()
+    x_mm, y_mm, heading_rad = here.pose(2)
+    here.click(x_mm, y_mm)
+    angle = heading_rad + SENSOR_RAD
+    here.click(x_mm + 24 * math.cos(angle), y_mm + 24 * math.sin(angle))
+    here.click(500, 520)
+    said = here.heard("(said) => said.length === 3")
+    assert [(pick["what"], pick["index"], pick["sensor"]) for pick in said] == [
+        ("robot", 2, -1),
+        ("sensor", 2, 0),
+        ("floor", -1, -1),
+    ]
+    assert (said[2]["x_mm"], said[2]["y_mm"]) == pytest.approx((500, 520), abs=0.7)
+
+
+@pytest.mark.parametrize(
+    ("tool", "points"),
+    [
+        ("rectangle", [[200, 480], [260, 520]]),
+        ("line", [[200, 480], [260, 520]]),
+        ("point", [[260, 520]]),
+        ("freehand", None),
+    ],
+)
+def test_tools_draw_on_the_grid(visit: Callable[..., Visit], tool: str, points: list[list[float]] | None) -> None:
+    here = visit(f"tool={tool}")
+    here.drag((198, 482), (263, 517))
+    (said,) = here.heard("(said) => said.length === 1")
+    assert (said["kind"], said["what"]) == ("draw", tool)
+    if points is None:
+        assert (said["points"][0], said["points"][-1]) == ([200, 480], [260, 520])
+        assert len(said["points"]) > 2
+        assert all(value % 10 == 0 for point in said["points"] for value in point)
+    else:
+        assert said["points"] == points
+
+
+def test_escape_ends_a_stroke_and_strokes_end_at_the_arena(visit: Callable[..., Visit]) -> None:
+    here = visit("tool=line")
+    here.page.mouse.move(*here.on_page(200, 500))
+    here.page.mouse.down()
+    here.page.mouse.move(*here.on_page(250, 500))
+    here.page.keyboard.press("Escape")
+    here.page.mouse.up()
+    here.drag((40, 500), (-15, 500))
+    (said,) = here.heard("(said) => said.length === 1")
+    assert said["points"] == [[40, 500], [0, 500]]
+
+
+def test_the_wheel_zooms_about_the_pointer_and_the_floor_is_dragged(visit: Callable[..., Visit]) -> None:
+    here = visit()
+    x, y = here.on_page(450, 520)
+    here.page.mouse.move(x, y)
+    wide = here.on_page(500, 520)[0] - x
+    here.page.mouse.wheel(0, -300)
+    here.wait("([x, y, wide]) => kiksDesk.toClient(500, 520)[0] - x > 1.3 * wide", [x, y, wide])
+    assert here.on_page(450, 520) == pytest.approx((x, y), abs=0.5)
+    here.page.mouse.down()
+    here.page.mouse.move(x - 80, y + 30, steps=3)
+    here.page.mouse.up()
+    assert here.on_page(450, 520) == pytest.approx((x - 80, y + 30), abs=1)
+    here.ask("fit")
+    here.wait(
+        "([x, y]) => Math.hypot(kiksDesk.toClient(450, 520)[0] - x, kiksDesk.toClient(450, 520)[1] - y) < 0.01", [x, y]
+    )
+
+
+def test_fingers_drag_and_pinch(visit: Callable[..., Visit]) -> None:
+    here = visit(has_touch=True)
+    touch = here.page.context.new_cdp_session(here.page)
+
+    def fingers(kind: str, *places: tuple[float, float]) -> None:
+        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": x, "y": y} for x, y in places]})
+
+    fingers("touchStart", here.on_page(420, 320))
+    for step in range(1, 6):
+        fingers("touchMove", here.on_page(420 + 8 * step, 320))
+    fingers("touchEnd")
+    said = here.heard("(said) => said.some((message) => message.kind === 'drop')")
+    assert said[0] == {"kind": "grab", "what": "body", "index": 0}
+    assert last(said, "move")["x_mm"] == pytest.approx(460, abs=1)
+    x, y = here.on_page(500, 520)
+    wide = here.on_page(600, 520)[0] - x
+    fingers("touchStart", (x - 50, y), (x + 50, y))
+    fingers("touchMove", (x - 100, y), (x + 100, y))
+    fingers("touchEnd")
+    assert here.on_page(600, 520)[0] - here.on_page(500, 520)[0] == pytest.approx(2 * wide, rel=0.02)
+
+
+def test_python_chooses_a_thing(visit: Callable[..., Visit]) -> None:
+    here = visit()
+    here.ask("select")
+    here.wait("() => document.querySelector('[aria-live]').textContent.startsWith('cylinder 2 chosen')")
+
+
+def test_a_lost_connection_comes_back_by_itself(visit: Callable[..., Visit]) -> None:
+    here = visit()
+    here.page.evaluate(
+        """import('kiks-desk').then(({ pageFeed }) => {
+            window.heard = [];
+            pageFeed().on('connection', (now) => window.heard.push(now));
+        })"""
+    )
+    received = here.page.evaluate("kiksDesk.stats().frames_received")
+    here.ask("cut")
+    here.wait("() => window.heard.join() === 'lost,open'")
+    here.wait("(received) => kiksDesk.stats().frames_received > received + 5 && kiksDesk.pose(0)", received)
+    assert here.page.locator("[data-testid=arena-notice]").is_hidden()
+
+
+def test_a_hidden_page_lets_the_server_rest(visit: Callable[..., Visit]) -> None:
+    here = visit()
+    hide = """(isHidden) => {
+        Object.defineProperty(document, 'hidden', { value: isHidden, configurable: true });
+        document.dispatchEvent(new Event('visibilitychange'));
+    }"""
+    here.page.evaluate(hide, True)
+    here.page.evaluate("import('kiks-desk').then(({ pageFeed }) => { window.feed = pageFeed(); })")
+    here.wait("() => window.feed._owed === 3")
+    received = here.feed("feed.frames_received")
+    here.page.evaluate(hide, False)
+    here.wait("(received) => window.feed._owed === 0 && window.feed.frames_received > received + 5", received)
+
+
+def test_another_scene_takes_the_place_of_the_first(visit: Callable[..., Visit]) -> None:
+    here = visit("view=both")
+    here.wait("() => kiksDesk.isSolid()")
+    count, number = here.feed("[feed.scene.robots.length, feed.scene.scene]")
+    here.ask("scene")
+    here.wait("([count, number]) => kiksDesk.scene().scene === number + 1 && kiksDesk.pose(count)", [count, number])
+    drawn = here.page.evaluate("kiksDesk.stats().solid_frames")
+    here.wait("(drawn) => kiksDesk.stats().solid_frames > drawn + 3", drawn)
+    assert here.feed("feed.frame.scene === feed.scene.scene")
+
+
+def test_without_webgl_the_top_view_goes_on(playwright: Playwright, address: str) -> None:
+    browser = playwright.chromium.launch(executable_path=CHROMIUM, args=[*ARGUMENTS, "--disable-3d-apis"])
+    try:
+        here = Visit(browser.new_page(viewport={"width": 1200, "height": 800}), address, "view=both")
+        here.wait("() => document.querySelector('[data-testid=arena-solid]').textContent.includes('needs WebGL 2')")
+        x_mm, y_mm, _ = here.pose(1)
+        here.drag((x_mm, y_mm), (x_mm + 10, y_mm))
+        here.heard("(said) => said.some((message) => message.kind === 'drop')")
+        assert not here.page.evaluate("kiksDesk.isSolid()")
+        assert not here.faults
+    finally:
+        browser.close()
