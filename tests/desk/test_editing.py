@@ -10,14 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import kiks
+from kiks.clock.gate import Gate
 from kiks.desk.desk import Desk
 from kiks.desk.editing import Editing
 from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.sketch_things import SketchRobot
+from kiks.ports.programs import Programs
 from kiks.sim.building import simulation_of
+from kiks.sim.simulation import Simulation
 
 
 @pytest.fixture
@@ -30,9 +32,19 @@ def desk(tmp_path: Path) -> Iterator[Desk]:
         lamps=(Lamp(50, 350),),
     )
     project = Project(arena, robots=(ProjectRobot(turrets=("k213",), name="Ada"),), seed=4)
-    desk = Desk(simulation_of(project, tmp_path), project=project, folder=tmp_path, owns_world=True)
+    hosts: list[Programs] = []
+
+    def new_programs(sim: Simulation, _commands: object, gate: Gate) -> Programs:
+        hosts.append(Programs(sim, is_heard=True, new_patience=gate.patience))
+        return hosts[-1]
+
+    sim = simulation_of(project, tmp_path)
+    desk = Desk(sim, project=project, folder=tmp_path, owns_world=True, new_programs=new_programs)
     yield desk
     desk.close()
+    # Whoever drives a desk closes the hosts of the worlds before; nobody drives this one.
+    for host in hosts[:-1]:
+        host.close()
 
 
 def in_order(desk: Desk, *acts: Callable[[Editing], Awaitable[None]]) -> Editing:
@@ -239,7 +251,7 @@ def test_another_arena_keeps_the_robots(desk):
 
 
 def test_a_world_of_another_program_keeps_its_robots():
-    sim = kiks.Simulation(Arena.box(500, 400), robots=2, seed=1)
+    sim = Simulation(Arena.box(500, 400), robots=2, seed=1)
     desk = Desk(sim)
 
     async def do() -> None:
