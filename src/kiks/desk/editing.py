@@ -217,7 +217,8 @@ class Editing:
             return False
         sketch = self._sketch
         for (number, robot), pose in zip(sketch.of(SketchRobot).items(), sim.poses().tolist(), strict=True):
-            sketch.note(number, SketchRobot(*pose, robot.kind))
+            x_mm, y_mm, heading_rad = pose
+            sketch.note(number, SketchRobot(x_mm, y_mm, heading_rad, robot.kind))
         for number, there in self._bodies.items():
             thing = sketch.things[number]
             x_mm, y_mm = float(bodies[there]["x_mm"]), float(bodies[there]["y_mm"])
@@ -231,9 +232,10 @@ class Editing:
         self._sim = self._desk.sim
         self._arena_number = self._sketch.arena_number
         bodies = self._sim.bodies()
-        for kind, is_ball in ((Ball, True), (Cylinder, False)):
-            numbers = [int(body["number"]) for body in bodies if (body["what"] == BALL) == is_ball]
-            self._bodies.update(zip(self._sketch.of(kind), numbers, strict=True))
+        balls = [int(body["number"]) for body in bodies if body["what"] == BALL]
+        cylinders = [int(body["number"]) for body in bodies if body["what"] != BALL]
+        self._bodies = dict(zip(self._sketch.of(Ball), balls, strict=True))
+        self._bodies |= dict(zip(self._sketch.of(Cylinder), cylinders, strict=True))
         self._lamps = list(self._sketch.of(Lamp))
 
     def _file(self, kind: str) -> str:

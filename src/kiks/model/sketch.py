@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -70,9 +69,11 @@ class Sketch:
 
     def __init__(self, arena: Arena, kinds: Sequence[str] = ("khepera",)) -> None:
         self.things: dict[int, Thing] = {}
-        self._next, self._history, self.version = 1, History(), 0
+        self._next, self._history, self.version = len(kinds) + 1, History(), 0
         self._canvas = Canvas(arena.brightness.copy(), arena.mm_per_cell, arena.name)
-        self._enter(arena, kinds)
+        pairs = enumerate(zip(arena.starts, kinds, strict=False), 1)
+        started = {number: SketchRobot(*start, kind) for number, (start, kind) in pairs}
+        self._enter(arena, started, dict(list(enumerate(kinds, 1))[len(started) :]))
 
     @property
     def brightness(self) -> npt.NDArray[np.uint8]:
@@ -156,45 +157,38 @@ class Sketch:
             ArenaError: If it has no room for the robots.
         """
         before, canvas = WholePatch(self._canvas, self.things), self._canvas
-        robots = list(self.of(SketchRobot).values())
-        wanted = [
-            SketchRobot(*arena.starts[index], robot.kind) if index < len(arena.starts) else robot
-            for index, robot in enumerate(robots)
-        ]
+        wanted: dict[int, SketchRobot | str] = {
+            number: SketchRobot(*arena.starts[index], robot.kind) if index < len(arena.starts) else robot
+            for index, (number, robot) in enumerate(self.of(SketchRobot).items())
+        }
         self._canvas = Canvas(arena.brightness.copy(), arena.mm_per_cell, arena.name, number=self._next)
         try:
-            self._enter(replace(arena, starts=()), self.kinds, wanted)
+            self._enter(arena, {}, wanted)
         except KiksError:
             self._canvas = canvas
             before.swap(canvas, self.things)
             raise
         self._push(before)
 
-    def _enter(self, arena: Arena, kinds: Sequence[str], wanted: Sequence[SketchRobot] = ()) -> None:
-        """Put everything into an empty raster: robots where they are wanted, or else at the nearest free place."""
+    def _enter(self, arena: Arena, robots: dict[int, SketchRobot], wanted: dict[int, SketchRobot | str]) -> None:
+        """Put everything into an empty raster: robots, and those for which a place near another or any is wanted."""
         self.things.clear()
-        others: list[Thing] = [*arena.balls, *arena.cylinders, *arena.lamps]
-        for index, kind in enumerate(kinds):
-            if index < len(arena.starts):
-                robot = SketchRobot(*arena.starts[index], kind)
-            else:
-                near = wanted[index] if index < len(wanted) else None
-                robot = self._seat(index + 1, kind, near, others)
-            self._add(robot)
-        for thing in others:
+        self.things.update(robots)
+        for thing in (*arena.bodies, *arena.lamps):
             self._add(thing)
+        for number, wish in wanted.items():
+            self.things[number] = self._seat(number, wish)
 
-    def _seat(self, number: int, kind: str, near: SketchRobot | None, others: Iterable[Thing]) -> SketchRobot:
-        """Return a free place for a robot: its own, the one nearest to it, or else the roomiest."""
-        radius_mm = robot_radius_mm(kind)
-        if near is not None and self._obstacle(near) is None:
-            return near
+    def _seat(self, number: int, wish: SketchRobot | str) -> SketchRobot:
+        """Return a free place for a robot: its own, the one nearest to it, or of a mere kind the roomiest."""
+        if isinstance(wish, SketchRobot) and self._obstacle(wish) is None:
+            return wish
+        kind, near = (wish, None) if isinstance(wish, str) else (wish.kind, (wish.x_mm, wish.y_mm))
         arena = Arena(self._canvas.brightness.copy(), self._canvas.mm_per_cell, self._canvas.name)
-        there = [thing for thing in [*self.things.values(), *others] if not isinstance(thing, Lamp)]
+        there = [thing for thing in self.things.values() if not isinstance(thing, Lamp)]
         discs = [(thing.x_mm, thing.y_mm, radius_of(thing)) for thing in there]
-        wish = None if near is None else (near.x_mm, near.y_mm)
-        place = free_place(arena, discs, radius_mm, wish, f"robot {number}")
-        return SketchRobot(*place, math.pi / 2 if near is None else near.heading_rad, kind)
+        place = free_place(arena, discs, robot_radius_mm(kind), near, f"robot {number}")
+        return SketchRobot(*place, math.pi / 2 if isinstance(wish, str) else wish.heading_rad, kind)
 
     # ---- walls ----
 
@@ -314,15 +308,6 @@ class Sketch:
         checked = self._checked(thing, but=number)
         self._push(ThingPatch(number, before))
         self.things[number] = checked
-
-    def move(self, number: int, x_mm: float, y_mm: float) -> None:
-        """Put a thing elsewhere.
-
-        Raises:
-            ParameterError: If there is no such thing, or a number is out of range.
-            ArenaError: If something is in the way.
-        """
-        self.change(number, self._thing(number)._replace(x_mm=x_mm, y_mm=y_mm))
 
     def remove(self, number: int) -> None:
         """Take a thing away.

@@ -100,4 +100,3 @@ def project_of(sim: Simulation, project: Project) -> Project:
 
 def _disc(body: Any) -> tuple[float, float, float]:
     return float(body["x_mm"]), float(body["y_mm"]), float(body["radius_mm"])
-
