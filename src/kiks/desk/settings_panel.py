@@ -1,4 +1,4 @@
-"""The settings of a world: seed, thinking, line, sensors, and what robots there are, each with a sentence of its own."""
+"""The settings of a world: seed, thinking, line, sensors and robots, each with a sentence of its own."""
 
 from __future__ import annotations
 
@@ -94,9 +94,7 @@ class SettingsPanel:
         self._model = _choice("Sensor model", MODELS, "What makes a count of what a sensor's rays meet.", "model")
         self._noise = ui.switch("Noise").props("data-testid=noise")
         with self._noise:
-            ui.tooltip(
-                "Real sensors never read the same twice. Off, they do: good for finding mistakes, bad for trust."
-            )
+            ui.tooltip("Real sensors never read the same twice; without noise they do, which helps to find mistakes.")
 
     def _name_amount(self) -> None:
         label, hint = (
