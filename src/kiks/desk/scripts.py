@@ -7,6 +7,7 @@ import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
+from kiks.desk.folder import check_name
 from kiks.errors import ParameterError
 from kiks.model.files import inside, replace_file
 
@@ -16,7 +17,7 @@ SIZE_LIMIT = 200_000
 COUNT_LIMIT = 200
 """Most files of the folder that are offered."""
 
-EXAMPLES = Path(__file__).parent / "examples"
+EXAMPLES = Path(__file__).parent / "example_programs"
 """Programs that come with KiKS."""
 
 NEW = '''"""My program."""
@@ -100,10 +101,10 @@ def save_script(folder: Path, name: str, text: str, *, may_replace: Script | Non
     """
     name = name.strip()
     name = name if name.endswith(".py") else f"{name}.py"
-    if name.startswith(".") or "/" in name:
+    check_name(name, (".py",))
+    if "/" in name:
         raise ParameterError(
-            f"a program's name must be a file's, without folders and without a dot before it, but it was {name!r}. "
-            "Take letters and digits, such as square.py."
+            f"a program's name must be one without folders, but it was {name!r}. Take letters and digits: square.py."
         )
     data = text.encode("utf-8", errors="replace")
     if len(data) > SIZE_LIMIT:

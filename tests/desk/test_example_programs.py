@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import kiks.desk.examples as examples
+import kiks.desk.example_programs as programs
 from kiks.model.arena import Arena
 from kiks.ports.unchanged import run_here
 from kiks.sim.simulation import Simulation
 from kiks.units import ns_from_s
 
-FOLDER = Path(examples.__file__).parent
+FOLDER = Path(programs.__file__).parent
 NAMES = sorted(path.stem for path in FOLDER.glob("[!_]*.py"))
 
 
