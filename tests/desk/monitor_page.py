@@ -1,5 +1,5 @@
-"""A real desk whose page has the monitor's panel alone. Run as a program, in a process of its own, because NiceGUI keeps
-one application a process; it prints its address when it listens.
+"""A real desk whose page has the monitor's panel alone. Run as a program, in a process of its own, because NiceGUI
+keeps one application a process; it prints its address when it listens.
 
 `/world` tells what the simulation says of itself, `/ask/WHAT` makes it do something: see `ask`.
 """
