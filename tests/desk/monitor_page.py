@@ -1,5 +1,5 @@
-"""A real desk whose page has the monitor's panel alone. Run as a program, in a process of its own, because NiceGUI keeps
-one application a process; it prints its address when it listens.
+"""A real desk whose page has the monitor's panel alone. Run as a program, in a process of its own, because NiceGUI
+keeps one application a process; it prints its address when it listens.
 
 `/world` tells what the simulation says of itself, `/ask/WHAT` makes it do something: see `ask`.
 """
@@ -38,6 +38,7 @@ def make_world() -> kiks.Simulation:
 def main() -> None:
     """Serve it until the process is ended."""
     sim = make_world()
+    begin = sim.checkpoint()
     panels: list[MonitorPanel] = []
     shown = show(sim, is_alive=True, browser=False, port=0)
 
@@ -64,6 +65,11 @@ def main() -> None:
         if what == "drive":
             for robot, order in enumerate((b"D,4,6\n", b"D,9,12\n", b"D,-20,15\n"), 1):
                 sim.port(robot).write(order)
+        elif what == "reset":
+            for robot in (1, 2, 3):
+                sim.port(robot).write(b"D,0,0\n")
+            await shown.desk.go_on()
+            await shown.desk.do(lambda sim: sim.reset(begin))
         elif what == "pause":
             await shown.desk.pause()
         elif what == "show2":

@@ -150,7 +150,7 @@ function write(button, counts, [red, green, blue]) {
   const text = String(Math.round(counts));
   if (button.firstChild.data !== text) button.firstChild.data = text;
   button.style.background = `rgb(${red},${green},${blue})`;
-  button.style.color = 0.3 * red + 0.59 * green + 0.11 * blue > 140 ? "#000000" : "#ffffff";
+  button.style.color = 0.3 * red + 0.59 * green + 0.11 * blue > 110 ? "#000000" : "#ffffff";
 }
 
 /** Draw on a canvas in CSS pixels, as sharp as the screen is; one without a size is left alone. */
