@@ -15,15 +15,12 @@ import pytest
 pytest.importorskip("nicegui", reason="the desk needs NiceGUI: install kiks[desk]")
 pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
 
-from playwright.sync_api import Browser, Playwright, sync_playwright
-from tests.desk.visits import ARGUMENTS, CHROMIUM, Visit
+from playwright.sync_api import Browser
+from tests.desk.visits import NewPage, Visit
 
 SENSOR_RAD = math.radians(66.4)
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not CHROMIUM.exists(), reason="tests in a browser need Chromium at /usr/bin/chromium"),
-]
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
@@ -41,34 +38,12 @@ def address() -> Iterator[str]:
         process.terminate()
 
 
-@pytest.fixture(scope="module")
-def playwright() -> Iterator[Playwright]:
-    with sync_playwright() as playwright:
-        yield playwright
-
-
-@pytest.fixture(scope="module")
-def browser(playwright: Playwright) -> Iterator[Browser]:
-    browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-    yield browser
-    browser.close()
-
-
 @pytest.fixture
-def visit(browser: Browser, address: str) -> Iterator[Callable[..., Visit]]:
-    """Open pages; at the end, none of them may have had a fault."""
-    visits = []
+def visit(new_page: NewPage, address: str) -> Callable[..., Visit]:
+    def open_page(query: str = "", **options: Any) -> Visit:
+        return Visit(new_page(1200, 800, **options), address, query)
 
-    def open_page(query: str = "", **context: Any) -> Visit:
-        page = browser.new_page(viewport={"width": 1200, "height": 800}, **context)
-        visits.append(Visit(page, address, query))
-        return visits[-1]
-
-    yield open_page
-    faults = [fault for one in visits for fault in one.faults]
-    for one in visits:
-        one.page.close()
-    assert not faults
+    return open_page
 
 
 def last(said: list[dict[str, Any]], kind: str) -> dict[str, Any]:
@@ -347,15 +322,10 @@ def test_things_are_dragged_in_three_dimensions_too(visit: Callable[..., Visit])
     assert (moved["x_mm"], moved["y_mm"]) == pytest.approx((x_mm + 50, y_mm + 30), abs=1)
 
 
-def test_without_webgl_the_top_view_goes_on(playwright: Playwright, address: str) -> None:
-    browser = playwright.chromium.launch(executable_path=CHROMIUM, args=[*ARGUMENTS, "--disable-3d-apis"])
-    try:
-        here = Visit(browser.new_page(viewport={"width": 1200, "height": 800}), address, "view=both")
-        here.wait("() => document.querySelector('[data-testid=arena-solid]').textContent.includes('needs WebGL 2')")
-        x_mm, y_mm, _ = here.pose(1)
-        here.drag((x_mm, y_mm), (x_mm + 10, y_mm))
-        here.heard("(said) => said.some((message) => message.kind === 'drop')")
-        assert not here.page.evaluate("kiksDesk.isSolid()")
-        assert not here.faults
-    finally:
-        browser.close()
+def test_without_webgl_the_top_view_goes_on(visit: Callable[..., Visit], browser_without_3d: Browser) -> None:
+    here = visit("view=both", by=browser_without_3d)
+    here.wait("() => document.querySelector('[data-testid=arena-solid]').textContent.includes('needs WebGL 2')")
+    x_mm, y_mm, _ = here.pose(1)
+    here.drag((x_mm, y_mm), (x_mm + 10, y_mm))
+    here.heard("(said) => said.some((message) => message.kind === 'drop')")
+    assert not here.page.evaluate("kiksDesk.isSolid()")

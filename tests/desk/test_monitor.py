@@ -16,19 +16,10 @@ import pytest
 pytest.importorskip("nicegui", reason="the desk needs NiceGUI: install kiks[desk]")
 pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
 
-from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
+from playwright.sync_api import Locator, Page, expect
+from tests.desk.visits import NewPage
 
-CHROMIUM = Path("/usr/bin/chromium")
-ARGUMENTS = [
-    *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync"),
-    *("--disable-background-networking", "--disable-component-update"),
-]
-GUARD_MS = 20_000
-
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not CHROMIUM.exists(), reason="tests in a browser need Chromium at /usr/bin/chromium"),
-]
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
@@ -46,22 +37,11 @@ def address() -> Iterator[str]:
         process.kill()
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        yield browser
-        browser.close()
-
-
 class Visit:
     """A page with the monitor, and what the simulation says."""
 
     def __init__(self, page: Page, address: str, query: str) -> None:
         self.page, self.address = page, address
-        self.faults: list[str] = []
-        page.set_default_timeout(GUARD_MS)
-        page.on("pageerror", lambda error: self.faults.append(str(error)))
         page.request.get(f"{address}/ask/reset")
         page.goto(f"{address}/monitor?{query}")
         page.wait_for_function("() => window.kiksMonitor?.drawn() > 3")
@@ -91,12 +71,8 @@ class Visit:
 
 
 @pytest.fixture
-def visit(browser: Browser, address: str) -> Iterator[Visit]:
-    page = browser.new_page(viewport={"width": 520, "height": 1100})
-    visit = Visit(page, address, "")
-    yield visit
-    page.close()
-    assert not visit.faults
+def visit(new_page: NewPage, address: str) -> Visit:
+    return Visit(new_page(520, 1100), address, "")
 
 
 def test_numbers_at_the_sensors_are_those_of_the_simulation(visit: Visit) -> None:
@@ -182,11 +158,11 @@ def test_another_robot_brings_its_own_turrets(visit: Visit) -> None:
     assert visit.fact("Turrets") == "Gripper"
 
 
-def test_dark_pages_are_drawn_for_the_dark(browser: Browser, address: str) -> None:
+def test_dark_pages_are_drawn_for_the_dark(new_page: NewPage, address: str) -> None:
     """The same page by day and by night, with pictures for a person to look at where KIKS_PICTURES says."""
     folder = os.environ.get("KIKS_PICTURES")
     for name in ("light", "dark"):
-        page = browser.new_page(viewport={"width": 520, "height": 1100})
+        page = new_page(520, 1100)
         visit = Visit(page, address, f"dark={name == 'dark'}")
         visit.find("proximity-2").click()
         expect(visit.find("explanation")).to_be_visible()
@@ -195,5 +171,3 @@ def test_dark_pages_are_drawn_for_the_dark(browser: Browser, address: str) -> No
             page.screenshot(path=Path(folder) / f"monitor_{name}.png", full_page=True)
         assert visit.page.evaluate("document.body.classList.contains('body--dark')") == (name == "dark")
         assert visit.painted(".kiks-curves") > 8
-        assert not visit.faults
-        page.close()

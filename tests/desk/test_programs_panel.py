@@ -14,17 +14,12 @@ import pytest
 pytest.importorskip("nicegui", reason="the desk needs NiceGUI: install kiks[desk]")
 pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
 
-from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
+from playwright.sync_api import Locator, Page, expect
+from tests.desk.visits import NewPage
 
 import kiks
 
-CHROMIUM = Path("/usr/bin/chromium")
-GUARD_MS = 20_000
-
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not CHROMIUM.exists(), reason="tests in a browser need Chromium at /usr/bin/chromium"),
-]
+pytestmark = pytest.mark.slow
 
 FOR_EVER = """import serial
 port = serial.Serial("COM1", timeout=1)
@@ -51,14 +46,6 @@ def served(folder: Path, *, may: str = "may") -> Iterator[str]:
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
-        yield browser
-        browser.close()
-
-
-@pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("folder")
 
@@ -70,17 +57,11 @@ def address(folder: Path) -> Iterator[str]:
 
 
 @pytest.fixture
-def page(browser: Browser, address: str) -> Iterator[Page]:
-    page = browser.new_page(viewport={"width": 900, "height": 1000})
-    page.set_default_timeout(GUARD_MS)
-    expect.set_options(timeout=GUARD_MS)
-    faults: list[str] = []
-    page.on("pageerror", lambda error: faults.append(str(error)))
+def page(new_page: NewPage, address: str) -> Page:
+    page = new_page(900, 1000)
     page.goto(address)
     expect(editor(page)).to_contain_text("First steps")
-    yield page
-    page.close()
-    assert not faults
+    return page
 
 
 def at(page: Page, name: str) -> Locator:
@@ -195,22 +176,21 @@ def test_wire_is_filtered_held_and_cleared(page: Page) -> None:
     expect(wire).to_have_text("")
 
 
-def test_line_is_watched_only_while_somebody_looks(browser: Browser, tmp_path: Path) -> None:
+def test_line_is_watched_only_while_somebody_looks(new_page: NewPage, tmp_path: Path) -> None:
     with served(tmp_path) as address:
-        page = browser.new_page()
-        expect.set_options(timeout=GUARD_MS)
+        page = new_page()
         page.goto(address)
         expect(editor(page)).to_contain_text("First steps")
         seen = "(fact) => fetch('/watched').then(a => a.json()).then(a => JSON.stringify(a) === fact)"
         page.wait_for_function(seen, arg="[true,false]", polling=100)
-        page.goto(f"{address}/docs")
+        page.goto(f"{address}/speeds")
         page.wait_for_function(seen, arg="[false,false]", polling=100)
         page.close()
 
 
-def test_page_of_an_open_desk_starts_nothing(browser: Browser, tmp_path: Path) -> None:
+def test_page_of_an_open_desk_starts_nothing(new_page: NewPage, tmp_path: Path) -> None:
     with served(tmp_path, may="may-not") as address:
-        page = browser.new_page()
+        page = new_page()
         page.goto(address)
         expect(at(page, "may-not")).to_contain_text("cannot be started from this page")
         assert at(page, "run-program").count() == 0

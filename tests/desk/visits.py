@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import io
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
 from PIL import Image
 from playwright.sync_api import Page
 
-CHROMIUM = Path("/usr/bin/chromium")
-ARGUMENTS = [
-    *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync"),
-    *("--disable-background-networking", "--disable-component-update", "--enable-unsafe-swiftshader"),
-]
-GUARD_MS = 20_000
+NewPage = Callable[..., Page]
+"""What the fixture `new_page` of conftest.py is."""
 
 
 class Visit:
@@ -22,9 +18,6 @@ class Visit:
 
     def __init__(self, page: Page, address: str, query: str) -> None:
         self.page, self.address = page, address
-        page.set_default_timeout(GUARD_MS)
-        self.faults: list[str] = []
-        page.on("pageerror", lambda error: self.faults.append(str(error)))
         self.ask("reset")
         self.mark = len(page.request.get(f"{address}/received").json())
         page.goto(f"{address}/?{query}")

@@ -1,0 +1,66 @@
+"""Chromium, for all tests that look at pages; they are left out where it is not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page, Playwright
+    from tests.desk.visits import NewPage
+
+CHROMIUM = Path("/usr/bin/chromium")
+ARGUMENTS = [
+    *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync"),
+    *("--disable-background-networking", "--disable-component-update", "--enable-unsafe-swiftshader"),
+]
+GUARD_MS = 20_000
+
+
+@pytest.fixture(scope="module")
+def playwright() -> Iterator[Playwright]:
+    """Of a module, not of the session: while it is there, its thread has a running event loop, and other modules
+    call `asyncio.run`. Chromium begins within 0.3 s."""
+    if not CHROMIUM.exists():
+        pytest.skip(f"tests in a browser need Chromium at {CHROMIUM}")
+    api = pytest.importorskip("playwright.sync_api", reason="tests in a browser need Playwright for Python")
+    api.expect.set_options(timeout=GUARD_MS)
+    with api.sync_playwright() as playwright:
+        yield playwright
+
+
+@pytest.fixture(scope="module")
+def browser(playwright: Playwright) -> Iterator[Browser]:
+    browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+    yield browser
+    browser.close()
+
+
+@pytest.fixture
+def browser_without_3d(playwright: Playwright) -> Iterator[Browser]:
+    browser = playwright.chromium.launch(executable_path=CHROMIUM, args=[*ARGUMENTS, "--disable-3d-apis"])
+    yield browser
+    browser.close()
+
+
+@pytest.fixture
+def new_page(browser: Browser) -> Iterator[NewPage]:
+    """Open pages; at the end, none of them may have had a fault, nor have said one on its console."""
+    pages: list[Page] = []
+    faults: list[str] = []
+
+    def open_page(width: int = 1280, height: int = 800, *, by: Browser | None = None, **options: Any) -> Page:
+        page = (by or browser).new_page(viewport={"width": width, "height": height}, **options)
+        page.set_default_timeout(GUARD_MS)
+        page.on("pageerror", lambda error: faults.append(str(error)))
+        page.on("console", lambda said: faults.append(said.text) if said.type == "error" else None)
+        pages.append(page)
+        return page
+
+    yield open_page
+    for page in pages:
+        page.close()
+    assert not faults
