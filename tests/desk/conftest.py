@@ -10,7 +10,10 @@ import pytest
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page, Playwright
+    from tests.desk.visitor import Visitor
     from tests.desk.visits import NewPage
+
+    from kiks.desk.showing import Shown
 
 CHROMIUM = Path("/usr/bin/chromium")
 ARGUMENTS = [
@@ -64,3 +67,21 @@ def new_page(browser: Browser) -> Iterator[NewPage]:
     for page in pages:
         page.close()
     assert not faults
+
+
+@pytest.fixture
+def shown(tmp_path: Path) -> Iterator[Shown]:
+    """A desk of its own for each test, in this process; its folder is the test's."""
+    pytest.importorskip("nicegui", reason="the desk needs NiceGUI: install kiks[desk]")
+    from tests.desk.visitor import open_desk
+
+    shown = open_desk(tmp_path)
+    yield shown
+    shown.close()
+
+
+@pytest.fixture
+def visitor(new_page: NewPage, shown: Shown) -> Visitor:
+    from tests.desk.visitor import Visitor
+
+    return Visitor(new_page(), shown)

@@ -49,6 +49,7 @@ export default {
       stats: () => stage.stats(),
       toClient: (x_mm, y_mm) => stage.toClient(x_mm, y_mm),
       scene: () => stage.feed.scene,
+      shown: () => ({ ...stage.show }),
       isSolid: () => stage.solidView !== null && stage.solid_frames > 0,
     };
   },

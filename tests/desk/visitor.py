@@ -1,0 +1,150 @@
+"""Somebody at the desk: a page of a real desk in the test's own process, so that the engine can be looked at, too.
+
+Nothing sleeps: `until` lets the page draw its next picture, again and again, until a fact is so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+from playwright.sync_api import Locator, Page, expect
+
+from kiks.desk.desk import Desk
+from kiks.desk.showing import Shown
+from kiks.model.arena import Arena
+from kiks.model.places import Ball, Cylinder, Lamp, Pose
+from kiks.model.project import Project, ProjectRobot
+from kiks.sim.building import simulation_of
+from kiks.sim.simulation import Simulation
+
+SCREENSHOTS = Path(__file__).parents[2] / "screenshots"
+"""Where pictures of what tests have seen are left for a person."""
+
+PICTURES_MAX = 1200
+"""Most pictures of the screen that something is waited for, 20 s or so: a guard, no measure."""
+
+NEXT_PICTURE = "() => new Promise((done) => requestAnimationFrame(() => done(true)))"
+FIRST_PICTURE = "() => window.kiksDesk?.stats().frames_drawn > 3 && kiksDesk.pose(0)"
+
+Fact = TypeVar("Fact")
+
+
+def make_project() -> Project:
+    """Return two robots, a ball, a cylinder and a lamp in a room of 600 by 400 mm."""
+    plain = Arena.box(600, 400)
+    arena = Arena(
+        plain.brightness,
+        plain.mm_per_cell,
+        "room",
+        starts=(Pose(150, 200, 0.0), Pose(450, 300, 2.0)),
+        lamps=(Lamp(80, 340, 2.0),),
+        balls=(Ball(300, 100),),
+        cylinders=(Cylinder(450, 100),),
+    )
+    return Project(arena, robots=(ProjectRobot(turrets=("k213",)), ProjectRobot(turrets=("gripper",))), seed=3)
+
+
+def open_desk(folder: Path, project: Project | None = None) -> Shown:
+    """Show a world that goes on by itself."""
+    project = project or make_project()
+    sim = simulation_of(project, folder)
+    shown = Shown(Desk(sim, project=project, folder=folder, owns_world=True, may_run_programs=True), port=0)
+    shown.drive()
+    return shown
+
+
+class Visitor:
+    """A page of a desk.
+
+    Args:
+        page: An empty page.
+        shown: The desk.
+    """
+
+    def __init__(self, page: Page, shown: Shown) -> None:
+        self.page, self.shown, self.desk = page, shown, shown.desk
+        page.goto(shown.url)
+        page.wait_for_function(FIRST_PICTURE)
+
+    @property
+    def sim(self) -> Simulation:
+        return self.desk.sim
+
+    def at(self, name: str) -> Locator:
+        return self.page.get_by_test_id(name)
+
+    def until(self, fact: Callable[[], Fact]) -> Fact:
+        """Wait until something is so."""
+        for _ in range(PICTURES_MAX):
+            if found := fact():
+                return found
+            self.page.evaluate(NEXT_PICTURE)
+        raise AssertionError("what was waited for did not come")
+
+    def tab(self, name: str) -> None:
+        self.at(f"tab-{name}").click()
+
+    def choose(self, name: str, text: str) -> None:
+        """Choose in a list by its words."""
+        self.at(name).click()
+        self.page.locator(".q-menu .q-item").get_by_text(text, exact=True).click()
+        expect(self.page.locator(".q-menu")).to_have_count(0)
+
+    def menu(self, button: str, text: str) -> None:
+        """Choose in a button's menu."""
+        self.at(button).click()
+        self.page.locator(".q-menu .q-item").get_by_text(text, exact=True).click()
+        expect(self.page.locator(".q-menu")).to_have_count(0)
+
+    def told(self, text: str) -> None:
+        """Wait until the page tells something."""
+        expect(self.page.locator(".q-notification").filter(has_text=text).first).to_be_visible()
+
+    def pause(self) -> None:
+        self.at("run").click()
+        self.until(lambda: self.desk.gate.is_paused)
+
+    def seen(self, robot: int) -> tuple[float, float, float]:
+        """Return where the page sees a robot."""
+        pose = self.answer("(index) => kiksDesk.pose(index)", robot - 1)
+        return pose["x_mm"], pose["y_mm"], pose["heading_rad"]
+
+    def on_page(self, x_mm: float, y_mm: float) -> tuple[float, float]:
+        x, y = self.page.evaluate("([x, y]) => kiksDesk.toClient(x, y)", [x_mm, y_mm])
+        return x, y
+
+    def pull(self, start: tuple[float, float], end: tuple[float, float]) -> None:
+        """Press the mouse at a place, and bring it to another one without letting go."""
+        self.page.mouse.move(*self.on_page(*start))
+        self.page.mouse.down()
+        self.page.mouse.move(*self.on_page(*end), steps=8)
+
+    def let_go(self) -> None:
+        self.page.mouse.up()
+        self.until(lambda: self.desk.hands.are_empty)
+
+    def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
+        self.pull(start, end)
+        self.let_go()
+
+    def write(self, text: str) -> None:
+        """Put a text into the editor as if it were pasted."""
+        self.page.locator(".cm-content").click()
+        self.page.keyboard.press("Control+a")
+        self.page.keyboard.insert_text(text)
+
+    def is_free(self, robot: int) -> bool:
+        """Say whether a robot stands where it can stand."""
+        with self.sim.lock:
+            x_mm, y_mm, _ = self.sim.pose(robot)
+            return bool(self.sim.freedom(robot - 1)(x_mm, y_mm))
+
+    def picture(self, name: str) -> None:
+        """Leave a picture of the page for a person."""
+        SCREENSHOTS.mkdir(exist_ok=True)
+        self.page.screenshot(path=SCREENSHOTS / f"{name}.png", animations="disabled")
+
+    def answer(self, script: str, argument: Any = None) -> Any:
+        return self.page.evaluate(script, argument)
