@@ -24,6 +24,15 @@ SPEEDS: dict[float, str] = {
 STEPS: dict[float, str] = {0.01: "10 ms", 0.1: "100 ms", 1.0: "1 s", 10.0: "10 s"}
 """How much a step is [s]."""
 
+LEAVE = """(event) => {
+    if (![" ", "."].includes(event.key) || event.target.ariaExpanded === "true") return;
+    event.qKeyEvent = true;
+    event.preventDefault();
+    event.target.blur();
+}"""
+"""Lets a closed list leave the keys of time to the page: who has just chosen a speed and presses space wants to pause,
+not to open the list again. Quasar skips events so marked, and the page's keys are heard when no list has the focus."""
+
 REFRESH_S = 0.2
 """How often clock and speed are shown anew [s]."""
 
@@ -68,8 +77,9 @@ class TimePanel:
         """Show how time stands; somebody else may have changed it."""
         desk = self._desk
         word, icon = ("Run", "play_arrow") if desk.gate.is_paused else ("Pause", "pause")
-        self._run.props(f'icon={icon} aria-label="{word}"')
-        self._run_tip.text = f"{word} (space)"
+        if self._run.props.get("aria-label") != word:
+            self._run.props(f'icon={icon} aria-label="{word}"')
+            self._run_tip.text = f"{word} (space)"
         self._clock.text = clock_text(desk.sim.now_ns)
         self._rate.text = f"{desk.meter.average:.1f} x on average, {desk.meter.momentary:.1f} x now"
         if self._speed.value != self._shown_speed():
@@ -120,6 +130,7 @@ def _select(choices: dict[float, str], value: float, word: str, name: str, width
         ui.select(choices, value=value)
         .props(f'dense dark borderless options-dense aria-label="{word}" data-testid={name}')
         .style(f"min-width: {width}")
+        .on("keydown", js_handler=LEAVE)
     )
 
 

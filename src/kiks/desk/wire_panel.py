@@ -194,7 +194,8 @@ class WirePanel:
                 label.text = text
                 bar.style(f"width: {percent:.2f}%")
                 name_in_bar.text = word if percent > 20 else ""
-        self._bar.props(f'aria-label="{", ".join(told)}"')
+        if self._bar.props.get("aria-label") != ", ".join(told):
+            self._bar.props["aria-label"] = ", ".join(told)
 
     # ---- what a person does ----
 
