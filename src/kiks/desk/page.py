@@ -25,11 +25,18 @@ STYLE = """
   background: rgba(20, 30, 40, .8); color: #fff; pointer-events: none; animation: desk-fade 2s 25s forwards;
 }
 @keyframes desk-fade { to { opacity: 0; visibility: hidden } }
+.desk-body > .q-splitter__after { min-width: 370px }
+.desk-tabs .q-tab { padding: 0 8px; min-width: 0 }
+.q-btn-toggle { white-space: nowrap }
+@media (max-width: 1200px) { .desk-tabs .q-tab__icon { display: none } }
+.body--dark .text-primary { color: #8fd0f0 !important }
+.body--dark .text-accent { color: #ff9f45 !important }
 *:focus-visible { outline: 3px solid var(--q-accent); outline-offset: 1px }
 """
 
 PRIMARY, ACCENT = "#174a63", "#b85c00"
-"""Colours that can be read with white on them, by all and on a wall: contrasts of 9.4 and 4.7 to 1."""
+"""Colours that can be read with white on them, by all and on a wall: contrasts of 9.4 and 4.7 to 1. On dark pages,
+words of these colours are lighter: see `STYLE`."""
 
 HINT = "Drag a robot to move it, its rim to turn it. Click it to look inside."
 
@@ -80,7 +87,7 @@ class Page:
         with (
             ui.tabs()
             .props("dense no-caps inline-label align=justify active-color=accent")
-            .classes("w-full") as self._tabs
+            .classes("w-full desk-tabs") as self._tabs
         ):
             for name, word, icon, _ in tabs:
                 ui.tab(name, word, icon=icon).props(f"data-testid=tab-{name}")
