@@ -8,6 +8,7 @@ from nicegui import ui
 
 from kiks.desk.arena_view import ArenaView, Pick
 from kiks.desk.desk import Desk
+from kiks.desk.editor_panel import EditorPanel
 from kiks.desk.monitor_panel import MonitorPanel
 from kiks.desk.programs_panel import ProgramsPanel
 from kiks.desk.settings_panel import SettingsPanel
@@ -66,6 +67,7 @@ class Page:
         tabs = (
             ("robot", "Robot", "smart_toy", lambda: self._build_monitor(feed)),
             ("wire", "Wire", "cable", lambda: WirePanel(desk)),
+            ("arena", "Arena", "edit", lambda: EditorPanel(desk, self._view)),
             ("programs", "Programs", "code", lambda: ProgramsPanel(desk)),
             ("settings", "Settings", "tune", lambda: SettingsPanel(desk)),
         )
