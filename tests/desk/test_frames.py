@@ -218,7 +218,9 @@ def test_rays_end_where_the_scene_and_a_frame_say():
             for angle, length in zip(sensor["rays_rad"], lengths, strict=True):
                 if length != NO_HIT:
                     end = begin + length / 100 * np.array([math.cos(heading + angle), math.sin(heading + angle)])
-                    assert min(*end, *(300 - end)) == pytest.approx(WALL_MM, abs=0.1)
+                    nearest, next_nearest = sorted(np.minimum(end, 300 - end))
+                    # The smooth surface of a raster rounds its corners.
+                    assert nearest == pytest.approx(WALL_MM, abs=0.1 if next_nearest > WALL_MM + 5 else 1.0)
                     met += 1
     assert met > 200
 

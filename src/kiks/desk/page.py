@@ -21,11 +21,18 @@ STYLE = """
 .desk-body { width: 100%; height: calc(100dvh - 58px) }
 .desk-panels { height: calc(100dvh - 58px - 37px) }
 .desk-panels .q-tab-panel { padding: 0; overflow: auto }
+.desk-hint {
+  position: absolute; right: 16px; bottom: 44px; max-width: 80%; padding: 6px 14px; border-radius: 16px;
+  background: rgba(20, 30, 40, .8); color: #fff; pointer-events: none; animation: desk-fade 2s 25s forwards;
+}
+@keyframes desk-fade { to { opacity: 0; visibility: hidden } }
 *:focus-visible { outline: 3px solid var(--q-accent); outline-offset: 1px }
 """
 
 PRIMARY, ACCENT = "#174a63", "#b85c00"
 """Colours that can be read with white on them, by all and on a wall: contrasts of 9.4 and 4.7 to 1."""
+
+HINT = "Drag a robot to move it, its rim to turn it. Click it to look inside."
 
 NEWS_S = 0.5
 """How often people are told what is new [s]."""
@@ -53,6 +60,7 @@ class Page:
         with ui.splitter(value=64, limits=(30, 100)).classes("desk-body") as halves:
             with halves.before:
                 self._view = ArenaView(feed, on_pick=self._pick)
+                ui.label(HINT).classes("desk-hint")
             with halves.after, ui.column().classes("w-full gap-0 no-wrap"):
                 self._build_tabs(feed)
         with tools:
