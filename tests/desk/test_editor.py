@@ -136,6 +136,10 @@ def test_walls_are_drawn_and_taken_back(desk: Desk, page: Page) -> None:
     wait_for_step(page, undo=True, redo=True)
     assert brightness(290, 290) == 255
     assert desk.sim.pose(1) == (120.0, 120.0, 0.0)
+    page.get_by_test_id("tab-wire").click()
+    page.get_by_test_id("tool-rectangle").wait_for(state="detached")
+    drag(page, (120, 120), (150, 180))
+    wait_until(page, lambda: desk.sim.pose(1)[1] > 170)
 
 
 def test_worlds_are_made_saved_and_opened(desk: Desk, page: Page) -> None:

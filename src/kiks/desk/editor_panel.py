@@ -82,7 +82,7 @@ class EditorPanel:
         with ui.row().classes("w-full gap-1"):
             for name, tool in TOOLS.items():
                 button = ui.button(icon=tool.icon, on_click=lambda name=name: self._choose(name))
-                button.props(f'dense padding="8px" aria-label="{tool.word}" data-testid=tool-{name}').mark(
+                button.props(f'dense padding="6px" aria-label="{tool.word}" data-testid=tool-{name}').mark(
                     f"tool-{name}"
                 )
                 with button:
@@ -128,6 +128,10 @@ class EditorPanel:
             _button("Maze", "grid_4x4", "new-maze", "A random maze with a lamp in its exit", self._new_maze)
 
     # ---- tools ----
+
+    def put_down(self) -> None:
+        """Take the hand in place of a tool, for people who turn to something else."""
+        self._choose("hand")
 
     def _choose(self, name: str) -> None:
         self._tool = name

@@ -26,6 +26,8 @@ class FilesPanel:
     """
 
     def __init__(self, desk: Desk) -> None:
+        # Files are taken at once: there is never a list of those that wait.
+        ui.add_css(".kiks-upload .q-uploader__list { display: none }")
         self._desk = desk
         self._folder = Folder(desk.folder)
         ui.separator()
@@ -65,7 +67,9 @@ class FilesPanel:
                     type="negative",
                 ),
             )
-            self._upload.props(f'flat bordered accept="{",".join(OPENED)}" data-testid=upload').classes("col")
+            self._upload.props(f'flat bordered accept="{",".join(OPENED)}" data-testid=upload').classes(
+                "col kiks-upload"
+            )
             self._upload.mark("upload")
             self._mm_per_pixel = ui.number("mm per pixel", value=1.0, min=0.1, max=100, step=0.1)
             self._mm_per_pixel.props("dense data-testid=mm-per-pixel").classes("w-28")

@@ -72,10 +72,11 @@ class Page:
         desk = self._desk
         self._unbuilt: dict[str, Callable[[], object]] = {}
         self._monitor: MonitorPanel | None = None
+        self._editor: EditorPanel | None = None
         tabs = (
             ("robot", "Robot", "smart_toy", lambda: self._build_monitor(feed)),
             ("wire", "Wire", "cable", lambda: WirePanel(desk)),
-            ("arena", "Arena", "edit", lambda: EditorPanel(desk, self._view)),
+            ("arena", "Arena", "edit", self._build_editor),
             ("programs", "Programs", "code", lambda: ProgramsPanel(desk)),
             ("settings", "Settings", "tune", lambda: SettingsPanel(desk)),
         )
@@ -96,6 +97,8 @@ class Page:
         self._panels.value = "robot"
 
     def _build(self, name: str) -> None:
+        if self._editor is not None and name != "arena":
+            self._editor.put_down()
         build = self._unbuilt.pop(name, None)
         if build is not None:
             with self._places[name]:
@@ -103,6 +106,9 @@ class Page:
 
     def _build_monitor(self, feed: str) -> None:
         self._monitor = MonitorPanel(self._desk, feed)
+
+    def _build_editor(self) -> None:
+        self._editor = EditorPanel(self._desk, self._view)
 
     async def _pick(self, pick: Pick) -> None:
         """Show the robot or the sensor that was clicked at."""
