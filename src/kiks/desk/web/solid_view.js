@@ -63,6 +63,12 @@ export class SolidView {
     this.fit();
   }
 
+  /** How many shapes and pictures the graphics card keeps for this view. */
+  get parts() {
+    const { geometries, textures } = this._renderer.info.memory;
+    return geometries + textures;
+  }
+
   // The surface of the pointer (pointer.js).
   get element() { return this.canvas; }
 
