@@ -13,7 +13,9 @@ const RAY_MM = 12;
 const MOST_LIGHTS = 3;
 
 export class SolidThings {
-  constructor() {
+  /** Without a graphics card (`isPlain`) lamps only glow and light the floor. */
+  constructor(isPlain) {
+    this._light_count = isPlain ? 0 : MOST_LIGHTS;
     this.group = new THREE.Group();
     this._bodies = [];
     this._lamps = [];
@@ -69,7 +71,7 @@ export class SolidThings {
 
   _putLamps(frame) {
     while (this._lamps.length < frame.lamp_count) {
-      const lamp = lampOf(this._lamps.length < MOST_LIGHTS);
+      const lamp = lampOf(this._lamps.length < this._light_count);
       this._lamps.push(lamp);
       this.group.add(lamp);
     }

@@ -25,7 +25,7 @@ const NO_WEBGL =
 
 export class SolidView {
   constructor(canvas, feed, isDark) {
-    const context = canvas.getContext("webgl2", { antialias: !isSoftware(), alpha: false });
+    const isPlain = isSoftware(), context = canvas.getContext("webgl2", { antialias: !isPlain, alpha: false });
     if (!context) throw new Error(NO_WEBGL);
     this.canvas = canvas;
     this.feed = feed;
@@ -41,7 +41,7 @@ export class SolidView {
     this._camera.up.set(0, 0, 1);
     this._ground = new THREE.Group();
     this._robots = new SolidRobots();
-    this._things = new SolidThings();
+    this._things = new SolidThings(isPlain);
     this._ring = ringMesh();
     this._ghost = ringMesh();
     const sun = new THREE.DirectionalLight(0xffffff, 1.9);
