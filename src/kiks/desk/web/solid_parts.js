@@ -2,6 +2,10 @@
 
 import { THREE } from "nicegui-scene";
 
+// Colours are mixed as they are on the screen: turning each dot of it to light and back is what costs most without a
+// graphics card.
+THREE.ColorManagement.enabled = false;
+
 /** Merge parts [geometry, colour, [x, y, z], [turn about x, y, z]] into one geometry. */
 export function merge(parts) {
   const positions = [], normals = [], colours = [], indices = [], colour = new THREE.Color();

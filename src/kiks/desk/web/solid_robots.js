@@ -33,7 +33,7 @@ export class SolidRobots {
     this._sensors = this._many(box(5, 7, 8), new THREE.MeshLambertMaterial(), 8 * count);
     this._leds = this._many(new THREE.OctahedronGeometry(2.4), new THREE.MeshBasicMaterial(), 2 * count);
     scene.robots.forEach((_, index) =>
-      this._caps.setColorAt(index, this._tint.setHSL(robotHue(index) / 360, 0.72, 0.42, THREE.SRGBColorSpace)));
+      this._caps.setColorAt(index, this._tint.setHSL(robotHue(index) / 360, 0.72, 0.42)));
     this._tops = scene.robots.map((robot, index) => this._top(robot, index));
     this._grippers = scene.robots.map((robot) => (robot.has_gripper ? this._gripper(robot) : null));
     this.setShapes(scene);
@@ -105,7 +105,7 @@ export class SolidRobots {
     spec.sensors.forEach(({ x_mm, y_mm, angle_rad }, k) => {
       place(this._sensors, 8 * index + k, 1.02 * x_mm, 1.02 * y_mm, LOWER_BOARD - 2, angle_rad);
       const bucket = readingBucket(readings[k]), [red, green, blue] = bucket ? READING_COLOURS[bucket] : [48, 54, 62];
-      this._tint.setRGB(red / 255, green / 255, blue / 255, THREE.SRGBColorSpace);
+      this._tint.setRGB(red / 255, green / 255, blue / 255);
       this._sensors.setColorAt(8 * index + k, this._tint);
     });
     robot.leds.forEach((isOn, k) => {
@@ -149,7 +149,8 @@ function bodyGeometry(robot) {
   for (const side of [-1, 1]) {
     parts.push([box(26, 2.6, UPPER_BOARD - LOWER_BOARD), "#caa64a", [0, side * 20.6, (LOWER_BOARD + UPPER_BOARD) / 2]]);
     parts.push([column(8, 4.8, 12), "#131517", [0, side * wheel_y, 8], [Math.PI / 2, 0, 0]]);
-    parts.push([new THREE.CircleGeometry(4.5, 10), "#9aa1aa", [0, side * (wheel_y + 2.5), 8], [-side * Math.PI / 2, 0, 0]]);
+    const hub = new THREE.CircleGeometry(4.5, 10);
+    parts.push([hub, "#9aa1aa", [0, side * (wheel_y + 2.5), 8], [(-side * Math.PI) / 2, 0, 0]]);
   }
   return merge(parts);
 }
@@ -190,7 +191,8 @@ function nameSprite(name, index) {
   context.fillStyle = "#ffffff";
   context.fillText(name, canvas.width / 2, 32);
   const map = new THREE.CanvasTexture(canvas);
-  map.colorSpace = THREE.SRGBColorSpace;
+  map.generateMipmaps = false;
+  map.minFilter = THREE.LinearFilter;
   const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map, depthTest: false }));
   sprite.scale.set((NAME_MM * canvas.width) / canvas.height, NAME_MM, 1);
   return sprite;

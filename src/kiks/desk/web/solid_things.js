@@ -35,7 +35,7 @@ export class SolidThings {
     const tint = new THREE.Color();
     scene.bodies.forEach((body, index) => {
       const [red, green, blue] = bodyColour(body);
-      tint.setRGB(red / 255, green / 255, blue / 255, THREE.SRGBColorSpace);
+      tint.setRGB(red / 255, green / 255, blue / 255);
       for (const mesh of [this._balls, this._cylinders]) mesh.setColorAt(index, tint);
     });
     this._rays = rayLines(scene.robots.length);
@@ -130,10 +130,7 @@ function rayLines(robot_count) {
   return new THREE.LineSegments(geometry, material);
 }
 
-const RAY_TINTS = READING_COLOURS.map(([red, green, blue]) => {
-  const tint = new THREE.Color().setRGB(red / 255, green / 255, blue / 255, THREE.SRGBColorSpace);
-  return [tint.r, tint.g, tint.b];
-});
+const RAY_TINTS = READING_COLOURS.map((colour) => colour.map((part) => part / 255));
 
 function putRays(geometry, frame, scene, poses) {
   const places = geometry.attributes.position.array, tints = geometry.attributes.color.array;
