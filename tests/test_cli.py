@@ -30,7 +30,9 @@ def state_of(text: str) -> str:
     return found[1]
 
 
-@pytest.mark.parametrize("command", ["demo", "run", "serve", "monitor", "calibrate", "accuracy", "fit", "warmup"])
+@pytest.mark.parametrize(
+    "command", ["desk", "demo", "run", "serve", "monitor", "calibrate", "accuracy", "fit", "warmup"]
+)
 def test_every_command_has_help_with_an_example(command: str) -> None:
     result = kiks(command, "--help")
     assert result.returncode == 0
@@ -41,7 +43,9 @@ def test_help_and_version_need_no_engine() -> None:
     script = (
         "import sys; sys.argv = ['kiks', '--help']\nimport kiks.cli\ntry: kiks.cli.main()\nexcept SystemExit: pass\n"
     )
-    script += "heavy = {'numba', 'scipy', 'numpy', 'PIL', 'rich'} & set(sys.modules); assert not heavy, heavy"
+    script += (
+        "heavy = {'numba', 'scipy', 'numpy', 'PIL', 'rich', 'nicegui'} & set(sys.modules); assert not heavy, heavy"
+    )
     assert subprocess.run([sys.executable, "-c", script], capture_output=True, check=False).returncode == 0
     assert re.fullmatch(r"KiKS \d+\.\d+.*\n", kiks("--version").stdout)
 
@@ -136,7 +140,7 @@ def test_live_thinking_is_recorded_and_replayed(tmp_path: Path) -> None:
         (("run", "--thinking", "slow", WANDER), "thinking must be 'none'"),
         (("run", "--robot", "kephera", WANDER), "Did you mean 'khepera'"),
         (("run", "--turret", "grippr", WANDER), "Did you mean 'gripper'"),
-        (("run", "--turret", "gripper=2", WANDER), "This simulation has robot 1"),
+        (("run", "--turret", "gripper=2", WANDER), "a robot's number from 1 to 1, but it was"),
         (("run", "--turret", "gripper=x", WANDER), "--turret must be a turret, or one with = and a robot's number"),
         (("demo", "--arena", "nowhere.png"), "nowhere.png"),
         (("demo", "--seconds", "2", "--picture", "/no/folder/x.png"), "a picture must go to a writable file"),

@@ -14,7 +14,7 @@ import pytest
 from tests.served import GUARD_S, PROGRAMS, fresh
 
 from kiks.clock.patience import Patience
-from kiks.errors import ParameterError
+from kiks.errors import KiksError, ParameterError
 from kiks.ports import programs as module
 from kiks.ports.process import OUTPUT_LIMIT, Command
 from kiks.ports.programs import Handle, Programs
@@ -249,3 +249,5 @@ def test_mistakes_are_told_before_anything_starts(tmp_path: Path) -> None:
         with pytest.raises(ParameterError, match=r"robot must be the number of one there is, but it was 2"):
             run.programs.start(DRIVE, robot=2)
         assert run.programs.handles == []
+    with pytest.raises(KiksError, match=r"must have a world, but that of drive.py has ended"):
+        run.programs.start(DRIVE)

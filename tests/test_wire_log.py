@@ -103,6 +103,17 @@ def test_log_stays_small_and_knows_since_when_it_is_whole() -> None:
     assert shares(sim).window_ns == sim.now_ns - log.since_ns
 
 
+def test_nothing_is_remembered_when_nobody_watches_any_longer() -> None:
+    wire = fresh().wires[0]
+    log = wire.watch(0)
+    assert wire.watch(0) is log
+    wire.unwatch()
+    assert wire.log is log
+    wire.unwatch()
+    assert wire.log is None
+    assert wire.shares(0, 1) is None
+
+
 @pytest.mark.slow
 def test_who_watches_changes_nothing() -> None:
     drive, sleeper = Command(PROGRAMS / "drive.py", ["COM1", "40", "3", "7"]), Command(PROGRAMS / "sleeper.py", ["12"])

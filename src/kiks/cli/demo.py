@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import enum
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from kiks.cli.desk import WithDesk, open_desk
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.match import show_match
 from kiks.cli.options import Seed, load_arena
 from kiks.errors import ParameterError
+
+if TYPE_CHECKING:
+    from kiks.demos.scene import Scene
 
 REPORT_S = 2.0
 """Simulated time between two updates of the display [s]: more of them would cost more than the simulation."""
@@ -48,6 +53,7 @@ def demo(
         str | None, typer.Option(help="soccer: the Python program of the left side; its arguments behind it in quotes.")
     ] = None,
     right: Annotated[str | None, typer.Option(help="soccer: that of the right side.")] = None,
+    desk: WithDesk = False,
 ) -> None:
     """Show robots at work, as fast as this computer can, and leave a picture of it.
 
@@ -63,18 +69,30 @@ def demo(
             raise ParameterError(f"{name} must be left out with {behaviour}, but it was {value!r}. It is for others.")
     ready_engine()
     if is_soccer:
-        show_match(seconds, seed, picture, left, right)
+        show_match(seconds, seed, picture, left, right, on_desk=desk)
         return
+    from kiks.demos.scenes import SCENES
+
+    scene = SCENES[behaviour](None if arena is None else load_arena(arena), seed=seed, baud=baud)
+    work = partial(_run, scene, behaviour, scene.seconds if seconds is None else seconds, picture)
+    if desk:
+        from kiks.desk.desk import Desk
+
+        open_desk(Desk(scene.sim), work=work)
+    else:
+        work()
+
+
+def _run(scene: Scene, behaviour: Behaviour, total_s: float, picture: Path | None) -> None:
+    """Run a demonstration to its end, say how it went, and draw it."""
     from time import perf_counter
 
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
 
-    from kiks.demos.scenes import SCENES
     from kiks.drawing import Trace, draw_simulation, save_picture
 
-    scene = SCENES[behaviour](None if arena is None else load_arena(arena), seed=seed, baud=baud)
-    sim, total_s = scene.sim, scene.seconds if seconds is None else seconds
+    sim = scene.sim
     trace = Trace(sim, scene.slice_s)
     working_s = told_s = 0.0
 
@@ -96,4 +114,4 @@ def demo(
     target = picture or Path(f"kiks-{behaviour}.png")
     save_picture(draw_simulation(sim, trace), target)
     typer.echo(f"{behaviour}: {report().strip()}")
-    typer.echo(f"Picture: {target}   Seed {seed}, state {sim.state_hash()}: the same on every computer.")
+    typer.echo(f"Picture: {target}   Seed {sim.seed}, state {sim.state_hash()}: the same on every computer.")

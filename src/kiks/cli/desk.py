@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -48,9 +49,7 @@ def desk(
     ] = None,
     folder: Annotated[
         Path | None,
-        typer.Option(
-            help="Folder of projects and programs; no file outside it is opened or saved."
-        ),
+        typer.Option(help="Folder of projects and programs; no file outside it is opened or saved."),
     ] = None,
     port: Annotated[
         int | None, typer.Option(help="TCP port of the page, 0 for a free one; 8123 if left out.", min=0, max=65535)
@@ -139,6 +138,7 @@ def open_desk(
     port: int | None = None,
     browser: bool = True,
     work: Callable[[], None] = lambda: None,
+    goes_on: bool = True,
     programs_ended: Callable[[Simulation], None] = lambda sim: None,
 ) -> None:
     """Show a desk until Ctrl-C.
@@ -148,7 +148,8 @@ def open_desk(
         host: Address to serve the page at.
         port: TCP port of the page.
         browser: Whether a browser is opened.
-        work: What moves the world at first; when it ends, the world goes on by itself.
+        work: What moves the world at first.
+        goes_on: Whether the world goes on by itself after that; else it stands still.
         programs_ended: Called with the world, locked, when its programs have ended.
     """
     from kiks.desk.driver import Driver
@@ -161,7 +162,9 @@ def open_desk(
         if browser:
             shown.browse()
         work()
-        Driver(desk, programs_ended).run()
+        if goes_on:
+            Driver(desk, programs_ended).run()
+        threading.Event().wait()
     except KeyboardInterrupt:
         typer.echo(f"Stopped after {desk.sim.time_s:.1f} s of simulated time.")
     finally:

@@ -32,6 +32,8 @@ def compile_everything() -> None:
     sim.proximity(1)
     sim.ambient(1)
     sim.look()
+    sim.explain(1, 0)
+    sim.explain_light(1, 0)
     sim.fit(1, "k213")
     robot.image()
     sim.image(1)

@@ -2,23 +2,33 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
 import typer
 
+from kiks.cli.desk import open_desk
 from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
-    from kiks.demos.match import Report
+    from kiks.demos.match import Match, Report
     from kiks.ports.process import Command
 
 SECONDS = 300.0
 """How long a match takes if nobody says otherwise [s]."""
 
 
-def show_match(seconds: float | None, seed: int, picture: Path | None, left: str | None, right: str | None) -> None:
+def show_match(
+    seconds: float | None,
+    seed: int,
+    picture: Path | None,
+    left: str | None,
+    right: str | None,
+    *,
+    on_desk: bool = False,
+) -> None:
     """Let two programs play, say when goals fall, and leave a picture.
 
     Args:
@@ -27,13 +37,12 @@ def show_match(seconds: float | None, seed: int, picture: Path | None, left: str
         picture: Where the picture goes.
         left: The program of the left side with its arguments; KiKS's own player if left out.
         right: That of the right side.
+        on_desk: Whether it is shown in a browser.
 
     Raises:
         ParameterError: If one of them is no program, or a value is out of range.
     """
-    from kiks.cli.match_picture import draw_match
-    from kiks.demos.match import Match, play
-    from kiks.drawing import save_picture
+    from kiks.demos.match import Match
 
     players = [player(left, 1, "left"), player(right, 2, "right")]
 
@@ -42,6 +51,20 @@ def show_match(seconds: float | None, seed: int, picture: Path | None, left: str
         typer.echo(f"{goal.time_s:6.1f} s   {left_count}:{right_count}   {goal.side}")
 
     match = Match(SECONDS if seconds is None else seconds, seed, on_goal=tell)
+    if on_desk:
+        from kiks.desk.desk import Desk
+
+        open_desk(Desk(match), work=partial(_play, match, players, picture), goes_on=False)
+    else:
+        _play(match, players, picture)
+
+
+def _play(match: Match, players: list[Command], picture: Path | None) -> None:
+    """Let them play to the end, say how it went, and draw it."""
+    from kiks.cli.match_picture import draw_match
+    from kiks.demos.match import play
+    from kiks.drawing import save_picture
+
     start_s = perf_counter()
     doubt = play(match, players, say=lambda text: typer.echo(f"kiks: {text}", err=True))
     speedup = match.time_s / (perf_counter() - start_s)
@@ -53,7 +76,7 @@ def show_match(seconds: float | None, seed: int, picture: Path | None, left: str
         f"{len(match.report.drops_s)} dropped balls"
     )
     repeatable = f"not repeatable: {doubt}" if doubt else f"state {match.state_hash()}: the same on every computer"
-    typer.echo(f"Picture: {target}   Seed {seed}, {repeatable}.")
+    typer.echo(f"Picture: {target}   Seed {match.seed}, {repeatable}.")
 
 
 def player(words: str | None, robot: int, side: str) -> Command:

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from kiks.model.arena import Arena
     from kiks.sim.simulation import Simulation
 
-ArenaFile = Annotated[str | None, typer.Option(help="Arena file (.toml) or picture; the classic box if left out.")]
+ArenaFile = Annotated[str | None, typer.Option(help="Arena (.toml, .kiks, .kad) or picture; the classic box if none.")]
 Robots = Annotated[int, typer.Option(help="Robots in the arena.", min=1, max=1000)]
 RobotKinds = Annotated[
     list[str] | None,

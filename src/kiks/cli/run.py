@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from kiks.cli.desk import WithDesk, open_desk
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.log import show_log
 from kiks.cli.options import ArenaFile, PatienceS, RobotKinds, Seed, Turrets, WhenSilent, fit_turrets, load_arena
 from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
+    from kiks.clock.gate import Gate
     from kiks.ports.process import Command
     from kiks.sim.simulation import Simulation
 
@@ -41,6 +44,7 @@ def run(
     ] = None,
     when_silent: WhenSilent = "ignore",
     patience: PatienceS = 2.0,
+    desk: WithDesk = False,
 ) -> None:
     """Run a program for a real robot on a simulated one, unchanged; its waits and sleeps cost no time.
 
@@ -66,6 +70,9 @@ def run(
         robot=kinds,
     )
     fit_turrets(sim, turret)
+    if desk:
+        _run_on_desk(sim, commands, mapping, thinking, save_thinking, when_silent, patience)
+        return
     code, doubt = 1, ""
     try:
         if len(commands) == 1:
@@ -73,11 +80,46 @@ def run(
         else:
             code, doubt = _run_several(sim, commands, mapping, thinking, save_thinking, when_silent, patience)
     finally:
-        if thinking.startswith("live"):
-            doubt = "thinking was live"
-        repeatable = f"not repeatable: {doubt}" if doubt else f"state {sim.state_hash()}"
-        typer.echo(f"kiks: {sim.time_s:.3f} s simulated, seed {seed}, {repeatable}", err=True)
+        _tell(sim, thinking, doubt)
     raise typer.Exit(code)
+
+
+def _tell(sim: Simulation, thinking: str, doubt: str) -> None:
+    """Say how the run has ended, and whether it is repeatable."""
+    if thinking.startswith("live"):
+        doubt = "thinking was live"
+    repeatable = f"not repeatable: {doubt}" if doubt else f"state {sim.state_hash()}"
+    typer.echo(f"kiks: {sim.time_s:.3f} s simulated, seed {sim.seed}, {repeatable}", err=True)
+
+
+def _run_on_desk(
+    sim: Simulation,
+    commands: list[Command],
+    told: dict[str, int],
+    thinking: str,
+    record: Path | None,
+    when_silent: str,
+    patience_s: float,
+) -> None:
+    """Run programs in processes of their own in a world that browsers see, until Ctrl-C."""
+    from kiks.desk.desk import Desk
+    from kiks.ports.programs import Programs
+
+    def host(sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
+        return Programs(
+            sim,
+            commands,
+            told=told,
+            thinking=thinking,
+            record=record,
+            when_silent=when_silent,
+            patience_s=patience_s,
+            say=lambda text: typer.echo(f"kiks: {text}", err=True),
+            new_patience=gate.patience,
+        )
+
+    desk = Desk(sim, commands=commands, new_programs=host)
+    open_desk(desk, programs_ended=lambda sim: _tell(sim, thinking, desk.programs.doubt))
 
 
 def _run_one(sim: Simulation, command: Command, told: dict[str, int], record: Path | None) -> int:

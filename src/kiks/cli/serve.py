@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from kiks.cli.desk import WithDesk
 from kiks.cli.ending import end_as_with_ctrl_c
 from kiks.cli.engine_start import compile_everything, ready_engine
 from kiks.cli.log import show_log
@@ -25,7 +26,9 @@ from kiks.cli.options import (
 from kiks.errors import LinkError
 
 if TYPE_CHECKING:
+    from kiks.desk.showing import Shown
     from kiks.ports.endpoint import Endpoint
+    from kiks.sim.simulation import Simulation
 
 TCP_PORT = 10020
 """TCP port of robot 1, that of the next one for robot 2 and so on (khepera-protocol.md 3.3)."""
@@ -62,6 +65,7 @@ def serve(
         str, typer.Option(help="Address that the TCP ports listen at; this computer's own only.")
     ] = "127.0.0.1",
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but warnings.")] = False,
+    desk: WithDesk = False,
 ) -> None:
     """Put simulated robots on real serial and TCP ports, for programs in any language.
 
@@ -69,6 +73,7 @@ def serve(
 
     Example: kiks serve --arena examples/arenas/maze.toml --link /tmp/khepera
     """
+    from kiks.clock.patience import Patience
     from kiks.ports.server import Server
     from kiks.sim.simulation import Simulation
 
@@ -89,6 +94,8 @@ def serve(
     compile_everything()  # or load it: before the first program waits for it
     ways: dict[int, list[Endpoint]] = {number: [] for number in range(1, robots + 1)}
     server = None
+    shown = _show(sim, speed) if desk else None
+    gate = None if shown is None else shown.desk.gate
     end_as_with_ctrl_c()  # so that the links are removed
     try:
         for number, endpoints in ways.items():
@@ -109,6 +116,8 @@ def serve(
             programs=programs,
             when_silent=when_silent,
             patience_s=patience,
+            pace=None if gate is None else gate.pace,
+            new_patience=Patience if gate is None else gate.patience,
         )
         say(_what_is_repeatable(thinking, speed, robots if programs is None else programs))
         server.serve()
@@ -116,12 +125,25 @@ def serve(
         state = "" if thinking == "live" else f" State {sim.state_hash()}."
         say(f"Stopped after {sim.time_s:.1f} s of simulated time.{state}")
     finally:
+        if shown is not None:
+            shown.close()
         if server is not None:
             server.close()
         else:
             for endpoints in ways.values():
                 for endpoint in endpoints:
                     endpoint.close()
+
+
+def _show(sim: Simulation, speed: float) -> Shown:
+    """Show the world in a browser; time passes there as people want it."""
+    from kiks.desk.desk import Desk
+    from kiks.desk.showing import Shown
+
+    shown = Shown(Desk(sim, speed=speed))
+    typer.echo(f"The desk: {shown.url}")
+    shown.browse()
+    return shown
 
 
 def _open_pty(number: int, robots: int, link: Path | None, baud: int) -> Endpoint:

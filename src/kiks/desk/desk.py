@@ -12,6 +12,7 @@ from typing import TypeVar
 from kiks.clock.gate import Gate
 from kiks.desk.speedometer import Speedometer
 from kiks.errors import LinkError
+from kiks.firmware.k213 import K213
 from kiks.model.files import inside
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, robot_names
@@ -20,6 +21,7 @@ from kiks.ports.programs import Programs
 from kiks.sim.building import project_of, simulation_of
 from kiks.sim.hands import Hands
 from kiks.sim.simulation import Simulation
+from kiks.sim.sites import KINDS
 from kiks.sim.tail import Tail
 
 LOOK_S = 0.003
@@ -267,9 +269,19 @@ class NewsHandler(logging.Handler):
 
 
 def foreign_project(sim: Simulation) -> Project:
-    """Return what can be told of a world that was not built from a project: robots of another kind become Kheperas."""
+    """Return what can be told of a world that was not built from a project.
+
+    Robots of another kind than KiKS has become Kheperas, and turrets of a user's own are left out.
+    """
     known = {RobotSpec.load(kind): kind for kind in robot_names()}
-    robots = tuple(ProjectRobot(kind=known.get(spec, "khepera")) for spec in sim.specs)
+    turrets = {**{kind: name for name, kind in KINDS.items()}, K213: "k213"}
+    robots = tuple(
+        ProjectRobot(
+            kind=known.get(spec, "khepera"),
+            turrets=tuple(turrets[type(each)] for each in sim.turrets(number) if type(each) in turrets),
+        )
+        for number, spec in enumerate(sim.specs, 1)
+    )
     return project_of(sim, Project(sim.arena, robots=robots, seed=sim.seed, thinking=sim.thinking))
 
 

@@ -14,7 +14,7 @@ from typing import Any
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from kiks.desk.desk import Desk
-from kiks.desk.frames import arena_picture, describe_scene, pack_frame
+from kiks.desk.frames import arena_picture, describe_scene, describe_shapes, pack_frame
 from kiks.errors import KiksError, ParameterError
 from kiks.sim.simulation import Simulation
 
@@ -23,6 +23,9 @@ FRAME_S = 0.04
 
 DRAG_FRAME_S = 0.015
 """The same while somebody moves something [s]."""
+
+SHAPES_FRAMES = 10
+"""After how many frames it is looked whether turrets have changed their looks."""
 
 IN_FLIGHT = 3
 """Most frames on their way to one browser."""
@@ -38,6 +41,7 @@ class Viewer:
         name: Whose hand it is.
         in_flight: Frames that it has not acknowledged.
         scene: Number of the scene that it has been told of.
+        shapes: What it has been told of turrets' looks.
         newest: The frame that it gets next.
         texts: Messages that it gets before that.
     """
@@ -46,6 +50,7 @@ class Viewer:
         self.name = name
         self.in_flight = 0
         self.scene = -1
+        self.shapes: dict[str, Any] = {}
         self.newest: bytes | None = None
         self.texts: list[str] = []
         self._news = asyncio.Event()
@@ -100,6 +105,8 @@ class Gateway:
         self._seen: tuple[Any, ...] = ()
         self._scene: dict[str, Any] = {}
         self._picture: tuple[Any, bytes] = (None, b"")
+        self._shapes: dict[str, Any] = {}
+        self._frame_count = 0
 
     # ---- out ----
 
@@ -127,6 +134,10 @@ class Gateway:
             self._scene["arena"]["picture"] = f"/desk/{self._number}/arena/{self._scene['scene']}.png"
             if self._picture[0] is not sim.arena:
                 self._picture = sim.arena, arena_picture(sim.arena)
+            self._shapes = describe_shapes(sim)
+        self._frame_count += 1
+        if self._frame_count % SHAPES_FRAMES == 0 and (shapes := describe_shapes(sim)) != self._shapes:
+            self._shapes = shapes
         desk.meter.note(sim.now_ns, is_paused=desk.gate.is_paused)
         return pack_frame(
             sim,
@@ -144,6 +155,9 @@ class Gateway:
             if viewer.scene != number:
                 viewer.scene = number
                 viewer.tell(self._scene)
+            if viewer.shapes is not self._shapes:
+                viewer.shapes = self._shapes
+                viewer.tell(self._shapes)
             if viewer.is_ready:
                 self.sent_bytes += len(frame)
                 viewer.show(frame)

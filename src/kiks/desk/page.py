@@ -2,23 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from nicegui import ui
 
 from kiks.desk.arena_view import ArenaView, Pick
 from kiks.desk.desk import Desk
+from kiks.desk.monitor_panel import MonitorPanel
+from kiks.desk.programs_panel import ProgramsPanel
+from kiks.desk.settings_panel import SettingsPanel
 from kiks.desk.time_panel import TimePanel
 from kiks.desk.view_panel import ViewPanel
+from kiks.desk.wire_panel import WirePanel
 
 STYLE = """
 .nicegui-content { padding: 0; gap: 0 }
 .desk-body { width: 100%; height: calc(100dvh - 58px) }
-.desk-tabs { min-height: 40px }
-.desk-panel { height: calc(100dvh - 58px - 41px); overflow: auto }
+.desk-panels { height: calc(100dvh - 58px - 37px) }
+.desk-panels .q-tab-panel { padding: 0; overflow: auto }
+.desk-hint {
+  position: absolute; right: 16px; bottom: 44px; max-width: 80%; padding: 6px 14px; border-radius: 16px;
+  background: rgba(20, 30, 40, .8); color: #fff; pointer-events: none; animation: desk-fade 2s 25s forwards;
+}
+@keyframes desk-fade { to { opacity: 0; visibility: hidden } }
 *:focus-visible { outline: 3px solid var(--q-accent); outline-offset: 1px }
 """
 
-PRIMARY, ACCENT = "#174a63", "#d9730d"
-"""Colours that can be read with white on them, by all and on a wall: contrast 9 and 3.4 to 1."""
+PRIMARY, ACCENT = "#174a63", "#b85c00"
+"""Colours that can be read with white on them, by all and on a wall: contrasts of 9.4 and 4.7 to 1."""
+
+HINT = "Drag a robot to move it, its rim to turn it. Click it to look inside."
 
 NEWS_S = 0.5
 """How often people are told what is new [s]."""
@@ -35,6 +48,7 @@ class Page:
     def __init__(self, desk: Desk, number: int) -> None:
         self._desk = desk
         self._told = desk.news.count
+        feed = f"/desk/{number}/feed"
         ui.colors(primary=PRIMARY, accent=ACCENT)
         ui.add_css(STYLE)
         with ui.header(elevated=True).classes("items-center q-py-none q-px-md no-wrap gap-2").style("height: 58px"):
@@ -42,20 +56,60 @@ class Page:
             TimePanel(desk)
             ui.space()
             tools = ui.row().classes("items-center no-wrap gap-1")
-        with ui.splitter(value=66, limits=(30, 100)).classes("desk-body") as halves:
+        with ui.splitter(value=64, limits=(30, 100)).classes("desk-body") as halves:
             with halves.before:
-                view = ArenaView(f"/desk/{number}/feed", on_pick=self._pick)
-            with halves.after:
-                self._build_panels(view)
+                self._view = ArenaView(feed, on_pick=self._pick)
+                ui.label(HINT).classes("desk-hint")
+            with halves.after, ui.column().classes("w-full gap-0 no-wrap"):
+                self._build_tabs(feed)
         with tools:
-            ViewPanel(desk, view)
+            ViewPanel(desk, self._view)
         ui.timer(NEWS_S, self._tell_news)
 
-    def _build_panels(self, view: ArenaView) -> None:
-        """Build the tabs beside the arena."""
+    def _build_tabs(self, feed: str) -> None:
+        """Build the tabs beside the arena; what is in one when it is first looked at."""
+        desk = self._desk
+        self._unbuilt: dict[str, Callable[[], object]] = {}
+        self._monitor: MonitorPanel | None = None
+        tabs = (
+            ("robot", "Robot", "smart_toy", lambda: self._build_monitor(feed)),
+            ("wire", "Wire", "cable", lambda: WirePanel(desk)),
+            ("programs", "Programs", "code", lambda: ProgramsPanel(desk)),
+            ("settings", "Settings", "tune", lambda: SettingsPanel(desk)),
+        )
+        with (
+            ui.tabs()
+            .props("dense no-caps inline-label align=justify active-color=accent")
+            .classes("w-full") as self._tabs
+        ):
+            for name, word, icon, _ in tabs:
+                ui.tab(name, word, icon=icon).props(f"data-testid=tab-{name}")
+        self._panels = ui.tab_panels(self._tabs, animated=False).classes("desk-panels w-full")
+        self._places: dict[str, ui.tab_panel] = {}
+        with self._panels:
+            for name, _, _, build in tabs:
+                self._places[name] = ui.tab_panel(name)
+                self._unbuilt[name] = build
+        self._panels.on_value_change(lambda event: self._build(event.value))
+        self._panels.value = "robot"
 
-    def _pick(self, pick: Pick) -> None:
-        """Show what was clicked at."""
+    def _build(self, name: str) -> None:
+        build = self._unbuilt.pop(name, None)
+        if build is not None:
+            with self._places[name]:
+                build()
+
+    def _build_monitor(self, feed: str) -> None:
+        self._monitor = MonitorPanel(self._desk, feed)
+
+    async def _pick(self, pick: Pick) -> None:
+        """Show the robot or the sensor that was clicked at."""
+        if pick.what in ("robot", "sensor"):
+            self._panels.value = "robot"
+            if self._monitor is not None and pick.what == "robot":
+                self._monitor.show_robot(pick.index)
+            elif self._monitor is not None:
+                await self._monitor.show_sensor(pick.index, pick.sensor)
 
     def _tell_news(self) -> None:
         first, news = self._desk.news.since(self._told)

@@ -20,6 +20,21 @@ LAYERS = {
 
 VIEWS = {"top": "2-D", "both": "both", "solid": "3-D"}
 
+HELP = """
+**With the mouse or a finger**
+
+* Drag a robot to move it; drag its rim, or drag with Shift, to turn it. Balls, cylinders and lamps are dragged, too.
+* Click a robot to look inside; click one of its sensors to learn why it reads what it reads.
+* Wheel or two fingers: nearer and farther. Drag the floor: move the view.
+
+**With the keyboard**
+
+* Space: run and pause. `.`: a step.
+* On the arena, which Tab reaches: `n` selects one thing after the other, arrows move it by 10 mm (with Shift 1 mm),
+  `q` and `e` turn it by 5 degrees, Escape lets go; `+` `-` `0`: nearer, farther, all.
+* In the editor of programs: Ctrl-Enter runs.
+"""
+
 
 class ViewPanel:
     """The buttons that say what is shown.
@@ -49,10 +64,14 @@ class ViewPanel:
         self._robots.on("before-show", self._list_robots)
         with _button("fit_screen", "Show all of the arena", "fit").on_click(view.fit):
             ui.tooltip("Show all of the arena (key: 0)")
+        with ui.dialog() as self._help, ui.card():
+            ui.markdown(HELP)
+            ui.button("Close", on_click=self._help.close).props("flat no-caps")
         dark = ui.dark_mode(value=None)
         with _button("contrast", "Light or dark", "dark"), ui.menu():
             for text, value in (("As the computer has it", None), ("Light", False), ("Dark", True)):
                 ui.menu_item(text, on_click=lambda value=value: dark.set_value(value))
+        _button("help_outline", "Help", "help").on_click(self._help.open)
 
     def _list_robots(self) -> None:
         self._robots.clear()

@@ -42,12 +42,34 @@ def load_arena(path: Path) -> Arena:
     what = f"Arena file {str(path)!r}"
     check_is_file(path, what)
     try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise ArenaError(f"{what} must be readable, but: {error}. Check its rights.") from None
+    return _decode(data, what, path.stem, path.parent)
+
+
+def decode_arena(data: bytes, name: str = "arena", what: str = "The arena file") -> Arena:
+    """Read the bytes of an arena file that has no picture.
+
+    Args:
+        data: The bytes.
+        name: What people call the arena if the file does not say.
+        what: What messages call the file.
+
+    Raises:
+        ArenaError: If it is damaged, no arena, or has a picture.
+    """
+    return _decode(data, what, name, None)
+
+
+def _decode(data: bytes, what: str, name: str, folder: Path | None) -> Arena:
+    try:
         # Undecodable bytes and endless numbers are ValueErrors too; deep nesting ends in a RecursionError.
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError, OSError) as error:
+        table = tomllib.loads(data.decode("utf-8"))
+    except (ValueError, RecursionError) as error:
         raise ArenaError(f"{what} must be TOML in UTF-8, but: {error}. Correct the file at that place.") from None
     try:
-        return _arena_of(table, path)
+        return _arena_of(table, name, folder)
     except KiksError as error:
         raise ArenaError(f"{what}: {error}") from None
 
@@ -78,7 +100,7 @@ def save_arena(arena: Arena, path: str | Path) -> None:
         ) from None
 
 
-def _arena_of(table: dict[str, Any], path: Path) -> Arena:
+def _arena_of(table: dict[str, Any], name: str, folder: Path | None) -> Arena:
     check_keys(table, _TOP_KEYS, "the file")
     for keys, rival in ((_PICTURE_KEYS, "size_mm"), (BOX_KEYS, "picture")):
         if rival in table and (given := [key for key in keys if key in table]):
@@ -86,7 +108,11 @@ def _arena_of(table: dict[str, Any], path: Path) -> Arena:
                 f"an arena must be either a picture or a box, but {rival} came with {given[0]}. Remove one of them."
             )
     if "picture" in table:
-        arena = _picture_arena(table, path)
+        if folder is None:
+            raise ArenaError(
+                "an arena that comes alone must have no picture beside it, but it names one. Open that picture instead."
+            )
+        arena = _picture_arena(table, folder)
     elif "size_mm" in table:
         width_mm, height_mm = pair_of(table, "size_mm", "the box")
         box_keys = {key: table[key] for key in BOX_KEYS[1:] if key in table}
@@ -96,7 +122,7 @@ def _arena_of(table: dict[str, Any], path: Path) -> Arena:
             "an arena must have a picture or a size, but it has neither. "
             'Give picture = "name.png" or size_mm = [width, height].'
         )
-    return replace(arena, name=typed(table, "name", str, path.stem, "the file"), **places_of(table))
+    return replace(arena, name=typed(table, "name", str, name, "the file"), **places_of(table))
 
 
 def places_of(table: dict[str, Any]) -> dict[str, Any]:
@@ -115,22 +141,21 @@ def places_of(table: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _picture_arena(table: dict[str, Any], path: Path) -> Arena:
+def _picture_arena(table: dict[str, Any], folder: Path) -> Arena:
     given = typed(table, "picture", str, "", "the file")
-    folder = path.parent.resolve()
+    home = folder.resolve()
     try:
-        picture = (folder / given).resolve()
+        picture = (home / given).resolve()
     except (ValueError, OSError, RuntimeError):
         # A NUL character, or links that lead in a circle.
-        picture = folder.parent
-    if not picture.is_relative_to(folder) or Path(given).is_absolute():
+        picture = home.parent
+    if not picture.is_relative_to(home) or Path(given).is_absolute():
         raise ArenaError(
             f"picture must lie in the arena file's folder or below it, but it was {given!r}. "
             "Copy the picture beside the file and give its name."
         )
     mm_per_pixel = table.get("mm_per_pixel", 1.0)
-    brightness = read_picture(path.parent / given, mm_per_pixel)
-    return Arena.from_array(brightness, mm_per_pixel=mm_per_pixel, name=path.stem)
+    return Arena.from_array(read_picture(folder / given, mm_per_pixel), mm_per_pixel=mm_per_pixel)
 
 
 def _starts(table: dict[str, Any]) -> Iterable[Pose]:

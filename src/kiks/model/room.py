@@ -8,6 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 import numpy.typing as npt
 
+from kiks.errors import ArenaError
 from kiks.model.arena import PAD, Arena
 from kiks.model.raster import between, clearance_mm
 
@@ -49,15 +50,23 @@ def room_mm(brightness: npt.NDArray[np.uint8], mm_per_cell: float, x_mm: float, 
 
 
 def free_place(
-    arena: Arena, discs: Iterable[tuple[float, float, float]], radius_mm: float, near: tuple[float, float] | None
-) -> tuple[float, float] | None:
-    """Return the free place for a disc that is nearest to another, the roomiest one without; None if there is none.
+    arena: Arena,
+    discs: Iterable[tuple[float, float, float]],
+    radius_mm: float,
+    near: tuple[float, float] | None,
+    what: str,
+) -> tuple[float, float]:
+    """Return the free place for a disc that is nearest to another, the roomiest one without.
 
     Args:
         arena: Walls.
         discs: x, y and radius of what else is in the way [mm].
         radius_mm: Radius of the disc [mm].
         near: x and y of the place wished for [mm].
+        what: What messages call the disc.
+
+    Raises:
+        ArenaError: If there is none.
     """
     cell = arena.mm_per_cell
     rows, columns = arena.brightness.shape
@@ -67,7 +76,10 @@ def free_place(
         np.minimum(room, (np.hypot(y - disc_y, x - disc_x) - disc_radius).astype(np.float32), out=room)
     is_free = room >= radius_mm
     if not is_free.any():
-        return None
+        raise ArenaError(
+            f"There must be room for {what}, {2 * radius_mm:g} mm across, but in arena {arena.name!r} is none. Take a "
+            "larger one, or take something away."
+        )
     if near is None:
         best = room.argmax()
     else:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -22,7 +21,16 @@ from kiks.model.places import Ball, Cylinder, Lamp, Pose, checked_places
 from kiks.model.raster import is_number
 from kiks.model.room import OVERLAP_MM, free_place, room_mm
 from kiks.model.sketch_history import BoxPatch, Canvas, History, Patch, ThingPatch, WholePatch
-from kiks.model.sketch_things import AnyThing, SketchRobot, Thing, name_of, radius_of, robot_radius_mm
+from kiks.model.sketch_things import (
+    AnyThing,
+    SketchRobot,
+    Thing,
+    name_of,
+    numbered,
+    overlap_of,
+    radius_of,
+    robot_radius_mm,
+)
 
 WIDTH_MAX_MM = 1000.0
 """Widest brush [mm]."""
@@ -45,6 +53,7 @@ class Sketch:
 
     Attributes:
         things: What stands or hangs in it, by numbers that stay the same; numbers rise with time.
+        version: Rises with each step, forth or back.
 
     Raises:
         ArenaError: If there is no room for a robot.
@@ -60,9 +69,11 @@ class Sketch:
 
     def __init__(self, arena: Arena, kinds: Sequence[str] = ("khepera",)) -> None:
         self.things: dict[int, Thing] = {}
-        self._next, self._history = 1, History()
+        self._next, self._history, self.version = len(kinds) + 1, History(), 0
         self._canvas = Canvas(arena.brightness.copy(), arena.mm_per_cell, arena.name)
-        self._enter(arena, kinds)
+        pairs = enumerate(zip(arena.starts, kinds, strict=False), 1)
+        started = {number: SketchRobot(*start, kind) for number, (start, kind) in pairs}
+        self._enter(arena, started, dict(list(enumerate(kinds, 1))[len(started) :]))
 
     @property
     def brightness(self) -> npt.NDArray[np.uint8]:
@@ -70,6 +81,11 @@ class Sketch:
         view = self._canvas.brightness.view()
         view.setflags(write=False)
         return view
+
+    @property
+    def arena_number(self) -> int:
+        """Number of the arena that was begun with; drawing in it does not change it."""
+        return self._canvas.number
 
     @property
     def width_mm(self) -> float:
@@ -141,49 +157,38 @@ class Sketch:
             ArenaError: If it has no room for the robots.
         """
         before, canvas = WholePatch(self._canvas, self.things), self._canvas
-        robots = list(self.of(SketchRobot).values())
-        wanted = [
-            SketchRobot(*arena.starts[index], robot.kind) if index < len(arena.starts) else robot
-            for index, robot in enumerate(robots)
-        ]
-        self._canvas = Canvas(arena.brightness.copy(), arena.mm_per_cell, arena.name)
+        wanted: dict[int, SketchRobot | str] = {
+            number: SketchRobot(*arena.starts[index], robot.kind) if index < len(arena.starts) else robot
+            for index, (number, robot) in enumerate(self.of(SketchRobot).items())
+        }
+        self._canvas = Canvas(arena.brightness.copy(), arena.mm_per_cell, arena.name, number=self._next)
         try:
-            self._enter(replace(arena, starts=()), self.kinds, wanted)
+            self._enter(arena, {}, wanted)
         except KiksError:
             self._canvas = canvas
             before.swap(canvas, self.things)
             raise
-        self._history.push(before)
+        self._push(before)
 
-    def _enter(self, arena: Arena, kinds: Sequence[str], wanted: Sequence[SketchRobot] = ()) -> None:
-        """Put everything into an empty raster: robots where they are wanted, or else at the nearest free place."""
+    def _enter(self, arena: Arena, robots: dict[int, SketchRobot], wanted: dict[int, SketchRobot | str]) -> None:
+        """Put everything into an empty raster: robots, and those for which a place near another or any is wanted."""
         self.things.clear()
-        others: list[Thing] = [*arena.balls, *arena.cylinders, *arena.lamps]
-        for index, kind in enumerate(kinds):
-            if index < len(arena.starts):
-                robot = SketchRobot(*arena.starts[index], kind)
-            else:
-                near = wanted[index] if index < len(wanted) else None
-                robot = self._seat(index + 1, kind, near, others)
-            self._add(robot)
-        for thing in others:
+        self.things.update(robots)
+        for thing in (*arena.bodies, *arena.lamps):
             self._add(thing)
+        for number, wish in wanted.items():
+            self.things[number] = self._seat(number, wish)
 
-    def _seat(self, number: int, kind: str, near: SketchRobot | None, others: Iterable[Thing]) -> SketchRobot:
-        """Return a free place for a robot: its own, the one nearest to it, or else the roomiest."""
-        radius_mm = robot_radius_mm(kind)
-        if near is not None and self._obstacle(near) is None:
-            return near
+    def _seat(self, number: int, wish: SketchRobot | str) -> SketchRobot:
+        """Return a free place for a robot: its own, the one nearest to it, or of a mere kind the roomiest."""
+        if isinstance(wish, SketchRobot) and self._obstacle(wish) is None:
+            return wish
+        kind, near = (wish, None) if isinstance(wish, str) else (wish.kind, (wish.x_mm, wish.y_mm))
         arena = Arena(self._canvas.brightness.copy(), self._canvas.mm_per_cell, self._canvas.name)
-        there = [thing for thing in [*self.things.values(), *others] if not isinstance(thing, Lamp)]
+        there = [thing for thing in self.things.values() if not isinstance(thing, Lamp)]
         discs = [(thing.x_mm, thing.y_mm, radius_of(thing)) for thing in there]
-        place = free_place(arena, discs, radius_mm, None if near is None else (near.x_mm, near.y_mm))
-        if place is None:
-            raise ArenaError(
-                f"There must be room for robot {number}, {2 * radius_mm:g} mm across, but there is none. "
-                "Take a larger arena, or take a robot away."
-            )
-        return SketchRobot(*place, math.pi / 2 if near is None else near.heading_rad, kind)
+        place = free_place(arena, discs, robot_radius_mm(kind), near, f"robot {number}")
+        return SketchRobot(*place, math.pi / 2 if isinstance(wish, str) else wish.heading_rad, kind)
 
     # ---- walls ----
 
@@ -251,7 +256,7 @@ class Sketch:
         except ArenaError:
             raster[box] = before
             raise
-        self._history.push(BoxPatch(box, before))
+        self._push(BoxPatch(box, before))
 
     def _check_walls(self, box: tuple[slice, slice]) -> None:
         """Check that after a wall was drawn there is floor, and nothing stands in it."""
@@ -270,7 +275,7 @@ class Sketch:
                 if gap_mm < -OVERLAP_MM:
                     raise ArenaError(
                         f"A wall must leave room for what stands in the arena, but it would be {-gap_mm:.1f} mm inside "
-                        f"{self._name(number)} at ({thing.x_mm:g}, {thing.y_mm:g}) mm. Move that first."
+                        f"{numbered(self.things, number)} at ({thing.x_mm:g}, {thing.y_mm:g}) mm. Move that first."
                     )
 
     # ---- things ----
@@ -288,7 +293,7 @@ class Sketch:
         ]
         if len(alike) >= THINGS_MAX:
             raise ParameterError(f"There must be at most {THINGS_MAX} of these, but there are {len(alike)} already.")
-        self._history.push(ThingPatch(self._next, None))
+        self._push(ThingPatch(self._next, None))
         self._add(checked)
         return self._next - 1
 
@@ -301,17 +306,8 @@ class Sketch:
         """
         before = self._thing(number)
         checked = self._checked(thing, but=number)
-        self._history.push(ThingPatch(number, before))
+        self._push(ThingPatch(number, before))
         self.things[number] = checked
-
-    def move(self, number: int, x_mm: float, y_mm: float) -> None:
-        """Put a thing elsewhere.
-
-        Raises:
-            ParameterError: If there is no such thing, or a number is out of range.
-            ArenaError: If something is in the way.
-        """
-        self.change(number, self._thing(number)._replace(x_mm=x_mm, y_mm=y_mm))
 
     def remove(self, number: int) -> None:
         """Take a thing away.
@@ -322,7 +318,7 @@ class Sketch:
         thing = self._thing(number)
         if isinstance(thing, SketchRobot) and len(self.kinds) == 1:
             raise ParameterError("There must be at least one robot, but this is the only one. Add another one first.")
-        self._history.push(ThingPatch(number, thing))
+        self._push(ThingPatch(number, thing))
         del self.things[number]
 
     def note(self, number: int, thing: Thing) -> None:
@@ -365,24 +361,12 @@ class Sketch:
         gap_mm = self._gap_mm(thing)
         if gap_mm < -OVERLAP_MM:
             return f"a wall is {-gap_mm:.1f} mm inside it"
-        for number, other in self.things.items():
-            if number == but or isinstance(other, Lamp):
-                continue
-            together_mm = radius_of(thing) + radius_of(other)
-            overlap_mm = together_mm - math.hypot(thing.x_mm - other.x_mm, thing.y_mm - other.y_mm)
-            if overlap_mm > OVERLAP_MM:
-                return f"{self._name(number)} is {overlap_mm:.1f} mm inside it"
-        return None
+        return overlap_of(thing, self.things, but)
 
     def _gap_mm(self, thing: SketchRobot | Ball | Cylinder) -> float:
         radius_mm = radius_of(thing)
         canvas = self._canvas
         return room_mm(canvas.brightness, canvas.mm_per_cell, thing.x_mm, thing.y_mm, radius_mm) - radius_mm
-
-    def _name(self, number: int) -> str:
-        kind = type(self.things[number])
-        alike = [each for each, thing in sorted(self.things.items()) if isinstance(thing, kind)]
-        return f"{name_of(kind)} {alike.index(number) + 1}"
 
     # ---- steps ----
 
@@ -402,6 +386,15 @@ class Sketch:
         """
         return self._swap(self._history.redoable, self._history.undoable)
 
+    def take_back(self) -> None:
+        """Take the last step back for good: it was none."""
+        if self.undo():
+            self._history.redoable.pop()
+
+    def _push(self, patch: Patch) -> None:
+        self._history.push(patch)
+        self.version += 1
+
     def _swap(self, source: list[Patch], target: list[Patch]) -> bool:
         if not source:
             return False
@@ -417,4 +410,5 @@ class Sketch:
             raise
         source.pop()
         target.append(other)
+        self.version += 1
         return True

@@ -26,11 +26,19 @@ Things = MutableMapping[int, Any]
 
 @dataclass
 class Canvas:
-    """What is painted on: uint8 [row, column] with row 0 at the bottom, the edge of a cell [mm], and its name."""
+    """What is painted on.
+
+    Attributes:
+        brightness: uint8 [row, column], row 0 at the bottom.
+        mm_per_cell: Edge of a cell [mm].
+        name: What people call it.
+        number: Another one for each canvas of a sketch.
+    """
 
     brightness: npt.NDArray[np.uint8]
     mm_per_cell: float
     name: str
+    number: int = 0
 
 
 class Patch(Protocol):
@@ -65,7 +73,8 @@ class WholePatch:
 
     def __init__(self, canvas: Canvas, things: Things) -> None:
         self._things = dict(things)
-        self._shape, self._mm_per_cell, self._name = canvas.brightness.shape, canvas.mm_per_cell, canvas.name
+        self._shape = canvas.brightness.shape
+        self._mm_per_cell, self._name, self._number = canvas.mm_per_cell, canvas.name, canvas.number
         self._packed = _packed(canvas.brightness)
         self.size = len(self._packed) + _THING_BYTES * len(things)
 
@@ -73,7 +82,7 @@ class WholePatch:
         """Put it back; return what it replaced."""
         other = WholePatch(canvas, things)
         canvas.brightness = _unpacked(self._packed, self._shape)
-        canvas.mm_per_cell, canvas.name = self._mm_per_cell, self._name
+        canvas.mm_per_cell, canvas.name, canvas.number = self._mm_per_cell, self._name, self._number
         things.clear()
         things.update(self._things)
         return other

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import NamedTuple, TypeVar
 
 from kiks.model.places import Ball, Cylinder, Lamp
 from kiks.model.robot import RobotSpec
+from kiks.model.room import OVERLAP_MM
 
 
 class SketchRobot(NamedTuple):
@@ -28,6 +30,25 @@ _NAMES: dict[type, str] = {SketchRobot: "robot", Ball: "ball", Cylinder: "cylind
 def name_of(kind: type[Thing]) -> str:
     """Return what people call a kind of thing."""
     return _NAMES[kind]
+
+
+def numbered(things: Mapping[int, Thing], number: int) -> str:
+    """Return what people call one of many things: 'ball 2', the second of all balls."""
+    kind = type(things[number])
+    alike = [each for each, thing in sorted(things.items()) if isinstance(thing, kind)]
+    return f"{name_of(kind)} {alike.index(number) + 1}"
+
+
+def overlap_of(thing: SketchRobot | Ball | Cylinder, things: Mapping[int, Thing], but: int = 0) -> str | None:
+    """Say which of many things but one is inside what stands on the floor, None if none is."""
+    for number, other in things.items():
+        if number == but or isinstance(other, Lamp):
+            continue
+        apart_mm = math.hypot(thing.x_mm - other.x_mm, thing.y_mm - other.y_mm)
+        overlap_mm = radius_of(thing) + radius_of(other) - apart_mm
+        if overlap_mm > OVERLAP_MM:
+            return f"{numbered(things, number)} is {overlap_mm:.1f} mm inside it"
+    return None
 
 
 def radius_of(thing: SketchRobot | Ball | Cylinder) -> float:

@@ -56,8 +56,8 @@ class NearLine:
         from_ns = sim.now_ns
         sim.advance_to(from_ns + time_ns)
         for wire in sim.wires:
-            if wire.log is not None and (wire is self._wire or wire.holder is not None):
-                wire.log.think(from_ns, from_ns + time_ns)
+            if wire is self._wire or wire.holder is not None:
+                wire.think(from_ns, from_ns + time_ns)
 
     def send(self, data: bytes) -> None:
         """Put characters on the line; wait while it is full."""

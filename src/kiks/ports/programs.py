@@ -204,6 +204,10 @@ class Programs:
                 f"a program must be a Python file, but there is none at {str(command.program)!r}. Save it first."
             )
         with self.sim.lock:
+            if self._is_closed:
+                raise KiksError(
+                    f"a program must have a world, but that of {command.program.name} has ended. Try again."
+                )
             self.sim.index_of(robot)
             there = [handle for handle in self.handles if handle.robot == robot]
             for handle in there:
@@ -328,7 +332,7 @@ class Programs:
         return handle
 
     def _end(self, handle: Handle) -> None:
-        """Free the robots of a program that a person has stopped, even while time stands still: in its own thread."""
+        """Free the robots of a program that a person has stopped: here, as `round` may be waiting for time to go on."""
         if handle.guest.is_stopped and not self._is_closed:
             with self.sim.lock:
                 handle.guest.part()
@@ -342,6 +346,9 @@ class Programs:
             guest = handle.guest
             if guest.is_silenced and handle.is_running:
                 handle.process.kill()
+            if guest.is_stopped and handle.process.code is not None:
+                guest.part()
+                handle.has_ended.set()
             if handle.has_hung_up:
                 continue
             if not handle.is_running:

@@ -36,8 +36,8 @@ class Server:
         when_silent: What happens to a program that is silent while others wait for it: 'wait': the world waits for it;
             'drop': it is hung up on; 'ignore': the world no longer waits for it (not live).
         patience_s: How long it may be silent [s of real time].
-        pace: For tests: a pace with its own wall clock, instead of `speed`.
-        new_patience: For tests: makes patiences with their own wall clock.
+        pace: A pace that others hold too, instead of `speed`.
+        new_patience: Makes patiences with another wall clock: one that stands still while the world does.
 
     Raises:
         ParameterError: If there is no such robot, or a value is out of range.

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from kiks.engine.state import BALL
-from kiks.errors import ArenaError
-from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
+from kiks.model.arena import Ball, Cylinder, Lamp, Pose
 from kiks.model.files import inside
 from kiks.model.policy import split_thinking
 from kiks.model.project import Project
@@ -85,7 +84,7 @@ def project_of(sim: Simulation, project: Project) -> Project:
     for body in bodies:
         x_mm, y_mm, radius_mm = _disc(body)
         if body["is_lifted"]:
-            x_mm, y_mm = _free_place(arena, discs, x_mm, y_mm, radius_mm)
+            x_mm, y_mm = free_place(arena, discs, radius_mm, (x_mm, y_mm), "what a gripper holds up")
             discs.append((x_mm, y_mm, radius_mm))
         place = (round(x_mm, 3), round(y_mm, 3), radius_mm, float(body["friction_mm_s2"]), int(body["brightness"]))
         if body["what"] == BALL:
@@ -101,15 +100,3 @@ def project_of(sim: Simulation, project: Project) -> Project:
 
 def _disc(body: Any) -> tuple[float, float, float]:
     return float(body["x_mm"]), float(body["y_mm"]), float(body["radius_mm"])
-
-
-def _free_place(
-    arena: Arena, discs: list[tuple[float, float, float]], x_mm: float, y_mm: float, radius_mm: float
-) -> tuple[float, float]:
-    place = free_place(arena, discs, radius_mm, (x_mm, y_mm))
-    if place is None:
-        raise ArenaError(
-            f"There must be room for what a gripper holds, {2 * radius_mm:g} mm across, but arena {arena.name!r} has "
-            "none. Let the robot put it down first."
-        )
-    return place

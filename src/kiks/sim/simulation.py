@@ -22,6 +22,7 @@ from kiks.firmware.turret import Turret
 from kiks.model.arena import Arena
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
 from kiks.sim.cameras import Cameras
+from kiks.sim.explanation import Explanation, LightExplanation, explain_ambient, explain_proximity
 from kiks.sim.look import Look, look, trace_rays
 from kiks.sim.sites import Place, first_memory, named
 from kiks.sim.table import TABLE
@@ -330,6 +331,43 @@ class Simulation(Things):
             self.sync()
             lengths_mm, _, _, _ = trace_rays(self, index, 1)
             return np.ascontiguousarray(lengths_mm[0])
+
+    def explain(self, robot: int, sensor: int) -> Explanation:
+        """Return why command `N` returns what it returns for a proximity sensor at this instant.
+
+        Args:
+            robot: Number of the robot, from 1.
+            sensor: Index of the sensor in the answer to `N`, from 0.
+
+        Raises:
+            ParameterError: If there is no such robot or sensor.
+
+        Example:
+            >>> sim = Simulation(Arena.box(200, 200))
+            >>> sim.place(1, 40.0, 100.0, 3.14159)
+            >>> why = sim.explain(1, 2)
+            >>> why.count == sim.proximity(1, noise=True)[2]
+            True
+            >>> why.rays[3].met, why.rays[3].brightness
+            ('wall', 255)
+        """
+        with self.lock:
+            self.sync()
+            return explain_proximity(self, self._networks, robot, sensor)
+
+    def explain_light(self, robot: int, sensor: int) -> LightExplanation:
+        """Return why command `O` returns what it returns for a light sensor at this instant.
+
+        Args:
+            robot: Number of the robot, from 1.
+            sensor: Index of the sensor in the answer to `O`, from 0.
+
+        Raises:
+            ParameterError: If there is no such robot or sensor.
+        """
+        with self.lock:
+            self.sync()
+            return explain_ambient(self, robot, sensor)
 
     def look(self) -> Look:
         """Return where everybody is at this instant, and what all sensors see; looking changes nothing."""

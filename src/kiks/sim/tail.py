@@ -45,6 +45,12 @@ class Tail(Generic[Item]):
             self._items.extend(new)
             self._count += skipped + len(new)
 
+    def append(self, item: Item) -> None:
+        """Take one thing."""
+        with self._lock:
+            self._items.append(item)
+            self._count += 1
+
     def since(self, number: int) -> tuple[int, list[Item]]:
         """Return what is kept from a number on, and the number of its first: a larger one if some are forgotten."""
         with self._lock:

@@ -63,6 +63,7 @@ class Wire:
         self._processing_ns = ns_from_s(firmware.spec.firmware.processing_ms * 1e-3)
         self.pending: deque[tuple[int, bytes, Hear | None]] = deque()
         self.log: WireLog | None = None
+        self._watcher_count = 0
         self.thinks_since_ns: int | None = None
         self._last_act_ns = 0
         self._orphan_count = 0
@@ -90,10 +91,9 @@ class Wire:
             if self.next_ns is None or self._last_act_ns < self.next_ns:
                 self.next_ns = self._last_act_ns
                 self._agenda.note(self.next_ns, self._index)
-        if self.log is not None:
-            due = list(self.pending)[len(self.pending) - len(lines) :]
-            acts = [(index, act_ns) for (index, _), (act_ns, _, _) in zip(lines, due, strict=True)]
-            self.log.send(data, start_ns, character_ns, acts)
+        if (log := self.log) is not None:
+            due = list(self.pending)[len(self.pending) - len(lines) :] if lines else []
+            log.send(data, start_ns, character_ns, [(k, each[0]) for (k, _), each in zip(lines, due, strict=True)])
 
     def act(self, now_ns: int) -> None:
         """Do what is due."""
@@ -107,8 +107,8 @@ class Wire:
             elif not self._orphan_count:
                 start_ns = self.line.answer(reply, now_ns)
             self._orphan_count = max(self._orphan_count - 1, 0)
-            if self.log is not None and start_ns is not None:
-                self.log.answer(reply, start_ns, self.line.character_ns, now_ns)
+            if (log := self.log) is not None and start_ns is not None:
+                log.answer(reply, start_ns, self.line.character_ns, now_ns)
             if self.firmware.baud != self.line.baud:
                 self.line.set_baud(self.firmware.baud)
         else:
@@ -123,19 +123,28 @@ class Wire:
             self._agenda.note(self.next_ns, self._index)
 
     def watch(self, now_ns: int) -> WireLog:
-        """Remember what goes over the line from now [ns] on, if nobody does yet."""
-        if self.log is None:
-            self.log = WireLog(now_ns)
-        return self.log
+        """Remember what goes over the line from now [ns] on, if nobody does yet; `unwatch` as often as this."""
+        self._watcher_count += 1
+        log = self.log
+        if log is None:
+            log = self.log = WireLog(now_ns)
+        return log
+
+    def unwatch(self) -> None:
+        """Watch it no longer; when nobody does, nothing is remembered."""
+        self._watcher_count -= 1
+        if self._watcher_count == 0:
+            self.log = None
 
     def think(self, from_ns: int, until_ns: int) -> None:
         """Note that the program has thought, for whoever watches."""
-        if self.log is not None:
-            self.log.think(from_ns, until_ns)
+        if (log := self.log) is not None:
+            log.think(from_ns, until_ns)
 
     def shares(self, from_ns: int, until_ns: int) -> TimeShares | None:
         """Return where the time of a window went; None if nobody watches."""
-        return None if self.log is None else self.log.shares(from_ns, until_ns, thinks_since_ns=self.thinks_since_ns)
+        log = self.log
+        return None if log is None else log.shares(from_ns, until_ns, thinks_since_ns=self.thinks_since_ns)
 
     def enter_client(self, holder: str, now_ns: int) -> None:
         """Let a real program have the line: all that it does between a reply and a command is thinking."""

@@ -82,6 +82,9 @@ class WireLog:
             character_ns: How long each takes [ns].
             acts: For each command that they complete: the index of its terminator, and when it acts [ns].
         """
+        if len(acts) == 1 and acts[0][0] == len(data) - 1:  # what nearly every program sends: one whole line
+            self.pieces.append(Piece(True, data, start_ns, start_ns + len(data) * character_ns, acts[0][1]))
+            return
         begin = 0
         pieces: list[tuple[int, int, int | None]] = []
         for index, acted_ns in acts:
@@ -100,11 +103,11 @@ class WireLog:
 
     def answer(self, data: bytes, start_ns: int, character_ns: int, acted_ns: int) -> None:
         """Note a reply."""
-        self.pieces.add([Piece(False, data, start_ns, start_ns + len(data) * character_ns, acted_ns)])
+        self.pieces.append(Piece(False, data, start_ns, start_ns + len(data) * character_ns, acted_ns))
 
     def think(self, from_ns: int, until_ns: int) -> None:
         """Note that the program of this line has thought."""
-        self._thoughts.add([(from_ns, until_ns)])
+        self._thoughts.append((from_ns, until_ns))
 
     @property
     def since_ns(self) -> int:

@@ -8,3 +8,6 @@ export { loadRaster } from "./raster.js";
 export { KEYS_HELP } from "./keys.js";
 export { Stage } from "./stage.js";
 export { nameOf, placeOf } from "./things.js";
+export { CURVES, isDashed, lineColour } from "./curves.js";
+export { Monitor } from "./monitor.js";
+export { placeOfNumber } from "./robot_drawing.js";

@@ -1,0 +1,1 @@
+"""Programs to begin with: plain pyserial, for a real Khepera as well."""

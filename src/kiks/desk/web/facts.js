@@ -1,0 +1,43 @@
+/* A robot's numbers in words, as rows of a list: [what, value]. */
+
+const DEGREES = 180 / Math.PI;
+const ARM_DOWN = 215, ARM_UPRIGHT = 127;
+
+/** Return the rows of a robot in a frame. */
+export function factsOf(scene, frame, index) {
+  const robot = frame.robot(index), known = scene.robots[index];
+  const rows = [
+    ["Clock", `${frame.time_s.toFixed(2)} s`],
+    ["Place", `x ${robot.x_mm.toFixed(1)}, y ${robot.y_mm.toFixed(1)} mm`],
+    ["Heading", `${turned(robot.heading_rad * DEGREES).toFixed(1)}°`],
+    ["Encoders", `left ${robot.encoders[0]}, right ${robot.encoders[1]}`],
+    ["Forwards", `${robot.forwards_mm.toFixed(0)} mm`],
+    ["Backwards", `${robot.backwards_mm.toFixed(0)} mm`],
+    ["In all", `${(robot.forwards_mm + robot.backwards_mm).toFixed(0)} mm`],
+    ["From start", `${robot.straight_mm.toFixed(0)} mm straight`],
+    ["Contacts", `${robot.contacts}${robot.isTouching ? ", touching now" : ""}`],
+    ["LEDs", robot.leds.map((isOn, k) => `${k} ${isOn ? "on" : "off"}`).join(", ")],
+    ["Line", robot.isLineInUse ? "a program is connected" : "nobody is connected"],
+    ["Kind", known.kind],
+    ["Turrets", known.turrets.length ? known.turrets.join(", ") : "none"],
+  ];
+  if (known.has_gripper) {
+    rows.push(["Arm", `${robot.arm.toFixed(0)} of 255, ${armWord(robot.arm)}`]);
+    rows.push(["Jaws", `${robot.jaws.toFixed(0)} of 200, ${jawsWord(robot.jaws)}`]);
+  }
+  return rows;
+}
+
+function turned(degrees) {
+  return ((degrees % 360) + 360) % 360;
+}
+
+function armWord(arm) {
+  if (arm >= ARM_DOWN) return "down in front";
+  if (Math.abs(arm - ARM_UPRIGHT) < 3) return "upright";
+  return arm > ARM_UPRIGHT ? "raised in front" : "folded back";
+}
+
+function jawsWord(jaws) {
+  return jaws >= 199.5 ? "open" : jaws < 0.5 ? "closed" : "between";
+}

@@ -1,0 +1,121 @@
+/* One robot from above, large, looking up the screen: its rays as seen, and lines from its sensors to their numbers. */
+
+import { readingBucket, READING_COLOURS, rgba } from "./colours.js";
+import { NO_HIT, RAY_UNIT_MM, RAYS_PER_SENSOR } from "./frame.js";
+import { paintRobot } from "./top_robots.js";
+
+/** Directions in which the numbers of the eight sensors stand around a robot, whatever way it looks [rad]. */
+const PLACES_RAD = [83, 49, 17, -17, -49, -83, -153, 153].map((degrees) => (degrees * Math.PI) / 180);
+const ASIDE_SHARE = 0.42, ALONG_SHARE = 0.43;
+const HIT_PX = 2.6;
+
+/** Where the number of a sensor stands, in shares of the picture's width and height. */
+export function placeOfNumber(sensor) {
+  const angle = PLACES_RAD[sensor];
+  return [0.5 - ASIDE_SHARE * Math.sin(angle), 0.5 - ALONG_SHARE * Math.cos(angle)];
+}
+
+/** Draw a robot; `context` takes CSS pixels times `ratio`, `look` is a RobotLook. */
+export function paintLargeRobot(context, width, height, ratio, look, scene, frame, index, chosen, isDark) {
+  const robot = frame.robot(index), known = scene.robots[index];
+  const middle = [width / 2, height / 2];
+  const scale = Math.min(width, height) / (2 * (known.radius_mm + known.reach_mm));
+  const at = (x_mm, y_mm) => [middle[0] - y_mm * scale, middle[1] - x_mm * scale];
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  context.clearRect(0, 0, width, height);
+  paintRings(context, middle, known, scale, isDark);
+  paintFans(context, at, known, robot, frame.rays(index), chosen, isDark);
+  paintLeaders(context, at, width, height, known, isDark);
+  context.setTransform(0, -scale * ratio, -scale * ratio, 0, middle[0] * ratio, middle[1] * ratio);
+  paintRobot(context, look, robot, null, index, scale, known.has_gripper, isDark);
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  if (robot.isTouching) {
+    context.strokeStyle = isDark ? "#ff5a4d" : "#e0261b";
+    context.lineWidth = 4;
+    context.beginPath();
+    context.arc(...middle, known.radius_mm * scale + 4, 0, 2 * Math.PI);
+    context.stroke();
+  }
+  paintCompass(context, robot.heading_rad, isDark);
+}
+
+/** Rings at each 20 mm from the robot's rim. */
+function paintRings(context, middle, known, scale, isDark) {
+  context.strokeStyle = isDark ? "rgba(230,238,246,.15)" : "rgba(30,40,50,.13)";
+  context.lineWidth = 1;
+  for (let way_mm = 20; way_mm < known.reach_mm; way_mm += 20) {
+    context.beginPath();
+    context.arc(...middle, (known.radius_mm + way_mm) * scale, 0, 2 * Math.PI);
+    context.stroke();
+  }
+}
+
+function paintFans(context, at, known, robot, lengths, chosen, isDark) {
+  known.sensors.forEach(({ x_mm, y_mm, rays_rad }, sensor) => {
+    const bucket = readingBucket(robot.proximity[sensor]), colour = READING_COLOURS[bucket];
+    const from = at(x_mm, y_mm), ends = [];
+    for (let ray = 0; ray < RAYS_PER_SENSOR; ray++) {
+      const length = lengths[sensor * RAYS_PER_SENSOR + ray], isHit = length !== NO_HIT;
+      const length_mm = isHit ? length * RAY_UNIT_MM : known.reach_mm;
+      ends.push([isHit, at(x_mm + length_mm * Math.cos(rays_rad[ray]), y_mm + length_mm * Math.sin(rays_rad[ray]))]);
+    }
+    context.fillStyle = rgba(colour, isDark ? 0.16 : 0.13);
+    context.beginPath();
+    context.moveTo(...from);
+    for (const [, end] of ends) context.lineTo(...end);
+    context.closePath();
+    context.fill();
+    context.lineWidth = sensor === chosen ? 2.6 : 1.3;
+    for (const [isHit, end] of ends) {
+      context.strokeStyle = rgba(colour, sensor === chosen || isHit ? 0.95 : 0.3);
+      context.beginPath();
+      context.moveTo(...from);
+      context.lineTo(...end);
+      context.stroke();
+      if (!isHit) continue;
+      context.fillStyle = rgba(colour);
+      context.beginPath();
+      context.arc(...end, HIT_PX, 0, 2 * Math.PI);
+      context.fill();
+    }
+  });
+}
+
+function paintLeaders(context, at, width, height, known, isDark) {
+  context.strokeStyle = isDark ? "rgba(230,238,246,.5)" : "rgba(30,40,50,.4)";
+  context.lineWidth = 1;
+  context.setLineDash([2, 3]);
+  context.beginPath();
+  known.sensors.forEach(({ x_mm, y_mm }, sensor) => {
+    const [across, down] = placeOfNumber(sensor);
+    context.moveTo(...at(x_mm, y_mm));
+    context.lineTo(across * width, down * height);
+  });
+  context.stroke();
+  context.setLineDash([]);
+}
+
+/** A dial in the corner: where the robot looks on the arena, whose x axis goes to the right. */
+function paintCompass(context, heading_rad, isDark) {
+  const ink = isDark ? "#e8edf2" : "#1d2329", x = 24, y = 24, radius = 17;
+  context.strokeStyle = ink;
+  context.lineWidth = 1.5;
+  context.beginPath();
+  context.arc(x, y, radius, 0, 2 * Math.PI);
+  context.stroke();
+  const tip = (angle, share) => [x + share * radius * Math.cos(angle), y - share * radius * Math.sin(angle)];
+  context.fillStyle = isDark ? "#6db1ff" : "#0b62d6";
+  context.beginPath();
+  context.moveTo(...tip(heading_rad, 0.95));
+  context.lineTo(...tip(heading_rad + 2.5, 0.7));
+  context.lineTo(...tip(heading_rad, -0.3));
+  context.lineTo(...tip(heading_rad - 2.5, 0.7));
+  context.closePath();
+  context.fill();
+  context.font = "600 12px system-ui, sans-serif";
+  context.textAlign = "center";
+  context.textBaseline = "top";
+  context.fillStyle = ink;
+  const degrees = Math.round((heading_rad * 180) / Math.PI) % 360;
+  context.fillText(`${(degrees + 360) % 360}°`, x + 1, y + radius + 5);
+}

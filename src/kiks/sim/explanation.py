@@ -1,0 +1,346 @@
+"""Why a sensor reads what it reads, in numbers and in plain words: `Simulation.explain`."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.engine import reasons
+from kiks.engine.gaze import NOTHING
+from kiks.engine.parameters import RAY_COUNT
+from kiks.errors import ParameterError
+from kiks.model.robot import SENSOR_COUNT
+from kiks.sim.look import name_of
+
+if TYPE_CHECKING:
+    from kiks.sim.simulation import Simulation
+
+SENSOR_NAMES = ("left 90", "left 45", "left 10", "right 10", "right 45", "right 90", "back right", "back left")
+"""What sensors are called, by their index in the answers to N and O (khepera-protocol.md 7.4)."""
+
+RESPONSES = {
+    "reflection": "the light that comes back along each ray, and the share of it above a threshold",
+    "thesis": "the thesis's networks, trained on a real robot",
+    "fast": "the thesis's table, which takes lengths in steps of 10 mm",
+    "standin": "a formula in place of the table of KiKS 2.2.0",
+    "curve": "counts against distance as they were measured on a real robot",
+}
+"""What each response goes by (docs/sensors.md)."""
+
+
+@dataclass(frozen=True)
+class SeenRay:
+    """One of a proximity sensor's seven rays.
+
+    Attributes:
+        angle_deg: Its direction, counter-clockwise from where the robot looks [deg].
+        length_mm: From the sensor to what it met, as the response takes it [mm]; infinite for nothing.
+        met: What it met: 'wall', 'robot 2', 'ball 1', 'cylinder 1' or 'nothing'.
+        brightness: Of what it met, 1 black to 255 white; 0 for nothing.
+        incidence_deg: Between the ray and the upright on the surface [deg], 0 where it meets it squarely; no number for
+            nothing.
+        contribution_counts: How much less the sensor would expect if this ray met nothing. Responses are no sums: the
+            contributions of all rays may come to more or less than the whole.
+    """
+
+    angle_deg: float
+    length_mm: float
+    met: str
+    brightness: int
+    incidence_deg: float
+    contribution_counts: float
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """Why command N returns a count for a sensor at this instant.
+
+    `baseline_counts + response_counts + scatter_counts + jitter_counts`, rounded to whole steps of `step_counts` and
+    cut off at 0 and `maximum_counts`, is `count`.
+
+    Attributes:
+        robot: Number of the robot, from 1.
+        sensor: Index of the sensor, from 0.
+        name: What it is called: 'left 90' and so on.
+        age_ms: How long ago it was sampled: each sensor has an instant of its own [ms].
+        reach_mm: How far its rays go [mm].
+        rays: The seven rays, the leftmost first.
+        response: The name of what makes counts of rays.
+        gain: The sensor's own, on the light where the response has light, else on the counts.
+        baseline_counts: What it expects with nothing near.
+        response_counts: What it expects above that.
+        scatter_counts: Noise in proportion to the reading.
+        jitter_counts: Noise that is there with nothing near, too.
+        step_counts: Steps of the converter.
+        maximum_counts: Its end.
+        count: What N returns.
+    """
+
+    robot: int
+    sensor: int
+    name: str
+    age_ms: float
+    reach_mm: float
+    rays: tuple[SeenRay, ...]
+    response: str
+    gain: float
+    baseline_counts: float
+    response_counts: float
+    scatter_counts: float
+    jitter_counts: float
+    step_counts: float
+    maximum_counts: float
+    count: int
+
+    @property
+    def expected_counts(self) -> float:
+        """What the sensor reads on average here, before noise and rounding."""
+        return self.baseline_counts + self.response_counts
+
+    def text(self) -> str:
+        """Return it in plain sentences, one a line."""
+        lines = [f"Sensor {self.sensor} ({self.name}) of robot {self.robot} reads {self.count}."]
+        met = [ray for ray in self.rays if ray.brightness > 0]
+        if met:
+            nearest_mm = min(ray.length_mm for ray in met)
+            lines.append(
+                f"It looked {self.age_ms:.1f} ms ago. {_how_many(len(met))} met {_listed(met)}, "
+                f"{nearest_mm:.1f} mm away where that is nearest."
+            )
+        else:
+            lines.append(f"It looked {self.age_ms:.1f} ms ago and saw nothing within {self.reach_mm:.0f} mm.")
+        lines.append(
+            f"With nothing near it reads {self.baseline_counts:.1f} on average. For its rays the response "
+            f"{self.response!r} ({RESPONSES[self.response]}) adds {self.response_counts:.1f}: "
+            f"{self.expected_counts:.1f} are expected."
+        )
+        most = max(self.rays, key=lambda ray: abs(ray.contribution_counts))
+        if abs(most.contribution_counts) >= 0.5:
+            lines.append(
+                f"The ray at {_angle(most.angle_deg)} matters most: without it, "
+                f"{self.expected_counts - most.contribution_counts:.1f} would be expected."
+            )
+        elif abs(self.response_counts) >= 0.5:
+            lines.append("No ray matters by itself: without any one of them, it would be as much.")
+        if self.gain != 1.0:
+            lines.append(f"This sensor's own gain, {self.gain:g}, is counted in.")
+        lines.append(_noise_line(self.scatter_counts + self.jitter_counts, self.expected_counts, self.count))
+        if self.count >= self.maximum_counts:
+            lines.append(f"That is the most that it can read: {self.maximum_counts:.0f}.")
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True)
+class SeenLamp:
+    """A lamp, as one light sensor sees it.
+
+    Attributes:
+        lamp: Its row in `Simulation.lamps`, counted from 1.
+        distance_mm: From the sensor [mm].
+        angle_deg: Off the sensor's axis, 0 straight ahead [deg].
+        power_w: Its power [W].
+        state: 'seen', 'off', 'behind the sensor', 'behind the robot itself' or 'hidden by wall', 'hidden by ball 1' ...
+        contribution_counts: How much more the sensor would expect without it: light makes readings smaller.
+    """
+
+    lamp: int
+    distance_mm: float
+    angle_deg: float
+    power_w: float
+    state: str
+    contribution_counts: float
+
+
+@dataclass(frozen=True)
+class LightExplanation:
+    """Why command O returns a count for a sensor at this instant.
+
+    `expected_counts + noise_counts`, rounded to whole steps and cut off as `Explanation` says, is `count`.
+
+    Attributes:
+        robot: Number of the robot, from 1.
+        sensor: Index of the sensor, from 0.
+        name: What it is called.
+        age_ms: How long ago it was sampled [ms].
+        lamps: All lamps, in their order.
+        unlit_counts: What it expects without any lamp.
+        expected_counts: What it expects with the lamps that it sees.
+        noise_counts: What chance added.
+        step_counts: Steps of the converter.
+        maximum_counts: Its end.
+        count: What O returns.
+    """
+
+    robot: int
+    sensor: int
+    name: str
+    age_ms: float
+    lamps: tuple[SeenLamp, ...]
+    unlit_counts: float
+    expected_counts: float
+    noise_counts: float
+    step_counts: float
+    maximum_counts: float
+    count: int
+
+    def text(self) -> str:
+        """Return it in plain sentences, one a line."""
+        lines = [
+            f"Light sensor {self.sensor} ({self.name}) of robot {self.robot} reads {self.count}; less is brighter."
+        ]
+        lines.append(f"Without any lamp it reads {self.unlit_counts:.0f} on average.")
+        if not self.lamps:
+            lines.append("There is no lamp in the arena.")
+        for lamp in self.lamps:
+            where = f"Lamp {lamp.lamp} ({lamp.power_w:g} W)"
+            if lamp.state == "seen":
+                lines.append(
+                    f"{where} shines on it from {lamp.distance_mm:.0f} mm, {lamp.angle_deg:.0f} degrees off its axis; "
+                    f"without it, {self.expected_counts + lamp.contribution_counts:.0f} would be expected."
+                )
+            else:
+                lines.append(f"{where} does not shine on it: it is {lamp.state}.")
+        lines.append(_noise_line(self.noise_counts, self.expected_counts, self.count))
+        return "\n".join(lines)
+
+
+def explain_proximity(sim: Simulation, networks: NDArray[np.void], robot: int, sensor: int) -> Explanation:
+    """Return why N returns what it returns for a sensor of a simulation that is locked and whose ticks are done.
+
+    Args:
+        sim: The simulation.
+        networks: What its robots' responses need besides rays.
+        robot: Number of the robot, from 1.
+        sensor: Index of the sensor, from 0.
+
+    Raises:
+        ParameterError: If there is no such robot or sensor.
+    """
+    index = sim.index_of(robot)
+    _check_sensor(sensor)
+    rays, met, without = np.empty((3, RAY_COUNT)), np.empty(RAY_COUNT, np.int64), np.empty(RAY_COUNT)
+    sampled_ns, expected, scattered, jitter, count = reasons.explain_proximity(
+        *(sim.scene, sim.sight, networks, sim.state.tick_count, sim.now_ns, sim.seed, index, sensor),
+        *(rays, met, without),
+    )
+    parameters = _parameters(sim, index)
+    angles_deg = np.degrees(np.arctan2(parameters["ray_sin"][sensor], parameters["ray_cos"][sensor])).tolist()
+    seen = tuple(
+        SeenRay(
+            angle_deg=angles_deg[ray],
+            length_mm=math.inf if met[ray] == NOTHING else float(rays[0, ray]),
+            met="nothing" if met[ray] == NOTHING else name_of(sim, int(met[ray])),
+            brightness=int(rays[2, ray]),
+            incidence_deg=math.nan if met[ray] == NOTHING else math.degrees(math.acos(min(rays[1, ray], 1.0))),
+            contribution_counts=expected - float(without[ray]),
+        )
+        for ray in range(RAY_COUNT)
+    )
+    baseline = float(parameters["baseline_counts"][sensor])
+    return Explanation(
+        robot=robot,
+        sensor=sensor,
+        name=SENSOR_NAMES[sensor],
+        age_ms=(sim.now_ns - sampled_ns) / 1e6,
+        reach_mm=float(parameters["reach_mm"]),
+        rays=seen,
+        response=sim.specs[index].proximity.response,
+        gain=float(parameters["gain"][sensor]),
+        baseline_counts=baseline,
+        response_counts=expected - baseline,
+        scatter_counts=scattered,
+        jitter_counts=jitter,
+        step_counts=float(parameters["step_counts"]),
+        maximum_counts=float(parameters["maximum_counts"]),
+        count=count,
+    )
+
+
+def explain_ambient(sim: Simulation, robot: int, sensor: int) -> LightExplanation:
+    """Return why O returns what it returns for a sensor of a simulation that is locked and whose ticks are done.
+
+    Raises:
+        ParameterError: If there is no such robot or sensor.
+    """
+    index = sim.index_of(robot)
+    _check_sensor(sensor)
+    facts, why = np.empty((len(sim.lamps), 3)), np.empty((len(sim.lamps), 2), np.int64)
+    sampled_ns, expected, noise, count, unlit = reasons.explain_ambient(
+        *(sim.scene, sim.sight, sim.lamps, sim.state.tick_count, sim.now_ns, sim.seed, index, sensor),
+        *(facts, why),
+    )
+    parameters = _parameters(sim, index)
+    lamps = tuple(
+        SeenLamp(
+            lamp=row + 1,
+            distance_mm=float(facts[row, 0]),
+            angle_deg=math.degrees(math.acos(max(min(facts[row, 1], 1.0), -1.0))),
+            power_w=float(sim.lamps[row, 2]),
+            state=_state_of(sim, int(why[row, 0]), int(why[row, 1])),
+            contribution_counts=float(facts[row, 2]) - expected,
+        )
+        for row in range(len(sim.lamps))
+    )
+    return LightExplanation(
+        robot=robot,
+        sensor=sensor,
+        name=SENSOR_NAMES[sensor],
+        age_ms=(sim.now_ns - sampled_ns) / 1e6,
+        lamps=lamps,
+        unlit_counts=unlit,
+        expected_counts=expected,
+        noise_counts=noise,
+        step_counts=float(parameters["step_counts"]),
+        maximum_counts=float(parameters["maximum_counts"]),
+        count=count,
+    )
+
+
+def _parameters(sim: Simulation, index: int) -> Any:
+    return sim.scene[2][int(sim.state.robots["kind"][0, index])]
+
+
+def _check_sensor(sensor: int) -> None:
+    if not isinstance(sensor, int) or not 0 <= sensor < SENSOR_COUNT:
+        raise ParameterError(
+            f"sensor must be a whole number from 0 to {SENSOR_COUNT - 1}, but it was {sensor!r}. 0 looks to the left, "
+            "2 and 3 ahead, 6 and 7 back."
+        )
+
+
+def _state_of(sim: Simulation, how: int, hider: int) -> str:
+    if how == reasons.HIDDEN:
+        return f"hidden by {name_of(sim, hider)}"
+    return {
+        reasons.SHINING: "seen",
+        reasons.OFF: "off",
+        reasons.BEHIND: "behind the sensor",
+        reasons.BEHIND_BODY: "behind the robot itself",
+    }[how]
+
+
+def _how_many(ray_count: int) -> str:
+    if ray_count == RAY_COUNT:
+        return "All of its seven rays"
+    return "One of its seven rays" if ray_count == 1 else f"{ray_count} of its seven rays"
+
+
+def _listed(rays: list[SeenRay]) -> str:
+    """Return what rays met, nearest things first."""
+    nearest_first = sorted(rays, key=lambda ray: ray.length_mm)
+    *others, last = dict.fromkeys("a wall" if ray.met == "wall" else ray.met for ray in nearest_first)
+    return f"{', '.join(others)} and {last}" if others else last
+
+
+def _angle(angle_deg: float) -> str:
+    side = "to the left" if angle_deg > 0 else "to the right"
+    return "0 degrees, straight ahead" if abs(angle_deg) < 0.5 else f"{abs(angle_deg):.0f} degrees {side}"
+
+
+def _noise_line(noise: float, expected: float, count: int) -> str:
+    verb = "added" if noise >= 0 else "took off"
+    return f"Chance {verb} {abs(noise):.1f}: that makes {expected + noise:.1f}, which the converter gives as {count}."

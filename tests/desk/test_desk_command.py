@@ -1,0 +1,143 @@
+"""`kiks desk`, and `--desk` of the other commands."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import IO
+from urllib.error import HTTPError
+from urllib.request import HTTPCookieProcessor, Request, build_opener, urlopen
+
+import pytest
+from tests.served import PROGRAMS
+from tests.test_cli import kiks, state_of
+
+pytestmark = pytest.mark.slow
+DRIVE = str(PROGRAMS / "drive.py")
+GUARD_S = 60.0
+
+
+@contextmanager
+def started(*words: str, folder: Path) -> Iterator[tuple[subprocess.Popen[str], IO[str]]]:
+    """Start the command; nothing of it outlives the test."""
+    with subprocess.Popen(
+        [sys.executable, "-m", "kiks", *words],
+        start_new_session=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        cwd=folder,
+        env={**os.environ, "PYTHONUNBUFFERED": "1", "DISPLAY": "", "WAYLAND_DISPLAY": ""},
+    ) as process:
+        assert process.stdout is not None
+        try:
+            yield process, process.stdout
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+
+
+def line_with(output: IO[str], text: str) -> str:
+    for line in output:
+        if text in line:
+            return line
+    raise AssertionError(f"nothing was said of {text!r}")
+
+
+def url_of(output: IO[str]) -> str:
+    found = re.search(r"http://\S+", line_with(output, "http://"))
+    assert found is not None
+    return found[0]
+
+
+def test_desk_serves_a_page_and_ends_with_ctrl_c(tmp_path: Path) -> None:
+    with started("desk", "--port", "0", "--no-browser", "--robots", "3", folder=tmp_path) as (process, output):
+        url = url_of(output)
+        with urlopen(url, timeout=GUARD_S) as answer:
+            assert answer.status == 200
+            assert b"KiKS" in answer.read()
+        with pytest.raises(HTTPError, match="403"):
+            urlopen(Request(url, headers={"Host": "evil.example"}), timeout=GUARD_S)
+        process.send_signal(signal.SIGINT)
+        assert line_with(output, "Stopped after")
+        assert process.wait(GUARD_S) == 0
+
+
+def test_other_hosts_need_the_token(tmp_path: Path) -> None:
+    with started("desk", "--port", "0", "--no-browser", "--host", "0.0.0.0", folder=tmp_path) as (_, output):
+        url = url_of(output).replace("0.0.0.0", "127.0.0.1")
+        bare, token = url.split("?token=")
+        assert len(token) >= 32
+        for wrong in (bare, f"{bare}?token=guess", f"{bare}/arena/1.png"):
+            with pytest.raises(HTTPError, match="403"):
+                urlopen(wrong, timeout=GUARD_S)
+        with build_opener(HTTPCookieProcessor()).open(url, timeout=GUARD_S) as answer:
+            assert answer.status == 200
+            assert "token" not in answer.url
+
+
+def test_run_on_a_desk_is_the_run_without(tmp_path: Path) -> None:
+    words = ("--seed", "3", DRIVE, "COM1", "5", "3", "5")
+    with started("run", "--desk", *words, folder=tmp_path) as (_, output):
+        url_of(output)
+        shown = state_of(line_with(output, "s simulated"))
+    assert shown == state_of(kiks("run", *words).stderr)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [(("demo", "avoid", "--seconds", "1"), "avoid: "), (("demo", "soccer", "--seconds", "1"), "soccer: left 0")],
+)
+def test_demonstration_on_a_desk(words: tuple[str, ...], said: str, tmp_path: Path) -> None:
+    with started(*words, "--desk", folder=tmp_path) as (process, output):
+        url = url_of(output)
+        assert line_with(output, said)
+        assert line_with(output, "Picture: ")
+        with urlopen(url, timeout=GUARD_S) as answer:
+            assert answer.status == 200
+        process.send_signal(signal.SIGINT)
+        assert process.wait(GUARD_S) == 0
+
+
+@pytest.mark.parametrize("thinking", ["live", "none"])
+def test_served_robots_on_a_desk(thinking: str, tmp_path: Path) -> None:
+    import serial
+
+    words = ("serve", "--desk", "--thinking", thinking, "--tcp", "0", "--no-pty")
+    with started(*words, folder=tmp_path) as (process, output):
+        url_of(output)
+        found = re.search(r"socket://\S+", line_with(output, "socket://"))
+        assert found is not None
+        with serial.serial_for_url(found[0], timeout=GUARD_S) as port:
+            port.write(b"H\n")
+            assert port.readline() == b"h,0,0\r\n"
+        process.send_signal(signal.SIGINT)
+        assert line_with(output, "Stopped after")
+        assert process.wait(GUARD_S) == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--arena", "nowhere.kiks"), "nowhere.kiks"),
+        (("--folder", "nowhere"), "--folder must be a folder"),
+        (("nowhere.py",), "PROGRAM must be a Python file"),
+        (("--turret", "laser"), "turrets must be of"),
+        (("--robots", "3", "--robot", "khepera", "--robot", "khepera_ii"), "--robot must name one kind for all"),
+        (("--thinking", "much"), "thinking must be"),
+        (("--speed", "-1"), "speed must be from 0.001 to 1000"),
+        (("--host", "192.0.2.1"), "the desk must be able to listen"),
+        (("--host", "no such host"), "the desk must be able to listen"),
+    ],
+)
+def test_mistakes_end_in_one_clear_line(words: tuple[str, ...], message: str, tmp_path: Path) -> None:
+    result = kiks("desk", "--no-browser", "--port", "0", *words, cwd=tmp_path)
+    assert result.returncode == 2
+    assert message in result.stderr
+    assert "Traceback" not in result.stderr

@@ -1,0 +1,151 @@
+"""Files of a desk: no name leads out of its folder, and what is no project is refused."""
+
+from __future__ import annotations
+
+import io
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PIL import Image
+
+from kiks.desk.example_worlds import EXAMPLES
+from kiks.desk.folder import LISTED_MAX, OPENED, UPLOAD_BYTES_MAX, Folder, decode, encode
+from kiks.errors import ArenaError, KiksError, ParameterError
+from kiks.model.arena import Arena, Lamp
+from kiks.model.project import Project
+from kiks.sim.building import simulation_of
+
+BAD_NAMES = [
+    "", " ", ".", "..", "../x", "a/../../x", "/etc/x", "//x", "\0", "x\0.kiks", "a\\b", "C:\\x", "c:x", "~/x", "~x",
+    ".hidden", "a/.hidden", "-rf", "con", "NUL.kiks", "com1.kiks", "a/aux.kiks", "x./y", "x\ny", "x" * 500,
+    "a/b\u202ec", "x?.kiks", "x*.kiks", "é" * 100,
+]  # fmt: skip
+
+
+def snapshot(folder: Path) -> list[Path]:
+    return sorted(folder.rglob("*"))
+
+
+@pytest.fixture
+def home(tmp_path: Path) -> Path:
+    home = tmp_path / "home"
+    home.mkdir()
+    (tmp_path / "secret.kiks").write_bytes(Project().to_bytes())
+    return home
+
+
+@pytest.mark.parametrize("name", BAD_NAMES)
+def test_names_that_lead_elsewhere_are_refused(home, name):
+    folder, before = Folder(home), snapshot(home.parent)
+    for each in (name, f"{name}/x.kiks"):
+        with pytest.raises(KiksError):
+            folder.save(Project(), each, may_replace=True)
+        with pytest.raises(KiksError):
+            folder.open(each)
+    assert [path for path in snapshot(home.parent) if path not in before] == []
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.text(st.sampled_from("./\\ab~:\0 -"), max_size=12))
+def test_whatever_is_typed_stays_in_the_folder(tmp_path_factory, name):
+    base = tmp_path_factory.mktemp("base")
+    home = base / "home"
+    home.mkdir()
+    try:
+        saved = Folder(home).save(Project(), name)
+    except KiksError:
+        assert snapshot(base) == [home]
+        return
+    assert snapshot(base) == [home, home / saved]
+    assert Folder(home).names() == [saved]
+
+
+def test_links_do_not_lead_out(home):
+    os.symlink(home.parent, home / "up")
+    os.symlink(home.parent / "secret.kiks", home / "secret.kiks")
+    os.symlink(home / "loop", home / "loop")
+    folder = Folder(home)
+    for name in ("up/secret.kiks", "secret.kiks", "up/new.kiks"):
+        with pytest.raises(ParameterError, match="elsewhere"):
+            folder.open(name)
+        with pytest.raises(ParameterError, match="elsewhere"):
+            folder.save(Project(), name, may_replace=True)
+    assert folder.names() == []
+    assert not (home.parent / "new.kiks").exists()
+
+
+def test_files_are_kept_and_listed(home):
+    folder = Folder(home)
+    (home / "sub").mkdir()
+    (home / "b.txt").write_text("")
+    (home / ".hidden.kiks").write_text("")
+    project = replace(Project(Arena.box(300, 200)), seed=5)
+    assert folder.save(project, " room ") == "room.kiks"
+    assert folder.save(project, "sub/other.kiks") == "sub/other.kiks"
+    assert folder.save(project, "old.KAD") == "old.KAD"
+    assert folder.names() == ["old.KAD", "room.kiks", "sub/other.kiks"]
+    assert folder.open("room.kiks").to_bytes() == project.to_bytes()
+    assert folder.open("old.KAD").arena.width_mm == 300
+    assert folder.has("room")
+    assert not folder.has("rooms")
+    with pytest.raises(ParameterError, match="is there"):
+        folder.save(project, "room")
+    folder.save(replace(project, seed=6), "room", may_replace=True)
+    assert folder.open("room.kiks").seed == 6
+    for name, words in [("sub/none/a", "writable"), ("a.toml", "end in"), ("none.kiks", "exist")]:
+        with pytest.raises(KiksError, match=words):
+            folder.open(name) if name.startswith("none") else folder.save(project, name)
+    (home / "dir.kiks").mkdir()
+    with pytest.raises(ParameterError, match="folder"):
+        folder.save(project, "dir", may_replace=True)
+
+
+def test_many_files_are_cut_short(home):
+    for number in range(LISTED_MAX + 20):
+        (home / f"{number}.kiks").touch()
+    assert len(Folder(home).names()) == LISTED_MAX
+    assert Folder(home / "none").names() == []
+
+
+def test_files_from_a_browser_become_projects():
+    picture = io.BytesIO()
+    Image.fromarray(np.zeros((120, 150), np.uint8)).save(picture, "PNG")
+    arena = replace(Arena.box(300, 200), lamps=(Lamp(50, 50),))
+    for name, data, width_mm in [
+        ("a.kiks", Project(arena).to_bytes(), 300),
+        ("C:\\docs\\a.KAD", encode(Project(arena), "a.kad"), 300),
+        ("../a.toml", b"size_mm = [400, 300]\n", 400),
+        ("a.png", picture.getvalue(), 150),
+    ]:
+        project = decode(name, data)
+        assert project.arena.width_mm == width_mm
+        assert project.arena.name == "a"
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "words"),
+    [
+        ("a.exe", b"", "end in"),
+        ("", b"", "end in"),
+        ("a.png", b"none", "picture"),
+        ("a.kad", b"none", "level 5"),
+        ("a.toml", b'picture = "/etc/passwd.png"', "comes alone"),
+        ("a.kiks", b"kiks = 3", "kiks must be 1"),
+        *((f"a{ending}", bytes(UPLOAD_BYTES_MAX + 1), "at most") for ending in OPENED),
+    ],
+)
+def test_other_files_from_a_browser_are_refused(name, data, words):
+    with pytest.raises((ArenaError, ParameterError), match=words):
+        decode(name, data)
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_examples_are_worlds(name):
+    project = EXAMPLES[name]()
+    sim = simulation_of(Project.from_bytes(project.to_bytes()))
+    assert sim.robot_count == len(project.robots)

@@ -1,0 +1,199 @@
+"""The monitor in a real browser, beside a real simulation (monitor_page.py)."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("nicegui", reason="the desk needs NiceGUI: install kiks[desk]")
+pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
+
+from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
+
+CHROMIUM = Path("/usr/bin/chromium")
+ARGUMENTS = [
+    *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync"),
+    *("--disable-background-networking", "--disable-component-update"),
+]
+GUARD_MS = 20_000
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not CHROMIUM.exists(), reason="tests in a browser need Chromium at /usr/bin/chromium"),
+]
+
+
+@pytest.fixture(scope="module")
+def address() -> Iterator[str]:
+    """Serve monitor_page.py in a process of its own."""
+    import kiks
+
+    environment = {**os.environ, "PYTHONPATH": str(Path(kiks.__file__).parents[1])}
+    command = [sys.executable, str(Path(__file__).with_name("monitor_page.py"))]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
+        assert process.stdout is not None
+        line = process.stdout.readline().strip()
+        assert line.startswith("http"), "the desk did not start"
+        yield line
+        process.kill()
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        yield browser
+        browser.close()
+
+
+class Visit:
+    """A page with the monitor, and what the simulation says."""
+
+    def __init__(self, page: Page, address: str, query: str) -> None:
+        self.page, self.address = page, address
+        self.faults: list[str] = []
+        page.set_default_timeout(GUARD_MS)
+        page.on("pageerror", lambda error: self.faults.append(str(error)))
+        page.request.get(f"{address}/ask/reset")
+        page.goto(f"{address}/monitor?{query}")
+        page.wait_for_function("() => window.kiksMonitor?.drawn() > 3")
+
+    def get(self, path: str) -> Any:
+        return json.loads(self.page.request.get(f"{self.address}{path}").text())
+
+    def find(self, name: str) -> Locator:
+        return self.page.get_by_test_id(name)
+
+    def fact(self, name: str) -> str:
+        """Return the value of a row of numbers."""
+        row = self.find("facts").locator("div", has=self.page.get_by_text(name, exact=True))
+        return row.locator("dd").inner_text()
+
+    def painted(self, selector: str) -> int:
+        """Return how many different colours are on a canvas."""
+        count: int = self.page.evaluate(
+            """(selector) => {
+                const canvas = document.querySelector(selector);
+                const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+                return new Set(new Uint32Array(data.buffer)).size;
+            }""",
+            selector,
+        )
+        return count
+
+
+@pytest.fixture
+def visit(browser: Browser, address: str) -> Iterator[Visit]:
+    page = browser.new_page(viewport={"width": 520, "height": 1100})
+    visit = Visit(page, address, "")
+    yield visit
+    page.close()
+    assert not visit.faults
+
+
+def test_numbers_at_the_sensors_are_those_of_the_simulation(visit: Visit) -> None:
+    visit.get("/ask/drive")
+    visit.page.wait_for_function("() => kiksMonitor.drawn() > 30")
+    visit.get("/ask/pause")
+    world = visit.get("/world")
+    for sensor in range(8):
+        expect(visit.find(f"proximity-{sensor}")).to_have_text(f"{world['counts'][0][sensor]:.0f}")
+        expect(visit.find(f"ambient-{sensor}")).to_have_text(f"{world['light'][0][sensor]:.0f}")
+    assert max(world["counts"][0]) > 100
+    expect(visit.find("facts")).to_contain_text(f"{world['time_s']:.2f} s")
+    expect(visit.find("speed-left")).to_contain_text(", set 4")
+    assert visit.painted(".kiks-monitor-robot canvas") > 20
+
+
+def test_a_click_takes_a_reading_apart(visit: Visit) -> None:
+    visit.get("/ask/pause")
+    world = visit.get("/world")
+    visit.find("proximity-2").click()
+    answer = visit.find("explanation")
+    expect(answer).to_contain_text(f"Why does it read {world['count']}?")
+    expect(answer).to_contain_text(f"Sensor 2 (left 10) of robot 1 reads {world['count']}.")
+    rows = visit.find("explanation-table").locator("tbody tr")
+    expect(rows).to_have_count(7)
+    shown = [rows.nth(k).locator("td").nth(1).inner_text() for k in range(7)]
+    assert shown == ["–" if length is None else f"{length:.1f}" for length in world["lengths_mm"]]
+    assert any(length is not None for length in world["lengths_mm"])
+    expect(visit.find("explanation-drawing").locator("svg")).to_have_attribute("aria-label", re.compile("wall at"))
+    expect(visit.find("proximity-2")).to_have_attribute("aria-pressed", "true")
+    visit.find("ambient-5").click()
+    expect(answer).to_contain_text("Light sensor 5 (right 90) of robot 1 reads")
+    expect(answer).to_contain_text("Lamp 2 (1 W)")
+    expect(rows).to_have_count(2)
+    visit.find("close-explanation").click()
+    expect(answer).to_be_hidden()
+
+
+def test_it_keeps_looking_when_asked_to(visit: Visit) -> None:
+    visit.find("proximity-1").click()
+    visit.find("keep-looking").click()
+    text = visit.find("explanation-text")
+    before = text.inner_text()
+    visit.get("/ask/drive")
+    expect(text).not_to_have_text(before)
+
+
+def test_keys_suffice(visit: Visit) -> None:
+    visit.page.get_by_label("Robot").first.focus()
+    for _ in range(6):
+        visit.page.keyboard.press("Tab")
+    focused = visit.page.evaluate("document.activeElement.dataset.testid")
+    assert focused in [f"{which}-{sensor}" for which in ("proximity", "ambient") for sensor in range(8)]
+    visit.page.keyboard.press("Enter")
+    expect(visit.find("explanation")).to_contain_text(f"ensor {focused[-1]} (")
+    visit.find("curves-speeds").focus()
+    visit.page.keyboard.press("Enter")
+    expect(visit.find("curves-speeds")).to_have_attribute("aria-checked", "true")
+
+
+def test_curves_can_be_chosen_and_lines_left_out(visit: Visit) -> None:
+    visit.get("/ask/drive")
+    for kind in ("ambient", "speeds", "proximity"):
+        visit.find(f"curves-{kind}").click()
+        expect(visit.find(f"curves-{kind}")).to_have_attribute("aria-checked", "true")
+        visit.page.wait_for_function(
+            "(drawn) => kiksMonitor.drawn() > drawn + 10", arg=visit.page.evaluate("kiksMonitor.drawn()")
+        )
+        assert visit.painted(".kiks-curves") > 8
+    first = visit.page.locator(".kiks-legend button").first
+    first.click()
+    expect(first).to_have_attribute("aria-pressed", "false")
+
+
+def test_another_robot_brings_its_own_turrets(visit: Visit) -> None:
+    expect(visit.find("camera-strip")).to_be_visible()
+    expect(visit.find("turret-words")).to_contain_text("K213 linear vision (turret 2): a picture every 200 ms")
+    expect(visit.find("turret-words")).to_contain_text("Radio (turret 4): silent")
+    visit.get("/ask/show2")
+    expect(visit.find("camera-strip")).to_be_hidden()
+    expect(visit.find("facts")).to_contain_text("127 of 255, upright")
+    expect(visit.find("turret-words")).to_have_text("Gripper (turret 1): holds nothing")
+    assert visit.fact("Turrets") == "Gripper"
+
+
+def test_dark_pages_are_drawn_for_the_dark(browser: Browser, address: str) -> None:
+    """The same page by day and by night, with pictures for a person to look at where KIKS_PICTURES says."""
+    folder = os.environ.get("KIKS_PICTURES")
+    for name in ("light", "dark"):
+        page = browser.new_page(viewport={"width": 520, "height": 1100})
+        visit = Visit(page, address, f"dark={name == 'dark'}")
+        visit.find("proximity-2").click()
+        expect(visit.find("explanation")).to_be_visible()
+        visit.page.wait_for_function("() => kiksMonitor.drawn() > 20")
+        if folder:
+            page.screenshot(path=Path(folder) / f"monitor_{name}.png", full_page=True)
+        assert visit.page.evaluate("document.body.classList.contains('body--dark')") == (name == "dark")
+        assert visit.painted(".kiks-curves") > 8
+        assert not visit.faults
+        page.close()
