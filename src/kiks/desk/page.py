@@ -73,24 +73,21 @@ class Page:
         self._unbuilt: dict[str, Callable[[], object]] = {}
         self._monitor: MonitorPanel | None = None
         self._editor: EditorPanel | None = None
+        self._sleepers: dict[str, WirePanel | ProgramsPanel] = {}
         tabs = (
-            ("robot", "Robot", "smart_toy", lambda: self._build_monitor(feed)),
-            ("wire", "Wire", "cable", lambda: WirePanel(desk)),
-            ("arena", "Arena", "edit", self._build_editor),
-            ("programs", "Programs", "code", lambda: ProgramsPanel(desk)),
-            ("settings", "Settings", "tune", lambda: SettingsPanel(desk)),
+            ("robot", "Robot", lambda: self._build_monitor(feed)),
+            ("wire", "Wire", lambda: self._build_sleeper("wire", WirePanel)),
+            ("arena", "Arena", self._build_editor),
+            ("programs", "Programs", lambda: self._build_sleeper("programs", ProgramsPanel)),
+            ("settings", "Settings", lambda: SettingsPanel(desk)),
         )
-        with (
-            ui.tabs()
-            .props("dense no-caps inline-label align=justify active-color=accent")
-            .classes("w-full") as self._tabs
-        ):
-            for name, word, icon, _ in tabs:
-                ui.tab(name, word, icon=icon).props(f"data-testid=tab-{name}")
+        with ui.tabs().props("dense no-caps align=justify active-color=accent").classes("w-full") as self._tabs:
+            for name, word, _ in tabs:
+                ui.tab(name, word).props(f"data-testid=tab-{name}")
         self._panels = ui.tab_panels(self._tabs, animated=False).classes("desk-panels w-full")
         self._places: dict[str, ui.tab_panel] = {}
         with self._panels:
-            for name, _, _, build in tabs:
+            for name, _, build in tabs:
                 self._places[name] = ui.tab_panel(name)
                 self._unbuilt[name] = build
         self._panels.on_value_change(lambda event: self._build(event.value))
@@ -103,6 +100,12 @@ class Page:
         if build is not None:
             with self._places[name]:
                 build()
+        for own, sleeper in self._sleepers.items():
+            sleeper.set_visible(own == name)
+
+    def _build_sleeper(self, name: str, kind: type[WirePanel | ProgramsPanel]) -> None:
+        """Build a panel that does nothing while it is not seen."""
+        self._sleepers[name] = kind(self._desk)
 
     def _build_monitor(self, feed: str) -> None:
         self._monitor = MonitorPanel(self._desk, feed)
