@@ -123,11 +123,7 @@ class ArenaView(
         if on_pick is not None:
             self.on("pick", lambda event: on_pick(_pick(event)))
         if on_draw is not None:
-            self.when_drawn(on_draw)
-
-    def when_drawn(self, act: Callable[[Stroke], Any]) -> None:
-        """Have somebody told of each stroke of a tool from now on."""
-        self.on("draw", lambda event: act(_stroke(event)))
+            self.on("draw", lambda event: on_draw(_stroke(event)))
 
     def set_view(self, view: View) -> None:
         """Show the arena from above ('top'), in 3-D ('solid') or 'both'.

@@ -72,7 +72,6 @@ class EditorPanel:
             self._build_steps()
             self._build_arenas()
             FilesPanel(desk)
-        view.when_drawn(self.draw)
         ui.keyboard(on_key=self._press, ignore=["input", "select", "textarea"])
         ui.timer(REFRESH_S, self._refresh)
         self._choose("hand")

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from nicegui import ui
 
-from kiks.desk.arena_view import ArenaView, Pick
+from kiks.desk.arena_view import ArenaView, Pick, Stroke
 from kiks.desk.desk import Desk
 from kiks.desk.editor_panel import EditorPanel
 from kiks.desk.monitor_panel import MonitorPanel
@@ -59,7 +59,7 @@ class Page:
             tools = ui.row().classes("items-center no-wrap gap-1")
         with ui.splitter(value=64, limits=(30, 100)).classes("desk-body") as halves:
             with halves.before:
-                self._view = ArenaView(feed, on_pick=self._pick)
+                self._view = ArenaView(feed, on_pick=self._pick, on_draw=self._draw)
                 ui.label(HINT).classes("desk-hint")
             with halves.after, ui.column().classes("w-full gap-0 no-wrap"):
                 self._build_tabs(feed)
@@ -121,6 +121,11 @@ class Page:
                 self._monitor.show_robot(pick.index)
             elif self._monitor is not None:
                 await self._monitor.show_sensor(pick.index, pick.sensor)
+
+    async def _draw(self, stroke: Stroke) -> None:
+        """Give a stroke to whoever has handed out the tool."""
+        if self._editor is not None:
+            await self._editor.draw(stroke)
 
     def _tell_news(self) -> None:
         first, news = self._desk.news.since(self._told)
