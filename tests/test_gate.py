@@ -236,3 +236,21 @@ def test_held_robot_stays_though_its_wheels_turn() -> None:
     hands.drop("a")
     sim.run(0.5)
     assert sim.pose(1)[0] > 150
+
+
+def test_others_may_press_upon_what_is_held() -> None:
+    sim = kiks.Simulation(kiks.Arena.box(400, 400), robots=4, seed=1)
+    for robot, (x_mm, y_mm, heading_rad) in enumerate(
+        ((200, 38, 0), (140, 38, 0), (260, 38, 3.1416), (200, 100, -1.57)), 1
+    ):
+        sim.place(robot, x_mm, y_mm, heading_rad)
+        kiks.Khepera(sim.port(robot)).set_speed(20, 20)
+    gate = sim.gate = Gate(sim.lock, speed=None)
+    hands = Hands(sim)
+    hands.grab("a", "robot", 0)
+    gate.keep(hands.keep)
+    for step in range(100):
+        hands.move("a", 200 + step, 38)
+        hands.turn("a", step / 10)
+        sim.run(0.05)
+    assert abs(sim.pose(1)[1] - 38) < 60
