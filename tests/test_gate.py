@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
 import pytest
 
@@ -12,6 +14,7 @@ import kiks
 from kiks.clock.gate import LAG_NS, SLICE_NS, Gate
 from kiks.clock.pace import Pace
 from kiks.errors import ParameterError
+from kiks.model.arena import Pose
 from kiks.sim.hands import Hands
 
 GUARD_S = 20.0
@@ -239,11 +242,9 @@ def test_held_robot_stays_though_its_wheels_turn() -> None:
 
 
 def test_others_may_press_upon_what_is_held() -> None:
-    sim = kiks.Simulation(kiks.Arena.box(400, 400), robots=4, seed=1)
-    for robot, (x_mm, y_mm, heading_rad) in enumerate(
-        ((200, 38, 0), (140, 38, 0), (260, 38, 3.1416), (200, 100, -1.57)), 1
-    ):
-        sim.place(robot, x_mm, y_mm, heading_rad)
+    starts = (Pose(200, 38, 0), Pose(140, 38, 0), Pose(260, 38, math.pi), Pose(200, 100, -math.pi / 2))
+    sim = kiks.Simulation(replace(kiks.Arena.box(400, 400), starts=starts), robots=4, seed=1)
+    for robot in range(1, 5):
         kiks.Khepera(sim.port(robot)).set_speed(20, 20)
     gate = sim.gate = Gate(sim.lock, speed=None)
     hands = Hands(sim)
