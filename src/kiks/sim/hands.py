@@ -88,7 +88,6 @@ class Hands:
             )
         if self.holds(what, index):
             raise ParameterError(f"one hand must let go before another takes {what} {index + 1}, but it holds it.")
-        self._sim.sync()
         self._held[owner] = self._found(what, index)
 
     def move(self, owner: str, x_mm: float, y_mm: float) -> None:
@@ -177,6 +176,7 @@ class Hands:
         return x, y
 
     def _freedom(self, held: Held) -> Callable[[float, float], bool]:
+        self._sim.sync()
         return self._sim.freedom(held.index if held.what == "robot" else self._sim.robot_count + held.index)
 
     def _put(self, held: Held) -> None:
