@@ -2,15 +2,16 @@
 
 Run: python benchmarks/desk.py [--json]. Needs Chromium.
 
-`desk.server_cpu_percent` is what the process that serves the desk takes of one core while 20 robots wander about in real
-time and one Chromium shows them: the world, the frames, the page and its panels, all of it; `desk.idle_cpu_percent` the
-same with no browser. `desk.browser_fps` is how many pictures of the arena Chromium draws a second, without a GPU, on this
-computer, which it shares with the server; `desk.bytes_per_s` is what goes over the socket.
+`desk.server_cpu_percent` is what the process that serves the desk takes of one core while 20 robots wander about in
+real time and one Chromium shows them: the world, the frames, the page and its panels, all of it;
+`desk.idle_cpu_percent` the same with no browser. `desk.browser_fps` is how many pictures of the arena Chromium draws a
+second, without a GPU, on this computer, which it shares with the server; `desk.bytes_per_s` is what goes over the
+socket.
 
-`desk.slowdown_percent` is what an open desk takes off the speed of a simulation at full acceleration: a program follows a
-wall at 9600 baud through the port in memory, with and without a desk to which somebody listens who acknowledges each
-frame; both take turns, and it is the median of the ratios. `desk.slowdown_20_percent` is the same for a world of 20 robots.
-`desk.first_picture_s` is the time from the command `kiks desk` to the first picture on the screen, warm.
+`desk.slowdown_percent` is what an open desk takes off the speed of a simulation at full acceleration: a program follows
+a wall at 9600 baud through the port in memory, with and without a desk to which somebody listens who acknowledges each
+frame; both take turns, and it is the median of the ratios. `desk.slowdown_20_percent` is the same in a world of 20
+robots. `desk.first_picture_s` is the time from the command `kiks desk` to the first picture on the screen, warm.
 """
 
 from __future__ import annotations
@@ -174,7 +175,7 @@ def main() -> None:
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--json", action="store_true", help="one JSON object a line")
     options = arguments.parse_args()
-    views = [dict((name, value) for name, value, _ in measure_view()) for _ in range(3)]
+    views = [{name: value for name, value, _ in measure_view()} for _ in range(3)]
     units = {"desk.browser_fps": "1/s", "desk.frames_per_s": "1/s", "desk.bytes_per_s": "B/s"}
     figures = [
         (name, statistics.median(view[name] for view in views), units.get(name, "% of a core")) for name in views[0]

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
 import pytest
 
@@ -12,6 +14,7 @@ import kiks
 from kiks.clock.gate import LAG_NS, SLICE_NS, Gate
 from kiks.clock.pace import Pace
 from kiks.errors import ParameterError
+from kiks.model.arena import Pose
 from kiks.sim.hands import Hands
 
 GUARD_S = 20.0
@@ -236,3 +239,19 @@ def test_held_robot_stays_though_its_wheels_turn() -> None:
     hands.drop("a")
     sim.run(0.5)
     assert sim.pose(1)[0] > 150
+
+
+def test_others_may_press_upon_what_is_held() -> None:
+    starts = (Pose(200, 38, 0), Pose(140, 38, 0), Pose(260, 38, math.pi), Pose(200, 100, -math.pi / 2))
+    sim = kiks.Simulation(replace(kiks.Arena.box(400, 400), starts=starts), robots=4, seed=1)
+    for robot in range(1, 5):
+        kiks.Khepera(sim.port(robot)).set_speed(20, 20)
+    gate = sim.gate = Gate(sim.lock, speed=None)
+    hands = Hands(sim)
+    hands.grab("a", "robot", 0)
+    gate.keep(hands.keep)
+    for step in range(100):
+        hands.move("a", 200 + step, 38)
+        hands.turn("a", step / 10)
+        sim.run(0.05)
+    assert abs(sim.pose(1)[1] - 38) < 60

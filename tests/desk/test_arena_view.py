@@ -304,11 +304,14 @@ def test_another_scene_takes_the_place_of_the_first(visit: Callable[..., Visit])
     here = visit("view=both")
     here.wait("() => kiksDesk.isSolid()")
     count, number = here.feed("[feed.scene.robots.length, feed.scene.scene]")
+    parts = here.page.evaluate("kiksDesk.stats().solid_parts")
     here.ask("scene")
     here.wait("([count, number]) => kiksDesk.scene().scene === number + 1 && kiksDesk.pose(count)", [count, number])
     drawn = here.page.evaluate("kiksDesk.stats().solid_frames")
     here.wait("(drawn) => kiksDesk.stats().solid_frames > drawn + 3", drawn)
     assert here.feed("feed.frame.scene === feed.scene.scene")
+    grown = here.page.evaluate("kiksDesk.stats().solid_parts") - parts
+    assert grown <= 2, "the graphics card keeps the one more robot's name and turrets, and nothing of the old scene"
 
 
 def test_things_are_dragged_in_three_dimensions_too(visit: Callable[..., Visit]) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from kiks.clock.gate import Gate
+from kiks.desk.editing import Editing
 from kiks.desk.speedometer import Speedometer
 from kiks.errors import LinkError
 from kiks.firmware.k213 import K213
@@ -56,6 +57,7 @@ class Desk:
         project: What it was built from.
         gate: Where its time passes.
         hands: What is held in it.
+        editing: What people draw in it.
         programs: The programs in it.
         meter: How fast its time passes.
         scene: Number of what there is to be seen; another one whenever something has come, gone or changed its looks.
@@ -82,6 +84,7 @@ class Desk:
         self._commands = list(commands)
         self._new_programs = new_programs or self._usual_programs
         self.project = foreign_project(sim) if project is None else project
+        self.editing = Editing(self)
         self._take(sim, speed)
 
     def _take(self, sim: Simulation, speed: float | None) -> None:

@@ -6,11 +6,10 @@ import asyncio
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from kiks.desk.desk import Desk
 from kiks.engine.state import BALL
 from kiks.errors import KiksError, ParameterError
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp
@@ -19,6 +18,9 @@ from kiks.model.project import ProjectRobot
 from kiks.model.sketch import Sketch
 from kiks.model.sketch_things import SketchRobot, Thing, radius_of
 from kiks.sim.simulation import Simulation
+
+if TYPE_CHECKING:
+    from kiks.desk.desk import Desk
 
 Done = TypeVar("Done")
 

@@ -6,8 +6,9 @@ from collections.abc import Callable
 
 from nicegui import ui
 
-from kiks.desk.arena_view import ArenaView, Pick
+from kiks.desk.arena_view import ArenaView, Pick, Stroke
 from kiks.desk.desk import Desk
+from kiks.desk.editor_panel import EditorPanel
 from kiks.desk.monitor_panel import MonitorPanel
 from kiks.desk.programs_panel import ProgramsPanel
 from kiks.desk.settings_panel import SettingsPanel
@@ -28,7 +29,7 @@ STYLE = """
 .desk-body > .q-splitter__after { min-width: 370px }
 .desk-tabs .q-tab { padding: 0 8px; min-width: 0 }
 .q-btn-toggle { white-space: nowrap }
-@media (max-width: 1200px) { .desk-tabs .q-tab__icon { display: none } }
+@media (max-width: 900px) { .q-header { padding: 0 4px } }
 .body--dark .text-primary { color: #8fd0f0 !important }
 .body--dark .text-accent { color: #ff9f45 !important }
 *:focus-visible { outline: 3px solid var(--q-accent); outline-offset: 1px }
@@ -65,7 +66,7 @@ class Page:
             tools = ui.row().classes("items-center no-wrap gap-1")
         with ui.splitter(value=64, limits=(30, 100)).classes("desk-body") as halves:
             with halves.before:
-                self._view = ArenaView(feed, on_pick=self._pick)
+                self._view = ArenaView(feed, on_pick=self._pick, on_draw=self._draw)
                 ui.label(HINT).classes("desk-hint")
             with halves.after, ui.column().classes("w-full gap-0 no-wrap"):
                 self._build_tabs(feed)
@@ -78,36 +79,48 @@ class Page:
         desk = self._desk
         self._unbuilt: dict[str, Callable[[], object]] = {}
         self._monitor: MonitorPanel | None = None
+        self._editor: EditorPanel | None = None
+        self._sleepers: dict[str, WirePanel | ProgramsPanel] = {}
         tabs = (
-            ("robot", "Robot", "smart_toy", lambda: self._build_monitor(feed)),
-            ("wire", "Wire", "cable", lambda: WirePanel(desk)),
-            ("programs", "Programs", "code", lambda: ProgramsPanel(desk)),
-            ("settings", "Settings", "tune", lambda: SettingsPanel(desk)),
+            ("robot", "Robot", lambda: self._build_monitor(feed)),
+            ("wire", "Wire", lambda: self._build_sleeper("wire", WirePanel)),
+            ("arena", "Arena", self._build_editor),
+            ("programs", "Programs", lambda: self._build_sleeper("programs", ProgramsPanel)),
+            ("settings", "Settings", lambda: SettingsPanel(desk)),
         )
         with (
-            ui.tabs()
-            .props("dense no-caps inline-label align=justify active-color=accent")
-            .classes("w-full desk-tabs") as self._tabs
+            ui.tabs().props("dense no-caps align=justify active-color=accent").classes("w-full desk-tabs") as self._tabs
         ):
-            for name, word, icon, _ in tabs:
-                ui.tab(name, word, icon=icon).props(f"data-testid=tab-{name}")
+            for name, word, _ in tabs:
+                ui.tab(name, word).props(f"data-testid=tab-{name}")
         self._panels = ui.tab_panels(self._tabs, animated=False).classes("desk-panels w-full")
         self._places: dict[str, ui.tab_panel] = {}
         with self._panels:
-            for name, _, _, build in tabs:
+            for name, _, build in tabs:
                 self._places[name] = ui.tab_panel(name)
                 self._unbuilt[name] = build
         self._panels.on_value_change(lambda event: self._build(event.value))
         self._panels.value = "robot"
 
     def _build(self, name: str) -> None:
+        if self._editor is not None and name != "arena":
+            self._editor.put_down()
         build = self._unbuilt.pop(name, None)
         if build is not None:
             with self._places[name]:
                 build()
+        for own, sleeper in self._sleepers.items():
+            sleeper.set_visible(own == name)
+
+    def _build_sleeper(self, name: str, kind: type[WirePanel | ProgramsPanel]) -> None:
+        """Build a panel that does nothing while it is not seen."""
+        self._sleepers[name] = kind(self._desk)
 
     def _build_monitor(self, feed: str) -> None:
         self._monitor = MonitorPanel(self._desk, feed)
+
+    def _build_editor(self) -> None:
+        self._editor = EditorPanel(self._desk, self._view)
 
     async def _pick(self, pick: Pick) -> None:
         """Show the robot or the sensor that was clicked at."""
@@ -117,6 +130,11 @@ class Page:
                 self._monitor.show_robot(pick.index)
             elif self._monitor is not None:
                 await self._monitor.show_sensor(pick.index, pick.sensor)
+
+    async def _draw(self, stroke: Stroke) -> None:
+        """Give a stroke to whoever has handed out the tool."""
+        if self._editor is not None:
+            await self._editor.draw(stroke)
 
     def _tell_news(self) -> None:
         first, news = self._desk.news.since(self._told)

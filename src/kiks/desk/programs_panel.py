@@ -65,6 +65,10 @@ class ProgramsPanel:
         self._drafts: dict[Script | None, str] = {}
         ui.add_css(CSS)
         with ui.column().classes("w-full q-pa-sm gap-2"):
+            if desk.may_run_programs:
+                self._build_editor()
+            else:
+                ui.label(MAY_NOT).classes("text-body2").mark("may-not").props('data-testid="may-not"')
             self._list = ui.column().classes("w-full gap-1").mark("programs").props('data-testid="programs"')
             with ui.expansion("Output", value=True).classes("w-full").props("dense") as self._output_box:
                 self._log = (
@@ -74,10 +78,6 @@ class ProgramsPanel:
                     .mark("output")
                     .props('data-testid="output" aria-label="What the program has printed"')
                 )
-            if desk.may_run_programs:
-                self._build_editor()
-            else:
-                ui.label(MAY_NOT).classes("text-body2").mark("may-not").props('data-testid="may-not"')
         self._timer = ui.timer(REFRESH_S, self.refresh)
         self.refresh()
 
@@ -107,7 +107,7 @@ class ProgramsPanel:
 
     def _draw_list(self, handles: list[Handle]) -> None:
         if not handles:
-            ui.label("No program runs. Choose one below, and run it.").classes("text-body2")
+            ui.label("No program runs.").classes("text-body2")
         for handle in handles:
             is_shown = handle is self._shown
             with ui.row().classes("w-full items-center no-wrap gap-1"):
@@ -190,6 +190,23 @@ class ProgramsPanel:
                 .mark("new-program")
             ):
                 ui.tooltip("Begin a new program")
+        with ui.row().classes("w-full items-end no-wrap gap-2"):
+            self._robot = (
+                ui.select({1: "robot 1"}, value=1, label="Runs on").props('dense data-testid="robot"').mark("robot")
+            )
+            with self._robot:
+                ui.tooltip("The robot that answers on whatever port the program opens")
+            self._arguments = (
+                ui.input("Arguments").classes("col").props('dense data-testid="arguments"').mark("arguments")
+            )
+            with self._arguments:
+                ui.tooltip("Words that the program finds in sys.argv; usually none")
+            with (
+                ui.button("Run", icon="play_arrow", on_click=self._run)
+                .props('unelevated no-caps color=primary data-testid="run-program"')
+                .mark("run-program")
+            ):
+                ui.tooltip("Save and run this program (Ctrl-Enter); one that runs on this robot is ended first")
         # The page's own keys (space, .) are letters here.
         with ui.element("div").classes("w-full").on("keydown", js_handler="(event) => event.stopPropagation()"):
             self._editor = (
@@ -201,7 +218,7 @@ class ProgramsPanel:
                     keymap={"Ctrl-Enter": self._run, "Cmd-Enter": self._run},
                 )
                 .classes("w-full")
-                .style("height: 40vh; border: 1px solid currentcolor")
+                .style("height: 38vh; border: 1px solid currentcolor")
                 .props('data-testid="editor"')
                 .mark("editor")
             )
@@ -220,23 +237,6 @@ class ProgramsPanel:
                 .mark("save-program")
             ):
                 ui.tooltip("Save the program in the desk's folder")
-        with ui.row().classes("w-full items-end no-wrap gap-2"):
-            self._robot = (
-                ui.select({1: "robot 1"}, value=1, label="Runs on").props('dense data-testid="robot"').mark("robot")
-            )
-            with self._robot:
-                ui.tooltip("The robot that answers on whatever port the program opens")
-            self._arguments = (
-                ui.input("Arguments").classes("col").props('dense data-testid="arguments"').mark("arguments")
-            )
-            with self._arguments:
-                ui.tooltip("Words that the program finds in sys.argv; usually none")
-            with (
-                ui.button("Run", icon="play_arrow", on_click=self._run)
-                .props('unelevated no-caps color=primary data-testid="run-program"')
-                .mark("run-program")
-            ):
-                ui.tooltip("Save and run this program (Ctrl-Enter); one that runs on this robot is ended first")
         self._offer()
         example = next(script for script in offered(self._desk.folder) if script.is_example)
         self._choice.value = next((s for s in self._choice.options if s.name == "first_steps.py"), example)

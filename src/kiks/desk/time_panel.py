@@ -51,8 +51,8 @@ class TimePanel:
             self._run_tip = ui.tooltip("")
         with _flat("skip_next", "Step", "step", self._step):
             self._step_tip = ui.tooltip("Let some time pass, then stand still (key: .)")
-        self._step_s = _select(STEPS, 0.01, "How much a step is", "step-size", "5.5rem")
-        self._speed = _select(SPEEDS, self._shown_speed(), "How fast time passes", "speed", "9.5rem")
+        self._step_s = _select(STEPS, 0.01, "How much a step is", "step-size", "5rem")
+        self._speed = _select(SPEEDS, self._shown_speed(), "How fast time passes", "speed", "8.5rem")
         self._speed.on_value_change(self._set_speed)
         with self._speed:
             ui.tooltip("How much simulated time passes in real time; it never changes what robots do")

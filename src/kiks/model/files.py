@@ -44,8 +44,8 @@ def check_relative(text: object, what: str) -> None:
     is_clean = isinstance(text, str) and text.isprintable() and not set(text) & set('\\:*?"<>|') and len(text) <= 1000
     if not is_clean or not all(part not in ("", ".", "..") for part in parts):
         raise ParameterError(
-            f"{what} must be the name of a file in the project's folder or below it, with / between folders, but it "
-            f"was {text!r}. Copy the file into that folder."
+            f"{what} must lead to a file in the project's folder or below it, with / between folders, but it was "
+            f"{text!r}. Copy the file into that folder."
         )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -87,7 +88,6 @@ class Hands:
             )
         if self.holds(what, index):
             raise ParameterError(f"one hand must let go before another takes {what} {index + 1}, but it holds it.")
-        self._sim.sync()
         self._held[owner] = self._found(what, index)
 
     def move(self, owner: str, x_mm: float, y_mm: float) -> None:
@@ -158,7 +158,7 @@ class Hands:
 
     def _slide(self, held: Held, x_mm: float, y_mm: float) -> tuple[float, float]:
         """Return how far a thing gets towards a place, in small steps, none of which ends in something else."""
-        is_free = self._sim.freedom(held.index if held.what == "robot" else self._sim.robot_count + held.index)
+        is_free = self._freedom(held)
         x, y = held.x_mm, held.y_mm
         for _ in range(STEPS_MAX):
             left_mm = math.hypot(x_mm - x, y_mm - y)
@@ -175,10 +175,17 @@ class Hands:
                 break
         return x, y
 
+    def _freedom(self, held: Held) -> Callable[[float, float], bool]:
+        self._sim.sync()
+        return self._sim.freedom(held.index if held.what == "robot" else self._sim.robot_count + held.index)
+
     def _put(self, held: Held) -> None:
-        if held.what == "robot":
-            self._sim.place(held.index + 1, held.x_mm, held.y_mm, held.heading_rad)
-        elif held.what == "body":
-            self._sim.move_body(int(self._bodies()["number"][held.index]), held.x_mm, held.y_mm)
-        else:
+        """Put a thing where its hand is; where others press upon it, it stays as it lies until they let it go."""
+        if held.what == "lamp":
             self._sim.lamps[held.index, :2] = held.x_mm, held.y_mm
+        elif not self._freedom(held)(held.x_mm, held.y_mm):
+            return
+        elif held.what == "robot":
+            self._sim.place(held.index + 1, held.x_mm, held.y_mm, held.heading_rad)
+        else:
+            self._sim.move_body(int(self._bodies()["number"][held.index]), held.x_mm, held.y_mm)

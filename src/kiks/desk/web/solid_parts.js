@@ -2,30 +2,31 @@
 
 import { THREE } from "nicegui-scene";
 
+// Colours are mixed as they are on the screen: turning each dot of it to light and back is what costs most without a
+// graphics card.
+THREE.ColorManagement.enabled = false;
+
 /** Merge parts [geometry, colour, [x, y, z], [turn about x, y, z]] into one geometry. */
 export function merge(parts) {
-  const pieces = parts.map(([geometry, colour, place = [0, 0, 0], turn = [0, 0, 0]]) => {
-    const matrix = new THREE.Matrix4().makeRotationFromEuler(new THREE.Euler(...turn)).setPosition(...place);
-    const piece = geometry.index ? geometry.toNonIndexed() : geometry.clone();
+  const positions = [], normals = [], colours = [], indices = [], colour = new THREE.Color();
+  for (const [geometry, paint, place = [0, 0, 0], turn = [0, 0, 0]] of parts) {
+    geometry.applyMatrix4(new THREE.Matrix4().makeRotationFromEuler(new THREE.Euler(...turn)).setPosition(...place));
+    const { position, normal } = geometry.attributes, first = positions.length / 3;
+    colour.set(paint);
+    positions.push(...position.array);
+    normals.push(...normal.array);
+    for (let k = 0; k < position.count; k++) {
+      colours.push(colour.r, colour.g, colour.b);
+      if (!geometry.index) indices.push(first + k);
+    }
+    if (geometry.index) for (const k of geometry.index.array) indices.push(first + k);
     geometry.dispose();
-    return { piece: piece.applyMatrix4(matrix), colour: new THREE.Color(colour) };
-  });
-  const count = pieces.reduce((sum, { piece }) => sum + piece.attributes.position.count, 0);
-  const positions = new Float32Array(3 * count);
-  const normals = new Float32Array(3 * count);
-  const colours = new Float32Array(3 * count);
-  let at = 0;
-  for (const { piece, colour } of pieces) {
-    positions.set(piece.attributes.position.array, at);
-    normals.set(piece.attributes.normal.array, at);
-    for (let k = 0; k < piece.attributes.position.count; k++) colours.set([colour.r, colour.g, colour.b], at + 3 * k);
-    at += piece.attributes.position.array.length;
-    piece.dispose();
   }
   const merged = new THREE.BufferGeometry();
-  merged.setAttribute("position", new THREE.BufferAttribute(positions, 3));
-  merged.setAttribute("normal", new THREE.BufferAttribute(normals, 3));
-  merged.setAttribute("color", new THREE.BufferAttribute(colours, 3));
+  merged.setAttribute("position", new THREE.Float32BufferAttribute(positions, 3));
+  merged.setAttribute("normal", new THREE.Float32BufferAttribute(normals, 3));
+  merged.setAttribute("color", new THREE.Float32BufferAttribute(colours, 3));
+  merged.setIndex(indices);
   return merged;
 }
 
@@ -36,6 +37,12 @@ export function box(length, width, height) {
 /** A cylinder that stands upright. */
 export function column(radius, height, sides = 20) {
   return new THREE.CylinderGeometry(radius, radius, height, sides).rotateX(Math.PI / 2);
+}
+
+/** A round board as parts for `merge`: a rim and a top; nobody sees it from below. */
+export function board(radius, height, colour, z, sides = 20) {
+  const rim = new THREE.CylinderGeometry(radius, radius, height, sides, 1, true).rotateX(Math.PI / 2);
+  return [[rim, colour, [0, 0, z]], [new THREE.CircleGeometry(radius, sides), colour, [0, 0, z + height / 2]]];
 }
 
 /** A plate of any outline [[x, y], ...] from z = 0 up. */

@@ -2,7 +2,7 @@
    What all robots of a kind share is one geometry, drawn for all of them at once. */
 
 import { THREE } from "nicegui-scene";
-import { box, column, empty, merge, plate } from "./solid_parts.js";
+import { board, box, column, empty, merge, plate } from "./solid_parts.js";
 import { readingBucket, READING_COLOURS, robotHue } from "./colours.js";
 import { armAngle, jawsOf, PIVOT_MM } from "./gripper.js";
 
@@ -29,11 +29,11 @@ export class SolidRobots {
     this._tint = new THREE.Color();
     if (!count) return;
     this._bodies = this._many(bodyGeometry(scene.robots[0]), this._material, count);
-    this._caps = this._many(column(9, 1.2), new THREE.MeshLambertMaterial(), count);
+    this._caps = this._many(merge(board(9, 1.2, "#ffffff", 0, 14)), new THREE.MeshLambertMaterial(), count);
     this._sensors = this._many(box(5, 7, 8), new THREE.MeshLambertMaterial(), 8 * count);
-    this._leds = this._many(new THREE.SphereGeometry(2, 8, 6), new THREE.MeshBasicMaterial(), 2 * count);
+    this._leds = this._many(new THREE.OctahedronGeometry(2.4), new THREE.MeshBasicMaterial(), 2 * count);
     scene.robots.forEach((_, index) =>
-      this._caps.setColorAt(index, this._tint.setHSL(robotHue(index) / 360, 0.72, 0.42, THREE.SRGBColorSpace)));
+      this._caps.setColorAt(index, this._tint.setHSL(robotHue(index) / 360, 0.72, 0.42)));
     this._tops = scene.robots.map((robot, index) => this._top(robot, index));
     this._grippers = scene.robots.map((robot) => (robot.has_gripper ? this._gripper(robot) : null));
     this.setShapes(scene);
@@ -105,7 +105,7 @@ export class SolidRobots {
     spec.sensors.forEach(({ x_mm, y_mm, angle_rad }, k) => {
       place(this._sensors, 8 * index + k, 1.02 * x_mm, 1.02 * y_mm, LOWER_BOARD - 2, angle_rad);
       const bucket = readingBucket(readings[k]), [red, green, blue] = bucket ? READING_COLOURS[bucket] : [48, 54, 62];
-      this._tint.setRGB(red / 255, green / 255, blue / 255, THREE.SRGBColorSpace);
+      this._tint.setRGB(red / 255, green / 255, blue / 255);
       this._sensors.setColorAt(8 * index + k, this._tint);
     });
     robot.leds.forEach((isOn, k) => {
@@ -139,8 +139,8 @@ function bodyGeometry(robot) {
   const radius = robot.radius_mm, wheel_y = robot.wheel_base_mm / 2 - 1.5;
   const parts = [
     [box(40, 36, 11), "#2a2e33", [0, 0, 8.5]],
-    [column(radius, BOARD, 28), GREEN, [0, 0, LOWER_BOARD + BOARD / 2]],
-    [column(radius, BOARD, 28), GREEN_ABOVE, [0, 0, UPPER_BOARD + BOARD / 2]],
+    ...board(radius, BOARD, GREEN, LOWER_BOARD + BOARD / 2),
+    ...board(radius, BOARD, GREEN_ABOVE, UPPER_BOARD + BOARD / 2),
     [box(11, 12, 2.4), "#15191c", [-11.5, 0, UPPER_BOARD + 2.6]],
     [box(14, 5, 2), "#15191c", [1, 15, UPPER_BOARD + 2.4]],
     [box(14, 5, 2), "#15191c", [1, -15, UPPER_BOARD + 2.4]],
@@ -148,8 +148,9 @@ function bodyGeometry(robot) {
   ];
   for (const side of [-1, 1]) {
     parts.push([box(26, 2.6, UPPER_BOARD - LOWER_BOARD), "#caa64a", [0, side * 20.6, (LOWER_BOARD + UPPER_BOARD) / 2]]);
-    parts.push([column(8, 4.8, 16), "#131517", [0, side * wheel_y, 8], [Math.PI / 2, 0, 0]]);
-    parts.push([column(4.5, 5.4, 10), "#9aa1aa", [0, side * wheel_y, 8], [Math.PI / 2, 0, 0]]);
+    parts.push([column(8, 4.8, 12), "#131517", [0, side * wheel_y, 8], [Math.PI / 2, 0, 0]]);
+    const hub = new THREE.CircleGeometry(4.5, 10);
+    parts.push([hub, "#9aa1aa", [0, side * (wheel_y + 2.5), 8], [(-side * Math.PI) / 2, 0, 0]]);
   }
   return merge(parts);
 }
@@ -164,7 +165,7 @@ function noseOf({ radius_mm }, height) {
 function turretGeometry(robot) {
   const top = topOf(robot), parts = robot.turrets.length ? [noseOf(robot, top)] : [];
   for (let z = UPPER_BOARD + BOARD + TURRET_STEP; z <= top + 0.1; z += TURRET_STEP) {
-    parts.push([column(robot.radius_mm, BOARD, 28), GREEN_ABOVE, [0, 0, z - BOARD / 2]]);
+    parts.push(...board(robot.radius_mm, BOARD, GREEN_ABOVE, z - BOARD / 2));
     for (const side of [-1, 1])
       parts.push([box(26, 2.6, TURRET_STEP - BOARD), "#caa64a", [0, side * 20.6, z - TURRET_STEP / 2]]);
   }
@@ -190,7 +191,8 @@ function nameSprite(name, index) {
   context.fillStyle = "#ffffff";
   context.fillText(name, canvas.width / 2, 32);
   const map = new THREE.CanvasTexture(canvas);
-  map.colorSpace = THREE.SRGBColorSpace;
+  map.generateMipmaps = false;
+  map.minFilter = THREE.LinearFilter;
   const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map, depthTest: false }));
   sprite.scale.set((NAME_MM * canvas.width) / canvas.height, NAME_MM, 1);
   return sprite;

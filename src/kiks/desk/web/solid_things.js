@@ -13,7 +13,9 @@ const RAY_MM = 12;
 const MOST_LIGHTS = 3;
 
 export class SolidThings {
-  constructor() {
+  /** Without a graphics card (`isPlain`) lamps only glow and light the floor. */
+  constructor(isPlain) {
+    this._light_count = isPlain ? 0 : MOST_LIGHTS;
     this.group = new THREE.Group();
     this._bodies = [];
     this._lamps = [];
@@ -33,7 +35,7 @@ export class SolidThings {
     const tint = new THREE.Color();
     scene.bodies.forEach((body, index) => {
       const [red, green, blue] = bodyColour(body);
-      tint.setRGB(red / 255, green / 255, blue / 255, THREE.SRGBColorSpace);
+      tint.setRGB(red / 255, green / 255, blue / 255);
       for (const mesh of [this._balls, this._cylinders]) mesh.setColorAt(index, tint);
     });
     this._rays = rayLines(scene.robots.length);
@@ -69,7 +71,7 @@ export class SolidThings {
 
   _putLamps(frame) {
     while (this._lamps.length < frame.lamp_count) {
-      const lamp = lampOf(this._lamps.length < MOST_LIGHTS);
+      const lamp = lampOf(this._lamps.length < this._light_count);
       this._lamps.push(lamp);
       this.group.add(lamp);
     }
@@ -128,10 +130,7 @@ function rayLines(robot_count) {
   return new THREE.LineSegments(geometry, material);
 }
 
-const RAY_TINTS = READING_COLOURS.map(([red, green, blue]) => {
-  const tint = new THREE.Color().setRGB(red / 255, green / 255, blue / 255, THREE.SRGBColorSpace);
-  return [tint.r, tint.g, tint.b];
-});
+const RAY_TINTS = READING_COLOURS.map((colour) => colour.map((part) => part / 255));
 
 function putRays(geometry, frame, scene, poses) {
   const places = geometry.attributes.position.array, tints = geometry.attributes.color.array;

@@ -25,7 +25,7 @@ const NO_WEBGL =
 
 export class SolidView {
   constructor(canvas, feed, isDark) {
-    const context = canvas.getContext("webgl2", { antialias: !isSoftware(), alpha: false });
+    const isPlain = isSoftware(), context = canvas.getContext("webgl2", { antialias: !isPlain, alpha: false });
     if (!context) throw new Error(NO_WEBGL);
     this.canvas = canvas;
     this.feed = feed;
@@ -36,17 +36,18 @@ export class SolidView {
     this.changes = 0;
     this._renderer = new THREE.WebGLRenderer({ canvas, context });
     this._renderer.setPixelRatio(1);
+    this._renderer.outputColorSpace = THREE.LinearSRGBColorSpace;
     this._scene = new THREE.Scene();
     this._camera = new THREE.PerspectiveCamera(FIELD_OF_VIEW_DEG, 1, 10, 20000);
     this._camera.up.set(0, 0, 1);
     this._ground = new THREE.Group();
     this._robots = new SolidRobots();
-    this._things = new SolidThings();
+    this._things = new SolidThings(isPlain);
     this._ring = ringMesh();
     this._ghost = ringMesh();
-    const sun = new THREE.DirectionalLight(0xffffff, 1.9);
+    const sun = new THREE.DirectionalLight(0xffffff, 1.2);
     sun.position.set(-0.4, -0.7, 1.4);
-    this._scene.add(new THREE.HemisphereLight(0xffffff, 0x8a8f98, 1.7), sun);
+    this._scene.add(new THREE.HemisphereLight(0xffffff, 0x7c828a, 2.7), sun);
     this._scene.add(this._ground, this._robots.group, this._things.group, this._ring, this._ghost);
     this._floor = new Floor();
     this._raycaster = new THREE.Raycaster();
@@ -61,6 +62,12 @@ export class SolidView {
     this._controls.addEventListener("start", () => (this._isMoved = true));
     this._controls.addEventListener("change", () => this.changes++);
     this.fit();
+  }
+
+  /** How many shapes and pictures the graphics card keeps for this view. */
+  get parts() {
+    const { geometries, textures } = this._renderer.info.memory;
+    return geometries + textures;
   }
 
   // The surface of the pointer (pointer.js).
@@ -121,7 +128,6 @@ export class SolidView {
     this._paper.width = this._flat.width_px;
     this._paper.height = this._flat.height_px;
     const map = new THREE.CanvasTexture(this._paper);
-    map.colorSpace = THREE.SRGBColorSpace;
     const floor = new THREE.Mesh(new THREE.PlaneGeometry(width_mm, height_mm), new THREE.MeshBasicMaterial({ map }));
     floor.position.set(width_mm / 2, height_mm / 2, 0);
     this._ground.add(floor, wallMesh(raster, this._colours));

@@ -111,7 +111,7 @@ function geometryOf(faces, grid, colours) {
     const upright = [x0, y0, 0, x1, y1, 0, x1, y1, top, x0, y0, top];
     positions.set(kind === TOP ? flat : upright, 12 * k);
     const grey = ((12 + 0.92 * wallGrey((level - 0.5) * (256 / LEVELS), colours)) * shade) / 255;
-    tint.setRGB(grey, grey, grey * 1.01, THREE.SRGBColorSpace);
+    tint.setRGB(grey, grey, grey * 1.01);
     for (let corner = 0; corner < 4; corner++) tints.set([tint.r, tint.g, tint.b], 12 * k + 3 * corner);
     indices.set([0, 1, 2, 0, 2, 3].map((corner) => 4 * k + corner), 6 * k);
   });

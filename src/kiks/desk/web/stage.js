@@ -112,7 +112,7 @@ export class Stage {
   stats() {
     return {
       frames_drawn: this.frames_drawn, frames_received: this.feed.frames_received, bytes: this.feed.bytes_received,
-      fps: this._fps(), solid_frames: this.solid_frames,
+      fps: this._fps(), solid_frames: this.solid_frames, solid_parts: this.solidView?.parts ?? 0,
     };
   }
 

@@ -1,0 +1,155 @@
+"""The desk in a real browser: the tabs beside the arena. The engine is asked whether what the page shows is so."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import pytest
+
+pytest.importorskip("nicegui", reason="the desk needs NiceGUI: install kiks[desk]")
+pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
+
+from playwright.sync_api import expect
+from tests.desk.visitor import Visitor
+
+pytestmark = pytest.mark.slow
+
+
+def setpoints(visitor: Visitor, robot: int = 1) -> list[int]:
+    found: list[int] = visitor.sim.state.robots["speed_setpoint"][0, robot - 1].tolist()
+    return found
+
+
+# ---- Robot ----
+
+
+def test_click_at_a_robot_opens_its_monitor(visitor: Visitor) -> None:
+    visitor.tab("wire")
+    visitor.page.mouse.click(*visitor.on_page(450, 300))
+    expect(visitor.at("monitor-robot")).to_have_value("Robot 2")
+    expect(visitor.at("facts")).to_contain_text("x 450.0, y 300.0 mm")
+    expect(visitor.at("turret-words")).to_have_text("Gripper (turret 1): holds nothing")
+    visitor.picture("monitor_by_click")
+
+
+def test_why_a_sensor_reads_what_it_reads(visitor: Visitor) -> None:
+    visitor.drag((150, 200), (45, 200))
+    visitor.drag((45 + 25.5, 200), (45, 260))
+    visitor.pause()
+    visitor.at("proximity-0").click()
+    count = visitor.sim.explain(1, 0).count
+    assert count > 100
+    expect(visitor.at("explanation")).to_contain_text(f"Why does it read {count}?")
+    expect(visitor.at("proximity-0")).to_have_text(str(count))
+    expect(visitor.at("explanation-table").locator("tbody tr")).to_have_count(7)
+    visitor.at("explanation").scroll_into_view_if_needed()
+    visitor.picture("why")
+
+
+def test_click_at_a_sensor_in_the_arena_asks_why(visitor: Visitor) -> None:
+    x_mm, y_mm, heading_rad = visitor.sim.pose(1)
+    visitor.page.mouse.click(*visitor.on_page(x_mm, y_mm))
+    angle = heading_rad + math.radians(66.4)
+    visitor.page.mouse.click(*visitor.on_page(x_mm + 24 * math.cos(angle), y_mm + 24 * math.sin(angle)))
+    expect(visitor.at("explanation")).to_contain_text("Sensor 0 (left 90) of robot 1")
+
+
+# ---- Wire ----
+
+
+def test_typed_command_drives_and_its_bytes_are_seen(visitor: Visitor) -> None:
+    visitor.tab("wire")
+    visitor.at("console").fill("D,10,15")
+    visitor.at("console").press("Enter")
+    visitor.until(lambda: setpoints(visitor) == [10, 15])
+    visitor.until(lambda: math.dist(visitor.sim.pose(1)[:2], (150, 200)) > 5)
+    expect(visitor.at("console-log")).to_contain_text("← d")
+    expect(visitor.at("wire")).to_contain_text("→ D,10,15\\n")
+    expect(visitor.at("wire")).to_contain_text("← d\\r\\n")
+    expect(visitor.at("wire-bar")).to_have_attribute("aria-label", re.compile("Link .* Robot .* Waiting"))
+    visitor.picture("wire")
+    visitor.at("console").fill("D,0,0")
+    visitor.at("console").press("Enter")
+    visitor.until(lambda: setpoints(visitor) == [0, 0])
+
+
+# ---- Programs ----
+
+
+def test_example_drives_prints_and_is_stopped(visitor: Visitor) -> None:
+    visitor.tab("programs")
+    visitor.choose("script", "example: avoid")
+    expect(visitor.page.locator(".cm-content")).to_contain_text("Braitenberg")
+    visitor.at("run-program").click()
+    expect(visitor.at("programs")).to_contain_text("avoid.py on robot 1: running")
+    visitor.until(lambda: math.dist(visitor.sim.pose(1)[:2], (150, 200)) > 5)
+    visitor.picture("program_runs")
+    visitor.at("stop").click()
+    expect(visitor.at("programs")).to_contain_text("avoid.py on robot 1: stopped")
+    visitor.until(lambda: setpoints(visitor) == [0, 0])
+    visitor.choose("script", "example: first steps")
+    expect(visitor.page.locator(".cm-content")).to_contain_text("First steps")
+    visitor.at("run-program").click()
+    expect(visitor.at("output")).to_contain_text("What the eight sensors see")
+    visitor.picture("program_has_printed")
+
+
+def test_mistake_in_a_program_is_shown_by_its_line(visitor: Visitor) -> None:
+    visitor.tab("programs")
+    visitor.at("new-program").click()
+    visitor.write("import kiks\n\nwhile True\n    pass\n")
+    visitor.at("run-program").click()
+    expect(visitor.at("mistake")).to_contain_text("Line 3: expected ':'")
+    assert not visitor.desk.programs.handles
+    visitor.picture("mistake_in_a_program")
+
+
+# ---- Settings ----
+
+
+def test_settings_make_a_new_world(visitor: Visitor) -> None:
+    visitor.drag((150, 200), (250, 250))
+    old = visitor.sim
+    visitor.tab("settings")
+    visitor.at("seed").fill("42")
+    visitor.choose("model", "fast: a table of those networks")
+    visitor.choose("baud", "38400")
+    visitor.at("noise").click()
+    visitor.at("add-robot").click()
+    visitor.picture("settings")
+    visitor.at("apply").click()
+    visitor.told("A new world, with these settings.")
+    assert visitor.sim is not old
+    project = visitor.desk.project
+    assert (project.seed, project.response, project.baud, project.noise) == (42, "fast", 38400, False)
+    assert visitor.sim.seed == 42
+    assert visitor.sim.robot_count == 3
+    assert visitor.sim.pose(1)[:2] == pytest.approx((250, 250), abs=1)
+    visitor.page.wait_for_function("() => kiksDesk.scene().robots.length === 3 && kiksDesk.pose(2)")
+    visitor.at("start-over").click()
+    visitor.told("From the start again.")
+    assert visitor.sim.robot_count == 3
+    expect(visitor.at("seed")).to_have_value("42")
+    visitor.picture("another_world")
+
+
+def test_wrong_setting_gets_a_clear_word(visitor: Visitor) -> None:
+    old = visitor.sim
+    visitor.tab("settings")
+    visitor.at("seed").fill("1.5")
+    visitor.at("apply").click()
+    visitor.told("seed must be a whole number, but it was 1.5.")
+    visitor.picture("wrong_setting")
+    assert visitor.sim is old
+
+
+def test_start_over_begins_at_the_very_start(visitor: Visitor) -> None:
+    visitor.drag((150, 200), (250, 250))
+    visitor.until(lambda: visitor.sim.now_ns > 500_000_000)
+    old = visitor.sim
+    visitor.tab("settings")
+    visitor.at("start-over").click()
+    visitor.told("From the start again.")
+    assert visitor.sim is not old
+    assert visitor.sim.pose(1) == (150, 200, 0)

@@ -1,0 +1,196 @@
+"""The panel for drawing in a real browser: what is drawn, opened and saved there is so in engine and folder."""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+pytest.importorskip("nicegui", reason="the desk needs NiceGUI: install kiks[desk]")
+pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
+
+from playwright.sync_api import Page, sync_playwright
+from tests.desk.visits import ARGUMENTS, CHROMIUM, GUARD_MS
+
+from kiks.desk.desk import Desk
+from kiks.desk.serving import SERVER
+from kiks.desk.showing import Shown
+from kiks.model.arena import Arena, Pose
+from kiks.model.project import Project
+from kiks.sim.building import simulation_of
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not CHROMIUM.exists(), reason="tests in a browser need Chromium at /usr/bin/chromium"),
+]
+
+
+@pytest.fixture
+def desk(tmp_path: Path) -> Desk:
+    project = Project(replace(Arena.box(600, 500), starts=(Pose(120.0, 120.0, 0.0),)))
+    desk = Desk(simulation_of(project), project=project, folder=tmp_path, owns_world=True)
+    desk.gate.pause(0)
+    return desk
+
+
+@pytest.fixture
+def page(desk: Desk) -> Iterator[Page]:
+    SERVER.start(port=0)
+    shown = Shown(desk)
+    shown.drive()
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        page = browser.new_page(viewport={"width": 1400, "height": 1000})
+        page.set_default_timeout(GUARD_MS)
+        faults: list[str] = []
+        page.on("pageerror", lambda error: faults.append(str(error)))
+        page.goto(shown.url)
+        page.wait_for_function("() => window.kiksDesk?.stats().frames_drawn > 3 && kiksDesk.pose(0)")
+        page.get_by_test_id("tab-arena").click()
+        page.get_by_test_id("tool-rectangle").wait_for()
+        yield page
+        page.close()
+        browser.close()
+        assert not faults
+    shown.close()
+
+
+def drag(page: Page, *points: tuple[float, float]) -> None:
+    places = [page.evaluate("([x, y]) => kiksDesk.toClient(x, y)", list(point)) for point in points]
+    page.mouse.move(*places[0])
+    page.mouse.down()
+    for place in places[1:]:
+        page.mouse.move(*place, steps=8)
+    page.mouse.up()
+
+
+def wait_for_step(page: Page, *, undo: bool = True, redo: bool = False) -> None:
+    for name, is_there in (("undo", undo), ("redo", redo)):
+        state = ":not([disabled])" if is_there else "[disabled]"
+        page.locator(f"[data-testid={name}]{state}").wait_for()
+
+
+def tell(page: Page, words: str) -> None:
+    page.locator(".q-notification", has_text=words).first.wait_for()
+
+
+def wait_until(page: Page, fact: Callable[[], object]) -> None:
+    """Wait for a fact of the engine, a picture of the screen at a time."""
+    for _ in range(1200):
+        if fact():
+            return
+        page.wait_for_function("() => new Promise((done) => requestAnimationFrame(() => done(true)))")
+    raise AssertionError("it did not come true")
+
+
+def look(page: Page, name: str) -> None:
+    """Write a picture of the page, where a person wants to see it."""
+    if folder := os.environ.get("KIKS_SCREENSHOTS"):
+        page.screenshot(path=Path(folder) / f"editor-{name}.png")
+
+
+def test_walls_are_drawn_and_taken_back(desk: Desk, page: Page) -> None:
+    def brightness(x_mm: int, y_mm: int) -> int:
+        return int(desk.sim.arena.brightness[y_mm, x_mm])
+
+    page.get_by_test_id("tool-rectangle").click()
+    drag(page, (250, 250), (330, 330))
+    wait_for_step(page)
+    assert brightness(290, 290) == 255
+    page.get_by_test_id("material").click()
+    page.get_by_role("option", name="wood").click()
+    page.get_by_test_id("tool-freehand").click()
+    drag(page, (400, 100), (450, 200), (520, 150))
+    page.get_by_test_id("tool-line").click()
+    drag(page, (400, 400), (550, 400))
+    page.get_by_test_id("tool-erase").click()
+    drag(page, (290, 200), (290, 400))
+    page.get_by_test_id("tool-ball").click()
+    drag(page, (150, 400))
+    page.get_by_test_id("tool-lamp").click()
+    drag(page, (50, 300))
+    wait_until(page, lambda: len(desk.sim.lamps) == 1)
+    look(page, "drawn")
+    assert (brightness(450, 200), brightness(475, 400), brightness(290, 290)) == (190, 190, 0)
+    assert len(desk.sim.bodies()) == 1
+    page.get_by_test_id("tool-remove").click()
+    drag(page, (150, 405))
+    wait_until(page, lambda: len(desk.sim.bodies()) == 0)
+    page.get_by_test_id("tool-rectangle").click()
+    drag(page, (100, 100), (140, 140))
+    tell(page, "robot 1")
+    look(page, "refused")
+    assert brightness(120, 120) == 0
+    page.locator("canvas").first.focus()
+    for _ in range(7):
+        page.keyboard.press("Control+z")
+    wait_for_step(page, undo=False, redo=True)
+    assert np.array_equal(desk.sim.arena.brightness, Arena.box(600, 500).brightness)
+    page.keyboard.press("Control+y")
+    wait_for_step(page, undo=True, redo=True)
+    assert brightness(290, 290) == 255
+    assert desk.sim.pose(1) == (120.0, 120.0, 0.0)
+    page.get_by_test_id("tab-wire").click()
+    page.get_by_test_id("tool-rectangle").wait_for(state="detached")
+    drag(page, (120, 120), (150, 180))
+    wait_until(page, lambda: desk.sim.pose(1)[1] > 170)
+
+
+def test_worlds_are_made_saved_and_opened(desk: Desk, page: Page) -> None:
+    page.get_by_test_id("new-arena").click()
+    page.get_by_test_id("box-width").fill("700")
+    page.get_by_test_id("box-rounded").fill("80")
+    look(page, "new")
+    page.get_by_test_id("dialog-ok").click()
+    wait_until(page, lambda: desk.sim.arena.width_mm == 700)
+    page.get_by_test_id("tool-robot").click()
+    drag(page, (400, 300))
+    wait_until(page, lambda: desk.sim.robot_count == 2)
+    name = page.get_by_test_id("save-name")
+    for bad, words in (("../out", "folder"), ("/etc/out", "folder"), ("con", "device")):
+        name.fill(bad)
+        page.get_by_test_id("save").click()
+        tell(page, words)
+    name.fill("mine")
+    page.get_by_test_id("save").click()
+    tell(page, "Saved as mine.kiks")
+    assert [path.name for path in desk.folder.iterdir()] == ["mine.kiks"]
+    saved = Project.load(desk.folder / "mine.kiks")
+    assert (saved.arena.width_mm, len(saved.robots)) == (700, 2)
+    with page.expect_download() as download:
+        page.get_by_test_id("download").click()
+    assert Path(download.value.path()).read_bytes() == saved.to_bytes()
+    page.get_by_test_id("new-maze").click()
+    page.get_by_test_id("dialog-ok").click()
+    wait_until(page, lambda: desk.sim.arena.name == "maze")
+    look(page, "maze")
+    page.get_by_test_id("open-name").click()
+    page.get_by_role("option", name="mine.kiks").click()
+    page.get_by_test_id("open").click()
+    wait_until(page, lambda: desk.sim.arena.width_mm == 700)
+    assert desk.sim.robot_count == 2
+    page.get_by_test_id("save").click()
+    page.get_by_test_id("dialog-yes").click()
+    tell(page, "Saved as mine.kiks")
+
+
+def test_files_come_from_the_browser(desk: Desk, page: Page) -> None:
+    picture = io.BytesIO()
+    Image.fromarray(np.zeros((300, 400), np.uint8)).save(picture, "PNG")
+    chooser = page.locator("[data-testid=upload] input[type=file]")
+    for file, mime, data, fact in (
+        ("a.png", "image/png", picture.getvalue(), lambda: desk.sim.arena.width_mm == 400),
+        ("b.kiks", "text/plain", Project(Arena.box(450, 300)).to_bytes(), lambda: desk.sim.arena.width_mm == 450),
+    ):
+        chooser.set_input_files({"name": file, "mimeType": mime, "buffer": data})
+        wait_until(page, fact)
+    chooser.set_input_files({"name": "c.kad", "mimeType": "text/plain", "buffer": b"nothing"})
+    tell(page, "level 5")
+    assert desk.sim.arena.width_mm == 450
+    assert list(desk.folder.iterdir()) == []
