@@ -69,7 +69,9 @@ export class Feed {
     const message = JSON.parse(text);
     if (message.kind === "scene") {
       this.scene = message;
-      this.frame = null;
+      // Where nothing has come or gone, what was seen last is still so: it would flicker otherwise.
+      const { robot_count, body_count } = this.frame ?? {};
+      if (robot_count !== message.robots.length || body_count !== message.bodies.length) this.frame = null;
       this._tell("scene", message);
     } else if (message.kind === "shapes" && this.scene) {
       this.scene.robots.forEach((robot, index) => (robot.shapes = message.robots[index] ?? robot.shapes));
