@@ -240,15 +240,21 @@ class ProgramsPanel:
         self._offer()
         example = next(script for script in offered(self._desk.folder) if script.is_example)
         self._choice.value = next((s for s in self._choice.options if s.name == "first_steps.py"), example)
-        ui.timer(0, self._follow_dark_mode, once=True)
+        ui.timer(0, self._dress_editor, once=True)
         ui.on("desk-dark", lambda event: self._set_theme(bool(event.args)))
 
-    def _follow_dark_mode(self) -> None:
-        """Give the editor the page's own colours, now and when they change."""
+    def _dress_editor(self) -> None:
+        """Give the editor a name, and the page's own colours, now and when they change."""
         ui.run_javascript("""
             const tell = () => emitEvent("desk-dark", document.body.classList.contains("body--dark"));
             new MutationObserver(tell).observe(document.body, { attributeFilter: ["class"] });
             tell();
+            const name = () => {
+                const text = document.querySelector("[data-testid=editor] .cm-content");
+                if (text) text.setAttribute("aria-label", "Program. Escape, then Tab leaves it.");
+                else requestAnimationFrame(name);
+            };
+            name();
         """)
 
     def _set_theme(self, is_dark: bool) -> None:

@@ -32,7 +32,7 @@ HELP = """
 * Space: run and pause. `.`: a step.
 * On the arena, which Tab reaches: `n` selects one thing after the other, arrows move it by 10 mm (with Shift 1 mm),
   `q` and `e` turn it by 5 degrees, Escape lets go; `+` `-` `0`: nearer, farther, all.
-* In the editor of programs: Ctrl-Enter runs.
+* In the editor of programs: Ctrl-Enter runs; Tab indents, and leaves the editor after Escape.
 """
 
 
