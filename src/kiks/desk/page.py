@@ -30,9 +30,14 @@ STYLE = """
 .desk-tabs .q-tab { padding: 0 8px; min-width: 0 }
 .q-btn-toggle { white-space: nowrap }
 @media (max-width: 900px) { .q-header { padding: 0 4px } }
-.body--dark .text-primary { color: #8fd0f0 !important }
-.body--dark .text-accent { color: #ff9f45 !important }
-*:focus-visible { outline: 3px solid var(--q-accent); outline-offset: 1px }
+.body--dark .text-primary { --q-primary: #8fd0f0 }
+.body--dark .text-accent { --q-accent: #ff9f45 }
+.q-notification .q-btn { --q-primary: #fff }
+body { --desk-focus: #b85c00 }
+.body--dark { --desk-focus: #ff9f45 }
+.q-header { --desk-focus: #ffd9a8 }
+*:focus-visible { outline: 3px solid var(--desk-focus); outline-offset: 1px }
+.no-outline:focus-visible, .q-tab:focus-visible { box-shadow: inset 0 0 0 3px var(--desk-focus) }
 """
 
 PRIMARY, ACCENT = "#174a63", "#b85c00"
