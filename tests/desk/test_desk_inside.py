@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 
+import numpy as np
 import pytest
 
 pytest.importorskip("nicegui", reason="the desk needs NiceGUI: install kiks[desk]")
@@ -103,6 +104,51 @@ def test_mistake_in_a_program_is_shown_by_its_line(visitor: Visitor) -> None:
     expect(visitor.at("mistake")).to_contain_text("Line 3: expected ':'")
     assert not visitor.desk.programs.handles
     visitor.picture("mistake_in_a_program")
+
+
+# ---- Arena ----
+
+
+def test_wall_is_drawn_saved_and_opened_again(visitor: Visitor) -> None:
+    visitor.tab("arena")
+    before = visitor.sim.arena.brightness.copy()
+    visitor.at("tool-rectangle").click()
+    visitor.drag((250, 200), (320, 280))
+    visitor.until(lambda: visitor.sim.arena.brightness[240, 290] == 255)
+    visitor.at("undo").click()
+    visitor.until(lambda: np.array_equal(visitor.sim.arena.brightness, before))
+    visitor.at("redo").click()
+    visitor.until(lambda: visitor.sim.arena.brightness[240, 290] == 255)
+    visitor.picture("wall_drawn")
+    visitor.at("tool-hand").click()
+    visitor.drag((150, 200), (200, 320))
+    saved, poses = visitor.sim.arena.brightness.copy(), visitor.sim.poses()
+    visitor.at("save-name").fill("mine")
+    visitor.at("save").click()
+    visitor.told("Saved as mine.kiks.")
+    visitor.at("example-name").scroll_into_view_if_needed()
+    visitor.at("open-example").click()
+    visitor.told("This is ")
+    visitor.until(lambda: visitor.sim.arena.brightness.shape != saved.shape)
+    visitor.choose("open-name", "mine.kiks")
+    visitor.at("open").click()
+    visitor.until(lambda: visitor.sim.arena.brightness.shape == saved.shape)
+    assert np.array_equal(visitor.sim.arena.brightness, saved)
+    assert visitor.sim.poses() == pytest.approx(poses, abs=1e-3)
+    assert (len(visitor.sim.bodies()), len(visitor.sim.lamps)) == (2, 1)
+    visitor.page.wait_for_function("() => kiksDesk.scene().robots.length === 2 && kiksDesk.pose(1)")
+    visitor.picture("opened_again")
+
+
+def test_bad_file_gets_a_clear_word(visitor: Visitor) -> None:
+    old = visitor.sim
+    visitor.tab("arena")
+    visitor.at("upload").locator("input[type=file]").set_input_files(
+        {"name": "mine.kiks", "mimeType": "text/plain", "buffer": b"no project at all"}
+    )
+    visitor.told("must")
+    visitor.picture("bad_file")
+    assert visitor.sim is old
 
 
 # ---- Settings ----

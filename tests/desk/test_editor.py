@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -15,20 +14,17 @@ from PIL import Image
 pytest.importorskip("nicegui", reason="the desk needs NiceGUI: install kiks[desk]")
 pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
 
-from playwright.sync_api import Page, sync_playwright
-from tests.desk.visits import ARGUMENTS, CHROMIUM, GUARD_MS
+from playwright.sync_api import Page
+from tests.desk.visitor import FIRST_PICTURE, SCREENSHOTS
+from tests.desk.visits import NewPage
 
 from kiks.desk.desk import Desk
-from kiks.desk.serving import SERVER
 from kiks.desk.showing import Shown
 from kiks.model.arena import Arena, Pose
 from kiks.model.project import Project
 from kiks.sim.building import simulation_of
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not CHROMIUM.exists(), reason="tests in a browser need Chromium at /usr/bin/chromium"),
-]
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
@@ -40,24 +36,16 @@ def desk(tmp_path: Path) -> Desk:
 
 
 @pytest.fixture
-def page(desk: Desk) -> Iterator[Page]:
-    SERVER.start(port=0)
-    shown = Shown(desk)
+def page(desk: Desk, new_page: NewPage) -> Iterator[Page]:
+    shown = Shown(desk, port=0)
     shown.drive()
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        page = browser.new_page(viewport={"width": 1400, "height": 1000})
-        page.set_default_timeout(GUARD_MS)
-        faults: list[str] = []
-        page.on("pageerror", lambda error: faults.append(str(error)))
-        page.goto(shown.url)
-        page.wait_for_function("() => window.kiksDesk?.stats().frames_drawn > 3 && kiksDesk.pose(0)")
-        page.get_by_test_id("tab-arena").click()
-        page.get_by_test_id("tool-rectangle").wait_for()
-        yield page
-        page.close()
-        browser.close()
-        assert not faults
+    page = new_page(1400, 1000)
+    page.goto(shown.url)
+    page.wait_for_function(FIRST_PICTURE)
+    page.get_by_test_id("tab-arena").click()
+    page.get_by_test_id("tool-rectangle").wait_for()
+    yield page
+    page.close()
     shown.close()
 
 
@@ -90,9 +78,9 @@ def wait_until(page: Page, fact: Callable[[], object]) -> None:
 
 
 def look(page: Page, name: str) -> None:
-    """Write a picture of the page, where a person wants to see it."""
-    if folder := os.environ.get("KIKS_SCREENSHOTS"):
-        page.screenshot(path=Path(folder) / f"editor-{name}.png")
+    """Leave a picture of the page for a person."""
+    SCREENSHOTS.mkdir(exist_ok=True)
+    page.screenshot(path=SCREENSHOTS / f"arena_{name}.png")
 
 
 def test_walls_are_drawn_and_taken_back(desk: Desk, page: Page) -> None:

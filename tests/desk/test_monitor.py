@@ -17,6 +17,7 @@ pytest.importorskip("nicegui", reason="the desk needs NiceGUI: install kiks[desk
 pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
 
 from playwright.sync_api import Locator, Page, expect
+from tests.desk.visitor import SCREENSHOTS
 from tests.desk.visits import NewPage
 
 pytestmark = pytest.mark.slow
@@ -159,15 +160,14 @@ def test_another_robot_brings_its_own_turrets(visit: Visit) -> None:
 
 
 def test_dark_pages_are_drawn_for_the_dark(new_page: NewPage, address: str) -> None:
-    """The same page by day and by night, with pictures for a person to look at where KIKS_PICTURES says."""
-    folder = os.environ.get("KIKS_PICTURES")
+    """The same page by day and by night, with pictures for a person to look at."""
+    SCREENSHOTS.mkdir(exist_ok=True)
     for name in ("light", "dark"):
         page = new_page(520, 1100)
         visit = Visit(page, address, f"dark={name == 'dark'}")
         visit.find("proximity-2").click()
         expect(visit.find("explanation")).to_be_visible()
         visit.page.wait_for_function("() => kiksMonitor.drawn() > 20")
-        if folder:
-            page.screenshot(path=Path(folder) / f"monitor_{name}.png", full_page=True)
+        page.screenshot(path=SCREENSHOTS / f"monitor_{name}.png", full_page=True)
         assert visit.page.evaluate("document.body.classList.contains('body--dark')") == (name == "dark")
         assert visit.painted(".kiks-curves") > 8

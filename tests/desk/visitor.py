@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
+import pytest
 from playwright.sync_api import Locator, Page, expect
 
 from kiks.desk.desk import Desk
@@ -27,6 +28,9 @@ PICTURES_MAX = 1200
 
 NEXT_PICTURE = "() => new Promise((done) => requestAnimationFrame(() => done(true)))"
 FIRST_PICTURE = "() => window.kiksDesk?.stats().frames_drawn > 3 && kiksDesk.pose(0)"
+
+INSIDE = {"robot": "proximity-0", "wire": "console", "arena": "save", "programs": "editor", "settings": "apply"}
+"""Something in each tab."""
 
 Fact = TypeVar("Fact")
 
@@ -85,6 +89,7 @@ class Visitor:
 
     def tab(self, name: str) -> None:
         self.at(f"tab-{name}").click()
+        expect(self.at(INSIDE[name])).to_be_visible()
 
     def choose(self, name: str, text: str) -> None:
         """Choose in a list by its words."""
@@ -122,8 +127,11 @@ class Visitor:
         self.page.mouse.move(*self.on_page(*end), steps=8)
 
     def let_go(self) -> None:
+        """Let go, and wait until the page shows where everything is."""
         self.page.mouse.up()
         self.until(lambda: self.desk.hands.are_empty)
+        for robot in range(1, self.sim.robot_count + 1):
+            self.until(lambda robot=robot: self.seen(robot) == pytest.approx(self.sim.pose(robot), abs=0.1))
 
     def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
         self.pull(start, end)
