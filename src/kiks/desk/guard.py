@@ -19,7 +19,7 @@ LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
 """Names of this computer as it calls itself."""
 
 FRAMES = (b"content-security-policy", b"frame-ancestors 'self' http://localhost:* http://127.0.0.1:* vscode-webview:")
-"""Whose pages may show this one within theirs: notebooks of this computer do. Any other could trick people into clicks."""
+"""Whose pages may show this one within theirs: notebooks of this computer. Others could trick people into clicks."""
 
 BODY_LIMIT = 64 << 20
 """Most bytes of a request: a project of 64 million cells, compressed."""
