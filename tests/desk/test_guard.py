@@ -63,6 +63,12 @@ def test_this_computer_may_come(host: str) -> None:
     assert status(come(host=host, origin=f"http://{host}")) == 200
 
 
+def test_only_pages_of_this_computer_may_show_it_within_theirs() -> None:
+    policy = dict(come()[0]["headers"])[b"content-security-policy"]
+    assert policy.startswith(b"frame-ancestors 'self' http://localhost:*")
+    assert b" *" not in policy.replace(b":*", b"")
+
+
 @pytest.mark.parametrize("kind", ["http", "websocket"])
 @pytest.mark.parametrize(
     "headers",

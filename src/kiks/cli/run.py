@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,6 +19,7 @@ from kiks.errors import ParameterError
 if TYPE_CHECKING:
     from kiks.clock.gate import Gate
     from kiks.ports.process import Command
+    from kiks.ports.programs import Programs
     from kiks.sim.simulation import Simulation
 
 
@@ -56,6 +58,7 @@ def run(
     ready_engine()
     show_log()
     kinds = robot or ["khepera"]
+    from kiks.ports.programs import Programs
     from kiks.ports.turns import check_policy
     from kiks.sim.simulation import Simulation
 
@@ -70,15 +73,26 @@ def run(
         robot=kinds,
     )
     fit_turrets(sim, turret)
+    host = partial(
+        Programs,
+        told=mapping,
+        thinking=thinking,
+        record=save_thinking,
+        when_silent=when_silent,
+        patience_s=patience,
+        say=lambda text: typer.echo(f"kiks: {text}", err=True),
+    )
     if desk:
-        _run_on_desk(sim, commands, mapping, thinking, save_thinking, when_silent, patience)
+        _run_on_desk(sim, commands, host, thinking)
         return
     code, doubt = 1, ""
     try:
         if len(commands) == 1:
             code = _run_one(sim, commands[0], mapping, save_thinking)
         else:
-            code, doubt = _run_several(sim, commands, mapping, thinking, save_thinking, when_silent, patience)
+            programs = host(sim, commands)
+            code = programs.run()
+            doubt = programs.doubt
     finally:
         _tell(sim, thinking, doubt)
     raise typer.Exit(code)
@@ -92,33 +106,14 @@ def _tell(sim: Simulation, thinking: str, doubt: str) -> None:
     typer.echo(f"kiks: {sim.time_s:.3f} s simulated, seed {sim.seed}, {repeatable}", err=True)
 
 
-def _run_on_desk(
-    sim: Simulation,
-    commands: list[Command],
-    told: dict[str, int],
-    thinking: str,
-    record: Path | None,
-    when_silent: str,
-    patience_s: float,
-) -> None:
+def _run_on_desk(sim: Simulation, commands: list[Command], host: Callable[..., Programs], thinking: str) -> None:
     """Run programs in processes of their own in a world that browsers see, until Ctrl-C."""
     from kiks.desk.desk import Desk
-    from kiks.ports.programs import Programs
 
-    def host(sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
-        return Programs(
-            sim,
-            commands,
-            told=told,
-            thinking=thinking,
-            record=record,
-            when_silent=when_silent,
-            patience_s=patience_s,
-            say=lambda text: typer.echo(f"kiks: {text}", err=True),
-            new_patience=gate.patience,
-        )
+    def host_at(sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
+        return host(sim, commands, new_patience=gate.patience)
 
-    desk = Desk(sim, commands=commands, new_programs=host)
+    desk = Desk(sim, commands=commands, new_programs=host_at)
     open_desk(desk, programs_ended=lambda sim: _tell(sim, thinking, desk.programs.doubt))
 
 
@@ -133,32 +128,6 @@ def _run_one(sim: Simulation, command: Command, told: dict[str, int], record: Pa
             from kiks.clock.thinking import save_thinking
 
             save_thinking(sim.program.measured_ns, record)
-
-
-def _run_several(
-    sim: Simulation,
-    commands: list[Command],
-    told: dict[str, int],
-    thinking: str,
-    record: Path | None,
-    when_silent: str,
-    patience_s: float,
-) -> tuple[int, str]:
-    """Run programs in processes of their own; return the first exit code that tells, and why it is not repeatable."""
-    from kiks.ports.programs import Programs
-
-    programs = Programs(
-        sim,
-        commands,
-        told=told,
-        thinking=thinking,
-        record=record,
-        when_silent=when_silent,
-        patience_s=patience_s,
-        say=lambda text: typer.echo(f"kiks: {text}", err=True),
-    )
-    code = programs.run()
-    return code, programs.doubt
 
 
 def parse_words(words: list[str]) -> list[Command]:

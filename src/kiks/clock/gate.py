@@ -20,7 +20,7 @@ from kiks.clock.pace import Pace
 from kiks.clock.patience import Patience
 from kiks.units import NS_PER_S, TICK_NS
 
-SLICE_NS = NS_PER_S // 100
+SLICE_NS = NS_PER_S // 50
 """Real time that passes in one go, if the pace is bound to it [ns]."""
 
 HELD_SLICE_NS = TICK_NS

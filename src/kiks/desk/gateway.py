@@ -101,7 +101,8 @@ class Gateway:
         self._desk = desk
         self._viewers: set[Viewer] = set()
         self._count = 0
-        self._moved = asyncio.Event()
+        self._wake = asyncio.Event()
+        self._has_moved = False
         self._seen: tuple[Any, ...] = ()
         self._scene: dict[str, Any] = {}
         self._picture: tuple[Any, bytes] = (None, b"")
@@ -116,10 +117,13 @@ class Gateway:
         due_s = loop.time()
         while not self._is_closed:
             due_s = max(due_s + FRAME_S, loop.time())
-            with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(self._moved.wait(), due_s - loop.time())
+            alarm = loop.call_at(due_s, self._wake.set)
+            await self._wake.wait()
+            alarm.cancel()
+            if self._has_moved:
                 await asyncio.sleep(DRAG_FRAME_S)
-            self._moved.clear()
+            self._has_moved = False
+            self._wake.clear()
             if any(viewer.is_ready for viewer in self._viewers):
                 self._show(await self._desk.do(self._look))
 
@@ -228,7 +232,8 @@ class Gateway:
             raise ParameterError(
                 f"a message must be one of ack, grab, move, turn and drop, but it was {kind!r}. Load the page anew."
             )
-        self._moved.set()
+        self._has_moved = True
+        self._wake.set()
 
 
 def _parse(text: str) -> dict[str, Any]:

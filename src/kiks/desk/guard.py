@@ -18,6 +18,9 @@ COOKIE = "kiks_token"
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
 """Names of this computer as it calls itself."""
 
+FRAMES = (b"content-security-policy", b"frame-ancestors 'self' http://localhost:* http://127.0.0.1:* vscode-webview:")
+"""Whose pages may show this one within theirs: notebooks of this computer. Others could trick people into clicks."""
+
 BODY_LIMIT = 64 << 20
 """Most bytes of a request: a project of 64 million cells, compressed."""
 
@@ -26,6 +29,7 @@ class Guard:
     """Stands before an ASGI application and lets in who may come.
 
     * A page of another site gets nothing: whoever names an `Origin` must come from the page itself.
+    * Only pages of this computer may show it within theirs.
     * Without a token, the page must have been asked for by a name of this computer, lest a foreign name that was made
       to mean it gets in.
     * With one, everything needs it, in a cookie; `?token=...` in an address sets the cookie.
@@ -57,7 +61,7 @@ class Guard:
         if refusal is not None:
             await _refuse(scope, send, 403, refusal)
         else:
-            await self._app(scope, _Limited(receive, BODY_LIMIT), send)
+            await self._app(scope, _Limited(receive, BODY_LIMIT), _Framed(send))
 
     def _refusal(self, headers: dict[str, str]) -> str | None:
         """Say why a request is not from the desk's own page, None if it is."""
@@ -94,6 +98,18 @@ class _Limited:
             if self._left < 0:
                 return {"type": "http.disconnect"}
         return message
+
+
+class _Framed:
+    """Passes on what an application answers, with a word on who may show it within a page."""
+
+    def __init__(self, send: Send) -> None:
+        self._send = send
+
+    async def __call__(self, message: Message) -> None:
+        if message["type"] == "http.response.start":
+            message = {**message, "headers": [*message.get("headers", ()), FRAMES]}
+        await self._send(message)
 
 
 def _name(host: str) -> str:

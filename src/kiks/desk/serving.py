@@ -122,7 +122,12 @@ class DeskServer:
         app = FastAPI(openapi_url=None)
         self._add_routes(app)
         ui.run_with(app, title="KiKS", dark=None, show_welcome_message=False, reconnect_timeout=10.0)
-        nicegui_app.on_startup(begun.set)
+
+        def begin() -> None:
+            self._loop = asyncio.get_running_loop()
+            begun.set()
+
+        nicegui_app.on_startup(begin)
         config = uvicorn.Config(
             Guard(app, self.token),
             log_level="warning",
@@ -133,12 +138,8 @@ class DeskServer:
             ws_per_message_deflate=False,
             timeout_graceful_shutdown=1,
         )
-
-        async def serve() -> None:
-            self._loop = asyncio.get_running_loop()
-            await uvicorn.Server(config).serve(sockets=[self._socket] if self._socket else None)
-
-        asyncio.run(serve())
+        assert self._socket is not None
+        uvicorn.Server(config).run(sockets=[self._socket])
 
     def _add_routes(self, app: FastAPI) -> None:
         """Say what is found where."""
