@@ -376,7 +376,7 @@ class Programs:
 
     def _tell_end(self, handle: Handle) -> None:
         """Say how a program has ended."""
-        self._say(f"{handle.name} has ended {handle.how}.")
+        self._say(f"{handle.name} {'was stopped' if handle.guest.is_stopped else f'has ended {handle.how}'}.")
         left = [other.guest for other in self.handles if other.is_running and other.guest.is_here]
         if left and not any(guest.is_waited_for for guest in left):
             names = ", ".join(guest.name for guest in left)
