@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from contextlib import nullcontext
 from typing import Any
 
 import pytest
@@ -110,3 +111,20 @@ def test_what_is_too_large_is_cut_off() -> None:
     piece = b"x" * (1 << 20)
     assert status(come(body=[piece] * (BODY_LIMIT >> 20))) == 200
     assert come(body=[piece] * ((BODY_LIMIT >> 20) + 1)) == []
+
+
+@pytest.mark.parametrize("has_left", [True, False])
+def test_only_who_is_still_there_can_be_failed(has_left: bool) -> None:
+    async def fails(scope: Any, receive: Any, send: Any) -> None:
+        await receive()
+        raise RuntimeError("No response returned.")
+
+    async def receive() -> dict[str, Any]:
+        return {"type": "http.disconnect"} if has_left else {"type": "http.request", "body": b""}
+
+    async def send(message: Any) -> None:
+        raise AssertionError(message)
+
+    coming = Guard(fails, None)({"type": "http", "headers": [(b"host", b"localhost")]}, receive, send)
+    with nullcontext() if has_left else pytest.raises(RuntimeError):
+        asyncio.run(coming)

@@ -61,7 +61,13 @@ class Guard:
         if refusal is not None:
             await _refuse(scope, send, 403, refusal)
         else:
-            await self._app(scope, _Limited(receive, BODY_LIMIT), _Framed(send))
+            limited = _Limited(receive, BODY_LIMIT)
+            try:
+                await self._app(scope, limited, _Framed(send))
+            except RuntimeError:
+                # Starlette says so, at length, when a browser leaves before it was answered: nobody is to read that.
+                if not limited.has_left:
+                    raise
 
     def _refusal(self, headers: dict[str, str]) -> str | None:
         """Say why a request is not from the desk's own page, None if it is."""
@@ -85,14 +91,20 @@ class Guard:
 
 
 class _Limited:
-    """Passes on what a client sends, and ends a request that is too large."""
+    """Passes on what a client sends, and ends a request that is too large.
+
+    Attributes:
+        has_left: Whether the client has gone.
+    """
 
     def __init__(self, receive: Receive, limit: int) -> None:
         self._receive = receive
         self._left = limit
+        self.has_left = False
 
     async def __call__(self) -> Message:
         message = await self._receive()
+        self.has_left = self.has_left or message["type"] == "http.disconnect"
         if message["type"] == "http.request":
             self._left -= len(message.get("body", b""))
             if self._left < 0:
