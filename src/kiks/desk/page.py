@@ -30,7 +30,7 @@ STYLE = """
 .desk-tabs .q-tab { padding: 0 8px; min-width: 0 }
 .q-btn-toggle { white-space: nowrap }
 @media (max-width: 900px) { .q-header { padding: 0 4px } }
-.body--dark .text-primary { --q-primary: #8fd0f0 }
+.body--dark :is(.text-primary, .q-toggle, .q-checkbox, .q-slider) { --q-primary: #8fd0f0 }
 .body--dark .text-accent { --q-accent: #ff9f45 }
 .q-notification .q-btn { --q-primary: #fff }
 body { --desk-focus: #b85c00 }
@@ -40,8 +40,8 @@ body { --desk-focus: #b85c00 }
 .no-outline:focus-visible, .q-tab:focus-visible { box-shadow: inset 0 0 0 3px var(--desk-focus) }
 """
 
-PRIMARY, ACCENT = "#174a63", "#b85c00"
-"""Colours that can be read with white on them, by all and on a wall: contrasts of 9.4 and 4.7 to 1. On dark pages,
+PRIMARY, ACCENT, POSITIVE = "#174a63", "#b85c00", "#1b7a34"
+"""Colours that can be read with white on them, by all and on a wall: contrasts of 9.4, 4.7 and 5.4 to 1. On dark pages,
 words of these colours are lighter: see `STYLE`."""
 
 HINT = "Drag a robot to move it, its rim to turn it. Click it to look inside."
@@ -62,7 +62,7 @@ class Page:
         self._desk = desk
         self._told = desk.news.count
         feed = f"/desk/{number}/feed"
-        ui.colors(primary=PRIMARY, accent=ACCENT)
+        ui.colors(primary=PRIMARY, accent=ACCENT, positive=POSITIVE)
         ui.add_css(STYLE)
         with ui.header(elevated=True).classes("items-center q-py-none q-px-md no-wrap gap-2").style("height: 58px"):
             ui.label("KiKS").classes("text-h6 gt-sm")
