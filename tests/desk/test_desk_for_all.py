@@ -184,6 +184,8 @@ def forget_all() -> None:
 
     def forget() -> None:
         for client in list(Client.instances.values()):
+            for task in client._delete_tasks.values():
+                task.cancel()
             client.delete()
         done.set()
 

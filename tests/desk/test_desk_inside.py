@@ -88,6 +88,7 @@ def test_example_drives_prints_and_is_stopped(visitor: Visitor) -> None:
     visitor.picture("program_runs")
     visitor.at("stop").click()
     expect(visitor.at("programs")).to_contain_text("avoid.py on robot 1: stopped")
+    visitor.told("program 1 (avoid.py) was stopped.")
     visitor.until(lambda: setpoints(visitor) == [0, 0])
     visitor.choose("script", "example: first steps")
     expect(visitor.page.locator(".cm-content")).to_contain_text("First steps")
