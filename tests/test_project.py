@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
 from kiks.cli.options import load_arena
@@ -41,13 +41,17 @@ def projects(draw) -> Project:
     if draw(st.booleans()):
         raster[:50] = draw(st.integers(1, 255))
         raster[draw(st.integers(250, 299)), 3:90] = 7
-    arena = replace(
-        Arena.from_array(raster, mm_per_pixel=draw(st.sampled_from([1.0, 2.5, 1.0])), name=draw(names)),
-        starts=tuple(Pose(*place, draw(headings)) for place in draw(st.lists(places, max_size=3))),
-        lamps=tuple(Lamp(*place, draw(thousandths), draw(st.booleans())) for place in draw(st.lists(places))),
-        balls=tuple(Ball(*place, 21.5, 33.0, draw(st.integers(1, 255))) for place in draw(st.lists(places))),
-        cylinders=tuple(Cylinder(*place) for place in draw(st.lists(places, max_size=2))),
-    )
+    walls = Arena.from_array(raster, mm_per_pixel=draw(st.sampled_from([1.0, 2.5, 1.0])), name=draw(names))
+    things = {
+        "starts": tuple(Pose(*place, draw(headings)) for place in draw(st.lists(places, max_size=3))),
+        "lamps": tuple(Lamp(*place, draw(thousandths), draw(st.booleans())) for place in draw(st.lists(places))),
+        "balls": tuple(Ball(*place, 21.5, 33.0, draw(st.integers(1, 255))) for place in draw(st.lists(places))),
+        "cylinders": tuple(Cylinder(*place) for place in draw(st.lists(places, max_size=2))),
+    }
+    try:
+        arena = replace(walls, **things)
+    except ArenaError:
+        reject()  # something would stand on a wall
     return Project(
         arena,
         robots=tuple(draw(st.lists(robots, min_size=1, max_size=4))),

@@ -90,7 +90,7 @@ def test_walls_are_drawn_and_taken_back(desk: Desk, page: Page) -> None:
     page.get_by_test_id("tool-rectangle").click()
     drag(page, (250, 250), (330, 330))
     wait_for_step(page)
-    assert brightness(290, 290) == 255
+    wait_until(page, lambda: brightness(290, 290) == 255)
     page.get_by_test_id("material").click()
     page.get_by_role("option", name="wood").click()
     page.get_by_test_id("tool-freehand").click()
@@ -119,10 +119,10 @@ def test_walls_are_drawn_and_taken_back(desk: Desk, page: Page) -> None:
     for _ in range(7):
         page.keyboard.press("Control+z")
     wait_for_step(page, undo=False, redo=True)
-    assert np.array_equal(desk.sim.arena.brightness, Arena.box(600, 500).brightness)
+    wait_until(page, lambda: np.array_equal(desk.sim.arena.brightness, Arena.box(600, 500).brightness))
     page.keyboard.press("Control+y")
     wait_for_step(page, undo=True, redo=True)
-    assert brightness(290, 290) == 255
+    wait_until(page, lambda: brightness(290, 290) == 255)
     assert desk.sim.pose(1) == (120.0, 120.0, 0.0)
     page.get_by_test_id("tab-wire").click()
     page.get_by_test_id("tool-rectangle").wait_for(state="detached")

@@ -14,7 +14,8 @@ from kiks.engine.state import BALL, BODY, CYLINDER
 from kiks.errors import ArenaError, KiksError, ParameterError
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp
 from kiks.model.robot import RobotSpec
-from kiks.sim.world import World, check_finite
+from kiks.model.room import OVERLAP_MM
+from kiks.sim.world import PRESSED_MM, World, check_finite
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ class Things(World):
         self._body_count = 0
         for body in arena.bodies:
             try:
-                self._add(body)
+                self._add(body, PRESSED_MM)
             except ParameterError as error:
                 raise ArenaError(f"Arena {arena.name!r}: {error}") from None
 
@@ -111,9 +112,9 @@ class Things(World):
             self.sync()
             return self._add(alone.bodies[0])
 
-    def _add(self, body: Ball | Cylinder) -> int:
+    def _add(self, body: Ball | Cylinder, overlap_mm: float = OVERLAP_MM) -> int:
         what, name = (BALL, "ball") if isinstance(body, Ball) else (CYLINDER, "cylinder")
-        self._check_free(f"the place of a {name}", body.x_mm, body.y_mm, body.radius_mm)
+        self._check_free(f"the place of a {name}", body.x_mm, body.y_mm, body.radius_mm, overlap_mm=overlap_mm)
         self._body_count += 1
         record = np.zeros(1, BODY)
         record["number"], record["what"] = self._body_count, what

@@ -18,6 +18,7 @@ from kiks.engine.state import BALL, State
 from kiks.errors import ArenaError, ParameterError
 from kiks.model.arena import PAD, Arena
 from kiks.model.robot import RobotSpec
+from kiks.model.room import OVERLAP_MM
 from kiks.sim.paths import Paths
 from kiks.units import TICK_NS, s_from_ns
 
@@ -27,8 +28,9 @@ STREAM_PLACE = 4
 ATTEMPTS = 10_000
 """Random places that are tried for a robot."""
 
-OVERLAP_MM = 0.01
-"""How deep things may be put into each other [mm], so that what touches may be put back where it was."""
+PRESSED_MM = 0.5
+"""How deep robots and bodies may begin in each other and in walls [mm]: in a world that was saved, some press upon
+others, and none is ever deeper than this."""
 
 
 class World:
@@ -200,7 +202,8 @@ class World:
             return self.arena.find_start(radius_mm)
         if index < len(self.arena.starts):
             start = self.arena.starts[index]
-            if (obstacle := self._obstacle(start.x_mm, start.y_mm, radius_mm, others)) is not None:
+            obstacle = self._obstacle(start.x_mm, start.y_mm, radius_mm, others, overlap_mm=PRESSED_MM)
+            if obstacle is not None:
                 raise ArenaError(
                     f"Arena {self.arena.name!r}: start {index + 1} at ({start.x_mm:g}, {start.y_mm:g}) mm must be "
                     f"free, but {obstacle}. Move it."
@@ -298,17 +301,23 @@ class World:
         return f"{'ball' if body['what'] == BALL else 'cylinder'} {body['number']}"
 
     def _obstacle(
-        self, x_mm: float, y_mm: float, radius_mm: float, discs: NDArray[np.float64], but: int = -1
+        self,
+        x_mm: float,
+        y_mm: float,
+        radius_mm: float,
+        discs: NDArray[np.float64],
+        but: int = -1,
+        overlap_mm: float = OVERLAP_MM,
     ) -> str | None:
         """Say which wall or disc but one is in the way of a disc, None if it is free."""
         inside = 0 <= x_mm <= self.arena.width_mm and 0 <= y_mm <= self.arena.height_mm
         gap_mm = contact.clearance_of_disc(*self.ground, float(x_mm), float(y_mm), radius_mm)
-        if not inside or gap_mm < -OVERLAP_MM:
+        if not inside or gap_mm < -overlap_mm:
             return f"a wall is {-gap_mm:.1f} mm inside it"
         overlaps_mm = radius_mm + discs[:, 2] - np.hypot(discs[:, 0] - x_mm, discs[:, 1] - y_mm)
         if but >= 0:
             overlaps_mm[but] = -math.inf
-        if len(overlaps_mm) and overlaps_mm.max() > OVERLAP_MM:
+        if len(overlaps_mm) and overlaps_mm.max() > overlap_mm:
             return f"{self._name(int(overlaps_mm.argmax()))} is {overlaps_mm.max():.1f} mm inside it"
         return None
 
@@ -321,9 +330,17 @@ class World:
         radius_mm = float(discs[disc, 2])
         return lambda x_mm, y_mm: self._obstacle(x_mm, y_mm, radius_mm, discs, disc) is None
 
-    def _check_free(self, what: str, x_mm: float, y_mm: float, radius_mm: float, but: int = -1) -> None:
+    def _check_free(
+        self,
+        what: str,
+        x_mm: float,
+        y_mm: float,
+        radius_mm: float,
+        but: int = -1,
+        overlap_mm: float = OVERLAP_MM,
+    ) -> None:
         """Raise a ParameterError if a disc [mm] would be in a wall or, but for one disc, in something else."""
-        obstacle = self._obstacle(x_mm, y_mm, radius_mm, self._discs(), but)
+        obstacle = self._obstacle(x_mm, y_mm, radius_mm, self._discs(), but, overlap_mm)
         if obstacle is not None:
             raise ParameterError(
                 f"{what} must be free, but at ({x_mm:g}, {y_mm:g}) mm {obstacle}. "
