@@ -176,6 +176,9 @@ def test_two_browsers_see_one_world_and_both_drag(visitor: Visitor, new_page: Ne
         for robot in (1, 2):
             one.until(lambda one=one, robot=robot: one.seen(robot) == pytest.approx(one.sim.pose(robot), abs=0.01))
     other.picture("two_browsers_drag")
+    other.page.mouse.up()
+    other.pull((150, 300), (160, 310))
+    expect(other.at("arena-notice")).to_contain_text("one hand must let go")
     visitor.page.mouse.up()
     other.page.mouse.up()
     other.at("run").click()

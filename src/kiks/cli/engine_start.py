@@ -10,7 +10,7 @@ def ready_engine() -> None:
     from kiks.engine.compiling import is_compiled
 
     if not is_compiled():
-        typer.echo("Compiling the engine for this computer: once, ten seconds or so ...", err=True)
+        typer.echo("Compiling the engine for this computer: once, half a minute or so ...", err=True)
         compile_everything()
 
 

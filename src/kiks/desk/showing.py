@@ -11,8 +11,12 @@ import webbrowser
 
 from kiks.desk.desk import Desk, NewsHandler
 from kiks.desk.driver import Driver
+from kiks.desk.frames import pack_frame
 from kiks.desk.serving import SERVER
+from kiks.engine.compiling import is_compiled
 from kiks.sim.simulation import Simulation
+
+_log = logging.getLogger("kiks.desk")
 
 
 class Shown:
@@ -36,6 +40,11 @@ class Shown:
 
     def __init__(self, desk: Desk, *, host: str = "127.0.0.1", port: int | None = None) -> None:
         self.desk = desk
+        if not is_compiled():
+            _log.warning("Compiling the engine for this computer: once, half a minute or so ...")
+        with desk.sim.lock:
+            # What browsers need of the engine is compiled before the first of them waits for it.
+            pack_frame(desk.sim, scene=0)
         SERVER.start(host=host, port=port)
         self._served = SERVER.open(desk)
         self.url = SERVER.url(self._served.number)

@@ -7,7 +7,8 @@
    feed.scene       the newest scene message (arena, robots, bodies) or null
    feed.frame       the newest frame (see frame.js) or null; it always belongs to feed.scene
    feed.connection  "connecting", "open", "lost" (it tries again by itself) or "gone" (the server has ended)
-   feed.on(what, callback) tells of "scene", "shapes", "frame" and "connection", and returns a function that ends that.
+   feed.on(what, callback) tells of "scene", "shapes", "frame", "connection" and "error" (what the server objects to, in
+                    words), and returns a function that ends that.
    feed.send(object) sends a message, and says whether there was a connection to send it on.
 
    A hidden page does not acknowledge: the server then rests, and the newest frame comes when the page is looked at
@@ -15,6 +16,7 @@
 
 import { Frame } from "./frame.js";
 
+const HAPPENINGS = ["scene", "shapes", "frame", "connection", "error"];
 const FIRST_PAUSE_MS = 250;
 const LONGEST_PAUSE_MS = 5000;
 /** Longest way between two frames that is stretched on the screen: beyond it, things would seem to lag. */
@@ -28,7 +30,7 @@ export class Feed {
     this.connection = "connecting";
     this.frames_received = 0;
     this.bytes_received = 0;
-    this._listeners = { scene: new Set(), shapes: new Set(), frame: new Set(), connection: new Set() };
+    this._listeners = Object.fromEntries(HAPPENINGS.map((what) => [what, new Set()]));
     this._pause_ms = FIRST_PAUSE_MS;
     this._owed = 0;
     document.addEventListener("visibilitychange", () => this._wake());
@@ -76,6 +78,8 @@ export class Feed {
     } else if (message.kind === "shapes" && this.scene) {
       this.scene.robots.forEach((robot, index) => (robot.shapes = message.robots[index] ?? robot.shapes));
       this._tell("shapes", this.scene);
+    } else if (message.kind === "error") {
+      this._tell("error", message.text);
     } else if (message.kind === "gone") {
       this._say("gone");
     }

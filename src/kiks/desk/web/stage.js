@@ -10,6 +10,7 @@ import { nameOf, placeOf } from "./things.js";
 import { Drawing } from "./tools.js";
 import { TopView } from "./top_view.js";
 
+const OBJECTION_MS = 5000;
 const SAY = {
   connecting: "Connecting to KiKS …",
   lost: "No connection to KiKS. Trying again …",
@@ -162,6 +163,7 @@ export class Stage {
         if (connection !== "open") this.hand.forget();
         this._say(connection);
       }),
+      this.feed.on("error", (text) => this._object(text)),
     ];
   }
 
@@ -279,6 +281,14 @@ export class Stage {
   }
 
   _say(connection) { this._notice(SAY[connection] ?? ""); }
+
+  /** Show for a while what the server objects to. */
+  _object(text) {
+    this._notice(text);
+    setTimeout(() => {
+      if (this.notice.textContent === text) this._say(this.feed.connection);
+    }, OBJECTION_MS);
+  }
 
   _notice(text) {
     this.notice.textContent = text;
