@@ -198,7 +198,7 @@ def make_app(robot_count: int) -> FastAPI:
             while True:
                 message = json.loads(await socket.receive_text())
                 if message["kind"] == "ack":
-                    sockets[socket] -= 1
+                    sockets[socket] -= message["count"]
                     continue
                 received.append(message)
                 world.obey(id(socket), message)

@@ -14,9 +14,14 @@ from tests.desk.visitor import Visitor
 from tests.desk.visits import NewPage
 
 from kiks.desk.showing import Shown
-from kiks.desk.time_panel import clock_text
 
 pytestmark = pytest.mark.slow
+
+
+def clock_text(now_ns: int) -> str:
+    """Return what the clock shows at a simulated time."""
+    hundredths = now_ns // 10_000_000
+    return f"{hundredths // 6000}:{hundredths // 100 % 60:02d}.{hundredths % 100:02d}"
 
 
 def centre_of_view(visitor: Visitor) -> tuple[float, float]:

@@ -85,7 +85,7 @@ def test_numbers_at_the_sensors_are_those_of_the_simulation(visit: Visit) -> Non
         expect(visit.find(f"proximity-{sensor}")).to_have_text(f"{world['counts'][0][sensor]:.0f}")
         expect(visit.find(f"ambient-{sensor}")).to_have_text(f"{world['light'][0][sensor]:.0f}")
     assert max(world["counts"][0]) > 100
-    expect(visit.find("facts")).to_contain_text(f"{world['time_s']:.2f} s")
+    expect(visit.find("facts")).to_contain_text(f"Clock0:{int(world['time_s'] * 100 + 1e-6) / 100:05.2f}")
     expect(visit.find("speed-left")).to_contain_text(", set 4")
     assert visit.painted(".kiks-monitor-robot canvas") > 20
 

@@ -215,7 +215,8 @@ class Gateway:
         message = _parse(text)
         kind = message["kind"]
         if kind == "ack":
-            viewer.in_flight = max(viewer.in_flight - 1, 0)
+            count = message.get("count", 1)
+            viewer.in_flight = max(viewer.in_flight - (count if isinstance(count, int) else 1), 0)
             return
         desk, name = self._desk, viewer.name
         if kind == "grab":

@@ -66,7 +66,7 @@ class Page:
         ui.add_css(STYLE)
         with ui.header(elevated=True).classes("items-center q-py-none q-px-md no-wrap gap-2").style("height: 58px"):
             ui.label("KiKS").classes("text-h6 gt-sm")
-            TimePanel(desk)
+            TimePanel(desk, feed)
             ui.space()
             tools = ui.row().classes("items-center no-wrap gap-1")
         with ui.splitter(value=64, limits=(30, 100)).classes("desk-body") as halves:

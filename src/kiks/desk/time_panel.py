@@ -5,6 +5,7 @@ from __future__ import annotations
 from nicegui import ui
 from nicegui.events import KeyEventArguments
 
+from kiks.desk.clock_view import ClockView
 from kiks.desk.desk import Desk
 from kiks.desk.feedback import told
 
@@ -33,8 +34,8 @@ LEAVE = """(event) => {
 """Lets a closed list leave the keys of time to the page: who has just chosen a speed and presses space wants to pause,
 not to open the list again. Quasar skips events so marked, and the page's keys are heard when no list has the focus."""
 
-REFRESH_S = 0.2
-"""How often clock and speed are shown anew [s]."""
+REFRESH_S = 0.5
+"""How often it is shown what others have changed [s]."""
 
 
 class TimePanel:
@@ -42,9 +43,10 @@ class TimePanel:
 
     Args:
         desk: The desk.
+        feed: Path of the WebSocket that frames come from.
     """
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: Desk, feed: str) -> None:
         self._desk = desk
         self._run = ui.button(on_click=self._toggle).props("round unelevated color=accent data-testid=run")
         with self._run:
@@ -56,11 +58,7 @@ class TimePanel:
         self._speed.on_value_change(self._set_speed)
         with self._speed:
             ui.tooltip("How much simulated time passes in real time; it never changes what robots do")
-        with ui.column().classes("gap-0 q-mx-sm").style("line-height: 1.15; white-space: nowrap"):
-            self._clock = ui.label().classes("text-subtitle1 text-weight-medium").props("data-testid=clock")
-            self._rate = ui.label().classes("text-caption gt-sm").props("data-testid=rate")
-            for label in (self._clock, self._rate):
-                label.style("font-variant-numeric: tabular-nums")
+        ClockView(feed)
         with _flat("bookmark_add", "Checkpoint", "mark", self._mark):
             ui.tooltip("Checkpoint: remember where everything stands")
         with _flat("settings_backup_restore", "Reset", "reset", self._reset):
@@ -80,8 +78,6 @@ class TimePanel:
         if self._run.props.get("aria-label") != word:
             self._run.props(f'icon={icon} aria-label="{word}"')
             self._run_tip.text = f"{word} (space)"
-        self._clock.text = clock_text(desk.sim.now_ns)
-        self._rate.text = f"{desk.meter.average:.1f} x on average, {desk.meter.momentary:.1f} x now"
         if self._speed.value != self._shown_speed():
             self._speed.value = self._shown_speed()
 
@@ -132,14 +128,3 @@ def _select(choices: dict[float, str], value: float, word: str, name: str, width
         .style(f"min-width: {width}")
         .on("keydown", js_handler=LEAVE)
     )
-
-
-def clock_text(now_ns: int) -> str:
-    """Return a simulated time for a person.
-
-    Example:
-        >>> clock_text(83_456_000_000)
-        '1:23.45'
-    """
-    hundredths = now_ns // 10_000_000
-    return f"{hundredths // 6000}:{hundredths // 100 % 60:02d}.{hundredths % 100:02d}"

@@ -1,5 +1,7 @@
 /* A robot's numbers in words, as rows of a list: [what, value]. */
 
+import { clockText } from "./clock.js";
+
 const DEGREES = 180 / Math.PI;
 const ARM_DOWN = 215, ARM_UPRIGHT = 127;
 
@@ -7,7 +9,7 @@ const ARM_DOWN = 215, ARM_UPRIGHT = 127;
 export function factsOf(scene, frame, index) {
   const robot = frame.robot(index), known = scene.robots[index];
   const rows = [
-    ["Clock", `${frame.time_s.toFixed(2)} s`],
+    ["Clock", clockText(frame.time_s)],
     ["Place", `x ${robot.x_mm.toFixed(1)}, y ${robot.y_mm.toFixed(1)} mm`],
     ["Heading", `${turned(robot.heading_rad * DEGREES).toFixed(1)}°`],
     ["Encoders", `left ${robot.encoders[0]}, right ${robot.encoders[1]}`],

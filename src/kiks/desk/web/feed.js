@@ -17,6 +17,8 @@
 import { Frame } from "./frame.js";
 
 const HAPPENINGS = ["scene", "shapes", "frame", "connection", "error"];
+/** Fewer than may be on their way: each message costs the server a tenth of a frame. */
+const ACKNOWLEDGED_TOGETHER = 2;
 const FIRST_PAUSE_MS = 250;
 const LONGEST_PAUSE_MS = 5000;
 /** Longest way between two frames that is stretched on the screen: beyond it, things would seem to lag. */
@@ -89,7 +91,7 @@ export class Feed {
     this.frames_received++;
     this.bytes_received += buffer.byteLength;
     this._owed++;
-    if (!document.hidden) this._acknowledge();
+    if (!document.hidden && this._owed >= ACKNOWLEDGED_TOGETHER) this._acknowledge();
     const frame = new Frame(buffer, performance.now());
     if (!this.scene || frame.scene !== this.scene.scene) return;
     const before = this.frame;
@@ -103,7 +105,7 @@ export class Feed {
   }
 
   _acknowledge() {
-    for (; this._owed > 0; this._owed--) this.send({ kind: "ack" });
+    if (this._owed && this.send({ kind: "ack", count: this._owed })) this._owed = 0;
   }
 
   _wake() {

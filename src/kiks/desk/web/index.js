@@ -4,6 +4,7 @@
 export { Feed, pageFeed } from "./feed.js";
 export { Frame, NO_HIT, RAY_UNIT_MM, RAYS_PER_ROBOT, RAYS_PER_SENSOR, Robot, SENSORS } from "./frame.js";
 export { palette, READING_COLOURS, readingBucket, rgba, robotColour } from "./colours.js";
+export { clockText } from "./clock.js";
 export { loadRaster } from "./raster.js";
 export { KEYS_HELP } from "./keys.js";
 export { Stage } from "./stage.js";
