@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 from nicegui import ui
 
@@ -16,29 +17,7 @@ from kiks.desk.time_panel import TimePanel
 from kiks.desk.view_panel import ViewPanel
 from kiks.desk.wire_panel import WirePanel
 
-STYLE = """
-.nicegui-content { padding: 0; gap: 0 }
-.desk-body { width: 100%; height: calc(100dvh - 58px) }
-.desk-panels { height: calc(100dvh - 58px - 37px) }
-.desk-panels .q-tab-panel { padding: 0; overflow: auto }
-.desk-hint {
-  position: absolute; right: 16px; bottom: 44px; max-width: 80%; padding: 6px 14px; border-radius: 16px;
-  background: rgba(20, 30, 40, .8); color: #fff; pointer-events: none; animation: desk-fade 2s 25s forwards;
-}
-@keyframes desk-fade { to { opacity: 0; visibility: hidden } }
-.desk-body > .q-splitter__after { min-width: 370px }
-.desk-tabs .q-tab { padding: 0 8px; min-width: 0 }
-.q-btn-toggle { white-space: nowrap }
-@media (max-width: 900px) { .q-header { padding: 0 4px } }
-.body--dark :is(.text-primary, .q-toggle, .q-checkbox, .q-slider) { --q-primary: #8fd0f0 }
-.body--dark .text-accent { --q-accent: #ff9f45 }
-.q-notification .q-btn { --q-primary: #fff }
-body { --desk-focus: #b85c00 }
-.body--dark { --desk-focus: #ff9f45 }
-.q-header { --desk-focus: #ffd9a8 }
-*:focus-visible { outline: 3px solid var(--desk-focus); outline-offset: 1px }
-.no-outline:focus-visible, .q-tab:focus-visible { box-shadow: inset 0 0 0 3px var(--desk-focus) }
-"""
+STYLE = Path(__file__).parent / "web" / "page.css"
 
 PRIMARY, ACCENT, POSITIVE = "#174a63", "#b85c00", "#1b7a34"
 """Colours that can be read with white on them, by all and on a wall: contrasts of 9.4, 4.7 and 5.4 to 1. On dark pages,
