@@ -138,6 +138,16 @@ def test_live_thinking_of_each_is_recorded_and_replayed(tmp_path: Path) -> None:
     assert run(FOUR[:2], thinking=f"replay:{times}")[:2] == live[:2]
 
 
+def test_one_program_alone_has_a_file_without_a_number(tmp_path: Path) -> None:
+    times = tmp_path / "times"
+    live = run(FOUR[:1], thinking="live", record=times)
+    assert times.exists()
+    assert run(FOUR[:1], thinking=f"replay:{times}")[:2] == live[:2]
+    sim = fresh(thinking=f"replay:{times}")
+    assert run_here(sim, Path(FOUR[0][0]), list(FOUR[0][1:]), {}) == 0
+    assert (sim.state_hash(), sim.now_ns) == live[:2]
+
+
 # ---- who ends, crashes, hangs or babbles ----
 
 

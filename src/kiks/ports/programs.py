@@ -101,8 +101,8 @@ class Programs:
         commands: Programs that begin together; the first one drives robot 1, whatever port it opens, and so on. None
             where a robot has none.
         told: Robots by port name, for whichever program opens it.
-        thinking: What the computing of each costs: 'none', 'fixed:MS', 'live', 'live:FACTOR', or 'replay:FILE' with
-            the number of the program appended: FILE.1.
+        thinking: What the computing of each costs: 'none', 'fixed:MS', 'live', 'live:FACTOR', or 'replay:FILE'; where
+            several begin together, with the number of the program appended: FILE.1.
         record: File for the thinking times of live runs, with the same numbers appended.
         when_silent: What happens to a program that is silent while others wait: 'wait', 'drop' (its process is ended)
             or 'ignore'.
@@ -145,6 +145,7 @@ class Programs:
         self._is_closed = False
         self._count = 0
         begin = [(robot, command) for robot, command in enumerate(commands, 1) if command is not None]
+        self._are_numbered = len(begin) > 1
         for number in range(1, len(begin) + 1):
             parse_thinking(self._policy(number))
         self._turns = Turns(
@@ -301,7 +302,11 @@ class Programs:
     # ---- inside ----
 
     def _policy(self, number: int) -> str:
-        return f"{self._thinking}.{number}" if self._thinking.startswith("replay:") else self._thinking
+        return self._thinking + (self._suffix(number) if self._thinking.startswith("replay:") else "")
+
+    def _suffix(self, number: int) -> str:
+        """Return what is appended to the names of files that each program has of its own."""
+        return f".{number}" if self._are_numbered else ""
 
     def _add(self, command: Command, robot: int) -> Handle:
         """Start a program's process and let it take part."""
@@ -311,7 +316,7 @@ class Programs:
         guest = Guest(name, number, robot, here, self.sim, self._turns, self._names)
         handle = Handle(command, guest)
         lateness = LATE if self._turns.has_begun else PUNCTUAL
-        record = f"{self._record}.{number}" if self._record is not None else ""
+        record = f"{self._record}{self._suffix(number)}" if self._record is not None else ""
         with there:
             try:
                 handle.process = Process(
