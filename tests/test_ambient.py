@@ -29,10 +29,15 @@ RIGHT_10 = {80: 496, 60: 476, 50: 444, 40: 404, 30: 342, 20: 283, 10: 262, 0: 22
 RIGHT_10 |= {-40: 345, -50: 407, -60: 453, -70: 487, -80: 497}
 
 
+ROOM = kiks.Arena.box(1400, 1400)
+
+
 def dark_room(*lamps: tuple[Any, ...], robot: RobotSpec = SPEC, seed: int = 0) -> kiks.Simulation:
     """A robot in the middle of a large box that looks to the right."""
-    arena = replace(kiks.Arena.box(1400, 1400), lamps=tuple(Lamp(*lamp) for lamp in lamps))
-    sim = kiks.Simulation(arena, robot=robot, seed=seed)
+    sim = kiks.Simulation(ROOM, robot=robot, seed=seed)
+    for lamp in lamps:
+        x_mm, y_mm, power_w, is_on = (*lamp, 1.0, True)[:4] if len(lamp) == 2 else (*lamp, True)[:4]
+        sim.add_lamp(x_mm, y_mm, power_w, is_on=is_on)
     sim.place(1, 700, 700, 0.0)
     return sim
 

@@ -94,6 +94,7 @@ def test_the_guide_names_the_default_marks(name: str) -> None:
 # ---- the command ----
 
 
+@pytest.mark.slow
 def test_the_command_asks_measures_and_writes(tmp_path: Path) -> None:
     hidden, out = hidden_robot(11, BASE), tmp_path / "mine.toml"
     sim = kiks.Simulation(robot=hidden)
@@ -203,6 +204,7 @@ def test_something_near_in_the_open_is_named() -> None:
     assert "the sensors must read little in the open, but sensor" in failure(Cornered(kiks.Simulation(), {}))
 
 
+@pytest.mark.slow
 def test_measurements_that_contradict_each_other_are_named() -> None:
     words = failure(Misplaced(kiks.Simulation(), {15: 12}), (5, 15, 25))
     assert "the measurements must agree with each other, but those at the" in words
@@ -251,6 +253,7 @@ def test_ctrl_c_in_the_middle_of_a_spin_stops_the_robot() -> None:
     assert stands_still(sim)
 
 
+@pytest.mark.slow
 def test_a_person_may_measure_again() -> None:
     class Fussy(SimPlacements):
         asked = 0

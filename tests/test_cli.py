@@ -50,6 +50,7 @@ def test_help_and_version_need_no_engine() -> None:
     assert re.fullmatch(r"KiKS \d+\.\d+.*\n", kiks("--version").stdout)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("behaviour", ["avoid", "follow"])
 def test_a_demo_is_the_same_in_two_processes_and_on_any_processor(behaviour: str, tmp_path: Path) -> None:
     arguments = ("demo", behaviour, "--seconds", "30", "--arena", ARENA, "--seed", "4")
@@ -63,6 +64,7 @@ def test_a_demo_is_the_same_in_two_processes_and_on_any_processor(behaviour: str
     assert (tmp_path / f"kiks-{behaviour}.png").exists()
 
 
+@pytest.mark.slow
 def test_a_cold_start_says_that_it_compiles(tmp_path: Path) -> None:
     result = kiks("warmup", env={"NUMBA_CACHE_DIR": str(tmp_path)})
     assert "Compiling the engine" in result.stderr

@@ -39,7 +39,7 @@ def desk(tmp_path: Path) -> Iterator[Desk]:
         return hosts[-1]
 
     sim = simulation_of(project, tmp_path)
-    desk = Desk(sim, project=project, folder=tmp_path, owns_world=True, new_programs=new_programs)
+    desk = Desk(sim, project=project, folder=tmp_path, owns_world=True, speed=None, new_programs=new_programs)
     yield desk
     desk.close()
     # Whoever drives a desk closes the hosts of the worlds before; nobody drives this one.

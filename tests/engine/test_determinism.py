@@ -86,7 +86,7 @@ def test_in_another_process(record: str) -> None:
 @pytest.mark.parametrize(
     ("processor", "needed"),
     [
-        ("generic", ()),
+        pytest.param("generic", (), marks=pytest.mark.slow),
         pytest.param("x86-64-v3", ("avx2", "fma"), marks=pytest.mark.slow),
         pytest.param("x86-64-v4", ("avx512f", "avx512bw", "avx512dq", "avx512vl"), marks=pytest.mark.slow),
     ],
