@@ -127,6 +127,7 @@ def run(command, *arguments):
 
 
 @needs_data
+@pytest.mark.slow
 def test_the_command_prints_json_and_draws(tmp_path):
     pytest.importorskip("matplotlib")
     result = run(accuracy, "--json", "--plots", str(tmp_path / "card"))
@@ -138,6 +139,7 @@ def test_the_command_prints_json_and_draws(tmp_path):
 
 
 @needs_data
+@pytest.mark.slow
 def test_the_command_prints_a_table(tmp_path):
     result = run(accuracy, "--page", str(tmp_path / "page.md"))
     assert "thesis networks" in result.stdout

@@ -150,6 +150,7 @@ def test_two_programs_do_the_same_again(tmp_path: Path) -> None:
     assert len({drive_all(tmp_path, "none", robots=2, patience_s=GUARD_S) for _ in range(3)}) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("thinking", ["none", "fixed:2"])
 def test_order_in_real_time_does_not_matter(thinking: str) -> None:
     ends = set()

@@ -18,6 +18,9 @@ from kiks.ports.rfc2217 import Rfc2217Endpoint
 from kiks.ports.tcp import TcpEndpoint
 from kiks.sim.simulation import Simulation
 
+# Each session is played over five kinds of ports; tests/firmware/test_sessions.py plays them in memory.
+pytestmark = pytest.mark.slow
+
 
 @contextmanager
 def by_name(sim: Simulation, folder: Path) -> Iterator[Any]:
