@@ -87,7 +87,6 @@ def test_a_program_runs_unchanged_in_simulated_time() -> None:
 
 
 def test_turrets_and_kinds_of_robots_from_the_command_line(tmp_path: Path) -> None:
-@pytest.mark.slow
     program = tmp_path / "ask.py"
     program.write_text(
         "import serial\n"
@@ -107,6 +106,9 @@ def test_turrets_and_kinds_of_robots_from_the_command_line(tmp_path: Path) -> No
         "b't,1,b,1,0\\r\\n'",
         "b't,4,b,1,0\\r\\n'",
     ], result.stderr
+
+
+@pytest.mark.slow
 def test_a_programs_exit_code_and_errors_are_its_own(tmp_path: Path) -> None:
     assert kiks("run", WANDER, "7").returncode == 7
     program = tmp_path / "wrong.py"
