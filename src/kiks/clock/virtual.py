@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -14,6 +15,8 @@ from kiks.units import NS_PER_S
 @contextmanager
 def virtual_time(now_ns: Callable[[], int], sleep: Callable[[float], None]) -> Iterator[None]:
     """Let `time.sleep`, `time.time`, `time.monotonic`, `time.perf_counter` and their `_ns` forms be simulated.
+
+    Threads that run already keep real time: they are none of the program's, such as the server of a desk.
 
     Args:
         now_ns: Returns the simulated time [ns]; may let a little of it pass, so that no loop waits for ever.
@@ -34,10 +37,22 @@ def virtual_time(now_ns: Callable[[], int], sleep: Callable[[float], None]) -> I
         replacements[name] = lambda: now_ns() / NS_PER_S
         replacements[f"{name}_ns"] = now_ns
     originals = {name: getattr(time, name) for name in replacements}
+    others = {thread.ident for thread in threading.enumerate()} - {threading.get_ident()}
     for name, replacement in replacements.items():
-        setattr(time, name, replacement)
+        setattr(time, name, _for_all_but(others, replacement, originals[name]) if others else replacement)
     try:
         yield
     finally:
         for name, original in originals.items():
             setattr(time, name, original)
+
+
+def _for_all_but(
+    others: set[int | None], replacement: Callable[..., Any], original: Callable[..., Any]
+) -> Callable[..., Any]:
+    """Return a function that is the replacement, but for some threads the original."""
+
+    def choose(*given: float) -> Any:
+        return (original if threading.get_ident() in others else replacement)(*given)
+
+    return choose
