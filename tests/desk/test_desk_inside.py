@@ -113,7 +113,7 @@ def test_mistake_in_a_program_is_shown_by_its_line(visitor: Visitor) -> None:
 def test_wall_is_drawn_saved_and_opened_again(visitor: Visitor) -> None:
     visitor.tab("arena")
     before = visitor.sim.arena.brightness.copy()
-    visitor.at("tool-rectangle").click()
+    visitor.take("rectangle")
     visitor.drag((250, 200), (320, 280))
     visitor.until(lambda: visitor.sim.arena.brightness[240, 290] == 255)
     visitor.at("undo").click()
@@ -121,7 +121,7 @@ def test_wall_is_drawn_saved_and_opened_again(visitor: Visitor) -> None:
     visitor.at("redo").click()
     visitor.until(lambda: visitor.sim.arena.brightness[240, 290] == 255)
     visitor.picture("wall_drawn")
-    visitor.at("tool-hand").click()
+    visitor.take("hand")
     visitor.drag((150, 200), (200, 320))
     saved, poses = visitor.sim.arena.brightness.copy(), visitor.sim.poses()
     visitor.at("save-name").fill("mine")

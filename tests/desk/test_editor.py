@@ -58,6 +58,12 @@ def drag(page: Page, *points: tuple[float, float]) -> None:
     page.mouse.up()
 
 
+def take(page: Page, tool: str) -> None:
+    """Choose a tool, and wait until the arena has it."""
+    page.get_by_test_id(f"tool-{tool}").click()
+    page.locator(f"[data-testid=tool-{tool}].bg-accent").wait_for()
+
+
 def wait_for_step(page: Page, *, undo: bool = True, redo: bool = False) -> None:
     for name, is_there in (("undo", undo), ("redo", redo)):
         state = ":not([disabled])" if is_there else "[disabled]"
@@ -87,30 +93,30 @@ def test_walls_are_drawn_and_taken_back(desk: Desk, page: Page) -> None:
     def brightness(x_mm: int, y_mm: int) -> int:
         return int(desk.sim.arena.brightness[y_mm, x_mm])
 
-    page.get_by_test_id("tool-rectangle").click()
+    take(page, "rectangle")
     drag(page, (250, 250), (330, 330))
     wait_for_step(page)
     wait_until(page, lambda: brightness(290, 290) == 255)
     page.get_by_test_id("material").click()
     page.get_by_role("option", name="wood").click()
-    page.get_by_test_id("tool-freehand").click()
+    take(page, "freehand")
     drag(page, (400, 100), (450, 200), (520, 150))
-    page.get_by_test_id("tool-line").click()
+    take(page, "line")
     drag(page, (400, 400), (550, 400))
-    page.get_by_test_id("tool-erase").click()
+    take(page, "erase")
     drag(page, (290, 200), (290, 400))
-    page.get_by_test_id("tool-ball").click()
+    take(page, "ball")
     drag(page, (150, 400))
-    page.get_by_test_id("tool-lamp").click()
+    take(page, "lamp")
     drag(page, (50, 300))
     wait_until(page, lambda: len(desk.sim.lamps) == 1)
     look(page, "drawn")
     assert (brightness(450, 200), brightness(475, 400), brightness(290, 290)) == (190, 190, 0)
     assert len(desk.sim.bodies()) == 1
-    page.get_by_test_id("tool-remove").click()
+    take(page, "remove")
     drag(page, (150, 405))
     wait_until(page, lambda: len(desk.sim.bodies()) == 0)
-    page.get_by_test_id("tool-rectangle").click()
+    take(page, "rectangle")
     drag(page, (100, 100), (140, 140))
     tell(page, "robot 1")
     look(page, "refused")
@@ -137,7 +143,7 @@ def test_worlds_are_made_saved_and_opened(desk: Desk, page: Page) -> None:
     look(page, "new")
     page.get_by_test_id("dialog-ok").click()
     wait_until(page, lambda: desk.sim.arena.width_mm == 700)
-    page.get_by_test_id("tool-robot").click()
+    take(page, "robot")
     drag(page, (400, 300))
     wait_until(page, lambda: desk.sim.robot_count == 2)
     name = page.get_by_test_id("save-name")

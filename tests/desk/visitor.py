@@ -133,6 +133,11 @@ class Visitor:
         for robot in range(1, self.sim.robot_count + 1):
             self.until(lambda robot=robot: self.seen(robot) == pytest.approx(self.sim.pose(robot), abs=0.1))
 
+    def take(self, tool: str) -> None:
+        """Choose a tool, and wait until the arena has it."""
+        self.at(f"tool-{tool}").click()
+        self.page.locator(f"[data-testid=tool-{tool}].bg-accent").wait_for()
+
     def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
         self.pull(start, end)
         self.let_go()
