@@ -89,13 +89,9 @@ class Gateway:
     Args:
         desk: The desk.
         number: Its number in this process.
-
-    Attributes:
-        sent_bytes: What frames and scenes have come to so far [bytes].
     """
 
     def __init__(self, desk: Desk, number: int) -> None:
-        self.sent_bytes = 0
         self._number = number
         self._is_closed = False
         self._desk = desk
@@ -163,7 +159,6 @@ class Gateway:
                 viewer.shapes = self._shapes
                 viewer.tell(self._shapes)
             if viewer.is_ready:
-                self.sent_bytes += len(frame)
                 viewer.show(frame)
 
     def close(self) -> None:

@@ -19,7 +19,7 @@ from kiks.errors import ArenaError, KiksError
 from kiks.model.arena import Arena
 from kiks.model.files import replace_file
 from kiks.model.mat import FILE_BYTES_MAX, read_numbers
-from kiks.model.picture import check_is_file
+from kiks.model.picture import read_start
 from kiks.model.places import Ball, Cylinder, Lamp, Pose
 from kiks.model.raster import cells_per_pixel
 
@@ -45,12 +45,7 @@ def load_kad(path: str | Path) -> Arena:
     """
     path = Path(path)
     what = f"Arena file {str(path)!r}"
-    check_is_file(path, what)
-    try:
-        with path.open("rb") as file:
-            data = file.read(FILE_BYTES_MAX + 1)
-    except OSError as error:
-        raise ArenaError(f"{what} must be readable, but: {error}. Check its rights.") from None
+    data = read_start(path, FILE_BYTES_MAX + 1, what)
     return decode_kad(data, path.stem, what)
 
 

@@ -97,6 +97,25 @@ def _read(source: Path | BytesIO, what: str, mm_per_pixel: float) -> npt.NDArray
                 raise _unreadable(what, error) from None
 
 
+def read_start(path: Path, bytes_max: int, what: str) -> bytes:
+    """Return a file, or its beginning if it is longer than anybody wants to know.
+
+    Args:
+        path: The path.
+        bytes_max: Most bytes that are read.
+        what: What the message calls it.
+
+    Raises:
+        ArenaError: If there is nothing, a folder, or no right to read.
+    """
+    check_is_file(path, what)
+    try:
+        with path.open("rb") as file:
+            return file.read(bytes_max)
+    except OSError as error:
+        raise ArenaError(f"{what} must be readable, but: {error}. Check its rights.") from None
+
+
 def check_is_file(path: Path, what: str) -> None:
     """Check that a path leads to a file.
 

@@ -25,7 +25,7 @@ from kiks.model.arena_file import (
     typed,
 )
 from kiks.model.files import check_relative, replace_file
-from kiks.model.picture import check_is_file
+from kiks.model.picture import read_start
 from kiks.model.policy import split_thinking
 from kiks.model.raster import is_number
 from kiks.model.raster_text import box_keys_of, raster_of_text, raster_text
@@ -171,12 +171,7 @@ class Project:
         if path.suffix.lower() != ".kiks":
             return cls.of_arena(Arena.load(path))
         what = f"Project file {str(path)!r}"
-        check_is_file(path, what)
-        try:
-            with path.open("rb") as file:
-                data = file.read(FILE_BYTES_MAX + 1)
-        except OSError as error:
-            raise ArenaError(f"{what} must be readable, but: {error}. Check its rights.") from None
+        data = read_start(path, FILE_BYTES_MAX + 1, what)
         return cls.from_bytes(data, name=path.stem, what=what)
 
     @classmethod

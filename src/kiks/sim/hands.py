@@ -17,7 +17,7 @@ STEP_MM = 0.5
 STEPS_MAX = 2000
 """Most steps of one move: who pulls farther pulls again."""
 
-SIDES_RAD = tuple(sign * math.radians(degrees) for degrees in (0, 25, 50, 75, 87) for sign in (1, -1))
+SIDES_RAD = (0.0, *(sign * math.radians(degrees) for degrees in (25, 50, 75, 87) for sign in (1, -1)))
 """Directions beside the straight one in which a thing may give way: it never gets farther from where it is wanted."""
 
 KINDS = ("robot", "body", "lamp")
@@ -81,7 +81,7 @@ class Hands:
             ParameterError: If there is no such thing, or another hand has it.
         """
         self.drop(owner)
-        counts = {"robot": self._sim.robot_count, "body": len(self._bodies()), "lamp": len(self._sim.lamps)}
+        counts = self._counts()
         if what not in KINDS or not isinstance(index, int) or not 0 <= index < counts[what]:
             raise ParameterError(
                 f"a hand must take one of {counts} by its kind and index, but it was to take {what!r} {index!r}."
@@ -130,8 +130,7 @@ class Hands:
     def keep(self) -> None:
         """Put everything that is held back where its hand is; what has gone meanwhile is held no longer."""
         for owner, held in list(self._held.items()):
-            here = {"robot": self._sim.robot_count, "body": len(self._bodies()), "lamp": len(self._sim.lamps)}
-            if held.index >= here[held.what]:
+            if held.index >= self._counts()[held.what]:
                 self.drop(owner)
                 continue
             if held.what == "lamp":
@@ -143,6 +142,10 @@ class Hands:
                 self._put(held)
 
     # ---- inside ----
+
+    def _counts(self) -> dict[str, int]:
+        """Return how many there are of each kind of thing."""
+        return {"robot": self._sim.robot_count, "body": len(self._bodies()), "lamp": len(self._sim.lamps)}
 
     def _bodies(self) -> Any:
         return self._sim.state.bodies[0]
