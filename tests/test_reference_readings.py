@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kiks.engine.networks import respond_networks
+from kiks.engine.networks import pack_networks, respond_networks
 from kiks.engine.parameters import pack
 from kiks.engine.responses import respond_all
 from kiks.fit.models import MAXIMUM_COUNTS
@@ -48,7 +48,7 @@ INVERTED_MM = np.repeat(PATTERNS[:, None, :7], 8, axis=1)
 
 def networks():
     counts = np.empty((len(PATTERNS), 8))
-    respond_networks(*NetworkResponse.load().weights, INVERTED_MM / 50.0, counts)
+    respond_networks(pack_networks(NetworkResponse.load()), INVERTED_MM / 50.0, counts)
     return counts
 
 

@@ -21,6 +21,10 @@ class LinkError(KiksError, OSError):
     """A port is unknown, busy or closed, or the robot's answer is not the one expected."""
 
 
+class WorkError(KiksError, RuntimeError):
+    """An evaluation cannot be had: the work raises, or its workers are lost again and again."""
+
+
 def nearest(given: str, known: Iterable[str]) -> str:
     """Return ' Did you mean X?' for the known name nearest to a mistyped one, or nothing.
 

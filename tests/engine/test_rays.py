@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kiks.engine.rays import cast_eight, cast_ray, cast_rays
+from kiks.engine.fans import cast_eight
+from kiks.engine.rays import cast_ray, cast_rays, sight_of
 from kiks.model.arena import PAD, Arena
 
 TOLERANCE_MM = 0.02
@@ -17,7 +18,7 @@ CLIPPED_MM = 0.003  # a ray that cuts less than this off a corner may pass it by
 
 
 def cast(arena, x, y, angle, reach=200.0):
-    sight = (arena.clearance, arena.surface, arena.faces, arena.mm_per_cell, PAD)
+    sight = sight_of(arena)
     return cast_ray(sight, x, y, math.cos(angle), math.sin(angle), reach)
 
 
@@ -40,7 +41,10 @@ def crossings(arena, x, y, angle, *, shrink_mm=0.0):
 
 
 def check(arena, x, y, angle, reach=200.0):
-    length, brightness = cast(arena, x, y, angle, reach)
+    check_ray(arena, x, y, angle, reach, *cast(arena, x, y, angle, reach))
+
+
+def check_ray(arena, x, y, angle, reach, length, brightness):
     surely, _ = crossings(arena, x, y, angle, shrink_mm=CLIPPED_MM)
     perhaps, shades = crossings(arena, x, y, angle, shrink_mm=-1e-6)
     latest = min(surely[0] if len(surely) else reach, reach)
@@ -104,16 +108,44 @@ def test_rays_in_lanes_are_rays_one_by_one(make_random_arena, number, draw, coun
     straight = (cosine == 0.0) == (sine == 0.0)
     cosine[straight], sine[straight] = 0.0, -1.0
     cell = arena.mm_per_cell
-    sight = (arena.clearance, arena.surface, arena.faces, cell, PAD)
+    sight = sight_of(arena)
     columns, rows = x * (1.0 / cell) + PAD, y * (1.0 / cell) + PAD
     lengths, brightnesses = np.empty(count), np.empty(count)
     cast_rays(sight, columns, rows, cosine, sine, lengths, brightnesses)
     alone = [cast_ray(sight, *ray, 1e6) for ray in zip(x, y, cosine, sine, strict=True)]
     assert list(zip(lengths * cell, brightnesses, strict=True)) == alone
-    out, reach = np.empty((2, 8)), float(rng.uniform(0.0, 200.0))
-    cast_eight(sight, columns[:8], rows[:8], np.array([cosine[:8], sine[:8]]), reach / cell, out)
-    near = [cast_ray(sight, *ray, reach) for ray in list(zip(x, y, cosine, sine, strict=True))[:8]]
-    assert [(length * cell if shade else reach, shade) for length, shade in out.T] == near
+
+
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(number=st.integers(0, 300), draw=st.integers(0, 2**32))
+def test_the_rays_of_a_sensor_end_where_the_first_wall_begins(make_random_arena, number, draw):
+    """From floor, from walls and from corners of cells, along the axes and diagonals, too."""
+    arena = make_random_arena(number)
+    rng = np.random.default_rng(draw)
+    cell = arena.mm_per_cell
+    sight = sight_of(arena)
+    for where in range(6):
+        x, y = rng.uniform(1, arena.width_mm - 1), rng.uniform(1, arena.height_mm - 1)
+        angle = rng.uniform(-math.pi, math.pi, 8)
+        if where % 2 == 1:
+            x, y = (rng.integers(2, count - 2) * cell for count in arena.brightness.shape[::-1])
+            angle = np.arange(8) * math.pi / 4 + (where == 3) * rng.uniform(-1e-3, 1e-3, 8)
+        reach, out = float(rng.uniform(0.0, 200.0)), np.empty((2, 8))
+        directions = np.array([np.cos(angle), np.sin(angle)])
+        cast_eight(sight, x * (1.0 / cell) + PAD, y * (1.0 / cell) + PAD, directions, reach / cell, out)
+        for ray in range(8):
+            length = out[0, ray] * cell if out[1, ray] > 0.0 else reach
+            check_ray(arena, x, y, angle[ray], reach, length, out[1, ray])
+
+
+def test_a_sensor_in_a_wall_sees_it():
+    arena = Arena.box(300, 300, brightness=77)
+    sight = sight_of(arena)
+    directions = np.array([np.cos(np.arange(8)), np.sin(np.arange(8))])
+    for x, y, brightness in ((5.0, 150.0, 77.0), (-50.0, 150.0, 255.0), (150.0, 900.0, 255.0)):
+        out = np.empty((2, 8))
+        cast_eight(sight, x + PAD, y + PAD, directions, 60.0, out)
+        assert out.tolist() == [[0.0] * 8, [brightness] * 8]
 
 
 @pytest.mark.parametrize("mm_per_pixel", [0.5, 1.0, 2.5])

@@ -107,7 +107,7 @@ def test_sensors_are_trained_on_samples_and_saved(tmp_path):
     seen = np.zeros((len(inputs), 8, 7))
     seen[:, 5] = inputs
     out = np.empty((len(inputs), 8))
-    kernels.respond_networks(*response.weights, seen, out)
+    kernels.respond_networks(kernels.pack_networks(response), seen, out)
     np.testing.assert_allclose(out[:, 5], np.clip(trained[5](inputs), 0, 1023), atol=0.3)
     assert not out[:, :5].any()  # nothing near, nothing read
 
@@ -130,7 +130,7 @@ def test_the_table_is_the_mean_of_the_networks():
     levels = rng.integers(0, 6, (50, 7))
     seen = np.repeat((levels / 5.0)[:, None], 8, axis=1)
     out, looked_up = np.empty((50, 8)), np.empty((50, 8))
-    kernels.respond_networks(*response.weights, seen, out)
+    kernels.respond_networks(kernels.pack_networks(response), seen, out)
     # Anything that rounds to the same level is the same entry.
     nearby = np.clip(seen + rng.uniform(-0.09, 0.09, seen.shape), 0.0, 1.0)
     kernels.respond_table(table, nearby, looked_up)
@@ -141,7 +141,7 @@ def test_kernels_against_numpy():
     response = NetworkResponse.load()
     seen = np.random.default_rng(1).random((200, 8, 7))
     out = np.empty((200, 8))
-    kernels.respond_networks(*response.weights, seen, out)
+    kernels.respond_networks(kernels.pack_networks(response), seen, out)
     for sensor in range(8):
         weights = (response.hidden[sensor], response.middle[sensor], response.last[sensor][None])
         network = networks.Network(weights, (True, False, False))

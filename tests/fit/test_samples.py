@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from kiks.engine.rays import cast_ray
+from kiks.engine.rays import cast_ray, sight_of
 from kiks.errors import ParameterError
 from kiks.fit.networks import PLACES
 from kiks.fit.samples import (
@@ -21,7 +21,7 @@ from kiks.fit.samples import (
     meet,
     nearnesses,
 )
-from kiks.model.arena import PAD, Arena
+from kiks.model.arena import Arena
 
 ROW = "0 1 2 3 4 5 6 1023"
 GOOD = f"8 2 3 5 2\nTURN 0\n{ROW}\n{ROW}\nTURN 1\n{ROW}\n{ROW}\nTURN 2\n{ROW}\n9 9 9 9 9 9 9 9\n"
@@ -163,7 +163,7 @@ def test_rays_are_those_of_the_engine(radius_mm, places):
     else:
         inside = np.hypot(x - edge - radius_mm, x[:, None] - middle) <= radius_mm
     arena = Arena(inside.astype(np.uint8) * 255, cell, "object")
-    sight = (arena.clearance, arena.surface, arena.faces, cell, PAD)
+    sight = sight_of(arena)
     checked = 0
     for i, gap in enumerate(gaps):
         for j, angle in enumerate(angles):

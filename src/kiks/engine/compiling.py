@@ -2,8 +2,9 @@
 
 Need: `fastmath` would let the compiler reorder sums, and then the bits depend on the width of the processor's vectors.
 Need: Numba's cache notices changes in the file of the cached function alone, but an entry point is made of functions
-from all files of the engine.
-Method: the cache folder carries a digest of the whole engine's source, so that any change starts a fresh one.
+from many files.
+Method: the cache folder carries a digest of the source of all folders that hold kernels, so that any change starts a
+fresh one.
 """
 
 from __future__ import annotations
@@ -15,6 +16,9 @@ from pathlib import Path
 from typing import Any
 
 from numba import config, njit
+
+KERNEL_FOLDERS = ("engine", "control", "batch")
+"""Folders beside one another whose files hold kernels."""
 
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "nogil": True}
 
@@ -46,12 +50,17 @@ def entry(function: Callable[..., Any]) -> Any:
 def cache_folder() -> Path:
     """Return the folder that holds the compiled engine: under `NUMBA_CACHE_DIR`, else the user's cache folder."""
     digest = hashlib.sha256()
-    for source in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(source.read_bytes())
+    for folder in KERNEL_FOLDERS:
+        for source in sorted((Path(__file__).parent.parent / folder).glob("*.py")):
+            digest.update(source.read_bytes())
     root = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(root) / "kiks" / digest.hexdigest()[:16]
 
 
-def is_compiled() -> bool:
-    """Say whether the machine code of this engine lies in the cache, so that the first call is quick."""
-    return any(cache_folder().rglob("*.nbc"))
+def is_compiled(name: str = "advance") -> bool:
+    """Say whether the machine code of a function that Python calls lies in the cache, so that its first call is quick.
+
+    Args:
+        name: Name of the function; that of the tick, without which nothing moves, if left out.
+    """
+    return any(cache_folder().rglob(f"*.{name}-*.nbc"))

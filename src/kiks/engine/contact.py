@@ -19,9 +19,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
 from kiks.engine.compiling import entry, kernel
+from kiks.engine.vectors import corners, floor
 
 PIECE_MM = 1.0
 """Longest piece of a motion near a wall [mm]: short against the radius, so that no wall is jumped over."""
@@ -30,7 +29,10 @@ SETTLED_MM = 1e-5
 """Penetration that counts as none [mm]."""
 
 PUSHES = 100
-"""Most steps out of the walls. One wall takes one or two, a corner of 90 degrees ten, a sharp one many."""
+"""Most steps out of the walls. One wall takes one or two, a corner of 90 degrees three, a sharp one more."""
+
+LEAST_GAIN = 0.2
+"""Clearance that a step out is taken to gain per way at least; along the middle of a corner of 23 degrees it does."""
 
 ROUND_A_CORNER = 1.001
 """How much farther than wanted a disc may get: beyond a convex corner the nearest free place is 0.02 % farther."""
@@ -41,24 +43,52 @@ def clearance_mm(field: Any, cell: Any, pad: Any, x: Any, y: Any) -> Any:
     """Return the distance from a point to the nearest wall's surface [mm], interpolated between cell centres."""
     column = min(max(x / cell + (pad - 0.5), 0.0), field.shape[1] - 1.001)
     row = min(max(y / cell + (pad - 0.5), 0.0), field.shape[0] - 1.001)
-    i = np.int64(column)
-    j = np.int64(row)
+    i = floor(column)
+    j = floor(row)
     fx = column - i
     fy = row - j
-    low = field[j, i] * (1.0 - fx) + field[j, i + 1] * fx
-    high = field[j + 1, i] * (1.0 - fx) + field[j + 1, i + 1] * fx
+    left, right, left_above, right_above = corners(field, i, j)
+    low = left * (1.0 - fx) + right * fx
+    high = left_above * (1.0 - fx) + right_above * fx
     return low * (1.0 - fy) + high * fy - 0.5 * cell
 
 
 @kernel
 def outward(field: Any, cell: Any, pad: Any, x: Any, y: Any) -> Any:
     """Return the unit vector away from the nearest wall, (0, 0) where there is none."""
-    gx = clearance_mm(field, cell, pad, x + 0.5 * cell, y) - clearance_mm(field, cell, pad, x - 0.5 * cell, y)
-    gy = clearance_mm(field, cell, pad, x, y + 0.5 * cell) - clearance_mm(field, cell, pad, x, y - 0.5 * cell)
+    nx, ny, _ = slope(field, cell, pad, x, y)
+    return nx, ny
+
+
+@kernel
+def slope(field: Any, cell: Any, pad: Any, x: Any, y: Any) -> Any:
+    """Return the unit vector away from the nearest wall, and by how much the clearance grows per way along it.
+
+    That is 1 at a wall, less between two walls, and 0 where there is none, with the vector (0, 0). It is taken across a
+    cell, from half a cell on one side to half a cell on the other; those places lie among three times three cells.
+    """
+    column = min(max(x / cell + (pad - 1.0), 0.0), field.shape[1] - 2.001)
+    row = min(max(y / cell + (pad - 1.0), 0.0), field.shape[0] - 2.001)
+    i = floor(column)
+    j = floor(row)
+    fx = column - i
+    fy = row - j
+    a, b, d, e = corners(field, i, j)
+    _, c, _, f = corners(field, i + 1.0, j)
+    _, _, g, h = corners(field, i, j + 1.0)
+    _, _, _, k = corners(field, i + 1.0, j + 1.0)
+    left, right = max(0.5 - fx, 0.0), max(fx - 0.5, 0.0)
+    low, high = max(0.5 - fy, 0.0), max(fy - 0.5, 0.0)
+    to_left = (b - a) * low + (e - d) * (1.0 - low - high) + (h - g) * high
+    to_right = (c - b) * low + (f - e) * (1.0 - low - high) + (k - h) * high
+    downwards = (d - a) * left + (e - b) * (1.0 - left - right) + (f - c) * right
+    upwards = (g - d) * left + (h - e) * (1.0 - left - right) + (k - f) * right
+    gx = to_left * (1.0 - fx) + to_right * fx
+    gy = downwards * (1.0 - fy) + upwards * fy
     length = math.sqrt(gx * gx + gy * gy)
     if length < 1e-9:
-        return 0.0, 0.0
-    return gx / length, gy / length
+        return 0.0, 0.0, 0.0
+    return gx / length, gy / length, length / cell
 
 
 @kernel
@@ -66,23 +96,27 @@ def push_out(field: Any, cell: Any, pad: Any, radius: Any, from_x: Any, from_y: 
     """Return the free place nearest to (x, y), which a disc has entered from the free place (from_x, from_y).
 
     Each step goes by the depth along the gradient. Towards any free place beyond straight walls that is never a step
-    away, so the disc ends no farther from where it came than it wanted to go, and energy does not grow. Where walls
-    are no longer straight, in a pinch, that is no law but a condition: else it goes back along the way.
+    away, so the disc ends no farther from where it came than it wanted to go, and energy does not grow. Between two
+    walls, where such a step gains less than the depth, it is longer by as much. Where walls are no longer straight, in
+    a pinch, that is no law but a condition: else it goes back along the way.
     """
-    reach = distance(from_x, from_y, x, y)
+    allowed = distance(from_x, from_y, x, y) * ROUND_A_CORNER
+    depth = radius - clearance_mm(field, cell, pad, x, y)
     for _ in range(PUSHES):
-        depth = radius - clearance_mm(field, cell, pad, x, y)
         if depth <= SETTLED_MM:
             break
-        nx, ny = outward(field, cell, pad, x, y)
-        x += depth * nx
-        y += depth * ny
+        nx, ny, gain = slope(field, cell, pad, x, y)
+        push = depth / max(gain, LEAST_GAIN)
+        x += push * nx
+        y += push * ny
+        depth = radius - clearance_mm(field, cell, pad, x, y)
     way = distance(from_x, from_y, x, y)
-    sunk = max(radius - clearance_mm(field, cell, pad, from_x, from_y), 0.0)
-    allowed = reach * ROUND_A_CORNER + sunk
     if depth <= SETTLED_MM and way <= allowed:
         return x, y
-    low, high = 0.0, min(allowed / way, 1.0) if way > 0.0 else 0.0
+    allowed += max(radius - clearance_mm(field, cell, pad, from_x, from_y), 0.0)
+    if depth <= SETTLED_MM and way <= allowed:
+        return x, y
+    low, high = 0.0, allowed / way if way > allowed else 1.0
     for _ in range(24):
         middle = 0.5 * (low + high)
         px, py = from_x + middle * (x - from_x), from_y + middle * (y - from_y)
@@ -100,14 +134,17 @@ def distance(x0: Any, y0: Any, x1: Any, y1: Any) -> Any:
 
 
 @kernel
-def resolve(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, u: Any, v: Any, q: Any) -> Any:
-    """Move a robot by at most (u, v), turn it by about q; return the displacement, the turn, and whether it touched."""
+def is_free(field: Any, cell: Any, pad: Any, parameters: Any, x: Any, y: Any) -> Any:
+    """Say whether a robot touches no wall at (x, y)."""
+    return clearance_mm(field, cell, pad, x, y) >= parameters.radius_mm - SETTLED_MM
+
+
+@kernel
+def slide(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, u: Any, v: Any, q: Any) -> Any:
+    """Move a robot that touches where (u, v) leads it as far as walls let it; return the displacement and the turn."""
     radius = parameters.radius_mm
     x, y = robot.x_mm, robot.y_mm
     wanted_x, wanted_y = x + u, y + v
-    if clearance_mm(field, cell, pad, wanted_x, wanted_y) >= radius - SETTLED_MM:
-        robot.x_mm, robot.y_mm = wanted_x, wanted_y
-        return u, v, q, False
     free_x, free_y = push_out(field, cell, pad, radius, x, y, wanted_x, wanted_y)
     push_x, push_y = free_x - wanted_x, free_y - wanted_y
     normal = math.sqrt(push_x * push_x + push_y * push_y)
@@ -116,16 +153,16 @@ def resolve(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, u: Any
         tx, ty = -push_y / normal, push_x / normal
         gyration = 0.5 * parameters.wheel_base_mm
         leverage = radius * radius / (gyration * gyration)
-        slide = du * tx + dv * ty - radius * q
+        sliding = du * tx + dv * ty - radius * q
         limit = parameters.wall_friction * normal
-        friction = min(max(-slide / (1.0 + leverage), -limit), limit)
+        friction = min(max(-sliding / (1.0 + leverage), -limit), limit)
         du += friction * tx
         dv += friction * ty
         q -= radius * friction / (gyration * gyration)
         free_x, free_y = push_out(field, cell, pad, radius, x, y, x + du, y + dv)
         du, dv = free_x - x, free_y - y
     robot.x_mm, robot.y_mm = free_x, free_y
-    return du, dv, q, True
+    return du, dv, q
 
 
 @entry

@@ -108,7 +108,7 @@ def see(tracks: Any, count: Any, moment: Any, scale: Any, view: Any, seen: Any) 
             ray, (0, 0) for all around; how far [mm].
         seen: float64 [`PER_DISC` * `count` at least].
     """
-    ticks_ago, back = moment
+    ticks_ago, back = np.int64(moment[0]), moment[1]
     cell, pad = scale
     x, y, left, right, reach_mm = view
     per_cell = 1.0 / cell

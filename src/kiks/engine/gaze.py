@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from kiks.engine.ambient import read_ambient
 from kiks.engine.compiling import entry, inlined, kernel
 from kiks.engine.discs import PER_TRACK, SEEN_SIZE, TRACKS_SIZE, disc_of, meet_discs, see
@@ -38,7 +40,7 @@ def find_met(
     met: Any,
 ) -> Any:
     """Write what each of a sensor's rays met into `met`, shape [7], from where it ended and how bright that was."""
-    x, y, rays_x, rays_y = view
+    x, y, rays_x, rays_y, _ = view
     cell, pad = scale(sight)
     per_cell = 1.0 / cell
     for ray in range(RAY_COUNT):
@@ -83,11 +85,8 @@ def gaze_sensor(
     """Write what a sensor's rays meet: `rays` [3, 7] has lengths, cosines and brightnesses, `met` [7] what it is."""
     view = view_of(parameters, pose[0], pose[1], pose[2], sensor)
     seen = stack_floats(SEEN_SIZE)
-    is_near, begin, seen_count = survey(sight, parameters, tracks, track_count, moment, view, seen)
-    if not is_near:
-        rays[0], rays[1], rays[2], met[:] = parameters.reach_mm, 1.0, 0.0, NOTHING
-        return
-    lengths_mm, cosines, brightnesses = trace(sight, REFLECTION, view, parameters.reach_mm, begin, seen, seen_count)
+    _, seen_count = survey(sight, parameters, tracks, track_count, moment, view, seen)
+    lengths_mm, cosines, brightnesses = trace(sight, REFLECTION, view, parameters.reach_mm, seen, seen_count)
     keep(lengths_mm, rays[0])
     keep(cosines, rays[1])
     keep(brightnesses, rays[2])
@@ -163,7 +162,8 @@ def places_at(scene: Any, tick_count: Any, time_ns: Any, poses: Any, places: Any
     robots, bodies, _, _ = scene
     for robot in range(poses.shape[0]):
         poses[robot, 0], poses[robot, 1], poses[robot, 2] = pose_at(robots[0, robot], tick_count, time_ns)
-    ticks_ago, back = moment_of(tick_count, time_ns)
+    ticks, back = moment_of(tick_count, time_ns)
+    ticks_ago = np.int64(ticks)
     for k in range(places.shape[0]):
         body = bodies[0, k]
         for axis in range(2):

@@ -25,6 +25,7 @@ from typing import Any
 from kiks.engine.compiling import entry, kernel
 from kiks.engine.contact import clearance_mm
 from kiks.engine.hold import held_place
+from kiks.engine.masks import choose
 from kiks.engine.numbers import sin_cos
 from kiks.engine.scene import count_discs, disc_at, is_on_floor
 
@@ -78,7 +79,7 @@ def move_arm(robot: Any) -> Any:
 def move_gripper(robot: Any, least_jaws: Any) -> Any:
     """Phase: let the arm and the jaws go a tick's way; the jaws stop at a width."""
     move_arm(robot)
-    target = least_jaws if robot.is_closing != 0 else JAWS_MAX
+    target = choose(robot.is_closing != 0, least_jaws, JAWS_MAX)
     robot.jaws += min(max(target - robot.jaws, -JAWS_STEP), JAWS_STEP)
 
 

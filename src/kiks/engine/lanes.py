@@ -36,13 +36,14 @@ def _on_the_stack(count: Any, element_type: Any) -> Any:
             memory = builder.alloca(ir.ArrayType(content, count.literal_value))
             memory.align = _CACHE_LINE
         size = context.get_value_type(types.intp)
+        bytes_each = size(element_type.bitwidth // 8)
         array = _arrays.make_array(array_type)(context, builder)
         _arrays.populate_array(
             array,
             data=builder.bitcast(memory, content.as_pointer()),
             shape=_pack(builder, [size(count.literal_value)]),
-            strides=_pack(builder, [size(8)]),
-            itemsize=size(8),
+            strides=_pack(builder, [bytes_each]),
+            itemsize=bytes_each,
             meminfo=None,
             parent=None,
         )
@@ -55,6 +56,12 @@ def _on_the_stack(count: Any, element_type: Any) -> Any:
 def stack_floats(typing: Any, count: Any) -> Any:
     """Return an uninitialised float64 array on the stack, of a length that is a constant; it dies with its function."""
     return _on_the_stack(count, types.float64)
+
+
+@_intrinsic
+def stack_narrow(typing: Any, count: Any) -> Any:
+    """Return an uninitialised float32 array on the stack, of a length that is a constant; it dies with its function."""
+    return _on_the_stack(count, types.float32)
 
 
 @_intrinsic

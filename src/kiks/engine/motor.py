@@ -13,8 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from kiks.engine.compiling import entry, kernel
+from kiks.engine.compiling import entry, inlined, kernel
+from kiks.engine.eights import one_of
+from kiks.engine.masks import choose, everywhere, lane_count
 from kiks.engine.state import MODE_POSITION, MODE_PWM, MODE_SPEED
+from kiks.engine.vectors import floor
 
 PWM_MAX = 255
 """Full power (khepera-protocol.md 4.16)."""
@@ -34,8 +37,8 @@ def clamp(value: Any, limit: Any) -> Any:
 
 @kernel
 def wrap_int32(value: Any) -> Any:
-    """Return the low 32 bits as a signed number: a counter that overflows."""
-    return ((np.int64(value) + 2147483648) & 4294967295) - 2147483648
+    """Return the low 32 bits of a whole number as a signed one: a counter that overflows."""
+    return value - 4294967296.0 * floor((value + 2147483648.0) * (1.0 / 4294967296.0))
 
 
 @kernel
@@ -50,10 +53,10 @@ def counter(robot: Any, wheel: Any) -> Any:
 @kernel
 def change_mode(robot: Any, wheel: Any, mode: Any) -> Any:
     """Hand a motor to another controller, which begins with an empty memory (khepera-protocol.md 6.3)."""
-    if robot.motor_mode[wheel] != mode:
-        robot.motor_mode[wheel] = mode
-        robot.error_sum[wheel] = 0
-        robot.last_error[wheel] = 0
+    is_other = robot.motor_mode[wheel] != mode
+    robot.motor_mode[wheel] = mode
+    robot.error_sum[wheel] = choose(is_other, 0, robot.error_sum[wheel])
+    robot.last_error[wheel] = choose(is_other, 0, robot.last_error[wheel])
     robot.on_target[wheel] = 0
 
 
@@ -105,7 +108,7 @@ def command_counters(robot: Any, left_pulses: Any, right_pulses: Any) -> Any:
 @kernel
 def position_error(robot: Any, wheel: Any) -> Any:
     """Return by how many pulses a wheel lags behind its trajectory, counted over the overflow of 32 bits."""
-    return wrap_int32(np.floor(robot.trajectory_pulses[wheel] + 0.5) - counter(robot, wheel))
+    return wrap_int32(floor(robot.trajectory_pulses[wheel] + 0.5) - counter(robot, wheel))
 
 
 @entry
@@ -139,19 +142,19 @@ def controller_error(robots: Any, world: Any, robot: Any, wheel: Any) -> Any:
     if state.motor_mode[wheel] == MODE_SPEED:
         return np.int64(state.speed_setpoint[wheel]) - state.measured_speed[wheel]
     if state.motor_mode[wheel] == MODE_POSITION:
-        return position_error(state, wheel)
+        return np.int64(position_error(state, wheel))
     return np.int64(0)
 
 
 # ---- phases of a tick ----
 
 
-@kernel
+@inlined
 def latch_encoders(robot: Any) -> Any:
     """Phase: count the whole pulses that the wheels have made, and how many of them since the last tick."""
     for wheel in range(2):
-        pulses = np.int64(np.floor(robot.wheel_pulses[wheel]))
-        slipped = np.int64(np.floor(robot.wheel_pulses[wheel] + robot.slip_pulses[wheel])) - pulses
+        pulses = floor(robot.wheel_pulses[wheel])
+        slipped = floor(robot.wheel_pulses[wheel] + robot.slip_pulses[wheel]) - pulses
         robot.measured_speed[wheel] = pulses - robot.pulse_count[wheel]
         robot.controlled_speed[wheel] = robot.measured_speed[wheel] + slipped - robot.slip_count[wheel]
         robot.pulse_count[wheel] = pulses
@@ -190,45 +193,63 @@ def advance_trajectory(robot: Any, wheel: Any) -> Any:
     robot.trajectory_pulses[wheel] += speed * side
 
 
-@kernel
+@inlined
 def pid(robot: Any, wheel: Any, gains: Any, error: Any, scale: Any) -> Any:
-    """Return the power that the firmware's controller asks for (khepera-protocol.md 6.3), in whole numbers as there."""
+    """Return the power that the firmware's controller asks for (khepera-protocol.md 6.3), in whole numbers as there.
+
+    Each is below 2^53, but for a demand that is far beyond full power anyway.
+    """
     error_sum = robot.error_sum[wheel] + error
     demand = gains[0] * error + gains[1] * error_sum + gains[2] * (error - robot.last_error[wheel])
-    power = abs(demand) // scale
-    power = power if demand >= 0 else -power
+    power = floor(abs(demand) / scale)
     # The integrator rests while the power is clipped, unless it works its way back.
-    if abs(power) <= PWM_MAX or (error < 0) == (demand > 0):
-        robot.error_sum[wheel] = error_sum
+    is_working = (power <= PWM_MAX) | ((error < 0) != (demand <= 0))
+    robot.error_sum[wheel] = choose(is_working, error_sum, robot.error_sum[wheel])
     robot.last_error[wheel] = error
-    return clamp(power, PWM_MAX)
+    return clamp(choose(demand >= 0, power, -power), PWM_MAX)
 
 
-@kernel
+@inlined
 def control_motors(robot: Any, parameters: Any) -> Any:
     """Phase: each motor's controller compares its set-point with the encoders and sets the power."""
     for wheel in range(2):
-        mode = robot.motor_mode[wheel]
-        if mode == MODE_SPEED:
-            error = np.int64(robot.speed_setpoint[wheel]) - robot.controlled_speed[wheel]
-            power = pid(robot, wheel, robot.speed_gains, error, parameters.gain_scale)
-        elif mode == MODE_POSITION:
-            if robot.on_target[wheel] == 0:
-                advance_trajectory(robot, wheel)
-            error = position_error(robot, wheel) - robot.slip_count[wheel]
-            power = pid(robot, wheel, robot.position_gains, error, parameters.gain_scale)
+        is_simple = robot.motor_mode[wheel] == MODE_SPEED
+        if everywhere(is_simple):
+            robot.pwm[wheel] = control_speed(robot, parameters, wheel)
         else:
-            power = np.int64(robot.pwm_setpoint[wheel])
-        robot.pwm[wheel] = power
+            for lane in range(lane_count(is_simple)):
+                control_motor(one_of(robot, lane), one_of(parameters, lane), wheel)
+
+
+@inlined
+def control_speed(robot: Any, parameters: Any, wheel: Any) -> Any:
+    """Return the power of a motor that is to turn at a speed."""
+    error = robot.speed_setpoint[wheel] - robot.controlled_speed[wheel]
+    return pid(robot, wheel, robot.speed_gains, error, parameters.gain_scale)
 
 
 @kernel
+def control_motor(robot: Any, parameters: Any, wheel: Any) -> Any:
+    """Set the power of one motor, whatever controls it."""
+    mode = robot.motor_mode[wheel]
+    if mode == MODE_SPEED:
+        robot.pwm[wheel] = control_speed(robot, parameters, wheel)
+    elif mode == MODE_POSITION:
+        if robot.on_target[wheel] == 0:
+            advance_trajectory(robot, wheel)
+        error = position_error(robot, wheel) - robot.slip_count[wheel]
+        robot.pwm[wheel] = pid(robot, wheel, robot.position_gains, error, parameters.gain_scale)
+    else:
+        robot.pwm[wheel] = robot.pwm_setpoint[wheel]
+
+
+@inlined
 def turn_motors(robot: Any, parameters: Any, wheel: Any) -> Any:
     """Phase: the motor follows its power with a lag; return the path its wheel would make in this tick [pulses]."""
-    power = np.float64(robot.pwm[wheel])
+    power = robot.pwm[wheel]
     driving = max(abs(power) - parameters.dead_band_pwm, 0.0) / (PWM_MAX - parameters.dead_band_pwm)
     final = driving * parameters.free_speed_pulses * parameters.motor_gain[wheel]
-    final = final if power >= 0.0 else -final
+    final = choose(power >= 0.0, final, -final)
     difference = robot.motor_speed[wheel] - final
     robot.motor_speed[wheel] = final + difference * parameters.lag_decay
     return final + difference * parameters.lag_ticks

@@ -2,7 +2,11 @@
 
 Source: thesis section 3.3, "7 input neurons, 13+7 neurons in 2 hidden layers, 1 linear output neuron" and "The 'Fast
 sensors' setting". A nearness is 1 for a ray of no length and 0 for one that meets nothing in range. Of each row of
-weights the last is the bias; their shapes stand in `kiks.model.network`. Sums run in a fixed order.
+weights in a file the last is the bias; their shapes stand in `kiks.model.network`.
+
+Method: a sensor's neurons are calculated eight at a time in float32 (`kiks.engine.narrow`). As the second layer and the
+output are linear, they are one: its weights are worked out once, when the networks are packed. Sums run in a fixed
+order.
 """
 
 from __future__ import annotations
@@ -13,25 +17,31 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.engine.compiling import entry, kernel
-from kiks.engine.numbers import tanh
-from kiks.model.network import INPUT_COUNT, LINEAR_COUNT, TANH_COUNT, NetworkResponse
+from kiks.engine.compiling import entry, inlined, kernel
+from kiks.engine.lanes import stack_narrow
+from kiks.engine.narrow import if_less, load_narrow, narrow, store_narrow, total, whole
+from kiks.engine.vectors import LANES
+from kiks.model.network import INPUT_COUNT, TANH_COUNT, NetworkResponse
 from kiks.model.robot import SENSOR_COUNT
 
 TABLE_LEVELS = 6
 """Values of each ray that the table knows: 0, 10, ..., 50 mm (thesis 3.3)."""
 
-TABLE_SIZE = TABLE_LEVELS**7
+TABLE_SIZE = TABLE_LEVELS**INPUT_COUNT
 """Entries of the table."""
 
 NETWORK_RESPONSES = ("thesis", "fast")
 """Responses of robots' files that need a record of `NETWORKS`."""
 
+NEURON_COUNT = 2 * LANES
+"""Neurons of the first layer that are calculated: the thesis's, and some without weights to fill the lanes."""
+
 NETWORKS = np.dtype(
     [
-        ("hidden", "f8", (SENSOR_COUNT, TANH_COUNT, INPUT_COUNT + 1)),
-        ("middle", "f8", (SENSOR_COUNT, LINEAR_COUNT, TANH_COUNT + 1)),
-        ("last", "f8", (SENSOR_COUNT, LINEAR_COUNT + 1)),
+        # Of each sensor: a row for each ray, then the biases; what each neuron counts, and the bias of that.
+        ("hidden", "f4", (SENSOR_COUNT, INPUT_COUNT + 1, NEURON_COUNT)),
+        ("output", "f4", (SENSOR_COUNT, NEURON_COUNT)),
+        ("bias", "f4", (SENSOR_COUNT,)),
         ("table", "f4", (TABLE_SIZE,)),  # zeros unless it is wanted
     ],
     align=True,
@@ -40,82 +50,114 @@ NETWORKS = np.dtype(
 
 MAXIMUM = 1023.0
 
+_PLACE_VALUES = np.array([TABLE_LEVELS**k for k in range(INPUT_COUNT - 1, -1, -1)] + [0], np.float32)
+
+
+@inlined
+def tanh(x: Any) -> Any:
+    """Return hyperbolic tangents within 7e-6: the continued fraction to the ninth level, up to 1."""
+    x = if_less(x, 6.297, x, 6.297)
+    x = if_less(-6.297, x, x, -6.297)
+    q = x * x
+    above = (((q + 990.0) * q + 135135.0) * q + 4729725.0) * q + 34459425.0
+    below = (((q * 45.0 + 13860.0) * q + 945945.0) * q + 16216200.0) * q + 34459425.0
+    value = x * above / below
+    value = if_less(value, 1.0, value, 1.0)
+    return if_less(-1.0, value, value, -1.0)
+
 
 @kernel
-def network_count(hidden: Any, middle: Any, last: Any, sensor: Any, seen: Any) -> Any:
-    """Return the count for the seven nearnesses of a sensor: 0 if nothing is near, else what its network says."""
-    rays = seen.shape[0]
-    nearest = 0.0
-    for ray in range(rays):
+def network_count(networks: Any, sensor: Any, seen: Any) -> Any:
+    """Return the count for nearnesses, float32 [8]: 0 if nothing is near, else what the network of the sensor says."""
+    nearest = np.float32(0.0)
+    for ray in range(INPUT_COUNT):
         nearest = max(nearest, seen[ray])
     if nearest <= 0.0:
         return 0.0
-    first = np.empty(hidden.shape[1], np.float64)
-    for neuron in range(first.shape[0]):
-        total = hidden[sensor, neuron, rays]
-        for ray in range(rays):
-            total += hidden[sensor, neuron, ray] * seen[ray]
-        first[neuron] = tanh(total)
-    linear_count = middle.shape[1]
-    count = last[sensor, linear_count]
-    for neuron in range(linear_count):
-        total = middle[sensor, neuron, first.shape[0]]
-        for k in range(first.shape[0]):
-            total += middle[sensor, neuron, k] * first[k]
-        count += last[sensor, neuron] * total
-    return min(max(count, 0.0), MAXIMUM)
+    weights = networks.hidden[sensor]
+    first, second = load_narrow(weights[INPUT_COUNT], 0), load_narrow(weights[INPUT_COUNT], LANES)
+    for ray in range(INPUT_COUNT):
+        first = first + load_narrow(weights[ray], 0) * seen[ray]
+        second = second + load_narrow(weights[ray], LANES) * seen[ray]
+    output = networks.output[sensor]
+    sums = tanh(first) * load_narrow(output, 0) + tanh(second) * load_narrow(output, LANES)
+    return min(max(np.float64(networks.bias[sensor] + total(sums)), 0.0), MAXIMUM)
 
 
 @kernel
 def table_count(table: Any, seen: Any) -> Any:
-    """Return the table's count for seven nearnesses, each rounded to the nearest fifth; the first ray counts most."""
-    index = 0
-    for ray in range(seen.shape[0]):
-        nearest: Any = np.int64(seen[ray] * (TABLE_LEVELS - 1) + 0.5)
-        index = index * TABLE_LEVELS + min(max(nearest, 0), TABLE_LEVELS - 1)
-    return np.float64(table[index])
+    """Return the table's count for nearnesses, float32 [8], each rounded to a fifth; the first ray counts most."""
+    levels = whole(load_narrow(seen, 0) * (TABLE_LEVELS - 1.0) + 0.5)
+    levels = if_less(levels, TABLE_LEVELS - 1.0, levels, TABLE_LEVELS - 1.0)
+    index = total(if_less(0.0, levels, levels, 0.0) * load_narrow(_PLACE_VALUES, 0))
+    return np.float64(table[np.int64(index)])
 
 
 @entry
-def fill_table(hidden: Any, middle: Any, last: Any, table: Any) -> Any:
-    """Write the mean of all sensors' networks for each pattern into `table`, float32 of the shape [6^7]."""
-    rays = hidden.shape[2] - 1
-    seen = np.empty(rays, np.float64)
+def fill_table(networks: Any, table: Any) -> Any:
+    """Write the mean of all sensors' networks for each pattern into `table`, float32 of the shape [6^7].
+
+    Args:
+        networks: Records of `NETWORKS`, shape [1].
+        table: Where the means go.
+    """
+    seen = stack_narrow(LANES)
     for index in range(table.shape[0]):
         digits = index
-        for ray in range(rays - 1, -1, -1):
+        for ray in range(INPUT_COUNT - 1, -1, -1):
             seen[ray] = (digits % TABLE_LEVELS) / (TABLE_LEVELS - 1)
             digits //= TABLE_LEVELS
-        total = 0.0
-        for sensor in range(hidden.shape[0]):
-            total += network_count(hidden, middle, last, sensor, seen)
-        table[index] = total / hidden.shape[0]
+        mean = 0.0
+        for sensor in range(SENSOR_COUNT):
+            mean += network_count(networks[0], sensor, seen)
+        table[index] = mean / SENSOR_COUNT
 
 
 @entry
-def respond_networks(hidden: Any, middle: Any, last: Any, seen: Any, out: Any) -> Any:
-    """Write the counts for many nearnesses, shape [samples, 8, 7], into `out`, shape [samples, 8]."""
+def respond_networks(networks: Any, seen: Any, out: Any) -> Any:
+    """Write the counts of `NETWORKS`, shape [1], for nearnesses [samples, 8, 7] into `out`, shape [samples, 8]."""
+    rays = stack_narrow(LANES)
     for sample in range(seen.shape[0]):
         for sensor in range(seen.shape[1]):
-            out[sample, sensor] = network_count(hidden, middle, last, sensor, seen[sample, sensor])
+            copy_rays(seen[sample, sensor], rays)
+            out[sample, sensor] = network_count(networks[0], sensor, rays)
 
 
 @entry
 def respond_table(table: Any, seen: Any, out: Any) -> Any:
     """Write the table's counts for many nearnesses, shape [samples, 8, 7], into `out`, shape [samples, 8]."""
+    rays = stack_narrow(LANES)
     for sample in range(seen.shape[0]):
         for sensor in range(seen.shape[1]):
-            out[sample, sensor] = table_count(table, seen[sample, sensor])
+            copy_rays(seen[sample, sensor], rays)
+            out[sample, sensor] = table_count(table, rays)
+
+
+@kernel
+def copy_rays(seen: Any, rays: Any) -> Any:
+    """Copy seven nearnesses into eight lanes."""
+    store_narrow(rays, 0, narrow(0.0))
+    for ray in range(INPUT_COUNT):
+        rays[ray] = seen[ray]
+
+
+def pack_networks(response: NetworkResponse) -> NDArray[np.void]:
+    """Return the weights of networks for the kernels, without a table, shape [1]."""
+    packed = np.zeros(1, NETWORKS)
+    packed["hidden"][0, :, :, :TANH_COUNT] = response.hidden.transpose(0, 2, 1)
+    last, bias = response.last[:, :-1], response.last[:, -1]
+    packed["output"][0, :, :TANH_COUNT] = np.einsum("sl,slt->st", last, response.middle[:, :, :-1])
+    packed["bias"][0] = bias + (last * response.middle[:, :, -1]).sum(axis=1)
+    return packed
 
 
 @functools.cache
 def networks_for(*responses: str) -> NDArray[np.void]:
     """Return what responses of robots' files need of the networks that come with KiKS, shape [1] or [0]."""
-    packed = np.zeros(0 if set(responses).isdisjoint(NETWORK_RESPONSES) else 1, NETWORKS)
-    if len(packed):
-        networks = NetworkResponse.load()
-        packed["hidden"], packed["middle"], packed["last"] = networks.weights
-        if "fast" in responses:
-            fill_table(*networks.weights, packed["table"][0])
+    if set(responses).isdisjoint(NETWORK_RESPONSES):
+        return np.zeros(0, NETWORKS)
+    packed = pack_networks(NetworkResponse.load())
+    if "fast" in responses:
+        fill_table(packed, packed["table"][0])
     packed.setflags(write=False)
     return packed

@@ -2,6 +2,7 @@
 
 Need: the mathematical library differs between systems in the last bit, and a run must not.
 Method: additions, multiplications, divisions, square roots and roundings alone, which IEEE 754 fixes to the bit.
+Sine, cosine and random numbers are for `Lanes`, too (`kiks.engine.vectors`).
 Random numbers are counter-based: a pure function of who asks and when, so that neither order nor threads matter.
 """
 
@@ -13,6 +14,9 @@ from typing import Any
 import numpy as np
 
 from kiks.engine.compiling import kernel
+from kiks.engine.masks import choose, everywhere, has_bit
+from kiks.engine.vectors import floor
+from kiks.engine.words import number, word
 
 # Pi/2 and ln 2 in two parts: the first has 33 bits, so that its product with a count below 2^20 is exact.
 _HALF_PI_HIGH = 1.5707963267341256
@@ -24,10 +28,8 @@ _RECIPROCALS = (0.0, *(1.0 / k for k in range(1, 22)))  # a multiplication costs
 
 
 @kernel
-def sin_cos(angle_rad: Any) -> Any:
-    """Return sine and cosine, each within 2e-16 for angles up to a million radians (Taylor series on +-pi/4)."""
-    turns = math.floor(angle_rad * 0.6366197723675814 + 0.5)
-    r = (angle_rad - turns * _HALF_PI_HIGH) - turns * _HALF_PI_LOW
+def sine_series(r: Any) -> Any:
+    """Return the sine of an angle within +-pi/4 (Taylor series)."""
     q = r * r
     sine = 1.0 / 355687428096000.0
     sine = sine * q - 1.0 / 1307674368000.0
@@ -37,7 +39,13 @@ def sin_cos(angle_rad: Any) -> Any:
     sine = sine * q - 1.0 / 5040.0
     sine = sine * q + 1.0 / 120.0
     sine = sine * q - 1.0 / 6.0
-    sine = r + r * q * sine
+    return r + r * q * sine
+
+
+@kernel
+def cosine_series(r: Any) -> Any:
+    """Return the cosine of an angle within +-pi/4 (Taylor series)."""
+    q = r * r
     cosine = 1.0 / 20922789888000.0
     cosine = cosine * q - 1.0 / 87178291200.0
     cosine = cosine * q + 1.0 / 479001600.0
@@ -45,21 +53,33 @@ def sin_cos(angle_rad: Any) -> Any:
     cosine = cosine * q + 1.0 / 40320.0
     cosine = cosine * q - 1.0 / 720.0
     cosine = cosine * q + 1.0 / 24.0
-    cosine = 1.0 - q * 0.5 + q * q * cosine
+    return 1.0 - q * 0.5 + q * q * cosine
+
+
+@kernel
+def sin_cos(angle_rad: Any) -> Any:
+    """Return sine and cosine, each within 2e-16 for angles up to a million radians."""
+    turns = floor(angle_rad * 0.6366197723675814 + 0.5)
+    r = (angle_rad - turns * _HALF_PI_HIGH) - turns * _HALF_PI_LOW
+    sine, cosine = sine_series(r), cosine_series(r)
     # Which quarter it is no processor can guess: these are choices without a jump.
-    quarter = np.int64(turns) & 3
-    is_swapped = (quarter & 1) != 0
-    first = cosine if is_swapped else sine
-    second = sine if is_swapped else cosine
-    return (-first if quarter >= 2 else first), (-second if quarter == 1 or quarter == 2 else second)
+    is_swapped, is_second_half = has_bit(turns, 0), has_bit(turns, 1)
+    first = choose(is_swapped, cosine, sine)
+    second = choose(is_swapped, sine, cosine)
+    return choose(is_second_half, -first, first), choose(is_swapped != is_second_half, -second, second)
 
 
 @kernel
 def sinc(angle_rad: Any) -> Any:
     """Return sin(a)/a: how much shorter a chord is than its arc of twice that angle."""
-    if abs(angle_rad) < 1e-4:
-        return 1.0 - angle_rad * angle_rad / 6.0
-    return sin_cos(angle_rad)[0] / angle_rad
+    size = abs(angle_rad)
+    is_tiny = size < 1e-4
+    nearly_one = 1.0 - angle_rad * angle_rad / 6.0
+    if everywhere(is_tiny):
+        return nearly_one
+    # Up to pi/4 the sine is its series: what `sin_cos` returns, to the bit.
+    sine = sine_series(angle_rad) if everywhere(size < 0.78) else sin_cos(angle_rad)[0]
+    return choose(is_tiny, nearly_one, sine / angle_rad)
 
 
 @kernel
@@ -114,7 +134,7 @@ def tanh(x: Any) -> Any:
 @kernel
 def mix(value: Any) -> Any:
     """Scramble 64 bits so that every bit of the input flips half of the output (the finalizer of SplitMix64)."""
-    z = np.uint64(value) + np.uint64(0x9E3779B97F4A7C15)
+    z = word(value) + np.uint64(0x9E3779B97F4A7C15)
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
     return z ^ (z >> np.uint64(31))
@@ -123,18 +143,18 @@ def mix(value: Any) -> Any:
 @kernel
 def source(seed: Any, world: Any, robot: Any, stream: Any, instant: Any) -> Any:
     """Return what the random numbers of this seed, world, robot, stream and instant come from, for `draw`."""
-    z = mix(np.uint64(seed))
-    z = mix(z ^ np.uint64(world))
-    z = mix(z ^ np.uint64(robot))
-    z = mix(z ^ np.uint64(stream))
-    return mix(z ^ np.uint64(instant))
+    z = mix(word(seed))
+    z = mix(z ^ word(world))
+    z = mix(z ^ word(robot))
+    z = mix(z ^ word(stream))
+    return mix(z ^ word(instant))
 
 
 @kernel
 def draw(origin: Any, index: Any) -> Any:
     """Return a random number in [0, 1): the one of an index from a source."""
-    z = mix(origin ^ np.uint64(index))
-    return np.float64(z >> np.uint64(11)) * (1.0 / 9007199254740992.0)
+    z = mix(origin ^ word(index))
+    return number(z >> np.uint64(11)) * (1.0 / 9007199254740992.0)
 
 
 @kernel

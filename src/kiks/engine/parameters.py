@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.engine.networks import NETWORK_RESPONSES, TABLE_LEVELS
-from kiks.engine.numbers import exponential, logarithm, sin_cos
+from kiks.engine.numbers import exponential, logarithm, power, sin_cos
 from kiks.engine.vectors import LANES
 from kiks.model.network import BODY_RADIUS_MM, NetworkResponse
 from kiks.model.robot import (
@@ -43,6 +43,8 @@ LIGHT_MM = 20.0
 STANDIN_RANGE_MM, STANDIN_REACH = 50.0, 1.06
 """Range of KiKS 2.2.0, and how much farther its sampled rays saw, in ranges (kiks-behaviour.md 3.1)."""
 
+_NEARER_MM, _ROUNDINGS = 1.01, 1e-6
+
 PARAMETERS = np.dtype(
     [
         ("radius_mm", "f8"),
@@ -67,6 +69,9 @@ PARAMETERS = np.dtype(
         ("ray_cos", "f8", (SENSOR_COUNT, LANES)),  # the lane over repeats the last ray
         ("ray_sin", "f8", (SENSOR_COUNT, LANES)),
         ("reach_mm", "f8"),  # longest length of a ray
+        ("watch_x_mm", "f8", (SENSOR_COUNT,)),  # a circle around all places where a wall makes a sensor respond
+        ("watch_y_mm", "f8", (SENSOR_COUNT,)),
+        ("watch_mm", "f8", (SENSOR_COUNT,)),
         ("ray_weight", "f8", (SENSOR_COUNT, LANES)),  # 0 for the lane over
         ("curve_counts", "f4", (CURVE_POINT_COUNT,)),
         ("behind_mm", "f8"),
@@ -166,8 +171,35 @@ def _pack_response(robot: Any, spec: RobotSpec) -> None:
             robot["ray_sin"][sensor, ray:] = sine
     if proximity.response == "curve" and spec.curve is not None:
         _pack_curve(robot, spec.curve, proximity)
+    near_mm = [reach_mm] * SENSOR_COUNT
     if proximity.response == "reflection" and spec.reflection is not None:
         _pack_reflection(robot, spec.reflection, proximity)
+        near_mm = _bright_mm(robot, spec.reflection)
+    _pack_watch(robot, geometry, near_mm)
+
+
+def _bright_mm(robot: Any, reflection: Reflection) -> list[float]:
+    """Return how far a white wall all around a sensor's rays may be before it makes the sensor respond [mm]."""
+    found = []
+    for sensor in range(SENSOR_COUNT):
+        threshold, light = reflection.threshold[sensor], robot["gain"][sensor] * sum(robot["ray_weight"][sensor])
+        dark = threshold - reflection.faint
+        far_mm = power(light * (1.0 + threshold) / dark, 1.0 / 3.0) if dark > 0.0 else math.inf
+        # A smooth surface may be a cell nearer than where rays end, and a cell has at most 1 mm.
+        found.append(min(float(robot["reach_mm"]), max(far_mm - reflection.behind_mm + _NEARER_MM, 0.0)))
+    return found
+
+
+def _pack_watch(robot: Any, geometry: Proximity | NetworkResponse, near_mm: Sequence[float]) -> None:
+    """Write the least circle around the sector in which a sensor's rays are up to a length."""
+    sine, cosine = sin_cos(math.radians(0.5 * geometry.field_of_view_deg))
+    ahead = min(max(cosine, 0.0), 0.5 / max(cosine, 0.5))
+    radius = max(ahead, 1.0 - ahead, math.sqrt((cosine - ahead) ** 2 + sine**2))
+    for sensor in range(SENSOR_COUNT):
+        out_mm = ahead * near_mm[sensor]
+        robot["watch_x_mm"][sensor] = robot["ray_x_mm"][sensor] + out_mm * robot["ray_cos"][sensor, AHEAD]
+        robot["watch_y_mm"][sensor] = robot["ray_y_mm"][sensor] + out_mm * robot["ray_sin"][sensor, AHEAD]
+        robot["watch_mm"][sensor] = (radius + _ROUNDINGS) * near_mm[sensor]
 
 
 def _pack_reflection(robot: Any, reflection: Reflection, proximity: Proximity) -> None:

@@ -12,18 +12,20 @@ import numpy as np
 
 from kiks.engine.compiling import entry, inlined, kernel
 from kiks.engine.discs import SEEN_LIMIT, SEEN_SIZE, TRACKS_SIZE, follow, meet_discs, see
+from kiks.engine.fans import cast_fan
 from kiks.engine.lanes import stack_floats, stack_integers
+from kiks.engine.masks import choose
 from kiks.engine.motion import pose_between
 from kiks.engine.numbers import draw, sin_cos, source
 from kiks.engine.parameters import RAY_COUNT
-from kiks.engine.rays import cast_fan, free_cells, meet_face, scale, stride
-from kiks.engine.responses import FAST, REFLECTION, respond
+from kiks.engine.rays import leap_at, scale
+from kiks.engine.responses import REFLECTION, respond
 from kiks.engine.scene import find_near, moment_of
-from kiks.engine.vectors import LANES, is_any, lane_of, load, splat, store
-from kiks.units import SENSOR_ROUND_NS, SENSOR_SLOT_NS, TICK_NS
+from kiks.engine.vectors import floor, greatest, lane_of, load
+from kiks.units import SENSOR_ROUND_NS, SENSOR_SLOT_NS
 
-STREAM_SLIP, STREAM_PROXIMITY = 1, 2
-"""Random streams: whoever draws has a number of his own."""
+STREAM_PROXIMITY = 2
+"""Random stream of the noise: whoever draws has a number of his own."""
 
 MOVED_MM = 30.0
 """How far a robot or a thing moves between the first sensor's sample and a reading, at most: 20 ms at 1.5 m/s."""
@@ -31,27 +33,29 @@ MOVED_MM = 30.0
 
 @kernel
 def sample_instant(time_ns: Any, sensor: Any) -> Any:
-    """Return the number of the round in which a sensor was last sampled, and when that was [ns]."""
-    slot_ns = sensor * SENSOR_SLOT_NS
-    if time_ns < slot_ns:
-        return np.int64(0), np.int64(0)
-    turn = (time_ns - slot_ns) // SENSOR_ROUND_NS
-    return np.int64(turn + 1), np.int64(turn * SENSOR_ROUND_NS + slot_ns)
+    """Return the number of the round in which a sensor was last sampled, and when that was [ns].
+
+    Times are numbers with a point, or eight: whole ones are exact for a hundred days.
+    """
+    slot_ns = 1.0 * sensor * SENSOR_SLOT_NS
+    turn = floor((time_ns - slot_ns) / SENSOR_ROUND_NS)
+    is_sampled = turn >= 0.0
+    return choose(is_sampled, turn + 1.0, 0.0), choose(is_sampled, turn * SENSOR_ROUND_NS + slot_ns, 0.0)
 
 
 @kernel
 def pose_at(robot: Any, tick_count: Any, time_ns: Any) -> Any:
     """Return x, y and heading at a time at most 20 ms before the end of the last tick."""
-    age_ns = max(tick_count * TICK_NS - time_ns, 0)
-    ticks_ago = min(age_ns // TICK_NS, robot.trail.shape[0] - 1)
-    share = 1.0 - (age_ns - ticks_ago * TICK_NS) / TICK_NS
-    return pose_between(robot, ticks_ago, max(share, 0.0))
+    ticks_ago, back = moment_of(tick_count, time_ns)
+    return pose_between(robot, ticks_ago, 1.0 - back)
 
 
 @kernel
 def sampled_pose(robot: Any, tick_count: Any, time_ns: Any, sensor: Any, is_sampled: Any) -> Any:
     """Return a sensor's round, its instant [ns], and x, y and heading of the robot then; if not sampled, those now."""
-    turn, instant_ns = sample_instant(time_ns, sensor) if is_sampled else (np.int64(0), time_ns)
+    turn, instant_ns = sample_instant(time_ns, sensor)
+    if not is_sampled:
+        turn, instant_ns = 0.0 * time_ns, 1.0 * time_ns
     x, y, heading = pose_at(robot, tick_count, instant_ns)
     return turn, instant_ns, x, y, heading
 
@@ -85,24 +89,48 @@ def expected_count(
     """
     view = view_of(parameters, x, y, heading, sensor)
     seen = stack_floats(SEEN_SIZE)
-    is_near, begin, seen_count = survey(sight, parameters, tracks, track_count, moment, view, seen)
+    is_near, seen_count = survey(sight, parameters, tracks, track_count, moment, view, seen)
     if not is_near:
         return parameters.baseline_counts[sensor]
-    lengths_mm, cosines, brightnesses = trace(
-        sight, parameters.response, view, parameters.reach_mm, begin, seen, seen_count
-    )
+    lengths_mm, cosines, brightnesses = trace(sight, parameters.response, view, parameters.reach_mm, seen, seen_count)
     counts = respond(networks, parameters, sensor, lengths_mm, cosines, brightnesses)
     return parameters.baseline_counts[sensor] + counts
 
 
 @inlined
 def view_of(parameters: Any, x: Any, y: Any, heading: Any, sensor: Any) -> Any:
-    """Return where a sensor's rays begin, x and y [mm], and their directions, cosines and sines, `Lanes`."""
+    """Return what a sensor looks at.
+
+    Returns:
+        Where its rays begin, x and y [mm]; their directions, cosines and sines, `Lanes`; the circle in which something
+        makes it respond, x, y and radius [mm].
+    """
     sine, cosine = sin_cos(heading)
+    watch = *watched(parameters, x, y, sine, cosine, sensor), parameters.watch_mm[sensor]
+    x, y = mount(parameters, x, y, sine, cosine, sensor)
+    rays_x, rays_y = aim(parameters, sine, cosine, sensor)
+    return x, y, rays_x, rays_y, watch
+
+
+@inlined
+def watched(parameters: Any, x: Any, y: Any, sine: Any, cosine: Any, sensor: Any) -> Any:
+    """Return the middle of the circle in which something makes a sensor respond, x and y [mm]; of a robot or eight."""
+    watch_x, watch_y = parameters.watch_x_mm[sensor], parameters.watch_y_mm[sensor]
+    return x + watch_x * cosine - watch_y * sine, y + watch_x * sine + watch_y * cosine
+
+
+@inlined
+def mount(parameters: Any, x: Any, y: Any, sine: Any, cosine: Any, sensor: Any) -> Any:
+    """Return where a sensor's rays begin, x and y [mm]; of a robot or of eight."""
     ray_x, ray_y = parameters.ray_x_mm[sensor], parameters.ray_y_mm[sensor]
-    x, y = x + ray_x * cosine - ray_y * sine, y + ray_x * sine + ray_y * cosine
+    return x + ray_x * cosine - ray_y * sine, y + ray_x * sine + ray_y * cosine
+
+
+@inlined
+def aim(parameters: Any, sine: Any, cosine: Any, sensor: Any) -> Any:
+    """Return where the rays of a robot's sensor go, cosines and sines, `Lanes`."""
     ray_cos, ray_sin = load(parameters.ray_cos[sensor]), load(parameters.ray_sin[sensor])
-    return x, y, ray_cos * cosine - ray_sin * sine, ray_cos * sine + ray_sin * cosine
+    return ray_cos * cosine - ray_sin * sine, ray_cos * sine + ray_sin * cosine
 
 
 @inlined
@@ -110,35 +138,33 @@ def survey(sight: Any, parameters: Any, tracks: Any, track_count: Any, moment: A
     """Find out what is about a sensor; write the discs in its view into `seen`, float64 [`SEEN_SIZE`].
 
     Returns:
-        Whether anything is within its reach; if not, it reads its baseline. A length that its rays may go freely
-        [cells]. How many discs are in view.
+        Whether anything may be near enough; if not, it reads its baseline. How many discs are in view.
     """
-    x, y, rays_x, rays_y = view
+    x, y, rays_x, rays_y, (watch_x, watch_y, watch_mm) = view
     cell, pad = scale(sight)
     per_cell = 1.0 / cell
-    begin = max(free_cells(sight, x * per_cell + pad, y * per_cell + pad), 0.0)
+    is_near = leap_at(sight, watch_x * per_cell + pad, watch_y * per_cell + pad) <= watch_mm * per_cell
     seen_count = 0
     if track_count > 0:
         left = lane_of(rays_x, 0), lane_of(rays_y, 0)
         right = lane_of(rays_x, RAY_COUNT - 1), lane_of(rays_y, RAY_COUNT - 1)
         seen_count = see(tracks, track_count, moment, (cell, pad), (x, y, left, right, parameters.reach_mm), seen)
-    return begin <= parameters.reach_mm * per_cell or seen_count > 0, begin, seen_count
+    return is_near or seen_count > 0, seen_count
 
 
 @inlined
-def trace(sight: Any, response: Any, view: Any, reach_mm: Any, begin: Any, seen: Any, seen_count: Any) -> Any:
+def trace(sight: Any, response: Any, view: Any, reach_mm: Any, seen: Any, seen_count: Any) -> Any:
     """Follow the rays of a sensor to what they meet, as exactly as a response needs them.
 
     Returns:
         Lengths of the rays [mm], cosines of the angles of incidence, and brightnesses, 0 for nothing, `Lanes`.
     """
-    x, y, rays_x, rays_y = view
+    x, y, rays_x, rays_y, _ = view
     cell, pad = scale(sight)
     per_cell = 1.0 / cell
     column, row, reach = x * per_cell + pad, y * per_cell + pad, reach_mm * per_cell
-    lengths, cosines, brightnesses = splat(reach), splat(1.0), splat(0.0)
-    if begin <= reach:
-        lengths, cosines, brightnesses = meet_walls(sight, response, column, row, rays_x, rays_y, reach, begin)
+    has_faces = response == REFLECTION
+    lengths, cosines, brightnesses = cast_fan(sight, has_faces, column, row, rays_x, rays_y, reach)
     if seen_count > 0:
         lengths, cosines, brightnesses = meet_discs(
             seen, seen_count, column, row, rays_x, rays_y, lengths, cosines, brightnesses
@@ -147,59 +173,11 @@ def trace(sight: Any, response: Any, view: Any, reach_mm: Any, begin: Any, seen:
 
 
 @kernel
-def meet_walls(
-    sight: Any, response: Any, column: Any, row: Any, rays_x: Any, rays_y: Any, reach: Any, begin: Any
-) -> Any:
-    """Follow a sensor's rays to the walls, as exactly as a response needs them.
-
-    Returns:
-        Lengths [cells], cosines of the angles of incidence, and brightnesses, `Lanes`.
-    """
-    if response == FAST:
-        return stride_all(sight, column, row, rays_x, rays_y, reach, begin)
-    lengths, brightnesses = cast_fan(sight, splat(column), splat(row), rays_x, rays_y, reach, splat(begin))
-    cosines = splat(1.0)
-    if response == REFLECTION and is_any(brightnesses):
-        lengths, cosines = meet_faces(sight, column, row, rays_x, rays_y, lengths, brightnesses)
-    return lengths, cosines, brightnesses
-
-
-@kernel
-def meet_faces(sight: Any, column: Any, row: Any, rays_x: Any, rays_y: Any, lengths: Any, brightnesses: Any) -> Any:
-    """Return where rays that met a wall meet its smooth surface, and how squarely, `Lanes`."""
-    exact, cosines, shades = stack_floats(LANES), stack_floats(LANES), stack_floats(LANES)
-    to_x, to_y = stack_floats(LANES), stack_floats(LANES)
-    store(exact, lengths)
-    store(cosines, splat(1.0))
-    store(shades, brightnesses)
-    store(to_x, rays_x)
-    store(to_y, rays_y)
-    for ray in range(RAY_COUNT):
-        if shades[ray] > 0.0:
-            exact[ray], cosines[ray] = meet_face(sight, column, row, to_x[ray], to_y[ray], exact[ray])
-    return load(exact), load(cosines)
-
-
-@kernel
-def stride_all(sight: Any, column: Any, row: Any, rays_x: Any, rays_y: Any, reach: Any, begin: Any) -> Any:
-    """Return what `meet_walls` does for the table, which rounds lengths to 10 mm: for it, rays need not be exact."""
-    lengths, brightnesses = stack_floats(LANES), stack_floats(LANES)
-    to_x, to_y = stack_floats(LANES), stack_floats(LANES)
-    store(to_x, rays_x)
-    store(to_y, rays_y)
-    lengths[RAY_COUNT], brightnesses[RAY_COUNT] = reach, 0.0
-    for ray in range(RAY_COUNT):
-        lengths[ray], shade = stride(sight, column, row, to_x[ray], to_y[ray], reach, begin)
-        brightnesses[ray] = shade
-    return load(lengths), splat(1.0), load(brightnesses)
-
-
-@kernel
 def integer_power(base: Any, exponent: Any) -> Any:
-    """Return a number to a whole, positive power by multiplication alone."""
-    result = 1.0
-    for _ in range(exponent):
-        result *= base
+    """Return a number, or eight, to a whole, positive power by multiplication alone."""
+    result = 1.0 + 0.0 * base
+    for k in range(np.int64(greatest(exponent))):
+        result = choose(k < exponent, result * base, result)
     return result
 
 
@@ -213,13 +191,13 @@ def quantile(values: Any, count: Any, share: Any) -> Any:
 
 @inlined
 def scatter(parameters: Any, count: Any, sign: Any, size: Any) -> Any:
-    """Return a count with that noise that is a share of it, from two random numbers 0..1.
+    """Return a count with that noise that is a share of it, from two random numbers 0..1; of a robot or of eight.
 
     It is at most 25 % of small and 10 % of large counts and seldom that much, to either side.
     """
     largest = parameters.noise_small - count / 1000.0 * (parameters.noise_small - parameters.noise_large)
     deviation = largest * integer_power(size, parameters.noise_exponent)
-    return count * (1.0 + deviation) if sign < 0.5 else count * (1.0 - parameters.noise_down * deviation)
+    return count * (1.0 + choose(sign < 0.5, deviation, -parameters.noise_down * deviation))
 
 
 @inlined
@@ -237,9 +215,9 @@ def chances(seed: Any, robot: Any, turn: Any, sensor: Any) -> Any:
 
 @kernel
 def quantize(parameters: Any, count: Any) -> Any:
-    """Return a count as the converter gives it: whole steps, within its range."""
-    steps = np.floor(count / parameters.step_counts + 0.5)
-    return np.int64(min(max(steps * parameters.step_counts, 0.0), parameters.maximum_counts))
+    """Return a count as the converter gives it: whole steps, within its range; of a robot or of eight."""
+    steps = floor(count / parameters.step_counts + 0.5)
+    return min(max(steps * parameters.step_counts, 0.0), parameters.maximum_counts)
 
 
 @inlined
@@ -297,7 +275,7 @@ def read_proximity(
         if is_noisy:
             sign, size, jitter = chances(seed, robot, turn, sensor)
             noisy = scatter(parameters, count, sign, size) + jitter_of(parameters, jitter)
-            out[sensor] = quantize(parameters, noisy)
+            out[sensor] = np.int64(quantize(parameters, noisy))
         else:
             out[sensor] = min(count, parameters.maximum_counts)
 

@@ -9,8 +9,8 @@ one each call from Python would cost half a microsecond more. It holds
 
 * field: distance of cells to the nearest wall [mm], 0 in a wall, float32 [rows, columns];
 * surface: brightness of cells, 0 for floor, uint8 [rows, columns];
-* faces: the smooth surface of the wall beside free cells that touch one (`kiks.model.arena.Arena.faces`), float32
-  [rows, columns, 3];
+* leaps: how far one may go from anywhere in a cell, int16 [rows, columns] (`kiks.model.arena.Arena.leaps`);
+* faces: the smooth surface of the wall beside free cells that touch one, int32 [rows, columns] (`Arena.faces` there);
 * cell: edge of a cell [mm];
 * pad: cells of the border around the arena.
 
@@ -27,23 +27,27 @@ import numpy as np
 from kiks.engine.compiling import entry, kernel
 from kiks.engine.discs import hides
 from kiks.engine.lanes import element, pointer_to, stack_floats
-from kiks.engine.vectors import cells_of, is_any, load, pick, splat, store, where_less
+from kiks.engine.vectors import pick
+from kiks.model.arena import PAD, Arena
+from kiks.model.raster import LEAPS_PER_CELL
 
 _DIAGONAL = 1.4142135623730951
 _WALK = 2.5  # up to this clearance a ray goes from cell to cell [cells]
-_STRIDE = 1.0  # shortest leap of a ray that need not be exact [cells]
 _NUDGE = 1e-3  # over the edge of a cell [cells]
-_BACK = 2e-3  # from there back over it [cells]
-_GRAZING = 0.1  # cosine of an incidence below which a surface is not worth finding
 _FAR = 1e30
 _LANES = 32  # of whole pictures: while some wait for the memory, others go on
 _FLAT = 1e-24  # square of a direction's part along an axis below which a ray never gets to the next cell there
 
 
+def sight_of(arena: Arena) -> tuple[Any, ...]:
+    """Return what rays meet of an arena."""
+    return arena.clearance, arena.surface, arena.leaps, arena.faces, float(arena.mm_per_cell), PAD
+
+
 @kernel
 def scale(sight: Any) -> Any:
     """Return the edge of a cell [mm] and the cells of the border around the arena."""
-    _, _, _, cell, pad = sight
+    _, _, _, _, cell, pad = sight
     return cell, pad
 
 
@@ -56,9 +60,14 @@ def cell_at(raster: Any, column: Any, row: Any) -> Any:
 @kernel
 def free_cells(sight: Any, column: Any, row: Any) -> Any:
     """Return how far a point may go in any direction without meeting a wall [cells]; at most 0 next to one."""
-    field, _, _, cell, _ = sight
-    i, j = cell_at(field, column, row)
-    return field[j, i] * (1.0 / cell) - _DIAGONAL
+    field, _, _, _, cell, _ = sight
+    return pick(field, column, row) * (1.0 / cell) - _DIAGONAL
+
+
+@kernel
+def leap_at(sight: Any, column: Any, row: Any) -> Any:
+    """Return how far a point, or eight, may go in any direction [cells]; less than 0 in a wall and beyond."""
+    return pick(sight[2], column, row) * (1.0 / LEAPS_PER_CELL)
 
 
 @kernel
@@ -77,7 +86,7 @@ def cast(sight: Any, column: Any, row: Any, cosine: Any, sine: Any, reach: Any, 
     Returns:
         Length of the ray [cells], `reach` if it meets nothing, and the brightness of what it met, 0 for nothing.
     """
-    field, surface, _, cell, _ = sight
+    field, surface, _, _, cell, _ = sight
     per_cell = 1.0 / cell
     per_column = 1.0 / cosine if cosine * cosine > _FLAT else _FAR
     per_row = 1.0 / sine if sine * sine > _FLAT else _FAR
@@ -101,87 +110,6 @@ def cast(sight: Any, column: Any, row: Any, cosine: Any, sine: Any, reach: Any, 
 
 
 @kernel
-def meet_face(sight: Any, column: Any, row: Any, cosine: Any, sine: Any, length: Any) -> Any:
-    """Return where a ray that `cast` followed meets its wall's surface, taken to be smooth, and how squarely.
-
-    Returns:
-        Length of the ray [cells], at most a cell from that of `cast`, and the cosine of the angle of incidence.
-    """
-    faces = sight[2]
-    before = length - _BACK
-    px, py = column + before * cosine, row + before * sine
-    i, j = cell_at(faces, px, py)
-    x, y = faces[j, i, 0], faces[j, i, 1]
-    squarely = x * cosine + y * sine
-    if x == 0.0 and y == 0.0:  # it begins in a wall, or meets the tip of a corner between cells
-        return length, 1.0
-    if squarely < _GRAZING:
-        return length, max(squarely, 0.0)
-    left = faces[j, i, 2] - (px - i - 0.5) * x - (py - j - 0.5) * y
-    return max(before + min(max(left / squarely, -1.0), 1.0), 0.0), squarely
-
-
-@kernel
-def stride(sight: Any, column: Any, row: Any, cosine: Any, sine: Any, reach: Any, begin: Any) -> Any:
-    """Follow one ray in fewer and longer leaps than `cast`, to within a cell or so of what that says.
-
-    A leap takes the ray to begin in the middle of its cell and may end inside a wall, a cell deep at most. Tips of
-    corners that a ray meets for less than a cell it may miss, straight walls of one cell it does not. It takes and
-    returns what `cast` does.
-    """
-    field, surface, _, cell, _ = sight
-    per_cell = 1.0 / cell
-    length = begin
-    while length < reach:
-        i, j = cell_at(field, column + length * cosine, row + length * sine)
-        clearance = field[j, i] * per_cell
-        if clearance == 0.0:
-            return max(length - 0.5 * _STRIDE, 0.0), np.int64(surface[j, i])
-        length += max(clearance, _STRIDE)
-    return reach, np.int64(0)
-
-
-@kernel
-def cast_fan(sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, reach: Any, begin: Any) -> Any:
-    """Follow eight rays at once, each to where `cast` would let it end, to the bit.
-
-    They step together until the last of them has ended; one that has stays where it is.
-
-    Args:
-        sight: What rays meet.
-        columns: Origins [cells], `Lanes`.
-        rows: Origins [cells], `Lanes`.
-        cosines: Directions, `Lanes`.
-        sines: Directions, `Lanes`.
-        reach: Longest length followed [cells].
-        begin: Length that is known to be free [cells], `Lanes`.
-
-    Returns:
-        Lengths of the rays [cells] and brightnesses of what they met, `Lanes`.
-    """
-    field, surface, _, cell, _ = sight
-    per_cell = 1.0 / cell
-    per_column = where_less(_FLAT, cosines * cosines, 1.0 / cosines, _FAR)
-    per_row = where_less(_FLAT, sines * sines, 1.0 / sines, _FAR)
-    right, up = where_less(0.0, cosines, 1.0, splat(0.0)), where_less(0.0, sines, 1.0, splat(0.0))
-    lengths = begin
-    while True:
-        px, py = columns + lengths * cosines, rows + lengths * sines
-        clearances = pick(field, px, py) * per_cell
-        goes_on = where_less(0.0, clearances, where_less(lengths, reach, 1.0, splat(0.0)), 0.0)
-        if not is_any(goes_on):
-            break
-        to_column = where_less(per_column, _FAR, (cells_of(px, field.shape[1]) + right - px) * per_column, _FAR)
-        to_row = where_less(per_row, _FAR, (cells_of(py, field.shape[0]) + up - py) * per_row, _FAR)
-        walk = where_less(to_column, to_row, to_column, to_row)
-        walk = where_less(0.0, walk, walk, 0.0) + _NUDGE
-        step = where_less(_WALK, clearances, clearances - _DIAGONAL, walk)
-        lengths = where_less(0.0, goes_on, lengths + step, lengths)
-    brightnesses = where_less(lengths, reach, pick(surface, px, py), 0.0)
-    return where_less(lengths, reach, lengths, reach), brightnesses
-
-
-@kernel
 def cast_many(sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, lengths: Any, brightnesses: Any) -> Any:
     """Follow many rays, each to the first wall: the lengths and brightnesses of `cast` to the bit, in less time.
 
@@ -196,7 +124,7 @@ def cast_many(sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, len
         lengths: Where the lengths of the rays go [cells], shape [rays].
         brightnesses: Where the brightnesses of the walls go, shape [rays].
     """
-    field, surface, _, cell, _ = sight
+    field, surface, _, _, cell, _ = sight
     per_cell = 1.0 / cell
     clearances, width = pointer_to(field), np.int32(field.shape[1])
     last_column, last_row = np.int32(field.shape[1] - 1), np.int32(field.shape[0] - 1)
@@ -252,7 +180,7 @@ def is_lit(sight: Any, seen: Any, seen_count: Any, x: Any, y: Any, lamp_x: Any, 
         lamp_x: The lamp [mm].
         lamp_y: The lamp [mm].
     """
-    field, _, _, cell, pad = sight
+    field, _, _, _, cell, pad = sight
     per_cell = 1.0 / cell
     column, row = x * per_cell + pad, y * per_cell + pad
     dx, dy = (lamp_x - x) * per_cell, (lamp_y - y) * per_cell
@@ -286,22 +214,3 @@ def cast_ray(sight: Any, x: Any, y: Any, cosine: Any, sine: Any, reach: Any) -> 
 def cast_rays(sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, lengths: Any, brightnesses: Any) -> Any:
     """Follow many rays from Python, each to the first wall; lengths and places in cells."""
     cast_many(sight, columns, rows, cosines, sines, lengths, brightnesses)
-
-
-@entry
-def cast_eight(sight: Any, columns: Any, rows: Any, directions: Any, reach: Any, out: Any) -> Any:
-    """Follow eight rays from Python as a proximity sensor does; all in cells.
-
-    Args:
-        sight: What rays meet.
-        columns: Origins, shape [8].
-        rows: Origins, shape [8].
-        directions: Cosines and sines, shape [2, 8].
-        reach: Longest length followed.
-        out: Where lengths and brightnesses go, shape [2, 8].
-    """
-    lengths, brightnesses = cast_fan(
-        sight, load(columns), load(rows), load(directions[0]), load(directions[1]), reach, splat(0.0)
-    )
-    store(out[0], lengths)
-    store(out[1], brightnesses)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from kiks.engine.ambient import STREAM_AMBIENT, expected_ambient, face, is_burning, mount_of
 from kiks.engine.compiling import entry, kernel
 from kiks.engine.discs import ALL_AROUND, PER_TRACK, SEEN_SIZE, TRACKS_SIZE, disc_of, everybody_else, see
@@ -96,10 +98,10 @@ def explain_proximity(
     without[:] = parameters.baseline_counts[sensor]
     view = view_of(parameters, x, y, heading, sensor)
     seen = stack_floats(SEEN_SIZE)
-    is_near, begin, seen_count = survey(sight, parameters, tracks, track_count, moment, view, seen)
+    is_near, seen_count = survey(sight, parameters, tracks, track_count, moment, view, seen)
     if is_near:
         lengths_mm, cosines, brightnesses = trace(
-            sight, parameters.response, view, parameters.reach_mm, begin, seen, seen_count
+            sight, parameters.response, view, parameters.reach_mm, seen, seen_count
         )
         keep(lengths_mm, rays[0])
         keep(brightnesses, rays[2])
@@ -109,7 +111,7 @@ def explain_proximity(
     expected = expected_count(sight, networks, parameters, tracks, track_count, moment, x, y, heading, sensor)
     sign, size, chance = chances(seed, robot, turn, sensor)
     scattered, jitter = scatter(parameters, expected, sign, size), jitter_of(parameters, chance)
-    return instant_ns, expected, scattered - expected, jitter, quantize(parameters, scattered + jitter)
+    return instant_ns, expected, scattered - expected, jitter, np.int64(quantize(parameters, scattered + jitter))
 
 
 @kernel
@@ -187,4 +189,4 @@ def explain_ambient(
     dark = expected_ambient(sight, others[:0], parameters, seen, seen_count, x, y, heading, sensor)
     jitter = uniform(seed, 0, robot, STREAM_AMBIENT, turn, sensor)
     noise = parameters.dark_noise_counts * (2.0 * jitter - 1.0)
-    return instant_ns, expected, noise, quantize(parameters, expected + noise), dark
+    return instant_ns, expected, noise, np.int64(quantize(parameters, expected + noise)), dark

@@ -22,12 +22,13 @@ from typing import Any
 
 import numpy as np
 
-from kiks.engine.compiling import entry, kernel
-from kiks.engine.lanes import stack_floats
+from kiks.engine.compiling import entry, inlined, kernel
+from kiks.engine.lanes import stack_floats, stack_narrow
+from kiks.engine.narrow import narrow, store_narrow, total
 from kiks.engine.networks import network_count, table_count
 from kiks.engine.numbers import exponential, power
 from kiks.engine.parameters import CURVE_POINT_COUNT, RAY_COUNT, STANDIN_REACH
-from kiks.engine.vectors import LANES, lane_of, load, splat, store, where_less
+from kiks.engine.vectors import LANES, load, splat, store, where_less
 from kiks.model.materials import BLACK_REFLECTANCE
 
 REFLECTION, THESIS, FAST, STANDIN, CURVE = 0, 1, 2, 3, 4
@@ -63,9 +64,7 @@ def reflection_count(parameters: Any, sensor: Any, lengths_mm: Any, cosines: Any
     shares = BLACK_REFLECTANCE + brightnesses * ((1.0 - BLACK_REFLECTANCE) / 255.0)
     shares = where_less(0.0, brightnesses, shares, 0.0)
     returned = load(parameters.ray_weight[sensor]) * shares * near * near * near
-    light = 0.0
-    for ray in range(RAY_COUNT):
-        light += lane_of(returned, ray)
+    light = total(returned)
     threshold = parameters.threshold[sensor]
     share = (1.0 + threshold) * parameters.gain[sensor] * light - threshold
     rounded = ramp(share, parameters.faint) - ramp(share - 1.0, parameters.bright)
@@ -87,13 +86,11 @@ def standin_count(range_mm: Any, lengths_mm: Any, brightnesses: Any) -> Any:
     return 1023.0 * (1.0 - exponential(-power(total, 1.61)))
 
 
-@kernel
-def inverted_lengths(range_mm: Any, lengths_mm: Any, brightnesses: Any, seen: Any) -> Any:
-    """Write the inputs of the thesis's networks: 1 at the sensor, 0 out of range, less for a dark surface."""
-    per_range = 1.0 / range_mm
-    for ray in range(RAY_COUNT):
-        inverted = max(1.0 - lengths_mm[ray] * per_range, 0.0)
-        seen[ray] = inverted * darkness(brightnesses[ray]) if brightnesses[ray] > 0.0 else 0.0
+@inlined
+def nearnesses(range_mm: Any, lengths_mm: Any, brightnesses: Any) -> Any:
+    """Return the inputs of the thesis's networks: 1 at the sensor, 0 out of range, less for a dark surface; `Lanes`."""
+    inverted = max(1.0 - lengths_mm * (1.0 / range_mm), 0.0)
+    return where_less(0.0, brightnesses, inverted * darkness(brightnesses), 0.0)
 
 
 @kernel
@@ -114,25 +111,25 @@ def respond(networks: Any, parameters: Any, sensor: Any, lengths_mm: Any, cosine
     """Return the counts above its baseline that a sensor expects, by its robot's response; the rays are `Lanes`."""
     if parameters.response == REFLECTION:
         return reflection_count(parameters, sensor, lengths_mm, cosines, brightnesses)
-    return respond_one_by_one(networks, parameters, sensor, lengths_mm, brightnesses)
+    gain = parameters.gain[sensor]
+    if parameters.response == THESIS or parameters.response == FAST:
+        seen = stack_narrow(LANES)
+        store_narrow(seen, 0, narrow(nearnesses(parameters.range_mm, lengths_mm, brightnesses)))
+        if parameters.response == THESIS:
+            return gain * network_count(networks[0], sensor, seen)
+        return gain * table_count(networks[0].table, seen)
+    return gain * respond_one_by_one(parameters, sensor, lengths_mm, brightnesses)
 
 
 @kernel
-def respond_one_by_one(networks: Any, parameters: Any, sensor: Any, lengths: Any, shades: Any) -> Any:
-    """Return the same for the responses that take ray by ray."""
+def respond_one_by_one(parameters: Any, sensor: Any, lengths: Any, shades: Any) -> Any:
+    """Return the same, but for the gain, for the responses that take ray by ray."""
     lengths_mm, brightnesses = stack_floats(LANES), stack_floats(LANES)
     store(lengths_mm, lengths)
     store(brightnesses, shades)
-    gain = parameters.gain[sensor]
     if parameters.response == STANDIN:
-        return gain * standin_count(parameters.range_mm, lengths_mm, brightnesses)
-    if parameters.response == CURVE:
-        return gain * curve_count(parameters, sensor, lengths_mm, brightnesses)
-    seen = stack_floats(RAY_COUNT)
-    inverted_lengths(parameters.range_mm, lengths_mm, brightnesses, seen)
-    if parameters.response == FAST:
-        return gain * table_count(networks[0].table, seen)
-    return gain * network_count(networks[0].hidden, networks[0].middle, networks[0].last, sensor, seen)
+        return standin_count(parameters.range_mm, lengths_mm, brightnesses)
+    return curve_count(parameters, sensor, lengths_mm, brightnesses)
 
 
 @entry

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from kiks.engine.compiling import entry, kernel
 from kiks.engine.state import TRAIL_LENGTH, State
+from kiks.engine.vectors import floor
 from kiks.units import TICK_NS
 
 SQUARE_MM = 64.0
@@ -118,6 +119,13 @@ def enter_everybody(scene: Any) -> Any:
         enter_all(scene, world)
 
 
+@entry
+def enter_worlds(scene: Any, worlds: Any) -> Any:
+    """Do the same in the worlds of these numbers, int64 [world]."""
+    for world in worlds:
+        enter_all(scene, world)
+
+
 @kernel
 def find_near(scene: Any, world: Any, x: Any, y: Any, reach_mm: Any, itself: Any, found: Any) -> Any:
     """Write the discs whose edge is within a reach [mm] of a place into `found`, without one; return how many.
@@ -152,8 +160,8 @@ def moment_of(tick_count: Any, time_ns: Any) -> Any:
     """Return the tick of a time at most 20 ms before the end of the last one, and how much of it was yet to come.
 
     Returns:
-        How many ticks ago it ended, and the share of it, 0..1, that lies behind the time.
+        How many ticks ago it ended, and the share of it, 0..1, that lies behind the time; for `Lanes`, lanes.
     """
-    age_ns = max(tick_count * TICK_NS - time_ns, 0)
-    ticks_ago = min(age_ns // TICK_NS, TRAIL_LENGTH - 1)
+    age_ns = max(1.0 * tick_count * TICK_NS - time_ns, 0.0)
+    ticks_ago = min(floor(age_ns * (1.0 / TICK_NS)), TRAIL_LENGTH - 1.0)
     return ticks_ago, min((age_ns - ticks_ago * TICK_NS) * (1.0 / TICK_NS), 1.0)

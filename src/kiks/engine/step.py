@@ -4,16 +4,32 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from kiks.engine.bodies import remember_place
-from kiks.engine.company import make_room, move_alone, move_together
-from kiks.engine.compiling import entry, kernel
+from kiks.engine.company import make_room, move_together
+from kiks.engine.compiling import entry, inlined, kernel
+from kiks.engine.eights import (
+    EIGHT,
+    EIGHT_KINDS,
+    copy_eight,
+    load_eight,
+    load_kinds,
+    one_of,
+    only,
+    open_eight,
+    put_back,
+    stack_record,
+    store_eight,
+)
 from kiks.engine.gripper import move_gripper, tend_grippers
 from kiks.engine.hold import carry_lifted
-from kiks.engine.motion import note_contact, remember_pose
+from kiks.engine.masks import anywhere, everywhere, opposite
+from kiks.engine.motion import draw_slip, move, note_contact, remember_pose
 from kiks.engine.motor import control_motors, latch_encoders, turn_motors
-from kiks.engine.numbers import uniform
-from kiks.engine.proximity import STREAM_SLIP
 from kiks.engine.scene import count_discs, enter_all
+from kiks.engine.vectors import LANES, splat, with_lane
+from kiks.engine.words import word
 
 
 @entry
@@ -38,24 +54,91 @@ def advance(scene: Any, ground: Any, seed: Any, tick: Any, tick_count: Any) -> A
 @kernel
 def advance_one(scene: Any, ground: Any, seed: Any, world: Any, tick: Any, tick_count: Any) -> Any:
     """Let time pass in a world of one robot: what is below, without company."""
+    robot = scene[0][world, 0]
+    parameters = scene[2][robot.kind]
     for now in range(tick, tick + tick_count):
-        left, right, slip_ratio = turn_wheels(scene, seed, world, 0, now)
-        if scene[0][world, 0].has_gripper != 0:
-            move_gripper(scene[0][world, 0], 0.0)
-        is_touching = move_alone(scene, ground, world, 0, left, right, slip_ratio)
-        note_contact(scene[0][world, 0], is_touching)
+        advance_alone(robot, parameters, ground, (seed, world, 0, now))
+
+
+@inlined
+def advance_alone(robot: Any, parameters: Any, ground: Any, chance: Any) -> Any:
+    """Let a tick pass for a robot that is alone, or for eight, each in its own world."""
+    field, cell, pad = ground
+    left, right = turn_wheels(robot, parameters)
+    has_gripper = robot.has_gripper != 0
+    if anywhere(has_gripper):
+        move_gripper(only(robot, has_gripper), 0.0)
+    is_touching = move(field, cell, pad, robot, parameters, left, right, chance)
+    note_contact(robot, is_touching)
+
+
+@kernel
+def advance_eight(eight: Any, parameters: Any, ground: Any, seeds: Any, until: Any) -> Any:
+    """Let time pass in eight worlds of one robot each.
+
+    Args:
+        eight: The robots, an `Eight` of `EIGHT`.
+        parameters: Their constants, an `Eight` of `EIGHT_KINDS`.
+        ground: The arena, as in `advance`.
+        seeds: Seeds of the eight worlds, `Words`; each is the first world of its seed.
+        until: Number of ticks after which each is to stand, `Lanes`; who has done as many does none.
+    """
+    before = open_eight(stack_record(EIGHT))
+    while True:
+        now = eight.tick_count
+        is_due = now < until
+        if not anywhere(is_due):
+            break
+        # Some are done before the others for a tick or two: putting them back costs less than asking at each number.
+        if not everywhere(is_due):
+            copy_eight(eight, before)
+        advance_alone(eight, parameters, ground, (seeds, 0, 0, now))
+        eight.tick_count = now + 1.0
+        if not everywhere(is_due):
+            put_back(before, eight, opposite(is_due))
+
+
+@entry
+def advance_batch(robots: Any, kinds: Any, ground: Any, seeds: Any, ticks_from: Any, ticks_to: Any) -> Any:
+    """Let time pass in worlds of one robot each, eight at once.
+
+    Args:
+        robots: Records of `ROBOT`, shape [world_count, 1]; changed in place.
+        kinds: Records of `PARAMETERS`, one for each kind.
+        ground: The arena, as in `advance`; all worlds have the same.
+        seeds: Seeds of the worlds, int64 [world_count].
+        ticks_from: Ticks that each world has done, int64 [world_count].
+        ticks_to: Ticks after which each is to stand, int64 [world_count].
+    """
+    record, constants = stack_record(EIGHT), stack_record(EIGHT_KINDS)
+    for first in range(0, robots.shape[0], LANES):
+        count = min(robots.shape[0] - first, LANES)
+        load_eight(robots, first, count, record)
+        load_kinds(robots, kinds, first, count, constants)
+        eight, parameters = open_eight(record), open_eight(constants)
+        last = first + count - 1
+        seed, until = word(splat(0.0)), splat(0.0)
+        for lane in range(LANES):
+            world = min(first + lane, last)
+            seed = with_lane(seed, lane, np.uint64(seeds[world]))
+            until = with_lane(until, lane, np.float64(ticks_to[world]))
+            one_of(eight, lane).tick_count = np.float64(ticks_from[world])
+        advance_eight(eight, parameters, ground, seed, until)
+        store_eight(robots, first, count, record)
 
 
 @kernel
 def advance_many(scene: Any, ground: Any, seed: Any, world: Any, tick: Any, tick_count: Any) -> Any:
     """Let time pass in a world of several things."""
-    robots, bodies, _, _ = scene
+    robots, bodies, kinds, _ = scene
     room = make_room(scene)
     neighbour_count, slack_mm = 0, -1.0
     for now in range(tick, tick + tick_count):
         for number in range(robots.shape[1]):
-            left, right, slip_ratio = turn_wheels(scene, seed, world, number, now)
-            room.ways[number, 0], room.ways[number, 1], room.ways[number, 2] = left, right, slip_ratio
+            robot = robots[world, number]
+            parameters = kinds[robot.kind]
+            room.ways[number, 0], room.ways[number, 1] = turn_wheels(robot, parameters)
+            room.ways[number, 2] = draw_slip(parameters, seed, world, number, now)
         for number in range(bodies.shape[1]):
             remember_place(bodies[world, number])
         if tend_grippers(scene, ground, world):
@@ -65,16 +148,10 @@ def advance_many(scene: Any, ground: Any, seed: Any, world: Any, tick: Any, tick
     enter_all(scene, world)
 
 
-@kernel
-def turn_wheels(scene: Any, seed: Any, world: Any, number: Any, now: Any) -> Any:
-    """Phases of a robot before it moves; return the paths of its wheels [pulses] and their slip ratio, if blocked."""
-    robots, _, kinds, _ = scene
-    robot = robots[world, number]
-    parameters = kinds[robot.kind]
+@inlined
+def turn_wheels(robot: Any, parameters: Any) -> Any:
+    """Phases of a robot before it moves; return the paths of its wheels [pulses]."""
     remember_pose(robot)
     latch_encoders(robot)
     control_motors(robot, parameters)
-    left = turn_motors(robot, parameters, 0)
-    right = turn_motors(robot, parameters, 1)
-    drawn = uniform(seed, world, number, STREAM_SLIP, now, 0)
-    return left, right, parameters.slip_ratio_min + drawn * (parameters.slip_ratio_max - parameters.slip_ratio_min)
+    return turn_motors(robot, parameters, 0), turn_motors(robot, parameters, 1)

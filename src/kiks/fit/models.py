@@ -58,7 +58,8 @@ def thesis(samples: Samples, response: NetworkResponse | None = None) -> Floats:
     response = response or NetworkResponse.load()
     seen = nearnesses(samples, fan_of(response))
     counts = np.empty(samples.counts.shape, np.float64)
-    networks.respond_networks(*response.weights, seen.reshape(-1, *seen.shape[2:]), counts.reshape(-1, SENSOR_COUNT))
+    packed = networks.pack_networks(response)
+    networks.respond_networks(packed, seen.reshape(-1, *seen.shape[2:]), counts.reshape(-1, SENSOR_COUNT))
     return counts
 
 

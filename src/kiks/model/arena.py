@@ -26,6 +26,7 @@ from kiks.model.raster import (
     box_raster,
     cells_per_pixel,
     clearance_mm,
+    free_leaps,
     wall_faces,
 )
 
@@ -75,7 +76,8 @@ class Arena:
     cylinders: tuple[Cylinder, ...] = ()
     _surface: npt.NDArray[np.uint8] | None = field(default=None, init=False, repr=False)
     _clearance: npt.NDArray[np.float32] | None = field(default=None, init=False, repr=False)
-    _faces: npt.NDArray[np.float32] | None = field(default=None, init=False, repr=False)
+    _leaps: npt.NDArray[np.int16] | None = field(default=None, init=False, repr=False)
+    _faces: npt.NDArray[np.int32] | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
         given = self.brightness
@@ -276,11 +278,25 @@ class Arena:
         return self._clearance
 
     @property
-    def faces(self) -> npt.NDArray[np.float32]:
+    def leaps(self) -> npt.NDArray[np.int16]:
+        """How far one may go from anywhere in a cell in any direction [1/16 cells], and what walls look like.
+
+        int16 [row + 2 PAD, column + 2 PAD], rounded down; wall cells have their brightness, negative.
+        """
+        if self._leaps is None:
+            leaps = free_leaps(self.surface)
+            leaps.setflags(write=False)
+            object.__setattr__(self, "_leaps", leaps)
+        assert self._leaps is not None
+        return self._leaps
+
+    @property
+    def faces(self) -> npt.NDArray[np.int32]:
         """Where the surface of the wall runs beside free cells that touch one, without the steps of the raster.
 
-        float32 [row + 2 PAD, column + 2 PAD, 3]: unit vectors straight into the wall, x and y, and how far that way its
-        surface is from the cell's centre [cells]; 0 for all other cells.
+        int32 [row + 2 PAD, column + 2 PAD]: three numbers with signs in one (`kiks.model.raster.unpack_faces`), the
+        first in the highest bits: x and y of a unit vector straight into the wall [1/1023], 11 bits each, and how far
+        that way its surface is from the cell's centre [1/256 cells], 10 bits; 0 for all other cells.
         """
         if self._faces is None:
             faces = wall_faces(self.surface, self.clearance, self.mm_per_cell)

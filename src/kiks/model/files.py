@@ -15,16 +15,34 @@ def replace_file(path: Path, data: bytes) -> None:
     Raises:
         ArenaError: If it cannot be written.
     """
+    try:
+        write_whole(path, data)
+    except (OSError, ValueError) as error:
+        raise ArenaError(f"The file {str(path)!r} must be writable, but: {error}. Choose another folder.") from None
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Write a file in one step, and see that it is on the disk: whatever happens, it is the old or the new one.
+
+    Raises:
+        OSError: If it cannot be written.
+        ValueError: If the path is none.
+    """
     fresh: Path | None = None
     try:
         handle, name = tempfile.mkstemp(prefix=".kiks-", dir=path.parent)
         fresh = Path(name)
         with open(handle, "wb") as file:
             file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
         fresh.chmod(0o644)
         os.replace(fresh, path)
-    except (OSError, ValueError) as error:
-        raise ArenaError(f"The file {str(path)!r} must be writable, but: {error}. Choose another folder.") from None
+        folder = os.open(path.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
     finally:
         if fresh is not None:
             fresh.unlink(missing_ok=True)

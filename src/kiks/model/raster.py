@@ -26,6 +26,15 @@ SIZE_MIN_MM = 100
 MM_PER_PIXEL_MIN, MM_PER_PIXEL_MAX = 0.1, 100.0
 """Finest and coarsest picture [mm per pixel]; beyond them the number is more likely a slip than a wish."""
 
+LEAPS_PER_CELL = 16
+"""Units of `Arena.leaps` in the edge of a cell."""
+
+FACE_UNITS = (1023.0, 1023.0, 256.0)
+"""Units of the three parts of `Arena.faces`: in a vector's length, twice, and in the edge of a cell."""
+
+FACE_BITS = (11, 11, 10)
+"""Bits of each of them, from the highest on."""
+
 _NUMBER_MAX = 1e9
 _BLOCK_ROWS = 64
 _WAY_REACH, _FILL_REACH = 9.0, 3.5  # surroundings of a cell that tell which way its wall is, and how far [blocks]
@@ -124,9 +133,23 @@ def clearance_mm(surface: npt.NDArray[np.uint8], mm_per_cell: float) -> npt.NDAr
     return clearance
 
 
+def free_leaps(surface: npt.NDArray[np.uint8]) -> npt.NDArray[np.int16]:
+    """Return how far it is from anywhere in a cell to the edge of the nearest wall cell [1/`LEAPS_PER_CELL` cells].
+
+    That is how far their squares are apart: as far as the centre of the one is from that of the nearest cell that is a
+    wall or touches one. Rounded down; walls have their brightness, negative.
+    """
+    from scipy.ndimage import maximum_filter
+
+    apart = clearance_mm(maximum_filter(surface, 3), 1.0)
+    leaps = np.minimum(apart * LEAPS_PER_CELL, np.iinfo(np.int16).max).astype(np.int16)
+    np.negative(surface, out=leaps, where=surface > 0, dtype=np.int16)
+    return leaps
+
+
 def wall_faces(
     surface: npt.NDArray[np.uint8], clearance: npt.NDArray[np.float32], mm_per_cell: float
-) -> npt.NDArray[np.float32]:
+) -> npt.NDArray[np.int32]:
     """Return where the surface of the wall runs beside every free cell that touches one, as if it were not in steps.
 
     The way into the wall is the gradient of how much wall is around, and the distance to its surface is that at which a
@@ -134,10 +157,9 @@ def wall_faces(
     a millimetre are taken together in blocks, of which it counts how much of each is wall.
 
     Returns:
-        Unit vectors in x and y into the wall, and how far its surface is from the cell's centre that way [cells],
-        shape [rows, columns, 3]; 0 for all other cells.
+        What `Arena.faces` is.
     """
-    faces = np.zeros((*surface.shape, 3), np.float32)
+    faces = np.zeros(surface.shape, np.int32)
     rows, columns = np.nonzero((clearance > 0.0) & (clearance < 1.5 * mm_per_cell))
     block = max(round(1.0 / mm_per_cell), 1)
     walls = _block_means(surface > 0, block)
@@ -162,9 +184,22 @@ def wall_faces(
         whole += near
     length = np.hypot(gradient[:, 0], gradient[:, 1])
     # In the middle of a gap as narrow as a cell both sides are as near: any way is as good.
-    faces[rows, columns, :2] = gradient / np.where(length > 1e-9, length, np.inf)[:, None]
-    faces[rows, columns, 2] = _distance_of_share(filled / whole) * block
+    vectors = gradient / np.where(length > 1e-9, length, np.inf)[:, None]
+    # Beyond two cells nobody asks how far it is.
+    distance = np.clip(_distance_of_share(filled / whole) * block, -1.99, 1.99)
+    whole_numbers = np.rint(np.column_stack([vectors, distance]) * FACE_UNITS).astype(np.int32)
+    packed = np.zeros(len(rows), np.int32)
+    for part, bits in enumerate(FACE_BITS):
+        packed = packed << bits | whole_numbers[:, part] & ((1 << bits) - 1)
+    faces[rows, columns] = np.where(length > 1e-9, packed, 0)
     return faces
+
+
+def unpack_faces(faces: npt.NDArray[np.int32]) -> npt.NDArray[np.float64]:
+    """Return the three parts of `Arena.faces`, shape [..., 3]: x and y of unit vectors, and distances [cells]."""
+    parts = [faces >> 21, faces << 11 >> 21, faces << 22 >> 22]
+    unpacked: npt.NDArray[np.float64] = np.stack(parts, axis=-1) / FACE_UNITS
+    return unpacked
 
 
 def _distance_of_share(share: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

@@ -77,7 +77,11 @@ def _check_proximity(proximity: Proximity, radius_mm: float, must: Must) -> None
     for key in ("mount_angle_deg", "mount_radius_mm", "direction_deg", "gain", "baseline_counts"):
         must(len(getattr(proximity, key)) == SENSOR_COUNT, f"proximity.{key}", f"a list of {SENSOR_COUNT}")
     must(all(0 < r <= radius_mm for r in proximity.mount_radius_mm), "proximity.mount_radius_mm", "inside the body")
-    must(all(0.05 <= gain <= 20 for gain in proximity.gain), "proximity.gain", "between 0.05 and 20")
+    must(
+        all(gain == 0 or 0.05 <= gain <= 20 for gain in proximity.gain),
+        "proximity.gain",
+        "between 0.05 and 20, or 0 for a dead sensor",
+    )
     must(0 < proximity.field_of_view_deg <= 180, "proximity.field_of_view_deg", "between 0 and 180 degrees")
     must(1 <= proximity.range_mm <= 1000, "proximity.range_mm", "between 1 and 1000 mm")
     must(

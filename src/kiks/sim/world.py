@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from kiks.engine import contact, proximity, step
 from kiks.engine.numbers import uniform
 from kiks.engine.parameters import PARAMETERS, pack
+from kiks.engine.rays import sight_of
 from kiks.engine.scene import enter_everybody, make_scene
 from kiks.engine.state import BALL, State
 from kiks.errors import ArenaError, ParameterError
@@ -64,15 +65,15 @@ class World:
         for kind, spec in enumerate(kinds):
             self._kinds[kind : kind + 1] = pack(spec)
         self._paths: Paths | None = None
-        for index in range(self.robot_count):
-            self._put(index, *self._start(index))
+        for index, pose in enumerate(self.start_poses(seed).tolist()):
+            self._put(index, *pose)
         self._enter()
 
     def _take(self, arena: Arena) -> None:
         """Take the walls of an arena for those that there are."""
         self.arena = arena
         self.ground = (arena.clearance, float(arena.mm_per_cell), PAD)
-        self.sight = (arena.clearance, arena.surface, arena.faces, float(arena.mm_per_cell), PAD)
+        self.sight = sight_of(arena)
 
     def set_arena(self, arena: Arena) -> None:
         """Put other walls around everything; time, robots, programs, balls, cylinders and lamps stay as they are.
@@ -85,7 +86,7 @@ class World:
         """
         # What follows from the walls may take a while: it is found before anybody has to wait.
         ground = (arena.clearance, float(arena.mm_per_cell), PAD)
-        assert arena.faces is not None
+        sight_of(arena)
         with self.lock:
             self.sync()
             for disc, (x_mm, y_mm, radius_mm) in enumerate(self._discs().tolist()):
@@ -190,14 +191,46 @@ class World:
         robot["trail"][:] = (x_mm, y_mm, heading_rad)
         robot["start_x_mm"], robot["start_y_mm"] = x_mm, y_mm
 
-    def _start(self, index: int) -> tuple[float, float, float]:
+    def start_poses(self, seed: int) -> NDArray[np.float64]:
+        """Return where robots start in this arena with a seed, float64 [robot, 3]: x_mm, y_mm, heading_rad.
+
+        Raises:
+            ArenaError: If there is no free place for one.
+        """
+        poses = np.zeros((self.robot_count, 3))
+        for index in range(self.robot_count):
+            others = np.column_stack([poses[:index, :2], [spec.body.radius_mm for spec in self.specs[:index]]])
+            poses[index] = self._start(index, seed, others)
+        return poses
+
+    def check_start_poses(self, poses: NDArray[np.float64], whose: str) -> None:
+        """Raise a ParameterError unless robots could stand at poses, float64 [robot, 3], bodies being where they are.
+
+        Args:
+            poses: The poses.
+            whose: Whose they are, for the message.
+
+        Raises:
+            ParameterError: If a number is not finite, or something is in the way.
+        """
+        discs = self._discs()
+        discs[: self.robot_count, :2] = poses[:, :2]
+        for index, (x_mm, y_mm, heading_rad) in enumerate(poses.tolist()):
+            check_finite(x_mm=x_mm, y_mm=y_mm, heading_rad=heading_rad)
+            obstacle = self._obstacle(x_mm, y_mm, self.specs[index].body.radius_mm, discs, index, PRESSED_MM)
+            if obstacle is not None:
+                raise ParameterError(
+                    f"the start of robot {index + 1} {whose} must be free, but at ({x_mm:g}, {y_mm:g}) mm {obstacle}. "
+                    "Move it."
+                )
+
+    def _start(self, index: int, seed: int, others: NDArray[np.float64]) -> tuple[float, float, float]:
         """Return the arena's start pose for a robot, else a free place: the roomiest for the first.
 
         Raises:
             ArenaError: If there is no free place for it.
         """
         radius_mm = self.specs[index].body.radius_mm
-        others = self._discs()[:index]
         if index == 0 and not self.arena.starts:
             return self.arena.find_start(radius_mm)
         if index < len(self.arena.starts):
@@ -210,7 +243,7 @@ class World:
                 )
             return start
         for attempt in range(ATTEMPTS):
-            x, y, turn = (uniform(self.seed, 0, index, STREAM_PLACE, attempt, axis) for axis in range(3))
+            x, y, turn = (uniform(seed, 0, index, STREAM_PLACE, attempt, axis) for axis in range(3))
             x, y = x * self.arena.width_mm, y * self.arena.height_mm
             if self._obstacle(x, y, radius_mm, others) is None:
                 return x, y, 2 * math.pi * turn

@@ -1,0 +1,177 @@
+"""Readings of eight lone robots at once, each alone in its world: what command N returns, with the same bits.
+
+Need: a program that drives many worlds spends most of its time reading sensors.
+Method: poses, places of sensors, what is free around them, and noise are calculated for eight robots at a time, as
+`Lanes`, by the functions that read one robot's. Only sensors that are near something go on: their fans are written
+down, of all robots and sensors together, and followed in turn (`kiks.engine.fans`).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from kiks.engine.ambient import read_ambient
+from kiks.engine.compiling import entry, kernel
+from kiks.engine.eights import EIGHT, eight_of, load_eight, load_lane, open_eight, stack_record
+from kiks.engine.fans import WAY_SIZE, enter, follow, met
+from kiks.engine.lanes import stack_floats, stack_integers, stack_narrow
+from kiks.engine.masks import choose
+from kiks.engine.numbers import sin_cos
+from kiks.engine.parameters import PARAMETERS
+from kiks.engine.proximity import aim, chances, jitter_of, mount, quantize, sampled_pose, scatter, watched
+from kiks.engine.rays import leap_at, scale
+from kiks.engine.responses import REFLECTION, respond
+from kiks.engine.vectors import LANES, lane_of, load, store
+from kiks.engine.words import load_words
+from kiks.model.robot import SENSOR_COUNT
+
+EIGHT_SENSES = eight_of(
+    PARAMETERS,
+    (
+        *("ray_x_mm", "ray_y_mm", "watch_x_mm", "watch_y_mm", "watch_mm"),
+        *("baseline_counts", "maximum_counts", "step_counts"),
+        *("noise_small", "noise_large", "noise_exponent", "noise_down"),
+    ),
+)
+"""The constants of eight robots that the reading of their sensors takes as lanes."""
+
+# Eight robots have 64 sensors; sizes of stack arrays must be constants of their own.
+_FANS = 64
+_WAYS_SIZE = SENSOR_COUNT * WAY_SIZE
+
+
+@kernel
+def load_senses(robots: Any, kinds: Any, first: Any, count: Any, senses: Any, which: Any) -> Any:
+    """Read what the sensors of the lone robots of some worlds are.
+
+    Args:
+        robots: Records of `ROBOT`, shape [world_count, 1].
+        kinds: Records of `PARAMETERS`, one for each kind.
+        first: The first of the worlds.
+        count: How many they are, 1 to 8; lanes over repeat the last one.
+        senses: Record of `EIGHT_SENSES` to be written.
+        which: Which of the kinds each is, int64 [8], to be written.
+    """
+    for lane in range(LANES):
+        which[lane] = robots[first + min(lane, count - 1), 0].kind
+        load_lane(senses, lane, kinds[which[lane]])
+
+
+@kernel
+def read_eight(
+    robots: Any, senses: Any, which: Any, kinds: Any, sight: Any, networks: Any, times_ns: Any, seeds: Any, out: Any
+) -> Any:
+    """Write the counts that command N returns at eight times in eight worlds, each with a lone robot.
+
+    Args:
+        robots: `Eight` of `EIGHT`, with the ticks that each has done.
+        senses: `Eight` of `EIGHT_SENSES`.
+        which: Which of the kinds each is, int64 [8].
+        kinds: Records of `PARAMETERS`, one for each kind.
+        sight: What rays meet of the arena (`kiks.engine.rays`).
+        networks: As `kiks.engine.proximity.read_proximity` takes them.
+        times_ns: When each robot reads, `Lanes`.
+        seeds: Seeds of the runs, `Words`.
+        out: int64 or float64, shape [8, 8]: a row for each robot.
+    """
+    cell, pad = scale(sight)
+    per_cell = 1.0 / cell
+    turns, counts, nears = stack_floats(_FANS), stack_floats(_FANS), stack_floats(_FANS)
+    xs, ys, sines, cosines = stack_floats(_FANS), stack_floats(_FANS), stack_floats(_FANS), stack_floats(_FANS)
+    for sensor in range(SENSOR_COUNT):
+        place = LANES * sensor
+        turn, _, x, y, heading = sampled_pose(robots, robots.tick_count, times_ns, sensor, True)
+        sine, cosine = sin_cos(heading)
+        watch_x, watch_y = watched(senses, x, y, sine, cosine, sensor)
+        leaps = leap_at(sight, watch_x * per_cell + pad, watch_y * per_cell + pad)
+        store(nears[place:], choose(leaps <= senses.watch_mm[sensor] * per_cell, 1.0, 0.0))
+        x, y = mount(senses, x, y, sine, cosine, sensor)
+        store(turns[place:], turn)
+        store(counts[place:], senses.baseline_counts[sensor])
+        store(xs[place:], x * per_cell + pad)
+        store(ys[place:], y * per_cell + pad)
+        store(sines[place:], sine)
+        store(cosines[place:], cosine)
+    ways, origins = stack_narrow(_WAYS_SIZE), stack_integers(SENSOR_COUNT)
+    under_way, whose = stack_integers(SENSOR_COUNT), stack_integers(SENSOR_COUNT)
+    for lane in range(LANES):
+        parameters = kinds[which[lane]]
+        reach = parameters.reach_mm * per_cell
+        fan_count = 0
+        for sensor in range(SENSOR_COUNT):
+            k = LANES * sensor + lane
+            if nears[k] > 0.0:
+                rays_x, rays_y = aim(parameters, sines[k], cosines[k], sensor)
+                enter(sight, ways, origins, fan_count, xs[k], ys[k], rays_x, rays_y, reach)
+                whose[fan_count] = sensor
+                fan_count += 1
+        follow(sight, ways, origins, under_way, fan_count)
+        for fan in range(fan_count):
+            lengths, squares, shades = met(sight, parameters.response == REFLECTION, ways, origins, fan)
+            sensor = whose[fan]
+            counts[LANES * sensor + lane] += respond(networks, parameters, sensor, lengths * cell, squares, shades)
+    for sensor in range(SENSOR_COUNT):
+        sign, size, chance = chances(seeds, 0, load(turns[LANES * sensor :]), sensor)
+        jitters = stack_floats(LANES)
+        for lane in range(LANES):
+            jitters[lane] = jitter_of(kinds[which[lane]], lane_of(chance, lane))
+        noisy = scatter(senses, load(counts[LANES * sensor :]), sign, size) + load(jitters)
+        quantized = quantize(senses, noisy)
+        for lane in range(LANES):
+            out[lane, sensor] = lane_of(quantized, lane)
+
+
+@entry
+def read_batch(
+    robots: Any, kinds: Any, sight: Any, networks: Any, tick_counts: Any, times_ns: Any, seeds: Any, out: Any
+) -> Any:
+    """Write the counts that command N returns in many worlds, each with a lone robot.
+
+    Args:
+        robots: Records of `ROBOT`, shape [world, 1].
+        kinds: Records of `PARAMETERS`, one for each kind of robot.
+        sight: What rays meet of the arena.
+        networks: As `kiks.engine.proximity.read_proximity` takes them.
+        tick_counts: Ticks done, int64 [world].
+        times_ns: When the robots read, int64 [world].
+        seeds: Seeds of the runs, int64 [world].
+        out: int64 [world, 8].
+    """
+    eight, senses, which = stack_record(EIGHT), stack_record(EIGHT_SENSES), stack_integers(LANES)
+    times, words, readings = stack_floats(LANES), stack_integers(LANES), np.empty((LANES, SENSOR_COUNT), np.int64)
+    for first in range(0, robots.shape[0], LANES):
+        count = min(robots.shape[0] - first, LANES)
+        load_eight(robots, first, count, eight)
+        load_senses(robots, kinds, first, count, senses, which)
+        for lane in range(LANES):
+            world = first + min(lane, count - 1)
+            eight.tick_count[lane] = tick_counts[world]
+            times[lane], words[lane] = times_ns[world], seeds[world]
+        eights = open_eight(eight), open_eight(senses)
+        read_eight(*eights, which, kinds, sight, networks, load(times), load_words(words), readings)
+        out[first : first + count] = readings[:count]
+
+
+@entry
+def read_ambient_batch(
+    scene: Any, sight: Any, lamps: Any, tick_counts: Any, times_ns: Any, seeds: Any, out: Any
+) -> Any:
+    """Write the counts that command O returns in many worlds, each with a lone robot.
+
+    Args:
+        scene: What there is, a world for each robot (`kiks.engine.scene`).
+        sight: What rays meet of the arena.
+        lamps: As `kiks.engine.ambient.read_ambient` takes them.
+        tick_counts: Ticks done, int64 [world].
+        times_ns: When the robots read, int64 [world].
+        seeds: Seeds of the runs, int64 [world].
+        out: int64 [world, 8].
+    """
+    robots, bodies, kinds, near = scene
+    begins, entries, spots, widest_mm = near
+    for world in range(out.shape[0]):
+        it = slice(world, world + 1)
+        alone = robots[it], bodies[it], kinds, (begins[it], entries[it], spots[it], widest_mm)
+        read_ambient(alone, sight, lamps, tick_counts[world], times_ns[world], seeds[world], 0, True, out[world])
