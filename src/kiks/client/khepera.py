@@ -227,18 +227,16 @@ class Khepera:
             raise self._silence(text.encode(), reply)
         return reply.rstrip(b"\r\n").decode("ascii", errors="replace")
 
-    # ---- inside ----
+    # ---- replies, for who has sent a command to several robots before reading the first reply ----
 
-    def _order(self, request: bytes) -> None:
-        """Send a command whose reply is its bare letter."""
-        self.port.write(request)
+    def hear_done(self, request: bytes) -> None:
+        """Read the reply to a command whose reply is its bare letter."""
         reply = self.port.read_until(b"\n")
         if reply != request[:1].lower() + b"\r\n":
             raise self._surprise(request, reply)
 
-    def _ask(self, request: bytes, count: int) -> list[int]:
-        """Send a command whose reply is whole numbers."""
-        self.port.write(request)
+    def hear_numbers(self, request: bytes, count: int) -> list[int]:
+        """Read the reply to a command whose reply is whole numbers, so many."""
         reply = self.port.read_until(b"\n")
         words = reply.split(b",")
         if len(words) == count + 1 and words[0] == request[:1].lower() and reply[-2:] == b"\r\n":
@@ -247,6 +245,18 @@ class Khepera:
             except ValueError:
                 pass
         raise self._surprise(request, reply)
+
+    # ---- inside ----
+
+    def _order(self, request: bytes) -> None:
+        """Send a command whose reply is its bare letter."""
+        self.port.write(request)
+        self.hear_done(request)
+
+    def _ask(self, request: bytes, count: int) -> list[int]:
+        """Send a command whose reply is whole numbers."""
+        self.port.write(request)
+        return self.hear_numbers(request, count)
 
     def _surprise(self, request: bytes, reply: bytes) -> LinkError:
         if reply[-1:] != b"\n":

@@ -1,0 +1,1 @@
+"""Many worlds at once: what is asked of one robot on a wire, asked of ten thousand."""

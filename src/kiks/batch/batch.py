@@ -1,0 +1,359 @@
+"""Many worlds at once, on all cores."""
+
+from __future__ import annotations
+
+import functools
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kiks.batch.beginning import Beginning
+from kiks.batch.bunches import bunch_size
+from kiks.batch.callbacks import DECIDER, decider_of
+from kiks.batch.loop import roll_out
+from kiks.batch.timing import Timing
+from kiks.batch.watching import Watching
+from kiks.batch.worlds import Alone, Together, Worlds
+from kiks.control.controller import SENSES, Controller, check_senses
+from kiks.control.functions import address_of
+from kiks.control.measure import Measure
+from kiks.engine.rays import sight_of
+from kiks.engine.scene import enter_worlds, make_scene
+from kiks.engine.state import State
+from kiks.engine.vectors import LANES
+from kiks.errors import ParameterError
+from kiks.model.arena import PAD, Arena
+from kiks.model.robot import SENSOR_COUNT, RobotSpec
+from kiks.units import NS_PER_S, ns_from_s
+
+BLOCKS_PER_THREAD = 4
+"""Pieces that the worlds are cut into for each thread: no thread waits long for the slowest."""
+
+EVER = 2**62
+"""More half loops, and later [ns], than anything."""
+
+STEP_BLOCK = 64
+"""Fewest worlds that a thread is woken for when all of them do a single step, which takes some microseconds each."""
+
+
+@dataclass(frozen=True)
+class Rollouts:
+    """What came of letting controllers drive.
+
+    Attributes:
+        values: What the measures say, float64 [world, robot, measure].
+        step_counts: Control steps done, int64 [world].
+    """
+
+    values: NDArray[np.float64]
+    step_counts: NDArray[np.int64]
+
+
+class Batch:
+    """Worlds of the same make, each with its own seed, start poses, robots and controllers.
+
+    World w with the seed s is, to the bit, a `kiks.Simulation` of that seed whose robots `kiks.drive` drives at the
+    pace of `timing`: the same readings, the same poses, the same hash.
+
+    Args:
+        arena: Where they are: one arena for all worlds, or several, which the worlds take in turn. They must hold the
+            same number of balls and cylinders.
+        worlds: How many worlds.
+        robot: What the robots are: a kind for all, or one for each world (a family of robots that differ), or, with
+            several robots, lists of them; names of robot files or `kiks.RobotSpec`.
+        robots: How many robots are in each world.
+        seed: Seed of world 0, the next ones count up; or a seed for each, int64 [world].
+        starts: Where robots start: x_mm, y_mm, heading_rad, float64 [world, robot, 3] or anything that broadcasts to
+            it. Left out, they start where a simulation of the world's seed would put them.
+        senses: What `reset` and `step` return: 'proximity', 'ambient' or both. `run` goes by its controller.
+        measures: What is measured step by step: see `values`. `run` has its own.
+        timing: The pace of the loop that drives them.
+        response: Response of the proximity sensors, if not that of the robots' files.
+        threads: How many threads; as many as the computer has cores if left out. Results do not depend on it.
+
+    Attributes:
+        lamps: x_mm, y_mm, power_w, and 1 for on or 0 for off, float64 [world, lamp, 4]. Write to it to move or switch.
+        notes: What the measures have noted step by step, one after the other, float64 [world, robot, note].
+
+    Raises:
+        ParameterError: If an argument is out of range or a start is not free.
+        ArenaError: If something has no free place where an arena puts it.
+
+    Example:
+        >>> import kiks
+        >>> @kiks.controller(parameters=2)
+        ... def ahead(sensors, memory, parameters, wheels):
+        ...     wheels[:] = parameters
+        >>> batch = kiks.Batch(kiks.Arena.box(1000, 1000), worlds=3, starts=(500, 500, 0))
+        >>> rollouts = batch.run(ahead, [[5, 5], [0, 0], [-5, 5]], seconds=1, measures=[kiks.measures.path_mm])
+        >>> rollouts.values[:, 0, 0].round(1)
+        array([34.6,  0. ,  0.5])
+    """
+
+    def __init__(
+        self,
+        arena: Arena | Sequence[Arena],
+        worlds: int,
+        *,
+        robot: str | RobotSpec | Sequence[Any] = "khepera",
+        robots: int = 1,
+        seed: int | ArrayLike = 0,
+        starts: ArrayLike | None = None,
+        senses: str | Sequence[str] = ("proximity",),
+        measures: Sequence[Measure] = (),
+        timing: Timing | None = None,
+        response: str | None = None,
+        threads: int | None = None,
+    ) -> None:
+        self.timing = Timing() if timing is None else timing
+        self._beginning = beginning = Beginning(arena, worlds, robot, robots, response)
+        self.arenas, self.arena_indices = beginning.arenas, beginning.arena_indices
+        self.specs, self.networks = beginning.specs, beginning.networks
+        self.world_count, self.robot_count = beginning.state.robots.shape
+        self.threads = (os.cpu_count() or 1) if threads is None else threads
+        if not isinstance(self.threads, int) or not 1 <= self.threads <= 4096:
+            raise ParameterError(f"threads must be a whole number from 1 to 4096, but it was {threads!r}.")
+        self.senses = check_senses(senses)
+        self.state = beginning.state
+        self.lamps = beginning.lamps.copy()
+        self.seeds = beginning.seeds_of(seed)
+        self._starts = beginning.starts_of(self.seeds, starts)
+        widths_mm, heights_mm = zip(*((each.width_mm, each.height_mm) for each in self.arenas), strict=True)
+        self._scene = make_scene(self.state, beginning.kinds, max(widths_mm), max(heights_mm))
+        self._line = self.timing.line(self.specs[0])
+        self._place = Alone if self.robot_count == 1 and not self.state.bodies.size else Together
+        self._ticks, self._begins_ns, self._watched_ns, self._sensed_ns, self._steps = (
+            np.zeros(self.world_count, np.int64) for _ in range(5)
+        )
+        self._sensors = np.zeros((self.world_count, self.robot_count, SENSOR_COUNT * len(self.senses)))
+        self._wheels = np.zeros((self.world_count, self.robot_count, 2))
+        self._watching = Watching(measures, self.senses, "the batch")
+        self.notes = np.zeros((self.world_count, self.robot_count, self._watching.note_count))
+        self._is_sensed = False
+        self._begin_again(np.arange(self.world_count))
+
+    # ---- all at once ----
+
+    def run(
+        self,
+        controller: Controller,
+        parameters: ArrayLike = (),
+        *,
+        seconds: float,
+        measures: Sequence[Measure] = (),
+    ) -> Rollouts:
+        """Let a controller drive all robots from their start on.
+
+        Args:
+            controller: The controller.
+            parameters: Its parameters: float64 [parameter] for all robots, [world, parameter] for all of a world, or
+                [world, robot, parameter].
+            seconds: No loop begins later than this [s].
+            measures: What is measured.
+
+        Raises:
+            ParameterError: If an argument is out of range, or Numba cannot compile the controller or a measure.
+        """
+        if not isinstance(controller, Controller):
+            raise ParameterError(
+                f"controller must be one that @kiks.controller has made, but it was {controller!r}. "
+                "Write @kiks.controller over the function."
+            )
+        if not (isinstance(seconds, int | float) and 0 <= seconds <= 1e9):
+            raise ParameterError(f"seconds must be from 0 to 1e9, but it was {seconds!r}.")
+        watching = Watching(measures, controller.senses, repr(controller.name))
+        given = controller.check_parameters(parameters)
+        if given.ndim == 2:
+            given = given[:, None, :]
+        shape = (self.world_count, self.robot_count)
+        try:
+            each_given = np.array(np.broadcast_to(given, (*shape, given.shape[-1])), order="C")
+        except ValueError:
+            raise ParameterError(
+                f"parameters must be [parameter], [world, parameter] or [world, robot, parameter] with {shape[0]} "
+                f"worlds and {shape[1]} robots, but their shape was {np.shape(parameters)}."
+            ) from None
+        self._begin_again(np.arange(self.world_count))
+        self._is_sensed = False
+        worlds = self._worlds(
+            sensors=np.zeros((*shape, controller.sensor_count)),
+            memory=np.zeros((*shape, controller.memory_count)),
+            parameters=each_given,
+            notes=np.zeros((*shape, watching.note_count)),
+        )
+        decider = decider_of(controller)
+        address, until_ns = address_of(decider, DECIDER), ns_from_s(seconds)
+        self._on_all_cores(worlds, controller.senses, (0, EVER), until_ns, address, watching.watchers)
+        return Rollouts(watching.values(worlds.notes), worlds.steps.copy())
+
+    # ---- step by step ----
+
+    def reset(
+        self,
+        worlds: ArrayLike | None = None,
+        *,
+        seeds: ArrayLike | None = None,
+        starts: ArrayLike | None = None,
+    ) -> NDArray[np.float64]:
+        """Put worlds back to their beginning and let their robots sense for the first time.
+
+        Args:
+            worlds: Which: numbers, or a bool for each; all if left out.
+            seeds: New seeds for these worlds, int64 [those worlds].
+            starts: New start poses for them, float64 [those worlds, robot, 3].
+
+        Returns:
+            What all robots of all worlds sensed last, float64 [world, robot, sensor]; a copy.
+
+        Raises:
+            ParameterError: If an argument is out of range or a start is not free.
+        """
+        chosen = np.arange(self.world_count) if worlds is None else np.arange(self.world_count)[np.asarray(worlds)]
+        chosen = np.atleast_1d(chosen)
+        if seeds is not None:
+            self.seeds[chosen] = self._beginning.check_seeds(seeds, len(chosen))
+        if starts is not None or seeds is not None:
+            self._starts[chosen] = self._beginning.starts_of(self.seeds[chosen], starts, chosen)
+        self._begin_again(chosen)
+        if len(chosen) and (self._is_sensed or worlds is None):
+            self._do_halves(0, 1, chosen)
+            self._is_sensed = self._is_sensed or worlds is None
+        return self._sensors.copy()
+
+    def step(self, wheels: ArrayLike) -> NDArray[np.float64]:
+        """Send all robots their speeds, wait for the next loop, and let them sense again.
+
+        Args:
+            wheels: Speeds of the left and right wheels [pulses/10 ms], float64 [world, robot, 2]; rounded and cut to
+                +-127 when they are sent.
+
+        Returns:
+            What the robots sensed, float64 [world, robot, sensor]; a copy.
+
+        Raises:
+            ParameterError: If the shape is another, or `reset` was not called before.
+        """
+        given = np.asarray(wheels, np.float64)
+        if given.shape != self._wheels.shape:
+            raise ParameterError(
+                f"wheels must be [world, robot, 2], here {self._wheels.shape}, but their shape was {given.shape}."
+            )
+        if not self._is_sensed:
+            raise ParameterError("reset() must be called before the first step(), and after a run().")
+        self._wheels[...] = given
+        self._do_halves(1, 3)
+        return self._sensors.copy()
+
+    # ---- what there is ----
+
+    @property
+    def times_s(self) -> NDArray[np.float64]:
+        """When the present loop of each world began [s], float64 [world]."""
+        return self._begins_ns / NS_PER_S
+
+    @property
+    def poses(self) -> NDArray[np.float64]:
+        """Where robots were at the end of the last tick, float64 [world, robot, 3]: x_mm, y_mm, heading_rad."""
+        robots = self.state.robots
+        return np.stack([robots["x_mm"], robots["y_mm"], robots["heading_rad"]], axis=-1)
+
+    @property
+    def values(self) -> NDArray[np.float64]:
+        """What the measures say of the steps that were done, float64 [world, robot, measure]."""
+        return self._watching.values(self.notes)
+
+    def state_hash(self, world: int) -> str:
+        """Return 16 hexadecimal digits that agree with those of a simulation in the same state.
+
+        Raises:
+            ParameterError: If there is no such world.
+        """
+        if not isinstance(world, int | np.integer) or not 0 <= world < self.world_count:
+            raise ParameterError(f"world must be from 0 to {self.world_count - 1}, but it was {world!r}.")
+        robots: Any = self.state.robots[world : world + 1].copy()
+        # A simulation numbers the kinds of its own robots alone.
+        kinds = robots["kind"][0].tolist()
+        robots["kind"] = [list(dict.fromkeys(kinds)).index(kind) for kind in kinds]
+        return State(robots, self.state.bodies[world : world + 1], int(self._ticks[world])).hash()
+
+    # ---- inside ----
+
+    def _begin_again(self, chosen: NDArray[np.int64]) -> None:
+        """Put worlds back to their beginning."""
+        self._beginning.put_back(self.state, chosen, self._starts[chosen])
+        for counted in (self._ticks, self._begins_ns, self._watched_ns, self._sensed_ns, self._steps):
+            counted[chosen] = 0
+        self.notes[chosen] = 0.0
+        enter_worlds(self._scene, chosen)
+
+    def _worlds(self, **given: NDArray[np.float64]) -> Any:
+        """Return all worlds as kernels see them."""
+        nothing = np.zeros((self.world_count, self.robot_count, 0))
+        arrays = {"sensors": self._sensors, "memory": nothing, "parameters": nothing, "notes": self.notes} | given
+        return Worlds(
+            self._scene,
+            self.lamps,
+            self.seeds,
+            self._ticks,
+            self._begins_ns,
+            self._watched_ns,
+            self._sensed_ns,
+            self._steps,
+            arrays["sensors"],
+            self._wheels,
+            arrays["memory"],
+            arrays["parameters"],
+            arrays["notes"],
+        )
+
+    def _do_halves(self, first: int, end: int, chosen: NDArray[np.int64] | None = None) -> None:
+        """Do halves of loops with the speeds that are given: even ones sense, odd ones act."""
+        watchers = self._watching.watchers
+        self._on_all_cores(
+            self._worlds(), self.senses, (first, end), EVER, 0, watchers, chosen=chosen, least=STEP_BLOCK
+        )
+
+    def _on_all_cores(
+        self,
+        worlds: Any,
+        senses: Sequence[str],
+        *more: Any,
+        chosen: NDArray[np.int64] | None = None,
+        least: int = LANES,
+    ) -> None:
+        """Let threads do `roll_out` on blocks of worlds, of so many worlds at least."""
+        codes = np.array([SENSES.index(sense) for sense in senses], np.int64)
+        blocks = list(self._blocks(np.arange(self.world_count) if chosen is None else chosen, least))
+        left = iter(blocks)
+
+        def work_off() -> None:
+            # Threads take blocks from one list until it is empty: an iterator gives each to one of them.
+            for (ground, sight), numbers in left:
+                place = self._place(ground, sight, self.networks, self._line, codes)
+                roll_out(place, worlds, bunch_size(place), numbers, *more)
+
+        helpers = [self._pool.submit(work_off) for _ in range(min(self.threads, len(blocks)) - 1)]
+        work_off()
+        for helper in helpers:
+            # One that has not begun by now finds nothing left, and never begins in a forked process.
+            if not helper.cancel():
+                helper.result()
+
+    @functools.cached_property
+    def _pool(self) -> ThreadPoolExecutor:
+        return ThreadPoolExecutor(self.threads)
+
+    def _blocks(self, chosen: NDArray[np.int64], least: int) -> Iterator[tuple[Any, NDArray[np.int64]]]:
+        """Cut worlds into blocks, each of one arena."""
+        length = max(-(-len(chosen) // (self.threads * BLOCKS_PER_THREAD)), least)
+        length = -(-length // LANES) * LANES  # all lanes of the processor have a world
+        for index, arena in enumerate(self.arenas):
+            walls = (arena.clearance, float(arena.mm_per_cell), PAD), sight_of(arena)
+            here = chosen[self.arena_indices[chosen] == index]
+            for first in range(0, len(here), length):
+                yield walls, np.ascontiguousarray(here[first : first + length])

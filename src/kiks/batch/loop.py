@@ -1,0 +1,220 @@
+"""The loop of a batch: sense, decide, act, watch, wait; for a bunch of worlds at once, again and again.
+
+A loop's instants are those of a program on serial lines (`kiks.batch.timing`), and all that happens at them is what
+happens in a `kiks.Simulation`: ticks that have begun are done, then the robot reads or obeys.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from kiks.batch.bunches import command, give_back, pass_to, read, show, take
+from kiks.batch.callbacks import call_decider, call_measure
+from kiks.batch.timing import ASK_LENGTH, acts_at, answer_length, order_length
+from kiks.control.controller import whole_speed
+from kiks.control.measure import Moment
+from kiks.engine.compiling import entry, kernel
+from kiks.model.robot import SENSOR_COUNT
+from kiks.units import NS_PER_S
+
+STATE_SIZE = 8
+"""Numbers in which a robot's part of a `Moment` is handed to those who watch."""
+
+
+@kernel
+def sense(place: Any, worlds: Any, bunch: Any, numbers: Any, is_on: Any, times_ns: Any, counts: Any) -> Any:
+    """Let the programs ask all robots for all that they sense, and wait for their replies.
+
+    Args:
+        place: Where the worlds are.
+        worlds: All worlds.
+        bunch: Those that are done at once.
+        numbers: Their numbers, int64 [W].
+        is_on: Which of them take part, bool [W].
+        times_ns: Room for a time of each, int64 [W].
+        counts: Room for a reading of each, int64 [W, 8].
+    """
+    robot_count = worlds.sensors.shape[1]
+    for k in range(numbers.shape[0]):
+        times_ns[k] = worlds.begins_ns[numbers[k]]
+        if is_on[k]:
+            worlds.sensed_ns[numbers[k]] = times_ns[k]
+    for number in range(place.sense_codes.shape[0]):
+        for k in range(numbers.shape[0]):
+            if is_on[k]:
+                times_ns[k] = acts_at(place.line, worlds.sensed_ns[numbers[k]], ASK_LENGTH)
+        pass_to(place, worlds, bunch, times_ns)
+        first = number * SENSOR_COUNT
+        for robot in range(robot_count):
+            read(place, worlds, bunch, place.sense_codes[number], times_ns, robot, counts)
+            for k in range(numbers.shape[0]):
+                if is_on[k]:
+                    world = numbers[k]
+                    for sensor in range(SENSOR_COUNT):
+                        worlds.sensors[world, robot, first + sensor] = counts[k, sensor]
+                    heard_ns = times_ns[k] + answer_length(counts[k]) * place.line.character_ns
+                    worlds.sensed_ns[world] = max(worlds.sensed_ns[world], heard_ns)
+
+
+@kernel
+def act(place: Any, worlds: Any, bunch: Any, numbers: Any, is_on: Any, times_ns: Any) -> Any:
+    """Let the programs send all robots their speeds, and note when the next loop begins; arguments as for `sense`.
+
+    The shorter a command the sooner it acts, and each must find its world as those before have left it. In `times_ns`
+    stands in the end when the last one acted.
+    """
+    line, wheels = place.line, worlds.wheels
+    for k in range(numbers.shape[0]):
+        times_ns[k] = worlds.begins_ns[numbers[k]]
+        if is_on[k]:
+            for robot in range(wheels.shape[1]):
+                for wheel in range(2):
+                    wheels[numbers[k], robot, wheel] = whole_speed(wheels[numbers[k], robot, wheel])
+    for turn in range(wheels.shape[1]):
+        for k in range(numbers.shape[0]):
+            if is_on[k]:
+                length = length_for(wheels, numbers[k], in_turn(wheels, numbers[k], turn))
+                times_ns[k] = acts_at(line, worlds.sensed_ns[numbers[k]], length)
+        pass_to(place, worlds, bunch, times_ns)
+        for k in range(numbers.shape[0]):
+            if is_on[k]:
+                robot = in_turn(wheels, numbers[k], turn)
+                left, right = wheels[numbers[k], robot, 0], wheels[numbers[k], robot, 1]
+                command(place, bunch, k, robot, np.int64(left), np.int64(right))
+    for k in range(numbers.shape[0]):
+        if is_on[k]:
+            world = numbers[k]
+            done_ns = times_ns[k] + line.done_length * line.character_ns
+            worlds.begins_ns[world] = max(done_ns, worlds.begins_ns[world] + line.period_ns)
+            worlds.steps[world] += 1
+
+
+@kernel
+def settle(place: Any, worlds: Any, bunch: Any, numbers: Any, times_ns: Any) -> Any:
+    """Let time pass up to the beginning of the next loop, and end the bunch; arguments as for `sense`."""
+    for k in range(numbers.shape[0]):
+        times_ns[k] = worlds.begins_ns[numbers[k]]
+    pass_to(place, worlds, bunch, times_ns)
+    give_back(place, worlds, bunch)
+
+
+@kernel
+def length_for(wheels: Any, world: Any, robot: Any) -> Any:
+    """Return the characters of the command that gives a robot its speeds."""
+    return order_length(np.int64(wheels[world, robot, 0]), np.int64(wheels[world, robot, 1]))
+
+
+@kernel
+def in_turn(wheels: Any, world: Any, turn: Any) -> Any:
+    """Return the robot of a world before whose command so many are shorter; of equal ones the first comes first."""
+    robot_count = wheels.shape[1]
+    if robot_count > 1:
+        for robot in range(robot_count):
+            length, before = length_for(wheels, world, robot), 0
+            for other in range(robot_count):
+                other_length = length_for(wheels, world, other)
+                before += other_length < length or (other_length == length and other < robot)
+            if before == turn:
+                return robot
+    return 0
+
+
+@kernel
+def bunch_up(block: Any, first: Any, numbers: Any, is_on: Any) -> Any:
+    """Choose the worlds of the next bunch; one that is not full repeats its last world, which then takes no part."""
+    for k in range(numbers.shape[0]):
+        numbers[k] = block[min(first + k, block.shape[0] - 1)]
+        is_on[k] = first + k < block.shape[0]
+
+
+@kernel
+def goes_on(worlds: Any, numbers: Any, is_on: Any, until_ns: Any) -> Any:
+    """Let only those worlds of a bunch take part whose next loop begins before a time [ns]; say whether one does."""
+    left = 0
+    for k in range(numbers.shape[0]):
+        is_on[k] = is_on[k] and worlds.begins_ns[numbers[k]] < until_ns
+        left += is_on[k]
+    return left > 0
+
+
+@kernel
+def look_on(
+    place: Any, worlds: Any, bunch: Any, numbers: Any, is_on: Any, times_ns: Any, state: Any, watchers: Any
+) -> Any:
+    """Let the measures look at the robots of a bunch.
+
+    Args:
+        place: Where the worlds are; this and the next ones as for `act`.
+        worlds: All worlds.
+        bunch: Those that are done at once.
+        numbers: Their numbers.
+        is_on: Which of them take part.
+        times_ns: When the last command acted.
+        state: Room for where a robot is and has been, float64 [`STATE_SIZE`].
+        watchers: The measures (`kiks.batch.callbacks.watchers_of`).
+    """
+    for k in range(numbers.shape[0]):
+        if is_on[k]:
+            world = numbers[k]
+            period_s = (times_ns[k] - worlds.watched_ns[world]) / NS_PER_S
+            worlds.watched_ns[world] = times_ns[k]
+            for robot in range(worlds.sensors.shape[1] if watchers.shape[0] > 0 else 0):
+                show(place, worlds, bunch, k, robot, state)
+                moment = Moment(
+                    times_ns[k] / NS_PER_S,
+                    period_s,
+                    worlds.sensors[world, robot],
+                    worlds.wheels[world, robot],
+                    state[0],
+                    state[1],
+                    state[2],
+                    state[3],
+                    state[4],
+                    state[5],
+                    state[6],
+                    state[7] > 0.0,
+                    worlds.scene[1][world],
+                    worlds.lamps[world],
+                )
+                for number in range(watchers.shape[0]):
+                    notes = worlds.notes[world, robot, watchers[number, 1] : watchers[number, 2]]
+                    call_measure(watchers[number, 0], (moment, notes))
+
+
+@entry
+def roll_out(
+    place: Any, worlds: Any, size: Any, block: Any, halves: Any, until_ns: Any, decider: Any, watchers: Any
+) -> Any:
+    """Do loops of the worlds of a block: all that begin before a time, or so many halves of them.
+
+    Args:
+        place: Where the worlds are.
+        worlds: All worlds.
+        size: How many of them are done at once.
+        block: Numbers of the worlds, int64 [world].
+        halves: Number of the first half to do, and of the first one not to do: even ones sense, odd ones act.
+        until_ns: The time [ns].
+        decider: Address of what calls a controller for each world of a bunch (`kiks.batch.callbacks`); 0 if the speeds
+            are given.
+        watchers: The measures (`kiks.batch.callbacks.watchers_of`).
+    """
+    numbers, is_on = np.empty(size, np.int64), np.empty(size, np.bool_)
+    times_ns, counts = np.empty(size, np.int64), np.zeros((size, SENSOR_COUNT), np.int64)
+    state = np.zeros(STATE_SIZE)
+    for first in range(0, block.shape[0], size):
+        bunch_up(block, first, numbers, is_on)
+        bunch = take(place, worlds, numbers)
+        for half in range(halves[0], halves[1]):
+            if half % 2 == 0:
+                if not goes_on(worlds, numbers, is_on, until_ns):
+                    break
+                sense(place, worlds, bunch, numbers, is_on, times_ns, counts)
+                if decider != 0:
+                    given = worlds.sensors, worlds.memory, worlds.parameters, worlds.wheels
+                    call_decider(decider, (numbers, is_on, *given))
+            else:
+                act(place, worlds, bunch, numbers, is_on, times_ns)
+                look_on(place, worlds, bunch, numbers, is_on, times_ns, state, watchers)
+        settle(place, worlds, bunch, numbers, times_ns)

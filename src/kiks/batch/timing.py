@@ -1,0 +1,99 @@
+"""When a program that drives robots over serial lines senses and acts: the milliseconds of every exchange.
+
+A loop of that program: it sends each sense's command to all its robots and reads all replies; decides; sends each robot
+its speeds and reads the replies; and waits until its period is over, if it is not already.
+
+A command acts when its last character has arrived and been processed; its reply begins then. A character takes 11 bit
+times, so how long a loop takes depends on what the robots say: `n,0,...` is shorter than `n,1023,...`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import namedtuple
+from dataclasses import dataclass
+from typing import Any
+
+from kiks.engine.compiling import kernel
+from kiks.errors import ParameterError
+from kiks.model.robot import RobotSpec
+from kiks.units import character_ns, ns_from_s
+
+Line: Any = namedtuple("Line", ("character_ns", "processing_ns", "think_ns", "period_ns", "done_length"))
+"""What kernels know of it: times [ns], and the characters of the reply to D."""
+
+ASK_LENGTH = 2
+"""Characters of a sense's command: its letter and a line feed."""
+
+
+@dataclass(frozen=True)
+class Timing:
+    """The pace of a control loop.
+
+    Args:
+        period_s: Time from the beginning of one loop to that of the next [s]; a loop that takes longer is followed by
+            the next one at once.
+        baud: Speed of the lines [bit/s]; None for a robot that senses and acts at once, without a line.
+        think_s: What the program needs before each command [s], as thinking 'fixed' has it.
+
+    Raises:
+        ParameterError: If a number is out of range.
+
+    Example:
+        >>> Timing(period_s=0.05, baud=None)
+        Timing(period_s=0.05, baud=None, think_s=0.0)
+    """
+
+    period_s: float = 0.1
+    baud: int | None = 9600
+    think_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, least in (("period_s", 0.01 if self.baud is None else 0.0), ("think_s", 0.0)):
+            value = getattr(self, name)
+            if not (isinstance(value, int | float) and math.isfinite(value) and least <= value <= 1000):
+                raise ParameterError(f"{name} must be from {least:g} to 1000 s, but it was {value!r}.")
+        if self.baud is not None and not (isinstance(self.baud, int) and 110 <= self.baud <= 10_000_000):
+            raise ParameterError(
+                f"baud must be from 110 to 10000000 bit/s, or None for no line, but it was {self.baud!r}. "
+                "The Khepera knows 9600, 19200, 38400 and 57600."
+            )
+
+    def line(self, spec: RobotSpec) -> Any:
+        """Return what kernels need to know of the line to a robot of a kind."""
+        has_line = self.baud is not None
+        return Line(
+            character_ns(self.baud) if self.baud is not None else 0,
+            ns_from_s(spec.firmware.processing_ms * 1e-3) if has_line else 0,
+            ns_from_s(self.think_s),
+            ns_from_s(self.period_s),
+            4 if spec.quirks.d_reply_trailing_comma else 3,
+        )
+
+
+@kernel
+def digit_count(number: Any) -> Any:
+    """Return how many characters a whole number of at most four digits takes, with its sign."""
+    size = abs(number)
+    return 1 + (size >= 10) + (size >= 100) + (size >= 1000) + (number < 0)
+
+
+@kernel
+def answer_length(counts: Any) -> Any:
+    """Return the characters of a sense's reply: its letter, a comma before each count, and CR LF."""
+    length = 3 + counts.shape[0]
+    for k in range(counts.shape[0]):
+        length += digit_count(counts[k])
+    return length
+
+
+@kernel
+def order_length(left: Any, right: Any) -> Any:
+    """Return the characters of `D,left,right` and a line feed."""
+    return 4 + digit_count(left) + digit_count(right)
+
+
+@kernel
+def acts_at(line: Any, now_ns: Any, length: Any) -> Any:
+    """Return when a command of so many characters acts, if the program begins to think of it now [ns]."""
+    return now_ns + line.think_ns + length * line.character_ns + line.processing_ns

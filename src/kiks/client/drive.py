@@ -1,0 +1,139 @@
+"""A controller at the wheel of robots on ports, simulated or real: the loop that a batch does ten thousand times."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kiks.client.khepera import Khepera, Port
+from kiks.control.controller import Controller, whole_speeds
+from kiks.errors import ParameterError
+from kiks.model.robot import SENSOR_COUNT
+from kiks.units import ns_from_s, s_from_ns
+
+COMMANDS = {"proximity": b"N\n", "ambient": b"O\n"}
+"""What is sent for each sense of `kiks.control.controller.SENSES`."""
+
+
+def drive(
+    port: str | Port | Sequence[str | Port],
+    controller: Controller,
+    parameters: ArrayLike = (),
+    *,
+    seconds: float,
+    period_s: float = 0.1,
+    baud: int = 9600,
+) -> int:
+    """Let a controller drive: ask for what it senses, let it decide, send the speeds, wait; again and again.
+
+    In a batch of the same timing (`kiks.Timing`) the same controller drives a robot of the same seed the same way, to
+    the bit. The robots are stopped at the end, also after an error.
+
+    Args:
+        port: What `kiks.Khepera` takes: a simulation's port, a port's name, or an open port. Several of them are
+            driven by one program, each robot with its own memory.
+        controller: The controller.
+        parameters: Its parameters, float64 [parameter], or [robot, parameter].
+        seconds: No loop begins later than this [s].
+        period_s: Time from the beginning of one loop to that of the next [s]; at once if a loop takes longer.
+        baud: Speed of ports that are opened by name [bit/s].
+
+    Returns:
+        How many loops there were.
+
+    Raises:
+        ParameterError: If a number is out of range.
+        LinkError: If a port cannot be opened, or a robot does not answer as it should.
+
+    Example:
+        >>> import kiks
+        >>> @kiks.controller
+        ... def ahead(sensors, memory, parameters, wheels):
+        ...     wheels[:] = 5.0
+        >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+        >>> kiks.drive(sim.port(1), ahead, seconds=1.0)
+        10
+    """
+    if not (isinstance(seconds, int | float) and math.isfinite(seconds) and seconds >= 0):
+        raise ParameterError(f"seconds must be a finite number of at least 0, but it was {seconds!r}.")
+    driver = Driver(port, controller, parameters, period_s=period_s, baud=baud)
+    until_ns = driver.begin_ns + ns_from_s(seconds)
+    try:
+        while driver.begin_ns < until_ns:
+            driver.step()
+    finally:
+        driver.stop()
+    return driver.loop_count
+
+
+class Driver:
+    """A controller at the wheel, loop by loop; arguments as for `drive`.
+
+    Attributes:
+        begin_ns: When the next loop begins, in the robots' time [ns].
+        loop_count: How many loops there were.
+
+    Raises:
+        ParameterError: If a number is out of range.
+        LinkError: If a port cannot be opened.
+    """
+
+    def __init__(
+        self,
+        port: str | Port | Sequence[str | Port],
+        controller: Controller,
+        parameters: ArrayLike = (),
+        *,
+        period_s: float = 0.1,
+        baud: int = 9600,
+    ) -> None:
+        if not (isinstance(period_s, int | float) and math.isfinite(period_s) and period_s >= 0):
+            raise ParameterError(f"period_s must be a finite number of at least 0, but it was {period_s!r}.")
+        ports = [port] if isinstance(port, str) or not isinstance(port, Sequence) else list(port)
+        if not ports:
+            raise ParameterError("port must be one or more robots' ports, but there was none.")
+        self._controller = controller
+        given = controller.check_parameters(parameters)
+        self._given = np.array(np.broadcast_to(given, (len(ports), given.shape[-1])), order="C")
+        self._sensors = np.zeros((len(ports), controller.sensor_count))
+        self._memory = np.zeros((len(ports), controller.memory_count))
+        self._wheels = np.zeros((len(ports), 2))
+        for k in range(len(ports)):  # a controller that cannot be compiled is refused before a robot stirs
+            controller(self._sensors[k], self._memory[k].copy(), self._given[k], self._wheels[k])
+        self._wheels[:] = 0.0
+        self._robots = [Khepera(each, baud=baud) for each in ports]
+        self._period_ns, self.begin_ns = ns_from_s(period_s), ns_from_s(self._robots[0].time_s)
+        self.loop_count = 0
+
+    def step(self) -> None:
+        """Do a loop, and wait until it is over.
+
+        Raises:
+            LinkError: If a robot does not answer as it should.
+        """
+        robots, sensors, wheels = self._robots, self._sensors, self._wheels
+        for number, sense in enumerate(self._controller.senses):
+            first = number * SENSOR_COUNT
+            for robot in robots:
+                robot.port.write(COMMANDS[sense])
+            for k, robot in enumerate(robots):
+                sensors[k, first : first + SENSOR_COUNT] = robot.hear_numbers(COMMANDS[sense], SENSOR_COUNT)
+        for k, robot in enumerate(robots):
+            self._controller(sensors[k], self._memory[k], self._given[k], wheels[k])
+            wheels[k] = whole_speeds(wheels[k])
+            robot.port.write(b"D,%d,%d\n" % tuple(wheels[k]))
+        for robot in robots:
+            robot.hear_done(b"D\n")
+        self.loop_count += 1
+        now_ns = ns_from_s(robots[0].time_s)
+        if self.begin_ns + self._period_ns > now_ns:
+            robots[0].pause(s_from_ns(self.begin_ns + self._period_ns - now_ns))
+        self.begin_ns = max(self.begin_ns + self._period_ns, now_ns)
+
+    def stop(self) -> None:
+        """Stop the robots."""
+        for robot in self._robots:
+            robot.stop()

@@ -1,0 +1,1 @@
+"""What decides in a batch: controllers, from readings to speeds, and measures of how well they do."""

@@ -1,0 +1,176 @@
+"""Controllers: plain functions from what a robot senses to the speeds of its wheels.
+
+The same function runs compiled in a batch and drives one robot on any port, simulated or real (`kiks.drive`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kiks.control.functions import Compiled, check_count
+from kiks.control.recipes import recipe_of
+from kiks.engine.compiling import entry, kernel
+from kiks.engine.motor import SPEED_MAX
+from kiks.errors import ParameterError, nearest
+from kiks.model.robot import SENSOR_COUNT
+
+SENSES = ("proximity", "ambient")
+"""What a controller may sense: eight counts each, by the commands N and O."""
+
+ARGUMENTS = ("sensors", "memory", "parameters", "wheels")
+
+
+class Controller(Compiled):
+    """A function `(sensors, memory, parameters, wheels)` of four float64 arrays that writes the last.
+
+    It is called once a control step. `sensors` has eight counts for each sense, in the order of `senses`, clockwise
+    from the left; `memory` is zeros at the start and its own from then on; `wheels` takes the speeds of the left and
+    right wheel [pulses/10 ms], which are rounded and cut to +-127 when they are sent.
+
+    Attributes:
+        senses: What it senses, of `SENSES`.
+        memory_count: Numbers that it remembers.
+        parameter_count: Numbers that make one such controller differ from another; None if any count will do.
+        recipe: What a file says to make it again (`kiks.controllers.from_recipe`), of what JSON knows;
+            None for a function inside another, or one that was typed into a console.
+
+    Example:
+        >>> import numpy as np
+        >>> import kiks
+        >>> @kiks.controller(parameters=1)
+        ... def shy(sensors, memory, parameters, wheels):
+        ...     wheels[0] = wheels[1] = 5.0 - parameters[0] * sensors[2]
+        >>> wheels = np.zeros(2)
+        >>> shy(np.full(8, 100.0), np.zeros(0), np.array([0.1]), wheels)
+        >>> wheels
+        array([-5., -5.])
+    """
+
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        *,
+        senses: Sequence[str] = ("proximity",),
+        memory: int = 0,
+        parameters: int | None = None,
+        recipe: Mapping[str, Any] | None = None,
+    ) -> None:
+        super().__init__(function, what="controller", arguments=ARGUMENTS)
+        self.senses = check_senses(senses)
+        if not self.senses:
+            raise ParameterError("senses must name one sense at least, but there was none.")
+        self.memory_count = check_count("memory", memory)
+        self.parameter_count = None if parameters is None else check_count("parameters", parameters)
+        self.recipe = recipe_of(function) if recipe is None else dict(recipe)
+
+    @property
+    def sensor_count(self) -> int:
+        """How many counts it senses."""
+        return SENSOR_COUNT * len(self.senses)
+
+    def __call__(
+        self,
+        sensors: NDArray[np.float64],
+        memory: NDArray[np.float64],
+        parameters: NDArray[np.float64],
+        wheels: NDArray[np.float64],
+    ) -> None:
+        """Decide once, by the same machine code as in a batch.
+
+        Raises:
+            ParameterError: If Numba cannot compile the function.
+        """
+        from numba.core.errors import NumbaError
+
+        try:
+            self.kernel(sensors, memory, parameters, wheels)
+        except NumbaError as error:
+            raise self.refused(error) from None
+
+    def check_parameters(self, parameters: ArrayLike) -> NDArray[np.float64]:
+        """Return parameters as float64, their last axis one controller's.
+
+        Raises:
+            ParameterError: If they are no finite numbers, or not as many as the controller has.
+        """
+        try:
+            given = np.ascontiguousarray(parameters, np.float64)
+        except (TypeError, ValueError):
+            raise ParameterError(f"parameters must be numbers, but they were {parameters!r:.60}.") from None
+        given = given.reshape(1) if given.ndim == 0 else given
+        if self.parameter_count not in (None, given.shape[-1]):
+            raise ParameterError(
+                f"the controller {self.name!r} must be given {self.parameter_count} parameters, but got "
+                f"{given.shape[-1]} (shape {given.shape}; the last axis is one controller's)."
+            )
+        if not np.isfinite(given).all():
+            raise ParameterError("parameters must be finite numbers, but some were infinite or no numbers.")
+        return given
+
+
+@overload
+def controller(function: Callable[..., Any]) -> Controller: ...
+@overload
+def controller(
+    *, senses: Sequence[str] = ..., memory: int = ..., parameters: int | None = ...
+) -> Callable[[Callable[..., Any]], Controller]: ...
+def controller(
+    function: Callable[..., Any] | None = None,
+    *,
+    senses: Sequence[str] = ("proximity",),
+    memory: int = 0,
+    parameters: int | None = None,
+) -> Any:
+    """Make a controller of a function; a decorator, with or without arguments.
+
+    Args:
+        function: A function `(sensors, memory, parameters, wheels)`; see `Controller`.
+        senses: What it senses: 'proximity', 'ambient' or both.
+        memory: How many numbers it remembers.
+        parameters: How many parameters it has; any count if left out.
+
+    Raises:
+        ParameterError: If it is no such function or an argument is out of range.
+    """
+
+    def make(function: Callable[..., Any]) -> Controller:
+        return Controller(function, senses=senses, memory=memory, parameters=parameters)
+
+    return make if function is None else make(function)
+
+
+@kernel
+def whole_speed(wanted: Any) -> Any:
+    """Return the speed that is sent for a wanted one [pulses/10 ms]: rounded, within what the robot takes."""
+    if math.isnan(wanted):
+        return np.int64(0)
+    return np.int64(np.rint(min(max(wanted, -float(SPEED_MAX)), float(SPEED_MAX))))
+
+
+@entry
+def whole_speeds(wheels: Any) -> Any:
+    """Return the speeds that are sent for two wanted ones [pulses/10 ms]."""
+    return whole_speed(wheels[0]), whole_speed(wheels[1])
+
+
+def check_senses(senses: str | Sequence[str]) -> tuple[str, ...]:
+    """Return some of `SENSES`.
+
+    Raises:
+        ParameterError: If there is another among them, or one twice.
+    """
+    given = (senses,) if isinstance(senses, str) else tuple(senses)
+    for sense in given:
+        if sense not in SENSES:
+            raise ParameterError(
+                f"senses must be some of {', '.join(SENSES)}, but {sense!r} was among them."
+                f"{nearest(str(sense), SENSES)}"
+            )
+    if len(set(given)) != len(given):
+        raise ParameterError(f"senses must name each sense once, but they were {given}.")
+    return given

@@ -1,0 +1,123 @@
+"""Measures: functions that watch a robot in a batch and say how well, how far or where it went."""
+
+from __future__ import annotations
+
+from collections import namedtuple
+from collections.abc import Callable, Sequence
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.control.controller import check_senses
+from kiks.control.functions import Compiled, check_count
+from kiks.errors import ParameterError
+
+Moment: Any = namedtuple(
+    "Moment",
+    (
+        "time_s",
+        "period_s",
+        "sensors",
+        "wheels",
+        "x_mm",
+        "y_mm",
+        "heading_rad",
+        "start_x_mm",
+        "start_y_mm",
+        "path_mm",
+        "contact_count",
+        "is_touching",
+        "bodies",
+        "lamps",
+    ),
+)
+"""What a measure sees of one robot in a control step, as its command takes effect.
+
+* time_s: simulated time [s];
+* period_s: how long it was since the last time, the first counts from 0 [s];
+* sensors: what the controller was given, float64;
+* wheels: the speeds that were sent, left and right [pulses/10 ms], float64;
+* x_mm, y_mm, heading_rad: where the robot is;
+* start_x_mm, start_y_mm: where it began;
+* path_mm: how far it has driven so far, ahead and back together [mm];
+* contact_count: how often it has met something so far;
+* is_touching: whether it does now, or did within the last 0.2 s;
+* bodies: records of `kiks.engine.state.BODY`, balls and cylinders of its world;
+* lamps: x [mm], y [mm], power [W] and 1 for on or 0 for off, float64 [lamp, 4].
+"""
+
+Result = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+
+def first_note(notes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the first of a measure's notes."""
+    return notes[..., 0]
+
+
+class Measure(Compiled):
+    """A function `(moment, notes)` that is called in each control step and writes into its notes.
+
+    Attributes:
+        note_count: Numbers that it keeps for each robot, zeros at the start.
+        result: From the notes at the end, float64 [..., note], to the values, float64 [...].
+        senses: What it wants to find first in `moment.sensors`; controllers that sense otherwise are refused.
+
+    Raises:
+        ParameterError: If it is no such function or an argument is out of range.
+    """
+
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        *,
+        notes: int = 1,
+        result: Result = first_note,
+        senses: Sequence[str] = (),
+    ) -> None:
+        super().__init__(function, what="measure", arguments=("moment", "notes"))
+        self.note_count = check_count("notes", notes, least=1)
+        if not callable(result):
+            raise ParameterError(f"result must be a function from notes to values, but it was {result!r}.")
+        self.result = result
+        self.senses = check_senses(senses)
+
+
+@overload
+def measure(function: Callable[..., Any]) -> Measure: ...
+@overload
+def measure(
+    *, notes: int = ..., result: Result = ..., senses: Sequence[str] = ...
+) -> Callable[[Callable[..., Any]], Measure]: ...
+def measure(
+    function: Callable[..., Any] | None = None,
+    *,
+    notes: int = 1,
+    result: Result = first_note,
+    senses: Sequence[str] = (),
+) -> Any:
+    """Make a measure of a function; a decorator, with or without arguments.
+
+    Args:
+        function: A function `(moment, notes)`; see `Moment` for what it sees.
+        notes: How many numbers it keeps for each robot, zeros at the start.
+        result: From the notes at the end, float64 [..., note], to the values, float64 [...]; the first if left out.
+        senses: What it wants to find first in `moment.sensors`: 'proximity', 'ambient' or both.
+
+    Raises:
+        ParameterError: If it is no such function or an argument is out of range.
+
+    Example:
+        >>> import kiks
+        >>> @kiks.measure
+        ... def farthest_mm(moment, notes):
+        ...     way = ((moment.x_mm - moment.start_x_mm) ** 2 + (moment.y_mm - moment.start_y_mm) ** 2) ** 0.5
+        ...     notes[0] = max(notes[0], way)
+        >>> farthest_mm.note_count
+        1
+    """
+
+    def make(function: Callable[..., Any]) -> Measure:
+        return Measure(function, notes=notes, result=result, senses=senses)
+
+    return make if function is None else make(function)

@@ -1,0 +1,321 @@
+"""The measures that come with KiKS: how far, how well and where a robot went.
+
+Speeds are those that were sent, in pulses/10 ms; 1 pulse/10 ms is 8 mm/s. A mean is one over control steps. Functions
+in brackets return the same measure for the same arguments.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.control.functions import check_number
+from kiks.control.measure import Measure, measure
+from kiks.engine.compiling import kernel
+from kiks.errors import ParameterError
+from kiks.model.arena import Arena
+
+FULL_SPEED = 10.0
+"""Speed that counts as 1 [pulses/10 ms]: 80 mm/s, at which Floreano and Mondada's robot drove at most."""
+
+FULL_COUNT = 1023.0
+"""Proximity that counts as 1 (khepera-protocol.md 8.4)."""
+
+PLACE_LIMIT_MM, SQUARE_LIMIT = 1e6, 1_000_000
+
+_BITS = 52
+"""Yes-or-no answers in a note, which holds whole numbers up to 2^53."""
+
+
+def mean(notes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the first note's share of the second, a count or a time; 0 of none."""
+    shares: NDArray[np.float64] = np.zeros(notes.shape[:-1])
+    np.divide(notes[..., 0], notes[..., 1], out=shares, where=notes[..., 1] > 0)
+    return shares
+
+
+# ---- how far ----
+
+
+@measure
+def path_mm(moment: Any, notes: Any) -> None:
+    """How far it has driven, ahead and back together [mm]."""
+    notes[0] = moment.path_mm
+
+
+@measure
+def net_mm(moment: Any, notes: Any) -> None:
+    """How far it is from its start, straight [mm]."""
+    notes[0] = distance_mm(moment, moment.start_x_mm, moment.start_y_mm)
+
+
+@measure(notes=2, result=mean)
+def straightness(moment: Any, notes: Any) -> None:
+    """`net_mm` as a share of `path_mm`: 1 for a straight line, 0 for a circle."""
+    notes[0], notes[1] = distance_mm(moment, moment.start_x_mm, moment.start_y_mm), moment.path_mm
+
+
+@measure(notes=2, result=mean)
+def speed_pulses(moment: Any, notes: Any) -> None:
+    """Mean of the wheels' speeds, ahead positive [pulses/10 ms]."""
+    notes[0] += 0.5 * (moment.wheels[0] + moment.wheels[1])
+    notes[1] += 1.0
+
+
+@measure
+def turned_pulses(moment: Any, notes: Any) -> None:
+    """What both wheels were told to turn, ahead or back [pulses]: a stand-in for the energy that it took."""
+    notes[0] += 100.0 * moment.period_s * (abs(moment.wheels[0]) + abs(moment.wheels[1]))
+
+
+# ---- how well ----
+
+
+@measure
+def contacts(moment: Any, notes: Any) -> None:
+    """How often it has met something."""
+    notes[0] = moment.contact_count
+
+
+@measure(notes=2, result=mean)
+def touching_share(moment: Any, notes: Any) -> None:
+    """Share of control steps in which it touched something, or had within 0.2 s."""
+    notes[0] += 1.0 if moment.is_touching else 0.0
+    notes[1] += 1.0
+
+
+@measure(notes=2, result=mean, senses=("proximity",))
+def avoidance(moment: Any, notes: Any) -> None:
+    """Mean of V (1 - sqrt(D)) (1 - i): fast, straight, and far from everything.
+
+    V is the mean of the wheels' absolute speeds, D half of how much they differ with their signs, i the highest
+    proximity count; each from 0 to 1, a speed of 80 mm/s and 1023 counts being 1 (Floreano and Mondada, Automatic
+    creation of an autonomous agent, From Animals to Animats 3, 1994, equation 1). That V is of absolute speeds is our
+    reading of it.
+    """
+    highest = 0.0
+    for k in range(8):
+        highest = max(highest, moment.sensors[k])
+    left, right = share_of_full(moment.wheels[0]), share_of_full(moment.wheels[1])
+    straight = 1.0 - np.sqrt(0.5 * abs(left - right))
+    notes[0] += 0.5 * (abs(left) + abs(right)) * straight * (1.0 - min(highest / FULL_COUNT, 1.0))
+    notes[1] += 1.0
+
+
+def wall_following(side: str = "left", *, counts: float = 300.0) -> Measure:
+    """Mean of V (1 - sqrt(D)) w: fast ahead, straight, with a wall beside it, neither too near nor too far.
+
+    V is the mean of the wheels' speeds, 0 if the robot drives back, D as in `avoidance`. w is 1 where the sensor on
+    that side reads `counts`, and falls in straight lines to 0 at no counts and at 1023. A measure of our own.
+
+    Args:
+        side: 'left' or 'right'.
+        counts: The proximity to keep.
+
+    Raises:
+        ParameterError: If an argument is out of range.
+    """
+    if side not in ("left", "right"):
+        raise ParameterError(f"side must be 'left' or 'right', but it was {side!r}.")
+    return _wall_following(0 if side == "left" else 5, check_number("counts", counts, 1, FULL_COUNT - 1))
+
+
+@functools.lru_cache(maxsize=256)
+def _wall_following(sensor: int, counts: float) -> Measure:
+    @measure(notes=2, result=mean, senses=("proximity",))
+    def wall_following(moment: Any, notes: Any) -> None:
+        found = min(moment.sensors[sensor], FULL_COUNT)
+        beside = found / counts if found < counts else (FULL_COUNT - found) / (FULL_COUNT - counts)
+        left, right = share_of_full(moment.wheels[0]), share_of_full(moment.wheels[1])
+        notes[0] += max(0.5 * (left + right), 0.0) * (1.0 - np.sqrt(0.5 * abs(left - right))) * beside
+        notes[1] += 1.0
+
+    return wall_following
+
+
+# ---- where ----
+
+
+@measure
+def final_x_mm(moment: Any, notes: Any) -> None:
+    """Where it is [mm]; with `final_y_mm` a description of what it did, for novelty and quality-diversity search."""
+    notes[0] = moment.x_mm
+
+
+@measure
+def final_y_mm(moment: Any, notes: Any) -> None:
+    """Where it is [mm]."""
+    notes[0] = moment.y_mm
+
+
+def coverage(arena: Arena, *, square_mm: float = 100.0) -> Measure:
+    """Share of an arena's squares in which the robot's middle was seen, once a control step.
+
+    Args:
+        arena: The arena; squares that are all wall count, too.
+        square_mm: Edge of a square [mm].
+
+    Raises:
+        ParameterError: If an argument is out of range or there are more than a million squares.
+    """
+    edge_mm = check_number("square_mm", square_mm, 1, PLACE_LIMIT_MM)
+    columns, rows = int(np.ceil(arena.width_mm / edge_mm)), int(np.ceil(arena.height_mm / edge_mm))
+    if columns * rows > SQUARE_LIMIT:
+        raise ParameterError(
+            f"coverage must have at most {SQUARE_LIMIT} squares, but {edge_mm:g} mm makes {columns} x {rows}. "
+            "Give larger squares."
+        )
+    return _coverage(columns, rows, edge_mm)
+
+
+@functools.lru_cache(maxsize=256)
+def _coverage(columns: int, rows: int, edge_mm: float) -> Measure:
+    def share(notes: NDArray[np.float64]) -> NDArray[np.float64]:
+        shares: NDArray[np.float64] = np.bitwise_count(notes.astype(np.int64)).sum(axis=-1) / (columns * rows)
+        return shares
+
+    @measure(notes=-(-columns * rows // _BITS), result=share)
+    def coverage(moment: Any, notes: Any) -> None:
+        column = min(max(int(moment.x_mm / edge_mm), 0), columns - 1)
+        square = min(max(int(moment.y_mm / edge_mm), 0), rows - 1) * columns + column
+        bit = np.int64(1) << np.int64(square % _BITS)
+        notes[square // _BITS] = float(np.int64(notes[square // _BITS]) | bit)
+
+    return coverage
+
+
+def goal_mm(x_mm: float, y_mm: float) -> Measure:
+    """How far it is from a place [mm].
+
+    Raises:
+        ParameterError: If an argument is out of range.
+    """
+    return _goal_mm(_place("x_mm", x_mm), _place("y_mm", y_mm))
+
+
+@functools.lru_cache(maxsize=256)
+def _goal_mm(x_mm: float, y_mm: float) -> Measure:
+    @measure
+    def goal_mm(moment: Any, notes: Any) -> None:
+        notes[0] = distance_mm(moment, x_mm, y_mm)
+
+    return goal_mm
+
+
+def reached_s(x_mm: float, y_mm: float, *, radius_mm: float = 50.0) -> Measure:
+    """When it first came within a radius of a place [s]; if it never did, how long it has tried.
+
+    Raises:
+        ParameterError: If an argument is out of range.
+    """
+    return _reached_s(_place("x_mm", x_mm), _place("y_mm", y_mm), _radius(radius_mm))
+
+
+@functools.lru_cache(maxsize=256)
+def _reached_s(x_mm: float, y_mm: float, radius_mm: float) -> Measure:
+    @measure(notes=2)
+    def reached_s(moment: Any, notes: Any) -> None:
+        if notes[1] == 0.0:
+            notes[0] = moment.time_s
+            notes[1] = 1.0 if distance_mm(moment, x_mm, y_mm) <= radius_mm else 0.0
+
+    return reached_s
+
+
+# ---- what is about ----
+
+
+@measure
+def light_mm(moment: Any, notes: Any) -> None:
+    """How far the nearest lamp that burns is [mm]; infinite if there is none."""
+    notes[0] = nearest_lamp_mm(moment)
+
+
+def near_light_share(radius_mm: float = 100.0) -> Measure:
+    """Share of control steps in which it was within a radius of a lamp that burns.
+
+    Raises:
+        ParameterError: If the radius is out of range.
+    """
+    return _near_light_share(_radius(radius_mm))
+
+
+@functools.lru_cache(maxsize=256)
+def _near_light_share(radius_mm: float) -> Measure:
+    @measure(notes=2, result=mean)
+    def near_light_share(moment: Any, notes: Any) -> None:
+        notes[0] += 1.0 if nearest_lamp_mm(moment) <= radius_mm else 0.0
+        notes[1] += 1.0
+
+    return near_light_share
+
+
+def gathered(x_mm: float, y_mm: float, *, radius_mm: float = 150.0) -> Measure:
+    """How many balls and cylinders have their middle within a radius of a place.
+
+    Raises:
+        ParameterError: If an argument is out of range.
+    """
+    return _gathered(_place("x_mm", x_mm), _place("y_mm", y_mm), _radius(radius_mm))
+
+
+@functools.lru_cache(maxsize=256)
+def _gathered(x_mm: float, y_mm: float, radius_mm: float) -> Measure:
+    @measure
+    def gathered(moment: Any, notes: Any) -> None:
+        notes[0] = 0.0
+        for body in moment.bodies:
+            across, up = body.x_mm - x_mm, body.y_mm - y_mm
+            notes[0] += 1.0 if across * across + up * up <= radius_mm * radius_mm else 0.0
+
+    return gathered
+
+
+@measure
+def spread_mm(moment: Any, notes: Any) -> None:
+    """How far balls and cylinders are from the middle of them all [mm], root mean square; 0 of none."""
+    count = moment.bodies.shape[0]
+    x_mm, y_mm, squares = 0.0, 0.0, 0.0
+    for body in moment.bodies:
+        x_mm += body.x_mm / count
+        y_mm += body.y_mm / count
+    for body in moment.bodies:
+        squares += ((body.x_mm - x_mm) * (body.x_mm - x_mm) + (body.y_mm - y_mm) * (body.y_mm - y_mm)) / count
+    notes[0] = np.sqrt(squares)
+
+
+# ---- what they are made of ----
+
+
+@kernel
+def distance_mm(moment: Any, x_mm: Any, y_mm: Any) -> Any:
+    """Return how far the robot is from a place."""
+    across, up = moment.x_mm - x_mm, moment.y_mm - y_mm
+    return np.sqrt(across * across + up * up)
+
+
+@kernel
+def share_of_full(speed: Any) -> Any:
+    """Return a speed as a share of `FULL_SPEED`, cut to +-1."""
+    return min(max(speed / FULL_SPEED, -1.0), 1.0)
+
+
+@kernel
+def nearest_lamp_mm(moment: Any) -> Any:
+    """Return how far the nearest lamp that burns is; infinite if there is none."""
+    nearest = np.inf
+    for lamp in range(moment.lamps.shape[0]):
+        if moment.lamps[lamp, 3] != 0.0 and moment.lamps[lamp, 2] > 0.0:
+            nearest = min(nearest, distance_mm(moment, moment.lamps[lamp, 0], moment.lamps[lamp, 1]))
+    return nearest
+
+
+def _place(name: str, value: object) -> float:
+    return check_number(name, value, -PLACE_LIMIT_MM, PLACE_LIMIT_MM)
+
+
+def _radius(value: object) -> float:
+    return check_number("radius_mm", value, 0, PLACE_LIMIT_MM)

@@ -1,0 +1,233 @@
+"""A batch: the same whatever the number of threads, the blocks and the processor; and clear words for what is wrong."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+
+import kiks
+from kiks.batch import batch as batch_module
+from kiks.batch.beginning import random_starts
+from kiks.model.family import family
+from kiks.model.places import Ball, Lamp
+
+
+@kiks.controller(parameters=2)
+def vehicle(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+    """Drive at a speed, and turn away from what is near."""
+    near = sensors[0] + 2.0 * sensors[1] + 3.0 * sensors[2] - 3.0 * sensors[3] - 2.0 * sensors[4] - sensors[5]
+    wheels[0] = parameters[0] + parameters[1] * near
+    wheels[1] = parameters[0] - parameters[1] * near
+
+
+def arenas() -> list[kiks.Arena]:
+    walls = np.zeros((400, 400), np.uint8)
+    walls[150:160, 100:300] = 200
+    return [kiks.Arena.from_array(walls), kiks.Arena.box(500, 300, rounded_mm=80)]
+
+
+def make(world_count: int = 37, **changes: Any) -> kiks.Batch:
+    """Return worlds of two arenas with robots that differ."""
+    robots = family(kiks.RobotSpec.load("khepera"), world_count, seed=4, dead_share=0.1)
+    options: dict[str, Any] = {"robot": robots, "seed": 21, "timing": kiks.Timing(0.05, 57600, 0.0013)}
+    return kiks.Batch(arenas(), world_count, **options | changes)
+
+
+def hashes(batch: kiks.Batch, seconds: float = 6.0) -> list[str]:
+    parameters = np.column_stack([np.linspace(2, 15, batch.world_count), np.linspace(0.001, 0.02, batch.world_count)])
+    batch.run(vehicle, parameters, seconds=seconds)
+    return [batch.state_hash(world) for world in range(batch.world_count)]
+
+
+def all_hashes() -> str:
+    """Return the hashes of worlds of every kind: alone, with a ball, with each response, and what they read."""
+    lines = hashes(make())
+    ball = [kiks.Arena(each.brightness, 1.0, "b", balls=(Ball(330, 100),)) for each in arenas()]
+    lines += hashes(kiks.Batch(ball, 5, robots=2, seed=1))
+    for response in ("thesis", "fast", "standin"):
+        batch = make(9, response=response)
+        lines += hashes(batch)
+        lines.append(batch.reset().tobytes().hex())
+    lit = [kiks.Arena(each.brightness, 1.0, "l", lamps=(Lamp(200, 250, 2.0),)) for each in arenas()]
+    lines.append(kiks.Batch(lit, 9, senses=("ambient", "proximity")).reset().tobytes().hex())
+    return "\n".join(lines)
+
+
+@pytest.fixture(scope="module")
+def expected() -> list[str]:
+    return hashes(make(threads=1))
+
+
+@pytest.mark.parametrize("threads", [2, 5])
+def test_threads_do_not_matter(expected: list[str], threads: int) -> None:
+    assert hashes(make(threads=threads)) == expected
+
+
+@pytest.mark.parametrize("lanes", [8, 24, 1000])
+def test_blocks_do_not_matter(expected: list[str], monkeypatch: pytest.MonkeyPatch, lanes: int) -> None:
+    monkeypatch.setattr(batch_module, "LANES", lanes)
+    assert hashes(make(threads=2)) == expected
+
+
+def test_a_world_is_the_same_among_others_and_alone(expected: list[str]) -> None:
+    robots = family(kiks.RobotSpec.load("khepera"), 37, seed=4, dead_share=0.1)
+    for world in (0, 13, 36):
+        alone = kiks.Batch(
+            arenas()[world % 2], 1, robot=[robots[world]], seed=21 + world, timing=kiks.Timing(0.05, 57600, 0.0013)
+        )
+        alone.run(vehicle, [np.linspace(2, 15, 37)[world], np.linspace(0.001, 0.02, 37)[world]], seconds=6.0)
+        assert alone.state_hash(0) == expected[world]
+
+
+def test_running_again_begins_again(expected: list[str]) -> None:
+    batch = make(threads=1)
+    hashes(batch, seconds=1.0)
+    assert hashes(batch) == expected
+
+
+@pytest.mark.slow
+def test_the_processor_does_not_matter() -> None:
+    """In a process of its own, compiled for a processor without wide vectors: all that a batch does, to the bit."""
+    environment = os.environ | {"NUMBA_CPU_NAME": "generic"}
+    done = subprocess.run([sys.executable, __file__], env=environment, capture_output=True, check=True, text=True)
+    assert done.stdout.strip() == all_hashes()
+
+
+def test_worlds_can_be_put_back_one_by_one() -> None:
+    batch = make(10)
+    first = batch.reset()
+    wheels = np.full((10, 1, 2), 8.0)
+    for _ in range(5):
+        batch.step(wheels)
+    again = batch.reset([2, 7])
+    np.testing.assert_array_equal(again[[2, 7]], first[[2, 7]])
+    assert batch.times_s[2] == 0.0
+    assert batch.times_s[3] > 0.2
+    moved = batch.reset([4], seeds=[99], starts=[[[60.0, 60.0, 0.5]]])
+    np.testing.assert_allclose(batch.poses[4, 0], [60.0, 60.0, 0.5])
+    assert not np.array_equal(moved[4], first[4])
+
+
+def test_a_step_is_a_loop_of_a_run() -> None:
+    """The same speeds given step by step leave the robots where a run leaves them."""
+
+    @kiks.controller
+    def turn(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+        wheels[0], wheels[1] = 7.0, 3.0
+
+    timing = kiks.Timing(0.05, 38400)
+    ran, stepped = make(9, timing=timing), make(9, timing=timing)
+    ran.run(turn, seconds=1.0)
+    stepped.reset()
+    for _ in range(20):
+        stepped.step(np.broadcast_to([7.0, 3.0], (9, 1, 2)))
+    np.testing.assert_array_equal(ran.times_s, stepped.times_s)
+    # A step has sensed once more, a few milliseconds later.
+    np.testing.assert_allclose(ran.poses[:, :, :2], stepped.poses[:, :, :2], atol=0.6)
+
+
+def test_lamps_can_be_moved_in_each_world() -> None:
+    lit = kiks.Arena(arenas()[0].brightness, 1.0, "lit", lamps=(Lamp(200, 250, 2.0),))
+    batch = kiks.Batch(lit, 3, senses="ambient", starts=(200, 60, 1.57))
+    batch.lamps[1, 0, 3] = 0.0
+    batch.lamps[2, 0, :2] = 200, 100
+    dark = batch.reset()[:, 0].min(axis=1)
+    assert dark[2] < dark[0] < dark[1]
+
+
+def test_every_random_start_is_free() -> None:
+    arena = arenas()[0]
+    starts = random_starts(arena, 200, seed=1)
+    assert starts.shape == (200, 3)
+    assert min(arena.clearance_at_mm(x_mm, y_mm) for x_mm, y_mm, _ in starts.tolist()) >= 27.5 + 4.9
+    np.testing.assert_array_equal(starts, random_starts(arena, 200, seed=1))
+
+
+def test_a_family_differs_and_repeats() -> None:
+    robots = family(kiks.RobotSpec.load("khepera"), 20, seed=1, dead_share=0.5)
+    assert robots == family(kiks.RobotSpec.load("khepera"), 20, seed=1, dead_share=0.5)
+    assert len(set(robots)) == 20
+    dead = np.mean([np.array(robot.proximity.gain) == 0.0 for robot in robots])
+    assert 0.3 < dead < 0.7
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"worlds": 0}, "worlds must be a whole number from 1"),
+        ({"robots": 0}, "robots must be a whole number from 1"),
+        ({"threads": 0}, "threads must be"),
+        ({"seed": -1}, "seeds must be"),
+        ({"seed": [1, 2]}, "seeds must be 4 whole numbers"),
+        ({"starts": (10, 10, 0)}, "start of robot 1 of world 0 must be free"),
+        ({"starts": [[1, 2]]}, "starts must be poses"),
+        ({"starts": (np.nan, 10, 0)}, "must be a finite number"),
+        ({"robot": ["khepera"] * 3}, "one for each of 4 worlds"),
+        ({"senses": ("smell",)}, "senses must be some of"),
+    ],
+)
+def test_what_is_wrong_is_said(options: dict[str, Any], words: str) -> None:
+    with pytest.raises(kiks.ParameterError, match=words):
+        kiks.Batch(arenas()[0], **{"worlds": 4} | options)
+
+
+def test_arenas_must_hold_as_many_bodies() -> None:
+    with_ball = kiks.Arena(arenas()[0].brightness, 1.0, "b", balls=(Ball(330, 100),))
+    with pytest.raises(kiks.ParameterError, match="same number of balls and cylinders"):
+        kiks.Batch([arenas()[0], with_ball], 2)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"parameters": [1.0]}, "must be given 2 parameters"),
+        ({"parameters": [[1.0, np.nan]]}, "must be finite"),
+        ({"parameters": np.zeros((3, 2))}, r"parameters must be \[parameter\]"),
+        ({"seconds": -1}, "seconds must be"),
+        ({"controller": 5}, "controller must be one that"),
+        ({"measures": [5]}, "measures must be made by"),
+    ],
+)
+def test_a_run_says_what_is_wrong(arguments: dict[str, Any], words: str) -> None:
+    given: dict[str, Any] = {"controller": vehicle, "parameters": [1.0, 0.0], "seconds": 1.0} | arguments
+    with pytest.raises(kiks.ParameterError, match=words):
+        make(4).run(given.pop("controller"), given.pop("parameters"), **given)
+
+
+def test_steps_say_what_is_wrong() -> None:
+    batch = make(2)
+    with pytest.raises(kiks.ParameterError, match=r"reset\(\) must be called"):
+        batch.step(np.zeros((2, 1, 2)))
+    batch.reset()
+    with pytest.raises(kiks.ParameterError, match="wheels must be"):
+        batch.step(np.zeros((2, 2)))
+    with pytest.raises(kiks.ParameterError, match="world must be from 0 to 1"):
+        batch.state_hash(2)
+
+
+def test_a_controller_that_numba_refuses() -> None:
+    @kiks.controller
+    def impossible(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+        wheels[0] = open("file")  # noqa: SIM115
+
+    with pytest.raises(kiks.ParameterError, match="'impossible' must be Python that Numba compiles"):
+        make(2).run(impossible, seconds=1.0)
+
+
+def test_speeds_that_are_no_numbers_are_nought() -> None:
+    @kiks.controller
+    def wild(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+        wheels[0], wheels[1] = np.nan, 1e300
+
+    batch = make(1)
+    batch.run(wild, seconds=0.5)
+    assert batch.state.robots["speed_setpoint"].tolist() == [[[0, 127]]]
+
+
+if __name__ == "__main__":
+    print(all_hashes())

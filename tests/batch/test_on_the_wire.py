@@ -1,0 +1,116 @@
+"""A batch and a wire: the same controller, seed and timing, the same run to the bit."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import kiks
+
+
+@kiks.controller(parameters=1, memory=1)
+def wander(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+    """Keep off what is near, and waver a little with the time."""
+    memory[0] += 1.0
+    waver = 2.0 if memory[0] % 40.0 < 20.0 else -2.0
+    left = sensors[0] * 4 + sensors[1] * 6 - sensors[2] * 6 - sensors[3] * 18 - sensors[4] * 6 - sensors[5] * 4
+    right = -sensors[0] * 4 - sensors[1] * 6 - sensors[2] * 14 - sensors[3] * 8 + sensors[4] * 6 + sensors[5] * 4
+    wheels[0] = parameters[0] * (8.0 + left / 200.0 + waver)
+    wheels[1] = parameters[0] * (8.0 + right / 200.0 - waver)
+
+
+@kiks.controller(senses=("proximity", "ambient"))
+def peer(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+    """Turn to the darker side, away from what is near."""
+    wheels[0] = 6.0 + (sensors[8] - sensors[13]) / 50.0 - sensors[4] / 100.0
+    wheels[1] = 6.0 - (sensors[8] - sensors[13]) / 50.0 - sensors[1] / 100.0
+
+
+def arena(**things: Any) -> kiks.Arena:
+    from kiks.model.arena import Ball, Lamp
+
+    walls = np.zeros((500, 600), np.uint8)
+    walls[200:210, 150:400] = 255
+    walls[300:400, 420:430] = 1
+    drawn = kiks.Arena.from_array(walls)
+    from dataclasses import replace
+
+    return replace(drawn, balls=(Ball(300, 100),) * bool(things.get("ball")), lamps=(Lamp(100, 400),))
+
+
+def drive_alone(
+    where: kiks.Arena, seed: int, timing: kiks.Timing, controller: kiks.Controller, parameters: Any, **sim_options: Any
+) -> tuple[int, str]:
+    """Return the loops of a drive on the wire, and the hash when it ended, before the robot was stopped."""
+    assert timing.baud is not None
+    sim = kiks.Simulation(where, seed=seed, thinking=f"fixed:{timing.think_s * 1e3}", **sim_options)
+    ports = [sim.port(number + 1) for number in range(sim.robot_count)]
+    hashes = []
+    for port in ports:
+        port.baudrate = timing.baud
+    first: Any = ports[0]
+    send = first.write
+
+    def note_and_send(data: bytes) -> int:
+        hashes.append(sim.state_hash())
+        return int(send(data))
+
+    first.write = note_and_send
+    loops = kiks.drive(ports, controller, parameters, seconds=8.0, period_s=timing.period_s)
+    return loops, hashes[-1]
+
+
+@pytest.mark.parametrize(
+    "timing",
+    [kiks.Timing(0.1, 9600), kiks.Timing(0.0, 9600), kiks.Timing(0.05, 38400, 0.0031)],
+    ids=["each 100 ms", "as fast as it goes", "with thinking"],
+)
+@pytest.mark.parametrize("controller", [wander, peer], ids=["proximity", "both senses"])
+@pytest.mark.parametrize("ball", [False, True], ids=["alone", "with a ball"])
+def test_batch_and_wire_agree_to_the_bit(timing: kiks.Timing, controller: kiks.Controller, ball: bool) -> None:
+    where = arena(ball=ball)
+    batch = kiks.Batch(where, worlds=3, seed=11, timing=timing)
+    rollouts = batch.run(controller, [1.0], seconds=8.0)
+    for world in range(3):
+        loops, state_hash = drive_alone(where, 11 + world, timing, controller, [1.0])
+        assert (loops, state_hash) == (rollouts.step_counts[world], batch.state_hash(world))
+
+
+@pytest.mark.parametrize("response", ["thesis", "fast", "standin"])
+def test_every_response_is_that_of_the_wire(response: str) -> None:
+    timing = kiks.Timing(0.1, 9600)
+    batch = kiks.Batch(arena(), worlds=2, seed=3, timing=timing, response=response)
+    rollouts = batch.run(wander, [[1.0], [0.7]], seconds=8.0)
+    for world, gain in enumerate((1.0, 0.7)):
+        found = drive_alone(arena(), 3 + world, timing, wander, [gain], response=response)
+        assert found == (rollouts.step_counts[world], batch.state_hash(world))
+
+
+def test_one_program_with_three_robots() -> None:
+    timing = kiks.Timing(0.1, 19200)
+    batch = kiks.Batch(arena(ball=True), worlds=2, robots=3, seed=5, timing=timing)
+    rollouts = batch.run(wander, np.full((2, 3, 1), [[1.0], [0.5], [0.8]]), seconds=8.0)
+    for world in range(2):
+        found = drive_alone(arena(ball=True), 5 + world, timing, wander, [[1.0], [0.5], [0.8]], robots=3)
+        assert found == (rollouts.step_counts[world], batch.state_hash(world))
+
+
+def test_step_by_step_is_the_same_as_at_once() -> None:
+    timing = kiks.Timing(0.05, 38400)
+    measures = [kiks.measures.path_mm, kiks.measures.avoidance]
+    stepped = kiks.Batch(arena(ball=True), worlds=9, robots=2, seed=1, timing=timing, measures=measures)
+    memory, wheels = np.zeros((9, 2, 1)), np.zeros((9, 2, 2))
+    sensors = stepped.reset()
+    while stepped.times_s.max() < 1.999:
+        for world in range(9):
+            for robot in range(2):
+                wander(sensors[world, robot], memory[world, robot], np.ones(1), wheels[world, robot])
+        before = stepped.state_hash(0)
+        sensors = stepped.step(wheels)
+    assert before != stepped.state_hash(0)
+    alone = kiks.Batch(arena(ball=True), worlds=9, robots=2, seed=1, timing=timing)
+    rollouts = alone.run(wander, [1.0], seconds=1.95 + 1e-9, measures=measures)
+    np.testing.assert_array_equal(alone.times_s, stepped.times_s)
+    np.testing.assert_array_equal(rollouts.values, stepped.values)

@@ -1,0 +1,253 @@
+"""Controllers that come with KiKS against plain NumPy, and what is promised of a user's own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import kiks
+from kiks.control.controller import whole_speeds
+from kiks.control.networks import exponential_between
+
+BOTH = ("proximity", "ambient")
+
+Trace = np.ndarray[Any, np.dtype[np.float64]]
+
+
+def outputs(controller: kiks.Controller, parameters: Any, sensors: Any) -> Trace:
+    """Return the speeds that a controller wants for one reading after the other, [step, 2]."""
+    memory, wheels = np.zeros(controller.memory_count), np.zeros((len(sensors), 2))
+    for step, reading in enumerate(sensors):
+        controller(reading, memory, parameters, wheels[step])
+    return wheels
+
+
+def readings(controller: kiks.Controller, step_count: int = 12, seed: int = 5) -> Trace:
+    return np.random.default_rng(seed).integers(0, 1024, (step_count, controller.sensor_count)).astype(float)
+
+
+def logistic(x: Any) -> Any:
+    return 1.0 / (1.0 + np.exp(-x))
+
+
+def taken(parameters: Trace, *shapes: tuple[int, ...]) -> list[Trace]:
+    """Cut parameters into matrices, and see that none is left."""
+    parts, first = [], 0
+    for shape in shapes:
+        size = int(np.prod(shape))
+        parts.append(parameters[first : first + size].reshape(shape))
+        first += size
+    assert first == len(parameters)
+    return parts
+
+
+def feed_forward(parameters: Trace, sensors: Trace, counts: list[int], *, feedback: bool, is_cut: bool) -> Trace:
+    layers = taken(parameters, *((1 + counts[k], counts[k + 1]) for k in range(len(counts) - 1)))
+    wheels, last = [], np.zeros(2)
+    for reading in sensors:
+        x = np.concatenate([reading / 1023.0, last]) if feedback else reading / 1023.0
+        for layer in layers[:-1]:
+            x = np.tanh(layer[0] + x @ layer[1:])
+        total = layers[-1][0] + x @ layers[-1][1:]
+        last = np.clip(total, -1, 1) if is_cut else np.tanh(total)
+        wheels.append(last)
+    return np.array(wheels)
+
+
+@pytest.mark.parametrize("feedback", [False, True])
+def test_linear(feedback: bool) -> None:
+    controller = kiks.controllers.linear(feedback=feedback, speed_limit=7.0)
+    parameters = 0.8 * kiks.controllers.random_parameters(controller, 1, seed=1)[0]
+    sensors = readings(controller)
+    expected = feed_forward(parameters, sensors, [8 + 2 * feedback, 2], feedback=feedback, is_cut=True)
+    np.testing.assert_allclose(outputs(controller, parameters, sensors), 7.0 * expected, atol=1e-12)
+    assert abs(expected).max() == 1.0
+    assert abs(expected).min() < 0.5
+
+
+@pytest.mark.parametrize(
+    ("hidden", "senses", "feedback"),
+    [((6,), "proximity", False), ((), "proximity", True), ((5, 3), BOTH, True)],
+    ids=["as it comes", "recurrent perceptron", "two hidden layers"],
+)
+def test_mlp(hidden: tuple[int, ...], senses: Any, feedback: bool) -> None:
+    controller = kiks.controllers.mlp(hidden=hidden, senses=senses, feedback=feedback)
+    parameters = kiks.controllers.random_parameters(controller, 1, seed=2)[0]
+    sensors = readings(controller)
+    counts = [controller.sensor_count + 2 * feedback, *hidden, 2]
+    expected = 10.0 * feed_forward(parameters, sensors, counts, feedback=feedback, is_cut=False)
+    np.testing.assert_allclose(outputs(controller, parameters, sensors), expected, atol=1e-3)
+
+
+@pytest.mark.parametrize("time_constant_s", [0.02, 0.4, 5.0])
+def test_ctrnn(time_constant_s: float) -> None:
+    controller = kiks.controllers.ctrnn(neurons=3, period_s=0.1, time_constant_s=time_constant_s, senses=BOTH)
+    parameters = kiks.controllers.random_parameters(controller, 1, seed=3)[0]
+    logarithms, biases, to_inputs, to_neurons = taken(parameters, (3,), (3,), (16, 3), (3, 3))
+    constants_s = time_constant_s * np.exp(np.clip(logarithms, -4, 4))
+    step_count = max(int(np.ceil(0.2 / constants_s.min())), 1)
+    y, expected = np.zeros(3), []
+    sensors = readings(controller)
+    for reading in sensors:
+        for _ in range(step_count):
+            drive = 4 * (logistic(y + 4 * biases) @ to_neurons + reading / 1023.0 @ to_inputs)
+            y = y + 0.1 / step_count / constants_s * (drive - y)
+        expected.append(10.0 * (2.0 * logistic(y + 4 * biases) - 1.0)[:2])
+    np.testing.assert_allclose(outputs(controller, parameters, sensors), expected, atol=5e-2)
+
+
+@pytest.mark.parametrize("logarithm", [-1000.0, 1000.0])
+def test_ctrnn_of_any_time_constant_stays_in_its_bounds(logarithm: float) -> None:
+    controller = kiks.controllers.ctrnn(neurons=3, time_constant_s=0.4)
+    parameters = np.full(controller.parameter_count or 0, 1.0)
+    parameters[:3] = logarithm
+    assert abs(outputs(controller, parameters, readings(controller, 200))).max() <= 10.0
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.floats(-6, 6))
+def test_exponential_between(x: float) -> None:
+    assert exponential_between(x) == pytest.approx(np.exp(np.clip(x, -4, 4)), rel=1e-3)
+
+
+def test_gru() -> None:
+    controller = kiks.controllers.gru(units=3)
+    parameters = kiks.controllers.random_parameters(controller, 1, seed=4)[0]
+    to_gates, to_units, to_wheels = taken(parameters, (12, 6), (12, 3), (4, 2))
+    h, expected = np.zeros(3), []
+    sensors = readings(controller)
+    for reading in sensors:
+        x = reading / 1023.0
+        gates = logistic(to_gates[0] + np.concatenate([x, h]) @ to_gates[1:])
+        z, r = gates[:3], gates[3:]
+        h = z * h + (1 - z) * np.tanh(to_units[0] + np.concatenate([x, r * h]) @ to_units[1:])
+        expected.append(10.0 * np.tanh(to_wheels[0] + h @ to_wheels[1:]))
+    np.testing.assert_allclose(outputs(controller, parameters, sensors), expected, atol=1e-3)
+
+
+READY_MADE = [
+    kiks.controllers.linear(),
+    kiks.controllers.linear(feedback=True),
+    kiks.controllers.mlp(),
+    kiks.controllers.ctrnn(neurons=3),
+    kiks.controllers.gru(units=3),
+]
+
+
+@pytest.mark.parametrize("controller", READY_MADE, ids=lambda each: each.name)
+def test_each_parameter_matters(controller: kiks.Controller) -> None:
+    assert controller.parameter_count is not None
+    parameters = 0.1 * kiks.controllers.random_parameters(controller, 1, seed=6)[0]
+    sensors = readings(controller, 3)
+    before = outputs(controller, parameters, sensors)
+    for k in range(controller.parameter_count):
+        parameters[k] += 0.05
+        assert (outputs(controller, parameters, sensors) != before).any(), k
+        parameters[k] -= 0.05
+
+
+@pytest.mark.parametrize("controller", READY_MADE, ids=lambda each: each.name)
+def test_batch_and_wire_agree(controller: kiks.Controller) -> None:
+    arena = kiks.Arena.box(300, 300)
+    parameters = kiks.controllers.random_parameters(controller, 1, seed=7)[0]
+    batch = kiks.Batch(arena, worlds=1, seed=8)
+    batch.run(controller, parameters, seconds=2.0)
+    sim = kiks.Simulation(arena, seed=8, thinking="none")
+    port: Any = sim.port(1)
+    hashes, send = [], port.write
+
+    def note_and_send(data: bytes) -> int:
+        hashes.append(sim.state_hash())
+        return int(send(data))
+
+    port.write = note_and_send
+    kiks.drive(port, controller, parameters, seconds=2.0)
+    # The last that is sent stops the robot.
+    assert hashes[-1] == batch.state_hash(0)
+
+
+def test_random_parameters() -> None:
+    controller = kiks.controllers.linear()
+    drawn = kiks.controllers.random_parameters(controller, 1000, seed=1)
+    assert drawn.shape == (1000, 18)
+    assert abs(drawn.mean()) < 0.05
+    assert drawn.std() == pytest.approx(1.0, abs=0.05)
+    np.testing.assert_array_equal(drawn, kiks.controllers.random_parameters(controller, 1000, seed=1))
+
+    @kiks.controller
+    def free(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+        wheels[0] = parameters[0]
+
+    with pytest.raises(kiks.ParameterError, match=r"'free' must say how many parameters.*parameters=\.\.\."):
+        kiks.controllers.random_parameters(free, 3, seed=1)
+
+
+def test_wild_speeds_are_cut_and_what_is_no_number_is_none() -> None:
+    assert whole_speeds(np.array([np.nan, 1e300])) == (0, 127)
+    assert whole_speeds(np.array([-np.inf, 2.5])) == (-127, 2)
+
+    @kiks.controller
+    def lost(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+        wheels[:] = np.nan
+
+    batch = kiks.Batch(kiks.Arena.box(300, 300), worlds=1)
+    assert batch.run(lost, seconds=1.0, measures=[kiks.measures.path_mm]).values[0, 0, 0] == 0.0
+
+
+def test_branches_and_memory_and_what_is_returned() -> None:
+    @kiks.controller(memory=1)
+    def hesitant(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> Any:
+        memory[0] += 1.0
+        if memory[0] > 3.0:
+            wheels[0] = wheels[1] = 5.0
+        else:
+            for k in range(2):
+                wheels[k] = 0.0
+
+    np.testing.assert_array_equal(outputs(hesitant, np.zeros(0), np.zeros((5, 8)))[:, 0], [0, 0, 0, 5, 5])
+    batch = kiks.Batch(kiks.Arena.box(500, 500), worlds=2, starts=(250, 250, 0))
+    first, second = (batch.run(hesitant, seconds=1.0, measures=[kiks.measures.path_mm]).values for _ in range(2))
+    assert first[0, 0, 0] > 10.0
+    np.testing.assert_array_equal(first, second)
+
+
+def test_what_cannot_be_compiled_is_refused_by_its_name() -> None:
+    @kiks.controller
+    def wordy(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+        wheels[0] = "fast".nothing
+
+    @kiks.measure
+    def vague(moment: Any, notes: Any) -> None:
+        notes[0] = moment.happiness
+
+    @kiks.controller
+    def still(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+        wheels[0] = 0.0
+
+    batch = kiks.Batch(kiks.Arena.box(300, 300), worlds=1)
+    with pytest.raises(kiks.ParameterError, match="the controller 'wordy' must be Python that Numba compiles"):
+        batch.run(wordy, seconds=1.0)
+    with pytest.raises(kiks.ParameterError, match="the measure 'vague' must be Python that Numba compiles"):
+        batch.run(still, seconds=1.0, measures=[vague])
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: kiks.controllers.mlp(hidden=(0,)), "hidden units must be a whole number from 1 to 256"),
+        (lambda: kiks.controllers.mlp(hidden=6), "hidden must be the units of up to 8 layers"),
+        (lambda: kiks.controllers.ctrnn(neurons=1), "neurons must be a whole number from 2"),
+        (lambda: kiks.controllers.ctrnn(period_s=0), "period_s must be from 0.001 to 10, but it was 0"),
+        (lambda: kiks.controllers.gru(units=2.5), "units must be a whole number from 1 to 256, but it was 2.5"),
+        (lambda: kiks.controllers.linear(speed_limit="fast"), "speed_limit must be from 0 to 127, but it was 'fast'"),
+        (lambda: kiks.controllers.linear(senses=("proximty",)), "Did you mean 'proximity'"),
+        (lambda: kiks.controllers.linear(senses=()), "senses must name one sense at least"),
+    ],
+)
+def test_arguments_out_of_range(make: Any, message: str) -> None:
+    with pytest.raises(kiks.ParameterError, match=message):
+        make()

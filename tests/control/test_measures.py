@@ -1,0 +1,241 @@
+"""Measures that come with KiKS against plain NumPy over all that they saw."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import kiks
+from kiks.control.measure import Moment
+from kiks.engine.state import BODY
+from kiks.model.arena import Cylinder, Lamp
+
+WORLDS, STEPS, COLUMNS = 4, 150, 16
+
+FULL = kiks.controllers.mlp(hidden=(), feedback=True)
+
+PLACE_MM = (250.0, 200.0)
+
+
+def arena() -> kiks.Arena:
+    box = kiks.Arena.box(500, 400)
+    return replace(box, cylinders=(Cylinder(150, 100), Cylinder(300, 300), Cylinder(350, 150)), lamps=(Lamp(100, 350),))
+
+
+class Trace:
+    """All moments of a run, one array for each thing seen, [world, step, ...]; and the measures' values."""
+
+    def __init__(self, *measures: kiks.Measure, seconds: float = 15.0) -> None:
+        kept: list[Any] = []
+
+        def keep(notes: Any) -> Any:
+            kept.append(notes.copy())
+            return notes[..., 0]
+
+        @kiks.measure(notes=1 + COLUMNS * STEPS, result=keep)
+        def record(moment: Any, notes: Any) -> None:
+            first = 1 + COLUMNS * int(notes[0])
+            notes[0] += 1.0
+            notes[first : first + 8] = moment.sensors
+            notes[first + 8] = moment.wheels[0]
+            notes[first + 9] = moment.wheels[1]
+            notes[first + 10], notes[first + 11] = moment.x_mm, moment.y_mm
+            notes[first + 12], notes[first + 13] = moment.time_s, moment.path_mm
+            notes[first + 14] = 1.0 if moment.is_touching else 0.0
+            notes[first + 15] = moment.period_s
+
+        self.batch = kiks.Batch(arena(), worlds=WORLDS, seed=4)
+        parameters = kiks.controllers.random_parameters(FULL, WORLDS, seed=5)
+        parameters[:, :2] = 1.0
+        self.starts_mm = self.batch.poses[:, 0, :2].copy()
+        self.values = self.batch.run(FULL, parameters, seconds=seconds, measures=(record, *measures)).values[:, 0, 1:].T
+        assert (kept[0][:, 0, 0] == STEPS).all()
+        steps = kept[0][:, 0, 1:].reshape(WORLDS, STEPS, COLUMNS)
+        self.sensors, self.wheels, self.places_mm = steps[..., :8], steps[..., 8:10], steps[..., 10:12]
+        self.times_s, self.paths_mm, self.is_touching, self.periods_s = np.moveaxis(steps[..., 12:], -1, 0)
+
+    def far_mm(self, x_mm: float, y_mm: float) -> Any:
+        return np.hypot(self.places_mm[..., 0] - x_mm, self.places_mm[..., 1] - y_mm)
+
+
+def test_how_far() -> None:
+    names = ("path_mm", "net_mm", "straightness", "speed_pulses", "turned_pulses", "final_x_mm", "final_y_mm")
+    trace = Trace(*(getattr(kiks.measures, name) for name in names))
+    found = dict(zip(names, trace.values, strict=True))
+    last = trace.places_mm[:, -1]
+    net_mm = np.hypot(*(last - trace.starts_mm).T)
+    np.testing.assert_array_equal(found["path_mm"], trace.paths_mm[:, -1])
+    np.testing.assert_array_equal([found["final_x_mm"], found["final_y_mm"]], last.T)
+    np.testing.assert_allclose(found["net_mm"], net_mm)
+    np.testing.assert_allclose(found["straightness"], net_mm / trace.paths_mm[:, -1])
+    np.testing.assert_allclose(found["speed_pulses"], trace.wheels.mean(axis=(1, 2)))
+    turned = (abs(trace.wheels).sum(axis=2) * trace.periods_s / 0.01).sum(axis=1)
+    np.testing.assert_allclose(found["turned_pulses"], turned)
+    np.testing.assert_allclose(trace.periods_s.sum(axis=1), trace.times_s[:, -1])
+
+
+def test_how_well() -> None:
+    following = kiks.measures.wall_following("right", counts=200)
+    trace = Trace(kiks.measures.avoidance, following, kiks.measures.touching_share, kiks.measures.contacts)
+    shares = trace.wheels / 10.0
+    straight = 1 - np.sqrt(abs(shares[..., 0] - shares[..., 1]) / 2)
+    highest = trace.sensors.max(axis=2) / 1023
+    np.testing.assert_allclose(
+        trace.values[0], (abs(shares).mean(axis=2) * straight * (1 - highest)).mean(axis=1), atol=1e-12
+    )
+    beside = np.interp(trace.sensors[..., 5], [0, 200, 1023], [0, 1, 0])
+    np.testing.assert_allclose(
+        trace.values[1], (np.maximum(shares.mean(axis=2), 0) * straight * beside).mean(axis=1), atol=1e-12
+    )
+    np.testing.assert_allclose(trace.values[2], trace.is_touching.mean(axis=1))
+    assert trace.values[2].max() > 0
+    np.testing.assert_array_equal(trace.values[3], trace.batch.state.robots["contact_count"][:, 0])
+
+
+def test_where() -> None:
+    radius_mm = 120.0
+    trace = Trace(
+        kiks.measures.coverage(arena(), square_mm=50),
+        kiks.measures.goal_mm(*PLACE_MM),
+        kiks.measures.reached_s(*PLACE_MM, radius_mm=radius_mm),
+        kiks.measures.light_mm,
+        kiks.measures.near_light_share(radius_mm),
+        kiks.measures.gathered(*PLACE_MM, radius_mm=radius_mm),
+        kiks.measures.spread_mm,
+    )
+    for world in range(WORLDS):
+        squares = {(int(x // 50), int(y // 50)) for x, y in trace.places_mm[world]}
+        assert trace.values[0, world] == len(squares) / 80
+        far_mm = trace.far_mm(*PLACE_MM)[world]
+        assert trace.values[1, world] == pytest.approx(far_mm[-1])
+        arrived = np.flatnonzero(far_mm <= radius_mm)
+        assert trace.values[2, world] == trace.times_s[world, arrived[0] if len(arrived) else -1]
+    lamp_mm = trace.far_mm(100, 350)
+    np.testing.assert_allclose(trace.values[3], lamp_mm[:, -1])
+    np.testing.assert_allclose(trace.values[4], (lamp_mm <= radius_mm).mean(axis=1))
+    # Nothing has moved the cylinders since the last step, or next to nothing.
+    places_mm = np.stack([trace.batch.state.bodies["x_mm"], trace.batch.state.bodies["y_mm"]], axis=-1)
+    within = (np.hypot(*np.moveaxis(places_mm - PLACE_MM, -1, 0)) <= radius_mm).sum(axis=1)
+    np.testing.assert_array_equal(trace.values[5], within)
+    spread_mm = np.sqrt(((places_mm - places_mm.mean(axis=1, keepdims=True)) ** 2).sum(axis=2).mean(axis=1))
+    np.testing.assert_allclose(trace.values[6], spread_mm, atol=5.0)
+
+
+def test_avoidance_of_a_stepped_batch() -> None:
+    parameters = kiks.controllers.random_parameters(FULL, WORLDS, seed=9)
+    run, stepped = (kiks.Batch(arena(), worlds=WORLDS, seed=6) for _ in range(2))
+    found = run.run(FULL, parameters, seconds=3.0, measures=[kiks.measures.avoidance]).values[:, 0, 0]
+    memory, wheels, totals = np.zeros((WORLDS, 2)), np.zeros((WORLDS, 1, 2)), np.zeros(WORLDS)
+    sensors = stepped.reset()
+    for _ in range(30):
+        for world in range(WORLDS):
+            FULL(sensors[world, 0], memory[world], parameters[world], wheels[world, 0])
+            left, right = np.rint(wheels[world, 0]) / 10
+            closeness = sensors[world, 0].max() / 1023
+            totals[world] += (abs(left) + abs(right)) / 2 * (1 - np.sqrt(abs(left - right) / 2)) * (1 - closeness)
+        sensors = stepped.step(wheels)
+    np.testing.assert_allclose(found, totals / 30, atol=1e-12)
+
+
+def moment(**given: Any) -> Any:
+    """Return a moment of a robot that stands in the middle of nowhere."""
+    usual = dict.fromkeys(Moment._fields, 0.0) | {
+        "sensors": np.zeros(8),
+        "wheels": np.zeros(2),
+        "contact_count": 0,
+        "is_touching": False,
+        "bodies": np.zeros(0, BODY),
+        "lamps": np.zeros((0, 4)),
+    }
+    return Moment(**(usual | given))
+
+
+def after(measure: kiks.Measure, *moments: Any) -> float:
+    """Return what a measure says after some moments."""
+    notes = np.zeros(measure.note_count)
+    for each in moments:
+        measure.kernel(each, notes)
+    return float(measure.result(notes[None])[0])
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(st.tuples(st.floats(0, 499), st.floats(0, 299)), max_size=80))
+def test_coverage_counts_each_square_once(places_mm: list[tuple[float, float]]) -> None:
+    coverage = kiks.measures.coverage(kiks.Arena.box(500, 300), square_mm=25)
+    squares = {(int(x_mm // 25), int(y_mm // 25)) for x_mm, y_mm in places_mm}
+    assert after(coverage, *(moment(x_mm=x_mm, y_mm=y_mm) for x_mm, y_mm in places_mm)) == len(squares) / 240
+
+
+def test_coverage_of_everything_is_one() -> None:
+    coverage = kiks.measures.coverage(kiks.Arena.box(500, 300), square_mm=100)
+    places = [moment(x_mm=x_mm, y_mm=y_mm) for x_mm in range(5, 500, 90) for y_mm in range(5, 300, 90)]
+    assert after(coverage, *places) == 1.0
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.tuples(st.integers(-127, 127), st.integers(-127, 127)), st.lists(st.integers(0, 1023), min_size=8, max_size=8)
+)
+def test_scores_lie_between_none_and_one(wheels: tuple[int, int], sensors: list[int]) -> None:
+    now = moment(wheels=np.array(wheels, float), sensors=np.array(sensors, float))
+    for measure in (kiks.measures.avoidance, kiks.measures.wall_following("left")):
+        assert 0.0 <= after(measure, now, now) <= 1.0
+
+
+def test_the_best_scores() -> None:
+    ahead = np.array([10.0, 10.0])
+    assert after(kiks.measures.avoidance, moment(wheels=ahead)) == 1.0
+    assert after(kiks.measures.avoidance, moment(wheels=np.array([10.0, -10.0]))) == 0.0
+    beside = np.zeros(8)
+    beside[0] = 400.0
+    following = kiks.measures.wall_following("left", counts=400)
+    assert after(following, moment(wheels=ahead, sensors=beside)) == 1.0
+    assert after(following, moment(wheels=-ahead, sensors=beside)) == 0.0
+    assert after(following, moment(wheels=ahead)) == 0.0
+
+
+def test_lamps_that_do_not_burn_are_none() -> None:
+    lamps = np.array([[10.0, 0.0, 1.0, 0.0], [30.0, 40.0, 1.0, 1.0]])
+    assert after(kiks.measures.light_mm, moment(lamps=lamps)) == 50.0
+    assert after(kiks.measures.light_mm, moment(lamps=lamps[:1])) == np.inf
+
+
+def test_nothing_seen_is_nothing() -> None:
+    for measure in (kiks.measures.avoidance, kiks.measures.straightness, kiks.measures.touching_share):
+        assert after(measure) == 0.0
+    assert after(kiks.measures.spread_mm, moment()) == 0.0
+
+
+def test_the_same_arguments_make_the_same_measure() -> None:
+    measures = kiks.measures
+    assert measures.coverage(kiks.Arena.box(500, 300)) is measures.coverage(kiks.Arena.box(450, 250), square_mm=100)
+    assert measures.gathered(1, 2, radius_mm=3) is measures.gathered(y_mm=2.0, x_mm=1.0, radius_mm=3.0)
+    assert measures.wall_following() is measures.wall_following("left", counts=300)
+    assert measures.reached_s(1, 2) is not measures.reached_s(1, 3)
+
+
+def test_what_a_measure_needs_must_be_sensed() -> None:
+    batch = kiks.Batch(kiks.Arena.box(300, 300), worlds=1)
+    controller = kiks.controllers.linear(senses=("ambient", "proximity"))
+    with pytest.raises(kiks.ParameterError, match=r"'avoidance' must find proximity first .* 'linear' senses ambient"):
+        batch.run(controller, np.zeros(34), seconds=1, measures=[kiks.measures.avoidance])
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: kiks.measures.wall_following("top"), "side must be 'left' or 'right', but it was 'top'"),
+        (lambda: kiks.measures.wall_following(counts=1023), "counts must be from 1 to 1022"),
+        (lambda: kiks.measures.coverage(kiks.Arena.box(2000, 2000), square_mm=1), "at most 1000000 squares, but 1 mm"),
+        (lambda: kiks.measures.goal_mm("here", 0), "x_mm must be from -1e"),
+        (lambda: kiks.measures.gathered(0, 0, radius_mm=-1), "radius_mm must be from 0"),
+    ],
+)
+def test_arguments_out_of_range(make: Any, message: str) -> None:
+    with pytest.raises(kiks.ParameterError, match=message):
+        make()
