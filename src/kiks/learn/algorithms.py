@@ -1,0 +1,210 @@
+"""The algorithms: what proposes candidates, and learns from what they were worth.
+
+Each draws its random numbers from the seed it was given and from nowhere else, and depends on nothing but what it is
+told: the same seed and the same values give the same candidates again. So a run is resumed by telling it all again.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.errors import ParameterError, nearest
+from kiks.learn.task import Axis
+
+Floats = NDArray[np.float64]
+
+SPREAD = 3.0
+"""Standard deviation of each parameter at the beginning: three times what controllers are made for, so that some of the
+first react sharply to what they see."""
+
+
+class Algorithm(Protocol):
+    """What proposes candidates. `ask` and `tell` take turns."""
+
+    def ask(self) -> Floats:
+        """Return the next generation, float64 [candidate, parameter]."""
+        ...
+
+    def tell(self, fitness: Floats, behaviours: Floats) -> None:
+        """Take what they were worth, float64 [candidate], and how they behaved, float64 [candidate, axis]."""
+
+    def favourite(self) -> Floats:
+        """Return the parameters that are now thought best, float64 [parameter]."""
+        ...
+
+
+class Cma:
+    """CMA-ES: a normal distribution that moves, stretches and turns towards what succeeds.
+
+    Args:
+        parameter_count: How many parameters a candidate has.
+        population: How many candidates a generation has.
+        seed: Seed of its random numbers.
+    """
+
+    def __init__(self, parameter_count: int, population: int, seed: int, axes: Sequence[Axis] = ()) -> None:
+        cma = library("cma")
+        rng = np.random.default_rng(seed)
+        options = {
+            "popsize": population,
+            "randn": lambda *shape: rng.standard_normal(shape),
+            "seed": np.nan,  # leaves the random numbers of the process alone
+            "verbose": -9,
+            "verb_log": 0,
+        }
+        self._strategy: Any = cma.CMAEvolutionStrategy(np.zeros(parameter_count), SPREAD, options)
+        self._candidates: list[Floats] = []
+
+    def ask(self) -> Floats:
+        """Return the next generation."""
+        self._candidates = self._strategy.ask()
+        return np.array(self._candidates)
+
+    def tell(self, fitness: Floats, behaviours: Floats) -> None:
+        """Take what they were worth."""
+        self._strategy.tell(self._candidates, (-fitness).tolist())
+
+    def favourite(self) -> Floats:
+        """Return the middle of the distribution: what all successful candidates have in common."""
+        return np.array(self._strategy.mean)
+
+
+class Ga:
+    """A genetic algorithm: tournaments of three, each parameter from either parent, normal mutations, one elite.
+
+    Args:
+        parameter_count: How many parameters a candidate has.
+        population: How many candidates a generation has.
+        seed: Seed of its random numbers.
+    """
+
+    MUTATION = 0.07
+    """Standard deviation of a mutation, in that of the first generation."""
+
+    RIVALS = 3
+    """How many take part in a tournament."""
+
+    def __init__(self, parameter_count: int, population: int, seed: int, axes: Sequence[Axis] = ()) -> None:
+        self._rng = np.random.default_rng(seed)
+        self._candidates = SPREAD * self._rng.standard_normal((population, parameter_count))
+        self._favourite = self._candidates[0]
+
+    def ask(self) -> Floats:
+        """Return the next generation."""
+        return self._candidates.copy()
+
+    def tell(self, fitness: Floats, behaviours: Floats) -> None:
+        """Let the fitter have children."""
+        rng, (population, parameter_count) = self._rng, self._candidates.shape
+        self._favourite = self._candidates[np.argmax(fitness)].copy()
+        rivals = rng.integers(population, size=(2, population, self.RIVALS))
+        winners = np.take_along_axis(rivals, fitness[rivals].argmax(axis=2)[:, :, None], axis=2)[:, :, 0]
+        mothers, fathers = self._candidates[winners]
+        children = np.where(rng.random((population, parameter_count)) < 0.5, mothers, fathers)
+        children += self.MUTATION * SPREAD * rng.standard_normal(children.shape)
+        children[0] = self._favourite
+        self._candidates = children
+
+    def favourite(self) -> Floats:
+        """Return the best of the last generation."""
+        best: Floats = self._favourite.copy()
+        return best
+
+
+class MapElites:
+    """MAP-Elites: for each cell of a map of behaviours the best that behaves so, all of them parents.
+
+    New candidates lie near an elite, moved along the line to another one (Vassiliades and Mouret 2018).
+
+    Args:
+        parameter_count: How many parameters a candidate has.
+        population: How many candidates a generation has.
+        seed: Seed of its random numbers.
+        axes: Of the map.
+
+    Raises:
+        ParameterError: If there are no axes.
+    """
+
+    NEAR, ALONG = 0.1, 0.2
+    """How far a child is from its parent in all directions, and along the line (standard deviations)."""
+
+    def __init__(self, parameter_count: int, population: int, seed: int, axes: Sequence[Axis] = ()) -> None:
+        if not axes:
+            raise ParameterError(
+                "map-elites must be told how behaviours differ, but this task has no axes. Give it some."
+            )
+        archives, emitters = library("ribs.archives"), library("ribs.emitters")
+        schedulers = library("ribs.schedulers")
+        first = SPREAD * np.random.default_rng(seed).standard_normal((population, parameter_count))
+        self.archive: Any = archives.GridArchive(
+            solution_dim=parameter_count,
+            dims=[axis.cells for axis in axes],
+            ranges=[(axis.low, axis.high) for axis in axes],
+            seed=seed,
+        )
+        emitter = emitters.IsoLineEmitter(
+            self.archive,
+            iso_sigma=self.NEAR * SPREAD,
+            line_sigma=self.ALONG,
+            initial_solutions=first,
+            batch_size=population,
+            seed=seed,
+        )
+        self._scheduler: Any = schedulers.Scheduler(self.archive, [emitter])
+
+    def ask(self) -> Floats:
+        """Return the next generation."""
+        return np.array(self._scheduler.ask())
+
+    def tell(self, fitness: Floats, behaviours: Floats) -> None:
+        """Put those on the map that are better than who is there."""
+        self._scheduler.tell(fitness, behaviours)
+
+    def favourite(self) -> Floats:
+        """Return the best on the map."""
+        return np.array(self.archive.best_elite["solution"])
+
+    def heat_map(self) -> Floats:
+        """Return the fitness in each cell, not a number where there is none, float64 [cell of axis 0, ...]."""
+        heat: Floats = np.full(self.archive.dims, np.nan)
+        elites = self.archive.data(["index", "objective"], return_type="dict")
+        heat[np.unravel_index(elites["index"], self.archive.dims)] = elites["objective"]
+        return heat
+
+
+ALGORITHMS: dict[str, type[Cma] | type[Ga] | type[MapElites]] = {"cma": Cma, "ga": Ga, "map-elites": MapElites}
+"""The algorithms by their names."""
+
+
+def make_algorithm(name: str, parameter_count: int, population: int, seed: int, axes: Sequence[Axis]) -> Algorithm:
+    """Return an algorithm.
+
+    Raises:
+        ParameterError: If there is none of that name, or its library is not installed.
+    """
+    if name not in ALGORITHMS:
+        raise ParameterError(
+            f"algorithm must be one of {', '.join(ALGORITHMS)}, but it was {name!r}.{nearest(str(name), ALGORITHMS)}"
+        )
+    return ALGORITHMS[name](parameter_count, population, seed, axes)
+
+
+def library(name: str) -> Any:
+    """Return a module of the libraries for learning.
+
+    Raises:
+        ParameterError: If it is not installed.
+    """
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        package = name.partition(".")[0]
+        raise ParameterError(
+            f"This must be done with {package}, but it cannot be imported ({error}). Run `pip install 'kiks[learn]'`."
+        ) from None

@@ -1,0 +1,283 @@
+"""An evolution: it asks for the worth of candidates, learns from the answer, and keeps the best: its champion.
+
+Each generation drives in worlds of its own, so the best of a generation may have been lucky. So what an algorithm
+thinks best after a generation is put on trial together with the next one, in worlds that stay the same for the whole
+evolution and that nobody is bred in. Who does best there is the champion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+import kiks
+from kiks.errors import ParameterError
+from kiks.learn.algorithms import make_algorithm
+from kiks.learn.champion import Champion
+from kiks.learn.executors import Executor, executor_for
+from kiks.learn.records import Folder, Generation
+from kiks.learn.task import Task
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+POPULATION = 40
+"""Candidates of a generation if nobody says otherwise."""
+
+TRIALS = 8
+"""How often a rival is tried, each time in as many worlds as a candidate of the population."""
+
+LOG_EVERY_S = 10.0
+"""How often the log is written [s]: it is written whole."""
+
+_OF_ALGORITHM, _OF_WORLDS, _OF_TRIALS = range(3)
+"""What seeds are for."""
+
+
+class Evolution:
+    """An evolution.
+
+    Args:
+        task: What for.
+        algorithm: 'cma' (CMA-ES), 'ga' (a genetic algorithm) or 'map-elites' (many different behaviours).
+        seed: Seed of everything: the same seed, the same evolution, however many workers there are.
+        population: How many candidates a generation has.
+        folder: Where it is kept: its generations, its champion and its log. If the folder holds some generations of the
+            same evolution, it goes on after them, as if it had never stopped. Left out, nothing is written.
+
+    Attributes:
+        task: The task.
+        algorithm: The algorithm's state: 'map-elites' has its map there.
+        generations: What the generations were worth, in their order.
+
+    Raises:
+        ParameterError: If an argument is out of range, or the folder holds another evolution.
+
+    Example:
+        >>> import kiks
+        >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=2), "ga", seed=1, population=8)
+        >>> with kiks.executor_for("threads", evolution.task) as executor:
+        ...     candidates = evolution.ask()
+        ...     evolution.tell(executor.evaluate(candidates, evolution.seeds))
+        >>> evolution.champion.generation
+        1
+    """
+
+    def __init__(
+        self,
+        task: Task,
+        algorithm: str = "cma",
+        *,
+        seed: int = 0,
+        population: int | None = None,
+        folder: str | Path | None = None,
+    ) -> None:
+        self.task, self.name = task, algorithm
+        self.population = POPULATION if population is None else population
+        if not isinstance(self.population, int) or not 4 <= self.population <= 1_000_000:
+            raise ParameterError(f"population must be a whole number from 4 to 1000000, but it was {population!r}.")
+        if not isinstance(seed, int) or not 0 <= seed < 2**63:
+            raise ParameterError(f"seed must be a whole number from 0 to 2^63 - 1, but it was {seed!r}.")
+        self.seed = seed
+        self.generations: list[Generation] = []
+        self.algorithm = make_algorithm(
+            algorithm, task.parameter_count, self.population, self._seed_for(_OF_ALGORITHM), task.axes
+        )
+        self._trial_seeds = [self._seed_for(_OF_TRIALS, number) for number in range(TRIALS)]
+        self._rival: Floats | None = None
+        self._asked: Floats | None = None
+        self._best: Champion | None = None
+        self._earlier_s, self._start_s, self._logged_s = 0.0, perf_counter(), -np.inf
+        self._folder = None if folder is None else Folder(folder)
+        if self._folder is not None:
+            self._resume(self._folder)
+
+    # ---- ask and tell ----
+
+    def ask(self) -> Floats:
+        """Return the candidates of the next generation, float64 [candidate, parameter]; the same until `tell`.
+
+        After the population come the trials of the rival that the generation before has brought forth, if any.
+        """
+        if self._asked is None:
+            asked = self.algorithm.ask()
+            if self._rival is not None:
+                asked = np.concatenate([asked, np.tile(self._rival, (TRIALS, 1))])
+            self._asked = asked
+        return self._asked.copy()
+
+    @property
+    def seeds(self) -> Integers:
+        """Seeds of the worlds of the candidates that `ask` returns, int64 [candidate].
+
+        All of a population drive in the same worlds, so that they can be compared.
+        """
+        seeds = [self._seed_for(_OF_WORLDS, len(self.generations))] * self.population
+        return np.array(seeds + ([] if self._rival is None else self._trial_seeds), np.int64)
+
+    def tell(self, values: ArrayLike) -> None:
+        """Take what the candidates of `ask` were worth.
+
+        Args:
+            values: Fitness, then the measures, float64 [candidate, 1 + measure], as `Task.evaluate` returns them; or
+                fitness alone, float64 [candidate]. More is better.
+
+        Raises:
+            ParameterError: If the shape is another or a number is not finite, or nobody has asked.
+        """
+        self._tell(values, self._earlier_s + perf_counter() - self._start_s)
+        if self._folder is not None:
+            self._folder.save(len(self.generations) - 1, self.generations[-1])
+
+    def _tell(self, values: ArrayLike, seconds: float) -> None:
+        if self._asked is None:
+            raise ParameterError("ask() must come before each tell(), but it did not.")
+        given = np.array(values, np.float64)
+        given = given[:, None] if given.ndim == 1 else given
+        count, most = len(self._asked), len(self.task.value_names)
+        if given.ndim != 2 or len(given) != count or given.shape[1] not in (1, most) or not np.isfinite(given).all():
+            raise ParameterError(
+                f"values must be finite numbers [candidate] or [candidate, value], here ({count},) or {(count, most)}, "
+                f"but their shape was {given.shape}."
+            )
+        fitness, trials = given[: self.population, 0], given[self.population :]
+        if self._rival is not None and (self._best is None or trials[:, 0].mean() > self._best.fitness):
+            self._best = self._champion(self._rival, trials.mean(axis=0), len(self.generations))
+        best_fitness = np.nan if self._best is None else self._best.fitness
+        generation = Generation(self._asked, given, self.population, best_fitness, seconds)
+        behaviours = np.zeros((self.population, 0))
+        if given.shape[1] == most:
+            columns = [self.task.value_names.index(axis.measure) for axis in self.task.axes]
+            behaviours = given[: self.population, columns]
+        self.algorithm.tell(fitness, behaviours)
+        self.generations.append(generation)
+        self._rival, self._asked = self.algorithm.favourite(), None
+
+    # ---- all at once ----
+
+    def run(
+        self,
+        *,
+        generations: int | None = None,
+        seconds: float | None = None,
+        executor: Executor | str = "threads",
+        each: Callable[[Evolution], Any] | None = None,
+    ) -> Champion:
+        """Evolve.
+
+        Args:
+            generations: Until there are so many, those counted that were there before.
+            seconds: No generation begins later than this [s of the wall clock].
+            executor: What evaluates candidates, or where it is done: see `kiks.learn.executors.executor_for`.
+            each: Is called after each generation.
+
+        Returns:
+            The champion.
+
+        Raises:
+            ParameterError: If neither generations nor seconds are given, or one is out of range.
+            WorkError: If the task cannot be evaluated.
+        """
+        if generations is None and seconds is None:
+            raise ParameterError("generations or seconds must be given, or it would never end, but neither was.")
+        for name, value in (("generations", generations), ("seconds", seconds)):
+            if value is not None and not (isinstance(value, int | float) and value >= 0):
+                raise ParameterError(f"{name} must be a number of at least 0, but it was {value!r}.")
+        if isinstance(executor, str):
+            with executor_for(executor, self.task) as opened:
+                return self.run(generations=generations, seconds=seconds, executor=opened, each=each)
+        begin_s = perf_counter()
+        try:
+            while (generations is None or len(self.generations) < generations) and (
+                seconds is None or perf_counter() - begin_s < seconds
+            ):
+                self.tell(executor.evaluate(self.ask(), self.seeds))
+                if perf_counter() - self._logged_s > LOG_EVERY_S:
+                    self.save_log()
+                if each is not None:
+                    each(self)
+        finally:
+            self.save_log()
+        return self.champion
+
+    def save_log(self) -> None:
+        """Write the champion and the log into the folder, if there is one.
+
+        Raises:
+            ParameterError: If they cannot be written, or pyarrow is not installed.
+        """
+        if self._folder is not None and self.generations:
+            self.champion.save(self._folder.path / "champion.toml")
+            self._folder.save_log(self.generations, self.task.value_names)
+            self._logged_s = perf_counter()
+
+    # ---- what came of it ----
+
+    @property
+    def champion(self) -> Champion:
+        """The best so far: of those that were on trial, or of the first generation while none has been.
+
+        Raises:
+            ParameterError: If there was no generation yet.
+        """
+        if self._best is not None:
+            return self._best
+        if not self.generations:
+            raise ParameterError("a generation must have been told before there is a champion, but none was.")
+        first = self.generations[-1]
+        winner = int(first.fitness.argmax())
+        return self._champion(first.candidates[winner], first.values[winner], len(self.generations))
+
+    def _champion(self, parameters: Floats, values: Floats, generation: int) -> Champion:
+        task = self.task
+        return Champion(
+            controller=task.controller,
+            parameters=tuple(parameters.tolist()),
+            task=task.name,
+            fitness=float(values[0]),
+            measures=dict(zip(task.measure_names, values[1:].tolist(), strict=False)),
+            generation=generation,
+            algorithm=self.name,
+            seed=self.seed,
+            robot=task.robot,
+            timing=task.timing,
+        )
+
+    # ---- inside ----
+
+    def _seed_for(self, what: int, number: int = 0) -> int:
+        """Return a seed that follows from that of the evolution."""
+        sequence = np.random.SeedSequence(self.seed, spawn_key=(what, number))
+        return int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(2))
+
+    def _resume(self, folder: Folder) -> None:
+        """Take what the folder holds.
+
+        Raises:
+            ParameterError: If it holds another evolution.
+        """
+        folder.check_identity(
+            {
+                "task": self.task.name,
+                "algorithm": self.name,
+                "seed": self.seed,
+                "population": self.population,
+                "controller": self.task.controller.name,
+                "task digest": self.task.digest(),
+                "kiks": kiks.__version__,
+            }
+        )
+        for saved in folder.generations():
+            if not np.array_equal(self.ask(), saved["candidates"]):
+                raise ParameterError(
+                    f"the evolution in {str(folder.path)!r} must go on to the bit, but generation "
+                    f"{len(self.generations) + 1} would have other candidates here: the libraries or the computer are "
+                    "others. Go on where it began, or take a new folder."
+                )
+            self._tell(saved["values"], float(saved["seconds"]))
+        self._earlier_s = self.generations[-1].seconds if self.generations else 0.0

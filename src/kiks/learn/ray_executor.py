@@ -1,0 +1,220 @@
+"""Workers that are actors of a Ray cluster, one a core, on this computer or on many.
+
+Need: whoever reaches a Ray cluster can have it run any code. A cluster that is started here therefore listens on the
+loopback address alone, without Ray's dashboard; one of several computers belongs on a private network
+(docs/distributed.md).
+Need: Ray could start lost actors and repeat lost calls by itself, but then nobody would see that a chunk kills one
+worker after the other. So actors live once, and `CrewExecutor` has done again what was lost.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import socket
+import threading
+from contextlib import suppress
+from typing import Any
+
+import kiks
+from kiks.errors import ParameterError
+from kiks.learn.work import Answer, Floats, Integers, Lost, Raised, Ready, Values, Work, Worker
+
+_log = logging.getLogger("kiks.learn")
+
+LOOPBACK = "127.0.0.1"
+
+PATIENCE_S = 10.0
+"""After how long without an answer it is looked whether there are other workers to be had [s]."""
+
+
+class RayCrew:
+    """A crew of actors (`Crew`).
+
+    Args:
+        work: What evaluates candidates.
+        address: Of a running cluster, "auto" for the one that this computer belongs to; None for the one that this
+            program is connected to, else for one of its own on this computer, for as long as the crew is open.
+    """
+
+    def __init__(self, work: Work, *, address: str | None) -> None:
+        self._work = work
+        self._address = address
+        self._ray: Any = None
+        self._has_connected = False
+        self._sigterm_before: Any = None
+        self._actors: dict[int, Any] = {}
+        self._owed: dict[Any, int] = {}
+        self._next_number = 0
+        self._shipped: Any = None
+
+    def open(self) -> None:
+        """Connect to the cluster, lay the work in its store, once for all workers, and start these.
+
+        Raises:
+            ParameterError: If Ray is not installed, no cluster is reached, or the work cannot be pickled.
+        """
+        self._ray = ray = _import_ray(loopback_only=self._address is None)
+        try:
+            pickled = ray.cloudpickle.dumps(self._work)
+        except Exception as error:
+            raise ParameterError(
+                f"Work must be picklable to run on a cluster, but {type(self._work).__name__} is not: {error}. Build"
+                " what cannot be pickled in prepare()."
+            ) from error
+        self._connect()
+        try:
+            self._shipped = ray.put(pickled)
+            self.muster()
+        except BaseException:
+            self.close()
+            raise
+
+    def _connect(self) -> None:
+        ray = self._ray
+        if ray.is_initialized():
+            there = ray.get_runtime_context().gcs_address
+            if self._address not in (None, "auto", there):
+                raise ParameterError(
+                    f"A program must use one cluster at a time, but it is connected to {there} and was asked for"
+                    f" {self._address}. Call ray.shutdown() before, or say 'ray' for the one that it is connected to."
+                )
+            return
+        if threading.current_thread() is threading.main_thread():
+            # ray.init() sets a handler of its own.
+            self._sigterm_before = signal.getsignal(signal.SIGTERM)
+        try:
+            if self._address is None:
+                core_count = len(os.sched_getaffinity(0))
+                ray.init("local", num_cpus=core_count, include_dashboard=False, _node_ip_address=LOOPBACK)
+            else:
+                _knock(self._address)
+                ray.init(self._address)
+        except (OSError, RuntimeError, ValueError, ray.exceptions.RayError) as error:
+            raise ParameterError(
+                f"A Ray cluster must be reached, but at {self._address or 'this computer'} none was ({error}). Start"
+                " one with `ray start --head`, and this program on one of its computers."
+            ) from error
+        self._has_connected = True
+        there = ray.get_runtime_context().gcs_address
+        if self._address is None and not there.startswith(f"{LOOPBACK}:"):
+            _log.warning(
+                "Ray listens on %s: whoever reaches it can run code here. Import ray after the executor was opened.",
+                there,
+            )
+
+    def close(self) -> None:
+        """End all actors, and the connection if there was none before."""
+        while self._actors:
+            self.dismiss(next(iter(self._actors)))
+        self._shipped = None
+        if self._has_connected:
+            self._has_connected = False
+            self._ray.shutdown()
+            if self._sigterm_before is not None:
+                signal.signal(signal.SIGTERM, self._sigterm_before)
+
+    def muster(self) -> int:
+        """Ask all that have nothing to do whether they are there, start one on each core that is free; return how many.
+
+        Who finds no core free waits for one: that of another program, or of a computer that joins.
+        """
+        busy = set(self._owed.values())
+        for number, actor in self._actors.items():
+            if number not in busy:
+                self._owed[actor.answer.remote()] = number
+        worker_count = max(1, int(self._ray.cluster_resources().get("CPU", 0)))
+        actor_class = self._ray.remote(num_cpus=1, max_restarts=0, max_task_retries=0)(RayWorker)
+        for _ in range(worker_count - len(self._actors)):
+            actor = self._actors[self._next_number] = actor_class.remote()
+            self._owed[actor.prepare.remote(self._shipped, kiks.__version__)] = self._next_number
+            self._next_number += 1
+        return worker_count
+
+    def hand(self, worker: int, candidates: Floats, seeds: Integers) -> None:
+        """Give a chunk to a worker that is ready."""
+        self._owed[self._actors[worker].evaluate.remote(candidates, seeds)] = worker
+
+    def wait(self) -> list[tuple[int, Answer]]:
+        """Return who answered what, as soon as somebody has; nothing if nobody has for a while."""
+        answered, _ = self._ray.wait(list(self._owed), num_returns=1, timeout=PATIENCE_S)
+        return [(self._owed[reference], self._answer(reference)) for reference in answered]
+
+    def _answer(self, reference: Any) -> Answer:
+        number = self._owed.pop(reference)
+        try:
+            answer: Answer = self._ray.get(reference)
+        except self._ray.exceptions.RayTaskError as error:
+            # The work catches what it raises: this is Ray, that could not build a worker or read what was sent.
+            return Raised.of(error)
+        except self._ray.exceptions.RayError as error:
+            self.dismiss(number)
+            return Lost(f"went ({' '.join(str(error).split())[:200]})")
+        return answer
+
+    def dismiss(self, worker: int) -> None:
+        """End a worker, whatever it does."""
+        actor = self._actors.pop(worker, None)
+        self._owed = {reference: number for reference, number in self._owed.items() if number != worker}
+        if actor is not None:
+            with suppress(self._ray.exceptions.RayError):
+                self._ray.kill(actor)
+
+
+class RayWorker:
+    """An actor: the work in a process of the cluster, with one thread."""
+
+    def prepare(self, pickled: bytes, version: str) -> Ready | Raised:
+        """Take the work and prepare it, if this is the same KiKS as that of the program which sends it."""
+        import pickle
+
+        if version != kiks.__version__:
+            return Raised(
+                f"ParameterError: All computers must have the same KiKS, but one has {kiks.__version__}, and the one"
+                f" where the evolution was started {version}. Install the same on all.",
+                "",
+            )
+        self._worker = Worker(lambda: pickle.loads(pickled), threads=1)
+        return self._worker.prepare()
+
+    def answer(self) -> Ready:
+        """Say that it is there."""
+        return Ready()
+
+    def evaluate(self, candidates: Floats, seeds: Integers) -> Values | Raised:
+        """Evaluate a chunk: candidates [candidate, parameter] with their seeds [candidate]."""
+        return self._worker.evaluate(candidates, seeds)
+
+
+def _knock(address: str) -> None:
+    """See whether anybody listens at HOST:PORT, for Ray would go on asking for minutes.
+
+    Raises:
+        OSError: If nobody does.
+    """
+    host, _, port = address.rpartition(":")
+    if port.isdecimal() and "://" not in address:
+        socket.create_connection((host, int(port)), timeout=PATIENCE_S).close()
+
+
+def _import_ray(*, loopback_only: bool) -> Any:
+    """Return the module, with the variables set that it reads when it is imported.
+
+    Args:
+        loopback_only: Whether it will start a cluster for this computer alone. Else, whatever address it is given, Ray
+            takes that which this computer has in the network, and some of its parts listen on all.
+
+    Raises:
+        ParameterError: If it is not installed.
+    """
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+    if loopback_only:
+        os.environ.setdefault("RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER", "0")
+    try:
+        import ray
+    except ImportError as error:
+        raise ParameterError(
+            "Evaluations on 'ray' need Ray, but it is not installed. Run `pip install 'kiks[ray]'`, or use 'processes'."
+        ) from error
+    return ray

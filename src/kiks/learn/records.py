@@ -1,0 +1,165 @@
+"""What an evolution leaves on the disk: its generations, from which it can go on, and a log for people and programs.
+
+Need: whatever happens to the process, all generations but the current one are safe, and the log can be read.
+Method: each generation is a small file of its own; files appear whole, in one step, after their bytes are on the disk.
+The log is made of all generations, anew each time.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.errors import ParameterError
+from kiks.learn.algorithms import library
+from kiks.model.files import write_whole
+
+Floats = NDArray[np.float64]
+
+IDENTITY, GENERATIONS, LOG = "evolution.json", "generations", "log.parquet"
+"""Names in the folder."""
+
+
+@dataclass(frozen=True)
+class Generation:
+    """What a generation was worth.
+
+    Attributes:
+        candidates: All that were evaluated, float64 [candidate, parameter]: the population, then a rival on trial.
+        values: What they were worth, float64 [candidate, value]: fitness, then measures.
+        population: How many of them are the population.
+        champion_fitness: That of the best rival so far; not a number before there was one.
+        seconds: When it was over [s of the wall clock, since the evolution began].
+    """
+
+    candidates: Floats
+    values: Floats
+    population: int
+    champion_fitness: float
+    seconds: float
+
+    @property
+    def fitness(self) -> Floats:
+        """Fitness of the population, float64 [candidate]."""
+        return self.values[: self.population, 0]
+
+
+class Folder:
+    """The folder of an evolution.
+
+    Args:
+        path: Where it is; it is made if it is not there.
+
+    Raises:
+        ParameterError: If it cannot be made.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        try:
+            (self.path / GENERATIONS).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise ParameterError(
+                f"the folder {str(path)!r} must be writable, but: {error}. Choose another one."
+            ) from None
+
+    def check_identity(self, identity: dict[str, Any]) -> None:
+        """Make the folder that of an evolution.
+
+        Raises:
+            ParameterError: If it is that of another one.
+        """
+        file = self.path / IDENTITY
+        if not file.exists():
+            replace_safely(file, (json.dumps(identity, indent=1) + "\n").encode())
+            return
+        try:
+            known = json.loads(file.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise ParameterError(
+                f"{str(file)!r} must tell whose folder this is, but: {error}. Take a new folder."
+            ) from None
+        for name, value in identity.items():
+            if known.get(name) != value:
+                raise ParameterError(
+                    f"the folder {str(self.path)!r} must hold the same evolution, but its {name} is "
+                    f"{known.get(name)!r}, not {value!r}. Take a new folder, or ask for what it holds."
+                )
+
+    def generations(self) -> Iterator[dict[str, Any]]:
+        """Yield candidates, values and seconds of each generation, as they were saved.
+
+        Raises:
+            ParameterError: If a file is broken.
+        """
+        number = 0
+        while (file := self._file(number)).exists():
+            try:
+                with np.load(file, allow_pickle=False) as arrays:
+                    yield {name: arrays[name] for name in ("candidates", "values", "seconds")}
+            except (OSError, ValueError, KeyError, BadZipFile) as error:
+                raise ParameterError(
+                    f"{str(file)!r} must be a generation, but: {error}. Remove it, and those after it."
+                ) from None
+            number += 1
+
+    def save(self, number: int, generation: Generation) -> None:
+        """Save a generation.
+
+        Raises:
+            ParameterError: If it cannot be written.
+        """
+        buffer = io.BytesIO()
+        seconds = np.float64(generation.seconds)
+        np.savez(buffer, candidates=generation.candidates, values=generation.values, seconds=seconds)
+        replace_safely(self._file(number), buffer.getvalue())
+
+    def save_log(self, generations: Sequence[Generation], value_names: Sequence[str]) -> None:
+        """Write the log of all generations, a row for each candidate of each population.
+
+        Raises:
+            ParameterError: If it cannot be written, or pyarrow is not installed.
+        """
+        pyarrow, parquet = library("pyarrow"), library("pyarrow.parquet")
+        counts = [len(each.fitness) for each in generations]
+
+        def of_each(values: Sequence[float]) -> NDArray[Any]:
+            return np.repeat(np.array(values), counts) if counts else np.zeros(0)
+
+        columns: dict[str, Any] = {
+            "generation": of_each(range(1, len(counts) + 1)).astype(np.int64),
+            "candidate": np.concatenate([np.zeros(0, np.int64), *map(np.arange, counts)]).astype(np.int64),
+        }
+        values = [each.values[: each.population] for each in generations]
+        table = np.concatenate(values) if values else np.zeros((0, len(value_names)))
+        columns |= {name: table[:, number] for number, name in enumerate(value_names[: table.shape[1]])}
+        columns["champion_fitness"] = of_each([each.champion_fitness for each in generations])
+        columns["seconds"] = of_each([each.seconds for each in generations])
+        evaluated = np.cumsum([len(each.values) for each in generations]).tolist()
+        columns["evaluations"] = of_each(evaluated).astype(np.int64)
+        buffer = io.BytesIO()
+        parquet.write_table(pyarrow.table(columns), buffer)
+        replace_safely(self.path / LOG, buffer.getvalue())
+
+    def _file(self, number: int) -> Path:
+        return self.path / GENERATIONS / f"{number + 1:06}.npz"
+
+
+def replace_safely(path: Path, data: bytes) -> None:
+    """Write a file, whole and in one step, and see that it is on the disk.
+
+    Raises:
+        ParameterError: If it cannot be written.
+    """
+    try:
+        write_whole(path, data)
+    except OSError as error:
+        raise ParameterError(f"the file {str(path)!r} must be writable, but: {error}. Choose another folder.") from None

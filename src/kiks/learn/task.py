@@ -1,0 +1,289 @@
+"""A task: what a controller is evolved for, and how what it did becomes one number, its fitness."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import pickle
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.batch.batch import Batch
+from kiks.batch.beginning import random_starts
+from kiks.batch.timing import Timing
+from kiks.control.controller import Controller
+from kiks.control.measure import Measure
+from kiks.errors import ParameterError
+from kiks.model.arena import Arena
+from kiks.model.robot import RobotSpec
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Fitness = Callable[[Mapping[str, Floats]], Floats]
+
+WORLDS_AT_ONCE = 20_000
+"""Most worlds of one batch: more of them would need more memory and run no faster."""
+
+
+CLEAR_MM = 8.0
+"""How far from everything robots start at least [mm]."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A direction in which behaviours differ, cut into cells.
+
+    Args:
+        measure: Name of the measure that says where on it a behaviour is.
+        low: Its lower end.
+        high: Its upper end; who is beyond an end counts to the last cell.
+        cells: How many cells.
+    """
+
+    measure: str
+    low: float
+    high: float
+    cells: int = 20
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
+            raise ParameterError(
+                f"an axis must lead from low to high, but {self.measure!r} led {self.low} to {self.high}."
+            )
+        if not isinstance(self.cells, int) or not 1 <= self.cells <= 10_000:
+            raise ParameterError(f"an axis must have 1 to 10000 cells, but {self.measure!r} had {self.cells!r}.")
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """A task that controllers are evolved for: a `kiks.learn.work.Work`.
+
+    A candidate, that is a controller's parameters, drives in `worlds` worlds, which the arenas share evenly. What is
+    measured there, on average over a world's robots, becomes one number, its fitness.
+
+    Args:
+        name: What it is called.
+        arenas: Where it trains.
+        controller: What is evolved; it must say how many parameters it has.
+        measures: What is measured, each with a name of its own.
+        fitness: From the measures, by name float64 [candidate, world], to the fitness, float64 [candidate]; more is
+            better. Left out, it is `cautious_mean` of the first measure.
+        seconds: How long a candidate drives in each world [s].
+        worlds: In how many worlds; a multiple of the number of arenas.
+        axes: In what behaviours differ, for algorithms that look for many of them.
+        robot: Kind of robot: a name or a robot file.
+        robots: How many robots there are in each world, all with the same controller.
+        timing: The pace of the loop; as of a program on a line of 9600 baud if left out.
+        starts: 'random' for free places anywhere, or 'arena' for where the arena puts robots.
+        exam: An arena where it does not train: champions show there what they can.
+        about: What it is about, in a line.
+        file: The file that it comes from, if it is a user's.
+
+    Raises:
+        ParameterError: If an argument is out of range.
+
+    Example:
+        >>> import kiks
+        >>> @kiks.controller(parameters=2)
+        ... def ahead(sensors, memory, parameters, wheels):
+        ...     wheels[:] = parameters
+        >>> task = Task("far", [kiks.Arena.box(500, 500)], ahead, [kiks.measures.path_mm], seconds=1, worlds=2)
+        >>> task.evaluate(np.array([[0.0, 0.0], [3.0, 3.0]]), np.zeros(2, np.int64), 1).round(1)
+        array([[ 0. ,  0. ],
+               [20.4, 20.4]])
+    """
+
+    name: str
+    arenas: tuple[Arena, ...]
+    controller: Controller
+    measures: tuple[Measure, ...]
+    fitness: Fitness | None = None
+    seconds: float = 30.0
+    worlds: int = 1
+    axes: tuple[Axis, ...] = ()
+    robot: str = "khepera"
+    robots: int = 1
+    timing: Timing = field(default_factory=Timing)
+    starts: str = "random"
+    exam: Arena | None = None
+    about: str = ""
+    file: str = ""
+
+    def __post_init__(self) -> None:
+        given: Any = self.arenas
+        arenas = (given,) if isinstance(given, Arena) else tuple(given)
+        object.__setattr__(self, "arenas", arenas)
+        object.__setattr__(self, "measures", tuple(self.measures))
+        object.__setattr__(self, "axes", tuple(self.axes))
+        if not arenas or not all(isinstance(arena, Arena) for arena in arenas):
+            raise ParameterError(f"arenas must be one or more kiks.Arena, but they were {self.arenas!r:.80}.")
+        if not isinstance(self.controller, Controller) or not self.controller.parameter_count:
+            raise ParameterError(
+                f"the controller of a task must have parameters, and say how many, but it was {self.controller!r}. "
+                "Write @kiks.controller(parameters=COUNT) over the function."
+            )
+        if not isinstance(self.worlds, int) or self.worlds < 1 or self.worlds % len(arenas):
+            raise ParameterError(
+                f"worlds must be a multiple of the number of arenas, {len(arenas)}, but it was {self.worlds!r}."
+            )
+        if not (isinstance(self.seconds, int | float) and 1e-3 <= self.seconds <= 1e6):
+            raise ParameterError(f"seconds must be from 0.001 to 1e6, but it was {self.seconds!r}.")
+        if self.starts not in ("random", "arena") or (self.starts == "random" and self.robots > 1):
+            raise ParameterError(
+                f"starts must be 'random' or 'arena', with several robots 'arena', but it was {self.starts!r}."
+            )
+        names = self.measure_names
+        if not names or not all(isinstance(each, Measure) for each in self.measures) or len(set(names)) != len(names):
+            raise ParameterError(f"measures must be one or more, each with another name, but they were {names}.")
+        for axis in self.axes:
+            if axis.measure not in names:
+                raise ParameterError(f"an axis must name one of {', '.join(names)}, but it named {axis.measure!r}.")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Functions go by value: a worker elsewhere has no file of the user's.
+        from numba import cloudpickle
+
+        dumps: Any = cloudpickle.dumps
+        values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        return _task_of, (dumps(values),)
+
+    def with_changes(self, **changes: Any) -> Task:
+        """Return the same task with other arguments.
+
+        Raises:
+            ParameterError: If one of them is out of range.
+        """
+        return replace(self, **changes)
+
+    @property
+    def measure_names(self) -> tuple[str, ...]:
+        """What the measures are called."""
+        return tuple(getattr(each, "name", repr(each)) for each in self.measures)
+
+    @property
+    def value_names(self) -> tuple[str, ...]:
+        """What the values of a candidate are called: fitness, then the measures."""
+        return ("fitness", *self.measure_names)
+
+    @property
+    def parameter_count(self) -> int:
+        """How many parameters a candidate has."""
+        return self.controller.parameter_count or 0
+
+    @property
+    def tick_count(self) -> int:
+        """How many robot-steps of 10 ms a candidate takes, about."""
+        return round(self.worlds * self.robots * self.seconds * 100)
+
+    def digest(self) -> str:
+        """Return 16 hexadecimal digits that differ for tasks whose evolution would."""
+        said = hashlib.sha256()
+        for each in self.arenas:
+            said.update(each.brightness.tobytes())
+            said.update(repr((each.mm_per_cell, each.starts, each.lamps, each.balls, each.cylinders)).encode())
+        made_of = (self.controller.recipe, self.controller.name, self.parameter_count, self.measure_names, self.seconds)
+        how = (self.worlds, self.axes, self.robots, self.timing, self.starts)
+        said.update(repr((self.name, made_of, how, RobotSpec.load(self.robot))).encode())
+        if self.file:
+            said.update(Path(self.file).read_bytes())
+        return said.hexdigest()[:16]
+
+    # ---- work ----
+
+    def prepare(self) -> None:
+        """Compile the controller and the measures."""
+        self.evaluate(np.zeros((1, self.parameter_count)), np.zeros(1, np.int64), 1, seconds=self.timing.period_s)
+
+    def evaluate(self, candidates: Floats, seeds: Integers, threads: int, seconds: float | None = None) -> Floats:
+        """Return what candidates are worth.
+
+        Args:
+            candidates: Parameters [candidate, parameter].
+            seeds: A seed for each [candidate]: of its worlds, and of where they start.
+            threads: How many threads are used.
+            seconds: How long they drive [s], if not as long as the task says.
+
+        Returns:
+            Fitness, then the mean of each measure, float64 [candidate, 1 + measure].
+
+        Raises:
+            ParameterError: If a measure or the fitness is no finite number, or the fitness has another shape.
+        """
+        at_once = max(1, WORLDS_AT_ONCE // self.worlds)
+        parts = []
+        for first in range(0, len(candidates), at_once):
+            part = slice(first, first + at_once)
+            parts.append(self._evaluate(candidates[part], seeds[part], threads, seconds or self.seconds))
+        return np.concatenate(parts)
+
+    def _evaluate(self, candidates: Floats, seeds: Integers, threads: int, seconds: float) -> Floats:
+        count = len(candidates)
+        batch = Batch(
+            self.arenas,
+            count * self.worlds,
+            robot=self.robot,
+            robots=self.robots,
+            seed=(seeds[:, None] + np.arange(self.worlds)).ravel(),
+            starts=self._starts(seeds) if self.starts == "random" else None,
+            senses=self.controller.senses,
+            timing=self.timing,
+            threads=threads,
+        )
+        given = np.repeat(candidates, self.worlds, axis=0)
+        values = batch.run(self.controller, given, seconds=seconds, measures=self.measures).values
+        values = values.mean(axis=1).reshape(count, self.worlds, len(self.measures))
+        for number, name in enumerate(self.measure_names):
+            if not np.isfinite(values[:, :, number]).all():
+                raise ParameterError(f"measures must be finite, but {name!r} was not. Look at what it divides by.")
+        named = {name: values[:, :, number] for number, name in enumerate(self.measure_names)}
+        made = cautious_mean(values[:, :, 0]) if self.fitness is None else self.fitness(named)
+        fitness = np.asarray(made, np.float64)
+        if fitness.shape != (count,) or not np.isfinite(fitness).all():
+            raise ParameterError(
+                f"fitness must return a finite number for each of {count} candidates, but returned {made!r:.80}. The "
+                "measures it gets are [candidate, world]: take a mean over axis 1."
+            )
+        return np.column_stack([fitness, values.mean(axis=1)])
+
+    def _starts(self, seeds: Integers) -> Floats:
+        """Return random start poses, float64 [world, 1, 3]: the same for the same seed."""
+        each_count = self.worlds // len(self.arenas)
+        radius_mm = RobotSpec.load(self.robot).body.radius_mm
+        poses = {}
+        for seed in dict.fromkeys(seeds.tolist()):
+            of_arenas = [
+                random_starts(arena, each_count, seed=seed, radius_mm=radius_mm, clear_mm=CLEAR_MM)
+                for arena in self.arenas
+            ]
+            # The worlds take the arenas in turn.
+            poses[seed] = np.stack(of_arenas, axis=1).reshape(self.worlds, 1, 3)
+        return np.concatenate([poses[seed] for seed in seeds.tolist()])
+
+
+def _task_of(pickled: bytes) -> Task:
+    """Return the task that was pickled."""
+    return Task(**pickle.loads(pickled))
+
+
+def cautious_mean(scores: Floats, caution: float = 0.5) -> Floats:
+    """Return one number for the scores of several worlds: their mean, drawn towards the mean of the worse half.
+
+    The worse half says what a controller is worth in worlds that do not suit it. Accidents count there, but no single
+    one decides, as the worst world would.
+
+    Args:
+        scores: [candidate, world].
+        caution: From 0, the mean, to 1, the mean of the worse half.
+
+    Example:
+        >>> cautious_mean(np.array([[1.0, 1.0, 0.0, 1.0]]))
+        array([0.625])
+    """
+    worse = np.sort(scores, axis=1)[:, : (scores.shape[1] + 1) // 2]
+    mean: Floats = (1 - caution) * scores.mean(axis=1) + caution * worse.mean(axis=1)
+    return mean

@@ -1,0 +1,329 @@
+"""Evolution: the same seed the same run, nothing lost when it is killed, and a champion that drives as it was bred."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import kiks
+from kiks import ParameterError
+from kiks.learn.task import cautious_mean
+
+pytest.importorskip("cma")
+pytest.importorskip("ribs")
+parquet = pytest.importorskip("pyarrow.parquet")
+
+
+def small(**changes: Any) -> kiks.Task:
+    """A task that takes a hundredth of a second."""
+    return kiks.tasks.avoid(**{"seconds": 1.0, "worlds": 3} | changes)
+
+
+def run(algorithm: str, folder: Path | None = None, executor: str = "threads:1", **given: Any) -> kiks.Evolution:
+    evolution = kiks.Evolution(small(), algorithm, population=8, folder=folder, **{"seed": 3} | given)
+    evolution.run(generations=4, executor=executor)
+    return evolution
+
+
+def candidates_of(evolution: kiks.Evolution) -> bytes:
+    return b"".join(each.candidates.tobytes() + each.values.tobytes() for each in evolution.generations)
+
+
+# ---- the same run again ----
+
+
+@pytest.mark.parametrize("algorithm", ["cma", "ga", "map-elites"])
+def test_the_same_seed_is_the_same_run(algorithm: str) -> None:
+    np.random.seed(1)
+    one = run(algorithm)
+    np.random.seed(2)
+    two = run(algorithm, executor="threads:2")
+    other = run(algorithm, seed=4)
+    assert candidates_of(one) == candidates_of(two) != candidates_of(other)
+    assert one.champion.parameters == two.champion.parameters
+
+
+@pytest.mark.slow
+def test_processes_give_the_same_run() -> None:
+    assert candidates_of(run("cma")) == candidates_of(run("cma", executor="processes:2"))
+
+
+def test_each_generation_has_worlds_of_its_own_and_trials_always_the_same() -> None:
+    evolution = run("ga")
+    before = evolution.seeds
+    evolution.tell(np.zeros(len(evolution.ask())))
+    assert len(set(before[:8])) == 1
+    assert before[0] != evolution.seeds[0]
+    assert (before[8:] == evolution.seeds[8:]).all()
+    assert len(before) > 8
+
+
+# ---- what is on the disk ----
+
+
+def test_an_evolution_goes_on_where_it_stopped(tmp_path: Path) -> None:
+    whole = run("cma", tmp_path / "whole")
+    part = kiks.Evolution(small(), "cma", population=8, seed=3, folder=tmp_path / "part")
+    part.run(generations=2)
+    rest = run("cma", tmp_path / "part")
+    assert candidates_of(rest) == candidates_of(whole)
+    assert (tmp_path / "part/champion.toml").read_bytes() == (tmp_path / "whole/champion.toml").read_bytes()
+
+
+KILLED = """
+import sys, kiks
+def told(evolution):
+    print(len(evolution.generations), flush=True)
+task = kiks.tasks.avoid(seconds=1.0, worlds=3)
+evolution = kiks.Evolution(task, "cma", population=8, seed=3, folder=sys.argv[1])
+evolution.run(generations=10**6, each=told)
+"""
+
+
+@pytest.mark.slow
+def test_who_is_killed_loses_the_current_generation_at_most(tmp_path: Path) -> None:
+    with subprocess.Popen([sys.executable, "-c", KILLED, str(tmp_path)], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        told = [int(process.stdout.readline()) for _ in range(3)][-1]
+        os.kill(process.pid, signal.SIGKILL)
+    again = kiks.Evolution(small(), "cma", population=8, seed=3, folder=tmp_path)
+    count = len(again.generations)
+    assert count >= told
+    again.run(generations=count + 1)
+    whole = kiks.Evolution(small(), "cma", population=8, seed=3)
+    whole.run(generations=count + 1)
+    assert candidates_of(again) == candidates_of(whole)
+    assert again.champion.parameters == whole.champion.parameters
+
+
+def test_the_log_has_a_row_for_each_candidate(tmp_path: Path) -> None:
+    evolution = run("cma", tmp_path)
+    log = parquet.read_table(tmp_path / "log.parquet").to_pydict()
+    assert log["generation"] == [number for number in range(1, 5) for _ in range(8)]
+    assert log["candidate"] == list(range(8)) * 4
+    assert log["fitness"] == [value for each in evolution.generations for value in each.fitness.tolist()]
+    assert {"avoidance", "contacts", "path_mm", "seconds", "evaluations", "champion_fitness"} <= set(log)
+    assert log["evaluations"][-1] == sum(len(each.values) for each in evolution.generations)
+
+
+def test_a_folder_of_another_evolution_is_refused(tmp_path: Path) -> None:
+    run("cma", tmp_path)
+    with pytest.raises(ParameterError, match="must hold the same evolution, but its seed is 3, not 4"):
+        kiks.Evolution(small(), "cma", population=8, seed=4, folder=tmp_path)
+    with pytest.raises(ParameterError, match="but its task digest is"):
+        kiks.Evolution(small(seconds=2.0), "cma", population=8, seed=3, folder=tmp_path)
+
+
+def test_a_broken_generation_is_named(tmp_path: Path) -> None:
+    run("cma", tmp_path)
+    (tmp_path / "generations/000002.npz").write_bytes(b"nothing")
+    with pytest.raises(ParameterError, match=r"000002.npz' must be a generation"):
+        kiks.Evolution(small(), "cma", population=8, seed=3, folder=tmp_path)
+
+
+@pytest.mark.parametrize("algorithm", ["ga", "map-elites"])
+def test_the_picture_is_drawn(algorithm: str, tmp_path: Path) -> None:
+    from kiks.learn.plots import save_plot
+
+    save_plot(run(algorithm), tmp_path / "fitness.png")
+    assert (tmp_path / "fitness.png").read_bytes().startswith(b"\x89PNG")
+
+
+# ---- algorithms ----
+
+
+@pytest.mark.parametrize("algorithm", ["cma", "ga"])
+def test_algorithms_climb(algorithm: str) -> None:
+    evolution = kiks.Evolution(small(), algorithm, seed=1, population=20)
+    for _ in range(40):
+        evolution.tell(-((evolution.ask() - 0.5) ** 2).sum(axis=1))
+    assert evolution.champion.fitness > -3.0
+    assert evolution.generations[0].fitness.max() < -5
+
+
+def test_map_elites_fills_its_map() -> None:
+    evolution = kiks.Evolution(small(), "map-elites", seed=1, population=20)
+    rng = np.random.default_rng(1)
+    for _ in range(5):
+        count = len(evolution.ask())
+        evolution.tell(rng.uniform(0, 1, (count, 5)))
+    heat = evolution.algorithm.heat_map()  # type: ignore[attr-defined]
+    assert heat.shape == (20, 20)
+    assert 1 <= np.isfinite(heat).sum() <= 20
+
+
+def test_map_elites_needs_axes() -> None:
+    with pytest.raises(ParameterError, match="has no axes"):
+        kiks.Evolution(small(axes=()), "map-elites")
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"algorithm": "cna"}, "Did you mean 'cma'"),
+        ({"population": 3}, "population must be a whole number from 4"),
+        ({"seed": -1}, "seed must be a whole number from 0"),
+    ],
+)
+def test_wrong_arguments_are_named(given: dict[str, Any], said: str) -> None:
+    with pytest.raises(ParameterError, match=said):
+        kiks.Evolution(small(), **given)
+
+
+def test_ask_and_tell_keep_their_order() -> None:
+    evolution = kiks.Evolution(small(), "ga", population=8)
+    with pytest.raises(ParameterError, match="must have been told"):
+        _ = evolution.champion
+    with pytest.raises(ParameterError, match="ask\\(\\) must come before"):
+        evolution.tell(np.zeros(8))
+    assert (evolution.ask() == evolution.ask()).all()
+    with pytest.raises(ParameterError, match="values must be finite numbers"):
+        evolution.tell(np.full(8, np.nan))
+    with pytest.raises(ParameterError, match="generations or seconds must be given"):
+        evolution.run()
+
+
+# ---- tasks ----
+
+
+def test_the_worse_half_counts() -> None:
+    scores = np.array([[1.0, 1.0, 1.0, 1.0], [1.0, 1.0, 1.0, 0.0]])
+    assert cautious_mean(scores, 0.0).tolist() == [1.0, 0.75]
+    assert cautious_mean(scores, 1.0).tolist() == [1.0, 0.5]
+
+
+@pytest.mark.parametrize("name", list(kiks.tasks.TASKS))
+def test_the_tasks_can_be_evaluated(name: str) -> None:
+    task = kiks.tasks.TASKS[name](seconds=0.5)
+    values = task.evaluate(np.zeros((2, task.parameter_count)), np.array([5, 5]), 1)
+    assert values.shape == (2, len(task.value_names))
+    assert np.isfinite(values).all()
+    assert (values[0] == values[1]).all()
+
+
+def test_values_do_not_depend_on_neighbours() -> None:
+    task = small()
+    candidates = np.random.default_rng(1).standard_normal((5, task.parameter_count))
+    seeds = np.array([1, 2, 3, 3, 1])
+    together = task.evaluate(candidates, seeds, 2)
+    alone = [task.evaluate(candidates[k : k + 1], seeds[k : k + 1], 1)[0] for k in range(5)]
+    assert (together == np.array(alone)).all()
+
+
+OWN = """
+import kiks
+
+@kiks.controller(parameters=2)
+def ahead(sensors, memory, parameters, wheels):
+    wheels[:] = parameters
+
+@kiks.measure
+def farthest_mm(moment, notes):
+    notes[0] = max(notes[0], moment.path_mm)
+
+task = kiks.Task("far", [kiks.Arena.box(500, 500)], ahead, [farthest_mm], seconds=1, worlds=2,
+                 fitness=lambda values: values["farthest_mm"].mean(axis=1))
+"""
+
+
+@pytest.mark.slow
+def test_a_task_of_ones_own_runs_in_processes_and_leaves_a_champion(tmp_path: Path) -> None:
+    (tmp_path / "far.py").write_text(OWN)
+    task = kiks.tasks.load(str(tmp_path / "far.py"))
+    evolution = kiks.Evolution(task, "ga", population=8, folder=tmp_path / "out")
+    champion = evolution.run(generations=3, executor="processes:1")
+    (tmp_path / "far.py").unlink()
+    again = kiks.Champion.load(tmp_path / "out/champion.toml")
+    assert again.parameters == champion.parameters
+    sim, ports = again.simulation(kiks.Arena.box(500, 500))
+    assert again.drive(ports, seconds=1.0) == 10
+    assert sim.travelled_mm(1) > 0
+
+
+def test_files_that_hold_no_task_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "none.py").write_text("task = 1\n")
+    with pytest.raises(ParameterError, match="must hold a `task"):
+        kiks.tasks.load(str(tmp_path / "none.py"))
+    (tmp_path / "bad.py").write_text("1 / 0\n")
+    with pytest.raises(ParameterError, match="ZeroDivisionError"):
+        kiks.tasks.load(str(tmp_path / "bad.py"))
+    with pytest.raises(ParameterError, match="Did you mean 'avoid'"):
+        kiks.tasks.load("avoyd")
+
+
+def test_wrong_tasks_are_named() -> None:
+    with pytest.raises(ParameterError, match="worlds must be a multiple of the number of arenas, 3"):
+        small(worlds=4)
+    with pytest.raises(ParameterError, match="an axis must name one of"):
+        small(axes=(kiks.Axis("nothing", 0, 1),))
+    task = small(fitness=lambda values: values["contacts"])
+    with pytest.raises(ParameterError, match="fitness must return a finite number for each of 1"):
+        task.prepare()
+
+
+# ---- champions ----
+
+
+def test_a_champion_is_the_same_after_its_file(tmp_path: Path) -> None:
+    champion = run("cma").champion
+    champion.save(tmp_path / "champion.toml")
+    again = kiks.Champion.load(tmp_path / "champion.toml")
+    for name in ("parameters", "task", "fitness", "measures", "generation", "algorithm", "seed", "robot", "timing"):
+        assert getattr(again, name) == getattr(champion, name)
+    assert again.controller is champion.controller
+
+
+def test_a_champion_drives_on_the_wire_as_in_the_batch() -> None:
+    task = small()
+    champion = run("cma").champion
+    sim, ports = champion.simulation(task.arenas[0], seed=7)
+    champion.drive(ports, seconds=2.0)
+    batch = kiks.Batch(task.arenas[0], 1, seed=7, timing=task.timing)
+    path_mm = batch.run(champion.controller, champion.parameters, seconds=2.0, measures=[kiks.measures.path_mm]).values
+    assert sim.travelled_mm(1) == pytest.approx(path_mm[0, 0, 0], abs=20)
+    assert batch.poses[0, 0].tolist()[:2] == pytest.approx(sim.pose(1)[:2], abs=10)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "said"),
+    [
+        ("champion = 1", "champion = 9", "the version of the format"),
+        ('kind = "linear"', 'kind = "linaer"', "Did you mean 'linear'"),
+        ("parameters = [", "parameters = [\n    1.0,", "must be given 18 parameters, but got 19"),
+        ("period_s = 0.1", "period_s = -1", "period_s must be from 0"),
+        ("seed = 3", "sed = 3", "Did you mean 'seed'"),
+        ('robot = "khepera"\n', "", "there must be a key 'robot'"),
+        ("champion = 1", "champion = ", "must be a champion's file"),
+    ],
+)
+def test_wrong_champions_are_named(before: str, after: str, said: str, tmp_path: Path) -> None:
+    run("cma").champion.save(tmp_path / "champion.toml")
+    text = (tmp_path / "champion.toml").read_text()
+    assert before in text
+    (tmp_path / "wrong.toml").write_text(text.replace(before, after))
+    with pytest.raises(ParameterError, match=said):
+        kiks.Champion.load(tmp_path / "wrong.toml")
+
+
+# ---- what it is all for ----
+
+
+@pytest.mark.slow
+def test_obstacle_avoidance_evolves_and_drives_on_the_wire() -> None:
+    task = kiks.tasks.avoid()
+    evolution = kiks.Evolution(task, "cma", seed=1)
+    champion = evolution.run(generations=25)
+    medians = [float(np.median(each.fitness)) for each in evolution.generations]
+    assert medians[-1] > 5 * max(medians[0], 0.01)
+    assert task.exam is not None
+    sim, ports = champion.simulation(task.exam, seed=1)
+    champion.drive(ports, seconds=60.0)
+    assert sim.contacts(1) <= 3
+    assert sim.travelled_mm(1) > 1000

@@ -1,0 +1,109 @@
+"""A Ray cluster of two nodes on this computer: the same values, whoever is lost on the way."""
+
+from __future__ import annotations
+
+import os
+import threading
+
+import numpy as np
+import pytest
+from tests.learn import works
+from tests.learn.test_executors import expected
+
+from kiks.errors import ParameterError, WorkError
+from kiks.learn.executors import executor_for
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def ray():
+    with pytest.MonkeyPatch.context() as patch:
+        # Not the user's own token, and none left in the home folder.
+        patch.setenv("RAY_AUTH_MODE", "token")
+        patch.setenv("RAY_AUTH_TOKEN", os.urandom(32).hex())
+        patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
+        # What lets Ray stay on the loopback address.
+        patch.setenv("RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER", "0")
+        yield pytest.importorskip("ray", reason="Ray is not installed: pip install 'kiks[ray]'")
+
+
+@pytest.fixture(scope="module")
+def cluster(ray):
+    from ray.cluster_utils import Cluster
+
+    node = {"num_cpus": 1, "node_ip_address": "127.0.0.1", "object_store_memory": 80 * 2**20}
+    cluster = Cluster(initialize_head=True, head_node_args={**node, "include_dashboard": False})
+    cluster.second = cluster.add_node(**node)
+    yield cluster
+    cluster.shutdown()
+
+
+def test_values_are_the_same_and_a_lost_worker_costs_its_chunk_only(cluster, ray, tmp_path):
+    candidates, seeds = works.candidates(100, marked=50), works.seeds(100)
+    with executor_for(f"ray:{cluster.address}", works.Deadly(tmp_path / "died")) as executor:
+        for count in (100, 0, 1, 100):
+            values = executor.evaluate(candidates[:count], seeds[:count])
+            assert len(values) == count
+            if count:
+                assert values.tobytes() == expected(candidates[:count], seeds[:count]).tobytes()
+    assert (tmp_path / "died").exists()
+    assert not ray.is_initialized()
+
+
+def test_a_connection_of_the_program_is_used_and_kept(cluster, ray):
+    candidates, seeds = works.candidates(40), works.seeds(40)
+    ray.init(cluster.address)
+    try:
+        with executor_for("ray", works.Whereabouts()) as executor:
+            values = np.concatenate([executor.evaluate(candidates, seeds) for _ in range(3)])
+        assert set(values[:, 0]).isdisjoint({os.getpid()})
+        assert len(set(values[:, 0])) <= 2
+        assert (values[:, 1:] == 1).all()
+        with executor_for("ray:auto", works.Failing()) as executor:
+            with pytest.raises(WorkError, match="raised ZeroDivisionError: a wheel came off"):
+                executor.evaluate(works.candidates(5, marked=3), works.seeds(5))
+            assert len(executor.evaluate(candidates, seeds)) == 40
+        with pytest.raises(ParameterError, match=r"must use one cluster at a time.*asked for 127\.0\.0\.1:1\."):
+            executor_for("ray:127.0.0.1:1", works.Sums()).__enter__()
+        assert ray.is_initialized()
+    finally:
+        ray.shutdown()
+
+
+def test_a_lost_node_costs_its_chunks_only(cluster, tmp_path):
+    candidates, seeds = works.candidates(100), works.seeds(100)
+    # The first two chunks: each node has one of them, for the first that comes waits until the other is stuck.
+    candidates[:16, 0] = works.MARK
+    os.mkfifo(tmp_path / "pipe")
+    os.mkfifo(tmp_path / "gate")
+    gate = os.open(tmp_path / "gate", os.O_RDWR)
+
+    def take_node_away():
+        with (tmp_path / "pipe").open() as pipe:
+            assert pipe.readline() == "here\n"
+        cluster.remove_node(cluster.second, allow_graceful=False)
+        os.write(gate, bytes(100))
+
+    thief = threading.Thread(target=take_node_away, daemon=True)
+    thief.start()
+    work = works.StuckOnANode(tmp_path / "pipe", tmp_path / "gate", cluster.second.node_id)
+    with executor_for(f"ray:{cluster.address}", work) as executor:
+        for _ in range(2):
+            assert np.array_equal(executor.evaluate(candidates, seeds), expected(candidates, seeds))
+    thief.join()
+    os.close(gate)
+
+
+def test_a_cluster_of_its_own_listens_to_this_computer_alone(ray, caplog):
+    candidates, seeds = works.candidates(40), works.seeds(40)
+    with executor_for("ray", works.Sums()) as executor:
+        assert ray.get_runtime_context().gcs_address.startswith("127.0.0.1:")
+        assert np.array_equal(executor.evaluate(candidates, seeds), expected(candidates, seeds))
+    assert not ray.is_initialized()
+    assert not [record for record in caplog.records if record.name.startswith("kiks")]
+
+
+def test_an_address_where_nobody_listens(ray):
+    with pytest.raises(ParameterError, match=r"must be reached, but at 127\.0\.0\.1:1 none was.*ray start --head"):
+        executor_for("ray:127.0.0.1:1", works.Sums()).__enter__()

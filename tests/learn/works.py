@@ -1,0 +1,153 @@
+"""Small works for tests of executors: in a module of their own, for workers import it."""
+
+from __future__ import annotations
+
+import os
+import signal
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+MARK = 0.125
+"""What candidates begin with that something happens to."""
+
+
+def candidates(count: int, *, marked: int | None = None) -> np.ndarray:
+    """Return candidates [count, 3], one of them marked."""
+    values = np.random.default_rng(count).standard_normal((count, 3))
+    if marked is not None:
+        values[marked, 0] = MARK
+    return values
+
+
+def seeds(count: int) -> np.ndarray:
+    return np.arange(count, dtype=np.int64) * 7 + 1
+
+
+class Sums:
+    """Two values that hang on all bits of parameters and seed; it spoils what it was given, as a work may."""
+
+    is_prepared = False
+
+    def prepare(self):
+        self.is_prepared = True
+
+    def evaluate(self, candidates, seeds, threads):
+        assert self.is_prepared
+        values = np.stack(
+            [candidates[:, 0] / 3 + candidates[:, 1] * candidates[:, 2], candidates[:, 1] / seeds], axis=1
+        )
+        candidates[:] = 0
+        seeds[:] = 0
+        return values
+
+
+@dataclass
+class Deadly(Sums):
+    """Kills its process when it meets a marked candidate; only once, if it is given where to remember it."""
+
+    memory: Path | None = None
+
+    def evaluate(self, candidates, seeds, threads):
+        if MARK in candidates[:, 0] and not (self.memory and self.memory.exists()):
+            if self.memory:
+                self.memory.touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return super().evaluate(candidates, seeds, threads)
+
+
+class Failing(Sums):
+    def evaluate(self, candidates, seeds, threads):
+        if MARK in candidates[:, 0]:
+            raise ZeroDivisionError("a wheel came off")
+        return super().evaluate(candidates, seeds, threads)
+
+
+class Unprepared(Sums):
+    def prepare(self):
+        raise FileNotFoundError("no arena")
+
+
+class Stillborn(Sums):
+    def prepare(self):
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+class Shapeless(Sums):
+    def evaluate(self, candidates, seeds, threads):
+        return candidates[:, 0]
+
+
+@dataclass
+class Whereabouts(Sums):
+    """Returns the process, how often it was prepared, and its threads."""
+
+    prepare_count: int = 0
+
+    def prepare(self):
+        self.prepare_count += 1
+
+    def evaluate(self, candidates, seeds, threads):
+        return np.full((len(candidates), 3), [os.getpid(), self.prepare_count, threads], dtype=np.float64)
+
+
+@dataclass
+class Waiting(Sums):
+    """With the marked candidate, waits until the last one is evaluated elsewhere (a named pipe says so)."""
+
+    pipe: Path
+    last: float
+
+    def evaluate(self, candidates, seeds, threads):
+        if MARK in candidates[:, 0]:
+            self.pipe.read_bytes()
+        if self.last in candidates[:, 0]:
+            self.pipe.write_bytes(b"done")
+        return super().evaluate(candidates, seeds, threads)
+
+
+@dataclass
+class Stuck(Sums):
+    """With a marked candidate, says through a named pipe that it is there, and stays until its process ends."""
+
+    pipe: Path
+
+    def evaluate(self, candidates, seeds, threads):
+        if MARK in candidates[:, 0]:
+            self.stay()
+        return super().evaluate(candidates, seeds, threads)
+
+    def stay(self):
+        self.open_pipe = self.pipe.open("w")
+        self.open_pipe.write("here\n")
+        self.open_pipe.flush()
+        while True:
+            signal.pause()
+
+
+@dataclass
+class StuckOnANode(Stuck):
+    """With a marked candidate, stays on one node of a Ray cluster; on others it waits for a byte from the gate."""
+
+    gate: Path
+    node: str
+
+    def stay(self):
+        import ray
+
+        if ray.get_runtime_context().get_node_id() == self.node:
+            super().stay()
+        with self.gate.open("rb", buffering=0) as gate:
+            gate.read(1)
+
+
+@dataclass
+class Lasting(Sums):
+    """Keeps a named pipe open as long as its worker lives."""
+
+    pipe: Path
+
+    def prepare(self):
+        super().prepare()
+        self.open_pipe = self.pipe.open("w")
