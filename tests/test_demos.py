@@ -31,7 +31,7 @@ HASHES = {
     "clean": "55a860905ec835bb",
     "maze": "4a86ab4836f34f20",
     "camera": "3c3e9c7f9ab38718",
-    "race": "d83fd9b1bce91555",
+    "race": "260bdac353beb334",
     "swarm": "bdb07fe26158484c",
 }
 

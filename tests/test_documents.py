@@ -34,7 +34,7 @@ def test_programs_run(page: str, code: str) -> None:
 
 
 def test_the_first_program_keeps_clear_of_the_walls() -> None:
-    (code,) = blocks(ROOT / "README.md", "python")
+    code = blocks(ROOT / "README.md", "python")[0]
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True)
     found = re.fullmatch(r"(\d+) mm, (\d+) contacts, state [0-9a-f]{16}\n", result.stdout)
     assert found

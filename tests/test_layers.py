@@ -17,13 +17,16 @@ LAYERS = [
     "units",
     "model",
     "engine",
+    "control",
     "firmware",
     "clock",
     "sim",
     "ports",
     "client",
-    "demos",
+    "batch",
     "drawing",
+    "learn",
+    "demos",
     "fit",
     "desk",
     "cli",
@@ -34,7 +37,7 @@ ALLOWED = {("sim", "ports"), ("sim", "desk")}
 
 # What of the standard library only some layers may touch.
 CLOCKS = {"time", "datetime"}
-MAY_SEE_THE_WALL_CLOCK = {"clock", "client", "desk", "cli"}
+MAY_SEE_THE_WALL_CLOCK = {"clock", "client", "learn", "desk", "cli"}
 RANDOM = {"random", "secrets"}
 MAY_HAVE_SECRETS = {"desk"}
 

@@ -16,9 +16,20 @@ from typing import TYPE_CHECKING, Any
 import serial  # noqa: TID253  (pyserial has to be told where our plug-in is)
 
 if TYPE_CHECKING:
+    from kiks.batch.batch import Batch
+    from kiks.batch.timing import Timing
+    from kiks.client.drive import drive
     from kiks.client.functions import kclose, kopen, ksend, ktime, pause
     from kiks.client.khepera import Khepera, Status
+    from kiks.control import controllers, measures
+    from kiks.control.controller import Controller, controller
+    from kiks.control.measure import Measure, measure
     from kiks.errors import ArenaError, KiksError, LinkError, ParameterError
+    from kiks.learn import tasks
+    from kiks.learn.champion import Champion
+    from kiks.learn.evolution import Evolution
+    from kiks.learn.executors import executor_for
+    from kiks.learn.task import Axis, Task
     from kiks.model.arena import Arena
     from kiks.model.robot import RobotSpec
     from kiks.sim.simulation import Simulation
@@ -28,36 +39,69 @@ __version__ = "3.0.0.dev0"
 __all__ = [
     "Arena",
     "ArenaError",
+    "Axis",
+    "Batch",
+    "Champion",
+    "Controller",
+    "Evolution",
     "Khepera",
     "KiksError",
     "LinkError",
+    "Measure",
     "ParameterError",
     "RobotSpec",
     "Simulation",
     "Status",
+    "Task",
+    "Timing",
+    "controller",
+    "controllers",
+    "drive",
+    "executor_for",
     "kclose",
     "kopen",
     "ksend",
     "ktime",
+    "measure",
+    "measures",
     "pause",
+    "tasks",
 ]
 
 _HOMES = {
     "Arena": "kiks.model.arena",
     "ArenaError": "kiks.errors",
+    "Axis": "kiks.learn.task",
+    "Batch": "kiks.batch.batch",
+    "Champion": "kiks.learn.champion",
+    "Controller": "kiks.control.controller",
+    "Evolution": "kiks.learn.evolution",
     "Khepera": "kiks.client.khepera",
     "KiksError": "kiks.errors",
     "LinkError": "kiks.errors",
+    "Measure": "kiks.control.measure",
     "ParameterError": "kiks.errors",
     "RobotSpec": "kiks.model.robot",
     "Simulation": "kiks.sim.simulation",
     "Status": "kiks.client.khepera",
+    "Task": "kiks.learn.task",
+    "Timing": "kiks.batch.timing",
+    "controller": "kiks.control.controller",
+    "controllers": "kiks.control.controllers",
+    "drive": "kiks.client.drive",
+    "executor_for": "kiks.learn.executors",
     "kclose": "kiks.client.functions",
     "kopen": "kiks.client.functions",
     "ksend": "kiks.client.functions",
     "ktime": "kiks.client.functions",
+    "measure": "kiks.control.measure",
+    "measures": "kiks.control.measures",
     "pause": "kiks.client.functions",
+    "tasks": "kiks.learn.tasks",
 }
+
+_MODULES = {"controllers", "measures", "tasks"}
+"""Names of whole modules."""
 
 if "kiks.ports.pyserial" not in serial.protocol_handler_packages:
     serial.protocol_handler_packages.append("kiks.ports.pyserial")
@@ -69,6 +113,7 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'kiks' has no attribute {name!r}")
     import importlib
 
-    value = getattr(importlib.import_module(_HOMES[name]), name)
+    module = importlib.import_module(_HOMES[name])
+    value = module if name in _MODULES else getattr(module, name)
     globals()[name] = value
     return value

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kiks.engine.state import BALL
 from kiks.errors import ParameterError
@@ -74,17 +75,40 @@ def draw_simulation(sim: Simulation, trace: Trace | None = None) -> Image:
         >>> draw_simulation(sim).size
         (600, 400)
     """
+    radii_mm = [spec.body.radius_mm for spec in sim.specs]
+    return draw_world(sim.arena, sim.lamps, sim.bodies(), sim.poses(), radii_mm, trace)
+
+
+def draw_world(
+    arena: Arena,
+    lamps: NDArray[np.float64],
+    bodies: NDArray[np.void],
+    poses: NDArray[np.float64],
+    radii_mm: Sequence[float],
+    trace: Trace | None = None,
+    *,
+    longest_side: int = _LONGEST_SIDE,
+) -> Image:
+    """Return a picture of what stands in an arena.
+
+    Args:
+        arena: The arena.
+        lamps: x_mm, y_mm, power_w, and 1 for on or 0 for off, float64 [lamp, 4].
+        bodies: Records of `kiks.engine.state.BODY`, shape [body].
+        poses: Of the robots: x_mm, y_mm, heading_rad, float64 [robot, 3].
+        radii_mm: Of the robots [mm].
+        trace: The way there: paths are drawn, and faintly what stood where at the beginning.
+        longest_side: Most pixels of a side.
+    """
     from PIL import Image
 
-    sheet = _Sheet(sim.arena)
-    radii_mm = [spec.body.radius_mm for spec in sim.specs]
-    for x_mm, y_mm, power_w, is_on in sim.lamps.tolist():
+    sheet = _Sheet(arena, longest_side)
+    for x_mm, y_mm, power_w, is_on in lamps.tolist():
         sheet.lamp((x_mm, y_mm), power_w, is_on=bool(is_on))
-    bodies = sim.bodies()
     if trace is not None:
-        for index, (radius_mm, poses) in enumerate(zip(radii_mm, trace.paths(), strict=True)):
-            sheet.path(poses, _colours(index, sim.robot_count, len(poses)), 1.2 if sim.robot_count == 1 else 1.6)
-            sheet.ring(poses[0][:2], radius_mm, (*_robot_colour(index, sim.robot_count), 90))
+        for index, (radius_mm, path) in enumerate(zip(radii_mm, trace.paths(), strict=True)):
+            sheet.path(path, _colours(index, len(poses), len(path)), 1.2 if len(poses) == 1 else 1.6)
+            sheet.ring(path[0][:2], radius_mm, (*_robot_colour(index, len(poses)), 90))
         for body in bodies:
             places = trace.bodies.get(int(body["number"]), [])
             sheet.line(places, (*_tint(body), 200), 2.4)
@@ -93,8 +117,8 @@ def draw_simulation(sim: Simulation, trace: Trace | None = None) -> Image:
     for body in bodies:
         place, radius_mm = (float(body["x_mm"]), float(body["y_mm"])), float(body["radius_mm"])
         sheet.body(place, radius_mm, _tint(body), is_ball=bool(body["what"] == BALL))
-    for index, pose in enumerate(sim.poses().tolist()):
-        sheet.robot(pose, radii_mm[index], _robot_colour(index, sim.robot_count), str(index + 1))
+    for index, pose in enumerate(poses.tolist()):
+        sheet.robot(pose, radii_mm[index], _robot_colour(index, len(poses)), str(index + 1))
     width, height = sheet.image.size
     return sheet.image.resize((width // _FINER, height // _FINER), Image.Resampling.LANCZOS)
 
@@ -144,13 +168,14 @@ class _Sheet:
 
     Args:
         arena: What is drawn on it first.
+        longest_side: Most pixels of a side of the picture.
     """
 
-    def __init__(self, arena: Arena) -> None:
+    def __init__(self, arena: Arena, longest_side: int) -> None:
         from PIL import Image, ImageDraw
 
         self.height_mm = arena.height_mm
-        self.scale = _FINER * min(_LONGEST_SIDE / max(arena.width_mm, arena.height_mm), 2.0)
+        self.scale = _FINER * min(longest_side / max(arena.width_mm, arena.height_mm), 2.0)
         size = (max(round(arena.width_mm * self.scale), _FINER), max(round(arena.height_mm * self.scale), _FINER))
         cells = np.flipud(arena.surface[PAD:-PAD, PAD:-PAD])
         # Walls are shown darker than they are: on paper a white wall would be taken for floor.
@@ -229,4 +254,4 @@ class _Sheet:
         self.pen.text(at(-0.16, 0.0), name, fill=_WHITE, font=font, anchor="mm", stroke_width=1, stroke_fill=_WHITE)
 
 
-__all__ = ["Trace", "draw_simulation", "save_picture"]
+__all__ = ["Trace", "draw_simulation", "draw_world", "save_picture"]

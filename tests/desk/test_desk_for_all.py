@@ -169,7 +169,7 @@ def test_visitors_who_leave_are_forgotten(new_page: NewPage, shown: Shown) -> No
     visitor.until(lambda: not any(client.has_socket_connection for client in Client.instances.values()))
     visitor.until(lambda: not viewers(shown.desk))
     forget_all()
-    visitor.until(lambda: gc.collect() >= 0 and not any(isinstance(each, Page) for each in gc.get_objects()))
+    visitor.until(lambda: gc.collect() >= 0 and not any(type(each) is Page for each in gc.get_objects()))
     assert all(wire.log is None for wire in shown.desk.sim.wires), "nobody watches a line"
 
 

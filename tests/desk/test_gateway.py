@@ -200,7 +200,7 @@ def test_run_is_the_same_with_a_desk_and_fifty_visitors() -> None:
             browser.frame()
             gc.collect()
             # Those who have gone are forgotten; the last one may just be going.
-            assert sum(isinstance(each, Viewer) for each in gc.get_objects()) <= 2
+            assert sum(type(each) is Viewer for each in gc.get_objects()) <= 2
     finally:
         shown.close()
         running.join(GUARD_S)

@@ -12,6 +12,8 @@ from kiks.cli.arena import arena
 from kiks.cli.calibrate import calibrate
 from kiks.cli.demo import demo
 from kiks.cli.desk import desk
+from kiks.cli.drive import drive
+from kiks.cli.evolve import evolve
 from kiks.cli.fit import fit
 from kiks.cli.monitor import monitor
 from kiks.cli.run import run
@@ -26,7 +28,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for _command in (desk, demo, run, serve, monitor, calibrate, accuracy, fit, warmup):
+for _command in (desk, demo, run, drive, evolve, serve, monitor, calibrate, accuracy, fit, warmup):
     # A program's own options, and whatever stands after its name, belong to the program.
     app.command(context_settings={"allow_interspersed_args": _command is not run})(_command)
 app.add_typer(arena, name="arena")

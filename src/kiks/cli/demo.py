@@ -13,7 +13,7 @@ from kiks.cli.desk import WithDesk, open_desk
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.match import show_match
 from kiks.cli.options import Seed, load_arena
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, nearest
 
 if TYPE_CHECKING:
     from kiks.demos.scene import Scene
@@ -36,7 +36,9 @@ class Behaviour(enum.StrEnum):
 
 
 def demo(
-    behaviour: Annotated[Behaviour, typer.Argument(help="What is shown.")] = Behaviour.AVOID,
+    behaviour: Annotated[
+        str, typer.Argument(help=f"What is shown: {', '.join(Behaviour)}, or a champion's file.", metavar="[BEHAVIOUR]")
+    ] = Behaviour.AVOID,
     seconds: Annotated[
         float | None, typer.Option(help="Simulated time [s]; each demonstration's own if left out.", min=1, max=86400)
     ] = None,
@@ -59,11 +61,16 @@ def demo(
 
     avoid: wander about and touch nothing. follow: along the walls. clean: push cylinders to the walls. maze: find the
     way out. camera: watch a moving ball. race: round a track. swarm: twenty robots spread out.
-    soccer: a match of two programs.
+    soccer: a match of two programs. A file that `kiks evolve` has left shows the champion.
 
     Example: kiks demo follow --arena examples/arenas/office.toml --seconds 300
     """
-    is_soccer = behaviour is Behaviour.SOCCER
+    if behaviour not in list(Behaviour) and not Path(behaviour).is_file():
+        raise ParameterError(
+            f"BEHAVIOUR must be one of {', '.join(Behaviour)}, or a champion's file, but it was {behaviour!r}."
+            f"{nearest(behaviour, [each.value for each in Behaviour])}"
+        )
+    is_soccer = behaviour == Behaviour.SOCCER
     for name, value in (("--arena", arena), ("--baud", baud)) if is_soccer else (("--left", left), ("--right", right)):
         if value is not None:
             raise ParameterError(f"{name} must be left out with {behaviour}, but it was {value!r}. It is for others.")
@@ -71,10 +78,17 @@ def demo(
     if is_soccer:
         show_match(seconds, seed, picture, left, right, on_desk=desk)
         return
-    from kiks.demos.scenes import SCENES
+    given = None if arena is None else load_arena(arena)
+    if behaviour in list(Behaviour):
+        from kiks.demos.scenes import SCENES
 
-    scene = SCENES[behaviour](None if arena is None else load_arena(arena), seed=seed, baud=baud)
-    work = partial(_run, scene, behaviour, scene.seconds if seconds is None else seconds, picture)
+        scene, name = SCENES[behaviour](given, seed=seed, baud=baud), behaviour
+    else:
+        from kiks.demos.champion import ChampionScene
+        from kiks.learn.champion import Champion
+
+        scene, name = ChampionScene(Champion.load(behaviour), given, seed=seed, baud=baud), Path(behaviour).stem
+    work = partial(_run, scene, name, scene.seconds if seconds is None else seconds, picture)
     if desk:
         from kiks.desk.desk import Desk
 
@@ -83,7 +97,7 @@ def demo(
         work()
 
 
-def _run(scene: Scene, behaviour: Behaviour, total_s: float, picture: Path | None) -> None:
+def _run(scene: Scene, behaviour: str, total_s: float, picture: Path | None) -> None:
     """Run a demonstration to its end, say how it went, and draw it."""
     from time import perf_counter
 

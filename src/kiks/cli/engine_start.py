@@ -14,6 +14,28 @@ def ready_engine() -> None:
         compile_everything()
 
 
+def ready_batch() -> None:
+    """Compile the engine, and say so if the batch, which is compiled when it first runs, is not in the cache."""
+    from kiks.engine.compiling import is_compiled
+
+    ready_engine()
+    if not is_compiled("roll_out"):
+        typer.echo("Compiling the batch for this computer: once, a minute or so ...", err=True)
+
+
+def compile_batch() -> None:
+    """Let a batch run and step, with lone robots and with some that may meet something."""
+    from kiks.batch.batch import Batch
+    from kiks.control.controllers import linear
+    from kiks.model.arena import Arena
+
+    controller = linear()
+    for robots in (1, 2):
+        batch = Batch(Arena.box(300, 300), 1, robots=robots)
+        batch.run(controller, [0.0] * (controller.parameter_count or 0), seconds=0.1)
+        batch.reset()
+
+
 def compile_everything() -> None:
     """Call every compiled function once, by way of what users call."""
     from kiks.client.khepera import Khepera

@@ -6,7 +6,7 @@ import shlex
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -24,7 +24,10 @@ if TYPE_CHECKING:
 
 
 def run(
-    program: Annotated[Path, typer.Argument(help="A Python program that talks to a Khepera through pyserial.")],
+    context: typer.Context,
+    program: Annotated[
+        Path, typer.Argument(help="A Python program that talks to a Khepera through pyserial, or a champion's file.")
+    ],
     arguments: Annotated[
         list[str] | None,
         typer.Argument(help="What the program finds in sys.argv; each .py file among it begins one more program."),
@@ -46,6 +49,7 @@ def run(
     ] = None,
     when_silent: WhenSilent = "ignore",
     patience: PatienceS = 2.0,
+    seconds: Annotated[float, typer.Option(help="How long a champion drives [s]; programs end by themselves.")] = 60.0,
     desk: WithDesk = False,
 ) -> None:
     """Run a program for a real robot on a simulated one, unchanged; its waits and sleeps cost no time.
@@ -53,10 +57,17 @@ def run(
     Its serial ports become simulated robots, and its time.sleep, time.time and time.monotonic simulated time. Several
     programs share a world, each in a process of its own: the first drives robot 1, the second robot 2, and so on.
 
+    A file that `kiks evolve` has left lets its champion drive all robots.
+
     Example: kiks run --arena examples/arenas/maze.toml --map /dev/ttyUSB0=1 wander.py
     """
     ready_engine()
     show_log()
+    if program.suffix == ".toml":
+        from kiks.cli.drive import run_champion
+
+        run_champion(program, **_options_of_champion(context, program, arguments or []))
+        return
     kinds = robot or ["khepera"]
     from kiks.ports.programs import Programs
     from kiks.ports.turns import check_policy
@@ -96,6 +107,17 @@ def run(
     finally:
         _tell(sim, thinking, doubt)
     raise typer.Exit(code)
+
+
+def _options_of_champion(context: typer.Context, file: Path, after: list[str]) -> dict[str, Any]:
+    """Return the options for a champion, which has no arguments of its own: what stands after it is for us, too."""
+    given = dict(context.params)
+    with context.command.make_context("kiks run", [*after, str(file)], parent=context.parent) as later:
+        for name, value in later.params.items():
+            source = later.get_parameter_source(name)
+            if source is not None and source.name == "COMMANDLINE":
+                given[name] = value
+    return {name: given[name] for name in ("arena", "robots", "turret", "seed", "seconds", "desk")}
 
 
 def _tell(sim: Simulation, thinking: str, doubt: str) -> None:

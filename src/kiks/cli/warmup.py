@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import typer
 
-from kiks.cli.engine_start import compile_everything, ready_engine
+from kiks.cli.engine_start import compile_batch, compile_everything, ready_batch
 
 
 def warmup() -> None:
-    """Compile the engine now, so that the next start is quick.
+    """Compile the engine and the batch now, so that the next start is quick.
 
     Example: kiks warmup
     """
     from time import perf_counter
 
     start_s = perf_counter()
-    ready_engine()
+    ready_batch()
     compile_everything()
+    compile_batch()
     typer.echo(f"The engine is ready ({perf_counter() - start_s:.1f} s).")

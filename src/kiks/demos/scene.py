@@ -52,7 +52,7 @@ class Scene:
 
     def __init__(self, arena: Arena | None = None, *, seed: int = 0, baud: int | None = None) -> None:
         self.seed = seed
-        self.sim = Simulation(arena or self.make_arena(), robots=self.robot_count, seed=seed)
+        self.sim = self.make_simulation(arena or self.make_arena())
         self.ports = [self.sim.port(number) for number in range(1, self.robot_count + 1)]
         for port in self.ports:
             port.baudrate = self.baud if baud is None else baud
@@ -64,6 +64,10 @@ class Scene:
     def make_arena(self) -> Arena:
         """Return the arena if nobody gives another."""
         return Arena.default()
+
+    def make_simulation(self, arena: Arena) -> Simulation:
+        """Return the world."""
+        return Simulation(arena, robots=self.robot_count, seed=self.seed)
 
     def prepare(self) -> None:
         """Put things into the arena and start the programs."""

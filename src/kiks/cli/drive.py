@@ -1,0 +1,67 @@
+"""`kiks drive`, and champions in `kiks run`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from kiks.cli.desk import open_desk
+from kiks.cli.ending import end_as_with_ctrl_c
+from kiks.cli.options import fit_turrets, load_arena
+
+
+def drive(
+    champion: Annotated[Path, typer.Argument(help="A champion's file, as `kiks evolve` leaves it.")],
+    port: Annotated[
+        list[str], typer.Option(help="Port of a robot: /dev/ttyUSB0, socket://HOST:PORT, ...; once for each robot.")
+    ],
+    seconds: Annotated[float, typer.Option(help="How long it drives [s].", min=0)] = 60.0,
+) -> None:
+    """Let a champion drive real robots, or any that answer on a port, and stop them at the end, also with Ctrl-C.
+
+    Example: kiks drive champion.toml --port /dev/ttyUSB0 --seconds 180
+    """
+    from kiks.learn.champion import Champion
+
+    end_as_with_ctrl_c()
+    loop_count = Champion.load(champion).drive(port, seconds=seconds)
+    typer.echo(f"kiks: {loop_count} loops in {seconds:g} s")
+
+
+def run_champion(
+    file: Path,
+    *,
+    arena: str | None,
+    robots: int,
+    turret: list[str] | None,
+    seed: int,
+    seconds: float,
+    desk: bool,
+) -> None:
+    """Let a champion drive all robots of a simulation, and say how it went.
+
+    Raises:
+        ParameterError: If the file is none of a champion.
+    """
+    from kiks.learn.champion import Champion
+
+    champion = Champion.load(file)
+    sim, ports = champion.simulation(load_arena(arena), robots=robots, seed=seed)
+    fit_turrets(sim, turret)
+
+    def work() -> None:
+        loop_count = champion.drive(ports, seconds=seconds)
+        contacts = sum(sim.contacts(number) for number in range(1, robots + 1))
+        typer.echo(
+            f"kiks: {loop_count} loops, {sim.travelled_mm(1) / 1000:.2f} m, {contacts} contacts, {sim.time_s:.3f} s "
+            f"simulated, seed {seed}, state {sim.state_hash()}"
+        )
+
+    if desk:
+        from kiks.desk.desk import Desk
+
+        open_desk(Desk(sim), work=work)
+    else:
+        work()

@@ -1,0 +1,157 @@
+"""`kiks evolve`."""
+
+from __future__ import annotations
+
+import enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from kiks.cli.ending import end_as_with_ctrl_c
+from kiks.cli.engine_start import ready_batch
+from kiks.cli.options import Seed
+from kiks.errors import ParameterError
+
+if TYPE_CHECKING:
+    from kiks.control.controller import Controller
+    from kiks.learn.evolution import Evolution
+    from kiks.learn.task import Task
+
+
+class AlgorithmName(enum.StrEnum):
+    """The algorithms there are."""
+
+    CMA = "cma"
+    GA = "ga"
+    MAP_ELITES = "map-elites"
+
+
+class ControllerKind(enum.StrEnum):
+    """The controllers that come with KiKS."""
+
+    LINEAR = "linear"
+    MLP = "mlp"
+    CTRNN = "ctrnn"
+    GRU = "gru"
+
+
+GENERATIONS = 60
+"""How many generations there are if nobody says otherwise."""
+
+EXAM_S = 180.0
+"""How long a champion drives in its exam [s]."""
+
+
+def evolve(
+    task: Annotated[str, typer.Argument(help="A task (--list shows them), or a Python file that holds one.")] = "avoid",
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of champion, log and picture; kiks-evolve-TASK if left out.")
+    ] = None,
+    generations: Annotated[
+        int | None, typer.Option(help=f"How many; {GENERATIONS} if neither this nor --seconds is given.", min=1)
+    ] = None,
+    seconds: Annotated[float | None, typer.Option(help="Begin no generation later than this [s].", min=0)] = None,
+    population: Annotated[int | None, typer.Option(help="Candidates of a generation.", min=4)] = None,
+    algorithm: Annotated[AlgorithmName | None, typer.Option(help="cma if left out; map-elites for maze-qd.")] = None,
+    controller: Annotated[
+        ControllerKind | None, typer.Option(help="What is evolved; the task's own if left out.")
+    ] = None,
+    seed: Seed = 0,
+    workers: Annotated[
+        int | None, typer.Option(help="Processes that evaluate; threads on all cores if left out.", min=1)
+    ] = None,
+    ray: Annotated[str | None, typer.Option(help="Evaluate on a Ray cluster: its address, auto, or local.")] = None,
+    list_: Annotated[bool, typer.Option("--list", help="List the tasks that come with KiKS.")] = False,
+) -> None:
+    """Evolve a controller for a task, and leave champion.toml, log.parquet and fitness.png.
+
+    Stopped with Ctrl-C or killed, it goes on where it was when the same command is given again.
+
+    Example: kiks evolve avoid --seed 1 --out runs/avoid
+    """
+    from kiks.learn import tasks
+
+    if list_:
+        for name in tasks.TASKS:
+            typer.echo(f"{name:10} {tasks.load(name).about}")
+        return
+    if workers is not None and ray is not None:
+        raise ParameterError(
+            f"--workers must be left out with --ray, but it was {workers}. Ray has workers of its own."
+        )
+    ready_batch()
+    end_as_with_ctrl_c()
+    chosen = tasks.load(task)
+    if controller is not None:
+        chosen = tasks.load(task, _controller(controller, chosen))
+    name = algorithm or (AlgorithmName.MAP_ELITES if task == "maze-qd" else AlgorithmName.CMA)
+    folder = out or Path(f"kiks-evolve-{chosen.name}")
+    from kiks.learn.evolution import Evolution
+
+    evolution = Evolution(chosen, str(name), seed=seed, population=population, folder=folder)
+    if evolution.generations:
+        typer.echo(f"Going on after generation {len(evolution.generations)} in {folder}.")
+    until = GENERATIONS if generations is None and seconds is None else generations
+    where = f"processes:{workers}" if workers else "threads" if ray is None else _ray(ray)
+    stopped = _run(evolution, until, seconds, where)
+    if evolution.generations:
+        _finish(evolution, folder, stopped=stopped)
+    if stopped:
+        raise typer.Exit(130)
+
+
+def _run(evolution: Evolution, generations: int | None, seconds: float | None, where: str) -> bool:
+    """Run an evolution and show how far it is; return whether it was stopped from outside."""
+    from kiks.cli.evolution_progress import progress_of
+
+    try:
+        with progress_of(evolution, generations, seconds) as show:
+            evolution.run(generations=generations, seconds=seconds, executor=where, each=show)
+    except KeyboardInterrupt:
+        return True
+    return False
+
+
+def _finish(evolution: Evolution, folder: Path, *, stopped: bool) -> None:
+    """Save the picture, and say what came of it."""
+    from kiks.learn.plots import save_plot
+
+    champion = evolution.champion
+    save_plot(evolution, folder / "fitness.png")
+    figures = ", ".join(f"{name} {value:.4g}" for name, value in champion.measures.items())
+    typer.echo(f"Champion of generation {champion.generation}: fitness {champion.fitness:.4f}   {figures}")
+    if stopped:
+        typer.echo(f"Stopped after generation {len(evolution.generations)}; the same command goes on.")
+    elif evolution.task.exam is not None:
+        typer.echo(_exam(evolution))
+    typer.echo(f"Folder: {folder}   See it drive: kiks demo {folder / 'champion.toml'}")
+
+
+def _exam(evolution: Evolution) -> str:
+    """Let the champion drive on a serial line where it has never been, and say how it went."""
+    task, champion = evolution.task, evolution.champion
+    assert task.exam is not None
+    sim, ports = champion.simulation(task.exam, robots=task.robots, seed=evolution.seed)
+    champion.drive(ports, seconds=EXAM_S)
+    contacts = sum(sim.contacts(number) for number in range(1, task.robots + 1))
+    return (
+        f"Exam on a line of {champion.baud} baud in '{task.exam.name}', unseen: {contacts} contacts, "
+        f"{sim.travelled_mm(1) / 1000:.2f} m in {sim.time_s:.0f} s"
+    )
+
+
+def _controller(kind: ControllerKind, task: Task) -> Controller:
+    """Return a controller of a kind with the senses and the speed limit of a task's own."""
+    from kiks.control.controllers import from_recipe
+    from kiks.learn.tasks import SPEED_LIMIT
+
+    recipe: dict[str, Any] = {"kind": str(kind), "senses": list(task.controller.senses), "speed_limit": SPEED_LIMIT}
+    if kind is ControllerKind.CTRNN:
+        recipe["period_s"] = task.timing.period_s
+    return from_recipe(recipe)
+
+
+def _ray(address: str) -> str:
+    """Return the place for --ray."""
+    return "ray" if address == "local" else f"ray:{address}"
