@@ -39,7 +39,6 @@ from PIL import Image, ImageDraw
 
 import kiks
 from kiks.batch.beginning import random_starts
-from kiks.control.recipes import random_parameters
 from kiks.model.places import Ball
 
 PINS = (
@@ -186,9 +185,8 @@ def main() -> None:
         measure = kheperax(arguments.kheperax)
         field, brain = maze(), kiks.controllers.mlp(hidden=(8,))
         start = (0.15 * MAZE_MM, 0.15 * MAZE_MM, np.pi / 2)
-        ours = rate(
-            worlds(field, 1000, response="thesis", starts=start), 12.5, brain, random_parameters(brain, 1000, seed=7)
-        )
+        given = kiks.controllers.random_parameters(brain, 1000, seed=7)
+        ours = rate(worlds(field, 1000, response="thesis", starts=start), 12.5, brain, given)
         found = in_turns(
             3, {"maze_full": ours, "kheperax8_100": lambda: measure(100), "kheperax8_1000": lambda: measure(1000)}
         )

@@ -81,7 +81,10 @@ def shown(tmp_path: Path) -> Iterator[Shown]:
 
 
 @pytest.fixture
-def visitor(new_page: NewPage, shown: Shown) -> Visitor:
+def visitor(new_page: NewPage, shown: Shown) -> Iterator[Visitor]:
     from tests.desk.visitor import Visitor
 
-    return Visitor(new_page(), shown)
+    page = new_page()
+    yield Visitor(page, shown)
+    # Before the desk: a page asks for pictures until its line breaks, and finds none of a desk that has gone.
+    page.close()

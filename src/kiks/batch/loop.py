@@ -15,15 +15,19 @@ from kiks.batch.callbacks import call_decider, call_measure
 from kiks.batch.timing import ASK_LENGTH, acts_at, answer_length, order_length
 from kiks.control.controller import whole_speed
 from kiks.control.measure import Moment
-from kiks.engine.compiling import entry, kernel
+from kiks.engine.compiling import entry, kernel, spliced
+from kiks.engine.lanes import borrowed, stack_booleans, stack_floats, stack_integers
+from kiks.engine.vectors import LANES
 from kiks.model.robot import SENSOR_COUNT
 from kiks.units import NS_PER_S
 
 STATE_SIZE = 8
 """Numbers in which a robot's part of a `Moment` is handed to those who watch."""
 
+_READINGS = LANES * SENSOR_COUNT  # sizes of stack arrays must be constants of their own
 
-@kernel
+
+@spliced
 def sense(place: Any, worlds: Any, bunch: Any, numbers: Any, is_on: Any, times_ns: Any, counts: Any) -> Any:
     """Let the programs ask all robots for all that they sense, and wait for their replies.
 
@@ -58,7 +62,7 @@ def sense(place: Any, worlds: Any, bunch: Any, numbers: Any, is_on: Any, times_n
                     worlds.sensed_ns[world] = max(worlds.sensed_ns[world], heard_ns)
 
 
-@kernel
+@spliced
 def act(place: Any, worlds: Any, bunch: Any, numbers: Any, is_on: Any, times_ns: Any) -> Any:
     """Let the programs send all robots their speeds, and note when the next loop begins; arguments as for `sense`.
 
@@ -91,7 +95,7 @@ def act(place: Any, worlds: Any, bunch: Any, numbers: Any, is_on: Any, times_ns:
             worlds.steps[world] += 1
 
 
-@kernel
+@spliced
 def settle(place: Any, worlds: Any, bunch: Any, numbers: Any, times_ns: Any) -> Any:
     """Let time pass up to the beginning of the next loop, and end the bunch; arguments as for `sense`."""
     for k in range(numbers.shape[0]):
@@ -121,7 +125,7 @@ def in_turn(wheels: Any, world: Any, turn: Any) -> Any:
     return 0
 
 
-@kernel
+@spliced
 def bunch_up(block: Any, first: Any, numbers: Any, is_on: Any) -> Any:
     """Choose the worlds of the next bunch; one that is not full repeats its last world, which then takes no part."""
     for k in range(numbers.shape[0]):
@@ -129,7 +133,7 @@ def bunch_up(block: Any, first: Any, numbers: Any, is_on: Any) -> Any:
         is_on[k] = first + k < block.shape[0]
 
 
-@kernel
+@spliced
 def goes_on(worlds: Any, numbers: Any, is_on: Any, until_ns: Any) -> Any:
     """Let only those worlds of a bunch take part whose next loop begins before a time [ns]; say whether one does."""
     left = 0
@@ -139,7 +143,7 @@ def goes_on(worlds: Any, numbers: Any, is_on: Any, until_ns: Any) -> Any:
     return left > 0
 
 
-@kernel
+@spliced
 def look_on(
     place: Any, worlds: Any, bunch: Any, numbers: Any, is_on: Any, times_ns: Any, state: Any, watchers: Any
 ) -> Any:
@@ -200,9 +204,10 @@ def roll_out(
             are given.
         watchers: The measures (`kiks.batch.callbacks.watchers_of`).
     """
-    numbers, is_on = np.empty(size, np.int64), np.empty(size, np.bool_)
-    times_ns, counts = np.empty(size, np.int64), np.zeros((size, SENSOR_COUNT), np.int64)
-    state = np.zeros(STATE_SIZE)
+    place, worlds, watchers = borrowed(place), borrowed(worlds), borrowed(watchers)
+    numbers, times_ns = stack_integers(LANES)[:size], stack_integers(LANES)[:size]
+    is_on, state = stack_booleans(LANES)[:size], stack_floats(STATE_SIZE)
+    counts = stack_integers(_READINGS).reshape((LANES, SENSOR_COUNT))[:size]
     for first in range(0, block.shape[0], size):
         bunch_up(block, first, numbers, is_on)
         bunch = take(place, worlds, numbers)

@@ -27,7 +27,7 @@ import numpy as np
 from kiks.engine.compiling import entry, kernel
 from kiks.engine.discs import ALL_AROUND, everybody_else, meet_disc, see
 from kiks.engine.lanes import stack_floats
-from kiks.engine.numbers import draw, sin_cos, source
+from kiks.engine.numbers import at_instant, draw, sin_cos, stream_of
 from kiks.engine.proximity import pose_at
 from kiks.engine.rays import cast, cast_many, free_cells, scale
 from kiks.engine.scene import moment_of
@@ -173,7 +173,7 @@ def take_image(
     chance = np.full((3, PIXEL_COUNT), 0.5)
     flicker = 0.5
     if is_noisy:
-        origin = source(seed, 0, robot, STREAM_CAMERA, time_ns)
+        origin = at_instant(stream_of(seed, 0, robot, STREAM_CAMERA), time_ns)
         flicker = draw(origin, 3 * PIXEL_COUNT)
         for kind in range(3):
             for p in range(PIXEL_COUNT):

@@ -36,6 +36,14 @@ def inlined(function: Callable[..., Any]) -> Any:
     return njit(forceinline=True, **_OPTIONS)(function)
 
 
+def spliced(function: Callable[..., Any]) -> Any:
+    """Compile a function as a piece of the kernel that calls it, and never by itself.
+
+    For large ones with one caller: what they call is then linked and compiled once, not again at each level.
+    """
+    return njit(inline="always", **_OPTIONS)(function)
+
+
 def entry(function: Callable[..., Any]) -> Any:
     """Compile a function that Python calls, and keep the machine code on disk."""
     settings: Any = config

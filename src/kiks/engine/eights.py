@@ -26,11 +26,10 @@ from kiks.engine.compiling import kernel
 from kiks.engine.masks import Mask, select
 from kiks.engine.parameters import PARAMETERS
 from kiks.engine.state import ROBOT
-from kiks.engine.vectors import LANES, Lanes, of_two
+from kiks.engine.vectors import LANES, Lanes, offer
 
 # Numba annotates these in part, and not as they are used in kernels.
 _intrinsic: Any = extending.intrinsic
-_overloads: Any = extending.overload
 _lower: Any = extending
 _templates: Any = templates
 _proxy: Any = cgutils.create_struct_proxy
@@ -189,7 +188,6 @@ def _offset(builder: Any, numbers: Any, kind: Any, index: Any) -> Any:
     return builder.mul(place, ir.Constant(_WORD, 8 * LANES))
 
 
-@_intrinsic
 def _get(typing: Any, numbers: Any, index: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         value, place = arguments
@@ -198,7 +196,6 @@ def _get(typing: Any, numbers: Any, index: Any) -> Any:
     return _kind_of(numbers)(numbers, index), generate
 
 
-@_intrinsic
 def _set(typing: Any, numbers: Any, index: Any, new: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         value, place, lanes = arguments
@@ -209,15 +206,12 @@ def _set(typing: Any, numbers: Any, index: Any, new: Any) -> Any:
     return types.void(numbers, index, new), generate
 
 
-of_two(operator.getitem, _get, lambda numbers, index: isinstance(numbers, _Numbers))
+def _are_numbers(numbers: Any, *others: Any) -> bool:
+    return isinstance(numbers, _Numbers)
 
 
-@_overloads(operator.setitem)
-def _overload_setitem(numbers: Any, index: Any, new: Any) -> Any:
-    def write(numbers: Any, index: Any, new: Any) -> Any:
-        _set(numbers, index, new)
-
-    return write if isinstance(numbers, _Numbers) else None
+offer(operator.getitem, _get, _are_numbers)
+offer(operator.setitem, _set, _are_numbers)
 
 
 # ---- from one type to the other ----

@@ -102,7 +102,6 @@ def follow(sight: Any, ways: Any, origins: Any, under_way: Any, count: Any) -> A
             k = under_way[place_in_line]
             way, origin = k * WAY_SIZE, origins[k]
             lengths = load_narrow(ways, way + _LENGTH)
-            lengths, _ = step(leaps, origin, ways, way, lengths)
             lengths, goes_on = step(leaps, origin, ways, way, lengths)
             store_narrow(ways, way + _LENGTH, lengths)
             store_narrow(ways, way + _MET, goes_on)

@@ -36,7 +36,7 @@ def _on_the_stack(count: Any, element_type: Any) -> Any:
             memory = builder.alloca(ir.ArrayType(content, count.literal_value))
             memory.align = _CACHE_LINE
         size = context.get_value_type(types.intp)
-        bytes_each = size(element_type.bitwidth // 8)
+        bytes_each = size(context.get_abi_sizeof(content))
         array = _arrays.make_array(array_type)(context, builder)
         _arrays.populate_array(
             array,
@@ -71,6 +71,12 @@ def stack_integers(typing: Any, count: Any) -> Any:
 
 
 @_intrinsic
+def stack_booleans(typing: Any, count: Any) -> Any:
+    """Return an uninitialised bool array on the stack, of a length that is a constant; it dies with its function."""
+    return _on_the_stack(count, types.boolean)
+
+
+@_intrinsic
 def pointer_to(typing: Any, array: Any) -> Any:
     """Return the address of the first element of an array without gaps, in C order."""
     if not (isinstance(array, types.Array) and array.layout == "C"):
@@ -90,3 +96,28 @@ def element(typing: Any, pointer: Any, index: Any) -> Any:
         return builder.load(builder.gep(arguments[0], [arguments[1]], inbounds=True))
 
     return pointer.dtype(pointer, types.int32), generate
+
+
+@_intrinsic
+def borrowed(typing: Any, value: Any) -> Any:
+    """Return arrays whose references nobody counts, in tuples as they were; whoever called the entry point holds them.
+
+    Counting them at each call of a kernel that is not compiled into its caller would cost a sixth of a batch's time.
+    """
+
+    def borrow(context: Any, builder: Any, kind: Any, arrays: Any) -> Any:
+        if isinstance(kind, types.BaseTuple):
+            kinds: Any = tuple(kind)  # type: ignore[arg-type, unused-ignore]
+            parts = [borrow(context, builder, each, builder.extract_value(arrays, k)) for k, each in enumerate(kinds)]
+            return context.make_tuple(builder, kind, parts)
+        if isinstance(kind, types.Array):
+            array = _arrays.make_array(kind)(context, builder, arrays)
+            array.meminfo = ir.Constant(array.meminfo.type, None)
+            array.parent = ir.Constant(array.parent.type, None)
+            return array._getvalue()
+        return arrays
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return borrow(context, builder, value, arguments[0])
+
+    return value(value), generate

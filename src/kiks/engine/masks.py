@@ -2,8 +2,8 @@
 
 Need: a formula with a condition in it, compiled for a number, decides by a boolean; compiled for eight, each lane
 decides for itself.
-Method: comparisons of `Lanes` give a `Mask`, with the operators & | and !=; `choose` and `opposite` take either. What is seldom
-done at all stands under `if anywhere(...)`, and what only one can do under a loop over `lane_count(...)`.
+Method: comparisons of `Lanes` give a `Mask`, with the operators & | and !=; `choose` and `opposite` take either. What
+is seldom done at all stands under `if anywhere(...)`, and what only one can do under a loop over `lane_count(...)`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from llvmlite import ir
 from numba import extending, types
 from numba.extending import models
 
-from kiks.engine.vectors import LANES, Lanes, are_lanes, of_two
+from kiks.engine.vectors import LANES, Lanes, are_lanes, offer
 
 # Numba annotates these in part, and not as they are used in kernels.
 _intrinsic: Any = extending.intrinsic
@@ -61,7 +61,6 @@ def select(builder: Any, mask: Any, then: Any, otherwise: Any) -> Any:
 def _comparison(symbol: Any, comparison: str) -> None:
     """Let kernels compare lanes."""
 
-    @_intrinsic
     def compare(typing: Any, first: Any, second: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             values = [context.cast(builder, *each, _LANES) for each in zip(arguments, signature.args, strict=True)]
@@ -69,7 +68,7 @@ def _comparison(symbol: Any, comparison: str) -> None:
 
         return _MASK(first, second), generate
 
-    of_two(symbol, compare, are_lanes)
+    offer(symbol, compare, are_lanes)
 
 
 for _symbol, _comparison_name in (
@@ -86,14 +85,13 @@ for _symbol, _comparison_name in (
 def _logic(symbol: Any, operation: str) -> None:
     """Let kernels combine masks."""
 
-    @_intrinsic
     def combine(typing: Any, first: Any, second: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             return getattr(builder, operation)(*arguments)
 
         return _MASK(first, second), generate
 
-    of_two(symbol, combine, lambda first, second: isinstance(first, Mask) and isinstance(second, Mask))
+    offer(symbol, combine, lambda first, second: isinstance(first, Mask) and isinstance(second, Mask))
 
 
 for _symbol, _operation in ((operator.and_, "and_"), (operator.or_, "or_"), (operator.ne, "xor")):

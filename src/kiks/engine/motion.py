@@ -15,8 +15,8 @@ from numba import extending, types
 from kiks.engine.compiling import inlined, kernel
 from kiks.engine.contact import PIECE_MM, clearance_mm, is_free, slide
 from kiks.engine.eights import one_of, only
-from kiks.engine.masks import anywhere, choose, holds, lane_count, opposite
-from kiks.engine.numbers import sin_cos, sinc, uniform
+from kiks.engine.masks import anywhere, choose, everywhere, holds, lane_count, opposite
+from kiks.engine.numbers import SMALL_RAD, sin_cos, sin_cos_of_small, sinc, uniform
 from kiks.engine.state import TRAIL_LENGTH
 from kiks.engine.vectors import floor, greatest, lane_of, with_lane
 
@@ -262,7 +262,8 @@ def pose_between(robot: Any, ticks_ago: Any, share: Any) -> Any:
     turn = boundary(robot, ticks_ago - 1, 2) - heading
     # The chord to a point on the arc is shorter by the ratio of sines, and turned back by the rest of the half angle.
     length = share * sinc(0.5 * share * turn) / sinc(0.5 * turn)
-    sine, cosine = sin_cos(0.5 * (share - 1.0) * turn)
+    back = 0.5 * (share - 1.0) * turn
+    sine, cosine = sin_cos_of_small(back) if everywhere(abs(back) < SMALL_RAD) else sin_cos(back)
     x = x0 + length * (dx * cosine - dy * sine)
     y = y0 + length * (dx * sine + dy * cosine)
     return x, y, heading + share * turn

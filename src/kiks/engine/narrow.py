@@ -17,12 +17,11 @@ from numba.core import cgutils
 from numba.extending import models
 from numba.np import arrayobj
 
-from kiks.engine.vectors import LANES, Lanes
+from kiks.engine.vectors import LANES, Lanes, offer
 from kiks.model.raster import FACE_BITS, FACE_UNITS
 
 # Numba annotates these in part, and not as they are used in kernels.
 _intrinsic: Any = extending.intrinsic
-_overloads: Any = extending.overload
 _insert_function: Any = cgutils.get_or_insert_function
 _arrays: Any = arrayobj
 
@@ -39,6 +38,8 @@ _INTEGER = ir.IntType(32)
 _FLOAT, _DOUBLE = ir.FloatType(), ir.DoubleType()
 _VECTOR, _DOUBLES = ir.VectorType(_FLOAT, LANES), ir.VectorType(_DOUBLE, LANES)
 _INTEGERS = ir.VectorType(_INTEGER, LANES)
+_ADDRESS = ir.IntType(64)
+_ADDRESSES, _POINTERS = ir.VectorType(_ADDRESS, LANES), ir.VectorType(_INTEGER.as_pointer(), LANES)
 
 
 @extending.register_model(Narrow)
@@ -62,24 +63,20 @@ def _splat(builder: Any, value: Any) -> Any:
     return _filled(builder, _VECTOR, builder.fptrunc(value, _FLOAT) if value.type == _DOUBLE else value)
 
 
-def _overload(symbol: Any, operation: str) -> None:
-    """Let kernels write an operator for it."""
+def _are_narrow(*kinds: Any) -> bool:
+    return all(isinstance(kind, Narrow | types.Float) for kind in kinds) and _NARROW in kinds
 
-    @_intrinsic
+
+def _arithmetic(operation: str) -> Any:
+    """Return what calculates with two sets of eight, or one and a number."""
+
     def calculate(typing: Any, first: Any, second: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             return getattr(builder, operation)(*(_splat(builder, value) for value in arguments))
 
         return _NARROW(first, second), generate
 
-    def write(first: Any, second: Any) -> Any:
-        return calculate(first, second)
-
-    @_overloads(symbol)
-    def operate(first: Any, second: Any) -> Any:
-        kinds = (Narrow, types.Float)
-        fits = isinstance(first, kinds) and isinstance(second, kinds)
-        return write if fits and _NARROW in (first, second) else None
+    return calculate
 
 
 for _symbol, _operation in (
@@ -88,7 +85,7 @@ for _symbol, _operation in (
     (operator.mul, "fmul"),
     (operator.truediv, "fdiv"),
 ):
-    _overload(_symbol, _operation)
+    offer(_symbol, _arithmetic(_operation), _are_narrow)
 
 
 @_intrinsic

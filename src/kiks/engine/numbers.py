@@ -24,27 +24,29 @@ _HALF_PI_LOW = 6.077100506506192e-11
 _LN2_HIGH = 0.6931471804855391
 _LN2_LOW = 7.440617110012397e-11
 
+SMALL_RAD = 0.78
+"""Angles below this need not be cut to within a quarter of a circle."""
+
 _RECIPROCALS = (0.0, *(1.0 / k for k in range(1, 22)))  # a multiplication costs a fraction of a division
 
 
 @kernel
-def sine_series(r: Any) -> Any:
-    """Return the sine of an angle within +-pi/4 (Taylor series)."""
-    q = r * r
-    sine = 1.0 / 355687428096000.0
-    sine = sine * q - 1.0 / 1307674368000.0
-    sine = sine * q + 1.0 / 6227020800.0
-    sine = sine * q - 1.0 / 39916800.0
-    sine = sine * q + 1.0 / 362880.0
-    sine = sine * q - 1.0 / 5040.0
-    sine = sine * q + 1.0 / 120.0
-    sine = sine * q - 1.0 / 6.0
-    return r + r * q * sine
+def sine_rest(q: Any) -> Any:
+    """Return sin(r)/r - 1 for an angle r within +-pi/4 from its square (Taylor series)."""
+    rest = 1.0 / 355687428096000.0
+    rest = rest * q - 1.0 / 1307674368000.0
+    rest = rest * q + 1.0 / 6227020800.0
+    rest = rest * q - 1.0 / 39916800.0
+    rest = rest * q + 1.0 / 362880.0
+    rest = rest * q - 1.0 / 5040.0
+    rest = rest * q + 1.0 / 120.0
+    rest = rest * q - 1.0 / 6.0
+    return q * rest
 
 
 @kernel
-def cosine_series(r: Any) -> Any:
-    """Return the cosine of an angle within +-pi/4 (Taylor series)."""
+def sin_cos_of_small(r: Any) -> Any:
+    """Return sine and cosine of an angle within +-pi/4 (Taylor series)."""
     q = r * r
     cosine = 1.0 / 20922789888000.0
     cosine = cosine * q - 1.0 / 87178291200.0
@@ -53,7 +55,7 @@ def cosine_series(r: Any) -> Any:
     cosine = cosine * q + 1.0 / 40320.0
     cosine = cosine * q - 1.0 / 720.0
     cosine = cosine * q + 1.0 / 24.0
-    return 1.0 - q * 0.5 + q * q * cosine
+    return r + r * sine_rest(q), 1.0 - q * 0.5 + q * q * cosine
 
 
 @kernel
@@ -61,7 +63,7 @@ def sin_cos(angle_rad: Any) -> Any:
     """Return sine and cosine, each within 2e-16 for angles up to a million radians."""
     turns = floor(angle_rad * 0.6366197723675814 + 0.5)
     r = (angle_rad - turns * _HALF_PI_HIGH) - turns * _HALF_PI_LOW
-    sine, cosine = sine_series(r), cosine_series(r)
+    sine, cosine = sin_cos_of_small(r)
     # Which quarter it is no processor can guess: these are choices without a jump.
     is_swapped, is_second_half = has_bit(turns, 0), has_bit(turns, 1)
     first = choose(is_swapped, cosine, sine)
@@ -72,14 +74,11 @@ def sin_cos(angle_rad: Any) -> Any:
 @kernel
 def sinc(angle_rad: Any) -> Any:
     """Return sin(a)/a: how much shorter a chord is than its arc of twice that angle."""
-    size = abs(angle_rad)
-    is_tiny = size < 1e-4
-    nearly_one = 1.0 - angle_rad * angle_rad / 6.0
-    if everywhere(is_tiny):
-        return nearly_one
-    # Up to pi/4 the sine is its series: what `sin_cos` returns, to the bit.
-    sine = sine_series(angle_rad) if everywhere(size < 0.78) else sin_cos(angle_rad)[0]
-    return choose(is_tiny, nearly_one, sine / angle_rad)
+    is_small = abs(angle_rad) < SMALL_RAD
+    ratio = 1.0 + sine_rest(angle_rad * angle_rad)
+    if everywhere(is_small):
+        return ratio
+    return choose(is_small, ratio, sin_cos(angle_rad)[0] / angle_rad)
 
 
 @kernel
@@ -141,18 +140,23 @@ def mix(value: Any) -> Any:
 
 
 @kernel
-def source(seed: Any, world: Any, robot: Any, stream: Any, instant: Any) -> Any:
-    """Return what the random numbers of this seed, world, robot, stream and instant come from, for `draw`."""
+def stream_of(seed: Any, world: Any, robot: Any, stream: Any) -> Any:
+    """Return what the random numbers of this seed, world, robot and stream come from, for `at_instant`."""
     z = mix(word(seed))
     z = mix(z ^ word(world))
     z = mix(z ^ word(robot))
-    z = mix(z ^ word(stream))
-    return mix(z ^ word(instant))
+    return mix(z ^ word(stream))
+
+
+@kernel
+def at_instant(origin: Any, instant: Any) -> Any:
+    """Return what the random numbers of a stream at an instant come from, for `draw`."""
+    return mix(origin ^ word(instant))
 
 
 @kernel
 def draw(origin: Any, index: Any) -> Any:
-    """Return a random number in [0, 1): the one of an index from a source."""
+    """Return a random number in [0, 1): the one of an index from an instant."""
     z = mix(origin ^ word(index))
     return number(z >> np.uint64(11)) * (1.0 / 9007199254740992.0)
 
@@ -160,4 +164,4 @@ def draw(origin: Any, index: Any) -> Any:
 @kernel
 def uniform(seed: Any, world: Any, robot: Any, stream: Any, instant: Any, index: Any) -> Any:
     """Return the random number in [0, 1) that belongs to this seed, world, robot, stream, instant and index."""
-    return draw(source(seed, world, robot, stream, instant), index)
+    return draw(at_instant(stream_of(seed, world, robot, stream), instant), index)

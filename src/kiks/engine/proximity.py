@@ -16,7 +16,7 @@ from kiks.engine.fans import cast_fan
 from kiks.engine.lanes import stack_floats, stack_integers
 from kiks.engine.masks import choose
 from kiks.engine.motion import pose_between
-from kiks.engine.numbers import draw, sin_cos, source
+from kiks.engine.numbers import at_instant, draw, sin_cos, stream_of
 from kiks.engine.parameters import RAY_COUNT
 from kiks.engine.rays import leap_at, scale
 from kiks.engine.responses import REFLECTION, respond
@@ -207,9 +207,9 @@ def jitter_of(parameters: Any, chance: Any) -> Any:
 
 
 @inlined
-def chances(seed: Any, robot: Any, turn: Any, sensor: Any) -> Any:
+def chances(stream: Any, turn: Any, sensor: Any) -> Any:
     """Return the three random numbers 0..1 of a sensor's reading in a round: sign and size of the share, and jitter."""
-    chance = source(seed, 0, robot, STREAM_PROXIMITY, turn)
+    chance = at_instant(stream, turn)
     return draw(chance, sensor * 3), draw(chance, sensor * 3 + 1), draw(chance, sensor * 3 + 2)
 
 
@@ -266,6 +266,7 @@ def read_proximity(
     robots, _, kinds, _ = scene
     state = robots[0, robot]
     parameters = kinds[state.kind]
+    stream = stream_of(seed, 0, robot, STREAM_PROXIMITY)
     tracks = stack_floats(TRACKS_SIZE)
     track_count = follow_near(scene, robot, tracks)
     for sensor in range(out.shape[0]):
@@ -273,7 +274,7 @@ def read_proximity(
         moment = moment_of(tick_count, instant_ns)
         count = expected_count(sight, networks, parameters, tracks, track_count, moment, x, y, heading, sensor)
         if is_noisy:
-            sign, size, jitter = chances(seed, robot, turn, sensor)
+            sign, size, jitter = chances(stream, turn, sensor)
             noisy = scatter(parameters, count, sign, size) + jitter_of(parameters, jitter)
             out[sensor] = np.int64(quantize(parameters, noisy))
         else:

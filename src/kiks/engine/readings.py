@@ -18,9 +18,19 @@ from kiks.engine.eights import EIGHT, eight_of, load_eight, load_lane, open_eigh
 from kiks.engine.fans import WAY_SIZE, enter, follow, met
 from kiks.engine.lanes import stack_floats, stack_integers, stack_narrow
 from kiks.engine.masks import choose
-from kiks.engine.numbers import sin_cos
+from kiks.engine.numbers import sin_cos, stream_of
 from kiks.engine.parameters import PARAMETERS
-from kiks.engine.proximity import aim, chances, jitter_of, mount, quantize, sampled_pose, scatter, watched
+from kiks.engine.proximity import (
+    STREAM_PROXIMITY,
+    aim,
+    chances,
+    jitter_of,
+    mount,
+    quantize,
+    sampled_pose,
+    scatter,
+    watched,
+)
 from kiks.engine.rays import leap_at, scale
 from kiks.engine.responses import REFLECTION, respond
 from kiks.engine.vectors import LANES, lane_of, load, store
@@ -39,7 +49,7 @@ EIGHT_SENSES = eight_of(
 
 # Eight robots have 64 sensors; sizes of stack arrays must be constants of their own.
 _FANS = 64
-_WAYS_SIZE = SENSOR_COUNT * WAY_SIZE
+_WAYS_SIZE = _FANS * WAY_SIZE
 
 
 @kernel
@@ -94,26 +104,28 @@ def read_eight(
         store(ys[place:], y * per_cell + pad)
         store(sines[place:], sine)
         store(cosines[place:], cosine)
-    ways, origins = stack_narrow(_WAYS_SIZE), stack_integers(SENSOR_COUNT)
-    under_way, whose = stack_integers(SENSOR_COUNT), stack_integers(SENSOR_COUNT)
+    ways, origins = stack_narrow(_WAYS_SIZE), stack_integers(_FANS)
+    under_way, whose = stack_integers(_FANS), stack_integers(_FANS)
+    fan_count = 0
     for lane in range(LANES):
         parameters = kinds[which[lane]]
         reach = parameters.reach_mm * per_cell
-        fan_count = 0
         for sensor in range(SENSOR_COUNT):
             k = LANES * sensor + lane
             if nears[k] > 0.0:
                 rays_x, rays_y = aim(parameters, sines[k], cosines[k], sensor)
                 enter(sight, ways, origins, fan_count, xs[k], ys[k], rays_x, rays_y, reach)
-                whose[fan_count] = sensor
+                whose[fan_count] = k
                 fan_count += 1
-        follow(sight, ways, origins, under_way, fan_count)
-        for fan in range(fan_count):
-            lengths, squares, shades = met(sight, parameters.response == REFLECTION, ways, origins, fan)
-            sensor = whose[fan]
-            counts[LANES * sensor + lane] += respond(networks, parameters, sensor, lengths * cell, squares, shades)
+    follow(sight, ways, origins, under_way, fan_count)
+    for fan in range(fan_count):
+        k = whose[fan]
+        parameters, sensor = kinds[which[k % LANES]], k // LANES
+        lengths, squares, shades = met(sight, parameters.response == REFLECTION, ways, origins, fan)
+        counts[k] += respond(networks, parameters, sensor, lengths * cell, squares, shades)
+    stream = stream_of(seeds, 0, 0, STREAM_PROXIMITY)
     for sensor in range(SENSOR_COUNT):
-        sign, size, chance = chances(seeds, 0, load(turns[LANES * sensor :]), sensor)
+        sign, size, chance = chances(stream, load(turns[LANES * sensor :]), sensor)
         jitters = stack_floats(LANES)
         for lane in range(LANES):
             jitters[lane] = jitter_of(kinds[which[lane]], lane_of(chance, lane))

@@ -11,9 +11,10 @@ from kiks.engine.compiling import entry, kernel
 from kiks.engine.discs import ALL_AROUND, PER_TRACK, SEEN_SIZE, TRACKS_SIZE, disc_of, everybody_else, see
 from kiks.engine.gaze import WALL, find_met, gaze_sensor, keep
 from kiks.engine.lanes import stack_floats
-from kiks.engine.numbers import uniform
+from kiks.engine.numbers import stream_of, uniform
 from kiks.engine.parameters import RAY_COUNT
 from kiks.engine.proximity import (
+    STREAM_PROXIMITY,
     chances,
     expected_count,
     follow_near,
@@ -109,7 +110,7 @@ def explain_proximity(
         for ray in range(RAY_COUNT):
             without[ray] += respond_without(networks, parameters, sensor, lengths_mm, cosines, brightnesses, ray)
     expected = expected_count(sight, networks, parameters, tracks, track_count, moment, x, y, heading, sensor)
-    sign, size, chance = chances(seed, robot, turn, sensor)
+    sign, size, chance = chances(stream_of(seed, 0, robot, STREAM_PROXIMITY), turn, sensor)
     scattered, jitter = scatter(parameters, expected, sign, size), jitter_of(parameters, chance)
     return instant_ns, expected, scattered - expected, jitter, np.int64(quantize(parameters, scattered + jitter))
 

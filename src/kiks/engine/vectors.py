@@ -9,6 +9,7 @@ eight numbers, or two or four on older processors, with the roundings of the sca
 
 from __future__ import annotations
 
+import functools
 import operator
 from collections.abc import Callable
 from typing import Any
@@ -17,6 +18,7 @@ import numpy as np
 from llvmlite import ir
 from numba import extending, types
 from numba.core import cgutils, typeconv
+from numba.core.typing import templates
 from numba.extending import models
 from numba.np import arrayobj
 
@@ -26,6 +28,7 @@ _overloads: Any = extending.overload
 _insert_function: Any = cgutils.get_or_insert_function
 _arrays: Any = arrayobj
 _typeconv: Any = typeconv
+_templates: Any = templates
 _lower_cast: Any = extending.lower_cast
 
 
@@ -79,10 +82,28 @@ def _widen(context: Any, builder: Any, kind: Any, lanes: Any, value: Any) -> Any
     return _splat(builder, context.cast(builder, value, kind, types.float64))
 
 
-def _arithmetic(operation: str) -> Any:
-    """Return an intrinsic that calculates with two sets of lanes, or one and a number."""
+def offer(symbol: Any, define: Any, fits: Callable[..., bool]) -> None:
+    """Let kernels write a function or an operator for arguments of types that fit.
 
-    @_intrinsic
+    Numba's own way, `overload`, would compile each pair of types as a function of its own: half of a cold start.
+
+    Args:
+        symbol: The function or operator.
+        define: What `numba.extending.intrinsic` takes.
+        fits: Whether it is for these types of arguments.
+    """
+
+    @functools.wraps(define)
+    def definition(typing: Any, *kinds: Any) -> Any:
+        return define(typing, *kinds) if fits(*kinds) else None
+
+    template = _templates.make_intrinsic_template(symbol, definition, define.__name__)
+    _templates.infer_global(symbol, types.Function(template))
+
+
+def _arithmetic(operation: str) -> Any:
+    """Return what calculates with two sets of lanes, or one and a number."""
+
     def calculate(typing: Any, first: Any, second: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             return getattr(builder, operation)(*(_splat(builder, value) for value in arguments))
@@ -92,28 +113,6 @@ def _arithmetic(operation: str) -> Any:
     return calculate
 
 
-def of_one(symbol: Any, calculate: Any, fits: Callable[..., bool]) -> None:
-    """Let kernels write a function or an operator for an intrinsic of one argument, if its type fits."""
-
-    def write(value: Any) -> Any:
-        return calculate(value)
-
-    @_overloads(symbol)
-    def operate(value: Any) -> Any:
-        return write if fits(value) else None
-
-
-def of_two(symbol: Any, calculate: Any, fits: Callable[..., bool]) -> None:
-    """Let kernels write a function or an operator for an intrinsic of two arguments, if their types fit."""
-
-    def write(first: Any, second: Any) -> Any:
-        return calculate(first, second)
-
-    @_overloads(symbol)
-    def operate(first: Any, second: Any) -> Any:
-        return write if fits(first, second) else None
-
-
 for _operation, *_symbols in (
     ("fadd", operator.add, operator.iadd),
     ("fsub", operator.sub, operator.isub),
@@ -121,13 +120,12 @@ for _operation, *_symbols in (
     ("fdiv", operator.truediv, operator.itruediv),
 ):
     for _symbol in _symbols:
-        of_two(_symbol, _arithmetic(_operation), are_lanes)
+        offer(_symbol, _arithmetic(_operation), are_lanes)
 
 
 def _function(name: str) -> Any:
-    """Return an intrinsic that calculates one number from one, or eight from eight."""
+    """Return what calculates one number from one, or eight from eight."""
 
-    @_intrinsic
     def calculate(typing: Any, value: Any) -> Any:
         result = _LANES if isinstance(value, Lanes) else types.float64
 
@@ -142,16 +140,15 @@ def _function(name: str) -> Any:
     return calculate
 
 
-floor = _function("floor")
+floor = _intrinsic(_function("floor"))
 """The greatest whole number that is not above a number, as a float64, or those of eight."""
 
-root = _function("sqrt")
+root = _intrinsic(_function("sqrt"))
 """The square root of a number, or those of eight."""
 
-of_one(abs, _function("fabs"), are_lanes)
+offer(abs, _function("fabs"), are_lanes)
 
 
-@_intrinsic
 def _negative(typing: Any, lanes: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.fneg(arguments[0])
@@ -159,13 +156,12 @@ def _negative(typing: Any, lanes: Any) -> Any:
     return _LANES(lanes), generate
 
 
-of_one(operator.neg, _negative, are_lanes)
+offer(operator.neg, _negative, are_lanes)
 
 
 def _extreme(comparison: str) -> Any:
-    """Return an intrinsic for `min` or `max`: of two that are equal the first, as it is with numbers."""
+    """Return what calculates `min` or `max`: of two that are equal the first, as it is with numbers."""
 
-    @_intrinsic
     def calculate(typing: Any, first: Any, second: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             one, other = (_splat(builder, value) for value in arguments)
@@ -176,8 +172,8 @@ def _extreme(comparison: str) -> Any:
     return calculate
 
 
-of_two(min, _extreme("<"), are_lanes)
-of_two(max, _extreme(">"), are_lanes)
+offer(min, _extreme("<"), are_lanes)
+offer(max, _extreme(">"), are_lanes)
 
 
 @_intrinsic

@@ -10,7 +10,7 @@ from numba import extending, types
 from numba.extending import models
 from numba.np import arrayobj
 
-from kiks.engine.vectors import LANES, Lanes, of_two
+from kiks.engine.vectors import LANES, Lanes, offer
 
 # Numba annotates these in part, and not as they are used in kernels.
 _intrinsic: Any = extending.intrinsic
@@ -52,9 +52,8 @@ def _are_words(*kinds: Any) -> bool:
 
 
 def _arithmetic(operation: str) -> Any:
-    """Return an intrinsic that calculates with words, or words and an integer."""
+    """Return what calculates with words, or words and an integer."""
 
-    @_intrinsic
     def calculate(typing: Any, first: Any, second: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             pairs = zip(arguments, signature.args, strict=True)
@@ -74,7 +73,7 @@ for _symbol, _operation in (
     (operator.xor, "xor"),
     (operator.rshift, "lshr"),
 ):
-    of_two(_symbol, _arithmetic(_operation), _are_words)
+    offer(_symbol, _arithmetic(_operation), _are_words)
 
 
 @_intrinsic
