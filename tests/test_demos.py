@@ -27,12 +27,12 @@ SEEDS = range(10)
 # The state after the first twenty seconds with seed 1. To renew: python tests/test_demos.py
 HASHES = {
     "avoid": "a06c9cd61940109c",
-    "follow": "626750f4979c3b6d",
-    "clean": "55a860905ec835bb",
-    "maze": "4a86ab4836f34f20",
-    "camera": "3c3e9c7f9ab38718",
-    "race": "260bdac353beb334",
-    "swarm": "bdb07fe26158484c",
+    "follow": "3d1b7ec06f60d15e",
+    "clean": "e6c5574f4731f7ba",
+    "maze": "548492f58d2a11ed",
+    "camera": "3015cda774d517f5",
+    "race": "9b2dbb58da99e908",
+    "swarm": "109a2ecfb1721dc9",
 }
 
 
