@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.engine.by_eights import read_after
 
+from kiks.batch.worlds import PROXIMITY
 from kiks.engine import motor, step
+from kiks.engine.networks import networks_for
 from kiks.engine.parameters import pack
+from kiks.engine.rays import sight_of
 from kiks.engine.scene import make_scene
 from kiks.engine.state import State
 from kiks.model.arena import PAD
 from kiks.model.robot import RobotSpec
+from kiks.units import TICK_NS
 
 KINDS = (
     {},
@@ -56,7 +61,11 @@ class Worlds:
 
     def advance(self, ticks_to):
         before, self.ticks = self.ticks, ticks_to
-        step.advance_batch(self.lanes, self.kinds, self.ground, self.seeds, before, ticks_to)
+        lanes = State(self.lanes, State.empty(world_count=self.count, robot_count=1).bodies)
+        scene = make_scene(lanes, self.kinds, self.arena.width_mm, self.arena.height_mm)
+        lamps = np.zeros((self.count, 0, 4))
+        places = self.ground, sight_of(self.arena), networks_for("reflection"), lamps
+        read_after(scene, *places, self.seeds, before, ticks_to * TICK_NS, PROXIMITY)
         for world in range(self.count):
             state = State(self.alone[world : world + 1], State.empty(world_count=1, robot_count=1).bodies)
             scene = make_scene(state, self.kinds, self.arena.width_mm, self.arena.height_mm)

@@ -6,18 +6,21 @@ import math
 
 import numpy as np
 import pytest
+from tests.engine.by_eights import read_after
 
+from kiks.batch.worlds import AMBIENT, PROXIMITY
 from kiks.engine.ambient import read_ambient
 from kiks.engine.networks import networks_for
 from kiks.engine.parameters import pack
 from kiks.engine.proximity import read_proximity
 from kiks.engine.rays import sight_of
-from kiks.engine.readings import read_ambient_batch, read_batch
 from kiks.engine.scene import make_scene
 from kiks.engine.state import State
+from kiks.model.arena import PAD
 from kiks.model.robot import RESPONSES, RobotSpec
 
 TICKS = 1000
+NO_LAMPS = np.zeros((0, 4))
 
 
 class Worlds:
@@ -25,6 +28,7 @@ class Worlds:
 
     def __init__(self, arena, kinds, count, rng):
         self.sight = sight_of(arena)
+        self.ground = arena.clearance, float(arena.mm_per_cell), PAD
         self.state = State.empty(world_count=count, robot_count=1)
         robots = self.state.robots[:, 0]
         robots["x_mm"] = rng.uniform(0.0, arena.width_mm, count)
@@ -48,6 +52,13 @@ class Worlds:
         robots, bodies, kinds, (begins, entries, spots, widest_mm) = self.scene
         it = slice(world, world + 1)
         return robots[it], bodies[it], kinds, (begins[it], entries[it], spots[it], widest_mm)
+
+    def read(self, code, networks, lamps=NO_LAMPS):
+        """Return what all robots read."""
+        lamps = np.broadcast_to(lamps, (len(self.ticks), *lamps.shape)).copy()
+        return read_after(
+            self.scene, self.ground, self.sight, networks, lamps, self.seeds, self.ticks, self.times_ns, code
+        )
 
     def moment(self, world):
         return int(self.ticks[world]), int(self.times_ns[world]), int(self.seeds[world]), 0, True
@@ -73,10 +84,7 @@ def kinds_of(*responses):
 
 def assert_equal_readings(arena, kinds, networks, count, rng):
     worlds = Worlds(arena, kinds, count, rng)
-    together, one_by_one = np.empty((count, 8), np.int64), np.empty((count, 8), np.int64)
-    read_batch(
-        worlds.state.robots, kinds, worlds.sight, networks, worlds.ticks, worlds.times_ns, worlds.seeds, together
-    )
+    together, one_by_one = worlds.read(PROXIMITY, networks), np.empty((count, 8), np.int64)
     for world in range(count):
         read_proximity(worlds.alone(world), worlds.sight, networks, *worlds.moment(world), one_by_one[world])
     np.testing.assert_array_equal(together, one_by_one)
@@ -103,8 +111,7 @@ def test_light_readings_of_many_worlds(make_random_arena):
     kinds = kinds_of("reflection")[0]
     worlds = Worlds(arena, kinds, 20, rng)
     lamps = np.array([[60.0, 60.0, 1.0, 1.0], [0.7 * arena.width_mm, 100.0, 2.0, 1.0]])
-    together, alone = np.empty((20, 8), np.int64), np.empty(8, np.int64)
-    read_ambient_batch(worlds.scene, worlds.sight, lamps, worlds.ticks, worlds.times_ns, worlds.seeds, together)
+    together, alone = worlds.read(AMBIENT, networks_for("reflection"), lamps), np.empty(8, np.int64)
     for world in range(20):
         read_ambient(worlds.alone(world), worlds.sight, lamps, *worlds.moment(world), alone)
         assert together[world].tolist() == alone.tolist()

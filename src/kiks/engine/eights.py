@@ -22,7 +22,6 @@ from numba.core import cgutils
 from numba.core.typing import templates
 from numba.extending import models
 
-from kiks.engine.compiling import kernel
 from kiks.engine.masks import Mask, select
 from kiks.engine.parameters import PARAMETERS
 from kiks.engine.state import ROBOT
@@ -359,39 +358,3 @@ def store_lane(typing: Any, eight: Any, lane: Any, record: Any) -> Any:
         return context.get_dummy_value()
 
     return types.void(eight, types.int64, record), generate
-
-
-@kernel
-def load_eight(robots: Any, first: Any, count: Any, eight: Any) -> Any:
-    """Read the lone robots of some worlds.
-
-    Args:
-        robots: Records of `ROBOT`, shape [world_count, 1].
-        first: The first of the worlds.
-        count: How many they are, 1 to 8; lanes over repeat the last one.
-        eight: Record of `EIGHT`; what it has besides, its ticks, stays as it is.
-    """
-    for lane in range(LANES):
-        load_lane(eight, lane, robots[first + min(lane, count - 1), 0])
-
-
-@kernel
-def store_eight(robots: Any, first: Any, count: Any, eight: Any) -> Any:
-    """Write the lone robots of some worlds: the opposite of `load_eight`."""
-    for lane in range(count):
-        store_lane(eight, lane, robots[first + lane, 0])
-
-
-@kernel
-def load_kinds(robots: Any, kinds: Any, first: Any, count: Any, eight: Any) -> Any:
-    """Read the constants of the lone robots of some worlds.
-
-    Args:
-        robots: Records of `ROBOT`, shape [world_count, 1].
-        kinds: Records of `PARAMETERS`, one for each kind.
-        first: The first of the worlds.
-        count: How many they are, 1 to 8; lanes over repeat the last one.
-        eight: Record of `EIGHT_KINDS`.
-    """
-    for lane in range(LANES):
-        load_lane(eight, lane, kinds[robots[first + min(lane, count - 1), 0].kind])

@@ -30,7 +30,7 @@ class Mask(types.Type):  # type: ignore[misc, unused-ignore]
 
 _MASK, _LANES = Mask(), Lanes()
 _VECTOR = ir.VectorType(ir.DoubleType(), LANES)
-_WORDS, _BITS = ir.VectorType(ir.IntType(64), LANES), ir.VectorType(ir.IntType(1), LANES)
+_WORDS = ir.VectorType(ir.IntType(64), LANES)
 _NOUGHTS, _ONES = ir.Constant(_WORDS, [0] * LANES), ir.Constant(_WORDS, [-1] * LANES)
 _MAGIC = 6755399441055744.0  # 1.5 * 2^52: added to a whole number, it leaves that in the lowest bits
 
@@ -171,17 +171,6 @@ def holds(typing: Any, condition: Any, lane: Any) -> Any:
         return builder.trunc(builder.lshr(bits, arguments[1]), ir.IntType(1))
 
     return types.boolean(condition, types.int64), generate
-
-
-@_intrinsic
-def mask_of(typing: Any, bits: Any) -> Any:
-    """Return the mask whose lanes are the lowest bits of an integer."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        whole = builder.trunc(arguments[0], ir.IntType(LANES))
-        return builder.sext(builder.bitcast(whole, _BITS), _WORDS)
-
-    return _MASK(types.int64), generate
 
 
 @_intrinsic

@@ -10,11 +10,8 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
-from kiks.engine.ambient import read_ambient
-from kiks.engine.compiling import entry, kernel
-from kiks.engine.eights import EIGHT, eight_of, load_eight, load_lane, open_eight, stack_record
+from kiks.engine.compiling import kernel
+from kiks.engine.eights import eight_of
 from kiks.engine.fans import WAY_SIZE, enter, follow, met
 from kiks.engine.lanes import stack_floats, stack_integers, stack_narrow
 from kiks.engine.masks import choose
@@ -34,7 +31,6 @@ from kiks.engine.proximity import (
 from kiks.engine.rays import leap_at, scale
 from kiks.engine.responses import REFLECTION, respond
 from kiks.engine.vectors import LANES, lane_of, load, store
-from kiks.engine.words import load_words
 from kiks.model.robot import SENSOR_COUNT
 
 EIGHT_SENSES = eight_of(
@@ -50,23 +46,6 @@ EIGHT_SENSES = eight_of(
 # Eight robots have 64 sensors; sizes of stack arrays must be constants of their own.
 _FANS = 64
 _WAYS_SIZE = _FANS * WAY_SIZE
-
-
-@kernel
-def load_senses(robots: Any, kinds: Any, first: Any, count: Any, senses: Any, which: Any) -> Any:
-    """Read what the sensors of the lone robots of some worlds are.
-
-    Args:
-        robots: Records of `ROBOT`, shape [world_count, 1].
-        kinds: Records of `PARAMETERS`, one for each kind.
-        first: The first of the worlds.
-        count: How many they are, 1 to 8; lanes over repeat the last one.
-        senses: Record of `EIGHT_SENSES` to be written.
-        which: Which of the kinds each is, int64 [8], to be written.
-    """
-    for lane in range(LANES):
-        which[lane] = robots[first + min(lane, count - 1), 0].kind
-        load_lane(senses, lane, kinds[which[lane]])
 
 
 @kernel
@@ -133,57 +112,3 @@ def read_eight(
         quantized = quantize(senses, noisy)
         for lane in range(LANES):
             out[lane, sensor] = lane_of(quantized, lane)
-
-
-@entry
-def read_batch(
-    robots: Any, kinds: Any, sight: Any, networks: Any, tick_counts: Any, times_ns: Any, seeds: Any, out: Any
-) -> Any:
-    """Write the counts that command N returns in many worlds, each with a lone robot.
-
-    Args:
-        robots: Records of `ROBOT`, shape [world, 1].
-        kinds: Records of `PARAMETERS`, one for each kind of robot.
-        sight: What rays meet of the arena.
-        networks: As `kiks.engine.proximity.read_proximity` takes them.
-        tick_counts: Ticks done, int64 [world].
-        times_ns: When the robots read, int64 [world].
-        seeds: Seeds of the runs, int64 [world].
-        out: int64 [world, 8].
-    """
-    eight, senses, which = stack_record(EIGHT), stack_record(EIGHT_SENSES), stack_integers(LANES)
-    times, words, readings = stack_floats(LANES), stack_integers(LANES), np.empty((LANES, SENSOR_COUNT), np.int64)
-    for first in range(0, robots.shape[0], LANES):
-        count = min(robots.shape[0] - first, LANES)
-        load_eight(robots, first, count, eight)
-        load_senses(robots, kinds, first, count, senses, which)
-        for lane in range(LANES):
-            world = first + min(lane, count - 1)
-            eight.tick_count[lane] = tick_counts[world]
-            times[lane], words[lane] = times_ns[world], seeds[world]
-        eights = open_eight(eight), open_eight(senses)
-        read_eight(*eights, which, kinds, sight, networks, load(times), load_words(words), readings)
-        out[first : first + count] = readings[:count]
-
-
-@entry
-def read_ambient_batch(
-    scene: Any, sight: Any, lamps: Any, tick_counts: Any, times_ns: Any, seeds: Any, out: Any
-) -> Any:
-    """Write the counts that command O returns in many worlds, each with a lone robot.
-
-    Args:
-        scene: What there is, a world for each robot (`kiks.engine.scene`).
-        sight: What rays meet of the arena.
-        lamps: As `kiks.engine.ambient.read_ambient` takes them.
-        tick_counts: Ticks done, int64 [world].
-        times_ns: When the robots read, int64 [world].
-        seeds: Seeds of the runs, int64 [world].
-        out: int64 [world, 8].
-    """
-    robots, bodies, kinds, near = scene
-    begins, entries, spots, widest_mm = near
-    for world in range(out.shape[0]):
-        it = slice(world, world + 1)
-        alone = robots[it], bodies[it], kinds, (begins[it], entries[it], spots[it], widest_mm)
-        read_ambient(alone, sight, lamps, tick_counts[world], times_ns[world], seeds[world], 0, True, out[world])

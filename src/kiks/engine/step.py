@@ -4,23 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from kiks.engine.bodies import remember_place
 from kiks.engine.company import make_room, move_together
 from kiks.engine.compiling import entry, inlined, kernel
 from kiks.engine.eights import (
     EIGHT,
-    EIGHT_KINDS,
     copy_eight,
-    load_eight,
-    load_kinds,
-    one_of,
     only,
     open_eight,
     put_back,
     stack_record,
-    store_eight,
 )
 from kiks.engine.gripper import move_gripper, tend_grippers
 from kiks.engine.hold import carry_lifted
@@ -28,8 +21,6 @@ from kiks.engine.masks import anywhere, everywhere, opposite
 from kiks.engine.motion import draw_slip, move, note_contact, remember_pose
 from kiks.engine.motor import control_motors, latch_encoders, turn_motors
 from kiks.engine.scene import count_discs, enter_all
-from kiks.engine.vectors import LANES, splat, with_lane
-from kiks.engine.words import word
 
 
 @entry
@@ -96,35 +87,6 @@ def advance_eight(eight: Any, parameters: Any, ground: Any, seeds: Any, until: A
         eight.tick_count = now + 1.0
         if not everywhere(is_due):
             put_back(before, eight, opposite(is_due))
-
-
-@entry
-def advance_batch(robots: Any, kinds: Any, ground: Any, seeds: Any, ticks_from: Any, ticks_to: Any) -> Any:
-    """Let time pass in worlds of one robot each, eight at once.
-
-    Args:
-        robots: Records of `ROBOT`, shape [world_count, 1]; changed in place.
-        kinds: Records of `PARAMETERS`, one for each kind.
-        ground: The arena, as in `advance`; all worlds have the same.
-        seeds: Seeds of the worlds, int64 [world_count].
-        ticks_from: Ticks that each world has done, int64 [world_count].
-        ticks_to: Ticks after which each is to stand, int64 [world_count].
-    """
-    record, constants = stack_record(EIGHT), stack_record(EIGHT_KINDS)
-    for first in range(0, robots.shape[0], LANES):
-        count = min(robots.shape[0] - first, LANES)
-        load_eight(robots, first, count, record)
-        load_kinds(robots, kinds, first, count, constants)
-        eight, parameters = open_eight(record), open_eight(constants)
-        last = first + count - 1
-        seed, until = word(splat(0.0)), splat(0.0)
-        for lane in range(LANES):
-            world = min(first + lane, last)
-            seed = with_lane(seed, lane, np.uint64(seeds[world]))
-            until = with_lane(until, lane, np.float64(ticks_to[world]))
-            one_of(eight, lane).tick_count = np.float64(ticks_from[world])
-        advance_eight(eight, parameters, ground, seed, until)
-        store_eight(robots, first, count, record)
 
 
 @kernel
