@@ -10,7 +10,7 @@ def ready_engine() -> None:
     from kiks.engine.compiling import is_compiled
 
     if not is_compiled():
-        typer.echo("Compiling the engine for this computer: once, half a minute or so ...", err=True)
+        typer.echo("Compiling the engine for this computer: once, a minute or so ...", err=True)
         compile_everything()
 
 
@@ -20,7 +20,7 @@ def ready_batch() -> None:
 
     ready_engine()
     if not is_compiled("roll_out"):
-        typer.echo("Compiling the batch for this computer: once, a minute or so ...", err=True)
+        typer.echo("Compiling the batch for this computer: once, half a minute or so ...", err=True)
 
 
 def compile_batch() -> None:

@@ -41,7 +41,7 @@ class Shown:
     def __init__(self, desk: Desk, *, host: str = "127.0.0.1", port: int | None = None) -> None:
         self.desk = desk
         if not is_compiled():
-            _log.warning("Compiling the engine for this computer: once, half a minute or so ...")
+            _log.warning("Compiling the engine for this computer: once, a minute or so ...")
         with desk.sim.lock:
             # What browsers need of the engine is compiled before the first of them waits for it.
             pack_frame(desk.sim, scene=0)
