@@ -58,7 +58,7 @@ def test_a_demo_is_the_same_in_two_processes(behaviour: str, tmp_path: Path) -> 
     assert first.returncode == 0, first.stderr
     assert (tmp_path / "run.png").stat().st_size > 5000
     assert re.search(r"30\.\d s .* x real time .* m .* contacts", first.stdout)
-    second = kiks(*arguments, "--picture", "again.png", cwd=tmp_path)
+    second = kiks(*arguments, cwd=tmp_path)
     assert state_of(first.stdout) == state_of(second.stdout)
     assert (tmp_path / f"kiks-{behaviour}.png").exists()
 
