@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -57,6 +58,14 @@ def test_nothing_may_stand_in_something_else(changes, words):
 def test_an_arena_too_small_for_so_many_robots_says_so():
     with pytest.raises(ArenaError, match=r"must have room for 9 robots, but .* for robot \d were all taken"):
         Simulation(Arena.box(180, 180), robots=9)
+
+
+def test_robots_start_where_no_ball_lies():
+    middle = Arena.box(400, 400).find_start(27.5)
+    arena = replace(Arena.box(400, 400), balls=(Ball(middle.x_mm, middle.y_mm), Ball(90, 90), Ball(310, 90)))
+    sim = Simulation(arena, robots=3, seed=5)
+    apart_mm = [math.hypot(x - ball.x_mm, y - ball.y_mm) for x, y, _ in sim.poses() for ball in arena.balls]
+    assert min(apart_mm) >= 27.5 + 32 - 0.01
 
 
 def test_random_starts_are_apart():

@@ -198,9 +198,12 @@ class World:
             ArenaError: If there is no free place for one.
         """
         poses = np.zeros((self.robot_count, 3))
-        for index in range(self.robot_count):
-            others = np.column_stack([poses[:index, :2], [spec.body.radius_mm for spec in self.specs[:index]]])
-            poses[index] = self._start(index, seed, others)
+        # Robots that have no place yet are nowhere.
+        bodies = [(body.x_mm, body.y_mm, body.radius_mm) for body in self.arena.bodies]
+        discs = np.array([(0.0, 0.0, -math.inf)] * self.robot_count + bodies).reshape(-1, 3)
+        for index, spec in enumerate(self.specs):
+            poses[index] = self._start(index, seed, discs)
+            discs[index] = *poses[index, :2], spec.body.radius_mm
         return poses
 
     def check_start_poses(self, poses: NDArray[np.float64], whose: str) -> None:
@@ -220,26 +223,30 @@ class World:
             obstacle = self._obstacle(x_mm, y_mm, self.specs[index].body.radius_mm, discs, index, PRESSED_MM)
             if obstacle is not None:
                 raise ParameterError(
-                    f"the start of robot {index + 1} {whose} must be free, but at ({x_mm:g}, {y_mm:g}) mm {obstacle}. "
-                    "Move it."
+                    f"the start of robot {index + 1} {whose} must be free, but at ({x_mm:g}, {y_mm:g}) mm "
+                    f"{self._is_inside(obstacle)}. Move it."
                 )
 
     def _start(self, index: int, seed: int, others: NDArray[np.float64]) -> tuple[float, float, float]:
-        """Return the arena's start pose for a robot, else a free place: the roomiest for the first.
+        """Return the arena's start pose for a robot, else a free place; for the first the roomiest, if it is free.
 
         Raises:
             ArenaError: If there is no free place for it.
         """
         radius_mm = self.specs[index].body.radius_mm
         if index == 0 and not self.arena.starts:
-            return self.arena.find_start(radius_mm)
+            widest = self.arena.find_start(radius_mm)
+            if self._obstacle(widest.x_mm, widest.y_mm, radius_mm, others) is None:
+                return widest
         if index < len(self.arena.starts):
             start = self.arena.starts[index]
-            obstacle = self._obstacle(start.x_mm, start.y_mm, radius_mm, others, overlap_mm=PRESSED_MM)
+            # Whatever else the arena puts there says so itself.
+            robots = others[: self.robot_count]
+            obstacle = self._obstacle(start.x_mm, start.y_mm, radius_mm, robots, overlap_mm=PRESSED_MM)
             if obstacle is not None:
                 raise ArenaError(
                     f"Arena {self.arena.name!r}: start {index + 1} at ({start.x_mm:g}, {start.y_mm:g}) mm must be "
-                    f"free, but {obstacle}. Move it."
+                    f"free, but {self._is_inside(obstacle)}. Move it."
                 )
             return start
         for attempt in range(ATTEMPTS):
@@ -341,18 +348,23 @@ class World:
         discs: NDArray[np.float64],
         but: int = -1,
         overlap_mm: float = OVERLAP_MM,
-    ) -> str | None:
-        """Say which wall or disc but one is in the way of a disc, None if it is free."""
+    ) -> tuple[int, float] | None:
+        """Return which disc but one is in the way of a disc, -1 for a wall, and how deep [mm]; None if it is free."""
         inside = 0 <= x_mm <= self.arena.width_mm and 0 <= y_mm <= self.arena.height_mm
         gap_mm = contact.clearance_of_disc(*self.ground, float(x_mm), float(y_mm), radius_mm)
         if not inside or gap_mm < -overlap_mm:
-            return f"a wall is {-gap_mm:.1f} mm inside it"
+            return -1, -float(gap_mm)
         overlaps_mm = radius_mm + discs[:, 2] - np.hypot(discs[:, 0] - x_mm, discs[:, 1] - y_mm)
         if but >= 0:
             overlaps_mm[but] = -math.inf
         if len(overlaps_mm) and overlaps_mm.max() > overlap_mm:
-            return f"{self._name(int(overlaps_mm.argmax()))} is {overlaps_mm.max():.1f} mm inside it"
+            return int(overlaps_mm.argmax()), float(overlaps_mm.max())
         return None
+
+    def _is_inside(self, obstacle: tuple[int, float]) -> str:
+        """Say in words what is in the way."""
+        disc, depth_mm = obstacle
+        return f"{'a wall' if disc < 0 else self._name(disc)} is {depth_mm:.1f} mm inside it"
 
     def freedom(self, disc: int) -> Callable[[float, float], bool]:
         """Return a function that says whether a disc, robots counted first, from 0, could lie at a place [mm].
@@ -376,7 +388,7 @@ class World:
         obstacle = self._obstacle(x_mm, y_mm, radius_mm, self._discs(), but, overlap_mm)
         if obstacle is not None:
             raise ParameterError(
-                f"{what} must be free, but at ({x_mm:g}, {y_mm:g}) mm {obstacle}. "
+                f"{what} must be free, but at ({x_mm:g}, {y_mm:g}) mm {self._is_inside(obstacle)}. "
                 f"The arena is {self.arena.width_mm:g} x {self.arena.height_mm:g} mm; a radius of "
                 f"{radius_mm:g} mm is needed."
             )
