@@ -209,7 +209,7 @@ def main() -> None:
         )
         rows.append(("batch.full_steps_per_s_all", found["all"], "robot-steps/s"))
         rows.append(("batch.second_core_adds", found["two"] / found["one"] - 1.0, "cores"))
-        growth = {f"worlds_{n}": rate(worlds(arena, n), seconds * min(1.0, 64 / n)) for n in (8, 64, 1000, 10_000)}
+        growth = {f"worlds_{n}": rate(worlds(arena, n), max(64 * seconds / n, 2.0)) for n in (64, 1000, 10_000)}
         growth |= {f"arena_{n}m": rate(worlds(box(1000 * n), 64), seconds) for n in (1, 2, 4)}
         growth |= {f"bodies_{n}": rate(worlds(box(1000, n), 64), seconds / 4) for n in (1, 10, 30)}
         for name, value in in_turns(3, growth).items():
