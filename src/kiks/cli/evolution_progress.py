@@ -39,11 +39,11 @@ def progress_of(
     def text() -> str:
         latest, number = evolution.generations[-1], len(evolution.generations)
         now_s = perf_counter()
-        rate = len(latest.values) * evolution.task.tick_count / max(now_s - last_s[0], 1e-9)
+        rate = len(latest.values) * evolution.task.driven_s / max(now_s - last_s[0], 1e-9)
         last_s[0] = now_s
         return (
             f"generation {number}   best {latest.fitness.max():.4f}   mean {latest.fitness.mean():.4f}   "
-            f"champion {evolution.champion.fitness:.4f}   {_metric(rate)} robot-steps/s   "
+            f"champion {evolution.champion.fitness:.4f}   {_metric(rate)} x real time   "
             f"{done_and_left()[1]:.0f} s left"
         )
 

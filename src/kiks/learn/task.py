@@ -176,9 +176,9 @@ class Task:
         return self.controller.parameter_count or 0
 
     @property
-    def tick_count(self) -> int:
-        """How many robot-steps of 10 ms a candidate takes, about."""
-        return round(self.worlds * self.robots * self.seconds * 100)
+    def driven_s(self) -> float:
+        """How long the robots of a candidate drive, all in all [s]."""
+        return self.worlds * self.robots * self.seconds
 
     def digest(self) -> str:
         """Return 16 hexadecimal digits that differ for tasks whose evolution would."""
