@@ -4,7 +4,7 @@ Run: python benchmarks/evolve.py [--json] [--seeds 5]. For each seed `kiks.tasks
 `GENERATIONS` generations. `evolve.threshold_s` is the median of the times after which the champion's fitness on trial
 is above `THRESHOLD`, with everything that comes before it but imports; `evolve.whole_s` that of a whole evolution.
 `evolve.contact_free` is the share of champions that drive `EXAM_S` simulated seconds on a line of 9600 baud in each
-of the arenas of `exams`, where none of them trained, without one contact.
+of the arenas of `exams`, where none of them trained, without one contact; `evolve.squares_...` is how far each got.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ from kiks.batch.beginning import random_starts
 from kiks.model.arena import Pose
 
 ARENAS = Path(__file__).parent.parent / "examples" / "arenas"
-GENERATIONS, THRESHOLD, EXAM_S = 60, 0.5, 180.0
+GENERATIONS, THRESHOLD, EXAM_S = 60, 0.15, 180.0
+SQUARE_MM = 100.0
 
 
 def exams() -> list[kiks.Arena]:
@@ -35,11 +36,13 @@ def exams() -> list[kiks.Arena]:
     return [replace(arena, starts=(Pose(*start),)) for arena, start in zip(arenas, starts, strict=True)]
 
 
-def contact_count(champion: kiks.Champion, arena: kiks.Arena, seed: int) -> tuple[int, float]:
-    """Return how often a champion meets something on the wire, and how far it drives [m]."""
+def drive(champion: kiks.Champion, arena: kiks.Arena, seed: int) -> tuple[int, float, int]:
+    """Return how often a champion meets something on the wire, how far it drives [m], and to how many squares."""
     sim, ports = champion.simulation(arena, seed=seed)
+    sim.record_paths()
     champion.drive(ports, seconds=EXAM_S)
-    return sim.contacts(1), sim.travelled_mm(1) / 1000
+    squares = {(int(x_mm // SQUARE_MM), int(y_mm // SQUARE_MM)) for x_mm, y_mm in sim.paths()[0, :, 1:3]}
+    return sim.contacts(1), sim.travelled_mm(1) / 1000, len(squares)
 
 
 def main() -> None:
@@ -60,11 +63,12 @@ def main() -> None:
         wholes_s.append(time.perf_counter() - start_s)
         above = [each.seconds for each in evolution.generations if each.champion_fitness > THRESHOLD]
         thresholds_s.append(above[0] if above else math.inf)
-        driven = [contact_count(champion, arena, seed) for arena in arenas]
-        passed += not any(contacts for contacts, _ in driven)
-        lengths_m += [metres for _, metres in driven]
-        for arena, (contacts, _) in zip(arenas, driven, strict=True):
+        driven = [drive(champion, arena, seed) for arena in arenas]
+        passed += not any(contacts for contacts, _, _ in driven)
+        lengths_m += [metres for _, metres, _ in driven]
+        for arena, (contacts, _, squares) in zip(arenas, driven, strict=True):
             rows.append((f"evolve.contacts_{arena.name.lower()}_{seed}", contacts, f"in {EXAM_S:g} s"))
+            rows.append((f"evolve.squares_{arena.name.lower()}_{seed}", squares, f"of {SQUARE_MM:g} mm seen"))
         rows.append((f"evolve.fitness_{seed}", champion.fitness, "on trial"))
         rows.append((f"evolve.threshold_s_{seed}", thresholds_s[-1], f"s to fitness {THRESHOLD:g}"))
     rows.append(("evolve.threshold_s", statistics.median(thresholds_s), f"s to fitness {THRESHOLD:g}"))

@@ -86,7 +86,7 @@ def test_how_well() -> None:
     straight = 1 - np.sqrt(abs(shares[..., 0] - shares[..., 1]) / 2)
     highest = trace.sensors.max(axis=2) / 1023
     np.testing.assert_allclose(
-        trace.values[0], (abs(shares).mean(axis=2) * straight * (1 - highest)).mean(axis=1), atol=1e-12
+        trace.values[0], (np.maximum(shares.mean(axis=2), 0) * straight * (1 - highest)).mean(axis=1), atol=1e-12
     )
     beside = np.interp(trace.sensors[..., 5], [0, 200, 1023], [0, 1, 0])
     np.testing.assert_allclose(
@@ -137,7 +137,7 @@ def test_avoidance_of_a_stepped_batch() -> None:
             FULL(sensors[world, 0], memory[world], parameters[world], wheels[world, 0])
             left, right = np.rint(wheels[world, 0]) / 10
             closeness = sensors[world, 0].max() / 1023
-            totals[world] += (abs(left) + abs(right)) / 2 * (1 - np.sqrt(abs(left - right) / 2)) * (1 - closeness)
+            totals[world] += max((left + right) / 2, 0) * (1 - np.sqrt(abs(left - right) / 2)) * (1 - closeness)
         sensors = stepped.step(wheels)
     np.testing.assert_allclose(found, totals / 30, atol=1e-12)
 
@@ -187,10 +187,30 @@ def test_scores_lie_between_none_and_one(wheels: tuple[int, int], sensors: list[
         assert 0.0 <= after(measure, now, now) <= 1.0
 
 
+def test_who_shuttles_or_spins_does_not_roam() -> None:
+    """Ahead at 64 mm/s for half a minute, the same to and fro, and around on the spot."""
+
+    @kiks.controller(parameters=2, memory=1)
+    def drive(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+        memory[0] += 1.0
+        wheels[0] = parameters[0]
+        wheels[1] = parameters[1] if parameters[1] != 0.0 else parameters[0]
+        if parameters[1] == 0.0 and memory[0] % 4.0 >= 2.0:
+            wheels[0], wheels[1] = -parameters[0], -parameters[0]
+
+    batch = kiks.Batch(kiks.Arena.box(3000, 300), 3, starts=(100, 150, 0.0))
+    ways = [[8.0, 8.0], [8.0, 0.0], [8.0, -8.0]]
+    ahead, shuttling, spinning = batch.run(drive, ways, seconds=30, measures=[kiks.measures.roaming]).values[:, 0, 0]
+    assert 0.7 < ahead < 0.8
+    assert shuttling < 0.1
+    assert spinning < 0.01
+
+
 def test_the_best_scores() -> None:
     ahead = np.array([10.0, 10.0])
     assert after(kiks.measures.avoidance, moment(wheels=ahead)) == 1.0
     assert after(kiks.measures.avoidance, moment(wheels=np.array([10.0, -10.0]))) == 0.0
+    assert after(kiks.measures.avoidance, moment(wheels=-ahead)) == 0.0
     beside = np.zeros(8)
     beside[0] = 400.0
     following = kiks.measures.wall_following("left", counts=400)

@@ -152,8 +152,8 @@ def test_map_elites_fills_its_map() -> None:
     evolution = kiks.Evolution(small(), "map-elites", seed=1, population=20)
     rng = np.random.default_rng(1)
     for _ in range(5):
-        count = len(evolution.ask())
-        evolution.tell(rng.uniform(0, 1, (count, 5)))
+        shape = len(evolution.ask()), len(evolution.task.value_names)
+        evolution.tell(rng.uniform(0, 1, shape))
     heat = evolution.algorithm.heat_map()  # type: ignore[attr-defined]
     assert heat.shape == (20, 20)
     assert 1 <= np.isfinite(heat).sum() <= 20

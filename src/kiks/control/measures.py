@@ -21,6 +21,12 @@ from kiks.model.arena import Arena
 FULL_SPEED = 10.0
 """Speed that counts as 1 [pulses/10 ms]: 80 mm/s, at which Floreano and Mondada's robot drove at most."""
 
+FULL_SPEED_MM_S = 80.0
+"""The same for a robot that is watched from outside [mm/s]."""
+
+ROAMING_S = 2.0
+"""How far back a robot must have been elsewhere to be under way [s]."""
+
 FULL_COUNT = 1023.0
 """Proximity that counts as 1 (khepera-protocol.md 8.4)."""
 
@@ -71,6 +77,23 @@ def turned_pulses(moment: Any, notes: Any) -> None:
     notes[0] += 100.0 * moment.period_s * (abs(moment.wheels[0]) + abs(moment.wheels[1]))
 
 
+@measure(notes=4, result=mean)
+def roaming(moment: Any, notes: Any) -> None:
+    """Mean speed at which it gets away from where it was in the last two seconds; 1 for 80 mm/s, 0 on the spot.
+
+    A robot that shuttles or spins drives fast and gets nowhere: there `path_mm` grows, and this does not.
+    """
+    if notes[1] == 0.0:
+        notes[2], notes[3] = moment.start_x_mm, moment.start_y_mm
+    # Where it was is a mean that forgets; on a straight way that is as far behind as it drives in that time.
+    share = min(moment.period_s / ROAMING_S, 1.0)
+    notes[2] += share * (moment.x_mm - notes[2])
+    notes[3] += share * (moment.y_mm - notes[3])
+    away_mm = distance_mm(moment, notes[2], notes[3])
+    notes[0] += min(away_mm / (ROAMING_S * FULL_SPEED_MM_S), 1.0)
+    notes[1] += 1.0
+
+
 # ---- how well ----
 
 
@@ -91,17 +114,17 @@ def touching_share(moment: Any, notes: Any) -> None:
 def avoidance(moment: Any, notes: Any) -> None:
     """Mean of V (1 - sqrt(D)) (1 - i): fast, straight, and far from everything.
 
-    V is the mean of the wheels' absolute speeds, D half of how much they differ with their signs, i the highest
-    proximity count; each from 0 to 1, a speed of 80 mm/s and 1023 counts being 1 (Floreano and Mondada, Automatic
-    creation of an autonomous agent, From Animals to Animats 3, 1994, equation 1). That V is of absolute speeds is our
-    reading of it.
+    V is the mean of the wheels' speeds, 0 if the robot drives back, D half of how much they differ with their signs, i
+    the highest proximity count; each from 0 to 1, a speed of 80 mm/s and 1023 counts being 1 (Floreano and Mondada,
+    Automatic creation of an autonomous agent, From Animals to Animats 3, 1994, equation 1). That only driving ahead
+    counts is our reading of it: of absolute speeds, shuttling on the spot would be best.
     """
     highest = 0.0
     for k in range(8):
         highest = max(highest, moment.sensors[k])
     left, right = share_of_full(moment.wheels[0]), share_of_full(moment.wheels[1])
     straight = 1.0 - np.sqrt(0.5 * abs(left - right))
-    notes[0] += 0.5 * (abs(left) + abs(right)) * straight * (1.0 - min(highest / FULL_COUNT, 1.0))
+    notes[0] += max(0.5 * (left + right), 0.0) * straight * (1.0 - min(highest / FULL_COUNT, 1.0))
     notes[1] += 1.0
 
 

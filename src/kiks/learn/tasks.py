@@ -42,12 +42,12 @@ def without_contacts(fitness: Floats, values: Values) -> Floats:
 
 
 def avoid_fitness(values: Values) -> Floats:
-    """Return the fitness of `avoid`."""
-    return without_contacts(cautious_mean(values["avoidance"]), values)
+    """Return the fitness of `avoid`: the paper's, for a robot that gets somewhere."""
+    return without_contacts(cautious_mean(values["avoidance"] * values["roaming"]), values)
 
 
 def avoid(controller: Controller | None = None, **changes: Any) -> Task:
-    """Return the task to drive fast and straight and touch nothing (Floreano and Mondada 1994).
+    """Return the task to drive fast, straight and about, and touch nothing (after Floreano and Mondada 1994).
 
     Args:
         controller: What is evolved; a linear one if left out.
@@ -57,13 +57,13 @@ def avoid(controller: Controller | None = None, **changes: Any) -> Task:
         "avoid",
         (rooms.pillars(), rooms.corridors(), rooms.wedges()),
         controller or controllers.linear(speed_limit=SPEED_LIMIT),
-        (measures.avoidance, measures.contacts, measures.path_mm, measures.straightness),
+        (measures.avoidance, measures.roaming, measures.contacts, measures.path_mm, measures.straightness),
         fitness=avoid_fitness,
-        seconds=15.0,
+        seconds=20.0,
         worlds=12,
         axes=(Axis("path_mm", 0, 1500), Axis("straightness", 0, 1)),
         exam=rooms.unseen(),
-        about="drive fast and straight, touch nothing",
+        about="drive fast, straight and about, touch nothing",
     )
     return replace(task, **changes)
 
