@@ -21,7 +21,7 @@ from kiks.model.arena import Arena
 FULL_SPEED = 10.0
 """Speed that counts as 1 [pulses/10 ms]: 80 mm/s, at which Floreano and Mondada's robot drove at most."""
 
-FULL_SPEED_MM_S = 80.0
+FULL_SPEED_MM_S = 8.0 * FULL_SPEED
 """The same for a robot that is watched from outside [mm/s]."""
 
 ROAMING_S = 2.0
@@ -79,7 +79,7 @@ def turned_pulses(moment: Any, notes: Any) -> None:
 
 @measure(notes=4, result=mean)
 def roaming(moment: Any, notes: Any) -> None:
-    """Mean speed at which it gets away from where it was in the last two seconds; 1 for 80 mm/s, 0 on the spot.
+    """Mean speed at which it gets away from where it was in the last two seconds: 1 for 80 mm/s, 0 on the spot.
 
     A robot that shuttles or spins drives fast and gets nowhere: there `path_mm` grows, and this does not.
     """

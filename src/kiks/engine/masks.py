@@ -123,30 +123,27 @@ def choose(typing: Any, condition: Any, then: Any, otherwise: Any) -> Any:
     return result(condition, then, otherwise), generate
 
 
-@_intrinsic
-def anywhere(typing: Any, condition: Any) -> Any:
-    """Say whether a condition holds in any lane."""
+def _of_all(comparison: str, bits: int) -> Any:
+    """Return the intrinsic that compares the lanes of a mask with bits; a boolean stays what it is."""
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        if not isinstance(condition, Mask):
-            return arguments[0]
-        bits = _whole(builder, arguments[0])
-        return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
+    @_intrinsic
+    def compare(typing: Any, condition: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            if not isinstance(condition, Mask):
+                return arguments[0]
+            whole = _whole(builder, arguments[0])
+            return builder.icmp_unsigned(comparison, whole, ir.Constant(whole.type, bits))
 
-    return types.boolean(condition), generate
+        return types.boolean(condition), generate
+
+    return compare
 
 
-@_intrinsic
-def everywhere(typing: Any, condition: Any) -> Any:
-    """Say whether a condition holds in all lanes."""
+anywhere = _of_all("!=", 0)
+"""Says whether a condition holds in any lane."""
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        if not isinstance(condition, Mask):
-            return arguments[0]
-        bits = _whole(builder, arguments[0])
-        return builder.icmp_unsigned("==", bits, ir.Constant(bits.type, 2**LANES - 1))
-
-    return types.boolean(condition), generate
+everywhere = _of_all("==", 2**LANES - 1)
+"""Says whether a condition holds in all lanes."""
 
 
 @_intrinsic

@@ -85,7 +85,7 @@ def _widen(context: Any, builder: Any, kind: Any, lanes: Any, value: Any) -> Any
 def offer(symbol: Any, define: Any, fits: Callable[..., bool]) -> None:
     """Let kernels write a function or an operator for arguments of types that fit.
 
-    Numba's own way, `overload`, would compile each pair of types as a function of its own: half of a cold start.
+    Numba's own way, `overload`, would compile each pair of types as a function of its own, a tenth of a second each.
 
     Args:
         symbol: The function or operator.
