@@ -16,8 +16,9 @@ from tests.served import GUARD_S, PROGRAMS, fresh
 from kiks.clock.patience import Patience
 from kiks.errors import KiksError, ParameterError
 from kiks.ports import programs as module
+from kiks.ports.handle import Handle
 from kiks.ports.process import OUTPUT_LIMIT, Command
-from kiks.ports.programs import Handle, Programs
+from kiks.ports.programs import Programs
 from kiks.sim.simulation import Simulation
 
 pytestmark = pytest.mark.slow

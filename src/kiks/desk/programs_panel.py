@@ -19,8 +19,8 @@ from kiks.desk.scripts import (
     split_arguments,
 )
 from kiks.errors import ParameterError
+from kiks.ports.handle import Handle
 from kiks.ports.process import Command
-from kiks.ports.programs import Handle
 
 if TYPE_CHECKING:
     from kiks.desk.desk import Desk

@@ -111,6 +111,9 @@ class K213(Turret):
         take: Takes a picture of what the robot sees at a time [ns], which is the present one.
         record: The robot's record of `kiks.engine.state.ROBOT`; one of its own if left out.
 
+    Attributes:
+        record: The record; another one when the state's arrays were replaced.
+
     Example:
         >>> camera = K213(lambda time_ns: (list(range(64)), 300))
         >>> camera.look(0)
@@ -124,30 +127,30 @@ class K213(Turret):
 
     def __init__(self, take: Callable[[int], Picture], record: Any = None) -> None:
         self._take = take
-        self._record = np.zeros(1, ROBOT)[0] if record is None else record
-        self._record["camera_period"] = 0
-        self._record["camera_taken_ns"] = -1
+        self.record = np.zeros(1, ROBOT)[0] if record is None else record
+        self.record["camera_period"] = 0
+        self.record["camera_taken_ns"] = -1
 
     @property
     def period_ns(self) -> int:
         """Pictures are taken when the time is a multiple of this [ns]."""
-        return PERIODS_NS[int(self._record["camera_period"])]
+        return PERIODS_NS[int(self.record["camera_period"])]
 
     @property
     def taken_ns(self) -> int:
         """When the last picture was taken [ns]."""
-        return int(self._record["camera_taken_ns"])
+        return int(self.record["camera_taken_ns"])
 
     @property
     def pixels(self) -> list[int]:
         """The last picture's greys, the leftmost first."""
-        greys: list[int] = self._record["camera_pixels"].tolist()
+        greys: list[int] = self.record["camera_pixels"].tolist()
         return greys
 
     @property
     def light(self) -> int:
         """The last picture's light level."""
-        return int(self._record["camera_light"])
+        return int(self.record["camera_light"])
 
     def reset(self) -> None:
         """Set the reading period to that of the power-on."""
@@ -155,12 +158,12 @@ class K213(Turret):
 
     def look(self, instant_ns: int) -> None:
         """Take a picture."""
-        self._record["camera_pixels"], self._record["camera_light"] = self._take(instant_ns)
-        self._record["camera_taken_ns"] = instant_ns
+        self.record["camera_pixels"], self.record["camera_light"] = self._take(instant_ns)
+        self.record["camera_taken_ns"] = instant_ns
 
     def set_period(self, code: int) -> None:
         """Set the reading period to that of a code of order U."""
-        self._record["camera_period"] = code
+        self.record["camera_period"] = code
 
     def shapes(self) -> Sequence[Shape]:
         """Return a box with a lens that looks ahead."""

@@ -52,7 +52,6 @@ class Firmware:
         sense_ambient: Callable[[], list[int]],
     ) -> None:
         self.spec = spec
-        self.robots = state.robots
         self.world = 0
         self.number = number
         self.sense_proximity = sense_proximity
@@ -63,14 +62,19 @@ class Firmware:
         self.now_ns = 0
         self.selected_baud = spec.firmware.baud
         self.demo_wakes_ns: int | None = None
+        self.take(state)
+        self._commands = {command.letter.encode(): (command.act, len(command.parameters)) for command in COMMANDS}
+        self.reset()
+
+    def take(self, state: State) -> None:
+        """Take the arrays of a state for those of the robot; due again when they were replaced."""
+        self.robots = state.robots
         # Writable views of this robot's fields: a field of one number has shape [1], the others keep their own.
         fields: dict[str, Any] = {}
         for name in ROBOT.names or ():
             column = state.robots[name][self.world]
-            fields[name] = column[number] if column.ndim > 1 else column[number : number + 1]
+            fields[name] = column[self.number] if column.ndim > 1 else column[self.number : self.number + 1]
         self.view = SimpleNamespace(**fields)
-        self._commands = {command.letter.encode(): (command.act, len(command.parameters)) for command in COMMANDS}
-        self.reset()
 
     def fit(self, turret: Turret) -> None:
         """Take a turret on; one without a number answers no orders."""

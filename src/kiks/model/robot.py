@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from importlib import resources
 from pathlib import Path
@@ -225,3 +226,33 @@ def _typed(value: Any, annotation: str, where: str) -> Any:
             raise ParameterError(f"{where} must be finite, but it was {value!r}.")
         return number
     return value
+
+
+def specs_of(
+    robot: str | RobotSpec | Sequence[str | RobotSpec], robots: int | None, response: str | None
+) -> list[RobotSpec]:
+    """Return what each robot of a world is.
+
+    Args:
+        robot: The kind of all, or a list with that of each: names that `RobotSpec.load` knows, files, or specs.
+        robots: How many there are; as many as kinds are named if None.
+        response: What makes counts of their proximity sensors' rays; what their files say if None.
+
+    Raises:
+        ParameterError: If the numbers do not fit each other, or a name is unknown.
+    """
+    named = [robot] if isinstance(robot, str | RobotSpec) else list(robot)
+    count = len(named) if robots is None else robots
+    if not isinstance(count, int) or not 1 <= count <= 1000:
+        raise ParameterError(
+            f"robots must be a whole number from 1 to 1000, but it was {count!r}. Say how many you need."
+        )
+    if len(named) not in (1, count):
+        raise ParameterError(
+            f"robot must name one kind for all or one for each of {count} robots, but it named {len(named)}. "
+            "Leave robots out to have one of each."
+        )
+    specs = [each if isinstance(each, RobotSpec) else RobotSpec.load(each) for each in named]
+    if response is not None:
+        specs = [spec.with_changes(proximity__response=response) for spec in specs]
+    return specs if len(specs) == count else specs * count

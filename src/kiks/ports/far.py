@@ -10,6 +10,8 @@ import os
 import socket
 import sys
 import threading
+from collections.abc import Callable
+from typing import NoReturn
 
 from kiks.clock.line import BACKLOG_LIMIT
 from kiks.errors import LinkError
@@ -20,18 +22,27 @@ TELL_NS = TICK_NS
 """How far a program's time runs on before it says so to those who wait for it [ns]."""
 
 
+def _end_process() -> NoReturn:
+    sys.stdout.flush()
+    os._exit(1)
+
+
 class Connection:
     """The way to the world, and the program's time.
 
     Args:
         there: The socket at whose other end the world is.
         is_late: Whether the world may have begun already: then the program's time begins when it first needs it.
+        ended: Called when the world has gone, and does not return: nothing that the program could do has a meaning.
     """
 
-    def __init__(self, there: socket.socket, *, is_late: bool = False) -> None:
+    def __init__(
+        self, there: socket.socket, *, is_late: bool = False, ended: Callable[[], NoReturn] = _end_process
+    ) -> None:
         self.lock = threading.RLock()
         self._now_ns = 0
         self._is_to_meet = is_late
+        self._ended = ended
         self._there = there
         self._told_ns = 0
         self._thought_ns = 0
@@ -86,13 +97,17 @@ class Connection:
             raise LinkError(answer.data.decode())
         return answer
 
+    def close(self) -> None:
+        """Hang up; what was said is still done."""
+        self._there.close()
+
     def _receive(self) -> None:
         try:
             received = self._there.recv(RECEIVE_SIZE)
         except OSError:
             received = b""
         if not received:
-            _end()
+            self._ended()
         self._received += received
 
     def _send(self, request: Request) -> None:
@@ -101,7 +116,7 @@ class Connection:
         try:
             self._there.sendall(request.pack())
         except OSError:
-            _end()
+            self._ended()
 
 
 class FarLine:
@@ -191,9 +206,3 @@ class FarLine:
         answer = self._connection.ask(kind, self._robot, first=first, second=second, third=third, data=data)
         self._ahead_count = answer.ahead_count
         return answer
-
-
-def _end() -> None:
-    """End at once: the world has gone, and nothing that the program could still do has a meaning."""
-    sys.stdout.flush()
-    os._exit(1)

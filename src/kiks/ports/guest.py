@@ -24,7 +24,7 @@ class Guest(Player):
     Args:
         name: Who it is, for a person.
         rank: Its number, from 1.
-        robot: Number of the robot that is its own.
+        robot: Number of the robot that is its own; 0 if it has none until it claims one.
         here: The socket at whose other end it is.
         sim: The world.
         turns: Where it takes its turn.
@@ -33,6 +33,7 @@ class Guest(Player):
     Attributes:
         is_silenced: Whether the world has parted from it because it was silent.
         is_stopped: Whether a person has stopped it: then its robots stop, too, when it has gone.
+        has_hung_up: Whether nothing more is to be heard from it.
     """
 
     def __init__(
@@ -43,6 +44,7 @@ class Guest(Player):
         self.is_here = False
         self.is_silenced = False
         self.is_stopped = False
+        self.has_hung_up = False
         self._here = here
         self._here.setblocking(False)
         self._sim = sim

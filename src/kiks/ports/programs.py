@@ -1,4 +1,4 @@
-"""Unchanged Python programs in one world, each in a process of its own. They come and go."""
+"""Programs in one world: unchanged Python programs, each in a process of its own, and visitors. They come and go."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from kiks.clock.thinking import parse_thinking
 from kiks.errors import KiksError, ParameterError
 from kiks.ports.child import LATE, PUNCTUAL
 from kiks.ports.guest import Guest
+from kiks.ports.handle import Handle
 from kiks.ports.names import Names
-from kiks.ports.process import Command, OutputLine, Process
+from kiks.ports.process import Command, Process
 from kiks.ports.turns import PATIENCE_S, Turns
 from kiks.sim.simulation import Simulation
-from kiks.sim.tail import Tail
 
 IDLE_S = 0.05
 """Longest sleep [s]: a second Ctrl-C is noticed within it."""
@@ -33,61 +33,6 @@ INTERRUPTED = 130
 """Exit code after Ctrl-C."""
 
 _log = logging.getLogger("kiks.run")
-
-
-class Handle:
-    """A program that was started.
-
-    Attributes:
-        command: What was started.
-        number: Its number, from 1 in the order in which they were started.
-        robot: Number of the robot that is its own.
-        name: Who it is, for a person.
-    """
-
-    def __init__(self, command: Command, guest: Guest) -> None:
-        self.command = command
-        self.number = guest.rank
-        self.robot = guest.robot
-        self.name = guest.name
-        self.has_hung_up = False
-        self.has_been_noticed = False
-        self.has_ended = threading.Event()
-        self.guest = guest
-        self.process: Process
-
-    @property
-    def is_running(self) -> bool:
-        """Whether it still runs; when not, its output is complete, and its robots are free if it was stopped."""
-        return not self.has_ended.is_set()
-
-    @property
-    def code(self) -> int | None:
-        """The exit code with which it has ended, 128 and its number after a signal; None while it runs."""
-        code = None if self.is_running else self.process.code
-        return code if code is None or code >= 0 else 128 - code
-
-    @property
-    def output(self) -> Tail[OutputLine] | None:
-        """What it has printed; None if the terminal has it."""
-        return self.process.output
-
-    @property
-    def state(self) -> str:
-        """What it does, in a word or two: 'running', 'stopping', 'stopped', 'silenced', or how it has ended."""
-        if self.is_running:
-            return "stopping" if self.guest.is_stopped else "running"
-        if self.guest.is_stopped:
-            return "stopped"
-        return "silenced" if self.guest.is_silenced else f"ended {self.how}"
-
-    @property
-    def how(self) -> str:
-        """How it has ended, in words; nothing while it runs."""
-        code = self.process.code
-        if code is None:
-            return ""
-        return f"with exit code {code}" if code >= 0 else f"by signal {-code}"
 
 
 class Programs:
@@ -136,6 +81,7 @@ class Programs:
     ) -> None:
         self.sim = sim
         self.handles: list[Handle] = []
+        self._visitors: list[Guest] = []
         self._say = say
         self._thinking = thinking
         self._record = record
@@ -229,6 +175,30 @@ class Programs:
         self._ring()
         return handle
 
+    def admit(self, name: str) -> socket.socket:
+        """Let a program take part that was started elsewhere; return its end of the connection, for `far.Connection`.
+
+        It takes part from its first word on, has the robots that it claims, and leaves by closing its end.
+
+        Args:
+            name: Who it is, for a person.
+
+        Raises:
+            KiksError: If the world has ended.
+        """
+        with self.sim.lock:
+            if self._is_closed:
+                raise KiksError(f"a program must have a world, but that of {name} has ended. Try again.")
+            self._count += 1
+            here, there = socket.socketpair()
+            guest = Guest(name, self._count, 0, here, self.sim, self._turns, self._names)
+            guest.is_waited_for = False
+            self._turns.join(guest)
+            self._visitors.append(guest)
+            self._was_touched = True
+        self._ring()
+        return there
+
     def stop(self, handle: Handle) -> None:
         """End a program, as Ctrl-C would; if it does not end within a second, or this is said again, at once.
 
@@ -274,15 +244,15 @@ class Programs:
                 if key.data is None:
                     self._quieten()
                 elif events & selectors.EVENT_WRITE:
-                    key.data.guest.flush()
-                if key.data is not None and events & selectors.EVENT_READ and not key.data.guest.receive():
+                    key.data.flush()
+                if key.data is not None and events & selectors.EVENT_READ and not key.data.receive():
                     self._hang_up(key.data)
             heard = [key.data for key, _ in ready]
-            for handle in over:
+            for guest in over:
                 # A process that the program has started may still hold the connection.
-                if handle not in heard and not handle.has_hung_up:
-                    handle.guest.leave()
-                    self._hang_up(handle)
+                if guest not in heard and not guest.has_hung_up:
+                    guest.leave()
+                    self._hang_up(guest)
             noticed = self._notice_ends()
         for handle in noticed:
             self._tell_end(handle)
@@ -295,6 +265,8 @@ class Programs:
         for handle in self.handles:
             handle.process.wait()
             handle.guest.close()
+        for guest in self._visitors:
+            guest.close()
         self._selector.close()
         self._bell.close()
         self._bell_rope.close()
@@ -344,8 +316,8 @@ class Programs:
         handle.has_ended.set()
         self._ring()
 
-    def _look_around(self) -> list[Handle]:
-        """See to it that every connection is listened to for what matters; return whose process has ended."""
+    def _look_around(self) -> list[Guest]:
+        """See to it that every connection is listened to for what matters; return those whose process has ended."""
         over = []
         for handle in self.handles:
             guest = handle.guest
@@ -354,26 +326,31 @@ class Programs:
             if guest.is_stopped and handle.process.code is not None:
                 guest.part()
                 handle.has_ended.set()
-            if handle.has_hung_up:
-                continue
-            if not handle.is_running:
-                over.append(handle)
-            events = selectors.EVENT_READ | (selectors.EVENT_WRITE if guest.has_unsent else 0)
-            if guest not in self._selector.get_map():
-                self._selector.register(guest, events, handle)
-            elif self._selector.get_key(guest).events != events:
-                self._selector.modify(guest, events, handle)
+            if not guest.has_hung_up:
+                self._listen_to(guest)
+                if not handle.is_running:
+                    over.append(guest)
+        self._visitors = [guest for guest in self._visitors if not guest.has_hung_up]
+        for guest in self._visitors:
+            self._listen_to(guest)
         return over
 
-    def _hang_up(self, handle: Handle) -> None:
-        self._selector.unregister(handle.guest)
-        handle.has_hung_up = True
-        if handle.guest.has_left:
-            handle.guest.close()
+    def _listen_to(self, guest: Guest) -> None:
+        events = selectors.EVENT_READ | (selectors.EVENT_WRITE if guest.has_unsent else 0)
+        if guest not in self._selector.get_map():
+            self._selector.register(guest, events, guest)
+        elif self._selector.get_key(guest).events != events:
+            self._selector.modify(guest, events, guest)
+
+    def _hang_up(self, guest: Guest) -> None:
+        self._selector.unregister(guest)
+        guest.has_hung_up = True
+        if guest.has_left:
+            guest.close()
 
     def _notice_ends(self) -> list[Handle]:
         """Return the programs that have ended since the last time."""
-        ended = [handle for handle in self.handles if handle.has_hung_up and not handle.is_running]
+        ended = [handle for handle in self.handles if handle.guest.has_hung_up and not handle.is_running]
         noticed = [handle for handle in ended if not handle.has_been_noticed]
         for handle in noticed:
             handle.has_been_noticed = True

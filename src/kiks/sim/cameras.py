@@ -40,6 +40,11 @@ class Cameras:
         self._fitted[index] = camera
         camera.look(self._sim.now_ns)
 
+    def take(self) -> None:
+        """Take the arrays of the state, which were replaced."""
+        for index, fitted in self._fitted.items():
+            fitted.record = self._sim.state.robots[0, index]
+
     def sync(self) -> None:
         """Let each camera take the last of its pictures that is due; the earlier ones nobody can ask for.
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from kiks.errors import ParameterError
+from kiks.sim.floor import check_finite
 from kiks.sim.simulation import Simulation
-from kiks.sim.world import check_finite
 
 STEP_MM = 0.5
 """How far a thing goes before it is looked whether it is still free [mm], as in KiKS 2.2.0 (kiks-behaviour.md 1.5)."""

@@ -40,7 +40,9 @@ class Paths:
         self._points.append(np.column_stack([robots["x_mm"], robots["y_mm"], robots["heading_rad"]]))
 
     def array(self) -> NDArray[np.float64]:
-        """Return all points, float64 [robot, point, 4]: time_s, x_mm, y_mm, heading_rad."""
-        poses = np.array(self._points).transpose(1, 0, 2)
+        """Return all points, float64 [robot, point, 4]: time_s, x_mm, y_mm, heading_rad; NaN before a robot came."""
+        poses = np.full((len(self._points[-1]), len(self._points), 3), np.nan)
+        for point, there in enumerate(self._points):
+            poses[: len(there), point] = there
         times_s = np.broadcast_to(np.array(self._times_s)[None, :, None], (*poses.shape[:2], 1))
         return np.concatenate([times_s, poses], axis=2)

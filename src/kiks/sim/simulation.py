@@ -20,7 +20,7 @@ from kiks.firmware.khepera import Firmware
 from kiks.firmware.radio import Radio, deliver
 from kiks.firmware.turret import Turret
 from kiks.model.arena import Arena
-from kiks.model.robot import SENSOR_COUNT, RobotSpec
+from kiks.model.robot import SENSOR_COUNT, RobotSpec, specs_of
 from kiks.sim.cameras import Cameras
 from kiks.sim.explanation import Explanation, LightExplanation, explain_ambient, explain_proximity
 from kiks.sim.look import Look, look, trace_rays
@@ -92,7 +92,7 @@ class Simulation(Things):
         self.program = Program(thinking)
         self.gate: Gate | None = None
         self._cameras = Cameras(self)
-        super().__init__(Arena.default() if arena is None else arena, _specs(robot, robots, response), seed)
+        super().__init__(Arena.default() if arena is None else arena, specs_of(robot, robots, response), seed)
         self.spec = self.specs[0]
         self._networks = networks_for(*(spec.proximity.response for spec in self.specs))
         self._counts = np.zeros(SENSOR_COUNT, np.int64)
@@ -210,6 +210,36 @@ class Simulation(Things):
         return show(self, speed=speed, is_alive=is_alive, port=port, browser=browser)
 
     # ---- robots ----
+
+    def add_robot(self, robot: str | RobotSpec = "khepera") -> int:
+        """Put one more robot into the world; return its number.
+
+        It starts where the arena has a start for it, if that is free, else at a random place. Robots, programs and
+        bodies that are there do not notice, until they meet it.
+
+        Args:
+            robot: Its kind: a name that `RobotSpec.load` knows, a file, or a `RobotSpec`.
+
+        Raises:
+            ParameterError: If there is no such kind.
+            ArenaError: If there is no free place for it.
+
+        Example:
+            >>> sim = Simulation(Arena.box(500, 500))
+            >>> sim.add_robot("khepera_ii")
+            2
+        """
+        (spec,) = specs_of(robot, 1, None)
+        with self.lock:
+            self.sync()
+            index = self._add_robot(spec)
+            for wire in self.wires:
+                wire.firmware.take(self.state)
+            self._cameras.take()
+            self._networks = networks_for(*(spec.proximity.response for spec in self.specs))
+            self.wires.append(Wire(self._firmware(index), self._agenda, index))
+            self._enter()
+            return index + 1
 
     def port(self, robot: int) -> SimPort:
         """Return the computer's end of a robot's line: one object, always the same.
@@ -385,24 +415,3 @@ class Simulation(Things):
         with self.lock:
             self.sync()
             return self._cameras.expect(index)
-
-
-def _specs(
-    robot: str | RobotSpec | Sequence[str | RobotSpec], robots: int | None, response: str | None
-) -> list[RobotSpec]:
-    """Return what each robot is."""
-    named = [robot] if isinstance(robot, str | RobotSpec) else list(robot)
-    count = len(named) if robots is None else robots
-    if not isinstance(count, int) or not 1 <= count <= 1000:
-        raise ParameterError(
-            f"robots must be a whole number from 1 to 1000, but it was {count!r}. Say how many you need."
-        )
-    if len(named) not in (1, count):
-        raise ParameterError(
-            f"robot must name one kind for all or one for each of {count} robots, but it named {len(named)}. "
-            "Leave robots out to have one of each."
-        )
-    specs = [each if isinstance(each, RobotSpec) else RobotSpec.load(each) for each in named]
-    if response is not None:
-        specs = [spec.with_changes(proximity__response=response) for spec in specs]
-    return specs if len(specs) == count else specs * count

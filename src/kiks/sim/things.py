@@ -15,7 +15,8 @@ from kiks.errors import ArenaError, KiksError, ParameterError
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp
 from kiks.model.robot import RobotSpec
 from kiks.model.room import OVERLAP_MM
-from kiks.sim.world import PRESSED_MM, World, check_finite
+from kiks.sim.floor import PRESSED_MM, check_finite
+from kiks.sim.world import World
 
 
 @dataclass(frozen=True)

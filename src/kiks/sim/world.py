@@ -4,37 +4,27 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kiks.engine import contact, proximity, step
-from kiks.engine.numbers import uniform
 from kiks.engine.parameters import PARAMETERS, pack
 from kiks.engine.rays import sight_of
 from kiks.engine.scene import enter_everybody, make_scene
-from kiks.engine.state import BALL, State
-from kiks.errors import ArenaError, ParameterError
+from kiks.engine.state import State
+from kiks.errors import ParameterError
 from kiks.model.arena import PAD, Arena
 from kiks.model.robot import RobotSpec
 from kiks.model.room import OVERLAP_MM
+from kiks.sim.floor import Floor, check_finite
 from kiks.sim.paths import Paths
 from kiks.units import TICK_NS, s_from_ns
 
-STREAM_PLACE = 4
-"""Random stream of the places of robots for which the arena gives no start pose."""
 
-ATTEMPTS = 10_000
-"""Random places that are tried for a robot."""
-
-PRESSED_MM = 0.5
-"""How deep robots and bodies may begin in each other and in walls [mm]: in a world that was saved, some press upon
-others, and none is ever deeper than this."""
-
-
-class World:
+class World(Floor):
     """Robots in an arena. Time passes in ticks, up to whatever time is asked for.
 
     Args:
@@ -54,20 +44,23 @@ class World:
         self._take(arena)
         self.specs = list(specs)
         self.seed = seed
-        self.robot_count = len(self.specs)
         self.lock = threading.RLock()
         self.now_ns = 0
-        self.state = State.empty(world_count=1, robot_count=self.robot_count)
+        self.state = State.empty(world_count=1, robot_count=len(self.specs))
+        self._tell_kinds()
+        self._paths: Paths | None = None
+        for index, pose in enumerate(self.start_poses(seed).tolist()):
+            self._put(index, *pose)
+        self._enter()
+
+    def _tell_kinds(self) -> None:
+        """Write down the constants of all kinds of robots, and of which kind each is."""
         kinds = list(dict.fromkeys(self.specs))
         self.state.robots["kind"][0] = [kinds.index(spec) for spec in self.specs]
         # Of that very type, not of an equal one: compiled functions would compare the two field by field at each call.
         self._kinds = np.zeros(len(kinds), PARAMETERS)
         for kind, spec in enumerate(kinds):
             self._kinds[kind : kind + 1] = pack(spec)
-        self._paths: Paths | None = None
-        for index, pose in enumerate(self.start_poses(seed).tolist()):
-            self._put(index, *pose)
-        self._enter()
 
     def _take(self, arena: Arena) -> None:
         """Take the walls of an arena for those that there are."""
@@ -185,79 +178,29 @@ class World:
             self._put(index, float(x_mm), float(y_mm), float(heading_rad))
             self._look_again()
 
+    def _add_robot(self, spec: RobotSpec) -> int:
+        """Put one more robot where the arena has a start for it, if that is free, else at a random place."""
+        index, discs = self.robot_count, self._discs()
+        place = None
+        if index < len(self.arena.starts):
+            start = self.arena.starts[index]
+            if self._obstacle(start.x_mm, start.y_mm, spec.body.radius_mm, discs) is None:
+                place = tuple(start)
+        if place is None:
+            place = self._random_place(index, self.seed, spec.body.radius_mm, discs, index + 1)
+        self.specs.append(spec)
+        robots = np.zeros((1, index + 1), self.state.robots.dtype)
+        robots[:, :index] = self.state.robots
+        self.state.robots = robots
+        self._tell_kinds()
+        self._put(index, *place)
+        return index
+
     def _put(self, index: int, x_mm: float, y_mm: float, heading_rad: float) -> None:
         robot: Any = self.state.robots[0, index]
         robot["x_mm"], robot["y_mm"], robot["heading_rad"] = x_mm, y_mm, heading_rad
         robot["trail"][:] = (x_mm, y_mm, heading_rad)
         robot["start_x_mm"], robot["start_y_mm"] = x_mm, y_mm
-
-    def start_poses(self, seed: int) -> NDArray[np.float64]:
-        """Return where robots start in this arena with a seed, float64 [robot, 3]: x_mm, y_mm, heading_rad.
-
-        Raises:
-            ArenaError: If there is no free place for one.
-        """
-        poses = np.zeros((self.robot_count, 3))
-        # Robots that have no place yet are nowhere.
-        bodies = [(body.x_mm, body.y_mm, body.radius_mm) for body in self.arena.bodies]
-        discs = np.array([(0.0, 0.0, -math.inf)] * self.robot_count + bodies).reshape(-1, 3)
-        for index, spec in enumerate(self.specs):
-            poses[index] = self._start(index, seed, discs)
-            discs[index] = *poses[index, :2], spec.body.radius_mm
-        return poses
-
-    def check_start_poses(self, poses: NDArray[np.float64], whose: str) -> None:
-        """Raise a ParameterError unless robots could stand at poses, float64 [robot, 3], bodies being where they are.
-
-        Args:
-            poses: The poses.
-            whose: Whose they are, for the message.
-
-        Raises:
-            ParameterError: If a number is not finite, or something is in the way.
-        """
-        discs = self._discs()
-        discs[: self.robot_count, :2] = poses[:, :2]
-        for index, (x_mm, y_mm, heading_rad) in enumerate(poses.tolist()):
-            check_finite(x_mm=x_mm, y_mm=y_mm, heading_rad=heading_rad)
-            obstacle = self._obstacle(x_mm, y_mm, self.specs[index].body.radius_mm, discs, index, PRESSED_MM)
-            if obstacle is not None:
-                raise ParameterError(
-                    f"the start of robot {index + 1} {whose} must be free, but at ({x_mm:g}, {y_mm:g}) mm "
-                    f"{self._is_inside(obstacle)}. Move it."
-                )
-
-    def _start(self, index: int, seed: int, others: NDArray[np.float64]) -> tuple[float, float, float]:
-        """Return the arena's start pose for a robot, else a free place; for the first the roomiest, if it is free.
-
-        Raises:
-            ArenaError: If there is no free place for it.
-        """
-        radius_mm = self.specs[index].body.radius_mm
-        if index == 0 and not self.arena.starts:
-            widest = self.arena.find_start(radius_mm)
-            if self._obstacle(widest.x_mm, widest.y_mm, radius_mm, others) is None:
-                return widest
-        if index < len(self.arena.starts):
-            start = self.arena.starts[index]
-            # Whatever else the arena puts there says so itself.
-            robots = others[: self.robot_count]
-            obstacle = self._obstacle(start.x_mm, start.y_mm, radius_mm, robots, overlap_mm=PRESSED_MM)
-            if obstacle is not None:
-                raise ArenaError(
-                    f"Arena {self.arena.name!r}: start {index + 1} at ({start.x_mm:g}, {start.y_mm:g}) mm must be "
-                    f"free, but {self._is_inside(obstacle)}. Move it."
-                )
-            return start
-        for attempt in range(ATTEMPTS):
-            x, y, turn = (uniform(seed, 0, index, STREAM_PLACE, attempt, axis) for axis in range(3))
-            x, y = x * self.arena.width_mm, y * self.arena.height_mm
-            if self._obstacle(x, y, radius_mm, others) is None:
-                return x, y, 2 * math.pi * turn
-        raise ArenaError(
-            f"Arena {self.arena.name!r} must have room for {self.robot_count} robots, but {ATTEMPTS} random places for "
-            f"robot {index + 1} were all taken. Ask for fewer, give start poses, or take a larger arena."
-        )
 
     def travelled_mm(self, robot: int) -> float:
         """Return the length of a robot's path so far [mm].
@@ -319,89 +262,8 @@ class World:
             self.sync()
             return int(self.state.robots["contact_count"][0, index])
 
-    # ---- places ----
-
-    def _discs(self) -> NDArray[np.float64]:
-        """Return place and radius [mm] of everything that may be in the way, float64 [disc, 3], robots first."""
-        robots, bodies = self.state.robots[0], self.state.bodies[0]
-        radii = [spec.body.radius_mm for spec in self.specs]
-        # What a gripper has lifted is in nobody's way.
-        body_radii = np.where(bodies["is_lifted"] != 0, -math.inf, bodies["radius_mm"])
-        return np.vstack(
-            [
-                np.column_stack([robots["x_mm"], robots["y_mm"], radii]),
-                np.column_stack([bodies["x_mm"], bodies["y_mm"], body_radii]),
-            ]
-        )
-
-    def _name(self, disc: int) -> str:
-        if disc < self.robot_count:
-            return f"robot {disc + 1}"
-        body = self.state.bodies[0, disc - self.robot_count]
-        return f"{'ball' if body['what'] == BALL else 'cylinder'} {body['number']}"
-
-    def _obstacle(
-        self,
-        x_mm: float,
-        y_mm: float,
-        radius_mm: float,
-        discs: NDArray[np.float64],
-        but: int = -1,
-        overlap_mm: float = OVERLAP_MM,
-    ) -> tuple[int, float] | None:
-        """Return which disc but one is in the way of a disc, -1 for a wall, and how deep [mm]; None if it is free."""
-        inside = 0 <= x_mm <= self.arena.width_mm and 0 <= y_mm <= self.arena.height_mm
-        gap_mm = contact.clearance_of_disc(*self.ground, float(x_mm), float(y_mm), radius_mm)
-        if not inside or gap_mm < -overlap_mm:
-            return -1, -float(gap_mm)
-        overlaps_mm = radius_mm + discs[:, 2] - np.hypot(discs[:, 0] - x_mm, discs[:, 1] - y_mm)
-        if but >= 0:
-            overlaps_mm[but] = -math.inf
-        if len(overlaps_mm) and overlaps_mm.max() > overlap_mm:
-            return int(overlaps_mm.argmax()), float(overlaps_mm.max())
-        return None
-
-    def _is_inside(self, obstacle: tuple[int, float]) -> str:
-        """Say in words what is in the way."""
-        disc, depth_mm = obstacle
-        return f"{'a wall' if disc < 0 else self._name(disc)} is {depth_mm:.1f} mm inside it"
-
-    def freedom(self, disc: int) -> Callable[[float, float], bool]:
-        """Return a function that says whether a disc, robots counted first, from 0, could lie at a place [mm].
-
-        It holds as long as nothing else moves.
-        """
-        discs = self._discs()
-        radius_mm = float(discs[disc, 2])
-        return lambda x_mm, y_mm: self._obstacle(x_mm, y_mm, radius_mm, discs, disc) is None
-
-    def _check_free(
-        self,
-        what: str,
-        x_mm: float,
-        y_mm: float,
-        radius_mm: float,
-        but: int = -1,
-        overlap_mm: float = OVERLAP_MM,
-    ) -> None:
-        """Raise a ParameterError if a disc [mm] would be in a wall or, but for one disc, in something else."""
-        obstacle = self._obstacle(x_mm, y_mm, radius_mm, self._discs(), but, overlap_mm)
-        if obstacle is not None:
-            raise ParameterError(
-                f"{what} must be free, but at ({x_mm:g}, {y_mm:g}) mm {self._is_inside(obstacle)}. "
-                f"The arena is {self.arena.width_mm:g} x {self.arena.height_mm:g} mm; a radius of "
-                f"{radius_mm:g} mm is needed."
-            )
-
     def state_hash(self) -> str:
         """Return 16 hexadecimal digits that any two equal runs agree on."""
         with self.lock:
             self.sync()
             return self.state.hash()
-
-
-def check_finite(**numbers: float) -> None:
-    """Raise a ParameterError if one of the numbers, named, is none or not finite."""
-    for name, value in numbers.items():
-        if not isinstance(value, int | float) or not math.isfinite(value):
-            raise ParameterError(f"{name} must be a finite number, but it was {value!r}.")
