@@ -29,6 +29,7 @@ LAYERS = [
     "demos",
     "fit",
     "desk",
+    "toolbox",
     "cli",
 ]
 
@@ -37,9 +38,9 @@ ALLOWED = {("sim", "ports"), ("sim", "desk")}
 
 # What of the standard library only some layers may touch.
 CLOCKS = {"time", "datetime"}
-MAY_SEE_THE_WALL_CLOCK = {"clock", "client", "learn", "desk", "cli"}
+MAY_SEE_THE_WALL_CLOCK = {"clock", "client", "learn", "desk", "toolbox", "cli"}
 RANDOM = {"random", "secrets"}
-MAY_HAVE_SECRETS = {"desk"}
+MAY_HAVE_SECRETS = {"desk", "toolbox"}
 
 SOURCES = sorted(ROOT.rglob("*.py"))
 

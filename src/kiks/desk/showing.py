@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import html
 import logging
-import os
-import sys
 import threading
 import webbrowser
 
 from kiks.desk.desk import Desk, NewsHandler
 from kiks.desk.driver import Driver
 from kiks.desk.frames import pack_frame
+from kiks.desk.screen import has_screen
 from kiks.desk.serving import SERVER
 from kiks.engine.compiling import is_compiled
 from kiks.sim.simulation import Simulation
@@ -62,7 +61,7 @@ class Shown:
 
     def browse(self) -> None:
         """Open it in a browser, where there is a screen."""
-        if sys.platform in ("win32", "darwin") or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"):
+        if has_screen():
             webbrowser.open(self.url)
 
     def close(self) -> None:

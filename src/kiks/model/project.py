@@ -45,7 +45,7 @@ FASTEST = "fastest"
 
 _VERSION = 1
 _TEXT_MAX = 1000
-_ROBOT_KEYS = ("name", "kind", "turrets", "program", "arguments")
+_ROBOT_KEYS = ("name", "kind", "turrets", "program", "arguments", "brightness")
 _WALL_KEYS = ("png", "mm_per_cell", *BOX_KEYS)
 _SETTINGS = ("seed", "thinking", "baud", "response", "noise", "speed")
 _TOP_KEYS = ("kiks", *_SETTINGS, "name", "robot", *ENTRY_KEYS, "walls")
@@ -61,9 +61,10 @@ class ProjectRobot:
         name: What people call it; its number if empty.
         program: A Python file in the project's folder, which drives it.
         arguments: What the program finds in `sys.argv`.
+        brightness: How other robots see it, 1 black to 255 white; as its file says if None.
 
     Raises:
-        ParameterError: If a name is unknown, or a path leaves the folder.
+        ParameterError: If a name is unknown, a path leaves the folder, or the brightness is out of range.
     """
 
     kind: str = "khepera"
@@ -71,6 +72,7 @@ class ProjectRobot:
     name: str = ""
     program: str | None = None
     arguments: tuple[str, ...] = ()
+    brightness: int | None = None
 
     def __post_init__(self) -> None:
         for texts in (self.turrets, self.arguments):
@@ -96,6 +98,10 @@ class ProjectRobot:
             raise ParameterError(f"turrets must differ, but they were {list(self.turrets)}. A robot has one of each.")
         if self.program is not None:
             check_relative(self.program, "program")
+        if self.brightness is not None and not _is_whole(self.brightness, 1, 255):
+            raise ParameterError(
+                f"brightness of a robot must be a whole number from 1 to 255, but it was {self.brightness!r}."
+            )
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from kiks.clock.program import Program
 from kiks.clock.thinking import save_thinking
-from kiks.ports.far import Connection, FarLine
+from kiks.ports.far import FarLine, SocketConnection
 from kiks.ports.messages import Kind
 from kiks.ports.port import VirtualPort
 from kiks.ports.unchanged import run_program
@@ -42,7 +42,7 @@ def main(descriptor: int, is_late: bool, thinking: str, record: str, program: Pa
         signal.signal(signal.SIGINT, signal.default_int_handler)
     # A process that the program starts has no business with the world.
     os.set_inheritable(descriptor, False)
-    connection = Connection(socket.socket(fileno=descriptor), is_late=is_late)
+    connection = SocketConnection(socket.socket(fileno=descriptor), is_late=is_late)
     policy = Program(thinking)
 
     def open_port(name: str) -> VirtualPort:

@@ -1,4 +1,4 @@
-"""The line to a robot in another process: a program's end of what `guest.py` is the other end of.
+"""The line to a robot whose world others share: a program's end of what `guest.py` is the other end of.
 
 The program keeps its own time: thinking, sleeping and asking cost it nothing but that. Only what needs the world goes
 there and back.
@@ -10,8 +10,7 @@ import os
 import socket
 import sys
 import threading
-from collections.abc import Callable
-from typing import NoReturn
+from abc import ABC, abstractmethod
 
 from kiks.clock.line import BACKLOG_LIMIT
 from kiks.errors import LinkError
@@ -22,33 +21,29 @@ TELL_NS = TICK_NS
 """How far a program's time runs on before it says so to those who wait for it [ns]."""
 
 
-def _end_process() -> NoReturn:
-    sys.stdout.flush()
-    os._exit(1)
-
-
-class Connection:
+class Connection(ABC):
     """The way to the world, and the program's time.
 
     Args:
-        there: The socket at whose other end the world is.
         is_late: Whether the world may have begun already: then the program's time begins when it first needs it.
-        ended: Called when the world has gone, and does not return: nothing that the program could do has a meaning.
     """
 
-    def __init__(
-        self, there: socket.socket, *, is_late: bool = False, ended: Callable[[], NoReturn] = _end_process
-    ) -> None:
+    def __init__(self, *, is_late: bool = False) -> None:
         self.lock = threading.RLock()
         self._now_ns = 0
         self._is_to_meet = is_late
-        self._ended = ended
-        self._there = there
         self._told_ns = 0
         self._thought_ns = 0
         self._unanswered_count = 0
         self._ticket = 0
-        self._received = bytearray()
+
+    @abstractmethod
+    def _say(self, request: Request) -> None:
+        """Let the world know something."""
+
+    @abstractmethod
+    def _wait(self, ticket: int) -> Answer:
+        """Return the answer with a ticket, when it is there."""
 
     @property
     def now_ns(self) -> int:
@@ -87,9 +82,7 @@ class Connection:
         # The answer to a question that Ctrl-C has interrupted is still to come: it has another ticket.
         self._ticket = (self._ticket + 1) % (1 << 32)
         self._send(Request(kind, robot, self._now_ns, self._ticket, first, second, third, self._thought_ns, data))
-        while (answer := take_answer(self._received)) is None or answer.ticket != self._ticket:
-            if answer is None:
-                self._receive()
+        answer = self._wait(self._ticket)
         self._unanswered_count = 0
         self._now_ns = self._told_ns = answer.now_ns
         self._is_to_meet = False
@@ -97,9 +90,36 @@ class Connection:
             raise LinkError(answer.data.decode())
         return answer
 
-    def close(self) -> None:
-        """Hang up; what was said is still done."""
-        self._there.close()
+    def _send(self, request: Request) -> None:
+        self._told_ns = self._now_ns
+        self._thought_ns = 0
+        self._say(request)
+
+
+class SocketConnection(Connection):
+    """The way to a world in another process.
+
+    Args:
+        there: The socket at whose other end it is.
+        is_late: Whether the world may have begun already.
+    """
+
+    def __init__(self, there: socket.socket, *, is_late: bool = False) -> None:
+        super().__init__(is_late=is_late)
+        self._there = there
+        self._received = bytearray()
+
+    def _say(self, request: Request) -> None:
+        try:
+            self._there.sendall(request.pack())
+        except OSError:
+            _end()
+
+    def _wait(self, ticket: int) -> Answer:
+        while (answer := take_answer(self._received)) is None or answer.ticket != ticket:
+            if answer is None:
+                self._receive()
+        return answer
 
     def _receive(self) -> None:
         try:
@@ -107,20 +127,12 @@ class Connection:
         except OSError:
             received = b""
         if not received:
-            self._ended()
+            _end()
         self._received += received
-
-    def _send(self, request: Request) -> None:
-        self._told_ns = self._now_ns
-        self._thought_ns = 0
-        try:
-            self._there.sendall(request.pack())
-        except OSError:
-            self._ended()
 
 
 class FarLine:
-    """A robot's line in another process; see `Line`."""
+    """A robot's line in a world that others share; see `Line`."""
 
     def __init__(self, connection: Connection, robot: int) -> None:
         self.lock = connection.lock
@@ -206,3 +218,9 @@ class FarLine:
         answer = self._connection.ask(kind, self._robot, first=first, second=second, third=third, data=data)
         self._ahead_count = answer.ahead_count
         return answer
+
+
+def _end() -> None:
+    """End at once: the world has gone, and nothing that the program could still do has a meaning."""
+    sys.stdout.flush()
+    os._exit(1)

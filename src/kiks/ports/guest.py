@@ -1,9 +1,10 @@
-"""A program in a process of its own, as one that takes its turn: at the other end of the connection is `far.py`."""
+"""A program that keeps its own time, as one that takes its turn: at the other end of the connection is `far.py`."""
 
 from __future__ import annotations
 
 import logging
 import socket
+from abc import abstractmethod
 from collections import deque
 
 from kiks.clock.line import BACKLOG_LIMIT
@@ -25,7 +26,6 @@ class Guest(Player):
         name: Who it is, for a person.
         rank: Its number, from 1.
         robot: Number of the robot that is its own; 0 if it has none until it claims one.
-        here: The socket at whose other end it is.
         sim: The world.
         turns: Where it takes its turn.
         names: Which robot answers on which port name.
@@ -33,25 +33,17 @@ class Guest(Player):
     Attributes:
         is_silenced: Whether the world has parted from it because it was silent.
         is_stopped: Whether a person has stopped it: then its robots stop, too, when it has gone.
-        has_hung_up: Whether nothing more is to be heard from it.
     """
 
-    def __init__(
-        self, name: str, rank: int, robot: int, here: socket.socket, sim: Simulation, turns: Turns, names: Names
-    ) -> None:
+    def __init__(self, name: str, rank: int, robot: int, sim: Simulation, turns: Turns, names: Names) -> None:
         super().__init__(name, rank)
         self.robot = robot
         self.is_here = False
         self.is_silenced = False
         self.is_stopped = False
-        self.has_hung_up = False
-        self._here = here
-        self._here.setblocking(False)
         self._sim = sim
         self._turns = turns
         self._names = names
-        self._received = bytearray()
-        self._unsent = bytearray()
         self._requests: deque[Request] = deque()
         self._read: Request | None = None
         self._robots: set[int] = set()
@@ -60,35 +52,19 @@ class Guest(Player):
         self._has_made_room = False
         self._has_been_warned = False
 
+    @abstractmethod
     def close(self) -> None:
         """Close the connection."""
-        self._here.close()
 
-    def fileno(self) -> int:
-        """Return the socket, to wait on."""
-        return self._here.fileno()
+    @abstractmethod
+    def tell(self, answer: Answer) -> None:
+        """Let the program have an answer."""
 
-    # ---- bytes come and go ----
-
-    def receive(self) -> bool:
-        """Take what the program says; return False when it has hung up."""
-        try:
-            received = self._here.recv(RECEIVE_SIZE)
-        except BlockingIOError:
-            return True
-        except OSError:
-            received = b""
-        if not received:
-            self.leave()
-            return False
-        self._received += received
-        while (request := take_request(self._received)) is not None:
-            self._hear(request)
-        return True
+    # ---- what it says ----
 
     def leave(self) -> None:
         """Let what the program has said still be done, then part from it."""
-        self._hear(Request(Kind.END, 0, self.acts_from_ns))
+        self.hear(Request(Kind.END, 0, self.acts_from_ns))
 
     def part(self) -> None:
         """Part from it at once: what it has said and is not done yet is forgotten."""
@@ -100,7 +76,8 @@ class Guest(Player):
         self._free_robots()
         self.has_left = True
 
-    def _hear(self, request: Request) -> None:
+    def hear(self, request: Request) -> None:
+        """Take something that the program says."""
         if self.has_left:
             return
         if not self.is_here:
@@ -113,20 +90,6 @@ class Guest(Player):
             self.acts_from_ns = max(self.acts_from_ns, request.at_ns)
         else:
             self._requests.append(request)
-
-    @property
-    def has_unsent(self) -> bool:
-        """Say whether an answer waits until the program takes it; `flush` when the socket is writable."""
-        return bool(self._unsent)
-
-    def flush(self) -> None:
-        """Send what waits, as far as the program takes it."""
-        try:
-            del self._unsent[: self._here.send(self._unsent)]
-        except BlockingIOError:
-            pass
-        except OSError:
-            self._unsent.clear()
 
     def drop(self) -> None:
         """Part from the program."""
@@ -286,5 +249,96 @@ class Guest(Player):
             line = self._sim.wires[robot - 1].line
             ahead_count = max(-((now_ns - line.sending_until_ns) // line.character_ns), 0)
         self.acts_from_ns = now_ns
-        self._unsent += Answer(self._ticket, is_good, now_ns, number, ahead_count, data).pack()
+        self.tell(Answer(self._ticket, is_good, now_ns, number, ahead_count, data))
+
+
+class SocketGuest(Guest):
+    """A program in a process of its own.
+
+    Args:
+        here: The socket at whose other end it is.
+        name: Who it is, for a person.
+        rank: Its number, from 1.
+        robot: Number of the robot that is its own.
+        sim: The world.
+        turns: Where it takes its turn.
+        names: Which robot answers on which port name.
+
+    Attributes:
+        has_hung_up: Whether nothing more is to be heard from it.
+    """
+
+    def __init__(
+        self, here: socket.socket, name: str, rank: int, robot: int, sim: Simulation, turns: Turns, names: Names
+    ) -> None:
+        super().__init__(name, rank, robot, sim, turns, names)
+        self.has_hung_up = False
+        self._here = here
+        self._here.setblocking(False)
+        self._received = bytearray()
+        self._unsent = bytearray()
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._here.close()
+
+    def fileno(self) -> int:
+        """Return the socket, to wait on."""
+        return self._here.fileno()
+
+    def receive(self) -> bool:
+        """Take what the program says; return False when it has hung up."""
+        try:
+            received = self._here.recv(RECEIVE_SIZE)
+        except BlockingIOError:
+            return True
+        except OSError:
+            received = b""
+        if not received:
+            self.leave()
+            return False
+        self._received += received
+        while (request := take_request(self._received)) is not None:
+            self.hear(request)
+        return True
+
+    def tell(self, answer: Answer) -> None:
+        """Send an answer; what the program does not take waits."""
+        self._unsent += answer.pack()
         self.flush()
+
+    @property
+    def has_unsent(self) -> bool:
+        """Say whether an answer waits until the program takes it; `flush` when the socket is writable."""
+        return bool(self._unsent)
+
+    def flush(self) -> None:
+        """Send what waits, as far as the program takes it."""
+        try:
+            del self._unsent[: self._here.send(self._unsent)]
+        except BlockingIOError:
+            pass
+        except OSError:
+            self._unsent.clear()
+
+
+class NearGuest(Guest):
+    """A program that speaks through a thread of this process; its end is `near.NearConnection`.
+
+    Attributes:
+        answer: What it was answered last; None until the answer is there.
+        is_closed: Whether the world has ended.
+    """
+
+    def __init__(self, name: str, rank: int, robot: int, sim: Simulation, turns: Turns, names: Names) -> None:
+        super().__init__(name, rank, robot, sim, turns, names)
+        self.answer: Answer | None = None
+        self.is_closed = False
+
+    def close(self) -> None:
+        """Let it know that the world has ended, or that it has left."""
+        self.is_closed = True
+
+    def tell(self, answer: Answer) -> None:
+        """Lay the answer down."""
+        self.answer = answer

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 
-from kiks.ports.guest import Guest
+from kiks.ports.guest import SocketGuest
 from kiks.ports.process import Command, OutputLine, Process
 from kiks.sim.tail import Tail
 
@@ -19,7 +19,7 @@ class Handle:
         name: Who it is, for a person.
     """
 
-    def __init__(self, command: Command, guest: Guest) -> None:
+    def __init__(self, command: Command, guest: SocketGuest) -> None:
         self.command = command
         self.number = guest.rank
         self.robot = guest.robot

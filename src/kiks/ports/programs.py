@@ -16,7 +16,7 @@ from kiks.clock.patience import Patience
 from kiks.clock.thinking import parse_thinking
 from kiks.errors import KiksError, ParameterError
 from kiks.ports.child import LATE, PUNCTUAL
-from kiks.ports.guest import Guest
+from kiks.ports.guest import NearGuest, SocketGuest
 from kiks.ports.handle import Handle
 from kiks.ports.names import Names
 from kiks.ports.process import Command, Process
@@ -81,7 +81,9 @@ class Programs:
     ) -> None:
         self.sim = sim
         self.handles: list[Handle] = []
-        self._visitors: list[Guest] = []
+        self._visitors: list[NearGuest] = []
+        self._is_moving = False
+        self._moved = threading.Condition(sim.lock)
         self._say = say
         self._thinking = thinking
         self._record = record
@@ -175,10 +177,10 @@ class Programs:
         self._ring()
         return handle
 
-    def admit(self, name: str) -> socket.socket:
-        """Let a program take part that was started elsewhere; return its end of the connection, for `far.Connection`.
+    def admit(self, name: str) -> NearGuest:
+        """Let a program take part that was started elsewhere and speaks through threads of this process.
 
-        It takes part from its first word on, has the robots that it claims, and leaves by closing its end.
+        It takes part from its first word on, has the robots that it claims, and leaves when it says so.
 
         Args:
             name: Who it is, for a person.
@@ -190,14 +192,33 @@ class Programs:
             if self._is_closed:
                 raise KiksError(f"a program must have a world, but that of {name} has ended. Try again.")
             self._count += 1
-            here, there = socket.socketpair()
-            guest = Guest(name, self._count, 0, here, self.sim, self._turns, self._names)
+            guest = NearGuest(name, self._count, 0, self.sim, self._turns, self._names)
             guest.is_waited_for = False
             self._turns.join(guest)
-            self._visitors.append(guest)
+            self._visitors = [each for each in self._visitors if not each.has_left] + [guest]
             self._was_touched = True
-        self._ring()
-        return there
+        return guest
+
+    @property
+    def is_shared(self) -> bool:
+        """Say whether more than one program takes part."""
+        return len(self._turns.players) > 1
+
+    def move(self) -> float | None:
+        """Do what may be done now, unless another thread is at it; the caller holds the lock. See `Turns.advance`."""
+        # The gate may make a thread wait in the middle, and then lets others look at the world.
+        if self._is_moving:
+            return None
+        self._is_moving = True
+        try:
+            return self._turns.advance()
+        finally:
+            self._is_moving = False
+            self._moved.notify_all()
+
+    def wait(self, seconds: float | None) -> None:
+        """Wait until somebody has moved the world, or for some time [s]; the lock is held by the caller."""
+        self._moved.wait(seconds)
 
     def stop(self, handle: Handle) -> None:
         """End a program, as Ctrl-C would; if it does not end within a second, or this is said again, at once.
@@ -235,7 +256,7 @@ class Programs:
             wait_limit_s: Longest time that is waited for a word of theirs [s of real time].
         """
         with self.sim.lock:
-            wait_s = self._turns.advance()
+            wait_s = self.move()
             over = self._look_around()
         wait_s = wait_limit_s if wait_s is None else min(wait_s, wait_limit_s)
         ready = self._selector.select(wait_s)
@@ -265,8 +286,10 @@ class Programs:
         for handle in self.handles:
             handle.process.wait()
             handle.guest.close()
-        for guest in self._visitors:
-            guest.close()
+        with self.sim.lock:
+            for guest in self._visitors:
+                guest.close()
+            self._moved.notify_all()
         self._selector.close()
         self._bell.close()
         self._bell_rope.close()
@@ -285,7 +308,7 @@ class Programs:
         number = self._count + 1
         name = f"program {number} ({command.program.name})"
         here, there = socket.socketpair()
-        guest = Guest(name, number, robot, here, self.sim, self._turns, self._names)
+        guest = SocketGuest(here, name, number, robot, self.sim, self._turns, self._names)
         handle = Handle(command, guest)
         lateness = LATE if self._turns.has_begun else PUNCTUAL
         record = f"{self._record}{self._suffix(number)}" if self._record is not None else ""
@@ -316,7 +339,7 @@ class Programs:
         handle.has_ended.set()
         self._ring()
 
-    def _look_around(self) -> list[Guest]:
+    def _look_around(self) -> list[SocketGuest]:
         """See to it that every connection is listened to for what matters; return those whose process has ended."""
         over = []
         for handle in self.handles:
@@ -330,19 +353,16 @@ class Programs:
                 self._listen_to(guest)
                 if not handle.is_running:
                     over.append(guest)
-        self._visitors = [guest for guest in self._visitors if not guest.has_hung_up]
-        for guest in self._visitors:
-            self._listen_to(guest)
         return over
 
-    def _listen_to(self, guest: Guest) -> None:
+    def _listen_to(self, guest: SocketGuest) -> None:
         events = selectors.EVENT_READ | (selectors.EVENT_WRITE if guest.has_unsent else 0)
         if guest not in self._selector.get_map():
             self._selector.register(guest, events, guest)
         elif self._selector.get_key(guest).events != events:
             self._selector.modify(guest, events, guest)
 
-    def _hang_up(self, guest: Guest) -> None:
+    def _hang_up(self, guest: SocketGuest) -> None:
         self._selector.unregister(guest)
         guest.has_hung_up = True
         if guest.has_left:

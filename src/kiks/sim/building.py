@@ -11,7 +11,7 @@ from kiks.engine.state import BALL
 from kiks.model.arena import Ball, Cylinder, Lamp, Pose
 from kiks.model.files import inside
 from kiks.model.policy import split_thinking
-from kiks.model.project import Project
+from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec
 from kiks.model.room import free_place
 from kiks.sim.simulation import Simulation
@@ -41,7 +41,7 @@ def simulation_of(project: Project, folder: str | Path = ".") -> Simulation:
         project.arena,
         seed=project.seed,
         thinking=thinking,
-        robot=[_spec(robot.kind, project, home) for robot in project.robots],
+        robot=[spec_of(robot, project, home) for robot in project.robots],
     )
     for number, (robot, wire) in enumerate(zip(project.robots, sim.wires, strict=True), start=1):
         for turret in robot.turrets:
@@ -51,9 +51,21 @@ def simulation_of(project: Project, folder: str | Path = ".") -> Simulation:
     return sim
 
 
-def _spec(kind: str, project: Project, home: Path) -> RobotSpec:
-    path = inside(home, kind, "kind") if kind.lower().endswith(".toml") else kind
+def spec_of(robot: ProjectRobot, project: Project, folder: Path) -> RobotSpec:
+    """Return what a robot of a project is.
+
+    Args:
+        robot: The robot.
+        project: The project, whose response and noise are its own.
+        folder: Where the project lies.
+
+    Raises:
+        ParameterError: If the robot's file is none, or leads out of the folder.
+    """
+    path = inside(folder, robot.kind, "kind") if robot.kind.lower().endswith(".toml") else robot.kind
     spec = RobotSpec.load(path, response=project.response)
+    if robot.brightness is not None:
+        spec = spec.with_changes(body__brightness=robot.brightness)
     return spec if project.noise else spec.without_noise()
 
 

@@ -1,0 +1,385 @@
+"""What the toolbox may ask for: a table, and what each of its rows does."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kiks import __version__
+from kiks.engine.numbers import uniform
+from kiks.engine.state import BALL
+from kiks.errors import KiksError, ParameterError
+from kiks.model.arena import Arena
+from kiks.model.arena_file import save_arena
+from kiks.model.kad import save_kad
+from kiks.sim.simulation import Simulation
+from kiks.toolbox.matrices import arena_of, place_mm, user_place
+from kiks.toolbox.visitor import Visitor
+from kiks.toolbox.words import escape, matrix_text, number_text, numbers_of, numbers_text, take_matrix, unescape
+
+STREAM_SPAWN = 6
+"""Random stream of what is put at random places, and of headings that nobody has given."""
+
+ATTEMPTS = 10_000
+"""Random places that are tried."""
+
+LIGHT_ROW, BALL_ROW, CYLINDER_ROW = 1, 2, 3
+"""What an object is in lists, and to kiks_spawn."""
+
+_log = logging.getLogger("kiks.toolbox")
+
+Act = Callable[[Visitor, str], str]
+
+
+def answer(visitor: Visitor, line: str) -> str:
+    """Return the answer to a line, never an exception."""
+    ticket, request = line[:1], line[1:]
+    name, _, words = request.partition(" ")
+    visitor.asked = 0
+    try:
+        act = REQUESTS.get(name)
+        if act is None:
+            raise ParameterError(f"a request must be one of {sorted(REQUESTS)}, but it was {name!r}.")
+        result = act(visitor, words)
+        return f"{ticket}+{visitor.clock()}{result}"
+    except KiksError as error:
+        why = str(error)
+    except Exception as error:
+        _log.exception("request %r failed", request[:200])
+        why = f"KiKS itself has failed at {name!r}: {error!r}. Please tell its makers."
+    return f"{ticket}-{visitor.clock()}{escape(why)}"
+
+
+# ---- worlds ----
+
+
+def _version(visitor: Visitor, words: str) -> str:
+    return __version__
+
+
+def _set(visitor: Visitor, words: str) -> str:
+    name, _, value = words.partition(" ")
+    visitor.session.settings = visitor.session.settings.changed(name, unescape(value))
+    return ""
+
+
+def _world(visitor: Visitor, words: str) -> str:
+    session = visitor.session
+    kind, _, rest = words.partition(" ")
+    if kind == "default":
+        session.begin_default()
+    elif kind == "file":
+        session.begin_file(unescape(rest))
+    elif kind == "matrix":
+        codes, left = take_matrix(rest.split())
+        greys = take_matrix(left)[0] if left else None
+        settings = session.settings
+        arena = arena_of(codes, greys, wall=settings.wall, ball=settings.ball, cylinder=settings.cylinder)
+        session.begin(settings.project_of(arena))
+    else:
+        raise ParameterError(f"a world must be default, file or matrix, but it was {kind!r}.")
+    return ""
+
+
+def _active(visitor: Visitor, words: str) -> str:
+    return str(int(visitor.session.desk is not None))
+
+
+def _desk(visitor: Visitor, words: str) -> str:
+    return visitor.session.url
+
+
+def _save(visitor: Visitor, words: str) -> str:
+    path = unescape(words)
+    project = visitor.session.present_project()
+    suffix = Path(path).suffix.lower()
+    if suffix == ".kiks":
+        project.save(path)
+    elif suffix == ".kad":
+        save_kad(project.arena, path)
+    elif suffix == ".toml":
+        save_arena(project.arena, path)
+    else:
+        raise ParameterError(f"a world's file must end in .kad, .kiks or .toml, but it was {path!r}.")
+    return ""
+
+
+def _read(visitor: Visitor, words: str) -> str:
+    return matrix_text(Arena.load(unescape(words)).brightness[::-1])
+
+
+def _print(visitor: Visitor, words: str) -> str:
+    if visitor.session.desk is not None:
+        visitor.session.desk.say(unescape(words))
+    return ""
+
+
+def _checkpoint(visitor: Visitor, words: str) -> str:
+    visitor.do(lambda sim: None)
+    visitor.session.mark()
+    return ""
+
+
+def _reset(visitor: Visitor, words: str) -> str:
+    visitor.do(lambda sim: None)
+    visitor.session.reset()
+    return ""
+
+
+def _state(visitor: Visitor, words: str) -> str:
+    return visitor.do(lambda sim: sim.state_hash())
+
+
+# ---- ports ----
+
+
+def _open(visitor: Visitor, words: str) -> str:
+    number, baud = numbers_of(words.split(), 2, "port and baud")
+    if number < 1 or number != int(number):
+        raise ParameterError(f"a simulated port must be -1, -2 and so on, but it was {-number:g}.")
+    visitor.open(int(number), round(baud))
+    return ""
+
+
+def _close(visitor: Visitor, words: str) -> str:
+    visitor.close(int(words))
+    return ""
+
+
+def _send(visitor: Visitor, words: str) -> str:
+    number, _, text = words.partition(" ")
+    return escape(visitor.send(int(number), unescape(text)))
+
+
+def _ask(visitor: Visitor, words: str) -> str:
+    number, _, text = words.partition(" ")
+    return escape(visitor.send(int(number), text + "\n"))
+
+
+def _listen(visitor: Visitor, words: str) -> str:
+    return escape(visitor.listen(int(words)))
+
+
+def _time(visitor: Visitor, words: str) -> str:
+    time_s = visitor.time_s(int(words))
+    return "" if time_s is None else number_text(time_s)
+
+
+def _pass(visitor: Visitor, words: str) -> str:
+    visitor.opened(int(words)).port.ask_ns()
+    return ""
+
+
+def _pause(visitor: Visitor, words: str) -> str:
+    visitor.pause(*numbers_of(words.split(), 1, "a pause"))
+    return ""
+
+
+def _pace(visitor: Visitor, words: str) -> str:
+    return numbers_text(100.0 * speed for speed in visitor.pace())
+
+
+# ---- robots ----
+
+
+def _pose(visitor: Visitor, words: str) -> str:
+    if visitor.session.desk is None:
+        return ""
+
+    def pose(sim: Simulation) -> str:
+        x_mm, y_mm, heading_rad = sim.pose(visitor.robot(int(words)))
+        return numbers_text((*user_place(sim.arena, x_mm, y_mm), heading_rad))
+
+    return visitor.do(pose)
+
+
+def _path(visitor: Visitor, words: str) -> str:
+    number = int(words)
+    opened = visitor.ports.get(number)
+
+    def path(sim: Simulation) -> str:
+        points = sim.paths()[visitor.robot(number) - 1]
+        if opened is not None:
+            points = points[points[:, 0] >= opened.opened_ns * 1e-9 - 1e-9]
+        points = points[~np.isnan(points[:, 1])]
+        x, y = user_place(sim.arena, points[:, 1], points[:, 2])
+        # A micrometre is more than anybody wants to know; it keeps the line short.
+        return matrix_text(np.round(np.vstack([x, y]), 3))
+
+    visitor.session.trace()
+    return visitor.do(path)
+
+
+def _distances(visitor: Visitor, words: str) -> str:
+    number = int(words)
+    opened = visitor.ports.get(number)
+
+    def distances(sim: Simulation) -> str:
+        robot = visitor.robot(number)
+        forwards_mm, backwards_mm, straight_mm = sim.distances_mm()[robot - 1].tolist()
+        if opened is not None:
+            x_mm, y_mm, _ = sim.pose(robot)
+            forwards_mm, backwards_mm = forwards_mm - opened.way_mm[0], backwards_mm - opened.way_mm[1]
+            straight_mm = math.hypot(x_mm - opened.start_mm[0], y_mm - opened.start_mm[1])
+        return numbers_text((forwards_mm, backwards_mm, straight_mm))
+
+    return visitor.do(distances)
+
+
+def _set_robot(visitor: Visitor, words: str) -> str:
+    number, x, y, angle = numbers_of(words.split(), 4, "port, x, y and angle")
+
+    def set_robot(sim: Simulation) -> str:
+        turn = uniform(sim.seed, 0, 0, STREAM_SPAWN, sim.now_ns, 0)
+        heading_rad = 2 * math.pi * turn if math.isnan(angle) else angle
+        return _is_done(lambda: sim.place(visitor.robot(int(number)), *place_mm(sim.arena, x, y), heading_rad))
+
+    return visitor.do(set_robot)
+
+
+# ---- objects ----
+
+
+def _objects(visitor: Visitor, words: str) -> str:
+    def objects(sim: Simulation) -> str:
+        rows = [(LIGHT_ROW, *user_place(sim.arena, *lamp[:2]), 0.0, 0.0) for lamp in sim.lamps.tolist()]
+        for body in sim.bodies():
+            x, y = user_place(sim.arena, float(body["x_mm"]), float(body["y_mm"]))
+            velocity = float(body["velocity_x"]), float(body["velocity_y"])
+            angle = math.atan2(velocity[1], velocity[0])
+            rows.append((BALL_ROW if body["what"] == BALL else CYLINDER_ROW, x, y, math.hypot(*velocity), angle))
+        return matrix_text(np.array(rows, np.float64).reshape(-1, 5))
+
+    return visitor.do(objects)
+
+
+def _set_object(visitor: Visitor, words: str) -> str:
+    number, x, y, speed, angle = numbers_of(words.split(), 5, "row, x, y, speed and angle")
+
+    def set_object(sim: Simulation) -> str:
+        lamps, bodies = sim.lamps, sim.bodies()
+        row = int(number) - 1
+        if not 0 <= row < len(lamps) + len(bodies):
+            raise ParameterError(
+                f"row must be one of the {len(lamps) + len(bodies)} that kiks_siminfo_objects lists, but it was "
+                f"{number:g}."
+            )
+        if row < len(lamps):
+            x_mm, y_mm = _kept(place_mm(sim.arena, x, y), lamps[row, :2].tolist())
+            is_inside = 0 <= x_mm <= sim.arena.width_mm and 0 <= y_mm <= sim.arena.height_mm
+            if is_inside:
+                lamps[row, :2] = x_mm, y_mm
+            return str(int(is_inside))
+        body: Any = bodies[row - len(lamps)]
+        here, velocity = (float(body["x_mm"]), float(body["y_mm"])), (body["velocity_x"], body["velocity_y"])
+        there = _kept(place_mm(sim.arena, x, y), here)
+        speed_mm_s = math.hypot(*velocity) if math.isnan(speed) else speed
+        heading_rad = math.atan2(velocity[1], velocity[0]) if math.isnan(angle) else angle
+        if speed_mm_s < 0:
+            speed_mm_s, heading_rad = -speed_mm_s, heading_rad + math.pi
+
+        def roll_from(place: tuple[float, float]) -> None:
+            sim.move_body(int(body["number"]), *place, speed_mm_s=min(speed_mm_s, 1000.0), heading_rad=heading_rad)
+
+        is_moved = _is_done(lambda: roll_from(there))
+        if is_moved == "0":
+            # Speed and angle count wherever it is (kiks-behaviour.md 1.4).
+            _is_done(lambda: roll_from(here))
+        return is_moved
+
+    return visitor.do(set_object)
+
+
+def _spawn(visitor: Visitor, words: str) -> str:
+    kind, x, y = numbers_of(words.split(), 3, "type, x and y")
+    if kind not in (LIGHT_ROW, BALL_ROW, CYLINDER_ROW):
+        raise ParameterError(f"type must be 1 (light), 2 (ball) or 3 (cylinder), but it was {kind:g}.")
+
+    def spawn(sim: Simulation) -> None:
+        arena = sim.arena
+        add: Callable[..., object] = sim.add_lamp
+        greys = {}
+        if kind != LIGHT_ROW:
+            add = sim.add_ball if kind == BALL_ROW else sim.add_cylinder
+            settings = visitor.session.settings
+            brightness = settings.ball if kind == BALL_ROW else settings.cylinder
+            greys = {} if brightness is None else {"brightness": brightness}
+        place_given = None
+        if not math.isnan(x) and not math.isnan(y):
+            place_given = place_mm(arena, x, y)
+            if not (0 <= place_given[0] <= arena.width_mm and 0 <= place_given[1] <= arena.height_mm):
+                raise ParameterError(
+                    f"a place must lie in the arena, x from 1 to {arena.width_mm:g} and y from 1 to "
+                    f"{arena.height_mm:g}, but it was ({x:g}, {y:g})."
+                )
+        elif kind != LIGHT_ROW:
+            place_given = (arena.width_mm / 2, arena.height_mm / 2)
+        if place_given is not None and _is_done(lambda: add(*place_given, **greys)) == "1":
+            return
+        there = len(sim.lamps) + len(sim.bodies())
+        for attempt in range(ATTEMPTS):
+            shares = [uniform(sim.seed, 0, there, STREAM_SPAWN, attempt, axis) for axis in (1, 2)]
+            place = shares[0] * arena.width_mm, shares[1] * arena.height_mm
+            # A lamp may hang anywhere; it is of use over the floor.
+            is_good = kind != LIGHT_ROW or arena.clearance_at_mm(*place) > 0
+            if is_good and _is_done(lambda place=place: add(*place, **greys)) == "1":  # type: ignore[misc]
+                return
+        raise ParameterError("there must be room for one more object, but none was found. Take something away.")
+
+    visitor.do(spawn)
+    if visitor.session.desk is not None:
+        visitor.session.desk.tell()
+    visitor.session.mark()
+    return ""
+
+
+def _kept(wanted: tuple[float, float], there: Any) -> tuple[float, float]:
+    """Return a place of which what nobody has given stays as it is."""
+    x_mm, y_mm = (old if math.isnan(new) else new for new, old in zip(wanted, there, strict=True))
+    return float(x_mm), float(y_mm)
+
+
+def _is_done(act: Callable[[], object]) -> str:
+    """Do something and say 1, or 0 if the place for it is not free."""
+    try:
+        act()
+    except ParameterError:
+        return "0"
+    return "1"
+
+
+REQUESTS: dict[str, Act] = {
+    "version": _version,
+    "set": _set,
+    "world": _world,
+    "active": _active,
+    "desk": _desk,
+    "save": _save,
+    "read": _read,
+    "print": _print,
+    "checkpoint": _checkpoint,
+    "reset": _reset,
+    "state": _state,
+    "open": _open,
+    "close": _close,
+    "send": _send,
+    "ask": _ask,
+    "listen": _listen,
+    "time": _time,
+    "pass": _pass,
+    "pause": _pause,
+    "pace": _pace,
+    "pose": _pose,
+    "path": _path,
+    "distances": _distances,
+    "set_robot": _set_robot,
+    "objects": _objects,
+    "set_object": _set_object,
+    "spawn": _spawn,
+}
+"""Requests by name."""
