@@ -1,0 +1,29 @@
+function kBraitenberg(ref, speed, seconds)
+% kBraitenberg  Let the robot drive about and avoid obstacles, as Braitenberg's third vehicle does.
+%
+%   kBraitenberg(ref, speed, seconds) couples the proximity sensors of robot ref to its wheels. speed is a factor for
+%   all speeds, 0.7 if left out: 14 pulses/10 ms where nothing is near. It goes on for so many seconds, by kiks_ktime;
+%   without end, until Ctrl-C, if left out. The robot is stopped whatever ends it.
+%
+%   A robot that does not answer is an error.
+%
+%   Example:
+%     ref = kiks_kopen([-1 9600 1]);
+%     kBraitenberg(ref, 0.7, 60)
+%     kiks_kclose(ref)
+%
+%   See also kBraitenbergG, kProximity, kSetSpeed.
+
+if nargin < 2 || isempty(speed)
+    speed = 0.7;
+end
+if nargin < 3
+    seconds = [];
+end
+parameters(speed, 1, 'speed (a factor)', 'kBraitenberg(ref, 0.7)');
+[start, seconds] = time_limit(ref, seconds);
+stopper = onCleanup(@() stop_robot(ref)); %#ok<NASGU>
+while seconds == Inf || kiks_ktime(ref(1)) - start < seconds
+    braitenberg_step(ref, speed);
+end
+end

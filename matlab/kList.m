@@ -1,0 +1,19 @@
+function text = kList(ref)
+% kList  List the programs in the robot's memory.
+%
+%   kList(ref) prints what robot ref has in its ROM; text = kList(ref) returns it, with a line feed between the lines.
+%
+%   Example:
+%     ref = kiks_kopen([-1 9600 1]);
+%     kList(ref)
+%     kiks_kclose(ref)
+%
+%   See also kTeam, kBios, kcmd.
+
+lines = kcmd(ref, 'list', 1);
+if nargout > 0
+    text = lines;
+else
+    fprintf('%s\n', lines);
+end
+end

@@ -1,0 +1,40 @@
+function reply = kiks_ksend(cmd, ref, timeout)
+% kiks_ksend  Send a command and return the robot's reply.
+%
+%   reply = kiks_ksend(cmd, ref) sends the text cmd, which ends in a line feed (10) or carriage return (13), and returns
+%   the reply without its line end. It is empty if cmd has no such end. With an empty cmd only time passes.
+%   kiks_ksend(cmd, ref, timeout) waits for a real robot for timeout seconds; a simulated one needs none.
+%
+%   An error if the port is not open, if ref has fewer than 4 elements, or if cmd is no text.
+%
+%   Example:
+%     ref = kiks_kopen; kiks_ksend(['D,5,5' 10], ref), kiks_kclose(ref)
+%
+%   See also kiks_kopen, kcmd.
+
+if nargin < 2 || numel(ref) < 4
+    error('kiks:argument', ['A command needs a reference of 4 elements, as kiks_kopen returns it. ' ...
+        'Call kiks_ksend([''N'' 10], ref).']);
+end
+if ref(1) >= 0
+    if nargin < 3
+        reply = ksend(cmd, ref);
+    else
+        reply = ksend(cmd, ref, timeout);
+    end
+elseif isempty(cmd)
+    simulator(sprintf('pass %d', -ref(1)));
+    reply = '';
+else
+    if ~ischar(cmd)
+        cmd = char(checked_command(cmd));
+    end
+    line = cmd(1:end - 1);
+    if cmd(end) == 10 && all(line > 31) && all(line ~= 92)
+        % What programs send thousands of times a second.
+        reply = simulator([sprintf('ask %d ', -ref(1)) line]);
+    else
+        reply = simulator([sprintf('send %d ', -ref(1)) escaped(cmd)]);
+    end
+end
+end

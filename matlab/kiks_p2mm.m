@@ -1,0 +1,12 @@
+function mm = kiks_p2mm(p)
+% kiks_p2mm  Convert encoder pulses to millimetres.
+%
+%   mm = kiks_p2mm(p) is how far a wheel has rolled after p pulses of its encoder: 0.082 * p. p may be a matrix.
+%
+%   Example:
+%     kiks_p2mm(976)
+%
+%   See also kiks_mm2p, kGetEncoders.
+
+mm = p * 0.082;
+end

@@ -1,0 +1,86 @@
+% kiks_preferences  What is simulated, and how: constants to be changed by the user.
+%
+%   This file is a script that sets constants. Copy it into the folder of your programs and change it there: the copy
+%   in the current folder wins, and may hold only the lines that differ. A program can also set a constant as a global
+%   variable, which wins over both:
+%
+%     global KIKS_SEED, KIKS_SEED = 7; kiks
+%
+%   The constants are read whenever a world begins: by kiks, kiks_arena, kiks_load, and by a kiks_kopen that starts
+%   a session. Some of KiKS 2.2.0 have nothing to do any more; they are accepted, and a value other than here is
+%   answered with a line that says why.
+%
+%   Example:
+%     kiks_preferences, KIKS_SEED
+%
+%   See also kiks, kiks_arena.
+
+% What is drawn by chance (noise, wheels that slip, random places): the same number, the same run. From 0 on.
+KIKS_SEED = 0;
+
+% How long a program takes between a reply and its next command, in the robot's time: 'live' as long as it really takes,
+% 'live:FACTOR' that many times as long, 'fixed:MS' always so many milliseconds, 'none' no time. With 'fixed' and
+% 'none' each run of a program is the same.
+KIKS_THINKING = 'live';
+
+% Let a program think as slowly as on another computer: its name, e.g. '300 MHz Celeron-A', or its index (see
+% kiks_speedtest). '' is this computer. The index of this one is taken from kiks_data.mat (kiks_calibrate) in the
+% current folder, else measured once, for two seconds. Then KIKS_THINKING is live with the factor that follows.
+KIKS_EMULATED_CPU = '';
+
+% 'Khepera', 'Khepera_II', or the name of a robot's file .toml.
+KIKS_ROBOT = 'Khepera';
+
+% What its proximity sensors go by: '' the robot's own, 'reflection', 'thesis', 'fast', 'standin' or 'curve'.
+KIKS_RESPONSE = '';
+
+% 1: sensors are noisy; 0: they are not.
+KIKS_NOISE = 1;
+
+% The turrets on each robot, of: k213 radio battle gripper.
+KIKS_TURRETS = 'k213 radio battle';
+
+% How many robots; [] as many as the arena has start poses, at least one.
+KIKS_ROBOTS = [];
+
+% What elements 2, 3 and 4 of an arena matrix are: 'kiks' (light, ball, cylinder) or 'thesis' (ball, light, cylinder).
+KIKS_ARENA_CODING = 'kiks';
+
+% A window that shows the world: [] if there is a display, 0 never, 1 always. It is read when a session starts.
+KIKS_WINDOW = [];
+
+% The brightness of things as sensors see them, 1 black to 255 white. [] suits the response: white balls, wooden
+% cylinders and the robot's own brightness with the responses of real robots; the values of KiKS 2.2.0 (ball 25,
+% cylinder 70, robot 120) with 'thesis', 'fast' and 'standin', which go by its rule of colours. A sensor that goes by
+% the light that comes back hardly sees a ball of 25.
+KIKS_COLOR_BALL = [];
+KIKS_COLOR_CYLINDER = [];
+KIKS_COLOR_ROBOT = [];
+
+% The brightness of walls that come without one, 1 to 255.
+KIKS_ARENA_DEFAULT_COLOR = 255;
+
+% How many lines kiks_status keeps.
+KIKS_LOG_HISTORY = 1000;
+
+% Without effect: the responses are measured, noise with them (KIKS_RESPONSE, KIKS_NOISE).
+KIKS_SIM_PROX_EMAX = 0.25;
+KIKS_SIM_PROX_EMIN = 0.10;
+KIKS_SIM_PROX_EEXP = 3;
+KIKS_SIM_PROX_NOISE = 1;
+KIKS_SIM_LIGHT_FEXP = 5;
+KIKS_K213_NOISE = 10;
+KIKS_K213_NONORMALIZE = [];
+
+% Without effect: rays and movement are exact.
+KIKS_SIM_PROX_STEP = 5;
+KIKS_K213_STEP = 10;
+KIKS_MMPERPIXEL = 2;
+
+% Without effect: paths are kept whole.
+KIKS_TRACE_MAX = 8^5;
+
+% Without effect: films are not recorded yet.
+KIKS_MOVIENAME = '';
+KIKS_MOVIECOMPRESSION = 'Indeo5';
+KIKS_MOVIEQUALITY = 50;

@@ -1,0 +1,27 @@
+function kiks_quit(silent)
+% kiks_quit  End the session.
+%
+%   kiks_quit closes the simulated ports, ends the simulator's process and its window, and forgets the log. A session
+%   that was joined goes on without this program. Without a session nothing happens.
+%
+%   kiks_quit(silent) says nothing if silent is not empty and not 0. Ports of real robots stay open: kclose.
+%
+%   Example:
+%     kiks, kiks_quit
+%
+%   See also kiks, kiks_kclose.
+
+open_ports('remove', 0);
+if simulator('--is-running')
+    try
+        simulator('close 0');
+    catch
+        % The process may be gone already: then all that is left is to forget it.
+    end
+    simulator('--end');
+    if nargin < 1 || isempty(silent) || ~any(silent)
+        disp('The KiKS session has ended.');
+    end
+end
+clear kiks_status
+end

@@ -1,0 +1,13 @@
+function kiks_recordmovie(name)
+% kiks_recordmovie  Not there yet: films are not recorded.
+%
+%   kiks_recordmovie(name) says that, and records nothing, so that old programs run. The simulator's window shows a run
+%   while it happens.
+%
+%   Example:
+%     kiks_recordmovie('run')
+%
+%   See also kiks.
+
+disp('kiks_recordmovie: films are not recorded yet. The simulator''s window shows the run.');
+end

@@ -1,0 +1,13 @@
+function kiks_reset()
+% kiks_reset  Put robots and things back to where they were at the last checkpoint.
+%
+%   kiks_reset moves everything back. Time, open ports and the wheels' speeds go on.
+%
+%   Example:
+%     kiks, kiks_siminfo_setrobot(100, 300, 0); kiks_reset, kiks_siminfo_robotpos, kiks_quit
+%
+%   See also kiks_checkpoint.
+
+need_session('kiks_reset');
+simulator('reset');
+end

@@ -1,0 +1,34 @@
+function ok = kiks_siminfo_setrobot(x, y, radians, port)
+% kiks_siminfo_setrobot  Put a simulated robot somewhere else.
+%
+%   ok = kiks_siminfo_setrobot(x, y, radians) puts this program's robot to x, y [mm] with the heading radians, a random
+%   one if it is left out or []. ok is 1; it is 0, and nothing changes, if the place is not free, if x or y is missing,
+%   or before a session. An open port stays open.
+%
+%   kiks_siminfo_setrobot(x, y, radians, port) is for port -1, -2, ...; port may be a reference.
+%
+%   Example:
+%     kiks, kiks_siminfo_setrobot(100, 200, pi / 2), kiks_siminfo_robotpos, kiks_quit
+%
+%   See also kiks_siminfo_robotpos, kiks_reset.
+
+if nargin < 3 || isempty(radians)
+    radians = NaN;
+end
+if nargin < 4
+    port = -1;
+end
+number = simulated_port(port);
+ok = 0;
+if nargin < 2
+    return
+end
+is_number = @(value) isnumeric(value) && isscalar(value) && ~isinf(value);
+if ~is_number(x) || ~is_number(y) || ~is_number(radians) || isnan(x) || isnan(y)
+    error('kiks:argument', ['x, y [mm] and the heading [rad] must be finite numbers, but they were %s, %s and %s. ' ...
+        'Call kiks_siminfo_setrobot(100, 200, 0).'], shown(x), shown(y), shown(radians));
+end
+if is_active()
+    ok = str2double(simulator(sprintf('set_robot %d %.17g %.17g %.17g', number, x, y, radians)));
+end
+end

@@ -1,0 +1,19 @@
+function speed = kiks_siminfo_speed()
+% kiks_siminfo_speed  Tell how fast the simulation runs.
+%
+%   speed = kiks_siminfo_speed() is [average momentary], in percent of real time: since the world began, and since the
+%   last call. It is [100 100] before a session.
+%
+%   Example:
+%     ref = kiks_kopen; kiks_pause(5), kiks_siminfo_speed, kiks_kclose(ref)
+%
+%   See also kiks_ktime.
+
+speed = [];
+if simulator('--is-running')
+    speed = sscanf(simulator('pace'), '%f')';
+end
+if isempty(speed)
+    speed = [100 100];
+end
+end

@@ -1,0 +1,30 @@
+function begin_world(arena, colormask, changes)
+% begin_world  Begin a new world; start the simulator's process if there is none.
+%
+%   begin_world(arena, colormask) takes the arguments of kiks and what kiks_preferences says.
+%   begin_world(arena, colormask, changes) takes values of the struct changes instead of those preferences.
+
+allow_numbers_in_text();
+preferences = prepare_process();
+if nargin > 2
+    names = fieldnames(changes);
+    for k = 1:numel(names)
+        preferences.(names{k}) = changes.(names{k});
+    end
+end
+% What is wrong with the arena is to be said before a process and its window are there.
+world = world_request(plain_text(arena), colormask, preferences);
+settings = setting_requests(preferences);
+is_new = ~is_active();
+cellfun(@simulator, settings, 'UniformOutput', false);
+simulator(world);
+% The ports were those of the world before.
+simulator('close 0');
+open_ports('remove', 0);
+if is_new
+    address = simulator('desk');
+    if ~isempty(address)
+        kiks_status(['The world is shown at ' address], 1);
+    end
+end
+end

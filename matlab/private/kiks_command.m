@@ -1,0 +1,28 @@
+function command = kiks_command()
+% kiks_command  The command that starts the simulator, as a row of words.
+%
+%   What the environment variable KIKS_COMMAND says; else the command of the Python environment that this folder
+%   belongs to; else `kiks`, wherever the system finds it.
+
+given = getenv('KIKS_COMMAND');
+if ~isempty(given)
+    command = strsplit(strtrim(given), ' ');
+    return
+end
+name = 'kiks';
+if ispc()
+    name = 'kiks.exe';
+end
+toolbox = fileparts(fileparts(mfilename('fullpath')));
+% Beside a checkout stands .venv; a package lies in lib/python3.x/site-packages/kiks/matlab.
+folders = {fullfile(toolbox, '..', '.venv', 'bin'), fullfile(toolbox, '..', '..', '..', '..', '..', 'bin'), ...
+    fullfile(toolbox, '..', '..', '..', '..', 'Scripts')};
+for k = 1:numel(folders)
+    candidate = fullfile(folders{k}, name);
+    if exist(candidate, 'file')
+        command = {candidate};
+        return
+    end
+end
+command = {name};
+end

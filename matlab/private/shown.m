@@ -1,0 +1,14 @@
+function text = shown(value)
+% shown  Say in a few words what somebody has given, for messages.
+
+if ischar(value) && size(value, 1) <= 1
+    text = ['''' value ''''];
+elseif isnumeric(value) && isscalar(value)
+    text = sprintf('%g', value);
+elseif (isnumeric(value) || islogical(value)) && numel(value) <= 6 && ~isempty(value)
+    text = mat2str(value, 6);
+else
+    size_text = sprintf('%dx', size(value));
+    text = ['a ' size_text(1:end - 1) ' ' class(value)];
+end
+end

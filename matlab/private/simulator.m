@@ -1,0 +1,102 @@
+function payload = simulator(request, varargin)
+% simulator  Ask the simulator's process for something; start it if there is none.
+%
+%   payload = simulator(request) sends a line and returns what is answered. What the simulator refuses is an Octave
+%   error.
+%
+%   simulator('--join', number)    takes part in a session that runs on this computer; 0: the newest
+%   simulator('--end')             parts from it; no error if there is none
+%   simulator('--is-running')      true if this Octave or MATLAB has one
+%   simulator('--clock', port)     time of a port [s] as the last answer told it; [] if that was another port's, or is
+%                                  more than a few milliseconds ago
+%
+%   Each request has a ticket, which its answer repeats: what Ctrl-C has kept us from reading answers nothing else.
+
+persistent link tickets ticket line_feed answer answered
+if isempty(tickets)
+    mlock  % `clear all` in a user's program would lose the process
+    tickets = char(33:126);
+    ticket = 0;
+    line_feed = char(10);
+    answered = tic();
+end
+if isempty(link) || request(1) == '-'
+    switch request
+        case '--is-running'
+            payload = ~isempty(link);
+            return
+        case '--clock'
+            payload = [];
+            if numel(answer) > 20 && toc(answered) < 0.005
+                payload = clock_of(answer, varargin{1});
+            end
+            return
+        case '--join'
+            if ~isempty(link)
+                error('kiks:session', 'A session must be left before another is joined. Call kiks_quit first.');
+            end
+            link = simulator_link('open', {'--join', sprintf('%d', varargin{1})});
+            return
+        case '--end'
+            ending = link;
+            link = [];
+            if ~isempty(ending)
+                simulator_link('close', ending);
+            end
+            return
+    end
+    if any(strcmp(strtok(request), {'ask', 'send', 'listen', 'pass', 'pause'}))
+        error('kiks:session', 'A port must be open for that, but none is. Open it with ref = kiks_kopen([-1 9600 1]).');
+    end
+    link = simulator_link('open', {});
+end
+ticket = ticket + 1;
+if ticket > 94
+    ticket = 1;
+end
+line = [tickets(ticket) request line_feed];
+while true
+    if link.is_pipe
+        % In line here, as this is what a program does thousands of times a second.
+        fputs(link.to, line);
+        fflush(link.to);
+        answer = fread(link.from, [1 96], '*char');
+        if numel(answer) < 96
+            break
+        end
+        length_ = str2double(answer(1:8));
+        if length_ > 88
+            answer = [answer, fread(link.from, [1 length_ - 88], '*char')];
+        end
+        answer = answer(9:length_ + 8);
+    else
+        [answer, link] = simulator_link('ask', link, line);
+        if isempty(answer)
+            break
+        end
+    end
+    if answer(1) == tickets(ticket)
+        answered = tic();
+        payload = answer(22:end);
+        if answer(2) == '-'
+            error('kiks:simulator', '%s', unescaped(payload));
+        end
+        return
+    end
+    line = '';
+end
+answer = '';
+ending = link;
+link = [];
+simulator_link('close', ending);
+error('kiks:session', ['The simulator must answer, but its process has ended. The world is lost: ' ...
+    'start another one with kiks(ARENA).']);
+end
+
+function seconds = clock_of(answer, port)
+told = sscanf(answer(3:21), '%f');
+seconds = [];
+if told(1) == port
+    seconds = told(2);
+end
+end
