@@ -83,6 +83,7 @@ class Desk:
         self.news: Tail[str] = Tail(NEWS_LIMIT)
         self._commands = list(commands)
         self._new_programs = new_programs or self._usual_programs
+        self._retired: list[Programs] = []
         self.project = foreign_project(sim) if project is None else project
         self.editing = Editing(self)
         self._take(sim, speed)
@@ -156,11 +157,17 @@ class Desk:
         sim = await asyncio.to_thread(simulation_of, project, self.folder)
         old = self.gate
         is_paused = old.is_paused
+        self._retired.append(self.programs)
         self.project, self._commands = project, list(commands)
         self._take(sim, old.speed)
         if is_paused:
             self.gate.pause(sim.now_ns)
         old.close()
+
+    def clear_away(self) -> None:
+        """End the programs of worlds that lay here before; for the thread that moves the world."""
+        while self._retired:
+            self._retired.pop().close()
 
     async def present_project(self) -> Project:
         """Return the project with everything where it is now.
@@ -251,6 +258,7 @@ class Desk:
     def close(self) -> None:
         """End its programs, and let the world go its way."""
         self.gate.close()
+        self.clear_away()
         self.programs.close()
         self.sim.gate = None
 

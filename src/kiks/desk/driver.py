@@ -41,9 +41,7 @@ class Driver:
                         self._programs_ended(programs.sim)
                     programs.sim.advance_to(programs.sim.now_ns + SLICE_NS)
                     programs.sim.sync()
-            if self._desk.programs is not programs:
-                # Another world lies on the desk.
-                programs.close()
+            self._desk.clear_away()
 
     def stop(self) -> None:
         """End it; from any thread."""

@@ -17,19 +17,23 @@ class NearConnection(Connection):
     Args:
         programs: Those who share the world.
         name: Who it is, for a person.
+        rank: Its place among those who act at the same instant.
 
     Raises:
         KiksError: If the world has ended.
     """
 
-    def __init__(self, programs: Programs, name: str) -> None:
+    def __init__(self, programs: Programs, name: str, rank: int) -> None:
         super().__init__(is_late=True)
         self._programs = programs
         self._world = programs.sim.lock
-        self._guest = programs.admit(name)
+        self._guest = programs.admit(name, rank)
+        self._is_resting = False
 
     def _say(self, request: Request) -> None:
         with self._world:
+            # Who was given up because it said nothing counts again.
+            self._guest.is_waited_for = not self._is_resting
             self._guest.hear(request)
             # Others may have waited for nothing but this.
             if self._programs.is_shared and request.kind is Kind.REACHED:
@@ -45,6 +49,19 @@ class NearConnection(Connection):
                 if guest.answer is None or guest.answer.ticket != ticket:
                     programs.wait(wait_s)
         return answer
+
+    def rest(self) -> None:
+        """Let the others go on without this program, until `wake`; what was said is still done."""
+        self._is_resting = True
+        with self._world:
+            self._guest.is_waited_for = False
+            self._programs.move()
+        # Its time begins again when it next needs the world.
+        self._is_to_meet = True
+
+    def wake(self) -> None:
+        """Be one of those again whom the world waits for."""
+        self._is_resting = False
 
     def close(self) -> None:
         """Leave; what was said is still done."""

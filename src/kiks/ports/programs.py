@@ -20,7 +20,7 @@ from kiks.ports.guest import NearGuest, SocketGuest
 from kiks.ports.handle import Handle
 from kiks.ports.names import Names
 from kiks.ports.process import Command, Process
-from kiks.ports.turns import PATIENCE_S, Turns
+from kiks.ports.turns import PATIENCE_S, START_PATIENCE_S, Turns
 from kiks.sim.simulation import Simulation
 
 IDLE_S = 0.05
@@ -28,6 +28,9 @@ IDLE_S = 0.05
 
 GRACE_S = 1.0
 """How long a program may tidy up after Ctrl-C [s of real time]."""
+
+VISIT_PATIENCE_S = 60.0
+"""How long the beginning is waited for if programs come that a person starts elsewhere [s of real time]."""
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C."""
@@ -56,6 +59,7 @@ class Programs:
         is_heard: Whether what they print is kept, in their handles; else it goes where that of this process goes. What
             a heard program starts ends with it.
         new_patience: Makes patiences with another wall clock: one that stands still while the world does.
+        visitors: How many programs that were started elsewhere begin together with these; see `admit`.
 
     Attributes:
         handles: The programs; of those that have ended the last one of each robot.
@@ -78,6 +82,7 @@ class Programs:
         say: Callable[[str], None] = lambda text: None,
         is_heard: bool = False,
         new_patience: Callable[[float], Patience] = Patience,
+        visitors: int = 0,
     ) -> None:
         self.sim = sim
         self.handles: list[Handle] = []
@@ -98,13 +103,14 @@ class Programs:
             parse_thinking(self._policy(number))
         self._turns = Turns(
             sim,
-            expected=len(begin),
+            expected=len(begin) + visitors,
             missing=self._missing,
             log=_log,
             is_once=True,
             when_silent=when_silent,
             patience_s=patience_s,
             new_patience=new_patience,
+            start_patience_s=VISIT_PATIENCE_S if visitors else START_PATIENCE_S,
         )
         self._names = Names(sim, told or {}, 0)
         for robot, _ in begin:
@@ -153,10 +159,7 @@ class Programs:
                 f"a program must be a Python file, but there is none at {str(command.program)!r}. Save it first."
             )
         with self.sim.lock:
-            if self._is_closed:
-                raise KiksError(
-                    f"a program must have a world, but that of {command.program.name} has ended. Try again."
-                )
+            self._check_open(command.program.name)
             self.sim.index_of(robot)
             there = [handle for handle in self.handles if handle.robot == robot]
             for handle in there:
@@ -177,22 +180,19 @@ class Programs:
         self._ring()
         return handle
 
-    def admit(self, name: str) -> NearGuest:
-        """Let a program take part that was started elsewhere and speaks through threads of this process.
-
-        It takes part from its first word on, has the robots that it claims, and leaves when it says so.
+    def admit(self, name: str, rank: int) -> NearGuest:
+        """Let a program take part, from its first word on, that was started elsewhere: a thread here speaks for it.
 
         Args:
             name: Who it is, for a person.
+            rank: Its place among those who act at the same instant.
 
         Raises:
             KiksError: If the world has ended.
         """
         with self.sim.lock:
-            if self._is_closed:
-                raise KiksError(f"a program must have a world, but that of {name} has ended. Try again.")
-            self._count += 1
-            guest = NearGuest(name, self._count, 0, self.sim, self._turns, self._names)
+            self._check_open(name)
+            guest = NearGuest(name, rank, 0, self.sim, self._turns, self._names)
             guest.is_waited_for = False
             self._turns.join(guest)
             self._visitors = [each for each in self._visitors if not each.has_left] + [guest]
@@ -217,7 +217,7 @@ class Programs:
             self._moved.notify_all()
 
     def wait(self, seconds: float | None) -> None:
-        """Wait until somebody has moved the world, or for some time [s]; the lock is held by the caller."""
+        """Wait until somebody has moved the world, or for some time [s]; the caller holds the lock."""
         self._moved.wait(seconds)
 
     def stop(self, handle: Handle) -> None:
@@ -247,7 +247,7 @@ class Programs:
                     self.round(IDLE_S)
         finally:
             self.close()
-        return INTERRUPTED if self._signals else next((handle.code for handle in self.handles if handle.code), 0)
+        return INTERRUPTED if self._signals else next((each.code for each in self.handles if each.code), 0)
 
     def round(self, wait_limit_s: float) -> None:
         """Do what may be done now, and listen to the programs.
@@ -270,7 +270,7 @@ class Programs:
                     self._hang_up(key.data)
             heard = [key.data for key, _ in ready]
             for guest in over:
-                # A process that the program has started may still hold the connection.
+                # A process that it has started may still hold the connection.
                 if guest not in heard and not guest.has_hung_up:
                     guest.leave()
                     self._hang_up(guest)
@@ -295,6 +295,10 @@ class Programs:
         self._bell_rope.close()
 
     # ---- inside ----
+
+    def _check_open(self, name: str) -> None:
+        if self._is_closed:
+            raise KiksError(f"a program must have a world, but that of {name} has ended. Try again.")
 
     def _policy(self, number: int) -> str:
         return self._thinking + (self._suffix(number) if self._thinking.startswith("replay:") else "")
@@ -386,7 +390,7 @@ class Programs:
 
     def _missing(self) -> str:
         """Return who has not taken part yet."""
-        return ", ".join(handle.name for handle in self.handles if not handle.guest.is_here)
+        return ", ".join(each.name for each in self.handles if not each.guest.is_here) or "a program elsewhere"
 
     def _ring(self) -> None:
         """Let `round` look up."""
@@ -408,8 +412,10 @@ class Programs:
             self._signals += 1
 
         self._grace = Patience(GRACE_S)
-        names = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-        before = {name: signal.signal(name, note) for name in names if signal.getsignal(name) is not signal.SIG_IGN}
+        ends = (
+            each for each in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP) if signal.getsignal(each) != signal.SIG_IGN
+        )
+        before = {each: signal.signal(each, note) for each in ends}
         try:
             yield
         finally:

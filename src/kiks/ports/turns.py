@@ -119,6 +119,7 @@ class Turns:
         when_silent: What happens to a program that is silent while others wait: 'wait', 'drop' or 'ignore'.
         patience_s: How long it may be [s of real time].
         new_patience: For tests: makes patiences with their own wall clock.
+        start_patience_s: How long the world waits for those with whom it begins [s of real time].
 
     Raises:
         ParameterError: If there is no such policy, or the patience is out of range.
@@ -140,6 +141,7 @@ class Turns:
         when_silent: str = "ignore",
         patience_s: float = PATIENCE_S,
         new_patience: Callable[[float], Patience] = Patience,
+        start_patience_s: float = START_PATIENCE_S,
     ) -> None:
         check_policy(when_silent, patience_s)
         self.players: list[Player] = []
@@ -153,7 +155,8 @@ class Turns:
         self._patience_s = patience_s
         self._new_patience = new_patience
         self._log = log
-        self._start = new_patience(START_PATIENCE_S)
+        self._start_patience_s = start_patience_s
+        self._start = new_patience(start_patience_s)
         self._has_named_missing = False
         self._seen_ns = 0
 
@@ -268,7 +271,7 @@ class Turns:
             return 0.0
         left_s = self._start.left_s()
         if left_s > 0:
-            word_s = left_s - (START_PATIENCE_S - START_WORD_S)
+            word_s = left_s - (self._start_patience_s - START_WORD_S)
             if word_s > 0:
                 return word_s
             if not self._has_named_missing:
@@ -284,7 +287,7 @@ class Turns:
             "the world has begun without %s, which did not come within %g s. Who comes now acts from now on, and the "
             "run is not repeatable.",
             self._missing(),
-            START_PATIENCE_S,
+            self._start_patience_s,
         )
         self.is_repeatable = False
         for player in self.players:

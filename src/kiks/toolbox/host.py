@@ -120,9 +120,8 @@ class Host:
         with self._lock:
             self._count += 1
             self._there[source] = close
-            name = f"program {self._count} (Octave or MATLAB)"
-        visitor = Visitor(self._session, name)
-        threading.Thread(target=self._listen, args=(visitor, source, sink), name=f"kiks {name}", daemon=True).start()
+            visitor = Visitor(self._session, self._count)
+        threading.Thread(target=self._listen, args=(visitor, source, sink), name=visitor.name, daemon=True).start()
 
     def _listen(self, visitor: Visitor, source: int, sink: int) -> None:
         """Answer somebody line by line until it hangs up."""

@@ -71,6 +71,7 @@ def _set(visitor: Visitor, words: str) -> str:
 def _world(visitor: Visitor, words: str) -> str:
     session = visitor.session
     kind, _, rest = words.partition(" ")
+    visitor.close(0)
     if kind == "default":
         session.begin_default()
     elif kind == "file":
@@ -80,7 +81,7 @@ def _world(visitor: Visitor, words: str) -> str:
         greys = take_matrix(left)[0] if left else None
         settings = session.settings
         arena = arena_of(codes, greys, wall=settings.wall, ball=settings.ball, cylinder=settings.cylinder)
-        session.begin(settings.project_of(arena))
+        session.begin_arena(arena)
     else:
         raise ParameterError(f"a world must be default, file or matrix, but it was {kind!r}.")
     return ""
@@ -138,40 +139,48 @@ def _state(visitor: Visitor, words: str) -> str:
 # ---- ports ----
 
 
+def _port(word: str) -> int:
+    """Return the number of a port; 1 stands for -1."""
+    if not (word.isascii() and word.isdigit() and len(word) < 10):
+        raise ParameterError(f"a port must be a whole number, -1, -2 and so on, but it was {word!r}.")
+    return int(word)
+
+
 def _open(visitor: Visitor, words: str) -> str:
-    number, baud = numbers_of(words.split(), 2, "port and baud")
-    if number < 1 or number != int(number):
-        raise ParameterError(f"a simulated port must be -1, -2 and so on, but it was {-number:g}.")
-    visitor.open(int(number), round(baud))
+    number, _, rest = words.partition(" ")
+    (baud,) = numbers_of(rest.split(), 1, "baud")
+    if not _port(number) or math.isnan(baud):
+        raise ParameterError(f"a simulated port must be -1, -2 and so on, and have a speed, but it was {words!r}.")
+    visitor.open(_port(number), round(baud))
     return ""
 
 
 def _close(visitor: Visitor, words: str) -> str:
-    visitor.close(int(words))
+    visitor.close(_port(words))
     return ""
 
 
 def _send(visitor: Visitor, words: str) -> str:
     number, _, text = words.partition(" ")
-    return escape(visitor.send(int(number), unescape(text)))
+    return escape(visitor.send(_port(number), unescape(text)))
 
 
 def _ask(visitor: Visitor, words: str) -> str:
     number, _, text = words.partition(" ")
-    return escape(visitor.send(int(number), text + "\n"))
+    return escape(visitor.send(_port(number), text + "\n"))
 
 
 def _listen(visitor: Visitor, words: str) -> str:
-    return escape(visitor.listen(int(words)))
+    return escape(visitor.listen(_port(words)))
 
 
 def _time(visitor: Visitor, words: str) -> str:
-    time_s = visitor.time_s(int(words))
+    time_s = visitor.time_s(_port(words))
     return "" if time_s is None else number_text(time_s)
 
 
 def _pass(visitor: Visitor, words: str) -> str:
-    visitor.opened(int(words)).port.ask_ns()
+    visitor.opened(_port(words)).port.ask_ns()
     return ""
 
 
@@ -188,22 +197,29 @@ def _pace(visitor: Visitor, words: str) -> str:
 
 
 def _pose(visitor: Visitor, words: str) -> str:
+    number = _port(words)
     if visitor.session.desk is None:
         return ""
 
     def pose(sim: Simulation) -> str:
-        x_mm, y_mm, heading_rad = sim.pose(visitor.robot(int(words)))
+        robot = visitor.robot(number)
+        if robot is None:
+            return ""
+        x_mm, y_mm, heading_rad = sim.pose(robot)
         return numbers_text((*user_place(sim.arena, x_mm, y_mm), heading_rad))
 
     return visitor.do(pose)
 
 
 def _path(visitor: Visitor, words: str) -> str:
-    number = int(words)
-    opened = visitor.ports.get(number)
+    number = _port(words)
+    opened = visitor.openings.get(number)
 
     def path(sim: Simulation) -> str:
-        points = sim.paths()[visitor.robot(number) - 1]
+        robot = visitor.robot(number)
+        if robot is None:
+            return "2 0"
+        points = sim.paths()[robot - 1]
         if opened is not None:
             points = points[points[:, 0] >= opened.opened_ns * 1e-9 - 1e-9]
         points = points[~np.isnan(points[:, 1])]
@@ -216,11 +232,13 @@ def _path(visitor: Visitor, words: str) -> str:
 
 
 def _distances(visitor: Visitor, words: str) -> str:
-    number = int(words)
-    opened = visitor.ports.get(number)
+    number = _port(words)
+    opened = visitor.openings.get(number)
 
     def distances(sim: Simulation) -> str:
         robot = visitor.robot(number)
+        if robot is None:
+            return "0 0 0"
         forwards_mm, backwards_mm, straight_mm = sim.distances_mm()[robot - 1].tolist()
         if opened is not None:
             x_mm, y_mm, _ = sim.pose(robot)
@@ -232,12 +250,17 @@ def _distances(visitor: Visitor, words: str) -> str:
 
 
 def _set_robot(visitor: Visitor, words: str) -> str:
-    number, x, y, angle = numbers_of(words.split(), 4, "port, x, y and angle")
+    word, _, rest = words.partition(" ")
+    number = _port(word)
+    x, y, angle = numbers_of(rest.split(), 3, "x, y and angle")
 
     def set_robot(sim: Simulation) -> str:
+        robot = visitor.robot(number)
+        if robot is None:
+            raise ParameterError(f"port {-number} must have a robot, but it has none. Open it with kiks_kopen.")
         turn = uniform(sim.seed, 0, 0, STREAM_SPAWN, sim.now_ns, 0)
         heading_rad = 2 * math.pi * turn if math.isnan(angle) else angle
-        return _is_done(lambda: sim.place(visitor.robot(int(number)), *place_mm(sim.arena, x, y), heading_rad))
+        return _is_done(lambda: sim.place(robot, *place_mm(sim.arena, x, y), heading_rad))
 
     return visitor.do(set_robot)
 
@@ -263,12 +286,12 @@ def _set_object(visitor: Visitor, words: str) -> str:
 
     def set_object(sim: Simulation) -> str:
         lamps, bodies = sim.lamps, sim.bodies()
-        row = int(number) - 1
-        if not 0 <= row < len(lamps) + len(bodies):
+        if number not in range(1, len(lamps) + len(bodies) + 1):
             raise ParameterError(
                 f"row must be one of the {len(lamps) + len(bodies)} that kiks_siminfo_objects lists, but it was "
                 f"{number:g}."
             )
+        row = int(number) - 1
         if row < len(lamps):
             x_mm, y_mm = _kept(place_mm(sim.arena, x, y), lamps[row, :2].tolist())
             is_inside = 0 <= x_mm <= sim.arena.width_mm and 0 <= y_mm <= sim.arena.height_mm

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from kiks.clock.gate import Gate
 from kiks.errors import LinkError
 from kiks.model.arena import Arena
 from kiks.model.project import Project, ProjectRobot
+from kiks.ports.process import Command
+from kiks.ports.programs import Programs
 from kiks.sim.building import simulation_of, spec_of
 from kiks.sim.simulation import Simulation
 from kiks.toolbox.settings import Settings
@@ -68,8 +71,12 @@ class Session:
         """Where a browser finds the desk; nothing if it is not shown."""
         return "" if self._shown is None else self._shown.url
 
-    def begin(self, project: Project) -> None:
+    def begin(self, project: Project, folder: Path) -> None:
         """Put a world in the place of the one that there is, if any.
+
+        Args:
+            project: The world.
+            folder: Where its files lie.
 
         Raises:
             KiksError: If it is none.
@@ -79,26 +86,36 @@ class Session:
         with self.lock:
             if self.desk is None:
                 self._ready()
-                sim = simulation_of(project)
+                sim = simulation_of(project, folder)
                 self.desk = Desk(
                     sim,
                     project=project,
                     # Who looks on wants to see something.
                     speed=1.0 if self._has_window else None,
-                    folder=Path.cwd(),
+                    folder=folder,
                     owns_world=True,
                     may_run_programs=True,
+                    new_programs=self._new_programs,
                 )
                 if self._has_window:
                     self._show()
             else:
+                self.desk.folder = folder.resolve()
                 asyncio.run(self.desk.replace(project))
             self.owners.clear()
             self._has_world.set()
 
+    def begin_arena(self, arena: Arena) -> None:
+        """Begin the world of an arena with the settings that there are.
+
+        Raises:
+            KiksError: If they do not fit each other.
+        """
+        self.begin(self.settings.project_of(arena), self.settings.folder)
+
     def begin_default(self) -> None:
         """Begin the classic arena with the settings that there are."""
-        self.begin(self.settings.project_of(Arena.default()))
+        self.begin_arena(Arena.default())
 
     def begin_file(self, path: str) -> None:
         """Begin the world of a file: a project as it is, any other arena with the settings that there are.
@@ -106,8 +123,10 @@ class Session:
         Raises:
             ArenaError: If the file is none.
         """
-        project = Project.load(path)
-        self.begin(project if path.lower().endswith(".kiks") else self.settings.project_of(project.arena))
+        if path.lower().endswith(".kiks"):
+            self.begin(Project.load(path), Path(path).parent)
+        else:
+            self.begin_arena(Arena.load(path))
 
     def trace(self) -> None:
         """See to it that paths are kept from now on, if they are not."""
@@ -186,12 +205,9 @@ class Session:
         """Do what may be done, and listen to those who take part; nothing moves unless one of them lets it."""
         if not self._has_world.wait(WAIT_S):
             return
-        desk = self.desk
-        assert desk is not None
-        programs = desk.programs
-        programs.round(WAIT_S)
-        if desk.programs is not programs:
-            programs.close()
+        assert self.desk is not None
+        self.desk.programs.round(WAIT_S)
+        self.desk.clear_away()
 
     def let_go(self) -> None:
         """Let time pass even if the world is paused: nobody is there any more who could want that."""
@@ -204,6 +220,21 @@ class Session:
             self._shown.close()
         elif self.desk is not None:
             self.desk.close()
+
+    def _new_programs(self, sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
+        return Programs(
+            sim,
+            commands,
+            thinking=sim.thinking,
+            say=self._say,
+            is_heard=True,
+            new_patience=gate.patience,
+            visitors=self.settings.programs if self.settings.programs > 1 else 0,
+        )
+
+    def _say(self, text: str) -> None:
+        if self.desk is not None:
+            self.desk.say(text)
 
     def _show(self) -> None:
         from kiks.desk.showing import Shown

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from kiks.errors import ParameterError, nearest
@@ -27,6 +28,7 @@ class Settings:
         ball: Brightness of balls; the usual one if None.
         cylinder: Brightness of cylinders; the usual one if None.
         brightness: Brightness of robots; that of their file if None.
+        programs: How many programs begin together; with 1 whoever comes begins.
         latency_s: What each exchange takes on top of all else [s], as a calibration has measured it.
     """
 
@@ -41,6 +43,7 @@ class Settings:
     ball: int | None = None
     cylinder: int | None = None
     brightness: int | None = None
+    programs: int = 1
     latency_s: float = 0.0
 
     def changed(self, name: str, value: str) -> Settings:
@@ -63,17 +66,23 @@ class Settings:
         except (ValueError, OverflowError):
             raise ParameterError(f"{name} must be {what}, but it was {value!r}. Look into kiks_preferences.") from None
 
+    @property
+    def folder(self) -> Path:
+        """Where the robot's file lies, if it is one."""
+        return Path(self.robot).parent
+
     def project_of(self, arena: Arena) -> Project:
-        """Return the world of an arena with these settings.
+        """Return the world of an arena with these settings; files in it are looked for in `folder`.
 
         Raises:
             ParameterError: If a value is out of range.
         """
         # A world has a robot, even where the first program is to bring one.
         count = max(len(arena.starts) if self.robots is None else self.robots, 1)
+        robot = ProjectRobot(kind=Path(self.robot).name, turrets=self.turrets, brightness=self.brightness)
         return Project(
             arena,
-            robots=(ProjectRobot(kind=self.robot, turrets=self.turrets, brightness=self.brightness),) * count,
+            robots=(robot,) * count,
             seed=self.seed,
             thinking=self.thinking,
             response=self.response,
@@ -124,6 +133,7 @@ _READERS: dict[str, tuple[Callable[[str], Any], str]] = {
     "ball": (_grey, "a whole number from 1 to 255"),
     "cylinder": (_grey, "a whole number from 1 to 255"),
     "brightness": (_grey, "a whole number from 1 to 255"),
+    "programs": (_whole, "a whole number from 1"),
     "latency_s": (_seconds, "a time from 0 to 10 s"),
 }
 """How the value of each setting is read, and what it has to be."""

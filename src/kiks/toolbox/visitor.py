@@ -38,6 +38,7 @@ class OpenPort:
         way_mm: What the robot had driven by then, forwards and backwards [mm].
         start_mm: Where it stood then [mm].
         is_clean: Whether every reply that was on its way has been read.
+        unfinished: What was sent since the last terminator.
         last_ns: When it was last asked how fast time passes [ns of simulated time].
         last_wall_s: The same of real time [s].
     """
@@ -51,6 +52,7 @@ class OpenPort:
     last_ns: int
     last_wall_s: float
     is_clean: bool = True
+    unfinished: bytes = b""
 
 
 class Visitor:
@@ -61,19 +63,21 @@ class Visitor:
 
     Args:
         session: The session.
-        name: Who it is, for a person.
+        number: Its number, from 1 in the order in which they came.
 
     Attributes:
         ports: The ports that are open, by number: 1 for port -1.
+        openings: The last opening of each port in this world.
         asked: Number of the port that the present request has to do with; 0 for none.
     """
 
-    def __init__(self, session: Session, name: str) -> None:
+    def __init__(self, session: Session, number: int) -> None:
         self.session = session
-        self.name = name
+        self.number = number
+        self.name = f"program {number} (Octave or MATLAB)"
         self.asked = 0
         self.ports: dict[int, OpenPort] = {}
-        self._robots: dict[int, int] = {}
+        self.openings: dict[int, OpenPort] = {}
         self._sim: Simulation | None = None
         self._connection: NearConnection | None = None
 
@@ -99,40 +103,45 @@ class Visitor:
             self._sim = sim
         if self._connection is None:
             assert session.desk is not None
-            self._connection = NearConnection(session.desk.programs, self.name)
+            self._connection = NearConnection(session.desk.programs, self.name, self.number)
+        if not self.ports:
+            self._connection.wake()
             # Anew, so that what passed while no port was open is not taken for thinking.
+            assert session.desk is not None
             self._program = Program(session.desk.project.thinking)
         try:
-            robot = session.take_robot(self, self._robots.get(number, number))
-            self._robots[number] = robot
-            port = VirtualPort(FarLine(self._connection, robot), self._program)
-            port.baudrate = baud
-            port.claim(f"{self.name}, port {-number}")
-            port.timeout = ANSWER_S
-            session.trace()
-            self._connection.ask(Kind.MEET)
-            with sim.lock:
-                x_mm, y_mm, _ = sim.pose(robot)
-                forwards_mm, backwards_mm, _ = sim.distances_mm()[robot - 1].tolist()
-            now_ns, now_s = port.ask_ns(), time.monotonic()
-            self.ports[number] = OpenPort(
-                port, robot, now_ns, now_s, (forwards_mm, backwards_mm), (x_mm, y_mm), now_ns, now_s
-            )
+            self.ports[number] = self.openings[number] = self._open(number, baud, self._connection, sim)
         finally:
-            self._part_if_idle()
+            self._rest_if_idle()
+        self.asked = number
+
+    def _open(self, number: int, baud: int, connection: NearConnection, sim: Simulation) -> OpenPort:
+        known = self.openings.get(number)
+        robot = self.session.take_robot(self, self._usual_robot(number)) if known is None else known.robot
+        port = VirtualPort(FarLine(connection, robot), self._program)
+        port.baudrate = baud
+        port.claim(f"{self.name}, port {-number}")
+        port.timeout = ANSWER_S
+        self.session.trace()
+        self._meet()
+        with sim.lock:
+            x_mm, y_mm, _ = sim.pose(robot)
+            forwards_mm, backwards_mm, _ = sim.distances_mm()[robot - 1].tolist()
+        now_ns, now_s = port.ask_ns(), time.monotonic()
+        return OpenPort(port, robot, now_ns, now_s, (forwards_mm, backwards_mm), (x_mm, y_mm), now_ns, now_s)
 
     def close(self, number: int) -> None:
         """Close a port, or all of them if it is 0; no error if it is not open. The robot drives on."""
         for each in list(self.ports) if number == 0 else [number]:
-            opened = self.ports.pop(each, None)
-            if opened is not None:
-                opened.port.close()
-        self._part_if_idle()
+            if each in self.ports:
+                if self._sim is self.session.world:
+                    self._meet()
+                self.ports.pop(each).port.close()
+        self._rest_if_idle()
 
     def leave(self) -> None:
         """Go: what was said is still done, and the robots belong to others."""
-        self.ports.clear()
-        self._part_if_idle()
+        self._lose_world()
         self.session.leave(self)
 
     def opened(self, number: int) -> OpenPort:
@@ -165,15 +174,10 @@ class Visitor:
             port.sleep(latency_s)
         port.write(data)
         # Empty lines are not answered, and of several commands at once the first is what was asked.
-        commands = len(data.replace(b"\r", b"\n").split(b"\n")) - 1
-        if commands == 1 and len(data) > 1:
-            reply = port.read_until(b"\n")
-        else:
-            asked = [line for line in data.replace(b"\r", b"\n").split(b"\n")[:-1] if line]
-            replies = [port.read_until(b"\n") for _ in asked]
-            reply = replies[0] if replies else b""
-        opened.is_clean = reply.endswith(b"\n") or not commands
-        return reply.rstrip(b"\r\n").decode("ascii", errors="replace")
+        *commands, opened.unfinished = (opened.unfinished + data).replace(b"\r", b"\n").split(b"\n")
+        replies = [port.read_until(b"\n") for command in commands if command]
+        opened.is_clean = all(reply.endswith(b"\n") for reply in replies)
+        return replies[0].rstrip(b"\r\n").decode("ascii", errors="replace") if replies else ""
 
     def listen(self, number: int) -> str:
         """Return what else comes, until the line is silent."""
@@ -236,28 +240,45 @@ class Visitor:
         if self.ports:
             # Asking and asking lets time pass, so that who waits for something to happen does not wait for ever.
             self.opened(next(iter(self.ports))).port.ask_ns()
-            assert self._connection is not None
-            self._connection.ask(Kind.MEET)
+            self._meet()
         with sim.lock:
             return act(sim)
 
-    def robot(self, number: int) -> int:
-        """Return the number of the robot behind a port, open or not; that which it would have if it never was."""
-        robot = self._robots.get(number, number) if self._sim is self.session.world else number
-        return min(robot, self.session.world.robot_count)
+    def robot(self, number: int) -> int | None:
+        """Return the number of the robot behind a port, open or not; None if it has none yet."""
+        if self._sim is self.session.world and number in self.openings:
+            return self.openings[number].robot
+        robot = self._usual_robot(number)
+        is_there = 1 <= robot <= self.session.world.robot_count
+        return robot if is_there and self.session.owners.get(robot, self) is self else None
 
     # ---- inside ----
 
-    def _part_if_idle(self) -> None:
-        """Hang up when no port is open: nobody waits for a program that has nothing to do with robots."""
+    def _usual_robot(self, number: int) -> int:
+        """Return which robot a port has if nobody else has it: the first program begins with robot 1, and so on."""
+        return self.number + number - 1
+
+    def _meet(self) -> None:
+        """Let the world come to where the program is in time."""
+        connection, sim = self._connection, self._sim
+        assert connection is not None
+        assert sim is not None
+        now_ns = connection.ask(Kind.MEET).now_ns
+        # Everybody else acts later, and what robots do before is done.
+        with sim.lock:
+            sim.advance_to(now_ns)
+
+    def _rest_if_idle(self) -> None:
+        """Let the world go on when no port is open: nobody waits for a program that has nothing to do with robots."""
         if not self.ports and self._connection is not None:
-            self._connection.close()
-            self._connection = None
+            self._connection.rest()
 
     def _lose_world(self) -> None:
         self.ports.clear()
-        self._robots.clear()
-        self._part_if_idle()
+        self.openings.clear()
+        if self._connection is not None:
+            self._connection.close()
+            self._connection = None
 
     def _is_over(self) -> NoReturn:
         """Say that the world has gone in which the ports were."""
