@@ -389,7 +389,6 @@ class Programs:
             _log.warning("%s, which the world does not wait for, still runs. Ctrl-C ends it.", names)
 
     def _missing(self) -> str:
-        """Return who has not taken part yet."""
         return ", ".join(each.name for each in self.handles if not each.guest.is_here) or "a program elsewhere"
 
     def _ring(self) -> None:
@@ -412,10 +411,8 @@ class Programs:
             self._signals += 1
 
         self._grace = Patience(GRACE_S)
-        ends = (
-            each for each in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP) if signal.getsignal(each) != signal.SIG_IGN
-        )
-        before = {each: signal.signal(each, note) for each in ends}
+        names = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+        before = {name: signal.signal(name, note) for name in names if signal.getsignal(name) is not signal.SIG_IGN}
         try:
             yield
         finally:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
-from numpy.lib.recfunctions import structured_to_unstructured
 from numpy.typing import NDArray
 
 from kiks.engine.state import State
 from kiks.units import TICK_NS
-
-_POSE = ["x_mm", "y_mm", "heading_rad"]
 
 
 class Paths:
@@ -37,13 +36,13 @@ class Paths:
 
     def _note(self, state: State) -> None:
         self._times_s.append(state.tick_count * TICK_NS * 1e-9)
-        # A copy of three fields of each record: stacking them as columns here would take as long as a reading.
-        self._points.append(state.robots[0][_POSE].copy())
+        robots: Any = state.robots[0]
+        self._points.append(np.array([robots["x_mm"], robots["y_mm"], robots["heading_rad"]]))
 
     def array(self) -> NDArray[np.float64]:
         """Return all points, float64 [robot, point, 4]: time_s, x_mm, y_mm, heading_rad; NaN before a robot came."""
-        poses = np.full((len(self._points[-1]), len(self._points), 3), np.nan)
+        poses = np.full((self._points[-1].shape[1], len(self._points), 3), np.nan)
         for point, there in enumerate(self._points):
-            poses[: len(there), point] = structured_to_unstructured(there)
+            poses[: there.shape[1], point] = there.T
         times_s = np.broadcast_to(np.array(self._times_s)[None, :, None], (*poses.shape[:2], 1))
         return np.concatenate([times_s, poses], axis=2)
