@@ -30,6 +30,7 @@ function answer = kiks(arena, colormask)
 %   kiks('--join')           takes part in the newest session on this computer that another Octave or MATLAB started
 %   kiks('--join', number)   in the session with that number
 %   kiks('--version')        prints the version; returns it if an output is wanted: 'KiKS 3.0.0'
+%   kiks('--state')          prints or returns 16 digits that two equal runs agree on, to the last bit
 %   kiks('--help')           shows this
 %
 %   Settings (seed, robot, thinking time and so on) are in kiks_preferences.
@@ -58,12 +59,19 @@ if ischar(arena) && strncmp(arena, '--', 2)
             if nargout > 0
                 answer = version_text;
             end
+        case '--state'
+            need_session('kiks(''--state'')');
+            answer = simulator('state');
+            if nargout == 0
+                disp(answer);
+                clear answer
+            end
         case '--help'
             help('kiks');
         case '--join'
             join_session(plain_text(colormask));
         otherwise
-            error('kiks:argument', ['The option must be --join, --version or --help, but it was %s. ' ...
+            error('kiks:argument', ['The option must be --join, --version, --state or --help, but it was %s. ' ...
                 'Give an arena, or nothing for the default one.'], arena);
     end
 elseif is_active()
@@ -75,11 +83,11 @@ end
 end
 
 function text = version_line()
-was_running = simulator('--is-running');
+was_running = simulator('--is-running', []);
 prepare_process();
 text = ['KiKS ' simulator('version')];
 if ~was_running
-    simulator('--end');
+    simulator('--end', []);
 end
 end
 

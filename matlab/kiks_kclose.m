@@ -24,7 +24,7 @@ if nargin > 0 && ~isempty(ref)
     number = -ref(1);
 end
 open_ports('remove', number);
-if simulator('--is-running')
+if simulator('--is-running', [])
     simulator(sprintf('close %d', number));
 end
 end

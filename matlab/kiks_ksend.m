@@ -22,19 +22,19 @@ if ref(1) >= 0
     else
         reply = ksend(cmd, ref, timeout);
     end
+    return
+end
+if ischar(cmd) && sum(cmd == 10) == 1 && cmd(end) == 10
+    % What programs send thousands of times a second.
+    if ref(1) == -1
+        reply = simulator(['ask 1 ' cmd(1:end - 1)]);
+    else
+        reply = simulator([sprintf('ask %d ', -ref(1)) cmd(1:end - 1)]);
+    end
 elseif isempty(cmd)
     simulator(sprintf('pass %d', -ref(1)));
     reply = '';
 else
-    if ~ischar(cmd)
-        cmd = char(checked_command(cmd));
-    end
-    line = cmd(1:end - 1);
-    if cmd(end) == 10 && all(line > 31) && all(line ~= 92)
-        % What programs send thousands of times a second.
-        reply = simulator([sprintf('ask %d ', -ref(1)) line]);
-    else
-        reply = simulator([sprintf('send %d ', -ref(1)) escaped(cmd)]);
-    end
+    reply = simulator([sprintf('send %d ', -ref(1)) escaped(char(checked_command(cmd)))]);
 end
 end

@@ -20,7 +20,7 @@ if isempty(port) || ~isnumeric(port)
         shown(port));
 elseif port(1) >= 0
     t = robot_link('time', port(1));
-elseif simulator('--is-running')
+elseif simulator('--is-running', [])
     % Who asks again and again without doing anything lets time pass.
     t = simulator('--clock', -port(1));
     if isempty(t) || t == last

@@ -43,6 +43,10 @@ KIKS_TURRETS = 'k213 radio battle';
 % How many robots; [] as many as the arena has start poses, at least one.
 KIKS_ROBOTS = [];
 
+% How many programs (Octaves, see kiks('--join')) begin together: the world waits until each has opened its port, and
+% then for each. So runs of several are the same each time, with 'fixed' and 'none'. 1: whoever comes begins.
+KIKS_PROGRAMS = 1;
+
 % What elements 2, 3 and 4 of an arena matrix are: 'kiks' (light, ball, cylinder) or 'thesis' (ball, light, cylinder).
 KIKS_ARENA_CODING = 'kiks';
 

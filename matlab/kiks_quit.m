@@ -12,13 +12,13 @@ function kiks_quit(silent)
 %   See also kiks, kiks_kclose.
 
 open_ports('remove', 0);
-if simulator('--is-running')
+if simulator('--is-running', [])
     try
         simulator('close 0');
     catch
         % The process may be gone already: then all that is left is to forget it.
     end
-    simulator('--end');
+    simulator('--end', []);
     if nargin < 1 || isempty(silent) || ~any(silent)
         disp('The KiKS session has ended.');
     end

@@ -16,7 +16,7 @@ if nargin < 1
 end
 number = simulated_port(port);
 pos = [];
-if simulator('--is-running')
+if simulator('--is-running', [])
     pos = sscanf(simulator(sprintf('pose %d', number)), '%f')';
 end
 end

@@ -10,7 +10,7 @@ function speed = kiks_siminfo_speed()
 %   See also kiks_ktime.
 
 speed = [];
-if simulator('--is-running')
+if simulator('--is-running', [])
     speed = sscanf(simulator('pace'), '%f')';
 end
 if isempty(speed)

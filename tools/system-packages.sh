@@ -1,6 +1,6 @@
 #!/bin/sh
-# What KiKS needs of the system: Python's venv module, and for the tests a C compiler (a robot is driven from C) and
-# Chromium (the desk is used in a real browser): system-packages.sh [tests].
+# What KiKS needs of the system: Python's venv module, and for the tests a C compiler (a robot is driven from C),
+# Chromium (the desk is used in a real browser) and Octave (the toolbox): system-packages.sh [tests].
 # As root on Debian this installs what is missing; otherwise it names it.
 set -eu
 
@@ -9,6 +9,9 @@ missing=""
 if [ "${1:-}" = tests ]; then
     command -v gcc >/dev/null 2>&1 || missing="$missing gcc libc6-dev"
     command -v chromium >/dev/null 2>&1 || missing="$missing chromium fonts-dejavu-core"
+    command -v octave-cli >/dev/null 2>&1 || missing="$missing octave"
+    # The package lies in a folder that names Octave's programming interface: ask Debian.
+    dpkg-query -W octave-instrument-control >/dev/null 2>&1 || missing="$missing octave-instrument-control"
 else
     command -v "$python" >/dev/null 2>&1 || missing="$missing python3"
     "$python" -c 'import sys, ensurepip, venv; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 || missing="$missing python3-venv"

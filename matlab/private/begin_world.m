@@ -19,7 +19,6 @@ is_new = ~is_active();
 cellfun(@simulator, settings, 'UniformOutput', false);
 simulator(world);
 % The ports were those of the world before.
-simulator('close 0');
 open_ports('remove', 0);
 if is_new
     address = simulator('desk');

@@ -6,16 +6,17 @@ function values = kask(ref, request, prefix, count, tries)
 
 values = -1;
 start = numel(prefix) + 1;
+command = [request char(10)];
 for attempt = 1:tries
-    reply = kcmd(ref, request);
-    if strncmp(reply, prefix, start - 1)
+    reply = kiks_ksend(command, ref);
+    if count == 0
+        if strcmp(reply, prefix)
+            values = 0;
+            return
+        end
+    elseif strncmp(reply, prefix, start - 1)
         numbers = sscanf(reply(start:end), ',%f');
-        if count == 0
-            if strcmp(reply, prefix)
-                values = 0;
-                return
-            end
-        elseif numel(numbers) == count
+        if numel(numbers) == count
             values = numbers;
             return
         end

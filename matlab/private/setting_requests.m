@@ -22,6 +22,7 @@ requests = {
     ['set brightness ' number_text(greys{3})]
     sprintf('set wall %d', p.KIKS_ARENA_DEFAULT_COLOR)
     ['set robots ' number_text(p.KIKS_ROBOTS)]
+    sprintf('set programs %d', p.KIKS_PROGRAMS)
     sprintf('set latency_s %.17g', latency_s(p))
     }';
 end

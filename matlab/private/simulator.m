@@ -1,54 +1,52 @@
-function payload = simulator(request, varargin)
+function payload = simulator(request, argument)
 % simulator  Ask the simulator's process for something; start it if there is none.
 %
 %   payload = simulator(request) sends a line and returns what is answered. What the simulator refuses is an Octave
 %   error.
 %
 %   simulator('--join', number)    takes part in a session that runs on this computer; 0: the newest
-%   simulator('--end')             parts from it; no error if there is none
-%   simulator('--is-running')      true if this Octave or MATLAB has one
+%   simulator('--end', [])             parts from it; no error if there is none
+%   simulator('--is-running', [])      true if this Octave or MATLAB has one
 %   simulator('--clock', port)     time of a port [s] as the last answer told it; [] if that was another port's, or is
 %                                  more than a few milliseconds ago
 %
 %   Each request has a ticket, which its answer repeats: what Ctrl-C has kept us from reading answers nothing else.
 
 persistent link tickets ticket line_feed answer answered
-if isempty(tickets)
-    mlock  % `clear all` in a user's program would lose the process
-    tickets = char(33:126);
-    ticket = 0;
-    line_feed = char(10);
-    answered = tic();
-end
-if isempty(link) || request(1) == '-'
+if nargin > 1
+    payload = [];
     switch request
         case '--is-running'
             payload = ~isempty(link);
-            return
         case '--clock'
-            payload = [];
             if numel(answer) > 20 && toc(answered) < 0.005
-                payload = clock_of(answer, varargin{1});
+                payload = clock_of(answer, argument);
             end
-            return
         case '--join'
             if ~isempty(link)
                 error('kiks:session', 'A session must be left before another is joined. Call kiks_quit first.');
             end
-            link = simulator_link('open', {'--join', sprintf('%d', varargin{1})});
-            return
+            link = simulator_link('open', {'--join', sprintf('%d', argument)});
         case '--end'
             ending = link;
             link = [];
             if ~isempty(ending)
                 simulator_link('close', ending);
             end
-            return
     end
+    return
+end
+if isempty(link)
     if any(strcmp(strtok(request), {'ask', 'send', 'listen', 'pass', 'pause'}))
         error('kiks:session', 'A port must be open for that, but none is. Open it with ref = kiks_kopen([-1 9600 1]).');
     end
     link = simulator_link('open', {});
+end
+if isempty(ticket)
+    mlock  % `clear all` in a user's program would lose the process
+    tickets = char(33:126);
+    ticket = 0;
+    line_feed = char(10);
 end
 ticket = ticket + 1;
 if ticket > 94

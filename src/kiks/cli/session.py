@@ -76,5 +76,8 @@ def _serve(listen: Path | None, window: bool | None, sink: int) -> None:
         host.run()
     except KeyboardInterrupt:
         pass
+    finally:
+        host.close()
+    # Threads that still read are of no use any more.
     sys.stdout.flush()
     os._exit(0)

@@ -35,7 +35,7 @@ LOOK_S = 0.5
 FIRST_S = 60.0
 """How long a process that listens waits for the first who comes [s of real time]."""
 
-SPIN_NS = 300_000 if len(os.sched_getaffinity(0)) > 1 else 0
+SPIN_NS = 200_000 if len(os.sched_getaffinity(0)) > 1 else 0
 """How long the next request is waited for without going to sleep [ns of real time]: a program in a loop sends it within
 that, and being woken takes a third of what a whole exchange does. With a single core the program needs it itself."""
 
@@ -97,16 +97,13 @@ class Host:
         self._attend(source, sink, lambda: None)
 
     def run(self) -> None:
-        """Move the world until the last has gone."""
+        """Move the world until the last has gone; then `close` is due."""
         waited = threading.Timer(FIRST_S, self._go_if_alone)
         waited.daemon = True
         waited.start()
         threading.Thread(target=self._look_around, name="kiks watch", daemon=True).start()
-        try:
-            while not self._is_over.is_set():
-                self._session.round()
-        finally:
-            self.close()
+        while not self._is_over.is_set():
+            self._session.round()
 
     def close(self) -> None:
         """Let nobody in any more, and end the world."""
