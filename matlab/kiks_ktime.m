@@ -20,10 +20,10 @@ if isempty(port) || ~isnumeric(port)
         shown(port));
 elseif port(1) >= 0
     t = robot_link('time', port(1));
-elseif simulator('--is-running', [])
+else
     % Who asks again and again without doing anything lets time pass.
     t = simulator('--clock', -port(1));
-    if isempty(t) || t == last
+    if (isempty(t) || t == last) && simulator('--is-running', [])
         t = sscanf(simulator(sprintf('time %d', -port(1))), '%f', 1);
     end
     last = t;

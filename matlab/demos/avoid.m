@@ -29,7 +29,10 @@ brightest = Inf;
 now_s = kiks_ktime(port);
 while now_s < seconds
     readings = kProximity(ref);
-    brightest = min([brightest; kAmbient(ref)]);
+    light = kAmbient(ref);
+    if numel(light) == 8
+        brightest = min([brightest; light]);
+    end
     [speeds, side] = away_from_walls(readings, 5, side);
     kSetSpeed(ref, speeds(1), speeds(2));
     loops = loops + 1;

@@ -6,9 +6,13 @@ function values = kask(ref, request, prefix, count, tries)
 
 values = -1;
 start = numel(prefix) + 1;
-command = [request char(10)];
 for attempt = 1:tries
-    reply = kiks_ksend(command, ref);
+    if numel(ref) == 4 && ref(1) == -1
+        % What kiks_ksend would do, without the call: programs ask thousands of times a second.
+        reply = simulator(['ask 1 ' request]);
+    else
+        reply = kiks_ksend([request char(10)], ref);
+    end
     if count == 0
         if strcmp(reply, prefix)
             values = 0;

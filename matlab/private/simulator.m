@@ -12,24 +12,29 @@ function payload = simulator(request, argument)
 %
 %   Each request has a ticket, which its answer repeats: what Ctrl-C has kept us from reading answers nothing else.
 
-persistent link tickets ticket line_feed answer answered
+persistent link is_pipe to from tickets ticket line_feed answer answered
 if nargin > 1
     payload = [];
     switch request
+        case '--clock'
+            if ~isempty(answer) && toc(answered) < 0.005
+                told = sscanf(answer(3:21), '%f');
+                if told(1) == argument
+                    payload = told(2);
+                end
+            end
         case '--is-running'
             payload = ~isempty(link);
-        case '--clock'
-            if numel(answer) > 20 && toc(answered) < 0.005
-                payload = clock_of(answer, argument);
-            end
         case '--join'
             if ~isempty(link)
                 error('kiks:session', 'A session must be left before another is joined. Call kiks_quit first.');
             end
             link = simulator_link('open', {'--join', sprintf('%d', argument)});
+            is_pipe = [];
         case '--end'
             ending = link;
             link = [];
+            answer = '';
             if ~isempty(ending)
                 simulator_link('close', ending);
             end
@@ -41,9 +46,13 @@ if isempty(link)
         error('kiks:session', 'A port must be open for that, but none is. Open it with ref = kiks_kopen([-1 9600 1]).');
     end
     link = simulator_link('open', {});
+    is_pipe = [];
 end
-if isempty(ticket)
+if isempty(is_pipe)
     mlock  % `clear all` in a user's program would lose the process
+    is_pipe = link.is_pipe;
+    to = link.to;
+    from = link.from;
     tickets = char(33:126);
     ticket = 0;
     line_feed = char(10);
@@ -54,17 +63,17 @@ if ticket > 94
 end
 line = [tickets(ticket) request line_feed];
 while true
-    if link.is_pipe
+    if is_pipe
         % In line here, as this is what a program does thousands of times a second.
-        fputs(link.to, line);
-        fflush(link.to);
-        answer = fread(link.from, [1 96], '*char');
+        fputs(to, line);
+        fflush(to);
+        answer = fread(from, [1 96], '*char');
         if numel(answer) < 96
             break
         end
         length_ = str2double(answer(1:8));
         if length_ > 88
-            answer = [answer, fread(link.from, [1 length_ - 88], '*char')];
+            answer = [answer, fread(from, [1 length_ - 88], '*char')];
         end
         answer = answer(9:length_ + 8);
     else
@@ -89,12 +98,4 @@ link = [];
 simulator_link('close', ending);
 error('kiks:session', ['The simulator must answer, but its process has ended. The world is lost: ' ...
     'start another one with kiks(ARENA).']);
-end
-
-function seconds = clock_of(answer, port)
-told = sscanf(answer(3:21), '%f');
-seconds = [];
-if told(1) == port
-    seconds = told(2);
-end
 end

@@ -56,7 +56,7 @@ if isempty(number)
     refuse(first, command);
 end
 name = sprintf('127.0.0.1:%d', number);
-link = struct('is_pipe', false, 'name', name, 'port', robot_port('open', name, 9600), 'rest', '');
+link = struct('is_pipe', false, 'to', [], 'from', [], 'name', name, 'port', robot_port('open', name, 9600), 'rest', '');
 robot_port('write', link.port, [token 10]);
 % Every connection begins with who is there.
 [~, link] = ask(link, '');

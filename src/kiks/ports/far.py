@@ -11,6 +11,8 @@ import socket
 import sys
 import threading
 from abc import ABC, abstractmethod
+from contextlib import AbstractContextManager
+from typing import Any
 
 from kiks.clock.line import BACKLOG_LIMIT
 from kiks.errors import LinkError
@@ -135,7 +137,7 @@ class FarLine:
     """A robot's line in a world that others share; see `Line`."""
 
     def __init__(self, connection: Connection, robot: int) -> None:
-        self.lock = connection.lock
+        self.lock: AbstractContextManager[Any] = connection.lock
         self._connection = connection
         self._robot = robot
         self._is_claimed = False

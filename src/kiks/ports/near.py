@@ -1,14 +1,17 @@
-"""The way of a program to a world of this process that it shares with others, each of which has a thread of its own.
+"""The way of a program to a world of this process that it may share with others, each with a thread of its own.
 
-Whoever needs an answer moves the world as far as it may go; only if somebody else has to act first does it wait.
+Whoever needs an answer moves the world as far as it may go; only if somebody else has to act first does it wait. Who is
+alone has nobody to wait for: then the line is that of the port in memory, and a third of the cost.
 """
 
 from __future__ import annotations
 
 from kiks.errors import LinkError
-from kiks.ports.far import Connection
+from kiks.ports.far import Connection, FarLine
+from kiks.ports.memory import NearLine
 from kiks.ports.messages import Answer, Kind, Request
 from kiks.ports.programs import Programs
+from kiks.sim.simulation import Simulation
 
 
 class NearConnection(Connection):
@@ -50,6 +53,16 @@ class NearConnection(Connection):
                     programs.wait(wait_s)
         return answer
 
+    @property
+    def is_alone(self) -> bool:
+        """Say whether nobody else takes part, and everything is done that this program has said."""
+        return not (self._programs.is_shared or self._guest.is_held_up or self._guest.has_left)
+
+    def come_to(self, time_ns: int) -> None:
+        """Go on from a time [ns] to which the program has moved the world itself."""
+        self._now_ns = self._told_ns = self._guest.acts_from_ns = time_ns
+        self._is_to_meet = False
+
     def rest(self) -> None:
         """Let the others go on without this program, until `wake`; what was said is still done."""
         self._is_resting = True
@@ -68,3 +81,56 @@ class NearConnection(Connection):
         with self._world:
             self._guest.leave()
             self._programs.move()
+
+
+class VisitorLine(FarLine):
+    """A robot's line in a world of this process; see `Line`.
+
+    Args:
+        connection: The program's way to the world.
+        sim: The world.
+        robot: Number of the robot, from 1.
+    """
+
+    def __init__(self, connection: NearConnection, sim: Simulation, robot: int) -> None:
+        super().__init__(connection, robot)
+        self.lock = sim.lock
+        self._sim = sim
+        self._way = connection
+        self._near = NearLine(sim, robot)
+
+    def think(self, time_ns: int) -> None:
+        """Let the time pass that the program has thought [ns]."""
+        if self._way.is_alone:
+            self._near.think(time_ns)
+            self._way.come_to(self._sim.now_ns)
+        else:
+            super().think(time_ns)
+
+    def pass_to(self, time_ns: int) -> None:
+        """Let time pass up to a time [ns]."""
+        if self._way.is_alone:
+            self._near.pass_to(time_ns)
+            self._way.come_to(self._sim.now_ns)
+        else:
+            super().pass_to(time_ns)
+
+    def send(self, data: bytes) -> None:
+        """Put characters on the line; wait while it is full."""
+        if self._way.is_alone:
+            self._near.send(data)
+            self._way.come_to(self._sim.now_ns)
+        else:
+            super().send(data)
+
+    def read(self, size: int | None, terminator: bytes | None, timeout_ns: int | None, poll_ns: int) -> bytes:
+        """Wait for `size` characters or a terminator; see `Line.read`.
+
+        Raises:
+            LinkError: If it could wait for ever.
+        """
+        if not self._way.is_alone:
+            return super().read(size, terminator, timeout_ns, poll_ns)
+        data = self._near.read(size, terminator, timeout_ns, poll_ns)
+        self._way.come_to(self._sim.now_ns)
+        return data

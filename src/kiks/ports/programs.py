@@ -201,8 +201,8 @@ class Programs:
 
     @property
     def is_shared(self) -> bool:
-        """Say whether more than one program takes part."""
-        return len(self._turns.players) > 1
+        """Say whether more than one program takes part, or is waited for to begin."""
+        return len(self._turns.players) > 1 or not self._turns.has_begun
 
     def move(self) -> float | None:
         """Do what may be done now, unless another thread is at it; the caller holds the lock. See `Turns.advance`."""

@@ -9,9 +9,8 @@ from typing import NoReturn, TypeVar
 
 from kiks.clock.program import Program
 from kiks.errors import LinkError
-from kiks.ports.far import FarLine
 from kiks.ports.messages import Kind
-from kiks.ports.near import NearConnection
+from kiks.ports.near import NearConnection, VisitorLine
 from kiks.ports.port import VirtualPort
 from kiks.sim.simulation import Simulation
 from kiks.toolbox.session import Session
@@ -118,7 +117,7 @@ class Visitor:
     def _open(self, number: int, baud: int, connection: NearConnection, sim: Simulation) -> OpenPort:
         known = self.openings.get(number)
         robot = self.session.take_robot(self, self._usual_robot(number)) if known is None else known.robot
-        port = VirtualPort(FarLine(connection, robot), self._program)
+        port = VirtualPort(VisitorLine(connection, sim, robot), self._program)
         port.baudrate = baud
         port.claim(f"{self.name}, port {-number}")
         port.timeout = ANSWER_S

@@ -1,0 +1,187 @@
+"""Programs of Octave as processes: what they print, what they say, and that nothing of them is left.
+
+A program says values for Python with say('name', value) and takes the message of an error with caught(@() ...); both are
+in `support`. Each has a folder of its own, for its files and for what tells where its session is found.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shutil
+import signal
+import subprocess
+import threading
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+GUARD_S = 100.0
+"""After so long a program is taken to hang [s]."""
+
+ROOT = Path(__file__).parents[2]
+TOOLBOX = ROOT / "matlab"
+DEMOS = TOOLBOX / "demos"
+SUPPORT = Path(__file__).parent / "support"
+
+OCTAVE = shutil.which("octave-cli")
+
+needs_octave = pytest.mark.skipif(OCTAVE is None, reason="octave-cli is not here: apt-get install octave")
+
+_BEGIN = f"""\
+1;
+more off
+addpath('{TOOLBOX}')
+addpath('{SUPPORT}')
+global KIKS_THINKING KIKS_SEED
+KIKS_THINKING = 'none';
+KIKS_SEED = 1;
+rand('twister', 1);
+"""
+
+
+class Octave:
+    """A program that runs in Octave.
+
+    It finds the toolbox; thinking costs nothing, and seeds are set, so that each run is the same.
+
+    Args:
+        program: Its text.
+        folder: Where it runs.
+        environment: Variables of the environment besides those that there are.
+        shares: Another program, whose sessions it shall find.
+
+    Attributes:
+        lines: What it has printed, without what it has said.
+        said: What it has said, by name.
+    """
+
+    def __init__(
+        self, program: str, folder: Path, environment: Mapping[str, str] | None = None, *, shares: Octave | None = None
+    ) -> None:
+        assert OCTAVE is not None
+        self.lines: list[str] = []
+        self.said: dict[str, Any] = {}
+        self._news = threading.Condition()
+        self._is_over = False
+        self.doors = folder / "doors" if shares is None else shares.doors
+        self.doors.mkdir(exist_ok=True)
+        file = folder / f"program_{len(list(folder.glob('program_*')))}.m"
+        file.write_text(_BEGIN + program, encoding="utf-8")
+        hidden = ("DISPLAY", "WAYLAND_DISPLAY", "KIKS_COMMAND", "KIKS_TRANSPORT")
+        own = {name: value for name, value in os.environ.items() if name not in hidden}
+        own |= {"KIKS_WINDOW": "0", "XDG_RUNTIME_DIR": str(self.doors), **(environment or {})}
+        self._process = subprocess.Popen(
+            [OCTAVE, "--no-gui", "-qf", file.name],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            cwd=folder,
+            env=own,
+            text=True,
+            # So that all of it can be killed at once.
+            start_new_session=True,
+        )
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def __enter__(self) -> Octave:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.end()
+
+    def children(self) -> list[int]:
+        """Return the numbers of the processes that Octave has started and that are there."""
+        number = self._process.pid
+        return [int(word) for word in Path(f"/proc/{number}/task/{number}/children").read_text().split()]
+
+    def wait_for(self, name: str) -> Any:
+        """Wait until the program has said something, and return it."""
+        with self._news:
+            is_there = self._news.wait_for(lambda: name in self.said or self._is_over, GUARD_S)
+        assert is_there, f"it has not said {name}:\n{self.text}"
+        assert name in self.said, f"it never said {name}:\n{self.text}"
+        return self.said[name]
+
+    def wait_for_line(self, begin: str) -> None:
+        """Wait until the program has printed a line that begins so."""
+        with self._news:
+            self._news.wait_for(lambda: self._is_over or any(line.startswith(begin) for line in self.lines), GUARD_S)
+        assert any(line.startswith(begin) for line in self.lines), f"it has not printed {begin!r}:\n{self.text}"
+
+    def tell(self) -> None:
+        """Let a program go on that waits in input of a line."""
+        assert self._process.stdin is not None
+        self._process.stdin.write("\n")
+        self._process.stdin.flush()
+
+    def kill(self) -> None:
+        """Kill Octave, and nothing else."""
+        self._process.kill()
+
+    def finish(self, status: int = 0) -> Octave:
+        """Wait until Octave and all that it has started are gone."""
+        try:
+            assert self._process.wait(GUARD_S) == status, self.text
+            # Every process that it has started has its output open.
+            self._reader.join(GUARD_S)
+            assert not self._reader.is_alive(), f"something is left of it:\n{self.text}"
+        except subprocess.TimeoutExpired:
+            raise AssertionError(f"it did not end:\n{self.text}") from None
+        return self
+
+    def end(self) -> None:
+        """Kill all of it, whatever it does."""
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait(GUARD_S)
+        self._reader.join(GUARD_S)
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+
+    def line(self, begin: str) -> str:
+        """Return the rest of the one line that begins so."""
+        found = [line for line in self.lines if line.startswith(begin)]
+        assert len(found) == 1, self.text
+        return found[0].removeprefix(begin)
+
+    @property
+    def text(self) -> str:
+        """What it has printed, for a person."""
+        with self._news:
+            return "\n".join(self.lines)
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        with self._process.stdout as output:
+            for line in output:
+                with self._news:
+                    if line.startswith("@"):
+                        name, size, value = line[1:].split(" ", 2)
+                        self.said[name] = _value(json.loads(size), json.loads(value))
+                    elif "ignoring const execution_exception" not in line:  # which Octave 7.3 says at each end
+                        self.lines.append(line.rstrip("\n"))
+                    self._news.notify_all()
+        with self._news:
+            self._is_over = True
+            self._news.notify_all()
+
+
+def run(program: str, folder: Path, environment: Mapping[str, str] | None = None) -> Octave:
+    """Run a program to its end; it must have no error, and nothing of it may be left."""
+    with Octave(program, folder, environment) as octave:
+        return octave.finish()
+
+
+def _value(size: list[int], value: Any) -> Any:
+    """Return a text, a number or a matrix."""
+    if isinstance(value, str):
+        return value
+    if size == [1, 1]:
+        return float("nan") if value is None else float(value)
+    return np.array(value, np.float64).reshape(size)

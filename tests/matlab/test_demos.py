@@ -1,0 +1,145 @@
+"""The demos: each runs with its usual arguments and does what its help says."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.matlab.octave import DEMOS, Octave, needs_octave, run
+
+pytestmark = [needs_octave, pytest.mark.slow]
+
+WITH_DEMOS = f"addpath('{DEMOS}')\n"
+
+NAMES = {"avoid", "battle", "camera", "clean", "dance", "follow", "football", "maze", "mv80mm", "siminfo"}
+
+
+def test_single_robots_avoid_follow_and_measure(tmp_path: Path) -> None:
+    done = run(
+        WITH_DEMOS
+        + """
+avoid
+say('avoid_path', kiks_siminfo_robotpath())
+kiks_arena
+follow
+ref = kiks_kopen();
+say('beside', kProximity(ref))
+say('followed', kiks_siminfo_robotpos())
+kiks_kclose(ref)
+kiks_arena
+mv80mm
+say('went', kiks_siminfo_robotdist())
+siminfo(-1, 9600, 20)
+say('ball', kiks_siminfo_objects())
+ref = kiks_kopen();
+kiks_pause(0.5)
+say('later', kiks_siminfo_objects())
+say('speeds', kGetSpeed(ref))
+for name = {'avoid', 'follow', 'clean', 'maze', 'mv80mm', 'siminfo', 'camera', 'battle', 'football', 'dance'}
+    say(['help_' name{1}], help(name{1}))
+end
+""",
+        tmp_path,
+    )
+    # avoid: it cruises at 41 mm/s, and in no ten seconds does it stay within 50 mm.
+    way_mm, loops_per_s = map(float, re.findall(r"(\d+) mm .* loops, ([\d.]+) a second", done.line("avoid: "))[0])
+    assert 60 * 25 < way_mm < 60 * 45
+    assert 10 < loops_per_s < 16
+    path = done.said["avoid_path"]
+    assert path.shape[1] > 1000
+    spans = [np.ptp(path[:, at : at + 250], axis=1).max() for at in range(0, path.shape[1] - 250, 50)]
+    assert min(spans) > 50
+    # follow: the wall is on the left, so it goes round clockwise.
+    assert float(re.findall(r"there for (\d+) %", done.line("follow: "))[0]) > 80
+    assert done.said["beside"][:2].max() > 60
+    assert done.said["followed"][0, 2] < np.pi / 2 - 2
+    # mv80mm
+    by_time, by_counters = (float(line) for line in re.findall(r"mv80mm: ([\d.]+) mm", done.text))
+    assert by_time == pytest.approx(82, abs=2)
+    assert by_counters == pytest.approx(80, abs=2)
+    assert done.said["went"][0, 0] == pytest.approx(by_time + by_counters, abs=5)
+    # siminfo: the ball rolls on when the demo has gone, the robot stands.
+    kind, x, y, speed, _ = done.said["ball"][0]
+    assert (kind, speed) == (2, pytest.approx(100, abs=20))
+    assert np.hypot(*(done.said["later"][0, 1:3] - (x, y))) > 20
+    assert not done.said["speeds"].any()
+    # Whatever is there has help, and is tested here.
+    assert {path.stem for path in DEMOS.glob("*.m")} == NAMES
+    for name in NAMES:
+        assert re.search(rf"^\s*{name}  Demo: .*\bExample:.*\bSee also ", done.said[f"help_{name}"], flags=re.DOTALL)
+
+
+def test_cylinders_come_to_the_walls_balls_into_the_goal_and_robots_out_of_mazes(tmp_path: Path) -> None:
+    done = run(
+        WITH_DEMOS
+        + """
+clean
+say('cylinders', kiks_siminfo_objects())
+maze
+ref = kiks_kopen();
+say('light', kAmbient(ref))
+say('robot', kiks_siminfo_robotpos())
+say('lamp', kiks_siminfo_objects())
+kiks_kclose(ref)
+football(-1, 9600, 60)
+say('port', kiks_ktime(-1))
+""",
+        tmp_path,
+    )
+    turns, tidy, tidy_before = map(
+        int, re.findall(r"back (\d+) times.*\nclean: (\d+) of 12 .* start it was (\d+)", done.text)[0]
+    )
+    assert turns > 10
+    assert tidy >= 7
+    assert tidy > tidy_before
+    places = done.said["cylinders"][:, 1:3]
+    assert places.shape == (12, 2)
+    assert (np.minimum(places, 501 - places).min(axis=1) <= 60).sum() == tidy
+    assert int(re.findall(r"at the light after .* reads (\d+)", done.line("maze: "))[0]) <= 55
+    assert done.said["light"].min() < 75
+    assert np.hypot(*(done.said["robot"][0, :2] - done.said["lamp"][0, 1:3])) < 50
+    assert int(re.findall(r"football: (\d+) goals", done.text)[0]) >= 3
+    assert done.said["port"].size == 0, "the port is closed"
+
+
+def test_cameras_show_bands_and_guns_hit_robots(tmp_path: Path) -> None:
+    done = run(
+        WITH_DEMOS
+        + """
+camera
+kiks_quit
+battle(-1, 9600, 60)
+""",
+        tmp_path,
+    )
+    pictures = re.findall(r"camera: +[\d.]+ s \[(.{64})\]", done.text)
+    assert len(pictures) == 12
+    assert all(len(set(picture)) >= 3 for picture in pictures)
+    darkest, brightest = map(int, re.findall(r"greys from (\d+) to (\d+)", done.text)[0])
+    assert darkest < 60
+    assert brightest > 220
+    reports = re.findall(r"battle: at \((\d+), (\d+)\) mm, angle (\d+), distance (\d+) mm, energy (\d+)", done.text)
+    assert 50 <= len(reports) <= 62
+    numbers = np.array(reports, int)
+    assert (numbers[:, 2] < 360).all()
+    assert (np.ptp(numbers[:, :2], axis=0) > 100).any()
+    shots, hits = map(int, re.findall(r"battle: (\d+) shots .*, (\d+) of them hit", done.text)[0])
+    assert shots >= hits >= 1
+
+
+def test_two_programs_dance_in_one_world(tmp_path: Path) -> None:
+    program = "dance(-1, 9600, 8)\nsay('pose', kiks_siminfo_robotpos())\n"
+    with Octave(WITH_DEMOS + program, tmp_path) as leader:
+        leader.wait_for_line("dance: waiting for a partner")
+        with Octave(WITH_DEMOS + "kiks('--join')\n" + program, tmp_path, shares=leader) as partner:
+            partner.finish()
+            leader.finish()
+    led = int(re.findall(r"led (\d+) figures", leader.text)[0])
+    danced, with_whom = map(int, re.findall(r"danced (\d+) figures with robot (\d+)", partner.text)[0])
+    assert led == danced >= 4
+    assert with_whom == 1
+    assert np.hypot(*(leader.said["pose"][0, :2] - (200, 200))) < 40
+    assert np.hypot(*(partner.said["pose"][0, :2] - (400, 200))) < 40

@@ -1,0 +1,225 @@
+"""Arenas in files and matrices: what is written is read, greys are seen, and mazes can be walked through."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from scipy.io import loadmat
+from scipy.ndimage import label
+
+from kiks.model.arena import Arena
+from kiks.model.kad import save_kad
+from kiks.model.project import Project
+from tests.matlab.octave import needs_octave, run
+
+pytestmark = needs_octave
+
+BOTH_WAYS = """
+arena = zeros(200, 300);
+arena([1:10 191:200], :) = 1;
+arena(60:80, 100:103) = 1;
+arena(150, 50) = -90;
+arena(40, 40) = 2;
+arena(100, 200) = 3;
+arena(150, 250) = 4;
+greys = 60 * (arena == 1);
+greys(60:80, 100:103) = 200;
+kiks(arena, greys)
+say('objects', kiks_siminfo_objects())
+kiks_save('octave.kad')
+kiks_save('octave.kiks')
+kiks_save('octave.toml')
+data = load('-mat', 'octave.kad');
+say('walls', data.walls)
+[walls, colours] = kiks_kad2arena(data.walls);
+say('drawn', double(walls) .* double(colours))
+say('drawn_class', [class(walls) ' ' class(colours)])
+kiks_arena
+kiks_load('octave.kad')
+say('kad_pose', kiks_siminfo_robotpos())
+say('kad_objects', kiks_siminfo_objects())
+kiks_load('octave.kiks')
+say('kiks_pose', kiks_siminfo_robotpos())
+say('kiks_objects', kiks_siminfo_objects())
+kiks_load('octave.toml')
+say('toml_pose', kiks_siminfo_robotpos())
+for name = {'python.kad', 'octave.kad', 'plain.tif', 'packed.tif', 'octave.toml'}
+    [walls, colours] = kiks_tif2arena(name{1});
+    say(strtok(strrep(name{1}, '.', '_')), double(colours))
+    say(['class_' strrep(name{1}, '.', '_')], [class(walls) ' ' class(colours)])
+end
+data = load('-mat', 'python.kad');
+[walls, colours] = kiks_kad2arena(data.walls);
+say('python_drawn', double(colours))
+[walls, colours] = kiks_tif2arena('nowhere.tif');
+say('nowhere', [size(walls) size(colours)])
+kiks_arena('packed.tif')
+kiks_save('packed.kad')
+kiks_quit(1)
+"""
+
+
+def test_files_of_octave_and_python_are_the_same(tmp_path: Path) -> None:
+    random = np.random.default_rng(5)
+    picture = np.kron(random.choice(np.array([0, 0, 0, 90, 255], np.uint8), (12, 15)), np.ones((10, 10), np.uint8))
+    picture[20:100, 40:120] = 0
+    Image.fromarray(picture).save(tmp_path / "plain.tif")
+    Image.fromarray(picture).save(tmp_path / "packed.tif", compression="packbits")
+    assert (tmp_path / "plain.tif").stat().st_size > 2 * (tmp_path / "packed.tif").stat().st_size
+    save_kad(Arena.from_array(picture), tmp_path / "python.kad")
+    done = run(BOTH_WAYS, tmp_path)
+    said = done.said
+
+    ours = np.zeros((200, 300))
+    ours[:10] = ours[190:] = 60
+    ours[59:80, 99:103] = 200
+    there = Arena.load(tmp_path / "octave.kad")
+    assert np.array_equal(there.brightness[::-1], ours)
+    assert (len(there.starts), len(there.lamps), len(there.balls), len(there.cylinders)) == (1, 1, 1, 1)
+    assert np.array_equal(loadmat(tmp_path / "octave.kad")["walls"][0], said["walls"][0])
+    assert np.array_equal(said["drawn"], ours)
+    assert said["drawn_class"] == "logical uint8"
+    assert said["kad_pose"][0] == pytest.approx([50, 150, np.pi / 2])
+    assert said["objects"][:, :3].tolist() == [[1, 40, 40], [2, 200, 100], [3, 250, 150]]
+    assert np.array_equal(said["kad_objects"], said["objects"])
+    assert np.array_equal(said["kiks_objects"], said["objects"])
+    assert np.array_equal(said["kiks_pose"], said["kad_pose"])
+    assert np.array_equal(said["toml_pose"], said["kad_pose"])
+    assert np.array_equal(Project.load(tmp_path / "octave.kiks").arena.brightness[::-1], ours)
+    assert Project.load(tmp_path / "octave.kiks").seed == 1
+
+    for name in ("plain_tif", "packed_tif", "python_kad"):
+        assert np.array_equal(said[name], picture), name
+        assert said[f"class_{name}"] == "logical uint8"
+    assert np.array_equal(said["octave_kad"], ours)
+    assert np.array_equal(said["octave_toml"], ours)
+    assert np.array_equal(said["python_drawn"], picture)
+    assert said["nowhere"].tolist() == [[0, 0, 0, 0]]
+    assert re.search(r"warning: The arena's file must exist, but 'nowhere\.tif' ", done.text)
+    assert np.array_equal(Arena.load(tmp_path / "packed.kad").brightness[::-1], picture)
+
+
+GREYS = """
+global KIKS_ARENA_CODING KIKS_NOISE KIKS_ARENA_DEFAULT_COLOR
+KIKS_NOISE = 0;
+arena = zeros(300, 300);
+arena(100:110, :) = 1;
+arena(130 + 28, 150) = -90;
+names = {'white', 'grey', 'black', 'default', 'default_grey'};
+greys = {255, 120, 1, [], []};
+defaults = [255 255 255 255 120];
+for k = 1:5
+    KIKS_ARENA_DEFAULT_COLOR = defaults(k);
+    if isempty(greys{k})
+        kiks_arena(arena)
+    else
+        kiks_arena(arena, greys{k} * arena .* (arena == 1))
+    end
+    ref = kiks_kopen;
+    say(names{k}, max(kProximity(ref)))
+end
+% An element of 0 in the mask does not make a hole.
+kiks_arena(arena, zeros(size(arena)))
+ref = kiks_kopen;
+say('zero', max(kProximity(ref)))
+say('logical', caught(@() kiks_arena(arena, ones(2))))
+
+codes = zeros(200);
+codes(50, 60) = 2;
+codes(100, 150) = 3;
+codes(150, 60) = 4;
+kiks_arena(codes)
+say('kiks', kiks_siminfo_objects())
+KIKS_ARENA_CODING = 'thesis';
+kiks_arena(codes)
+say('thesis', kiks_siminfo_objects())
+maze = kiks_generate_maze(2, 2);
+say('thesis_light', sum(maze(:) == 3))
+kiks_arena(maze)
+say('thesis_maze', kiks_siminfo_objects())
+KIKS_ARENA_CODING = 'kiks';
+% Several starts: the most negative is the first robot's; what is too small is replaced.
+codes = zeros(300);
+codes(100, 100) = -90;
+codes(200, 200) = -360;
+kiks_arena(codes)
+say('first', kiks_siminfo_robotpos(-1))
+say('second', kiks_siminfo_robotpos(-2))
+kiks_arena(zeros(99, 200))
+say('replaced', kiks_siminfo_robotpos())
+say('wrong', caught(@() kiks_arena(NaN(200))))
+"""
+
+
+def test_greys_are_seen_and_codes_mean_what_is_set(tmp_path: Path) -> None:
+    done = run(GREYS, tmp_path)
+    said = done.said
+    assert said["white"] > said["grey"] > said["black"]
+    assert said["white"] - said["black"] > 100
+    assert said["default"] == said["white"]
+    assert said["default_grey"] == said["grey"]
+    assert said["zero"] == said["black"]
+    assert said["logical"].startswith("kiks:argument|The colormask must be a matrix as large as the arena")
+    assert said["kiks"][:, :3].tolist() == [[1, 60, 50], [2, 150, 100], [3, 60, 150]]
+    assert said["thesis"][:, :3].tolist() == [[1, 150, 100], [2, 60, 50], [3, 60, 150]]
+    assert said["thesis_light"] == 1
+    assert said["thesis_maze"][:, 0].tolist() == [1]
+    assert said["first"][0] == pytest.approx([200, 200, 0], abs=1e-9)
+    assert said["second"][0] == pytest.approx([100, 100, np.pi / 2])
+    assert "warning: An arena must be at least 100 x 100 mm" in done.text
+    assert said["replaced"][0, :2] == pytest.approx([250.5, 325.5])
+    assert said["wrong"].startswith("kiks:argument|An arena's elements must be")
+
+
+MAZES = """
+for k = 1:12
+    rand('twister', k);
+    say(sprintf('demo_%d', k), kiks_generate_maze(5, 5))
+end
+say('usual', kiks_generate_maze())
+say('wide', kiks_generate_maze(3, 2, 150, 20))
+say('one', kiks_generate_maze(1, 1))
+rand('twister', 1);
+say('again', kiks_generate_maze(5, 5))
+kiks_arena(kiks_generate_maze(5, 5))
+say('pose', kiks_siminfo_robotpos())
+say('lamp', kiks_siminfo_objects())
+kiks_quit(1)
+"""
+
+
+@pytest.mark.slow
+def test_mazes_have_their_size_and_every_cell_can_be_reached(tmp_path: Path) -> None:
+    said = run(MAZES, tmp_path).said
+    assert len({said[f"demo_{k}"].tobytes() for k in range(1, 13)}) == 12
+    assert np.array_equal(said["demo_1"], said["again"])
+    mazes = [(said[f"demo_{k}"], 5, 5, 120, 10) for k in range(1, 13)]
+    mazes += [(said["usual"], 4, 4, 120, 10), (said["wide"], 3, 2, 150, 20), (said["one"], 1, 1, 120, 10)]
+    for maze, columns, rows, path, wall in mazes:
+        pitch = path + wall
+        # kiks-behaviour.md 1.9; twice a wall less than its sum of widths, as both outer walls stand on paths.
+        assert maze.shape == (rows * pitch - wall, (columns + 2) * path + (columns - 1) * wall)
+        assert maze[:10].all()
+        assert maze[-11:].all()
+        assert maze[:, :10].all()
+        assert maze[:, -11:].all()
+        ((y, x),) = np.argwhere(maze == -360)
+        assert (y + 1, x + 1) == (round(path / 2), round((wall + path) / 2) - wall)
+        ((light_y, light_x),) = np.argwhere(maze == 2)
+        assert (light_y + 1) == maze.shape[0] - path + round(path / 2)
+        assert abs(light_x - (maze.shape[1] - path / 2)) <= wall
+        # One piece of floor, in which each cell's middle lies: the entrance, the cells and the exit.
+        pieces, count = label(maze != 1)
+        assert count == 1
+        for row in range(rows):
+            for column in range(columns):
+                assert pieces[row * pitch + path // 2, (column + 1) * pitch - wall + path // 2] == 1
+        # Exactly one way to each: all walls hang together.
+        assert label(maze == 1, np.ones((3, 3)))[1] == 1
+    assert said["demo_1"].shape == (640, 880)
+    assert said["pose"][0] == pytest.approx([55, 60, 0], abs=1e-9)
+    assert said["lamp"][0, :3].tolist() == [1, 830, 580]

@@ -1,0 +1,350 @@
+"""Programs as people wrote them for the Matlab KiKS (kiks-behaviour.md 4.3): their ways run unchanged."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.matlab.octave import needs_octave, run
+
+pytestmark = needs_octave
+
+# ---- programs of one loop, ended by the clock, with conditions on vectors ----
+
+LOOPS = """
+clear all
+close all
+% A wanderer that backs off when both wheels lag behind.
+spd = [10; 10];
+backed = 0;
+loops = 0;
+ref = kiks_kopen([-1, 9600, 1]);
+kSetEncoders(ref, 0, 0);
+t0 = clock;
+while (kiks_ktime(-1) < 20)
+    prox = kProximity(ref);
+    light = kAmbient(ref);
+    stat = kGetStatus(ref);
+    err = [stat(3); stat(6)];
+    if err > spd * 0.8
+        kSetEncoders(ref, 0, 0);
+        kMoveTo(ref, -200, -200);
+        status = kGetStatus(ref);
+        while status(1) + status(4) < 2
+            status = kGetStatus(ref);
+            kiks_pause(0.1);
+        end;
+        kMoveTo(ref, -700, 300);
+        status = kGetStatus(ref);
+        while status(1) + status(4) < 2
+            status = kGetStatus(ref);
+            kiks_pause(0.1);
+        end;
+        backed = backed + 1;
+    end;
+    kSetSpeed(ref, spd(1), spd(2));
+    kiks_pause(0.05);
+    loops = loops + 1;
+end;
+say('real_s', etime(clock, t0))
+say('backed', backed)
+say('loops', loops)
+say('time', kiks_ktime(-1))
+% Closed without being stopped: it drives on as soon as time passes again.
+kSetSpeed(ref, 3, -3);
+kiks_kclose(ref);
+say('closed_at', kiks_siminfo_robotpos())
+ref = kiks_kopen([-1, 9600, 1]);
+say('begins', kiks_ktime(-1))
+kiks_pause(1)
+say('drove_on', kiks_siminfo_robotpos())
+say('counts_on', kGetEncoders(ref))
+% Endless, but for a count; waiting by a vector of times; a program that forgets everything.
+i = 0;
+t = Inf;
+while kiks_ktime(-1) < t
+    kSetSpeed(ref, 5, 5);
+    i = i + 1;
+    if i == 20, t = 0; end;
+end;
+start = kiks_ktime(ref);
+while kiks_ktime(ref) - start < 2
+end;
+say('waited', kiks_ktime(ref) - start)
+clear all
+kiks_kclose([]);
+ref = kiks_kopen([-1, 9600, 1]);
+say('after_clear', kProximity(ref))
+% The lines that follow in many programs: replies taken to pieces.
+reply = kiks_ksend(['H' 10], ref);
+[value, count, errmsg] = sscanf(reply, 'h,%d,%d');
+say('pieces', [numel(value) count isempty(errmsg)])
+say('letter', strcmp(reply(1), 'h'))
+kiks_kclose(ref);
+"""
+
+
+def test_loops_end_by_the_clock_and_compare_vectors(tmp_path: Path) -> None:
+    said = run(LOOPS, tmp_path).said
+    assert said["backed"] >= 1, "it has met a wall, and felt it"
+    assert said["loops"] > 50
+    assert 20 <= said["time"] < 25
+    assert said["real_s"] < 20, "no real second for each simulated one"
+    assert said["begins"] < 0.1
+    assert said["drove_on"][0, 2] - said["closed_at"][0, 2] < -0.5
+    assert said["drove_on"][0, :2] == pytest.approx(said["closed_at"][0, :2], abs=5)
+    assert (said["counts_on"] != 0).all()
+    assert said["waited"].shape == (1, 4)
+    assert 2 <= said["waited"][0, 0] < 2.1
+    assert said["after_clear"].shape == (8, 1)
+    assert said["pieces"].tolist() == [[2, 2, 1]]
+    assert said["letter"] == 1
+
+
+# ---- scripts that print what they get, with commands of text and the number 10 ----
+
+PRINTING = """
+ref = kiks_kopen([-1 9600 1])
+kiks_ksend(['D,10,10' 10], ref)
+kiks_ksend(['N' 10], ref)
+kProximity(ref)
+for i = 1:10
+    kiks_ksend(['D,' num2str(i) ',' num2str(i) 10], ref);
+end
+t = kiks_ktime(-1)
+kiks_ksend([68 44 48 44 48 10], ref)
+kiks_kclose(ref)
+[bios, protocol] = kBios(kiks_kopen)
+kiks_kopen([-1 9600 1])
+"""
+
+
+def test_scripts_without_semicolons_print_replies_and_opening_twice_ends_them(tmp_path: Path) -> None:
+    (tmp_path / "straight.m").write_text(PRINTING)
+    done = run("say('why', caught(@straight))\nkiks_kclose([])\nsay('opens', kiks_kopen)\n", tmp_path)
+    text = "\n".join(line for line in done.lines if line)
+    assert re.search(r"^ref =\n +-1 +-1 +-1 +-1\nans = d\nans = n(,\d+){8}\nans =\n( +\d+\n){8}t = 0\.\d+\nans = d\n", text)
+    assert re.search(r"bios = \d+(\.\d+)?\nprotocol = \d+(\.\d+)?$", text)
+    assert "warning" not in text
+    assert re.match(r"kiks:\w+\|port -1 must be closed before it is opened.*kiks_kclose\(\[\]\)", done.said["why"])
+    assert done.said["opens"].tolist() == [[-1, -1, -1, -1]]
+
+
+# ---- worlds of landmarks: moves of 10 mm and turns of 508 pulses, with sensors read on the way ----
+
+LANDMARKS = """
+function [x, i] = moved(ref, left, right)
+    % Moves, and reads the sensors as columns of a matrix meanwhile.
+    kSetEncoders(ref, 0, 0);
+    kMoveTo(ref, left, right);
+    status = kGetStatus(ref);
+    x = [];
+    i = 0;
+    while status(1) + status(4) < 2
+        i = i + 1;
+        x(:, i) = kProximity(ref);
+        status = kGetStatus(ref);
+    end
+    kSetSpeed(ref, 0, 0);
+    kiks_pause(0.2)
+end
+
+ARENA = zeros(500, 500);
+ARENA(130, 250) = -270;
+ARENA(275:285, 245:255) = 1;
+ARENA(160:170, 280:290) = 1;
+kiks(ARENA);
+say('start', kiks_siminfo_robotpos())
+ref = kiks_kopen([-1, 9600, 100]);
+kSetProfile(ref, 20, 64, 20, 64);
+passes = [];
+for step = 1:11
+    [x, i] = moved(ref, kiks_mm2p(10), kiks_mm2p(10));
+    passes(step) = i;
+    reading = mean(x, 2);
+    say(sprintf('reading_%d', step), reading)
+end
+say('passes', passes)
+say('moved', kiks_siminfo_robotpos())
+for step = 1:10
+    moved(ref, 51, -51);
+end
+say('turned', kiks_siminfo_robotpos())
+[x, i] = moved(ref, -508, 508);
+say('turned_back', kiks_siminfo_robotpos())
+say('way', kiks_p2mm(508))
+kiks_kclose(ref);
+kiks(zeros(800, 800))
+say('same_world', kiks_siminfo_objects())
+kiks_quit
+say('none', kiks_siminfo_robotpos())
+
+ARENA = zeros(800, 800);
+ARENA(300, 400) = -270;
+ARENA(450:470, 390:410) = 1;
+ARENA(200:220, 500:580) = 1;
+ARENA(500:560, 200:220) = 1;
+kiks(ARENA);
+say('start_800', kiks_siminfo_robotpos())
+ref = kiks_kopen([-1, 9600, 100]);
+[x, i] = moved(ref, kiks_mm2p(100), kiks_mm2p(100));
+say('before_block', kProximity(ref))
+kiks_kclose(ref);
+"""
+
+
+def test_landmarks_are_met_where_they_are(tmp_path: Path) -> None:
+    said = run(LANDMARKS, tmp_path).said
+    down = 3 * np.pi / 2
+    assert said["start"][0] == pytest.approx([250, 130, down])
+    assert said["start_800"][0] == pytest.approx([400, 300, down])
+    assert (said["passes"] >= 1).all(), "each move lasts longer than an exchange"
+    assert said["moved"][0] == pytest.approx([250, 240, down], abs=2)
+    # The block beside the way is seen on the left, which is where x is large, and then the one ahead.
+    assert max(said[f"reading_{step}"][0, 0] for step in range(1, 12)) > 100
+    assert said["reading_11"][2:4].max() > 200
+    assert said["reading_1"][2:4].max() < 50
+    assert said["turned"][0, 2] - said["moved"][0, 2] == pytest.approx(-np.pi / 2, abs=0.1)
+    assert said["turned_back"][0, 2] - said["turned"][0, 2] == pytest.approx(np.pi / 2, abs=0.05)
+    assert said["way"] == pytest.approx(41.65, abs=0.01)
+    assert said["same_world"].shape == (0, 5)
+    assert said["none"].size == 0
+    assert said["before_block"][2:4].max() > 20
+
+
+# ---- programs that steer by the battle turret's compass ----
+
+COMPASS = """
+function face(ref, wanted)
+    % Turns until the compass is within ten degrees of what is wanted.
+    a = kBattle_sensors(ref);
+    while a(3) < wanted - 5 || a(3) > wanted + 5
+        kiks_ksend(['D,10,0' 10], ref);
+        a = kBattle_sensors(ref);
+    end
+    kiks_ksend(['D,0,0' 10], ref);
+end
+
+kiks
+ref = kiks_kopen([-1 9600 1]);
+for wanted = [180 90 270 45]
+    face(ref, wanted);
+    kiks_pause(0.2)
+    a = kBattle_sensors(ref);
+    say(sprintf('faces_%d', wanted), a(3))
+end
+angles = [];
+kiks_ksend(['D,10,-10' 10], ref);
+for i = 1:100
+    a = kBattle_sensors(ref);
+    angles(i) = a(3);
+end
+kiks_ksend(['D,0,0' 10], ref);
+say('angles', angles)
+% Greedy: towards a place, turning by what it sees.
+goal = [120 500];
+face(ref, 270);
+steps = 0;
+a = kBattle_sensors(ref);
+while a(2) < goal(2) && steps < 1000
+    p = kProximity(ref);
+    if max(p(3:4)) > 500
+        kiks_ksend(['D,5,-5' 10], ref);
+    else
+        kiks_ksend(['D,10,10' 10], ref);
+    end
+    a = kBattle_sensors(ref);
+    steps = steps + 1;
+end
+say('there', a)
+kiks_ksend(['D,0,0' 10], ref);
+kiks_kclose(ref);
+"""
+
+
+def test_turns_end_within_ten_degrees_of_the_compass(tmp_path: Path) -> None:
+    said = run(COMPASS, tmp_path).said
+    for wanted in (180, 90, 270, 45):
+        assert said[f"faces_{wanted}"] == pytest.approx(wanted, abs=12)
+    angles = said["angles"][0]
+    assert (angles == angles.astype(int)).all()
+    assert angles.min() >= 0
+    assert angles.max() <= 359
+    assert np.ptp(angles) > 300
+    assert said["there"][1, 0] >= 500
+
+
+# ---- arenas from pictures, windows with buttons: a session after the other ----
+
+PICTURES = """
+ARENA = imread('corridors.tif');
+ARENA = double(ARENA > 128);
+ARENA(60, 60) = -360;
+kiks(ARENA);
+ref = kiks_kopen([-1 9600 1]);
+% Depth first: always on, else to the left, else back; what was seen is put on a stack.
+stack = [];
+for i = 1:200
+    a = kBattle_sensors(ref);
+    p = kProximity(ref);
+    l = kAmbient(ref);
+    if min(l) < 100, break; end
+    if max(p(2:5)) > 300
+        kiks_ksend(['D,5,-5' 10], ref);
+    else
+        kiks_ksend(['D,8,8' 10], ref);
+        stack(:, end + 1) = a(1:2);
+    end
+end
+say('stack', stack)
+kiks_kclose(ref);
+say('left', kiks_siminfo_robotpos())
+kiks('corridors.tif');
+say('ignored', kiks_siminfo_robotpos())
+kiks_quit
+kiks_quit
+say('quit', kiks_ktime(-1))
+say('after_quit', caught(@() kProximity(ref)))
+say('no_ending', caught(@() kiks('robot_wars')))
+kiks_kiksnet('knockknock');
+
+kiks('corridors.tif');
+say('file', kiks_siminfo_robotpos())
+kiks_arena(imread('corridors.tif') > 128);
+say('matrix', kiks_siminfo_robotpos())
+
+% A controller made for the real robot, with the reference exchanged.
+ref = kopen([-1, 9600, 100]);
+inputs = [];
+for i = 1:20
+    inputs(i, :) = [kAmbient(ref)' kProximity(ref)'];
+    kSetSpeed(ref, 4, 4);
+end
+kSetSpeed(ref, 0, 0);
+kclose(ref);
+say('inputs', inputs)
+"""
+
+
+def test_pictures_are_arenas_and_sessions_follow_each_other(tmp_path: Path) -> None:
+    picture = np.zeros((400, 520), np.uint8)
+    picture[:10] = picture[-10:] = 255
+    picture[:, :10] = picture[:, -10:] = 255
+    picture[130:140, :380] = 200
+    picture[260:270, 140:] = 255
+    Image.fromarray(picture).save(tmp_path / "corridors.tif")
+    done = run(PICTURES, tmp_path)
+    said = done.said
+    assert said["stack"].shape[0] == 2
+    assert said["stack"][:, 0] == pytest.approx([60, 60], abs=2)
+    assert said["stack"][0].max() > 300, "it has gone along the first corridor"
+    assert said["ignored"].tolist() == said["left"].tolist(), "the world that there is stays"
+    assert said["quit"].size == 0
+    assert said["file"].shape == said["matrix"].shape == (1, 3)
+    assert said["after_quit"].startswith("kiks:session|A port must be open for that, but none is.")
+    assert re.match(r"kiks:argument\|The name of an arena's file must end in one of .*'robot_wars'", said["no_ending"])
+    assert said["inputs"].shape == (20, 16)

@@ -1,0 +1,457 @@
+"""Sessions: nothing gets lost, nothing is left behind, several share one, the same run comes again, and errors say why."""
+
+from __future__ import annotations
+
+import os
+import re
+import select
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.matlab.octave import GUARD_S, Octave, needs_octave, run
+from tests.matlab.test_functions import NAMES
+
+pytestmark = needs_octave
+
+# ---- the line ----
+
+EXCHANGES = """
+ref = kiks_kopen([-1 9600 1]);
+commands = {['N' 10], ['H' 10], ['D,1,-1' 10], ['E' 10], ['K' 10]};
+forms = {'^n(,\\d+){8}$', '^h(,-?\\d+){2}$', '^d$', '^e(,-?\\d+){2}$', '^k(,-?\\d+){6}$'};
+wrong = {};
+for i = 1:2000
+    for k = 1:5
+        reply = kiks_ksend(commands{k}, ref);
+        if isempty(regexp(reply, forms{k}, 'once'))
+            wrong{end + 1} = [commands{k} reply];
+        end
+    end
+end
+say('wrong', strjoin(wrong, ';'))
+say('count', 5 * i)
+% Several lines at once, lines without an end and empty ones: what comes later answers nothing else.
+for i = 1:20
+    kiks_ksend(['N' 10 'H' 10], ref);
+    kiks_ksend('E', ref);
+    kiks_ksend([10 10], ref);
+    say(sprintf('after_%d', i), kiks_ksend(['D,0,0' 10], ref))
+end
+kiks_kclose(ref)
+"""
+
+
+@pytest.mark.slow
+def test_ten_thousand_replies_answer_their_own_commands(tmp_path: Path) -> None:
+    said = run(EXCHANGES, tmp_path).said
+    assert said["wrong"] == ""
+    assert said["count"] == 10_000
+    # `E` and what follows it are one line.
+    assert [said[f"after_{i}"] for i in range(1, 21)] == ["d"] * 20
+
+
+# ---- ends ----
+
+KILLED = """
+for turn = 1:2
+    ref = kiks_kopen([-1 9600 1]);
+    why = '';
+    try
+        for i = 1:200
+            kProximity(ref);
+            if i == 50
+                system(sprintf('kill -9 %d', session_number()));
+                begin = tic();
+            end
+        end
+    catch failure
+        why = [failure.identifier '|' failure.message];
+    end
+    say(sprintf('why_%d', turn), why)
+    say(sprintf('after_%d', turn), i)
+    say(sprintf('gone_%d', turn), kiks_siminfo_robotpos())
+    if turn == 2
+        kiks_kclose(ref)
+        kiks_quit
+    end
+    kiks
+    ref = kiks_kopen([-1 9600 1]);
+    say(sprintf('readings_%d', turn), kProximity(ref))
+    say(sprintf('seconds_%d', turn), toc(begin))
+    kiks_quit(1)
+end
+"""
+
+
+@pytest.mark.parametrize("transport", ["pipes", "tcp"])
+def test_a_program_survives_the_simulators_death(transport: str, tmp_path: Path) -> None:
+    said = run(KILLED, tmp_path, transport_variables(transport)).said
+    for turn in (1, 2):
+        assert re.match(r"kiks:session\|The simulator must answer, but its process has ended\. ", said[f"why_{turn}"])
+        assert 50 <= said[f"after_{turn}"] <= 52
+        assert said[f"gone_{turn}"].size == 0
+        assert said[f"readings_{turn}"].shape == (8, 1)
+        assert said[f"seconds_{turn}"] < 10, "that it takes two is a figure, not a law"
+
+
+def test_a_killed_octave_leaves_nothing_behind(tmp_path: Path) -> None:
+    program = """
+ref = kiks_kopen([-1 9600 1]);
+kSetSpeed(ref, 5, 5);
+say('session', session_number())
+while true
+    kProximity(ref);
+end
+"""
+    with Octave(program, tmp_path) as octave:
+        session = os.pidfd_open(int(octave.wait_for("session")))
+        octave.kill()
+        octave.finish(-9)
+        assert has_ended(session)
+        assert list(octave.doors.glob("kiks/session-*")) == []
+
+
+def test_kiks_quit_and_the_end_of_a_program_leave_nothing_behind(tmp_path: Path) -> None:
+    program = """
+ref = kiks_kopen([-1 9600 1]);
+say('session', session_number())
+fgetl(stdin);
+kiks_quit
+say('quit', session_number())
+fgetl(stdin);
+ref = kiks_kopen([-1 9600 1]);
+say('another', session_number())
+fgetl(stdin);
+"""
+    with Octave(program, tmp_path) as octave:
+        session = os.pidfd_open(int(octave.wait_for("session")))
+        octave.tell()
+        assert octave.wait_for("quit") == 0
+        assert has_ended(session), "it is gone when kiks_quit returns"
+        assert octave.children() == []
+        octave.tell()
+        another = os.pidfd_open(int(octave.wait_for("another")))
+        octave.tell()
+        octave.finish()
+        assert has_ended(another)
+
+
+# ---- several ----
+
+
+def test_two_programs_share_a_world_and_see_each_other(tmp_path: Path) -> None:
+    first_program = """
+arena = zeros(300, 600);
+arena(150, 150) = -360;
+arena(150, 450) = -180;
+kiks(arena)
+say('session', session_number())
+fgetl(stdin);
+ref = kiks_kopen([-1 9600 1]);
+kSetSpeed(ref, 4, 4);
+kiks_pause(1)
+kStop(ref);
+say('here', kiks_siminfo_robotpos())
+readings = kProximity(ref);
+while max(readings(3:4)) < 300 && kiks_ktime(-1) < 300
+    readings = kProximity(ref);
+end
+say('saw', readings)
+say('other_there', kiks_siminfo_robotpos(-2))
+kiks_kclose(ref)
+kiks_quit
+"""
+    second_program = """
+kiks('--join', {number})
+say('taken', caught(@() kiks('--join', {number})))
+ref = kiks_kopen([-1 9600 1]);
+say('begins', kiks_siminfo_robotpos())
+say('opened', 1)
+readings = kProximity(ref);
+while max(readings(3:4)) < 300 && kiks_ktime(-1) < 300
+    kSetSpeed(ref, 5, 5);
+    readings = kProximity(ref);
+end
+kStop(ref);
+kiks_pause(1)
+say('saw', readings)
+say('here', kiks_siminfo_robotpos())
+kiks_kclose(ref)
+kiks_quit
+say('left', kiks_siminfo_robotpos())
+say('again', caught(@() kiks('--join', {number} + 1)))
+"""
+    with Octave(first_program, tmp_path) as first:
+        number = int(first.wait_for("session"))
+        with Octave(second_program.format(number=number), tmp_path, shares=first) as second:
+            second.wait_for("opened")
+            first.tell()
+            second.finish()
+            first.finish()
+    assert second.said["begins"][0] == pytest.approx([450, 150, np.pi], abs=1)
+    assert second.said["taken"].startswith("kiks:session|A session must be left before another is joined.")
+    assert first.said["saw"][2:4].max() >= 300
+    assert second.said["saw"][2:4].max() >= 300
+    gap_mm = second.said["here"][0, 0] - first.said["here"][0, 0] - 55
+    assert 0 < gap_mm < 40
+    assert first.said["here"][0, 0] == pytest.approx(150 + 32, abs=4)
+    assert first.said["other_there"][0, :2] == pytest.approx(second.said["here"][0, :2], abs=15)
+    assert second.said["left"].size == 0
+    assert re.match(r"kiks:session\|.*session \d+ must run before it is joined", second.said["again"])
+
+
+# ---- the same again ----
+
+SAME = """
+global KIKS_THINKING KIKS_SEED
+KIKS_THINKING = '%s';
+KIKS_SEED = %d;
+arena = zeros(400);
+arena(200, 200) = -17;
+kiks(arena)
+kiks_spawn(2)
+kiks_spawn(3)
+kiks_spawn(1)
+ref = kiks_kopen([-1 9600 1]);
+for i = 1:150
+    readings = kProximity(ref);
+    kSetSpeed(ref, 8 + readings(1) / 50, 8 - readings(4) / 50);
+    printf('%%s\\n', sprintf('%%d ', readings, kAmbient(ref), kLinVis(ref)));
+    printf('%%s\\n', sprintf('%%.17g ', kiks_siminfo_robotpos(), kiks_siminfo_objects(), kiks_ktime(-1)));
+    if i == 100
+        kiks_pause(1)
+    end
+end
+printf('%%s\\n', sprintf('%%.17g ', kiks_siminfo_robotpath()));
+disp(kiks('--state'))
+kiks_kclose(ref)
+kiks_quit
+"""
+
+
+@pytest.mark.slow
+def test_the_same_seed_gives_the_same_run_by_pipes_and_by_tcp(tmp_path: Path) -> None:
+    first = run(SAME % ("none", 7), tmp_path)
+    assert len(first.lines) > 300
+    assert re.fullmatch(r"[0-9a-f]{16}", [line for line in first.lines if line][-2])
+    assert run(SAME % ("none", 7), tmp_path).lines == first.lines
+    assert run(SAME % ("none", 8), tmp_path).lines != first.lines
+    fixed = run(SAME % ("fixed:3", 7), tmp_path)
+    assert fixed.lines != first.lines
+    assert run(SAME % ("none", 7), tmp_path, transport_variables("tcp")).lines == first.lines
+    assert run(SAME % ("fixed:3", 7), tmp_path, transport_variables("tcp")).lines == fixed.lines
+
+
+# ---- what is wrong is said ----
+
+TAKES_ANYTHING = """
+kiks_setup kiks_quit kiks_kiksnet kiks_recordmovie kiks_preferences kiks_siminfo_objects kiks_siminfo_speed kiks_tif2arena
+kiks_siminfo_robotdist kiks_siminfo_robotpath kiks_mm2p kiks_p2mm
+""".split()
+
+ONLY_REF = """
+kProximity kAmbient kGetSpeed kGetEncoders kGetStatus kStatus kStop kBios kFlush kList kTeam kLinVis kLinLight
+kRadio_status kRadio_read kBattle_sensors kBattle_fire kSetEncoders kSetProfile kSetSpeedPID kSetPositionPID
+""".split()
+
+WRONG_REFS = ["[]", "5", "'xxxx'", "[-7 -7 -7 -7]", "[-1 -1]", "[-1.5 -1.5 -1.5 -1.5]", "nan(1, 4)", "[7 9600 1 1]"]
+
+WRONG = [
+    *(f"{name}({ref})" for name in ONLY_REF for ref in WRONG_REFS),
+    "kSetSpeed(ref, NaN, 1)",
+    "kSetSpeed(ref, [1 2], 1)",
+    "kSetSpeed(ref, 'a', 'b')",
+    "kSetSpeed(ref, Inf, 3)",
+    "kSetSpeed(ref, {1}, 3)",
+    "kSetSpeed(ref, 1)",
+    "kSetSpeed()",
+    "kMoveTo(ref)",
+    "kMoveTo(ref, NaN, 1)",
+    "kSetEncoders(ref, 'a', 1)",
+    "kSetProfile(ref, NaN)",
+    "kSetSpeedPID(ref, NaN)",
+    "kSetPositionPID(ref, {})",
+    "kLED(ref)",
+    "kLED(ref, 0, NaN)",
+    "kLED(ref, [0 1], [1 1 1])",
+    "kGetAnalog(ref)",
+    "kGetAnalog(ref, NaN)",
+    "kSetPWM(ref, 1)",
+    "kSetPWM(ref, NaN, 1)",
+    "kReadByte(ref)",
+    "kReadByte(ref, NaN)",
+    "kWriteByte(ref, 1)",
+    "kWriteByte(ref, NaN, 1)",
+    "kTurret(ref)",
+    "kTurret(ref, NaN, 'B')",
+    "kTurret(ref, 2, 5)",
+    "kTurretBios(ref)",
+    "kTurretBios(ref, NaN)",
+    "kSetArm(ref)",
+    "kSetArm(ref, NaN)",
+    "kSetGripper(ref)",
+    "kSetGripper(ref, NaN)",
+    "kRadio_send(ref)",
+    "kRadio_send(ref, NaN, 'a', 1)",
+    "kRadio_send(ref, 1, 1:3, NaN)",
+    "kRadio_send(ref, 1, 300, 1)",
+    "kcmd(ref, {})",
+    "kcmd([-7 -7 -7 -7], 'N')",
+    "kiks_ksend()",
+    "kiks_ksend(['N' 10])",
+    "kiks_ksend(['N' 10], -1)",
+    "kiks_ksend({1}, ref)",
+    "kiks_ksend(['a'; 'b'], ref)",
+    "kiks_ksend(struct(), ref)",
+    "kiks_ksend(['N' 10], [-7 -7 -7 -7])",
+    "ksend()",
+    "ksend('N', -1)",
+    "ksends()",
+    "ksends('N', -1)",
+    "kopen()",
+    "kopen({})",
+    "kopen([])",
+    "kopen(NaN)",
+    "kopen([0 -1])",
+    "kopen([0 9600 -1])",
+    "kopen('nowhere')",
+    "kopen('/dev/nowhere', 9600, 1)",
+    "kopen([99 9600 1])",
+    "kopen([-1 9600 1])",
+    "kclose(NaN)",
+    "kiks_kopen()",
+    "kiks_kopen(-1)",
+    "kiks_kopen(NaN)",
+    "kiks_kopen([-1 0])",
+    "kiks_kopen([-1 9600 -1])",
+    "kiks_kopen(-1.5)",
+    "kiks_kopen(1:9)",
+    "kiks_kopen({1})",
+    "kiks_kopen([-2 1e9])",
+    "kiks_kclose('a')",
+    "kiks_kclose({1})",
+    "kiks_kclose(NaN)",
+    "kiks_ktime('x')",
+    "kiks_ktime([])",
+    "kiks_ktime(NaN)",
+    "kiks_ktime(-1.5)",
+    "kiks_pause()",
+    "kiks_pause(-1)",
+    "kiks_pause(Inf)",
+    "kiks_pause('a')",
+    "kiks_pause([1 2])",
+    "kiks_print(5)",
+    "kiks_status({})",
+    "kiks_spawn()",
+    "kiks_spawn(7)",
+    "kiks_spawn('a')",
+    "kiks_spawn(2, [NaN 1])",
+    "kiks_spawn(2, 5)",
+    "kiks_spawn(2, [1e6 5])",
+    "kiks_siminfo_setobject()",
+    "kiks_siminfo_setobject(0)",
+    "kiks_siminfo_setobject(99)",
+    "kiks_siminfo_setobject(1, 'ab')",
+    "kiks_siminfo_setobject(1, 1, 1, Inf)",
+    "kiks_siminfo_setrobot('a', 1)",
+    "kiks_siminfo_setrobot(NaN, 1)",
+    "kiks_siminfo_setrobot(1, 1, Inf)",
+    "kiks_siminfo_setrobot(1, 1, 1, 0)",
+    "kiks_siminfo_robotpos(0)",
+    "kiks_siminfo_robotpath('a')",
+    "kiks_siminfo_robotdist(1)",
+    "kiks_load()",
+    "kiks_load(5)",
+    "kiks_load('nowhere.kad')",
+    "kiks_load('nowhere')",
+    "kiks_save()",
+    "kiks_save(5)",
+    "kiks_save('x.png')",
+    "kiks_save('/nowhere/x.kad')",
+    "kiks_arena('x')",
+    "kiks_arena(ones(200))",
+    "kiks_arena(zeros(200, 200, 2))",
+    "kiks_arena(0.5 * ones(200))",
+    "kiks_arena(zeros(200), ones(3))",
+    "kiks_arena(zeros(200), 300 * ones(200))",
+    "kiks_arena(@sin)",
+    "kiks('--what')",
+    "kiks('--join', 'x')",
+    "kiks('--join')",
+    "kiks_kad2arena()",
+    "kiks_kad2arena('a')",
+    "kiks_kad2arena([100 100 4 1])",
+    "kiks_generate_maze(0)",
+    "kiks_generate_maze(2, 2, 10)",
+    "kiks_generate_maze('a')",
+    "kiks_arena_new_create()",
+    "kiks_arena_new_create(50, 50)",
+    "kiks_arena_new_create(200, 200, 0, 300)",
+    "kiks_speedtest(0)",
+    "kiks_calibrate(-5)",
+    "kiks_calibrate(-1, 5)",
+    "kBraitenberg(ref, NaN)",
+    "kBraitenberg(ref, 1, -1)",
+    "kBraitenbergG(ref, NaN)",
+    "kProximityG(ref, 5)",
+]
+
+WITHOUT_SESSION = ["kiks_spawn(2)", "kiks_save('x.kad')", "kiks_checkpoint()", "kiks_reset()", "kProximity(-ones(1, 4))"]
+
+PREFERENCES = {
+    "KIKS_SEED": "-1",
+    "KIKS_THINKING": "'slowly'",
+    "KIKS_EMULATED_CPU": "'abacus'",
+    "KIKS_ROBOT": "'Roomba'",
+    "KIKS_RESPONSE": "'guess'",
+    "KIKS_NOISE": "2",
+    "KIKS_TURRETS": "'laser'",
+    "KIKS_ROBOTS": "0.5",
+    "KIKS_ARENA_CODING": "'other'",
+    "KIKS_COLOR_BALL": "300",
+    "KIKS_ARENA_DEFAULT_COLOR": "0",
+}
+
+
+def test_whatever_is_wrong_is_said_by_kiks_itself(tmp_path: Path) -> None:
+    missing = [name for name in NAMES if not any(call.startswith(f"{name}(") for call in WRONG + WITHOUT_SESSION)]
+    assert sorted(set(missing) - set(TAKES_ANYTHING)) == []
+    lines = [f"say('w{number}', caught(@() {call}))" for number, call in enumerate(WITHOUT_SESSION)]
+    lines.append("ref = kiks_kopen([-1 9600 1]);")
+    lines += [f"say('c{number}', caught(@() {call}))" for number, call in enumerate(WRONG)]
+    lines.append("say('still_there', kProximity(ref))\nkiks_quit(1)")
+    for name, value in PREFERENCES.items():
+        lines += [f"global {name}", f"before = {name};", f"{name} = {value};"]
+        lines += [f"say('{name}', caught(@() kiks_arena()))", f"{name} = before;"]
+    lines.append("kiks_arena\nsay('pose', kiks_siminfo_robotpos())")
+    done = run("\n".join(lines), tmp_path)
+    assert done.said["still_there"].shape == (8, 1)
+    assert done.said["pose"].shape == (1, 3)
+    answers = {call: done.said[f"w{number}"] for number, call in enumerate(WITHOUT_SESSION)}
+    answers |= {call: done.said[f"c{number}"] for number, call in enumerate(WRONG)}
+    answers |= {name: done.said[name] for name in PREFERENCES}
+    foreign = {call: words for call, words in answers.items() if not re.match(r"kiks:\w+\|", words)}
+    assert foreign == {}
+    vague = {call: words for call, words in answers.items() if not re.search(r"\b(must|needs)\b.*\.$", words)}
+    assert vague == {}
+    for name in PREFERENCES:
+        assert "kiks_preferences" in done.said[name] or name in done.said[name], done.said[name]
+
+
+# ---- inside ----
+
+
+def transport_variables(transport: str) -> dict[str, str]:
+    return {"KIKS_TRANSPORT": "tcp"} if transport == "tcp" else {}
+
+
+def has_ended(process: int) -> bool:
+    """Wait until a process is gone; its end can be waited for without looking again and again."""
+    poll = select.poll()
+    poll.register(process, select.POLLIN)
+    try:
+        return bool(poll.poll(GUARD_S * 1000))
+    finally:
+        os.close(process)
