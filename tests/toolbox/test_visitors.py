@@ -147,6 +147,27 @@ def test_nothing_moves_while_nobody_asks(session: Session) -> None:
     assert ask("state") == state
 
 
+def test_who_watches_sees_thinking_pass_as_it_happens(session: Session) -> None:
+    """And it is not charged again: the robot has driven for as long as the program has thought, no longer."""
+    ask = Asker(session)
+    ask("set thinking live")
+    ask("world default")
+    assert session.desk is not None
+    session.desk.gate.set_speed(1.0, session.world.now_ns)
+    ask("open 1 9600")
+    ask("ask 1 D,5,5")
+    driven_ns = session.world.now_ns + 200_000_000
+    guard = threading.Event()
+    for _ in range(200):
+        if session.world.now_ns >= driven_ns:
+            break
+        guard.wait(GUARD_S / 200)
+    assert session.world.now_ns >= driven_ns, "time passes although nobody asks"
+    before_ns = session.world.now_ns
+    ask("ask 1 H")
+    assert session.world.now_ns - before_ns < 150_000_000, "what has passed is not charged again"
+
+
 def test_a_pause_lets_simulated_time_pass(session: Session) -> None:
     ask = begun(session)
     ask("open 1 9600")

@@ -58,6 +58,16 @@ class NearConnection(Connection):
         """Say whether nobody else takes part, and everything is done that this program has said."""
         return not (self._programs.is_shared or self._guest.is_held_up or self._guest.has_left)
 
+    def live(self, time_ns: int) -> bool:
+        """Let time pass [ns] while the program thinks; say whether it did: nobody else is there."""
+        sim = self._programs.sim
+        with self._world:
+            if not self.is_alone or self._is_resting:
+                return False
+            sim.advance_to(sim.now_ns + time_ns)
+            sim.sync()
+            return True
+
     def come_to(self, time_ns: int) -> None:
         """Go on from a time [ns] to which the program has moved the world itself."""
         self._now_ns = self._told_ns = self._guest.acts_from_ns = time_ns
@@ -102,7 +112,8 @@ class VisitorLine(FarLine):
     def think(self, time_ns: int) -> None:
         """Let the time pass that the program has thought [ns]."""
         if self._way.is_alone:
-            self._near.think(time_ns)
+            # Some of it may have passed already, as it did: see `NearConnection.live`.
+            self._near.think(max(time_ns - (self._sim.now_ns - self._way.now_ns), 0))
             self._way.come_to(self._sim.now_ns)
         else:
             super().think(time_ns)

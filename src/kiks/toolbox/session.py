@@ -18,13 +18,18 @@ from kiks.ports.programs import Programs
 from kiks.sim.building import simulation_of, spec_of
 from kiks.sim.simulation import Simulation
 from kiks.toolbox.settings import Settings
+from kiks.units import NS_PER_S
 
 if TYPE_CHECKING:
     from kiks.desk.desk import Desk
     from kiks.desk.showing import Shown
+    from kiks.toolbox.visitor import Visitor
 
 WAIT_S = 0.05
 """Longest time for which the world does not look around [s of real time]."""
+
+SLICE_NS = NS_PER_S // 50
+"""Simulated time that passes in one go while a program thinks [ns]."""
 
 PATH_PERIOD_S = 0.04
 """Time between two points of a path [s]: KiKS moved its robot 25 times a second (kiks-behaviour.md 7.1)."""
@@ -40,6 +45,7 @@ class Session:
     Attributes:
         settings: What is wanted of the next world.
         desk: The world and all that belongs to it; None before the first.
+        visitors: Those who take part.
         owners: Who has which robot as its own, by the robot's number.
         lock: Held by whoever makes a world or takes a robot.
     """
@@ -47,6 +53,7 @@ class Session:
     def __init__(self, *, ready: Callable[[], None] = lambda: None, has_window: bool = False) -> None:
         self.settings = Settings()
         self.desk: Desk | None = None
+        self.visitors: list[Visitor] = []
         self.owners: dict[int, object] = {}
         self.lock = threading.RLock()
         self._ready = ready
@@ -202,12 +209,19 @@ class Session:
     # ---- the thread that moves the world ----
 
     def round(self) -> None:
-        """Do what may be done, and listen to those who take part; nothing moves unless one of them lets it."""
+        """Do what may be done, and listen to those who take part; nothing moves unless one of them lets it.
+
+        At a pace that people see, thinking that is measured passes as it happens: who has let a robot drive sees it
+        drive while the next command is being typed, and does not wait afterwards for that to pass.
+        """
         if not self._has_world.wait(WAIT_S):
             return
-        assert self.desk is not None
-        self.desk.programs.round(WAIT_S)
-        self.desk.clear_away()
+        desk = self.desk
+        assert desk is not None
+        is_seen = desk.gate.speed is not None and desk.project.thinking == "live" and len(self.visitors) == 1
+        has_lived = is_seen and any(visitor.live(SLICE_NS) for visitor in self.visitors)
+        desk.programs.round(0 if has_lived else WAIT_S)
+        desk.clear_away()
 
     def let_go(self) -> None:
         """Let time pass even if the world is paused: nobody is there any more who could want that."""

@@ -79,6 +79,7 @@ class Visitor:
         self.openings: dict[int, OpenPort] = {}
         self._sim: Simulation | None = None
         self._connection: NearConnection | None = None
+        session.visitors.append(self)
 
     # ---- ports ----
 
@@ -142,6 +143,7 @@ class Visitor:
         """Go: what was said is still done, and the robots belong to others."""
         self._lose_world()
         self.session.leave(self)
+        self.session.visitors.remove(self)
 
     def opened(self, number: int) -> OpenPort:
         """Return a port that is open.
@@ -215,6 +217,11 @@ class Visitor:
         if not self.ports:
             raise LinkError("a port must be open for simulated time to pass, but none is. Call kiks_kopen first.")
         self.opened(next(iter(self.ports))).port.sleep(seconds)
+
+    def live(self, time_ns: int) -> bool:
+        """Let time pass [ns] while the program thinks, and say whether it did."""
+        connection = self._connection
+        return connection is not None and connection.live(time_ns)
 
     def pace(self) -> tuple[float, float]:
         """Return how fast simulated time has passed, since a port was opened and since this was last asked."""
