@@ -38,7 +38,7 @@ docs: setup
 	$(BIN)/python docs/make_commands.py
 
 benchmarks: setup
-	for name in wire sensors crowd programs desk batch evolve environments; do $(BIN)/python benchmarks/$$name.py; done
+	for name in wire sensors crowd programs desk batch evolve environments octave; do $(BIN)/python benchmarks/$$name.py; done
 
 clean:
 	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,8 +1,8 @@
 """How fast programs in Octave run: the demo follow at 9600 baud, and bare exchanges, through the toolbox in matlab/.
 
-Run: python benchmarks/octave.py [--json]. Each figure is a median. The peers, in the same run: what Octave's tcpclient does
-with a server that answers a fixed line at once and simulates nothing, and a process at the ends of two pipes that does
-the same: as fast as anything can be that is not in Octave itself.
+Run: python benchmarks/octave.py [--json]. Each figure is a median. The peers, in the same run: what Octave's tcpclient
+does with a server that answers a fixed line at once and simulates nothing, and a process at the ends of two pipes that
+does the same: as fast as anything can be that is not in Octave itself.
 """
 
 from __future__ import annotations

@@ -275,3 +275,53 @@ def test_the_contacts_of_each_robot_are_counted(sim):
     sim.run(3)
     assert (sim.contacts(1), sim.contacts(2)) == (1, 1)
     assert sim.pose(2)[0] > 510
+
+
+def test_a_robot_that_comes_changes_nothing_for_those_that_are_there():
+    """As if it had always been there, far away: readings, pictures and ways are the same to the bit."""
+    runs = []
+    for comes in (False, True):
+        sim = Simulation(replace(Arena.box(1500, 600), starts=(Pose(100, 300, 0.3), Pose(1400, 300, 0.0))), seed=4)
+        sim.fit(1, "k213")
+        sim.add_ball(300, 300)
+        robot, told = Khepera(sim.port(1)), []
+        for loop in range(120):
+            if comes and loop == 40:
+                assert sim.add_robot() == 2
+            told.append((robot.proximity(), robot.encoders(), robot.image()))
+            robot.set_speed(5 + loop % 5, 7 - loop % 3)
+        runs.append((told, sim.pose(1), sim.bodies().tobytes()))
+    assert runs[0] == runs[1]
+
+
+def test_a_robot_that_comes_starts_where_the_arena_says_else_where_there_is_room(sim):
+    arena = replace(Arena.box(600, 600), starts=(Pose(100, 100, 0), Pose(300, 300, 1.0), Pose(500, 500, 2.0)))
+    sim = Simulation(arena)
+    sim.record_paths(0.1)
+    sim.run(1.0)
+    sim.place(1, 500, 500, 0)
+    assert sim.add_robot("khepera_ii") == 2
+    assert sim.pose(2) == (300, 300, 1.0)
+    assert sim.add_robot() == 3, "its start is taken"
+    assert math.hypot(sim.pose(3)[0] - 500, sim.pose(3)[1] - 500) > 55
+    for robot, pulses in ((2, 35), (3, 27.5)):
+        assert sim.specs[robot - 1].body.radius_mm == pulses
+        port = sim.port(robot)
+        port.write(b"D,5,5\n")
+        assert port.readline() == b"d\r\n"
+    before = sim.pose(3)
+    sim.run(1.0)
+    assert math.hypot(sim.pose(3)[0] - before[0], sim.pose(3)[1] - before[1]) > 20
+    paths = sim.paths()
+    assert np.isnan(paths[2, 0, 1])
+    assert not np.isnan(paths[2, -1, 1])
+    assert not np.isnan(paths[0]).any()
+
+
+def test_no_robot_comes_where_there_is_no_room():
+    sim = Simulation(Arena.box(120, 120))
+    with pytest.raises(ArenaError, match="must have room for 2 robots"):
+        sim.add_robot()
+    assert sim.robot_count == 1
+    with pytest.raises(ParameterError, match="robot must be one of"):
+        sim.add_robot("kheperra")
