@@ -1,9 +1,9 @@
 function avoid(port, baud, seconds)
 % avoid  Demo: wander about and keep away from the walls.
 %
-%   avoid(port, baud, seconds) drives for seconds (60) with the robot on port (-1, the simulated one) at baud (9600), in
-%   the world that there is, else in the default arena. In each loop it reads the proximity and the light sensors and
-%   sets the speeds. It prints how long loops took and how far the robot has come.
+%   avoid(port, baud, seconds) drives for seconds (60) with the robot on port (-1, the simulated one; a real one as in
+%   kopen) at baud (9600), in the world that there is, else in the default arena. In each loop it reads the proximity
+%   and the light sensors and sets the speeds. It prints how many loops there were and how far the robot has come.
 %
 %   Example:
 %     avoid(-1, 9600, 20)
@@ -20,13 +20,13 @@ if nargin < 3 || isempty(seconds)
     seconds = 60;
 end
 
-ref = kiks_kopen([port baud 1]);
+ref = opened(port, baud);
 closing = onCleanup(@() leave(ref)); %#ok<NASGU>
 side = 0;
 kSetEncoders(ref, 0, 0);
 loops = 0;
 brightest = Inf;
-now_s = kiks_ktime(port);
+now_s = kiks_ktime(ref(1));
 while now_s < seconds
     readings = kProximity(ref);
     light = kAmbient(ref);
@@ -36,7 +36,7 @@ while now_s < seconds
     [speeds, side] = away_from_walls(readings, 5, side);
     kSetSpeed(ref, speeds(1), speeds(2));
     loops = loops + 1;
-    now_s = kiks_ktime(port);
+    now_s = kiks_ktime(ref(1));
 end
 way = kiks_p2mm(mean(kGetEncoders(ref)));
 fprintf('avoid: %.0f mm in %.1f s, %d loops, %.1f a second; the brightest light read %d.\n', way, now_s, loops, ...

@@ -1,9 +1,10 @@
 function battle(port, baud, seconds)
 % battle  Demo: look for other robots, fire at them and apologize.
 %
-%   battle(port, baud, seconds) drives with the robot on port (-1, the simulated one) at baud (9600). It needs the
-%   turrets battle, K213 and radio. The robot keeps away from the walls. When the camera sees something dark, it turns
-%   there and fires, and says sorry by radio to whom it has hit. Goes on for seconds, until Ctrl-C if they are left out.
+%   battle(port, baud, seconds) drives with the robot on port (-1, the simulated one; a real one as in kopen) at baud
+%   (9600). It needs the turrets battle, K213 and radio. The robot keeps away from the walls. When the camera sees
+%   something dark, it turns there and fires, and says sorry by radio to whom it has hit. Goes on for seconds, until
+%   Ctrl-C if they are left out.
 %
 %   Every second it prints where the robot is, where it looks, how far it can see and how much energy it has, and what
 %   comes by radio. With a simulated robot it drives in the world that there is, else in a room with a second robot;
@@ -23,20 +24,20 @@ end
 if nargin < 3 || isempty(seconds)
     seconds = Inf;
 end
-if port < 0 && isempty(kiks_siminfo_robotpos())
+if is_simulated(port) && isempty(kiks_siminfo_robotpos())
     arena = zeros(500, 700);
     arena(250, 150) = -360;
     arena(250, 550) = -180;
     kiks_arena(arena);
 end
 
-ref = kiks_kopen([port baud 1]);
+ref = opened(port, baud);
 closing = onCleanup(@() leave(ref)); %#ok<NASGU>
 side = 0;
 shots = 0;
 hits = 0;
 next_s = 0;
-now_s = kiks_ktime(port);
+now_s = kiks_ktime(ref(1));
 while now_s < seconds
     listen(ref);
     readings = kProximity(ref);
@@ -52,7 +53,7 @@ while now_s < seconds
         end
     end
     kSetSpeed(ref, speeds(1), speeds(2));
-    now_s = kiks_ktime(port);
+    now_s = kiks_ktime(ref(1));
     if numel(state) == 7 && now_s >= next_s
         kiks_print(sprintf('battle: at (%d, %d) mm, angle %d, distance %d mm, energy %d', state([1:4 6])));
         next_s = floor(now_s) + 1;

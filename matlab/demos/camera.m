@@ -1,9 +1,9 @@
 function camera(port, baud, seconds)
 % camera  Demo: wander about and take pictures with the linear camera.
 %
-%   camera(port, baud, seconds) drives for seconds (60) with the robot on port (-1, the simulated one) at baud (19200,
-%   so that a picture takes 150 ms) and keeps away from the walls. It needs the turret K213. With a simulated robot it
-%   drives in the world that there is, else in a room with bands of different grey on its walls.
+%   camera(port, baud, seconds) drives for seconds (60) with the robot on port (-1, the simulated one; a real one as in
+%   kopen) at baud (19200, so that a picture takes 150 ms) and keeps away from the walls. It needs the turret K213. With
+%   a simulated robot it drives in the world that there is, else in a room with bands of different grey on its walls.
 %
 %   Every 5 s it prints the picture as a line of characters, heavy ones for dark pixels, and at the end how many
 %   pictures there were.
@@ -22,12 +22,12 @@ end
 if nargin < 3 || isempty(seconds)
     seconds = 60;
 end
-if port < 0 && isempty(kiks_siminfo_robotpos())
+if is_simulated(port) && isempty(kiks_siminfo_robotpos())
     room = banded_room();
     kiks_arena(room{:});
 end
 
-ref = kiks_kopen([port baud 1]);
+ref = opened(port, baud);
 closing = onCleanup(@() leave(ref)); %#ok<NASGU>
 side = 0;
 shades = '#%*+=-:. ';
@@ -35,7 +35,7 @@ pictures = 0;
 darkest = Inf;
 brightest = -Inf;
 next_s = 0;
-now_s = kiks_ktime(port);
+now_s = kiks_ktime(ref(1));
 while now_s < seconds
     [speeds, side] = away_from_walls(kProximity(ref), 3, side);
     kSetSpeed(ref, speeds(1), speeds(2));
@@ -49,7 +49,7 @@ while now_s < seconds
             next_s = next_s + 5;
         end
     end
-    now_s = kiks_ktime(port);
+    now_s = kiks_ktime(ref(1));
 end
 if pictures == 0
     fprintf('camera: the robot has no camera that answers.\n');

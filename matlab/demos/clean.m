@@ -1,8 +1,9 @@
 function clean(port, baud, seconds)
 % clean  Demo: push the cylinders that stand about to the walls.
 %
-%   clean(port, baud, seconds) drives for seconds (60) with the robot on port (-1, the simulated one) at baud (9600).
-%   With a simulated robot it begins a new world, an empty room of 500 x 500 mm with twelve cylinders at random places.
+%   clean(port, baud, seconds) drives for seconds (60) with the robot on port (-1, the simulated one; a real one as in
+%   kopen) at baud (9600). With a simulated robot it begins a new world, an empty room of 500 x 500 mm with twelve
+%   cylinders at random places.
 %
 %   A cylinder fits between the two diagonal sensors, a wall does not. So the robot turns towards whatever it sees and
 %   pushes what is in front of it, until that is a wall or moves no more. Then it backs off, turns and looks elsewhere.
@@ -23,7 +24,7 @@ if nargin < 3 || isempty(seconds)
     seconds = 60;
 end
 room = 500;
-if port < 0
+if is_simulated(port)
     kiks_arena(zeros(room));
     for k = 1:12
         kiks_spawn(3, 30 + (room - 60) * rand(1, 2));
@@ -31,13 +32,13 @@ if port < 0
     tidy_before = tidy_count(room);
 end
 
-ref = kiks_kopen([port baud 1]);
+ref = opened(port, baud);
 closing = onCleanup(@() leave(ref)); %#ok<NASGU>
 kSetProfile(ref, 40, 128, 40, 128);
 cruise = 30;
 blocked = 0;
 turns = 0;
-while kiks_ktime(port) < seconds
+while kiks_ktime(ref(1)) < seconds
     readings = kProximity(ref);
     status = kGetStatus(ref);
     if numel(readings) ~= 8 || numel(status) ~= 6
@@ -56,8 +57,8 @@ while kiks_ktime(port) < seconds
     turn = max(-cruise, min(cruise, [-1 -1 -1 1 1 1 0 0] * readings / 100));
     kSetSpeed(ref, cruise + turn, cruise - turn);
 end
-fprintf('clean: turned back %d times in %.1f s.\n', turns, kiks_ktime(port));
-if port < 0
+fprintf('clean: turned back %d times in %.1f s.\n', turns, kiks_ktime(ref(1)));
+if is_simulated(port)
     fprintf('clean: %d of 12 cylinders are within 60 mm of a wall; at the start it was %d.\n', tidy_count(room), ...
         tidy_before);
 end

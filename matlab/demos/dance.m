@@ -7,10 +7,10 @@ function dance(port, baud, seconds, partner)
 %   The first begins a world with two robots and leads: it tells its partner each figure by radio before it drives it.
 %   The second drives what it is told, with left and right exchanged, so that it is the mirror image.
 %
-%   dance(port, baud, seconds, partner) is for the robot on port (-1) at baud (9600). The dance lasts for seconds (30)
-%   from when the partner has answered. partner is the number of the other robot's radio; 0 follows whoever leads. If
-%   it is left out, who begins the world leads robot 2, and who finds one follows. It prints how many figures there
-%   were.
+%   dance(port, baud, seconds, partner) is for the robot on port (-1; a real one as in kopen) at baud (9600). The dance
+%   lasts for seconds (30) from when the partner has answered. partner is the number of the other robot's radio; 0
+%   follows whoever leads. If it is left out, who begins the world leads robot 2, and who finds one follows. It prints
+%   how many figures there were.
 %
 %   Example:
 %     dance
@@ -26,7 +26,7 @@ end
 if nargin < 3 || isempty(seconds)
     seconds = 30;
 end
-is_first = port < 0 && isempty(kiks_siminfo_robotpos());
+is_first = is_simulated(port) && isempty(kiks_siminfo_robotpos());
 if nargin < 4 || isempty(partner)
     partner = 2 * is_first;
 end
@@ -37,7 +37,7 @@ if is_first
     kiks_arena(arena);
 end
 
-ref = kiks_kopen([port baud 1]);
+ref = opened(port, baud);
 closing = onCleanup(@() leave(ref)); %#ok<NASGU>
 if partner > 0
     count = lead(ref, partner, seconds);

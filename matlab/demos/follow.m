@@ -1,9 +1,10 @@
 function follow(port, baud, seconds)
 % follow  Demo: follow the wall on the left.
 %
-%   follow(port, baud, seconds) drives for seconds (30) with the robot on port (-1, the simulated one) at baud (9600),
-%   in the world that there is, else in the default arena. Until there is a wall the robot drifts to the left; then it
-%   keeps the wall on its left, clockwise round the arena. It prints for how much of the time there was one.
+%   follow(port, baud, seconds) drives for seconds (30) with the robot on port (-1, the simulated one; a real one as in
+%   kopen) at baud (9600), in the world that there is, else in the default arena. Until there is a wall the robot drifts
+%   to the left; then it keeps the wall on its left, clockwise round the arena. It prints for how much of the time there
+%   was one.
 %
 %   Example:
 %     follow(-1, 9600, 60)
@@ -20,13 +21,13 @@ if nargin < 3 || isempty(seconds)
     seconds = 30;
 end
 
-ref = kiks_kopen([port baud 1]);
+ref = opened(port, baud);
 closing = onCleanup(@() leave(ref)); %#ok<NASGU>
 kSetEncoders(ref, 0, 0);
 found_s = Inf;
 beside = 0;
 loops = 0;
-now_s = kiks_ktime(port);
+now_s = kiks_ktime(ref(1));
 while now_s < seconds
     [speeds, has_wall] = along_wall(kProximity(ref));
     if isinf(found_s) && ~has_wall
@@ -38,7 +39,7 @@ while now_s < seconds
         beside = beside + 1;
     end
     loops = loops + ~isinf(found_s);
-    now_s = kiks_ktime(port);
+    now_s = kiks_ktime(ref(1));
 end
 way = kiks_p2mm(mean(kGetEncoders(ref)));
 if isinf(found_s)

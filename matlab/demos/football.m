@@ -30,7 +30,7 @@ middle = complex(size(arena, 2), -size(arena, 1)) / 2;
 goal = complex(goal_line(2) + 30, imag(middle));
 goals = 0;
 last_s = 0;
-now_s = kiks_ktime(port);
+now_s = kiks_ktime(ref(1));
 while now_s < seconds
     ball = kiks_siminfo_objects();
     ball = complex(ball(1, 2), -ball(1, 3));
@@ -38,7 +38,7 @@ while now_s < seconds
     speeds = to_goal(complex(pose(1), -pose(2)), pose(3), ball, goal);
     kSetSpeed(ref, speeds(1), speeds(2));
     kiks_pause(0.04);
-    now_s = kiks_ktime(port);
+    now_s = kiks_ktime(ref(1));
     is_in = real(ball) > goal_line(2);
     if is_in
         goals = goals + 1;

@@ -1,9 +1,9 @@
 function maze(port, baud, seconds)
 % maze  Demo: find the way out of a maze, to the light in its exit.
 %
-%   maze(port, baud, seconds) drives with the robot on port (-1, the simulated one) at baud (9600) until it is at the
-%   light, or until seconds (600) have passed. With a simulated robot it begins a new world, a random maze of 5 x 5
-%   cells; the exit is at the lower right.
+%   maze(port, baud, seconds) drives with the robot on port (-1, the simulated one; a real one as in kopen) at baud
+%   (9600) until it is at the light, or until seconds (600) have passed. With a simulated robot it begins a new world, a
+%   random maze of 5 x 5 cells; the exit is at the lower right.
 %
 %   The robot keeps the wall on its left, which leads out of each maze without islands. Once the light is near, it turns
 %   towards it. It prints how long that took, and what the brightest sensor reads: about 55 right at the light.
@@ -22,17 +22,17 @@ end
 if nargin < 3 || isempty(seconds)
     seconds = 600;
 end
-if port < 0
+if is_simulated(port)
     kiks_arena(kiks_generate_maze(5, 5));
 end
 
-ref = kiks_kopen([port baud 1]);
+ref = opened(port, baud);
 closing = onCleanup(@() leave(ref)); %#ok<NASGU>
 kSetEncoders(ref, 0, 0);
 % How much to turn right for the light that each sensor sees.
 turns = [-3 -2 -1 1 2 3 4 -4];
 [brightest, sensor] = min(kAmbient(ref));
-now_s = kiks_ktime(port);
+now_s = kiks_ktime(ref(1));
 while brightest > 55 && now_s < seconds
     if brightest < 330
         speeds = 3 + [1; -1] * turns(sensor);
@@ -44,7 +44,7 @@ while brightest > 55 && now_s < seconds
     if numel(light) == 8
         [brightest, sensor] = min(light);
     end
-    now_s = kiks_ktime(port);
+    now_s = kiks_ktime(ref(1));
 end
 kSetSpeed(ref, 0, 0);
 way = kiks_p2mm(mean(kGetEncoders(ref)));

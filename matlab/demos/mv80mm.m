@@ -1,9 +1,9 @@
 function mv80mm(port, baud)
 % mv80mm  Demo: drive 80 mm, by time and by the counters of the wheels.
 %
-%   mv80mm(port, baud) moves the robot on port (-1, the simulated one) at baud (9600) twice. First it drives at 40 mm/s
-%   for two seconds: the speed is rounded to 5 pulses/10 ms, 41 mm/s, so it comes 82 mm far. Then the position
-%   controllers bring the wheels 80 mm further. It prints both ways as the wheels have counted them.
+%   mv80mm(port, baud) moves the robot on port (-1, the simulated one; a real one as in kopen) at baud (9600) twice.
+%   First it drives at 40 mm/s for two seconds: the speed is rounded to 5 pulses/10 ms, 41 mm/s, so it comes 82 mm far.
+%   Then the position controllers bring the wheels 80 mm further. It prints both ways as the wheels have counted them.
 %
 %   Example:
 %     mv80mm
@@ -17,7 +17,7 @@ if nargin < 2 || isempty(baud)
     baud = 9600;
 end
 
-ref = kiks_kopen([port baud 1]);
+ref = opened(port, baud);
 closing = onCleanup(@() leave(ref)); %#ok<NASGU>
 
 % By time. A pulse each 10 ms is 100 pulses a second.

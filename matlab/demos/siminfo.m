@@ -26,13 +26,13 @@ kiks_spawn(2, [250 50]);
 ref = kiks_kopen([port baud 1]);
 closing = onCleanup(@() leave(ref)); %#ok<NASGU>
 side = 0;
-before_s = kiks_ktime(port);
+before_s = kiks_ktime(ref(1));
 now_s = before_s;
 while now_s < seconds
     [speeds, side] = away_from_walls(kProximity(ref), 5, side);
     kSetSpeed(ref, speeds(1), speeds(2));
     light = kAmbient(ref); %#ok<NASGU>
-    now_s = kiks_ktime(port);
+    now_s = kiks_ktime(ref(1));
     ball = kiks_siminfo_objects();
     kiks_siminfo_setobject(1, [], [], 100, ball(1, 5) + pi / 8 * (now_s - before_s));
     before_s = now_s;

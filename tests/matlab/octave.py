@@ -1,7 +1,7 @@
 """Programs of Octave as processes: what they print, what they say, and that nothing of them is left.
 
-A program says values for Python with say('name', value) and takes the message of an error with caught(@() ...); both are
-in `support`. Each has a folder of its own, for its files and for what tells where its session is found.
+A program says values for Python with say('name', value) and takes the message of an error with caught(@() ...); both
+are in `support`. Each has a folder of its own, for its files and for what tells where its session is found.
 """
 
 from __future__ import annotations
@@ -9,11 +9,13 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
 import threading
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +33,21 @@ SUPPORT = Path(__file__).parent / "support"
 OCTAVE = shutil.which("octave-cli")
 
 needs_octave = pytest.mark.skipif(OCTAVE is None, reason="octave-cli is not here: apt-get install octave")
+
+
+@cache
+def has_tcp() -> bool:
+    """Say whether Octave can open TCP connections."""
+    assert OCTAVE is not None
+    command = [OCTAVE, "-qf", "--eval", "exit(isempty(pkg('list', 'instrument-control')))"]
+    return subprocess.run(command, capture_output=True, timeout=GUARD_S, check=False).returncode == 0
+
+
+def need_tcp() -> None:
+    """Skip a test where Octave has no TCP connections."""
+    if not has_tcp():
+        pytest.skip("Octave's instrument-control is not here: apt-get install octave-instrument-control")
+
 
 _BEGIN = f"""\
 1;
@@ -85,6 +102,7 @@ class Octave:
             text=True,
             # So that all of it can be killed at once.
             start_new_session=True,
+            errors="replace",
         )
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
@@ -115,9 +133,9 @@ class Octave:
         assert any(line.startswith(begin) for line in self.lines), f"it has not printed {begin!r}:\n{self.text}"
 
     def tell(self) -> None:
-        """Let a program go on that waits in input of a line."""
+        """Let a program go on that waits in fread(stdin, 1); fgetl would wait for what comes after the line, too."""
         assert self._process.stdin is not None
-        self._process.stdin.write("\n")
+        self._process.stdin.write(".")
         self._process.stdin.flush()
 
     def kill(self) -> None:
@@ -161,9 +179,8 @@ class Octave:
         with self._process.stdout as output:
             for line in output:
                 with self._news:
-                    if line.startswith("@"):
-                        name, size, value = line[1:].split(" ", 2)
-                        self.said[name] = _value(json.loads(size), json.loads(value))
+                    if words := re.fullmatch(r"@(\w+) (\[[\d,]+\]) (.*)\n", line):
+                        self.said[words[1]] = _value(json.loads(words[2]), json.loads(words[3]))
                     elif "ignoring const execution_exception" not in line:  # which Octave 7.3 says at each end
                         self.lines.append(line.rstrip("\n"))
                     self._news.notify_all()

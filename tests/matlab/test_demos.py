@@ -7,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.matlab.octave import DEMOS, Octave, need_tcp, needs_octave, run
+from tests.served import served
 
-from tests.matlab.octave import DEMOS, Octave, needs_octave, run
+from kiks.ports.tcp import TcpEndpoint
 
 pytestmark = [needs_octave, pytest.mark.slow]
 
@@ -143,3 +145,20 @@ def test_two_programs_dance_in_one_world(tmp_path: Path) -> None:
     assert with_whom == 1
     assert np.hypot(*(leader.said["pose"][0, :2] - (200, 200))) < 40
     assert np.hypot(*(partner.said["pose"][0, :2] - (400, 200))) < 40
+
+
+def test_demos_drive_robots_on_real_ports(tmp_path: Path) -> None:
+    need_tcp()
+    endpoint = TcpEndpoint(0)
+    with served([endpoint]) as real:
+        done = run(
+            WITH_DEMOS
+            + f"mv80mm('{endpoint.name}')\nfollow('{endpoint.name}', 9600, 2)\nsay('session', session_number())",
+            tmp_path,
+        )
+        real.wait_free()
+        assert real.sim.travelled_mm(1) > 100
+    assert done.said["session"] == 0, "nothing is simulated here"
+    by_counters = float(re.findall(r"([\d.]+) mm with kMoveTo", done.text)[0])
+    assert by_counters == pytest.approx(80, abs=2)
+    assert re.search(r"follow: \d+ mm in 2\.\d s, and no wall\.", done.text)

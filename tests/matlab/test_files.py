@@ -10,11 +10,11 @@ import pytest
 from PIL import Image
 from scipy.io import loadmat
 from scipy.ndimage import label
+from tests.matlab.octave import needs_octave, run
 
 from kiks.model.arena import Arena
 from kiks.model.kad import save_kad
 from kiks.model.project import Project
-from tests.matlab.octave import needs_octave, run
 
 pytestmark = needs_octave
 

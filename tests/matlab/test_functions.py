@@ -7,31 +7,28 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from tests.matlab.octave import TOOLBOX, needs_octave, run
 
 pytestmark = needs_octave
 
 # kiks-behaviour.md: 1.1, 1.2, 1.4, 4.2; and what stands in kMatlab's place for files and real robots.
-NAMES = """
-kiks kiks_arena kiks_tif2arena kiks_kad2arena kiks_generate_maze kiks_arena_new_create kiks_quit kiks_setup
-kiks_checkpoint kiks_reset kiks_recordmovie kiks_print kiks_status kiks_speedtest kiks_calibrate kiks_mm2p kiks_p2mm
-kiks_kiksnet kiks_preferences kiks_load kiks_save
-kiks_kopen kiks_ksend kiks_kclose kiks_ktime kiks_pause
-kiks_siminfo_robotpos kiks_siminfo_robotpath kiks_siminfo_robotdist kiks_siminfo_objects kiks_siminfo_setobject
-kiks_siminfo_setrobot kiks_siminfo_speed kiks_spawn
-kcmd kProximity kAmbient kSetSpeed kGetSpeed kSetEncoders kGetEncoders kMoveTo kGetStatus kStatus kStop kSetProfile kLED
-kBios kGetAnalog kSetPWM kSetSpeedPID kSetPositionPID kReadByte kWriteByte kFlush kList kTeam kTurret kTurretBios
-kLinVis kLinLight kSetArm kSetGripper kRadio_status kRadio_read kRadio_send kBattle_sensors kBattle_fire
-kopen ksend ksends kclose kProximityG kBraitenberg kBraitenbergG
-""".split()
+NAMES = re.findall(
+    r"\w+",
+    """
+    kiks kiks_arena kiks_tif2arena kiks_kad2arena kiks_generate_maze kiks_arena_new_create kiks_quit kiks_setup
+    kiks_checkpoint kiks_reset kiks_recordmovie kiks_print kiks_status kiks_speedtest kiks_calibrate kiks_mm2p kiks_p2mm
+    kiks_kiksnet kiks_preferences kiks_load kiks_save
+    kiks_kopen kiks_ksend kiks_kclose kiks_ktime kiks_pause
+    kiks_siminfo_robotpos kiks_siminfo_robotpath kiks_siminfo_robotdist kiks_siminfo_objects kiks_siminfo_setobject
+    kiks_siminfo_setrobot kiks_siminfo_speed kiks_spawn
+    kcmd kProximity kAmbient kSetSpeed kGetSpeed kSetEncoders kGetEncoders kMoveTo kGetStatus kStatus kStop kSetProfile
+    kLED kBios kGetAnalog kSetPWM kSetSpeedPID kSetPositionPID kReadByte kWriteByte kFlush kList kTeam kTurret
+    kTurretBios kLinVis kLinLight kSetArm kSetGripper kRadio_status kRadio_read kRadio_send kBattle_sensors kBattle_fire
+    kopen ksend ksends kclose kProximityG kBraitenberg kBraitenbergG
+    """,
+)
 
-HELP = """
-names = {%s};
-for k = 1:numel(names)
-    say(names{k}, help(names{k}))
-end
-""" % ", ".join(f"'{name}'" for name in NAMES)  # fmt: skip
+HELP = "".join(f"say('{name}', help('{name}'))\n" for name in NAMES)
 
 ROBOT = """
 ref = kiks_kopen([-1 9600 1]);
