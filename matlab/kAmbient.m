@@ -11,5 +11,8 @@ function values = kAmbient(ref)
 %
 %   See also kProximity.
 
+if nargin < 1
+    ref = [];
+end
 values = kask(ref, 'O', 'o', 8, 1);
 end

@@ -13,5 +13,8 @@ function result = kBattle_fire(ref)
 %
 %   See also kBattle_sensors.
 
+if nargin < 1
+    ref = [];
+end
 result = kask(ref, 'T,99,F', 't,99,f', 2, 1);
 end

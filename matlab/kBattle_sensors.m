@@ -13,5 +13,8 @@ function values = kBattle_sensors(ref)
 %
 %   See also kBattle_fire.
 
+if nargin < 1
+    ref = [];
+end
 values = kask(ref, 'T,99,S', 't,99,s', 7, 1);
 end

@@ -11,6 +11,9 @@ function [bios, protocol] = kBios(ref)
 %
 %   See also kTurretBios, kList.
 
+if nargin < 1
+    ref = [];
+end
 versions = kask(ref, 'B', 'b', 2, 1);
 if nargout < 2
     bios = versions';

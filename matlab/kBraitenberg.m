@@ -14,6 +14,10 @@ function kBraitenberg(ref, speed, seconds)
 %
 %   See also kBraitenbergG, kProximity, kSetSpeed.
 
+if nargin < 1
+    ref = [];
+end
+need_ref(ref);
 if nargin < 2 || isempty(speed)
     speed = 0.7;
 end

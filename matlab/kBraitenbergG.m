@@ -14,6 +14,10 @@ function kBraitenbergG(ref, gain, seconds)
 %
 %   See also kBraitenberg, kProximityG, kiks_siminfo_robotpath.
 
+if nargin < 1
+    ref = [];
+end
+need_ref(ref);
 if nargin < 2 || isempty(gain)
     gain = 0.7;
 end

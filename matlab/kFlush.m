@@ -11,6 +11,9 @@ function text = kFlush(ref)
 %
 %   See also kcmd.
 
+if nargin < 1
+    ref = [];
+end
 flushed = kcmd(ref, ' ', 1);
 if nargout > 0
     text = flushed;

@@ -15,5 +15,8 @@ function values = kGetEncoders(ref)
 %
 %   See also kSetEncoders, kiks_p2mm.
 
+if nargin < 1
+    ref = [];
+end
 values = kask(ref, 'H', 'h', 2, 3);
 end

@@ -14,5 +14,8 @@ function values = kGetSpeed(ref)
 %
 %   See also kSetSpeed, kGetEncoders.
 
+if nargin < 1
+    ref = [];
+end
 values = kask(ref, 'E', 'e', 2, 1);
 end

@@ -17,5 +17,8 @@ function status = kGetStatus(ref)
 %
 %   See also kStatus, kMoveTo, kSetSpeed.
 
+if nargin < 1
+    ref = [];
+end
 status = kask(ref, 'K', 'k', 6, 1);
 end

@@ -11,5 +11,8 @@ function level = kLinLight(ref)
 %
 %   See also kLinVis.
 
+if nargin < 1
+    ref = [];
+end
 level = kask(ref, 'T,2,L', 't,2,l', 2, 1);
 end

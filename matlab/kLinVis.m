@@ -12,5 +12,8 @@ function pixels = kLinVis(ref)
 %
 %   See also kLinLight, kTurret.
 
+if nargin < 1
+    ref = [];
+end
 pixels = kask(ref, 'T,2,N', 't,2,n', 64, 1);
 end

@@ -10,6 +10,9 @@ function text = kList(ref)
 %
 %   See also kTeam, kBios, kcmd.
 
+if nargin < 1
+    ref = [];
+end
 lines = kcmd(ref, 'list', 1);
 if nargout > 0
     text = lines;

@@ -13,5 +13,8 @@ function values = kProximity(ref)
 %
 %   See also kAmbient, kProximityG, kSetSpeed.
 
+if nargin < 1
+    ref = [];
+end
 values = kask(ref, 'N', 'n', 8, 3);
 end

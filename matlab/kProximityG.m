@@ -14,6 +14,10 @@ function kProximityG(ref, kind, seconds)
 %
 %   See also kProximity, kBraitenbergG.
 
+if nargin < 1
+    ref = [];
+end
+need_ref(ref);
 if nargin < 2 || isempty(kind)
     kind = 'bar';
 end

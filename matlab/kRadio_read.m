@@ -13,5 +13,8 @@ function message = kRadio_read(ref)
 %
 %   See also kRadio_send, kRadio_status.
 
+if nargin < 1
+    ref = [];
+end
 message = kask(ref, 'T,4,R', 't,4,r', 18, 1);
 end

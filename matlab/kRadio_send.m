@@ -12,11 +12,17 @@ function reply = kRadio_send(ref, id, message, len)
 %
 %   See also kRadio_read, kRadio_status.
 
+if nargin < 1
+    ref = [];
+end
 if nargin < 3
     error('kiks:argument', 'kRadio_send needs a receiver and a message. Give kRadio_send(ref, 2, ''Hello'', 5).');
 end
 example = 'kRadio_send(ref, 2, ''Hello'', 5)';
-bytes = round(double(message(:)'));
+bytes = -1;
+if ischar(message) || isnumeric(message)
+    bytes = round(double(message(:)'));
+end
 if ~all(bytes >= 0 & bytes <= 255)
     error('kiks:argument', 'message must be a text or numbers 0 to 255, but it was %s. Give %s.', ...
         shown(message), example);

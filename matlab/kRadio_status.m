@@ -13,6 +13,9 @@ function status = kRadio_status(ref)
 %
 %   See also kRadio_read, kRadio_send.
 
+if nargin < 1
+    ref = [];
+end
 bits = kask(ref, 'T,4,F', 't,4,f', 1, 1);
 if bits < 0
     status = [];

@@ -12,6 +12,9 @@ function result = kSetEncoders(ref, left, right)
 %
 %   See also kGetEncoders, kMoveTo, kiks_mm2p.
 
+if nargin < 1
+    ref = [];
+end
 if nargin < 2 || isempty(left)
     left = 0;
 end

@@ -13,6 +13,9 @@ function result = kSetPositionPID(ref, Kp, Ki, Kd)
 %
 %   See also kSetSpeedPID, kMoveTo.
 
+if nargin < 1
+    ref = [];
+end
 if nargin < 2 || isempty(Kp)
     Kp = 3000;
 end

@@ -14,6 +14,9 @@ function result = kSetProfile(ref, speed_left, acceleration_left, speed_right, a
 %
 %   See also kMoveTo, kGetStatus.
 
+if nargin < 1
+    ref = [];
+end
 if nargin < 2 || isempty(speed_left)
     speed_left = 20;
 end

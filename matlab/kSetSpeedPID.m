@@ -13,6 +13,9 @@ function result = kSetSpeedPID(ref, Kp, Ki, Kd)
 %
 %   See also kSetPositionPID, kSetSpeed.
 
+if nargin < 1
+    ref = [];
+end
 if nargin < 2 || isempty(Kp)
     Kp = 3800;
 end

@@ -12,6 +12,9 @@ function kStatus(ref)
 %
 %   See also kGetStatus.
 
+if nargin < 1
+    ref = [];
+end
 status = kGetStatus(ref);
 if numel(status) ~= 6
     fprintf('The robot does not answer.\n');

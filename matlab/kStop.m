@@ -12,5 +12,8 @@ function result = kStop(ref)
 %
 %   See also kSetSpeed.
 
+if nargin < 1
+    ref = [];
+end
 result = kask(ref, 'D,0,0', 'd', 0, 1);
 end

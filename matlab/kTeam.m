@@ -10,6 +10,9 @@ function text = kTeam(ref)
 %
 %   See also kList.
 
+if nargin < 1
+    ref = [];
+end
 lines = kcmd(ref, 'k-team', 1);
 if nargout > 0
     text = lines;

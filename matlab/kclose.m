@@ -14,7 +14,10 @@ function kclose(ref)
 if nargin < 1
     ref = [];
 end
-if isempty(ref)
+if ~isnumeric(ref)
+    error('kiks:argument', 'ref must be what kopen returned, or [] for all, but it was %s. Call kclose(ref).', ...
+        shown(ref));
+elseif isempty(ref)
     robot_link('close', []);
 elseif ref(1) < 0
     kiks_kclose(ref);

@@ -17,7 +17,10 @@ function reply = kcmd(ref, text, multiline)
 %
 %   See also kiks_ksend, ksend, kFlush, kTurret.
 
-reply = kiks_ksend([text char(10)], ref);
+if nargin < 2
+    error('kiks:argument', 'kcmd needs a reference and a command. Give kcmd(ref, ''N'').');
+end
+reply = kiks_ksend([checked_command(text) char(10)], ref);
 if nargin > 2 && any(multiline)
     if ref(1) < 0
         further = unescaped(simulator(sprintf('listen %d', -ref(1))));

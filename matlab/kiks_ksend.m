@@ -12,9 +12,11 @@ function reply = kiks_ksend(cmd, ref, timeout)
 %
 %   See also kiks_kopen, kcmd.
 
-if nargin < 2 || numel(ref) < 4
-    error('kiks:argument', ['A command needs a reference of 4 elements, as kiks_kopen returns it. ' ...
-        'Call kiks_ksend([''N'' 10], ref).']);
+if nargin < 2
+    ref = [];
+end
+if ~isnumeric(ref) || numel(ref) < 4
+    need_ref(ref);
 end
 if ref(1) >= 0
     if nargin < 3

@@ -9,5 +9,8 @@ function p = kiks_mm2p(mm)
 %
 %   See also kiks_p2mm, kMoveTo.
 
+if nargin < 1 || ~isnumeric(mm)
+    error('kiks:argument', 'kiks_mm2p needs numbers [millimetres]. Give kiks_mm2p(80).');
+end
 p = mm / 0.082;
 end

@@ -8,5 +8,8 @@ function mm = kiks_p2mm(p)
 %
 %   See also kiks_mm2p, kGetEncoders.
 
+if nargin < 1 || ~isnumeric(p)
+    error('kiks:argument', 'kiks_p2mm needs numbers [pulses]. Give kiks_p2mm(80).');
+end
 mm = p * 0.082;
 end

@@ -27,7 +27,7 @@ try
     prepare_process();
     greys = matrix_of(simulator(['read ' escaped(path_name)]));
 catch failure
-    warning('kiks:file', '%s', failure.message);
+    warn('kiks:file', '%s', failure.message);
     return
 end
 arena = greys > 0;

@@ -32,7 +32,8 @@ def test_it_knows_where_it_is(heading_deg: float, distance_mm: int) -> None:
     sim = a_simulation(1, (1,))
     sim.place(1, 300.7, 299.6, math.radians(heading_deg))
     x_mm, y_mm, angle, ahead_mm, percent, points, hits = ask(sim, "S")
-    assert (x_mm, y_mm, angle) == (300, 300, heading_deg % 360)  # 600 - 299.6 from the top
+    # 300.7 mm from the left is in KiKS's column 301, 600 - 299.6 from the top in its row 300 (kiks-behaviour.md, 0).
+    assert (x_mm, y_mm, angle) == (301, 300, heading_deg % 360)
     assert ahead_mm == pytest.approx(distance_mm, abs=2)
     assert (percent, points, hits) == (100, 27, 0)
 

@@ -7,7 +7,7 @@ function values = kask(ref, request, prefix, count, tries)
 values = -1;
 start = numel(prefix) + 1;
 for attempt = 1:tries
-    if numel(ref) == 4 && ref(1) == -1
+    if isnumeric(ref) && numel(ref) == 4 && ref(1) == -1
         % What kiks_ksend would do, without the call: programs ask thousands of times a second.
         reply = simulator(['ask 1 ' request]);
     else

@@ -5,7 +5,8 @@ function text = parameters(numbers, count, what, example)
 %   they must be, with the unit, and gives example as a right call.
 
 % Programs set speeds thousands of times a second: the sum is finite if all are, and costs one call less.
-if numel(numbers) ~= count || ~isnumeric(numbers) || ~isfinite(sum(numbers))
+if numel(numbers) ~= count || ~(isnumeric(numbers) || islogical(numbers)) || ~isreal(numbers) || ...
+        ~isfinite(sum(numbers))
     error('kiks:argument', '%s must be %s, but it was %s. Give %s.', what, in_words(count), shown(numbers), example);
 end
 % Adding 0 makes 0 of -0, which would be written with its sign.

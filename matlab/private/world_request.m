@@ -8,7 +8,7 @@ elseif ischar(arena)
 else
     codes = checked_codes(arena);
     if any(size(codes) < 100)
-        warning('kiks:argument', ['An arena must be at least 100 x 100 mm, but this matrix is %d x %d. ' ...
+        warn('kiks:argument', ['An arena must be at least 100 x 100 mm, but this matrix is %d x %d. ' ...
             'The default arena is taken instead.'], size(codes, 1), size(codes, 2));
         request = 'world default';
         return

@@ -16,6 +16,10 @@ class Program:
     Args:
         thinking: A policy that `parse_thinking` knows.
 
+    Attributes:
+        thinks: Whether its thinking costs time.
+        measures: Whether that is as long as it really takes.
+
     Raises:
         ParameterError: If it knows none of that name.
     """
@@ -24,6 +28,7 @@ class Program:
         policy = parse_thinking(thinking)
         self._policy = None if isinstance(policy, ThinkingFixed) and policy.time_ns == 0 else policy
         self.thinks = self._policy is not None
+        self.measures = isinstance(policy, ThinkingLive)
         self._waiting = Waiting()
 
     def enter(self, *, is_command: bool) -> int:

@@ -42,14 +42,17 @@ def _fire(battle: Battle) -> Values:
 
 
 def _sense(battle: Battle) -> Values:
-    """S: x, y [mm from the left and top], heading [degrees], what is free ahead [mm], energy [% and points], hits."""
+    """S: x, y [mm from the left and top], heading [degrees], what is free ahead [mm], energy [% and points], hits.
+
+    Places are rounded: so they are the numbers of KiKS's columns and rows.
+    """
     site = battle.site
     x_mm, y_mm, heading_rad = site.pose()
     hits = int(site.record["battle_hits"])
     site.record["battle_hits"] = 0
     return (
-        int(x_mm),
-        int(site.arena_mm[1] - y_mm),
+        int(x_mm + 0.5),
+        int(site.arena_mm[1] - y_mm + 0.5),
         round(heading_rad * DEGREES_PER_RAD) % 360,
         battle.ahead_mm(site.ray().distance_mm),
         int(100.0 * battle.energy / battle.most),

@@ -71,7 +71,6 @@ def _set(visitor: Visitor, words: str) -> str:
 def _world(visitor: Visitor, words: str) -> str:
     session = visitor.session
     kind, _, rest = words.partition(" ")
-    visitor.close(0)
     if kind == "default":
         session.begin_default()
     elif kind == "file":
@@ -84,6 +83,8 @@ def _world(visitor: Visitor, words: str) -> str:
         session.begin_arena(arena)
     else:
         raise ParameterError(f"a world must be default, file or matrix, but it was {kind!r}.")
+    # Its ports were those of the world before; nobody is surprised who has asked for another.
+    visitor.close(0)
     return ""
 
 

@@ -132,10 +132,11 @@ class Visitor:
 
     def close(self, number: int) -> None:
         """Close a port, or all of them if it is 0; no error if it is not open. The robot drives on."""
+        if self.ports and self._sim is not self.session.world:
+            self._lose_world()
         for each in list(self.ports) if number == 0 else [number]:
             if each in self.ports:
-                if self._sim is self.session.world:
-                    self._meet()
+                self._meet()
                 self.ports.pop(each).port.close()
         self._rest_if_idle()
 
@@ -195,11 +196,15 @@ class Visitor:
     # ---- time ----
 
     def clock(self) -> str:
-        """Return which port was asked and the time since it was opened [s], in 19 characters; 0 for none."""
+        """Return which port was asked and the time since it was opened [s], in 19 characters; 0 for none.
+
+        The number is negative if thinking is measured: then more time has passed when somebody looks later.
+        """
         opened = self.ports.get(self.asked)
         if opened is None or self._connection is None:
             return "  0     0.000000000"
-        return f"{self.asked:3d}{s_from_ns(self._connection.now_ns - opened.opened_ns):16.9f}"
+        number = -self.asked if self._program.measures else self.asked
+        return f"{number:3d}{s_from_ns(self._connection.now_ns - opened.opened_ns):16.9f}"
 
     def time_s(self, number: int) -> float | None:
         """Return the simulated time since a port was opened [s]; None if it is not."""
