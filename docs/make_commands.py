@@ -6,6 +6,7 @@ The examples are executed as the page is made, so that they are true. A test fai
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -172,5 +173,9 @@ def page() -> str:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(page(), encoding="utf-8")
-    print(f"{PAGE} written")
+    if "--check" in sys.argv:
+        if PAGE.read_text(encoding="utf-8") != page():
+            sys.exit(f"{PAGE.name} must be what the command table says, but is not. Run make docs.")
+    else:
+        PAGE.write_text(page(), encoding="utf-8")
+        print(f"{PAGE.name} written")

@@ -1,0 +1,45 @@
+"""docs/matlab.md tells the truth: its program runs, its functions exist, its constants are preferences."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from tests.matlab.octave import ROOT, TOOLBOX, needs_octave, run
+
+PAGE = (ROOT / "docs" / "matlab.md").read_text(encoding="utf-8")
+
+
+def public_functions() -> set[str]:
+    return {path.stem for path in TOOLBOX.glob("*.m")}
+
+
+@needs_octave
+@pytest.mark.slow
+def test_the_first_program_runs_and_stays_clear_of_the_wall(tmp_path: Path) -> None:
+    program = re.findall(r"^```matlab\n(.*?)^```", PAGE, flags=re.MULTILINE | re.DOTALL)[0]
+    after = program.replace("kiks_kclose(ref);", "say('pose', kiks_siminfo_robotpos()); kiks_kclose(ref);")
+    x, y, _ = run(after, tmp_path).said["pose"].ravel()
+    assert 28 < x < 472
+    assert 28 < y < 472
+
+
+def test_every_function_is_listed_and_every_listed_one_exists() -> None:
+    listed = set(re.findall(r"`(k\w+)`", PAGE[PAGE.index("## Functions") : PAGE.index("`kiks('--version')`")]))
+    assert listed == public_functions()
+
+
+def test_every_constant_of_the_table_is_a_preference() -> None:
+    known = set(
+        re.findall(r"^(KIKS_\w+) =", (TOOLBOX / "kiks_preferences.m").read_text(encoding="utf-8"), re.MULTILINE)
+    )
+    named = set(re.findall(r"`(KIKS_\w+)`", PAGE[PAGE.index("| constant") : PAGE.index("The other constants")]))
+    assert named <= known
+    new = {"KIKS_SEED", "KIKS_THINKING", "KIKS_ROBOT", "KIKS_TURRETS", "KIKS_PROGRAMS", "KIKS_WINDOW"}
+    assert new <= named
+
+
+def test_demos_are_named() -> None:
+    named = set(re.findall(r"`(\w+)`", PAGE[PAGE.index("**Demos**") : PAGE.index("**Real robots.**")]))
+    assert {path.stem for path in (TOOLBOX / "demos").glob("*.m")} <= named
