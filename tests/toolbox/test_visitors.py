@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -437,3 +438,16 @@ def test_whatever_words_come_an_answer_goes_out(session: Session) -> None:
             told = ask.told(f"{name} {words}")
             assert told[1] in "+-"
             assert "KiKS itself has failed" not in told, (name, words, told)
+
+
+def test_a_robot_may_be_a_file(session: Session, tmp_path: Path) -> None:
+    ours = resources.files("kiks.model").joinpath("robots", "khepera.toml").read_text(encoding="utf-8")
+    file = tmp_path / "mine.toml"
+    file.write_text(ours.replace("pulse_mm = 0.08 ", "pulse_mm = 0.082 "), encoding="utf-8")
+    ask = begun(session, f"robot {file}", "robots 1")
+    assert session.world.specs[0].body.pulse_mm == 0.082
+    ask("open 1 9600")
+    ask("open 2 9600")
+    assert session.world.specs[1].body.pulse_mm == 0.082, "who comes later is of the same kind"
+    ask(f"set robot {tmp_path / 'none.toml'}")
+    assert "none.toml" in ask.refused("world default")
