@@ -35,7 +35,7 @@ LOOK_S = 0.5
 FIRST_S = 60.0
 """How long a process that listens waits for the first who comes [s of real time]."""
 
-SPIN_NS = 200_000 if len(os.sched_getaffinity(0)) > 1 else 0
+SPIN_NS = 1_000_000 if len(os.sched_getaffinity(0)) > 1 else 0
 """How long the next request is waited for without going to sleep [ns of real time]: a program in a loop sends it within
 that, and being woken takes a third of what a whole exchange does. With a single core the program needs it itself."""
 
