@@ -155,11 +155,12 @@ class Desk:
                 "there, or open another desk: kiks desk."
             )
         sim = await asyncio.to_thread(simulation_of, project, self.folder)
-        old = self.gate
+        old, programs = self.gate, self.programs
         is_paused = old.is_paused
-        self._retired.append(self.programs)
         self.project, self._commands = project, list(commands)
         self._take(sim, old.speed)
+        # Only now: whoever moves the world ends them at once, and must have the new ones to turn to.
+        self._retired.append(programs)
         if is_paused:
             self.gate.pause(sim.now_ns)
         old.close()

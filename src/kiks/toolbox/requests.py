@@ -17,6 +17,7 @@ from kiks.errors import KiksError, ParameterError
 from kiks.model.arena import Arena
 from kiks.model.arena_file import save_arena
 from kiks.model.kad import save_kad
+from kiks.sim.floor import ATTEMPTS
 from kiks.sim.simulation import Simulation
 from kiks.toolbox.matrices import arena_of, place_mm, user_place
 from kiks.toolbox.visitor import Visitor
@@ -24,9 +25,6 @@ from kiks.toolbox.words import escape, matrix_text, number_text, numbers_of, num
 
 STREAM_SPAWN = 6
 """Random stream of what is put at random places, and of headings that nobody has given."""
-
-ATTEMPTS = 10_000
-"""Random places that are tried."""
 
 LIGHT_ROW, BALL_ROW, CYLINDER_ROW = 1, 2, 3
 """What an object is in lists, and to kiks_spawn."""
