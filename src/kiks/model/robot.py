@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import math
-import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import asdict, field
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import Field
 
 from kiks.errors import ParameterError, nearest
-from kiks.model.robot_checks import check
+from kiks.model.data_file import Text, check, parse_toml, read_file, record
 from kiks.model.robot_parts import (
     AMBIENT_MODELS,
     CURVE_POINT_LIMIT,
@@ -50,7 +50,7 @@ __all__ = [
 ]
 
 
-@dataclass(frozen=True)
+@record
 class RobotSpec:
     """A kind of robot.
 
@@ -61,7 +61,7 @@ class RobotSpec:
         4
     """
 
-    name: str
+    name: Annotated[Text, Field(min_length=1, description='Write: name = "My robot".')]
     body: Body
     motor: Motor
     reset: Reset
@@ -84,27 +84,35 @@ class RobotSpec:
         Raises:
             ParameterError: If there is no such robot, the file is no TOML, or a key is missing, unknown or wrong.
         """
-        known = robot_names()
-        if str(name_or_path) in known:
-            source = str(name_or_path)
-            text = (_FOLDER / f"{source}.toml").read_text(encoding="utf-8")
+        source, known = str(name_or_path), robot_names()
+        what = f"Robot file {source!r}"
+        if source in known:
+            data = (_FOLDER / f"{source}.toml").read_bytes()
+        elif Path(source).suffix or Path(source).exists():
+            data = read_file(Path(source), what)
         else:
-            source = str(name_or_path)
-            try:
-                text = Path(name_or_path).read_text(encoding="utf-8")
-            except (OSError, UnicodeDecodeError) as error:
-                raise ParameterError(
-                    f"robot must be one of {known} or a readable TOML file, but it was {source!r} ({error})."
-                    f"{nearest(source, known)} Copy a robot of ours to begin with one of your own."
-                ) from None
-        try:
-            table = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
             raise ParameterError(
-                f"robot file {source!r} must be TOML, but {error}. Compare it with 'khepera.toml'."
-            ) from None
-        spec = _robot_from_table(table, source)
+                f"robot must be one of {known} or a TOML file, but it was {source!r}.{nearest(source, known)} Copy a "
+                "robot of ours to begin with one of your own."
+            )
+        spec = check(RobotSpec, parse_toml(data, what), what, advice=_ADVICE)
         return spec if response is None else spec.with_changes(proximity__response=response)
+
+    def __post_init__(self) -> None:
+        response = self.proximity.response
+        is_known = response not in ("curve", "reflection") or getattr(self, response) is not None
+        if not is_known:
+            raise ParameterError(f"proximity.response {response!r} needs a section [{response}], but there is none.")
+        for number, radius_mm in enumerate(self.proximity.mount_radius_mm):
+            if radius_mm > self.body.radius_mm:
+                raise ParameterError(
+                    f"proximity.mount_radius_mm[{number}] must be inside the body, but it was {radius_mm:g}."
+                )
+        if self.motor.free_speed_pulses * self.body.pulse_mm > 20:
+            raise ParameterError(
+                "motor.free_speed_pulses must be at most 20 mm a tick (2 m/s), but it was "
+                f"{self.motor.free_speed_pulses:g}."
+            )
 
     @property
     def is_noisy(self) -> bool:
@@ -131,23 +139,17 @@ class RobotSpec:
         Raises:
             ParameterError: If there is no such section or key, or a value is out of range.
         """
-        table: dict[str, dict[str, Any]] = {}
+        table = {name: values for name, values in asdict(self).items() if values is not None}
         for name, value in changes.items():
             section, _, key = name.partition("__")
-            table.setdefault(section, {})[key] = value
-        spec = self
-        for section, values in table.items():
-            part = getattr(spec, section, None)
-            if part is None or isinstance(part, str):
+            if not isinstance(table.get(section), dict):
+                sections = [known for known, values in table.items() if isinstance(values, dict)]
                 raise ParameterError(
-                    f"a change must be named 'section__key' of a section that the robot has, but it was {section!r}. "
-                    f"Sections: {list(_SECTIONS)}."
+                    f"a change must be named 'section__key' of a section that the robot has, but it was {name!r}. "
+                    f"Sections: {sections}."
                 )
-            for key in values:
-                _check_key(key, [f.name for f in fields(part)], f"section '{section}'")
-            spec = replace(spec, **{section: replace(part, **values)})
-        check(spec, spec.name)
-        return spec
+            table[section][key] = value
+        return check(RobotSpec, table, self.name, advice=_ADVICE)
 
 
 _FOLDER = resources.files("kiks.model") / "robots"
@@ -158,74 +160,7 @@ def robot_names() -> list[str]:
     return sorted(entry.name[:-5] for entry in _FOLDER.iterdir() if entry.name.endswith(".toml"))
 
 
-_SECTIONS: dict[str, type[Any]] = {
-    "body": Body,
-    "motor": Motor,
-    "reset": Reset,
-    "proximity": Proximity,
-    "ambient": Ambient,
-    "firmware": FirmwareSpec,
-    "quirks": Quirks,
-    "curve": Curve,
-    "reflection": Reflection,
-}
-
-_ABSENT: dict[str, Any] = {"quirks": Quirks(), "curve": None, "reflection": None}
-"""Sections that a file may leave out, and what that means."""
-
-
-def _check_key(key: str, known: list[str], where: str) -> None:
-    if key not in known:
-        raise ParameterError(f"{where} must hold only {known}, but it has {key!r}.{nearest(key, known)}")
-
-
-def _robot_from_table(table: dict[str, Any], source: str) -> RobotSpec:
-    where = f"robot file {source!r}"
-    for key in table:
-        _check_key(key, ["name", *_SECTIONS], where)
-    parts: dict[str, Any] = {}
-    for section, kind in _SECTIONS.items():
-        if section in _ABSENT and section not in table:
-            parts[section] = _ABSENT[section]
-            continue
-        values = table.get(section)
-        if not isinstance(values, dict):
-            raise ParameterError(
-                f"{where} must have a section [{section}], but it has none. Copy it from 'khepera.toml'."
-            )
-        types = {f.name: str(f.type) for f in fields(kind)}
-        for key in values:
-            _check_key(key, list(types), f"{where}, section [{section}]")
-        missing = [] if kind is Quirks else [key for key in types if key not in values]
-        if missing:
-            raise ParameterError(
-                f"{where}, section [{section}] must give {missing}, but does not. Copy them from 'khepera.toml'."
-            )
-        parts[section] = kind(**{key: _typed(values[key], types[key], f"{where}, {section}.{key}") for key in values})
-    name = table.get("name")
-    if not isinstance(name, str) or not name:
-        raise ParameterError(f'{where} must give the robot a name, but it was {name!r}. Write: name = "My robot".')
-    spec = RobotSpec(name=name, **parts)
-    check(spec, where)
-    return spec
-
-
-def _typed(value: Any, annotation: str, where: str) -> Any:
-    """Return a TOML value as the annotated type; an int may stand for a float, and nothing else for anything else."""
-    if annotation.startswith("tuple["):
-        item = "int" if "int" in annotation else "float"
-        if not isinstance(value, list):
-            raise ParameterError(f"{where} must be a list of {item}s, but it was {value!r}.")
-        return tuple(_typed(entry, item, where) for entry in value)
-    wanted: dict[str, tuple[type, ...]] = {"int": (int,), "float": (int, float), "str": (str,), "bool": (bool,)}
-    if not isinstance(value, wanted[annotation]) or (annotation != "bool" and isinstance(value, bool)):
-        raise ParameterError(f"{where} must be of type {annotation}, but it was {value!r}.")
-    if annotation == "float":
-        number = float(str(value))
-        if not math.isfinite(number):
-            raise ParameterError(f"{where} must be finite, but it was {value!r}.")
-        return number
-    return value
+_ADVICE = "Compare it with 'khepera.toml'."
 
 
 def specs_of(

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from itertools import pairwise
+from typing import Annotated, Literal, get_args
+
+from pydantic import Field
+
+from kiks.errors import ParameterError, shown
+from kiks.model.data_file import Number, Switch, Text, Whole, record
 
 SENSOR_COUNT = 8
 """Infra-red sensors of a Khepera, clockwise from the left side (khepera-protocol.md 4.14)."""
 
-RESPONSES = ("reflection", "thesis", "fast", "standin", "curve")
+Response = Literal["reflection", "thesis", "fast", "standin", "curve"]
+RESPONSES: tuple[str, ...] = get_args(Response)
 """What makes counts of a sensor's rays (`kiks.engine.responses`)."""
 
 JITTER_POINT_LIMIT = 51
@@ -16,27 +23,39 @@ JITTER_POINT_LIMIT = 51
 CURVE_POINT_LIMIT = 32
 """Most points of a measured curve of counts against distance."""
 
-AMBIENT_MODELS = ("flux", "thesis")
+AmbientModel = Literal["flux", "thesis"]
+AMBIENT_MODELS: tuple[str, ...] = get_args(AmbientModel)
 """How several lamps make one reading: their light adds up, or the thesis's formula for the strongest."""
 
 LAMP_POINT_LIMIT = 64
 """Most points of the curve of light against distance."""
 
+Angle = Annotated[Number, Field(ge=-360, le=360)]
+Counts = Annotated[Number, Field(ge=-1023, le=65535)]
+Share = Annotated[Number, Field(ge=0, le=1)]
+Brightness = Annotated[Whole, Field(ge=1, le=255, description="1 is black, 255 white.")]
+Gains = Annotated[tuple[Annotated[Whole, Field(ge=0, le=32767)], ...], Field(min_length=3, max_length=3)]
+_ONE_EACH = Field(min_length=SENSOR_COUNT, max_length=SENSOR_COUNT, description="One for each sensor.")
 
-@dataclass(frozen=True)
+
+@record
 class Body:
     """Shape and contact. `slip_ratio_min` and `_max` bound a blocked wheel's speed, as a share of its command.
 
     `brightness` is how other robots see it: 1 black to 255 white.
     """
 
-    diameter_mm: float
-    brightness: int
-    wheel_base_mm: float
-    pulse_mm: float
-    wall_friction: float
-    slip_ratio_min: float
-    slip_ratio_max: float
+    diameter_mm: Annotated[Number, Field(ge=10, le=500)]
+    brightness: Brightness
+    wheel_base_mm: Annotated[Number, Field(gt=0, le=500)]
+    pulse_mm: Annotated[Number, Field(ge=0.001, le=1)]
+    wall_friction: Annotated[Number, Field(ge=0, le=2)]
+    slip_ratio_min: Share
+    slip_ratio_max: Share
+
+    def __post_init__(self) -> None:
+        must(self.wheel_base_mm <= self.diameter_mm, self, "wheel_base_mm", "no more than the diameter")
+        must(self.slip_ratio_min <= self.slip_ratio_max, self, "slip_ratio_min", "at most slip_ratio_max")
 
     @property
     def radius_mm(self) -> float:
@@ -44,29 +63,29 @@ class Body:
         return self.diameter_mm / 2
 
 
-@dataclass(frozen=True)
+@record
 class Motor:
     """Wheel speed against PWM: linear beyond a dead band, with a first-order lag."""
 
-    free_speed_pulses: float
-    time_constant_ms: float
-    dead_band_pwm: float
-    left_gain: float
-    right_gain: float
-    gain_scale: int
+    free_speed_pulses: Annotated[Number, Field(ge=1, le=1000)]
+    time_constant_ms: Annotated[Number, Field(ge=0.1, le=1000)]
+    dead_band_pwm: Annotated[Number, Field(ge=0, lt=255)]
+    left_gain: Annotated[Number, Field(ge=0.5, le=1.5)]
+    right_gain: Annotated[Number, Field(ge=0.5, le=1.5)]
+    gain_scale: Annotated[Whole, Field(ge=1, le=1 << 20)]
 
 
-@dataclass(frozen=True)
+@record
 class Reset:
     """What the controllers hold after a reset: gains (Kp, Ki, Kd) and the speed profile."""
 
-    speed_gains: tuple[int, int, int]
-    position_gains: tuple[int, int, int]
-    profile_speed_pulses: int
-    profile_acceleration: int
+    speed_gains: Gains
+    position_gains: Gains
+    profile_speed_pulses: Annotated[Whole, Field(ge=1, le=127)]
+    profile_acceleration: Annotated[Whole, Field(ge=1, le=255)]
 
 
-@dataclass(frozen=True)
+@record
 class Proximity:
     """Where the eight infra-red sensors sit and look [deg, left positive], and how they answer [counts].
 
@@ -76,24 +95,31 @@ class Proximity:
     baseline with nothing near, from its least to its largest value in equally probable steps.
     """
 
-    response: str
-    mount_angle_deg: tuple[float, ...]
-    mount_radius_mm: tuple[float, ...]
-    direction_deg: tuple[float, ...]
-    field_of_view_deg: float
-    range_mm: float
-    gain: tuple[float, ...]
-    baseline_counts: tuple[float, ...]
-    maximum_counts: int
-    step_counts: int
-    noise_small: float
-    noise_large: float
-    noise_exponent: int
-    noise_down: float
-    jitter_counts: tuple[float, ...]
+    response: Response
+    mount_angle_deg: Annotated[tuple[Angle, ...], _ONE_EACH]
+    mount_radius_mm: Annotated[tuple[Annotated[Number, Field(gt=0, le=250)], ...], _ONE_EACH]
+    direction_deg: Annotated[tuple[Angle, ...], _ONE_EACH]
+    field_of_view_deg: Annotated[Number, Field(gt=0, le=180)]
+    range_mm: Annotated[Number, Field(ge=1, le=1000)]
+    gain: Annotated[tuple[Annotated[Number, Field(ge=0, le=20)], ...], _ONE_EACH]
+    baseline_counts: Annotated[tuple[Counts, ...], _ONE_EACH]
+    maximum_counts: Annotated[Whole, Field(ge=1, le=65535)]
+    step_counts: Annotated[Whole, Field(ge=1, le=65535)]
+    noise_small: Annotated[Number, Field(ge=0, lt=1)]
+    noise_large: Annotated[Number, Field(ge=0, lt=1)]
+    noise_exponent: Annotated[Whole, Field(ge=1, le=20)]
+    noise_down: Share
+    jitter_counts: Annotated[tuple[Counts, ...], Field(min_length=1, max_length=JITTER_POINT_LIMIT)]
+
+    def __post_init__(self) -> None:
+        is_gain = all(gain == 0 or gain >= 0.05 for gain in self.gain)
+        must(is_gain, self, "gain", "between 0.05 and 20, or 0 for a dead sensor")
+        must(self.step_counts <= self.maximum_counts, self, "step_counts", "at most maximum_counts")
+        must(self.noise_large <= self.noise_small, self, "noise_large", "at most noise_small")
+        must(rises(self.jitter_counts), self, "jitter_counts", "a list in which none is below the one before")
 
 
-@dataclass(frozen=True)
+@record
 class Curve:
     """What the response 'curve' knows: counts above the baseline of a sensor that looks straight at a white wall.
 
@@ -101,13 +127,23 @@ class Curve:
     All counts are multiplied by `scale`.
     """
 
-    distance_mm: tuple[float, ...]
-    counts: tuple[float, ...]
-    ray_weight: tuple[float, ...]
-    scale: float
+    distance_mm: Annotated[
+        tuple[Annotated[Number, Field(ge=1, le=10_000)], ...], Field(min_length=2, max_length=CURVE_POINT_LIMIT)
+    ]
+    counts: Annotated[
+        tuple[Annotated[Number, Field(gt=0, le=65535)], ...], Field(min_length=2, max_length=CURVE_POINT_LIMIT)
+    ]
+    ray_weight: Annotated[tuple[Share, ...], Field(min_length=4, max_length=4)]
+    scale: Annotated[Number, Field(ge=0.05, le=20)]
+
+    def __post_init__(self) -> None:
+        must(all(near < far for near, far in pairwise(self.distance_mm)), self, "distance_mm", "a list that rises")
+        falls = rises(self.counts[::-1]) and len(self.counts) == len(self.distance_mm)
+        must(falls, self, "counts", "one for each distance, falling")
+        must(self.ray_weight[0] > 0, self, "ray_weight", "a list whose first number is above 0")
 
 
-@dataclass(frozen=True)
+@record
 class Reflection:
     """What the response 'reflection' knows: how much light a sensor gets back, and what it makes of that.
 
@@ -118,15 +154,15 @@ class Reflection:
     `faint` and at the upper one over `bright`, shares too, to either side.
     """
 
-    behind_mm: float
-    light: tuple[float, ...]
-    threshold: tuple[float, ...]
-    lobe_deg: tuple[float, ...]
-    faint: float
-    bright: float
+    behind_mm: Annotated[Number, Field(ge=0.1, le=1000)]
+    light: Annotated[tuple[Annotated[Number, Field(ge=1e-3, le=1e3)], ...], _ONE_EACH]
+    threshold: Annotated[tuple[Annotated[Number, Field(ge=0, le=10)], ...], _ONE_EACH]
+    lobe_deg: Annotated[tuple[Annotated[Number, Field(ge=1, le=180)], ...], _ONE_EACH]
+    faint: Annotated[Number, Field(ge=1e-3, le=0.5)]
+    bright: Annotated[Number, Field(ge=1e-3, le=0.5)]
 
 
-@dataclass(frozen=True)
+@record
 class Ambient:
     """How the sensors answer to light.
 
@@ -136,33 +172,53 @@ class Ambient:
     in the dark is `dark_counts`.
     """
 
-    model: str
-    direction_deg: tuple[float, ...]
-    dark_counts: float
-    noise_counts: float
-    background_counts: float
-    angle_exponent: float
-    lamp_step_mm: float
-    lamp_counts: tuple[float, ...]
+    model: AmbientModel
+    direction_deg: Annotated[tuple[Angle, ...], _ONE_EACH]
+    dark_counts: Annotated[Number, Field(ge=0, le=1023)]
+    noise_counts: Annotated[Number, Field(ge=0, le=1023)]
+    background_counts: Annotated[Number, Field(ge=0, le=1023)]
+    angle_exponent: Annotated[Number, Field(gt=0, le=20)]
+    lamp_step_mm: Annotated[Number, Field(ge=0.1, le=1000)]
+    lamp_counts: Annotated[
+        tuple[Annotated[Number, Field(ge=0, le=1023)], ...], Field(min_length=2, max_length=LAMP_POINT_LIMIT)
+    ]
+
+    def __post_init__(self) -> None:
+        counts = self.lamp_counts
+        must(rises(counts) and counts[-1] <= self.dark_counts, self, "lamp_counts", "a list that rises to dark_counts")
+        is_between = counts[0] < self.background_counts <= self.dark_counts
+        must(is_between, self, "background_counts", "above lamp_counts, up to dark_counts")
 
 
-@dataclass(frozen=True)
+@record
 class FirmwareSpec:
     """What the robot's program says of itself, and how long it thinks about a command."""
 
-    banner: str
-    bios_version: str
-    protocol_version: str
-    processing_ms: float
-    baud: int
-    has_user_flash: bool
+    banner: Text
+    bios_version: Text
+    protocol_version: Text
+    processing_ms: Annotated[Number, Field(ge=0, le=1000)]
+    baud: Annotated[Whole, Field(ge=75, le=4_000_000, description="A Khepera's usual is 9600.")]
+    has_user_flash: Switch
 
 
-@dataclass(frozen=True)
+@record
 class Quirks:
     """Deviations that single clients need (khepera-protocol.md 3.4 and 11.3). All off is the documented robot."""
 
-    answer_empty_lines: bool = False
-    accept_lower_case: bool = False
-    unknown_command_with_z: bool = False
-    d_reply_trailing_comma: bool = False
+    answer_empty_lines: Switch = False
+    accept_lower_case: Switch = False
+    unknown_command_with_z: Switch = False
+    d_reply_trailing_comma: Switch = False
+
+
+def must(holds: bool, part: object, key: str, rule: str) -> None:
+    """Raise a ParameterError unless a rule between fields holds; it names the section of a robot's file."""
+    if not holds:
+        section = type(part).__name__.removesuffix("Spec").lower()
+        raise ParameterError(f"{section}.{key} must be {rule}, but it was {shown(getattr(part, key))}.")
+
+
+def rises(values: tuple[float, ...]) -> bool:
+    """Tell whether no value is below the one before it."""
+    return all(low <= high for low, high in pairwise(values))

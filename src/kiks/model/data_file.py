@@ -1,0 +1,347 @@
+"""Data files: read within a limit of size, checked against a declared model, refused in one line.
+
+Need: a file that people write or receive is read whole or not at all. Whatever is wrong with it, one line names the
+file, the key, the rule, the value and the way out. No file takes much more memory than it has bytes.
+Method: a model is a class under `record`, with the rules beside its fields (pydantic). `check` makes one of a table.
+The words of a message come from the declaration: the rule from type and bounds, the way out from the description.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import re
+import tomllib
+import types
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import (
+    Annotated,
+    Any,
+    Literal,
+    NamedTuple,
+    TypeVar,
+    Union,
+    dataclass_transform,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
+
+import pydantic.dataclasses
+from pydantic import ConfigDict, Field, Strict, TypeAdapter, ValidationError
+from pydantic.fields import FieldInfo
+
+from kiks.errors import SHOWN_MAX, KiksError, ParameterError, nearest, shown
+
+BYTES_MAX = 4 << 20
+"""Most bytes of a file that says nothing else."""
+
+TEXT_MAX = 1000
+"""Most characters of a text in a file."""
+
+KEY_PARTS_MAX = 16
+"""Most parts of a dotted key; tomllib's memory grows with their square."""
+
+COORDINATE_MAX = 1e9
+"""Largest magnitude of a number that is a coordinate or a length [mm]."""
+
+Number = Annotated[float, Strict()]
+Whole = Annotated[int, Strict()]
+Switch = Annotated[bool, Strict()]
+Text = Annotated[str, Strict(), Field(max_length=TEXT_MAX, pattern=r"^[^\x00]*$")]
+Coordinate = Annotated[float, Strict(), Field(ge=-COORDINATE_MAX, le=COORDINATE_MAX)]
+Point = Annotated[tuple[Coordinate, ...], Field(min_length=2, max_length=2)]
+
+_Model = TypeVar("_Model")
+
+
+class Rule(NamedTuple):
+    """The words for what a field must be, where its type and bounds do not say it."""
+
+    text: str
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field, Field))
+def record(kind: type[_Model]) -> type[_Model]:
+    """Make a class a frozen dataclass whose fields keep the rules beside them, made in code or of a file alike.
+
+    Rules between fields stand in `__post_init__`, which raises a ParameterError.
+    """
+    config = ConfigDict(extra="forbid", allow_inf_nan=False)
+    made: Any = pydantic.dataclasses.dataclass(frozen=True, config=config)(kind)
+    initialise = made.__init__
+
+    def checked(self: Any, *args: Any, **values: Any) -> None:
+        try:
+            initialise(self, *args, **values)
+        except ValidationError as error:
+            raise ParameterError(_sentence(made, error)) from None
+
+    made.__init__ = checked
+    return made  # type: ignore[no-any-return]
+
+
+def check(
+    model: type[_Model], values: object, what: str, *, advice: str = "", error: type[KiksError] = ParameterError
+) -> _Model:
+    """Return a record of the values of a file.
+
+    Args:
+        model: What the file holds, a class under `record`.
+        values: What was read.
+        what: What the message calls the file.
+        advice: What the message says where the field says nothing.
+        error: What is raised.
+
+    Raises:
+        KiksError: If the values break a rule. It is an `error`.
+    """
+    try:
+        made: _Model = adapter(model).validate_python(values)  # type: ignore[arg-type] # a class can be hashed
+    except ValidationError as broken:
+        raise error(f"{what}: {_sentence(model, broken, advice)}") from None
+    return made
+
+
+@cache
+def adapter(model: Any) -> TypeAdapter[Any]:
+    """Return what validates a model and describes it as a JSON schema."""
+    return TypeAdapter(model)
+
+
+# ---- bytes ----
+
+
+def read_file(path: Path, what: str, *, bytes_max: int = BYTES_MAX, error: type[KiksError] = ParameterError) -> bytes:
+    """Return the bytes of a file.
+
+    Args:
+        path: The file.
+        what: What the message calls it.
+        bytes_max: Most bytes that it may have.
+        error: What is raised.
+
+    Raises:
+        KiksError: If there is nothing, a folder, no right to read, or too much. It is an `error`.
+    """
+    try:
+        if path.is_dir():
+            raise error(f"{what} must be a file, but it is a folder. Name a file in it.")
+        if not path.is_file():
+            raise error(
+                f"{what} must exist, but there is no such file. Check the name and the folder {str(Path.cwd())!r}."
+            )
+        with path.open("rb") as file:
+            data = file.read(bytes_max + 1)
+    except (OSError, ValueError) as failure:
+        if isinstance(failure, KiksError):
+            raise
+        raise error(f"{what} must be readable, but: {failure}. Check its name and its rights.") from None
+    check_size(data, what, bytes_max=bytes_max, error=error)
+    return data
+
+
+def check_size(data: bytes, what: str, *, bytes_max: int, error: type[KiksError] = ParameterError) -> None:
+    """Check that a file is not too large.
+
+    Raises:
+        KiksError: If it has more than `bytes_max` bytes. It is an `error`.
+    """
+    if len(data) > bytes_max:
+        raise error(f"{what} must have at most {bytes_max / 2**20:g} MiB, but it has more. Is it the right file?")
+
+
+def parse_toml(data: bytes, what: str, *, error: type[KiksError] = ParameterError) -> dict[str, Any]:
+    """Return the table of a TOML file.
+
+    Raises:
+        KiksError: If the bytes are no TOML in UTF-8. It is an `error`.
+    """
+    try:
+        text = data.decode("utf-8")
+        _check_keys_are_short(text)
+        return tomllib.loads(text)
+    except (ValueError, RecursionError, OverflowError) as failure:
+        raise error(
+            f"{what} must be TOML in UTF-8, but: {_one_line(failure)}. Correct the file at that place."
+        ) from None
+
+
+def parse_json(data: bytes, what: str, *, error: type[KiksError] = ParameterError) -> Any:
+    """Return what a JSON file holds.
+
+    Raises:
+        KiksError: If the bytes are no JSON in UTF-8. It is an `error`.
+    """
+    try:
+        return json.loads(data.decode("utf-8"))
+    except (ValueError, RecursionError, OverflowError) as failure:
+        raise error(
+            f"{what} must be JSON in UTF-8, but: {_one_line(failure)}. Correct the file at that place."
+        ) from None
+
+
+_CORRECT = "Correct the file at that place."
+_STRINGS_AND_COMMENTS = re.compile(
+    r"""
+    \"{3}(?:[^\\"]|\\.|"(?!""))*+\"{3} | '{3}(?:[^']|'(?!''))*+'{3}
+    | "(?:[^"\\\n]|\\.)*+" | '[^'\n]*+' | \#[^\n]*+
+    """,
+    re.DOTALL | re.VERBOSE,
+)
+_LONG_KEY = re.compile(rf"(?<![\w-])(?:[\w-]*+\.){{{KEY_PARTS_MAX}}}")
+
+
+def _check_keys_are_short(text: str) -> None:
+    bare = re.sub(r"[ \t]++", "", _STRINGS_AND_COMMENTS.sub("", text))
+    if _LONG_KEY.search(bare):
+        raise ValueError(f"a key has more than {KEY_PARTS_MAX} parts")
+
+
+def _one_line(failure: BaseException) -> str:
+    text = " ".join(str(failure).split())
+    if isinstance(failure, RecursionError):
+        return "it is nested too deeply"
+    if "set_int_max_str_digits" in text:
+        return "a whole number has thousands of digits"
+    return text[:SHOWN_MAX].rstrip(".")
+
+
+# ---- what a message says of a broken rule ----
+
+
+def _sentence(model: type[Any], error: ValidationError, advice: str = "") -> str:
+    """Return rule, value and way out of the first rule that is broken; an unknown key comes before all others."""
+    found = error.errors(include_url=False)
+    first = next((each for each in found if each["type"] in _UNKNOWN), found[0])
+    kind, given = first["type"], first["input"]
+    path, place = _place(model, first["loc"])
+    name = _named(model, path) or "the file"
+    if kind in _UNKNOWN:
+        key, known = str(first["loc"][-1]), list(_hints(place.base))
+        rule = f"{name} must have known keys only, but it has {shown(key)}."
+        return f"{rule}{nearest(key, known)} Known are {', '.join(known)}."
+    if kind == "value_error":
+        said = str(first["ctx"]["error"])
+        return f"{name}: {said}" if path and isinstance(path[-1], int) else said
+    way_out = place.description or advice
+    if kind == "missing":
+        return f"{name} must be given, but it is missing. {way_out}".rstrip()
+    if isinstance(given, str) and get_origin(place.base) is Literal:
+        way_out = f"{nearest(given, map(str, get_args(place.base)))} {way_out}".lstrip()
+    return f"{name} must be {_rule(place.base, place.bounds)}, but it was {shown(given)}. {way_out}".rstrip()
+
+
+_UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")
+
+
+class _Place(NamedTuple):
+    """What is declared at a place of a model: its type, bounds on it, and what the field says of itself."""
+
+    base: Any
+    bounds: tuple[Any, ...]
+    description: str
+
+
+def _place(model: Any, loc: tuple[int | str, ...]) -> tuple[tuple[int | str, ...], _Place]:
+    """Return where a rule is broken, less the names of alternatives that pydantic puts there, and what is declared."""
+    here = _declared(model)
+    path: list[int | str] = []
+    for part in loc:
+        hints = _hints(here.base)
+        if part in hints:
+            inner = _declared(hints[str(part)])
+        elif isinstance(part, int) and get_origin(here.base) is tuple:
+            inner = _declared(get_args(here.base)[0])
+        else:
+            continue
+        path.append(part)
+        here = inner._replace(description=inner.description or here.description)
+    return tuple(path), here
+
+
+def _declared(hint: Any) -> _Place:
+    """Return what an annotation declares; of an optional one, what it is if it is there."""
+    if get_origin(hint) in (Union, types.UnionType):
+        parts = [part for part in get_args(hint) if part is not type(None)]
+        if len(parts) == 1:
+            return _declared(parts[0])
+    if get_origin(hint) is not Annotated:
+        return _Place(hint, (), "")
+    inner = _declared(get_args(hint)[0])
+    bounds, description = list(inner.bounds), inner.description
+    for said in get_args(hint)[1:]:
+        bounds += said.metadata if isinstance(said, FieldInfo) else [said]
+        description = getattr(said, "description", None) or description
+    return _Place(inner.base, tuple(bounds), description)
+
+
+@cache
+def _hints(kind: Any) -> dict[str, Any]:
+    """Return the fields of a record or a named tuple with their annotations."""
+    if not isinstance(kind, type) or not (dataclasses.is_dataclass(kind) or hasattr(kind, "_fields")):
+        return {}
+    return get_type_hints(kind, include_extras=True)
+
+
+def _named(model: Any, path: tuple[int | str, ...]) -> str:
+    """Return how messages name a place: 'body.diameter_mm', 'proximity.gain[4]', 'start 2: at_mm'."""
+    text = ""
+    for depth, part in enumerate(path, start=1):
+        if isinstance(part, str):
+            text += part if not text or text.endswith(" ") else f".{part}"
+        elif _hints(_place(model, path[:depth])[1].base):
+            text += f" {part + 1}" + (": " if depth < len(path) else "")
+        else:
+            text += f"[{part}]"
+    return text
+
+
+def _rule(base: Any, bounds: tuple[Any, ...]) -> str:
+    """Return in words what a value must be."""
+    said = next((bound.text for bound in bounds if isinstance(bound, Rule)), None)
+    if said is not None:
+        return said
+    limits = {name: getattr(bound, name) for bound in bounds for name in _LIMITS if hasattr(bound, name)}
+    if get_origin(base) is Literal:
+        return f"one of {', '.join(map(repr, get_args(base)))}"
+    if get_origin(base) is tuple:
+        inner = _declared(get_args(base)[0])
+        low, high = limits.get("min_length", 0), limits.get("max_length")
+        count = f"{low} " if low == high else f"{low} to {high} " if high else f"{low} or more " if low else ""
+        of = f", each {_rule(inner.base, inner.bounds)}" if not _hints(inner.base) else ""
+        return f"a list of {count}{'tables' if not of else 'values'}{of}"
+    if base is str:
+        count = f"{'1 to' if 'min_length' in limits else 'up to'} {limits.get('max_length', TEXT_MAX)}"
+        return f"a text of {count} characters"
+    if base is bool:
+        return "true or false"
+    if base in (int, float):
+        span = _span(limits)
+        return f"a {'whole ' if base is int else '' if span else 'finite '}number{span}"
+    return "a table"
+
+
+_LIMITS = ("ge", "gt", "le", "lt", "min_length", "max_length")
+
+
+def _span(limits: Mapping[str, Any]) -> str:
+    low, high = limits.get("ge", limits.get("gt")), limits.get("le", limits.get("lt"))
+    above, below = "gt" in limits, "lt" in limits
+    if low is None and high is None:
+        return ""
+    if high is None:
+        return f" above {low:g}" if above else f" of at least {low:g}"
+    if low is None:
+        return f" below {high:g}" if below else f" of at most {high:g}"
+    if not above and not below:
+        return f" from {_figure(low)} to {_figure(high)}"
+    return (
+        f" {'above' if above else 'of at least'} {_figure(low)} and {'below' if below else 'at most'} {_figure(high)}"
+    )
+
+
+def _figure(value: float) -> str:
+    return str(value) if isinstance(value, int) else f"{value:g}"
