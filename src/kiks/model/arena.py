@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from kiks.errors import ArenaError, ParameterError
-from kiks.model.materials import brightness_of
+from kiks.model.box import Box
 from kiks.model.maze import draw_maze
 from kiks.model.places import Ball, Cylinder, Lamp, Pose, checked_places
 from kiks.model.raster import (
@@ -23,7 +23,6 @@ from kiks.model.raster import (
     PAD,
     SIZE_MIN_MM,
     between,
-    box_raster,
     cells_per_pixel,
     clearance_mm,
     free_leaps,
@@ -210,8 +209,8 @@ class Arena:
             >>> int(Arena.box(400, 300, brightness="wood").brightness.max())
             190
         """
-        raster = box_raster(width_mm, height_mm, wall_mm, rounded_mm, brightness_of(brightness))
-        return cls.from_array(raster, name="box")
+        box = Box(width_mm, height_mm, wall_mm, rounded_mm, brightness)  # type: ignore[arg-type] # a material's name
+        return cls.from_array(box.raster(), name="box")
 
     @classmethod
     def maze(cls, *, columns: int = 4, rows: int = 4, path_mm: int = 120, wall_mm: int = 10, seed: int = 0) -> Arena:

@@ -4,30 +4,132 @@ from __future__ import annotations
 
 import json
 import math
-import tomllib
-from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Field
 
-from kiks.errors import ArenaError, KiksError, ParameterError, nearest
+from kiks.errors import ArenaError, KiksError, ParameterError
 from kiks.model.arena import Arena
-from kiks.model.picture import check_is_file, read_picture
-from kiks.model.places import Ball, Cylinder, Lamp, Pose
-from kiks.model.raster import is_number
+from kiks.model.box import PartMm, SideMm
+from kiks.model.data_file import Coordinate, Number, Point, Switch, Text, check, parse_toml, read_file, record
+from kiks.model.files import inside
+from kiks.model.picture import read_picture
+from kiks.model.places import Ball, Brightness, Cylinder, Friction, Lamp, Pose, Power, Radius
+from kiks.model.raster import MM_PER_PIXEL_MAX, MM_PER_PIXEL_MIN
 
-_PICTURE_KEYS = ("picture", "mm_per_pixel")
-BOX_KEYS = ("size_mm", "wall_mm", "rounded_mm", "brightness")
-ENTRY_KEYS = {
-    "start": ("at_mm", "heading_deg"),
-    "lamp": ("at_mm", "power_w", "is_on"),
-    "ball": ("at_mm", "radius_mm", "friction_mm_s2", "brightness"),
-    "cylinder": ("at_mm", "radius_mm", "friction_mm_s2", "brightness"),
-}
-_Body = TypeVar("_Body", Ball, Cylinder)
-_TOP_KEYS = (*_PICTURE_KEYS, *BOX_KEYS, "name", *ENTRY_KEYS)
+THINGS_MAX = 1000
+"""Most starts, lamps, balls and cylinders of a file, of each."""
+
+Pitch = Annotated[
+    Number,
+    Field(ge=MM_PER_PIXEL_MIN, le=MM_PER_PIXEL_MAX, description="Most arenas are drawn with 1 mm per pixel."),
+]
+At = Annotated[Point, Field(description="Give at_mm = [x, y]; y counts upwards from the lower edge.")]
+Size = Annotated[tuple[SideMm, ...], Field(min_length=2, max_length=2, description="Give size_mm = [width, height].")]
+
+
+@record
+class StartEntry:
+    """Where a robot starts."""
+
+    at_mm: At
+    heading_deg: Annotated[Coordinate, Field(description="0 looks right, 90 up.")] = 90.0
+
+
+@record
+class LampEntry:
+    """A lamp."""
+
+    at_mm: At
+    power_w: Power = 1.0
+    is_on: Switch = True
+
+
+@record
+class BallEntry:
+    """A ball that rolls when it is kicked."""
+
+    at_mm: At
+    radius_mm: Radius = 32.0
+    friction_mm_s2: Friction = 20.0
+    brightness: Brightness = 255
+
+
+@record
+class CylinderEntry:
+    """A cylinder that slides while it is pushed."""
+
+    at_mm: At
+    radius_mm: Radius = 16.0
+    friction_mm_s2: Friction = 160.0
+    brightness: Brightness = 190
+
+
+Starts = Annotated[tuple[StartEntry, ...], Field(max_length=THINGS_MAX)]
+Lamps = Annotated[tuple[LampEntry, ...], Field(max_length=THINGS_MAX)]
+Balls = Annotated[tuple[BallEntry, ...], Field(max_length=THINGS_MAX)]
+Cylinders = Annotated[tuple[CylinderEntry, ...], Field(max_length=THINGS_MAX)]
+
+
+@record
+class Walls:
+    """The walls of an arena: a picture, or a box in whole millimetres."""
+
+    size_mm: Size | None = None
+    wall_mm: PartMm | None = None
+    rounded_mm: PartMm | None = None
+    brightness: Brightness | None = None
+
+    def box(self) -> Arena:
+        """Return the box.
+
+        Raises:
+            ParameterError: If there is no size, or a number does not fit the others.
+            ArenaError: If the box is too small or too large.
+        """
+        if self.size_mm is None:
+            raise ParameterError("size_mm must be given, but it is missing. Give size_mm = [width, height].")
+        keys = {name: getattr(self, name) for name in ("wall_mm", "rounded_mm", "brightness")}
+        return Arena.box(*self.size_mm, **{name: value for name, value in keys.items() if value is not None})
+
+    def check_is_alone(self, rival: str) -> None:
+        """Check that no key of a box came with one of a picture.
+
+        Raises:
+            ParameterError: If one did.
+        """
+        given = [name for name in ("size_mm", "wall_mm", "rounded_mm", "brightness") if getattr(self, name) is not None]
+        if given:
+            raise ParameterError(
+                f"walls must be either a picture or a box, but {rival} came with {given[0]}. Remove one of them."
+            )
+
+
+@record
+class ArenaFile(Walls):
+    """An arena of KiKS: walls, and what stands between them."""
+
+    name: Text | None = None
+    picture: Annotated[Text, Field(description="A picture in the file's folder or below it.")] | None = None
+    mm_per_pixel: Pitch | None = None
+    start: Starts = ()
+    lamp: Lamps = ()
+    ball: Balls = ()
+    cylinder: Cylinders = ()
+
+    def __post_init__(self) -> None:
+        if self.picture is not None:
+            self.check_is_alone("picture")
+        elif self.mm_per_pixel is not None:
+            raise ParameterError("mm_per_pixel must come with a picture, but there is none. Boxes have cells of 1 mm.")
+        elif self.size_mm is None:
+            raise ParameterError(
+                "an arena must have a picture or a size, but it has neither. "
+                'Give picture = "name.png" or size_mm = [width, height].'
+            )
 
 
 def load_arena(path: Path) -> Arena:
@@ -40,12 +142,7 @@ def load_arena(path: Path) -> Arena:
         ArenaError: If the file or its picture is missing, damaged, or no arena. The message names file and entry.
     """
     what = f"Arena file {str(path)!r}"
-    check_is_file(path, what)
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise ArenaError(f"{what} must be readable, but: {error}. Check its rights.") from None
-    return _decode(data, what, path.stem, path.parent)
+    return _decode(read_file(path, what, error=ArenaError), what, path.stem, path.parent)
 
 
 def decode_arena(data: bytes, name: str = "arena", what: str = "The arena file") -> Arena:
@@ -63,15 +160,38 @@ def decode_arena(data: bytes, name: str = "arena", what: str = "The arena file")
 
 
 def _decode(data: bytes, what: str, name: str, folder: Path | None) -> Arena:
+    file = check(ArenaFile, parse_toml(data, what, error=ArenaError), what, error=ArenaError)
     try:
-        # Undecodable bytes and endless numbers are ValueErrors too; deep nesting ends in a RecursionError.
-        table = tomllib.loads(data.decode("utf-8"))
-    except (ValueError, RecursionError) as error:
-        raise ArenaError(f"{what} must be TOML in UTF-8, but: {error}. Correct the file at that place.") from None
-    try:
-        return _arena_of(table, name, folder)
+        arena = file.box() if file.picture is None else _picture_arena(file.picture, file.mm_per_pixel or 1.0, folder)
+        return replace(arena, name=name if file.name is None else file.name, **places_of(file))
     except KiksError as error:
         raise ArenaError(f"{what}: {error}") from None
+
+
+def _picture_arena(picture: str, mm_per_pixel: float, folder: Path | None) -> Arena:
+    if folder is None:
+        raise ArenaError(
+            "an arena that comes alone must have no picture beside it, but it names one. Open that picture instead."
+        )
+    return Arena.from_array(
+        read_picture(inside(folder, picture, "picture"), mm_per_pixel), mm_per_pixel=mm_per_pixel
+    )
+
+
+def places_of(file: Any) -> dict[str, Any]:
+    """Return what the entries of a file say of starts, lamps, balls and cylinders, for `dataclasses.replace`."""
+    bodies = {
+        f"{kind.__name__.lower()}s": tuple(
+            kind(*each.at_mm, each.radius_mm, each.friction_mm_s2, each.brightness)
+            for each in getattr(file, kind.__name__.lower())
+        )
+        for kind in (Ball, Cylinder)
+    }
+    return {
+        "starts": tuple(Pose(*each.at_mm, math.radians(each.heading_deg)) for each in file.start),
+        "lamps": tuple(Lamp(*each.at_mm, each.power_w, each.is_on) for each in file.lamp),
+        **bodies,
+    }
 
 
 def save_arena(arena: Arena, path: str | Path) -> None:
@@ -98,142 +218,6 @@ def save_arena(arena: Arena, path: str | Path) -> None:
         raise ArenaError(
             f"Arena {arena.name!r} must be written to {str(path)!r}, but: {error}. Check the folder."
         ) from None
-
-
-def _arena_of(table: dict[str, Any], name: str, folder: Path | None) -> Arena:
-    check_keys(table, _TOP_KEYS, "the file")
-    for keys, rival in ((_PICTURE_KEYS, "size_mm"), (BOX_KEYS, "picture")):
-        if rival in table and (given := [key for key in keys if key in table]):
-            raise ArenaError(
-                f"an arena must be either a picture or a box, but {rival} came with {given[0]}. Remove one of them."
-            )
-    if "picture" in table:
-        if folder is None:
-            raise ArenaError(
-                "an arena that comes alone must have no picture beside it, but it names one. Open that picture instead."
-            )
-        arena = _picture_arena(table, folder)
-    elif "size_mm" in table:
-        width_mm, height_mm = pair_of(table, "size_mm", "the box")
-        box_keys = {key: table[key] for key in BOX_KEYS[1:] if key in table}
-        arena = Arena.box(width_mm, height_mm, **box_keys)
-    else:
-        raise ArenaError(
-            "an arena must have a picture or a size, but it has neither. "
-            'Give picture = "name.png" or size_mm = [width, height].'
-        )
-    return replace(arena, name=typed(table, "name", str, name, "the file"), **places_of(table))
-
-
-def places_of(table: dict[str, Any]) -> dict[str, Any]:
-    """Return what the entries of a file say of starts, lamps, balls and cylinders, for `dataclasses.replace`.
-
-    Raises:
-        ArenaError: If an entry has unknown keys or values of another type.
-    """
-    return {
-        "starts": tuple(_starts(table)),
-        "lamps": tuple(_lamps(table)),
-        "balls": tuple(_body(Ball, who, entry) for who, entry in entries_of(table, "ball", ENTRY_KEYS["ball"])),
-        "cylinders": tuple(
-            _body(Cylinder, who, entry) for who, entry in entries_of(table, "cylinder", ENTRY_KEYS["cylinder"])
-        ),
-    }
-
-
-def _picture_arena(table: dict[str, Any], folder: Path) -> Arena:
-    given = typed(table, "picture", str, "", "the file")
-    home = folder.resolve()
-    try:
-        picture = (home / given).resolve()
-    except (ValueError, OSError, RuntimeError):
-        # A NUL character, or links that lead in a circle.
-        picture = home.parent
-    if not picture.is_relative_to(home) or Path(given).is_absolute():
-        raise ArenaError(
-            f"picture must lie in the arena file's folder or below it, but it was {given!r}. "
-            "Copy the picture beside the file and give its name."
-        )
-    mm_per_pixel = table.get("mm_per_pixel", 1.0)
-    return Arena.from_array(read_picture(folder / given, mm_per_pixel), mm_per_pixel=mm_per_pixel)
-
-
-def _starts(table: dict[str, Any]) -> Iterable[Pose]:
-    for who, entry in entries_of(table, "start", ENTRY_KEYS["start"]):
-        heading_deg = entry.get("heading_deg", 90)
-        if not is_number(heading_deg):
-            raise ArenaError(f"{who}: heading_deg must be a number, but it was {heading_deg!r}. 0 looks right, 90 up.")
-        x_mm, y_mm = pair_of(entry, "at_mm", who)
-        yield Pose(x_mm, y_mm, math.radians(heading_deg))
-
-
-def _lamps(table: dict[str, Any]) -> Iterable[Lamp]:
-    for who, entry in entries_of(table, "lamp", ENTRY_KEYS["lamp"]):
-        power_w = entry.get("power_w", 1.0)
-        if not is_number(power_w):
-            raise ArenaError(f"{who}: power_w must be a number, but it was {power_w!r}. A Khepera lamp has 1 W.")
-        x_mm, y_mm = pair_of(entry, "at_mm", who)
-        yield Lamp(x_mm, y_mm, power_w, typed(entry, "is_on", bool, True, who))
-
-
-def _body(kind: type[_Body], who: str, entry: dict[str, Any]) -> _Body:
-    x_mm, y_mm = pair_of(entry, "at_mm", who)
-    return kind(x_mm, y_mm, **{key: value for key, value in entry.items() if key != "at_mm"})
-
-
-def entries_of(table: dict[str, Any], label: str, keys: tuple[str, ...]) -> Iterable[tuple[str, dict[str, Any]]]:
-    """Yield each entry of a list of tables, with what messages call it.
-
-    Raises:
-        ArenaError: If it is no such list, or an entry has other keys.
-    """
-    entries = table.get(label, [])
-    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
-        raise ArenaError(f"{label} must be a list of tables, but it was {entries!r}. Head each with [[{label}]].")
-    for number, entry in enumerate(entries, start=1):
-        who = f"{label} {number}"
-        check_keys(entry, keys, who)
-        yield who, entry
-
-
-def check_keys(table: dict[str, Any], known: tuple[str, ...], who: str) -> None:
-    """Check that a table has known keys only.
-
-    Raises:
-        ArenaError: If it has another one; the message has the nearest.
-    """
-    for key in table:
-        if key not in known:
-            raise ArenaError(
-                f"{who} must have known keys only, but has {key!r}.{nearest(key, known)} Known are {', '.join(known)}."
-            )
-
-
-def pair_of(table: dict[str, Any], key: str, who: str) -> Any:
-    """Return the two numbers of a key, unconverted: whole numbers stay whole.
-
-    Raises:
-        ArenaError: If there are none.
-    """
-    if key not in table:
-        raise ArenaError(f"{who} must have {key}, but has none. Give {key} = [x, y].")
-    pair = table[key]
-    if not isinstance(pair, list) or len(pair) != 2 or not all(is_number(value) for value in pair):
-        raise ArenaError(f"{who}: {key} must be two numbers in mm, but it was {pair!r}. Give {key} = [x, y].")
-    return pair
-
-
-def typed(table: dict[str, Any], key: str, kind: type, default: Any, who: str) -> Any:
-    """Return the value of a key.
-
-    Raises:
-        ArenaError: If it is of another type.
-    """
-    value = table.get(key, default)
-    if not isinstance(value, kind):
-        form = "true or false" if kind is bool else 'a text in "quotes"'
-        raise ArenaError(f"{who}: {key} must be {form}, but it was {value!r}. Write it that way.")
-    return value
 
 
 def _toml_of(arena: Arena, picture: str) -> str:

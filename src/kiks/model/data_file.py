@@ -224,8 +224,9 @@ def _sentence(model: type[Any], error: ValidationError, advice: str = "") -> str
         rule = f"{name} must have known keys only, but it has {shown(key)}."
         return f"{rule}{nearest(key, known)} Known are {', '.join(known)}."
     if kind == "value_error":
-        said = str(first["ctx"]["error"])
-        return f"{name}: {said}" if path and isinstance(path[-1], int) else said
+        # A rule that begins with 'must' is one of the field; any other names its keys itself, but not the entry.
+        said, entry = str(first["ctx"]["error"]), _named(model, path[: _entry_depth(model, path)])
+        return f"{name} {said}" if said.startswith("must ") else f"{entry}: {said}" if entry else said
     way_out = place.description or advice
     if kind == "missing":
         return f"{name} must be given, but it is missing. {way_out}".rstrip()
@@ -297,6 +298,12 @@ def _named(model: Any, path: tuple[int | str, ...]) -> str:
         else:
             text += f"[{part}]"
     return text
+
+
+def _entry_depth(model: Any, path: tuple[int | str, ...]) -> int:
+    """Return how many parts of a path lead to the innermost entry of a list of tables, 0 if it is in none."""
+    depths = [depth for depth, part in enumerate(path, start=1) if isinstance(part, int)]
+    return max((depth for depth in depths if _hints(_place(model, path[:depth])[1].base)), default=0)
 
 
 def _rule(base: Any, bounds: tuple[Any, ...]) -> str:

@@ -3,35 +3,44 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
-from typing import Any, NamedTuple, TypeVar
+from collections.abc import Iterable
+from typing import Annotated, Any, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import BeforeValidator, Field
 
-from kiks.errors import ArenaError, ParameterError
+from kiks.errors import ArenaError
+from kiks.model.data_file import Coordinate, Number, Switch, Whole, check
 from kiks.model.materials import brightness_of
-from kiks.model.raster import is_number
 
-RADIUS_MIN_MM, RADIUS_MAX_MM = 10.0, 100.0
-"""Radii that balls and cylinders may have [mm]."""
+Brightness = Annotated[
+    Whole,
+    BeforeValidator(brightness_of, json_schema_input_type=int | str),
+    Field(ge=1, le=255, description="1 is black, 255 white; or the name of a material, such as 'wood'."),
+]
+Radius = Annotated[Number, Field(ge=10, le=100, description="Leave it out for the usual one.")]
+Friction = Annotated[Number, Field(ge=0, le=1e5, description="Leave it out for the usual one.")]
+Power = Annotated[
+    Number, Field(gt=0, le=1e9, description="A Khepera lamp has 1 W. Switch a lamp off with is_on instead.")
+]
 
 
 class Pose(NamedTuple):
     """Where a robot stands and looks: position [mm], heading [rad] counter-clockwise from +x."""
 
-    x_mm: float
-    y_mm: float
-    heading_rad: float
+    x_mm: Coordinate
+    y_mm: Coordinate
+    heading_rad: Coordinate
 
 
 class Lamp(NamedTuple):
     """A point of light: position [mm], electric power [W]."""
 
-    x_mm: float
-    y_mm: float
-    power_w: float = 1.0
-    is_on: bool = True
+    x_mm: Coordinate
+    y_mm: Coordinate
+    power_w: Power = 1.0
+    is_on: Switch = True
 
 
 class Ball(NamedTuple):
@@ -41,11 +50,11 @@ class Ball(NamedTuple):
     Khepera would run into it unseen: this one is white, as those are that people play with.
     """
 
-    x_mm: float
-    y_mm: float
-    radius_mm: float = 32.0
-    friction_mm_s2: float = 20.0
-    brightness: int = 255
+    x_mm: Coordinate
+    y_mm: Coordinate
+    radius_mm: Radius = 32.0
+    friction_mm_s2: Friction = 20.0
+    brightness: Brightness = 255
 
 
 class Cylinder(NamedTuple):
@@ -54,19 +63,19 @@ class Cylinder(NamedTuple):
     Size and friction are those of KiKS (kiks-behaviour.md 3.6), where its grey was 70; this one is of wood.
     """
 
-    x_mm: float
-    y_mm: float
-    radius_mm: float = 16.0
-    friction_mm_s2: float = 160.0
-    brightness: int = 190
+    x_mm: Coordinate
+    y_mm: Coordinate
+    radius_mm: Radius = 16.0
+    friction_mm_s2: Friction = 160.0
+    brightness: Brightness = 190
 
 
-_Place = TypeVar("_Place", bound=tuple[Any, ...])
+_Place = TypeVar("_Place", Pose, Lamp, Ball, Cylinder)
 
 
 def checked_places(
     label: str,
-    kind: Callable[..., _Place],
+    kind: type[_Place],
     entries: Iterable[Iterable[Any]],
     brightness: npt.NDArray[np.uint8],
     mm_per_cell: float,
@@ -76,32 +85,20 @@ def checked_places(
     Args:
         label: What messages call an entry; "lamp" may hang over a wall, everything else stands on floor.
         kind: `Pose`, `Lamp`, `Ball` or `Cylinder`.
-        entries: The entries, or plain tuples of the same numbers.
+        entries: The entries, or plain tuples of the same values.
         brightness: The arena's raster, uint8 [row, column], row 0 at the bottom.
         mm_per_cell: Edge of a cell [mm].
 
     Raises:
-        ParameterError: If an entry holds something else than finite numbers.
-        ArenaError: If an entry lies outside the arena or in a wall, or a lamp's power is not positive.
+        ParameterError: If a value of an entry breaks its rule.
+        ArenaError: If an entry lies outside the arena or in a wall.
     """
     places = []
     for number, entry in enumerate(entries, start=1):
-        who, values = f"{label} {number}", list(entry)
-        # Beyond the numbers come the switch of a lamp, and the brightness of a body.
-        count = 3 if kind is Pose or kind is Lamp else 4
-        if not all(is_number(value) for value in values[:count]):
-            raise ParameterError(
-                f"{who} must be made of finite numbers, but it was {values!r}. Give places in mm and headings in rad."
-            )
-        last = map(bool, values[count:]) if kind is Lamp else map(brightness_of, values[count:])
-        place = kind(*(float(value) for value in values[:count]), *last)
+        who = f"{label} {number}"
+        values = [value.item() if isinstance(value, np.generic) else value for value in entry]
+        place = check(kind, dict(zip(kind._fields, values, strict=False)), who)
         _check_position(who, place[0], place[1], brightness, mm_per_cell)
-        if isinstance(place, Lamp) and place.power_w <= 0:
-            raise ArenaError(
-                f"{who}: power_w must be positive, but it was {place.power_w:g}. Switch a lamp off with is_on instead."
-            )
-        if isinstance(place, Ball | Cylinder):
-            _check_body(who, place)
         places.append(place)
     return tuple(places)
 
@@ -119,16 +116,3 @@ def _check_position(who: str, x_mm: float, y_mm: float, brightness: npt.NDArray[
         raise ArenaError(
             f"{who} must stand on floor, but at {where} is a wall. Move it; y counts upwards from the lower edge."
         )
-
-
-def _check_body(who: str, body: Ball | Cylinder) -> None:
-    for name, value, low, high in (
-        ("radius_mm", body.radius_mm, RADIUS_MIN_MM, RADIUS_MAX_MM),
-        ("friction_mm_s2", body.friction_mm_s2, 0, 1e5),
-        ("brightness", body.brightness, 1, 255),
-    ):
-        if not (is_number(value) and low <= value <= high and (name != "brightness" or isinstance(value, int))):
-            raise ArenaError(
-                f"{who}: {name} must be a {'whole ' if name == 'brightness' else ''}number from {low} to {high:g}, "
-                f"but it was {value!r}. Leave it out for the usual one."
-            )

@@ -80,40 +80,6 @@ def is_number(value: Any) -> bool:
     return bool(-_NUMBER_MAX <= value <= _NUMBER_MAX)
 
 
-def box_raster(width_mm: int, height_mm: int, wall_mm: int, rounded_mm: int, brightness: int) -> npt.NDArray[np.uint8]:
-    """Draw an empty box at 1 mm per cell: uint8 [row, column]. See `Arena.box`.
-
-    Args:
-        width_mm: Outer width [mm].
-        height_mm: Outer height [mm].
-        wall_mm: Thickness of the wall [mm].
-        rounded_mm: Radius of the corners of the floor [mm].
-        brightness: Brightness of the wall, 1..255.
-
-    Raises:
-        ParameterError: If a number is not whole or out of range.
-        ArenaError: If the box is too small or too large.
-    """
-    _check_whole("width_mm", width_mm, 1, int(_NUMBER_MAX), "Boxes are drawn in whole millimetres.")
-    _check_whole("height_mm", height_mm, 1, int(_NUMBER_MAX), "Boxes are drawn in whole millimetres.")
-    width, height = int(width_mm), int(height_mm)
-    cells_per_pixel(height, width, 1.0)
-    _check_whole("wall_mm", wall_mm, 0, (min(width, height) - 1) // 2, "Floor must remain between the walls.")
-    wall = int(wall_mm)
-    _check_whole("rounded_mm", rounded_mm, 0, min(width, height) // 2 - wall, "A corner ends where the next begins.")
-    _check_whole("brightness", brightness, 1, 255, "0 would be floor.")
-
-    radius = int(rounded_mm)
-    raster = np.full((height, width), brightness, np.uint8)
-    floor = raster[wall : height - wall, wall : width - wall]
-    floor[...] = 0
-    from_centre_mm = radius - np.arange(radius) - 0.5
-    outside_circle = from_centre_mm[:, None] ** 2 + from_centre_mm**2 > radius**2
-    for corner in (floor, floor[::-1], floor[:, ::-1], floor[::-1, ::-1]):
-        corner[:radius, :radius][outside_circle] = brightness
-    return raster
-
-
 def clearance_mm(surface: npt.NDArray[np.uint8], mm_per_cell: float) -> npt.NDArray[np.float32]:
     """Return the distance to the nearest wall cell, between centres [mm].
 
@@ -232,8 +198,3 @@ def between(position: float, count: int) -> tuple[int, float]:
     position = min(max(position, 0.0), count - 1.0)
     lower = min(int(position), count - 2)
     return lower, position - lower
-
-
-def _check_whole(name: str, value: object, low: int, high: int, advice: str) -> None:
-    if not is_number(value) or value != int(value) or not low <= value <= high:  # type: ignore[call-overload, operator]
-        raise ParameterError(f"{name} must be a whole number from {low} to {high}, but it was {value!r}. {advice}")

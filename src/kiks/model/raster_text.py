@@ -11,8 +11,8 @@ import numpy as np
 
 from kiks.errors import ArenaError, KiksError
 from kiks.model.arena import Arena
+from kiks.model.box import Box
 from kiks.model.picture import decode_picture
-from kiks.model.raster import box_raster
 
 _LINE = 116
 
@@ -63,7 +63,7 @@ def box_keys_of(arena: Arena) -> dict[str, Any] | None:
         if outside != corner:
             continue
         try:
-            if np.array_equal(box_raster(width, height, wall, rounded, grey), raster):
+            if np.array_equal(Box(width, height, wall, rounded, grey).raster(), raster):
                 return {"size_mm": [width, height], "wall_mm": wall, "rounded_mm": rounded, "brightness": grey}
         except KiksError:
             return None

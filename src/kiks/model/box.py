@@ -1,0 +1,64 @@
+"""An empty box: the arena that a few numbers say, in Python, in arena files and in projects."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import BeforeValidator, Field
+
+from kiks.errors import ParameterError
+from kiks.model.data_file import Whole, record
+from kiks.model.places import Brightness
+from kiks.model.raster import cells_per_pixel
+
+
+def _whole(value: Any) -> Any:
+    """Return a number without a fraction as an int; anything else as it is."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+_WHOLE = BeforeValidator(_whole, json_schema_input_type=int)
+_ADVICE = "Boxes are drawn in whole millimetres."
+SideMm = Annotated[Whole, _WHOLE, Field(ge=1, le=1_000_000_000, description=_ADVICE)]
+PartMm = Annotated[Whole, _WHOLE, Field(ge=0, le=1_000_000_000, description=_ADVICE)]
+
+
+@record
+class Box:
+    """An empty box with a wall around it, in whole millimetres; see `Arena.box`."""
+
+    width_mm: SideMm
+    height_mm: SideMm
+    wall_mm: PartMm = 10
+    rounded_mm: PartMm = 0
+    brightness: Annotated[Brightness, BeforeValidator(_whole)] = 255
+
+    def __post_init__(self) -> None:
+        side_mm = min(self.width_mm, self.height_mm)
+        for name, most, advice in (
+            ("wall_mm", (side_mm - 1) // 2, "Floor must remain between the walls."),
+            ("rounded_mm", side_mm // 2 - self.wall_mm, "A corner ends where the next begins."),
+        ):
+            if (value := getattr(self, name)) > most:
+                raise ParameterError(f"{name} must be a whole number from 0 to {most}, but it was {value}. {advice}")
+
+    def raster(self) -> npt.NDArray[np.uint8]:
+        """Draw it at 1 mm per cell: uint8 [row, column].
+
+        Raises:
+            ArenaError: If the box is too small or too large.
+        """
+        cells_per_pixel(self.height_mm, self.width_mm, 1.0)
+        raster = np.full((self.height_mm, self.width_mm), self.brightness, np.uint8)
+        wall, radius = self.wall_mm, self.rounded_mm
+        floor = raster[wall : self.height_mm - wall, wall : self.width_mm - wall]
+        floor[...] = 0
+        from_centre_mm = radius - np.arange(radius) - 0.5
+        outside_circle = from_centre_mm[:, None] ** 2 + from_centre_mm**2 > radius**2
+        for corner in (floor, floor[::-1], floor[:, ::-1], floor[::-1, ::-1]):
+            corner[:radius, :radius][outside_circle] = self.brightness
+        return raster
