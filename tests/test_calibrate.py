@@ -336,9 +336,9 @@ def test_a_robot_file_is_read_back_as_it_was(name: str, tmp_path: Path) -> None:
 
 
 def test_a_robot_file_that_cannot_be_written_is_named(tmp_path: Path) -> None:
-    with pytest.raises(kiks.ParameterError, match="a robot file must go to a folder that can be written"):
+    with pytest.raises(kiks.ParameterError, match="a robot must go to a file that can be written"):
         save_robot(BASE, tmp_path / "no" / "robot.toml")
     (tmp_path / "folder").mkdir()
-    with pytest.raises(kiks.ParameterError, match="a robot file must go to a writable place"):
+    with pytest.raises(kiks.ParameterError, match=r"folder' cannot \(it is a folder\)"):
         save_robot(BASE, tmp_path / "folder")
     assert [entry.name for entry in tmp_path.iterdir()] == ["folder"]

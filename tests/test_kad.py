@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.io import loadmat, savemat
 
-from kiks.errors import ArenaError
+from kiks.errors import ArenaError, ParameterError
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
 from kiks.model.kad import PIECES_MAX, decode_kad, encode_kad, load_kad, save_kad
 from kiks.model.mat import FILE_BYTES_MAX
@@ -254,5 +254,5 @@ def test_what_does_not_fit_is_refused(tmp_path):
     noise = np.random.default_rng(2).integers(0, 256, (600, 600)).astype(np.uint8)
     with pytest.raises(ArenaError, match=str(PIECES_MAX)):
         encode_kad(Arena.from_array(noise))
-    with pytest.raises(ArenaError, match="writable"):
+    with pytest.raises(ParameterError, match="an arena must go to a file that can be written"):
         save_kad(Arena.default(), tmp_path / "none" / "a.kad")

@@ -184,7 +184,7 @@ def test_bad_bytes_are_refused(tmp_path):
         Project.load(tmp_path / "none.kiks")
     with pytest.raises(ParameterError, match=r"\.kiks"):
         Project().save(tmp_path / "none.toml")
-    with pytest.raises(ArenaError, match="writable"):
+    with pytest.raises(ParameterError, match="can be written"):
         Project().save(tmp_path / "none" / "a.kiks")
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import colorsys
 import math
 from collections.abc import Iterable, Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from kiks.engine.state import BALL
 from kiks.errors import ParameterError
 from kiks.model.arena import PAD, Arena
+from kiks.model.files import check_writable, replace_file
 from kiks.sim.simulation import Simulation
 
 if TYPE_CHECKING:
@@ -129,12 +131,35 @@ def save_picture(image: Image, path: str | Path) -> None:
     Raises:
         ParameterError: If the place cannot be written or the ending names no type of picture.
     """
+    pixels, kind = BytesIO(), _picture_type(path)
+    image.save(pixels, kind)
+    replace_file(path, pixels.getvalue(), "a picture")
+
+
+def check_picture(path: str | Path) -> None:
+    """Raise, before the run that is drawn, what `save_picture` would raise.
+
+    Raises:
+        ParameterError: If the place cannot be written or the ending names no type of picture.
+    """
+    _picture_type(path)
+    check_writable(path, "a picture")
+
+
+def _picture_type(path: str | Path) -> str:
+    from PIL import Image
+
+    Image.init()
+    kind = Image.registered_extensions().get(Path(path).suffix.lower(), "")
     try:
-        image.save(path)
-    except (OSError, ValueError) as error:
+        # Some types can be read only, or need a library that is not there.
+        Image.new("RGB", (1, 1)).save(BytesIO(), kind)
+    except (KeyError, OSError, ValueError):
         raise ParameterError(
-            f"a picture must go to a writable file like 'run.png', but {str(path)!r} failed: {error}."
+            f"a picture must go to a file like 'run.png', but {str(path)!r} ends like no picture that can be written. "
+            "Let it end in .png."
         ) from None
+    return kind
 
 
 def _robot_colour(index: int, robot_count: int) -> Colour:
@@ -254,4 +279,4 @@ class _Sheet:
         self.pen.text(at(-0.16, 0.0), name, fill=_WHITE, font=font, anchor="mm", stroke_width=1, stroke_fill=_WHITE)
 
 
-__all__ = ["Trace", "draw_simulation", "draw_world", "save_picture"]
+__all__ = ["Trace", "check_picture", "draw_simulation", "draw_world", "save_picture"]

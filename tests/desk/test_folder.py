@@ -97,7 +97,7 @@ def test_files_are_kept_and_listed(home):
         folder.save(project, "room")
     folder.save(replace(project, seed=6), "room", may_replace=True)
     assert folder.open("room.kiks").seed == 6
-    for name, words in [("sub/none/a", "writable"), ("a.toml", "end in"), ("none.kiks", "exist")]:
+    for name, words in [("sub/none/a", "can be written"), ("a.toml", "end in"), ("none.kiks", "exist")]:
         with pytest.raises(KiksError, match=words):
             folder.open(name) if name.startswith("none") else folder.save(project, name)
     (home / "dir.kiks").mkdir()

@@ -176,7 +176,7 @@ def test_networks_have_their_shape(tmp_path, change):
     (tmp_path / "net.json").write_text(json.dumps(data))
     with pytest.raises(ParameterError, match=f"{next(iter(change))} must be finite numbers of the shape"):
         NetworkResponse.load(tmp_path / "net.json")
-    with pytest.raises(ParameterError, match="must go to a place that can be written"):
+    with pytest.raises(ParameterError, match="networks must go to a file that can be written"):
         NetworkResponse.load().save(tmp_path / "no" / "net.json")
 
 

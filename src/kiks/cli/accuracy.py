@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from kiks.cli.engine_start import ready_engine
-from kiks.errors import ParameterError
+from kiks.model.files import replace_file
 
 if TYPE_CHECKING:
     from kiks.fit.accuracy import Card
@@ -41,13 +41,7 @@ def accuracy(
     else:
         _show(card)
     if page is not None:
-        try:
-            page.write_text(cards.page(card), encoding="utf-8")
-        except OSError as error:
-            raise ParameterError(
-                f"--page must name a file that can be written, but {str(page)!r} cannot ({error.strerror}). "
-                "Choose another."
-            ) from error
+        replace_file(page, cards.page(card), "--page")
     if plots is not None:
         from kiks.fit.plots import plot_card
 

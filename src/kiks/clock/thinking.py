@@ -13,6 +13,7 @@ from time import perf_counter_ns
 from typing import Protocol
 
 from kiks.errors import ParameterError
+from kiks.model.files import replace_file
 from kiks.model.policy import split_thinking
 from kiks.units import NS_PER_S
 
@@ -103,8 +104,12 @@ def parse_thinking(text: str) -> Thinking:
 
 
 def save_thinking(measured_ns: list[int], path: str | Path) -> None:
-    """Write the times that a live run measured [ns], one a line, for 'replay:FILE'."""
-    Path(path).write_text("".join(f"{time_ns}\n" for time_ns in measured_ns), encoding="ascii")
+    """Write the times that a live run measured [ns], one a line, for 'replay:FILE'.
+
+    Raises:
+        ParameterError: If the file cannot be written.
+    """
+    replace_file(path, "".join(f"{time_ns}\n" for time_ns in measured_ns), "thinking times")
 
 
 def _read_times(path: Path) -> list[int]:

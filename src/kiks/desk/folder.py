@@ -80,14 +80,15 @@ class Folder:
             may_replace: Whether an earlier file of that name may be replaced.
 
         Raises:
-            ParameterError: If the name leads out of the folder, cannot be one, or is taken.
-            ArenaError: If the file cannot be written, or the arena does not fit into it.
+            ParameterError: If the name leads out of the folder, cannot be one, or is taken, or the file cannot be
+                written.
+            ArenaError: If the arena does not fit into the file.
         """
         full = self.full_name(name)
         path = self._path(full, SAVED)
         if path.exists() and not may_replace:
             raise ParameterError(f"The name must be new, but {full!r} is there. Choose another one, or replace it.")
-        replace_file(path, encode(project, full))
+        replace_file(path, encode(project, full), "a project")
         return full
 
     def has(self, name: str) -> bool:

@@ -96,8 +96,7 @@ def save_script(folder: Path, name: str, text: str, *, may_replace: Script | Non
         may_replace: The file that it was read from; another one of that name is not written over.
 
     Raises:
-        ParameterError: If the name leads out of the folder or is taken, or the text is too long.
-        ArenaError: If it cannot be written.
+        ParameterError: If the name leads out of the folder or is taken, the text is too long, or it cannot be written.
     """
     name = name.strip()
     name = name if name.endswith(".py") else f"{name}.py"
@@ -115,7 +114,7 @@ def save_script(folder: Path, name: str, text: str, *, may_replace: Script | Non
             f"a program must have a name that is free, but there is a {name!r} already. Take another name, or open "
             "that one and change it."
         )
-    replace_file(path, data)
+    replace_file(path, data, "a program")
     return script
 
 

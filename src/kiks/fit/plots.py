@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from kiks.errors import ParameterError
 from kiks.fit.samples import MAXIMUM_COUNTS, Floats, is_active
+from kiks.model.files import make_folder, replace_file
 from kiks.model.robot import SENSOR_COUNT
 
 if TYPE_CHECKING:
@@ -35,14 +37,10 @@ def _figure(columns: int, rows: int) -> tuple[Any, Any]:
 
 
 def _save(figure: Any, file: Path) -> Path:
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(file, dpi=100)
-    except OSError as error:
-        raise ParameterError(
-            f"Plots must go to a folder that can be written, but {str(file.parent)!r} cannot ({error.strerror}). "
-            "Choose another with --plots."
-        ) from error
+    make_folder(file.parent, "plots")
+    pixels = BytesIO()
+    figure.savefig(pixels, format="png", dpi=100)
+    replace_file(file, pixels.getvalue(), "a plot")
     return file
 
 

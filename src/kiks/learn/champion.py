@@ -17,8 +17,8 @@ from kiks.client.khepera import Port
 from kiks.control.controller import Controller
 from kiks.control.controllers import from_recipe, recipe_for
 from kiks.errors import ParameterError, nearest
-from kiks.learn.records import replace_safely
 from kiks.model.arena import Arena
+from kiks.model.files import replace_files
 from kiks.sim.simulation import Simulation
 
 FORMAT = 1
@@ -112,11 +112,13 @@ class Champion:
         """
         target = Path(path)
         recipe = recipe_for(self.controller, target.parent)
+        files: dict[Path, bytes | str] = {}
         if "file" in recipe:
             beside = target.with_name(f"{target.stem}_controller.py")
-            replace_safely(beside, _bytes_of(target.parent / recipe["file"]))
+            files[beside] = _bytes_of(target.parent / recipe["file"])
             recipe = {"file": beside.name, "name": recipe["name"]}
-        replace_safely(target, self._text(recipe).encode())
+        files[target] = self._text(recipe)
+        replace_files(files, "a champion")
 
     def _text(self, recipe: Mapping[str, Any]) -> str:
         top = {"champion": FORMAT} | {name: getattr(self, name) for name in _TOP[1:-1]}

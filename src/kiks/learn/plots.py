@@ -10,7 +10,7 @@ import numpy as np
 
 from kiks.learn.algorithms import MapElites, library
 from kiks.learn.evolution import Evolution
-from kiks.learn.records import replace_safely
+from kiks.model.files import replace_file
 
 
 def save_plot(evolution: Evolution, path: str | Path) -> None:
@@ -29,7 +29,7 @@ def save_plot(evolution: Evolution, path: str | Path) -> None:
         _draw_map(figure, axes[1], evolution, algorithm)
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=110)
-    replace_safely(Path(path), buffer.getvalue())
+    replace_file(path, buffer.getvalue(), "the picture")
 
 
 def _draw_fitness(axes: Any, evolution: Evolution) -> None:

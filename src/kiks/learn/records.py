@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from kiks.errors import ParameterError
 from kiks.learn.algorithms import library
-from kiks.model.files import write_whole
+from kiks.model.files import make_folder, replace_file
 
 Floats = NDArray[np.float64]
 
@@ -64,12 +64,7 @@ class Folder:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        try:
-            (self.path / GENERATIONS).mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise ParameterError(
-                f"the folder {str(path)!r} must be writable, but: {error}. Choose another one."
-            ) from None
+        make_folder(self.path / GENERATIONS, "an evolution")
 
     def check_identity(self, identity: dict[str, Any]) -> None:
         """Make the folder that of an evolution.
@@ -79,7 +74,7 @@ class Folder:
         """
         file = self.path / IDENTITY
         if not file.exists():
-            replace_safely(file, (json.dumps(identity, indent=1) + "\n").encode())
+            replace_file(file, json.dumps(identity, indent=1) + "\n", "an evolution")
             return
         try:
             known = json.loads(file.read_text(encoding="utf-8"))
@@ -120,7 +115,7 @@ class Folder:
         buffer = io.BytesIO()
         seconds = np.float64(generation.seconds)
         np.savez(buffer, candidates=generation.candidates, values=generation.values, seconds=seconds)
-        replace_safely(self._file(number), buffer.getvalue())
+        replace_file(self._file(number), buffer.getvalue(), "a generation")
 
     def save_log(self, generations: Sequence[Generation], value_names: Sequence[str]) -> None:
         """Write the log of all generations, a row for each candidate of each population.
@@ -147,19 +142,7 @@ class Folder:
         columns["evaluations"] = of_each(evaluated).astype(np.int64)
         buffer = io.BytesIO()
         parquet.write_table(pyarrow.table(columns), buffer)
-        replace_safely(self.path / LOG, buffer.getvalue())
+        replace_file(self.path / LOG, buffer.getvalue(), "the log")
 
     def _file(self, number: int) -> Path:
         return self.path / GENERATIONS / f"{number + 1:06}.npz"
-
-
-def replace_safely(path: Path, data: bytes) -> None:
-    """Write a file, whole and in one step, and see that it is on the disk.
-
-    Raises:
-        ParameterError: If it cannot be written.
-    """
-    try:
-        write_whole(path, data)
-    except OSError as error:
-        raise ParameterError(f"the file {str(path)!r} must be writable, but: {error}. Choose another folder.") from None

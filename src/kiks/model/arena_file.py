@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,7 +16,7 @@ from kiks.errors import ArenaError, KiksError, ParameterError
 from kiks.model.arena import Arena
 from kiks.model.box import PartMm, SideMm
 from kiks.model.data_file import Coordinate, Number, Point, Switch, Text, check, parse_toml, read_file, record
-from kiks.model.files import inside
+from kiks.model.files import replace_files, within
 from kiks.model.picture import read_picture
 from kiks.model.places import Ball, Brightness, Cylinder, Friction, Lamp, Pose, Power, Radius
 from kiks.model.raster import MM_PER_PIXEL_MAX, MM_PER_PIXEL_MIN
@@ -174,7 +175,7 @@ def _picture_arena(picture: str, mm_per_pixel: float, folder: Path | None) -> Ar
             "an arena that comes alone must have no picture beside it, but it names one. Open that picture instead."
         )
     return Arena.from_array(
-        read_picture(inside(folder, picture, "picture"), mm_per_pixel), mm_per_pixel=mm_per_pixel
+        read_picture(within(folder, picture, "picture"), mm_per_pixel), mm_per_pixel=mm_per_pixel
     )
 
 
@@ -202,22 +203,16 @@ def save_arena(arena: Arena, path: str | Path) -> None:
         path: The TOML file.
 
     Raises:
-        ParameterError: If the name does not end in .toml.
-        ArenaError: If the files cannot be written.
+        ParameterError: If the name does not end in .toml, or the files cannot be written.
     """
     from PIL import Image
 
     path = Path(path)
     if path.suffix.lower() != ".toml":
         raise ParameterError(f"path must end in '.toml', but it was {str(path)!r}. The picture goes beside it as .png.")
-    picture = path.with_suffix(".png")
-    try:
-        Image.fromarray(np.flipud(arena.brightness)).save(picture)
-        path.write_text(_toml_of(arena, picture.name), encoding="utf-8")
-    except OSError as error:
-        raise ArenaError(
-            f"Arena {arena.name!r} must be written to {str(path)!r}, but: {error}. Check the folder."
-        ) from None
+    picture, pixels = path.with_suffix(".png"), BytesIO()
+    Image.fromarray(np.flipud(arena.brightness)).save(pixels, "PNG")
+    replace_files({picture: pixels.getvalue(), path: _toml_of(arena, picture.name)}, "an arena")
 
 
 def _toml_of(arena: Arena, picture: str) -> str:

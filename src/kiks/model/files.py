@@ -3,49 +3,143 @@
 from __future__ import annotations
 
 import os
-import tempfile
+import stat
+from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 
-from kiks.errors import ArenaError, ParameterError
+from kiks.errors import ParameterError, shown
 
 
-def replace_file(path: Path, data: bytes) -> None:
-    """Write a file; an earlier one of that name is replaced in one step.
-
-    Raises:
-        ArenaError: If it cannot be written.
-    """
-    try:
-        write_whole(path, data)
-    except (OSError, ValueError) as error:
-        raise ArenaError(f"The file {str(path)!r} must be writable, but: {error}. Choose another folder.") from None
-
-
-def write_whole(path: Path, data: bytes) -> None:
+def replace_file(path: str | Path, data: bytes | str, what: str = "The file", *, is_private: bool = False) -> None:
     """Write a file in one step, and see that it is on the disk: whatever happens, it is the old or the new one.
 
+    A link stays one, an earlier file's rights stay; what is no file (a pipe, a terminal) is written to as it is.
+
+    Args:
+        path: Where it goes.
+        data: What it holds; text becomes UTF-8.
+        what: What messages call it.
+        is_private: Whether this user alone may read it; else a new file has the rights that the umask leaves.
+
     Raises:
-        OSError: If it cannot be written.
-        ValueError: If the path is none.
+        ParameterError: If it cannot be written; an earlier file is then as it was.
     """
-    fresh: Path | None = None
+    replace_files({Path(path): data}, what, is_private=is_private)
+
+
+def replace_files(files: Mapping[Path, bytes | str], what: str = "The file", *, is_private: bool = False) -> None:
+    """Write files that belong together as `replace_file` writes one: none is replaced before all are on the disk.
+
+    Raises:
+        ParameterError: If one of them cannot be written; the earlier ones are then as they were.
+    """
+    fresh: dict[Path, Path] = {}
+    path = Path()
     try:
-        handle, name = tempfile.mkstemp(prefix=".kiks-", dir=path.parent)
-        fresh = Path(name)
-        with open(handle, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        fresh.chmod(0o644)
-        os.replace(fresh, path)
-        folder = os.open(path.parent, os.O_RDONLY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
+        for path, data in files.items():
+            target = _target(path)
+            content = data.encode() if isinstance(data, str) else data
+            if target.exists() and not target.is_file():
+                target.write_bytes(content)
+                continue
+            fresh[target] = _name_beside(target)
+            _write(fresh[target], content, 0o600 if is_private else 0o666)
+            if target.exists() and not is_private:
+                fresh[target].chmod(stat.S_IMODE(target.stat().st_mode))
+        for path, beside in fresh.items():
+            os.replace(beside, path)
+            _settle(path.parent)
+    except (OSError, ValueError) as error:
+        raise _unwritable(what, "file", path, error) from None
     finally:
-        if fresh is not None:
-            fresh.unlink(missing_ok=True)
+        for beside in fresh.values():
+            with suppress(OSError):
+                beside.unlink()
+
+
+def check_writable(path: str | Path, what: str, *, is_new: bool = False) -> None:
+    """Raise, before the work whose result goes there, if a file could not be written.
+
+    A file is made beside it and removed: rights do not tell of disks that are full or can be read only.
+
+    Args:
+        path: Where it is to go.
+        what: What messages call it.
+        is_new: Whether an earlier file of that name must not be there.
+
+    Raises:
+        ParameterError: If it cannot be written.
+    """
+    if is_new and os.path.lexists(path):
+        raise ParameterError(f"{what} must name a new file, but {str(path)!r} is there. Choose another name.")
+    try:
+        target = _target(path)
+        if not target.exists() or target.is_file():
+            beside = _name_beside(target)
+            _write(beside, b"", 0o600)
+            beside.unlink()
+    except (OSError, ValueError) as error:
+        raise _unwritable(what, "file", path, error) from None
+
+
+def make_folder(path: str | Path, what: str) -> None:
+    """Make a folder, if it is not there, in which files can be written.
+
+    Raises:
+        ParameterError: If it cannot be one.
+    """
+    try:
+        Path(path).mkdir(parents=True, exist_ok=True)
+        beside = _name_beside(Path(path, "file"))
+        _write(beside, b"", 0o600)
+        beside.unlink()
+    except (OSError, ValueError) as error:
+        raise _unwritable(what, "folder", path, error) from None
+
+
+def _target(path: str | Path) -> Path:
+    """Return what a path leads to, through links; it may not be there.
+
+    Raises:
+        OSError: If it is a folder, or a file that is protected from being written.
+        ValueError: If it has characters that paths cannot have.
+    """
+    target = Path(os.path.realpath(path))
+    if target.is_dir():
+        raise IsADirectoryError(None, "it is a folder")
+    if target.exists() and not os.access(target, os.W_OK):
+        raise PermissionError(None, "it is write-protected")
+    return target
+
+
+def _name_beside(target: Path) -> Path:
+    return target.with_name(f".kiks-{os.urandom(8).hex()}")
+
+
+def _write(path: Path, data: bytes, mode: int) -> None:
+    """Write a new file and see that it is on the disk."""
+    with open(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode), "wb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def _settle(folder: Path) -> None:
+    """See that the names in a folder are on the disk, where the system has a way for that."""
+    with suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+def _unwritable(what: str, kind: str, path: str | Path, error: Exception) -> ParameterError:
+    why = error.strerror if isinstance(error, OSError) else error
+    return ParameterError(
+        f"{what} must go to a {kind} that can be written, but {str(path)!r} cannot ({why}). Choose another place."
+    )
 
 
 def check_relative(text: object, what: str) -> None:
@@ -63,12 +157,12 @@ def check_relative(text: object, what: str) -> None:
     if not is_clean or not all(part not in ("", ".", "..") for part in parts):
         raise ParameterError(
             f"{what} must lead to a file in the project's folder or below it, with / between folders, but it was "
-            f"{text!r}. Copy the file into that folder."
+            f"{shown(text)}. Copy the file into that folder."
         )
 
 
 def inside(folder: Path, text: str, what: str) -> Path:
-    """Return the path of a file in a folder or below it, wherever links may lead.
+    """Return the path of a file in a project's folder or below it, if its text suits any computer.
 
     Args:
         folder: The folder.
@@ -76,16 +170,27 @@ def inside(folder: Path, text: str, what: str) -> Path:
         what: What messages call it.
 
     Raises:
-        ParameterError: If it lies elsewhere.
+        ParameterError: If the text suits only some computers, or the file lies elsewhere.
     """
     check_relative(text, what)
+    return within(folder, text, what)
+
+
+def within(folder: Path, text: str, what: str) -> Path:
+    """Return the path of a file in a folder or below it, wherever links may lead.
+
+    Raises:
+        ParameterError: If it lies elsewhere.
+    """
     try:
         home = folder.resolve()
         path = (home / text).resolve()
     except (OSError, ValueError, RuntimeError):
+        # A NUL character, or links that lead in a circle.
         home, path = folder, folder.parent
-    if not path.is_relative_to(home) or path == home:
+    if not path.is_relative_to(home) or path == home or Path(text).is_absolute():
         raise ParameterError(
-            f"{what} must lie in the project's folder or below it, but {text!r} leads elsewhere. Copy it there."
+            f"{what} must lie in the folder of the file that names it, or below, but {shown(text)} leads elsewhere. "
+            "Copy it there."
         )
     return path

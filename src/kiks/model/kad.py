@@ -75,9 +75,10 @@ def save_kad(arena: Arena, path: str | Path) -> None:
     """Write a `.kad` file; an earlier one of that name is replaced in one step.
 
     Raises:
-        ArenaError: If the arena has no cells of 1 mm, too many pieces, or the file cannot be written.
+        ArenaError: If the arena has no cells of 1 mm, or too many pieces.
+        ParameterError: If the file cannot be written.
     """
-    replace_file(Path(path), encode_kad(arena))
+    replace_file(path, encode_kad(arena), "an arena")
 
 
 def encode_kad(arena: Arena) -> bytes:

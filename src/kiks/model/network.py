@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.errors import ParameterError
+from kiks.model.files import replace_file
 from kiks.model.robot import SENSOR_COUNT
 
 INPUT_COUNT, TANH_COUNT, LINEAR_COUNT = 7, 13, 7
@@ -120,13 +121,7 @@ class NetworkResponse:
         """
         parts = [f'"{name}": {json.dumps(getattr(self, name))}' for name in (*_PLACES, "field_of_view_deg", "range_mm")]
         parts += [f'"{name}": {_written(getattr(self, name))}' for name in _WEIGHTS]
-        try:
-            Path(file).write_text("{\n" + ",\n".join(parts) + "\n}\n", encoding="utf-8")
-        except OSError as error:
-            raise ParameterError(
-                f"The networks must go to a place that can be written, but {str(file)!r} cannot ({error.strerror}). "
-                "Choose another with --out."
-            ) from error
+        replace_file(file, "{\n" + ",\n".join(parts) + "\n}\n", "networks")
 
 
 def _written(array: NDArray[np.float64]) -> str:

@@ -193,13 +193,12 @@ class Project:
         """Write the file, in one step.
 
         Raises:
-            ParameterError: If its name does not end in .kiks.
-            ArenaError: If it cannot be written.
+            ParameterError: If its name does not end in .kiks, or it cannot be written.
         """
         path = Path(path)
         if path.suffix.lower() != ".kiks":
             raise ParameterError(f"A project's file must end in '.kiks', but it was {str(path)!r}.")
-        replace_file(path, self.to_bytes())
+        replace_file(path, self.to_bytes(), "a project")
 
     @classmethod
     def from_bytes(

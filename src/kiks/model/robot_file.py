@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
-import os
-import tempfile
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from kiks.errors import ParameterError
+from kiks.model.arena_file import quoted
+from kiks.model.files import replace_file
 from kiks.model.robot import RobotSpec
 
 
@@ -24,27 +22,7 @@ def save_robot(spec: RobotSpec, path: str | Path, *, comment: str = "") -> None:
     Raises:
         ParameterError: If the file cannot be written.
     """
-    target = Path(path)
-    try:
-        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-    except OSError as error:
-        raise ParameterError(
-            f"a robot file must go to a folder that can be written, but it was {str(path)!r} ({error.strerror}). "
-            "Choose another folder."
-        ) from None
-    fresh = Path(name)
-    try:
-        with open(handle, "w", encoding="utf-8") as file:
-            file.write(robot_toml(spec, comment))
-        fresh.chmod(0o644)
-        RobotSpec.load(fresh)
-        os.replace(fresh, target)
-    except OSError as error:
-        raise ParameterError(
-            f"a robot file must go to a writable place, but {str(path)!r} is none ({error.strerror}). Choose another."
-        ) from None
-    finally:
-        fresh.unlink(missing_ok=True)
+    replace_file(path, robot_toml(spec, comment), "a robot")
 
 
 def robot_toml(spec: RobotSpec, comment: str = "") -> str:
@@ -54,7 +32,7 @@ def robot_toml(spec: RobotSpec, comment: str = "") -> str:
         >>> robot_toml(RobotSpec.load("khepera"), "mine").splitlines()[:5]
         ['# mine', 'name = "Khepera"', '', '[body]', 'diameter_mm = 55.0']
     """
-    lines = [f"# {line}".rstrip() for line in comment.splitlines()]
+    lines = [f"# {_printable(line)}".rstrip() for line in comment.splitlines()]
     sections = []
     for entry in fields(spec):
         value = getattr(spec, entry.name)
@@ -66,9 +44,14 @@ def robot_toml(spec: RobotSpec, comment: str = "") -> str:
     return "\n".join(lines + sections) + "\n"
 
 
+def _printable(line: str) -> str:
+    """Return a line without characters that TOML allows in no comment."""
+    return "".join(character if character.isprintable() else "?" for character in line)
+
+
 def _toml(value: Any) -> str:
     if isinstance(value, tuple):
         return f"[{', '.join(map(_toml, value))}]"
-    if isinstance(value, bool | str):
-        return json.dumps(value)
-    return repr(value)
+    if isinstance(value, bool):
+        return str(value).lower()
+    return quoted(value) if isinstance(value, str) else repr(value)

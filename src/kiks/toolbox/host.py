@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 from kiks import __version__
 from kiks.errors import LinkError
+from kiks.model.files import replace_file
 from kiks.ports.pty import default_folder
 from kiks.toolbox.requests import answer
 from kiks.toolbox.session import Session
@@ -85,7 +86,7 @@ class Host:
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.door = Door(os.getpid(), self._listener.getsockname()[1], secrets.token_urlsafe(TOKEN_BYTES))
         self._file = default_folder() / f"{_PREFIX}{self.door.number}"
-        _write_alone(self._file, self.door.line())
+        write_door(self.door, self._file)
         self._there: dict[int, Callable[[], None]] = {}
         self._count = 0
         self._lock = threading.Lock()
@@ -217,12 +218,9 @@ def write_door(door: Door, path: Path) -> None:
     """Write where a session is found into a file that this user alone can read.
 
     Raises:
-        LinkError: If the file is there already, or cannot be written.
+        ParameterError: If the file cannot be written.
     """
-    try:
-        _write_alone(path, door.line())
-    except OSError as error:
-        raise LinkError(f"{str(path)!r} must be the name of a new file, but it is not ({error.strerror}).") from None
+    replace_file(path, door.line(), "where a session is found", is_private=True)
 
 
 def _connect(door: Door) -> socket.socket:
@@ -240,14 +238,6 @@ def _is_open(door: Door, file: Path) -> bool:
         file.unlink(missing_ok=True)
         return False
     return True
-
-
-def _write_alone(path: Path, text: str) -> None:
-    """Write a new file in one step that nobody but this user can read."""
-    beside = path.with_name(f".{path.name}-{os.getpid()}")
-    with open(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="ascii") as file:
-        file.write(text)
-    os.replace(beside, path)
 
 
 def _lines(source: int) -> Iterator[str]:
