@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
@@ -15,7 +16,7 @@ from pydantic import Field
 from kiks.errors import ArenaError, KiksError, ParameterError
 from kiks.model.arena import Arena
 from kiks.model.box import PartMm, SideMm
-from kiks.model.data_file import Coordinate, Number, Point, Switch, Text, check, parse_toml, read_file, record
+from kiks.model.data_file import Coordinate, Number, Point, Rule, Switch, Text, check, parse_toml, read_file, record
 from kiks.model.files import replace_files, within
 from kiks.model.picture import read_picture
 from kiks.model.places import Ball, Brightness, Cylinder, Friction, Lamp, Pose, Power, Radius
@@ -29,7 +30,11 @@ Pitch = Annotated[
     Field(ge=MM_PER_PIXEL_MIN, le=MM_PER_PIXEL_MAX, description="Most arenas are drawn with 1 mm per pixel."),
 ]
 At = Annotated[Point, Field(description="Give at_mm = [x, y]; y counts upwards from the lower edge.")]
-Size = Annotated[tuple[SideMm, ...], Field(min_length=2, max_length=2, description="Give size_mm = [width, height].")]
+Size = Annotated[
+    tuple[SideMm, ...],
+    Field(min_length=2, max_length=2, description="Give size_mm = [width, height]."),
+    Rule("two whole numbers in mm"),
+]
 
 
 @record
@@ -69,10 +74,12 @@ class CylinderEntry:
     brightness: Brightness = 190
 
 
-Starts = Annotated[tuple[StartEntry, ...], Field(max_length=THINGS_MAX)]
-Lamps = Annotated[tuple[LampEntry, ...], Field(max_length=THINGS_MAX)]
-Balls = Annotated[tuple[BallEntry, ...], Field(max_length=THINGS_MAX)]
-Cylinders = Annotated[tuple[CylinderEntry, ...], Field(max_length=THINGS_MAX)]
+Starts = Annotated[tuple[StartEntry, ...], Field(max_length=THINGS_MAX, description="Head each with [[start]].")]
+Lamps = Annotated[tuple[LampEntry, ...], Field(max_length=THINGS_MAX, description="Head each with [[lamp]].")]
+Balls = Annotated[tuple[BallEntry, ...], Field(max_length=THINGS_MAX, description="Head each with [[ball]].")]
+Cylinders = Annotated[
+    tuple[CylinderEntry, ...], Field(max_length=THINGS_MAX, description="Head each with [[cylinder]].")
+]
 
 
 @record
@@ -174,24 +181,22 @@ def _picture_arena(picture: str, mm_per_pixel: float, folder: Path | None) -> Ar
         raise ArenaError(
             "an arena that comes alone must have no picture beside it, but it names one. Open that picture instead."
         )
-    return Arena.from_array(
-        read_picture(within(folder, picture, "picture"), mm_per_pixel), mm_per_pixel=mm_per_pixel
-    )
+    return Arena.from_array(read_picture(within(folder, picture, "picture"), mm_per_pixel), mm_per_pixel=mm_per_pixel)
 
 
 def places_of(file: Any) -> dict[str, Any]:
     """Return what the entries of a file say of starts, lamps, balls and cylinders, for `dataclasses.replace`."""
-    bodies = {
-        f"{kind.__name__.lower()}s": tuple(
-            kind(*each.at_mm, each.radius_mm, each.friction_mm_s2, each.brightness)
-            for each in getattr(file, kind.__name__.lower())
-        )
-        for kind in (Ball, Cylinder)
-    }
+
+    def at(kind: Callable[..., Any], entries: Iterable[Any], *names: str) -> tuple[Any, ...]:
+        return tuple(kind(*each.at_mm, *(getattr(each, name) for name in names)) for each in entries)
+
+    body = ("radius_mm", "friction_mm_s2", "brightness")
+    starts = (Pose(each.at_mm[0], each.at_mm[1], math.radians(each.heading_deg)) for each in file.start)
     return {
-        "starts": tuple(Pose(*each.at_mm, math.radians(each.heading_deg)) for each in file.start),
-        "lamps": tuple(Lamp(*each.at_mm, each.power_w, each.is_on) for each in file.lamp),
-        **bodies,
+        "starts": tuple(starts),
+        "lamps": at(Lamp, file.lamp, "power_w", "is_on"),
+        "balls": at(Ball, file.ball, *body),
+        "cylinders": at(Cylinder, file.cylinder, *body),
     }
 
 

@@ -32,6 +32,7 @@ from typing import (
 import pydantic.dataclasses
 from pydantic import ConfigDict, Field, Strict, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
+from pydantic_core import core_schema
 
 from kiks.errors import SHOWN_MAX, KiksError, ParameterError, nearest, shown
 
@@ -47,20 +48,21 @@ KEY_PARTS_MAX = 16
 COORDINATE_MAX = 1e9
 """Largest magnitude of a number that is a coordinate or a length [mm]."""
 
-Number = Annotated[float, Strict()]
-Whole = Annotated[int, Strict()]
-Switch = Annotated[bool, Strict()]
-Text = Annotated[str, Strict(), Field(max_length=TEXT_MAX, pattern=r"^[^\x00]*$")]
-Coordinate = Annotated[float, Strict(), Field(ge=-COORDINATE_MAX, le=COORDINATE_MAX)]
-Point = Annotated[tuple[Coordinate, ...], Field(min_length=2, max_length=2)]
-
-_Model = TypeVar("_Model")
-
 
 class Rule(NamedTuple):
     """The words for what a field must be, where its type and bounds do not say it."""
 
     text: str
+
+
+Number = Annotated[float, Strict()]
+Whole = Annotated[int, Strict()]
+Switch = Annotated[bool, Strict()]
+Text = Annotated[str, Strict(), Field(max_length=TEXT_MAX, pattern=r"^[^\x00]*$")]
+Coordinate = Annotated[float, Strict(), Field(ge=-COORDINATE_MAX, le=COORDINATE_MAX)]
+Point = Annotated[tuple[Coordinate, ...], Field(min_length=2, max_length=2), Rule("two numbers in mm")]
+
+_Model = TypeVar("_Model")
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field, Field))
@@ -81,6 +83,17 @@ def record(kind: type[_Model]) -> type[_Model]:
 
     made.__init__ = checked
     return made  # type: ignore[no-any-return]
+
+
+@dataclasses.dataclass(frozen=True)
+class OneOf:
+    """The names that a text must be one of; not a `Literal`, so that code may hold the name as a `str`."""
+
+    names: tuple[str, ...]
+
+    def __get_pydantic_core_schema__(self, _source: Any, _handler: Any) -> core_schema.CoreSchema:
+        """Return the schema of a choice."""
+        return core_schema.literal_schema(list(self.names))
 
 
 def check(
@@ -230,9 +243,9 @@ def _sentence(model: type[Any], error: ValidationError, advice: str = "") -> str
     way_out = place.description or advice
     if kind == "missing":
         return f"{name} must be given, but it is missing. {way_out}".rstrip()
-    if isinstance(given, str) and get_origin(place.base) is Literal:
-        way_out = f"{nearest(given, map(str, get_args(place.base)))} {way_out}".lstrip()
-    return f"{name} must be {_rule(place.base, place.bounds)}, but it was {shown(given)}. {way_out}".rstrip()
+    if isinstance(given, str) and (names := _names(place)):
+        way_out = f"{nearest(given, names)} {way_out}".lstrip()
+    return f"{name} must be {_rule(place)}, but it was {shown(given)}. {way_out}".rstrip()
 
 
 _UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")
@@ -252,14 +265,17 @@ def _place(model: Any, loc: tuple[int | str, ...]) -> tuple[tuple[int | str, ...
     path: list[int | str] = []
     for part in loc:
         hints = _hints(here.base)
+        if isinstance(part, int) and part < len(hints):
+            # An argument without its name.
+            part = list(hints)[part]
         if part in hints:
-            inner = _declared(hints[str(part)])
+            here = _declared(hints[str(part)])
         elif isinstance(part, int) and get_origin(here.base) is tuple:
             inner = _declared(get_args(here.base)[0])
+            here = inner._replace(description=inner.description or here.description)
         else:
             continue
         path.append(part)
-        here = inner._replace(description=inner.description or here.description)
     return tuple(path), here
 
 
@@ -306,19 +322,27 @@ def _entry_depth(model: Any, path: tuple[int | str, ...]) -> int:
     return max((depth for depth in depths if _hints(_place(model, path[:depth])[1].base)), default=0)
 
 
-def _rule(base: Any, bounds: tuple[Any, ...]) -> str:
+def _names(place: _Place) -> list[str]:
+    """Return the names to choose from, if that is what is declared."""
+    if get_origin(place.base) is Literal:
+        return [str(each) for each in get_args(place.base)]
+    return [name for bound in place.bounds if isinstance(bound, OneOf) for name in bound.names]
+
+
+def _rule(place: _Place) -> str:
     """Return in words what a value must be."""
+    base, bounds, _ = place
     said = next((bound.text for bound in bounds if isinstance(bound, Rule)), None)
     if said is not None:
         return said
+    if names := _names(place):
+        return f"one of {', '.join(map(repr, names))}"
     limits = {name: getattr(bound, name) for bound in bounds for name in _LIMITS if hasattr(bound, name)}
-    if get_origin(base) is Literal:
-        return f"one of {', '.join(map(repr, get_args(base)))}"
     if get_origin(base) is tuple:
         inner = _declared(get_args(base)[0])
         low, high = limits.get("min_length", 0), limits.get("max_length")
         count = f"{low} " if low == high else f"{low} to {high} " if high else f"{low} or more " if low else ""
-        of = f", each {_rule(inner.base, inner.bounds)}" if not _hints(inner.base) else ""
+        of = f", each {_rule(inner)}" if not _hints(inner.base) else ""
         return f"a list of {count}{'tables' if not of else 'values'}{of}"
     if base is str:
         count = f"{'1 to' if 'min_length' in limits else 'up to'} {limits.get('max_length', TEXT_MAX)}"
@@ -351,4 +375,4 @@ def _span(limits: Mapping[str, Any]) -> str:
 
 
 def _figure(value: float) -> str:
-    return str(value) if isinstance(value, int) else f"{value:g}"
+    return str(value) if isinstance(value, int) else f"{value:g}".replace("e+0", "e")

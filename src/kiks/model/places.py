@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Annotated, Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -70,12 +70,12 @@ class Cylinder(NamedTuple):
     brightness: Brightness = 190
 
 
-_Place = TypeVar("_Place", Pose, Lamp, Ball, Cylinder)
+_Place = TypeVar("_Place", bound=tuple[Any, ...])
 
 
 def checked_places(
     label: str,
-    kind: type[_Place],
+    kind: Callable[..., _Place],
     entries: Iterable[Iterable[Any]],
     brightness: npt.NDArray[np.uint8],
     mm_per_cell: float,
@@ -93,11 +93,12 @@ def checked_places(
         ParameterError: If a value of an entry breaks its rule.
         ArenaError: If an entry lies outside the arena or in a wall.
     """
-    places = []
+    places: list[_Place] = []
+    model: Any = kind
     for number, entry in enumerate(entries, start=1):
         who = f"{label} {number}"
         values = [value.item() if isinstance(value, np.generic) else value for value in entry]
-        place = check(kind, dict(zip(kind._fields, values, strict=False)), who)
+        place = check(model, dict(zip(model._fields, values, strict=False)), who)
         _check_position(who, place[0], place[1], brightness, mm_per_cell)
         places.append(place)
     return tuple(places)

@@ -5,37 +5,46 @@ The file is an arena file with its raster within, the robots, and the settings o
 
 from __future__ import annotations
 
-import tomllib
-from collections.abc import Iterable
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from kiks.errors import ArenaError, KiksError, ParameterError, nearest
+from pydantic import AfterValidator, Field, InstanceOf
+
+from kiks.errors import ArenaError, KiksError, ParameterError, nearest, shown
 from kiks.model.arena import Arena
 from kiks.model.arena_file import (
-    BOX_KEYS,
-    ENTRY_KEYS,
-    check_keys,
-    entries_of,
-    pair_of,
+    THINGS_MAX,
+    Balls,
+    Cylinders,
+    Lamps,
+    Pitch,
+    Starts,
+    Walls,
     place_lines,
     places_of,
     quoted,
-    typed,
+)
+from kiks.model.data_file import (
+    Number,
+    OneOf,
+    Rule,
+    Switch,
+    Text,
+    Whole,
+    check,
+    check_size,
+    parse_toml,
+    read_file,
+    record,
 )
 from kiks.model.files import check_relative, replace_file
-from kiks.model.picture import read_start
 from kiks.model.policy import split_thinking
-from kiks.model.raster import is_number
 from kiks.model.raster_text import box_keys_of, raster_of_text, raster_text
-from kiks.model.robot import RESPONSES, robot_names
+from kiks.model.robot import Baud, Brightness, Response, robot_names
 
 FILE_BYTES_MAX = 96 << 20
 """Most bytes of a project file."""
-
-THINGS_MAX = 1000
-"""Most robots, starts, lamps, balls and cylinders, of each."""
 
 TURRETS = ("k213", "gripper", "radio", "io", "battle")
 """What a robot of a project may carry (docs/turrets.md)."""
@@ -44,14 +53,35 @@ FASTEST = "fastest"
 """What stands in a file for no speed: as fast as possible."""
 
 _VERSION = 1
-_TEXT_MAX = 1000
-_ROBOT_KEYS = ("name", "kind", "turrets", "program", "arguments", "brightness")
-_WALL_KEYS = ("png", "mm_per_cell", *BOX_KEYS)
 _SETTINGS = ("seed", "thinking", "baud", "response", "noise", "speed")
-_TOP_KEYS = ("kiks", *_SETTINGS, "name", "robot", *ENTRY_KEYS, "walls")
 
 
-@dataclass(frozen=True)
+def _check_kind(kind: str) -> str:
+    if kind.lower().endswith(".toml"):
+        check_relative(kind, "kind")
+    elif kind not in (known := robot_names()):
+        raise ParameterError(f"must be one of {known} or a .toml file, but it was {shown(kind)}.{nearest(kind, known)}")
+    return kind
+
+
+def _check_program(program: str) -> str:
+    check_relative(program, "program")
+    return program
+
+
+def _check_differ(turrets: tuple[str, ...]) -> tuple[str, ...]:
+    if len(set(turrets)) < len(turrets):
+        raise ParameterError(f"must differ, but they were {list(turrets)}. A robot has one of each.")
+    return turrets
+
+
+def _check_thinking(thinking: str) -> str:
+    if isinstance(file := split_thinking(thinking)[1], str):
+        check_relative(file, "thinking's replay file")
+    return thinking
+
+
+@record
 class ProjectRobot:
     """A robot of a project.
 
@@ -67,44 +97,23 @@ class ProjectRobot:
         ParameterError: If a name is unknown, a path leaves the folder, or the brightness is out of range.
     """
 
-    kind: str = "khepera"
-    turrets: tuple[str, ...] = ()
-    name: str = ""
-    program: str | None = None
-    arguments: tuple[str, ...] = ()
-    brightness: int | None = None
-
-    def __post_init__(self) -> None:
-        for texts in (self.turrets, self.arguments):
-            if not isinstance(texts, tuple) or len(texts) > 100:
-                raise ParameterError(f"turrets and arguments must be up to 100 texts, but they were {texts!r}.")
-        for text in (self.kind, self.name, *self.turrets, *self.arguments):
-            if not isinstance(text, str) or len(text) > _TEXT_MAX or "\0" in text:
-                raise ParameterError(
-                    f"A robot's settings must be texts of up to {_TEXT_MAX} characters, but one was {text!r}."
-                )
-        if not self.kind.lower().endswith(".toml") and self.kind not in (known := robot_names()):
-            raise ParameterError(
-                f"kind must be one of {known} or a .toml file, but it was {self.kind!r}.{nearest(self.kind, known)}"
-            )
-        if self.kind.lower().endswith(".toml"):
-            check_relative(self.kind, "kind")
-        for turret in self.turrets:
-            if turret not in TURRETS:
-                raise ParameterError(
-                    f"turrets must be of {list(TURRETS)}, but one was {turret!r}.{nearest(turret, TURRETS)}"
-                )
-        if len(set(self.turrets)) < len(self.turrets):
-            raise ParameterError(f"turrets must differ, but they were {list(self.turrets)}. A robot has one of each.")
-        if self.program is not None:
-            check_relative(self.program, "program")
-        if self.brightness is not None and not _is_whole(self.brightness, 1, 255):
-            raise ParameterError(
-                f"brightness of a robot must be a whole number from 1 to 255, but it was {self.brightness!r}."
-            )
+    kind: Annotated[Text, AfterValidator(_check_kind)] = "khepera"
+    turrets: Annotated[tuple[Annotated[str, OneOf(TURRETS)], ...], AfterValidator(_check_differ)] = ()
+    name: Text = ""
+    program: Annotated[Text, AfterValidator(_check_program)] | None = None
+    arguments: Annotated[tuple[Text, ...], Field(max_length=100)] = ()
+    brightness: Brightness | None = None
 
 
-@dataclass(frozen=True, eq=False)
+Robots = Annotated[
+    tuple[ProjectRobot, ...], Field(min_length=1, max_length=THINGS_MAX, description="Head each with [[robot]].")
+]
+Seed = Annotated[Whole, Field(ge=0, le=2**63 - 1)]
+ThinkingPolicy = Annotated[Text, AfterValidator(_check_thinking)]
+Speed = Annotated[Number, Field(ge=1e-3, le=1e3, description="1 is real time.")]
+
+
+@record
 class Project:
     """What a world is built from; `dataclasses.replace` makes a changed copy.
 
@@ -128,43 +137,19 @@ class Project:
         ('gripper',)
     """
 
-    arena: Arena = field(default_factory=Arena.default)
-    robots: tuple[ProjectRobot, ...] = (ProjectRobot(),)
-    seed: int = 0
-    thinking: str = "none"
-    baud: int | None = None
-    response: str | None = None
-    noise: bool = True
-    speed: float | None = 1.0
+    arena: Annotated[InstanceOf[Arena], Rule("a kiks.Arena")] = Field(default_factory=Arena.default)
+    robots: Robots = (ProjectRobot(),)
+    seed: Seed = 0
+    thinking: ThinkingPolicy = "none"
+    baud: Baud | None = None
+    response: Response | None = None
+    noise: Switch = True
+    speed: Speed | None = 1.0
 
     def __post_init__(self) -> None:
-        if not isinstance(self.arena, Arena):
-            raise ParameterError(f"arena must be a kiks.Arena, but it was {self.arena!r}. Read one with Arena.load.")
-        if not all(isinstance(robot, ProjectRobot) for robot in self.robots):
-            raise ParameterError("robots must be of ProjectRobot, but others were given.")
-        for name, low in (("robots", 1), ("starts", 0), ("lamps", 0), ("balls", 0), ("cylinders", 0)):
-            count = len(self.robots if name == "robots" else getattr(self.arena, name))
-            if not low <= count <= THINGS_MAX:
-                raise ParameterError(f"{name} must be {low} to {THINGS_MAX}, but there are {count}.")
-        if not _is_whole(self.seed, 0, 2**63 - 1):
-            raise ParameterError(f"seed must be a whole number from 0 to 2^63 - 1, but it was {self.seed!r}.")
-        if isinstance(file := split_thinking(self.thinking)[1], str):
-            check_relative(file, "thinking's replay file")
-        if self.baud is not None and not _is_whole(self.baud, 75, 4_000_000):
-            raise ParameterError(
-                f"baud must be a whole number from 75 to 4000000, but it was {self.baud!r}. A Khepera's usual is 9600."
-            )
-        if self.response is not None and self.response not in RESPONSES:
-            raise ParameterError(
-                f"response must be one of {list(RESPONSES)}, but it was {self.response!r}."
-                f"{nearest(str(self.response), RESPONSES)}"
-            )
-        if not isinstance(self.noise, bool):
-            raise ParameterError(f"noise must be true or false, but it was {self.noise!r}.")
-        if self.speed is not None and not (is_number(self.speed) and 1e-3 <= self.speed <= 1e3):
-            raise ParameterError(
-                f"speed must be from 0.001 to 1000, or {FASTEST!r}, but it was {self.speed!r}. 1 is real time."
-            )
+        for name in ("starts", "lamps", "balls", "cylinders"):
+            if (count := len(getattr(self.arena, name))) > THINGS_MAX:
+                raise ParameterError(f"{name} must be at most {THINGS_MAX}, but there are {count}.")
 
     @classmethod
     def load(cls, path: str | Path) -> Project:
@@ -177,7 +162,7 @@ class Project:
         if path.suffix.lower() != ".kiks":
             return cls.of_arena(Arena.load(path))
         what = f"Project file {str(path)!r}"
-        data = read_start(path, FILE_BYTES_MAX + 1, what)
+        data = read_file(path, what, bytes_max=FILE_BYTES_MAX, error=ArenaError)
         return cls.from_bytes(data, name=path.stem, what=what)
 
     @classmethod
@@ -220,15 +205,20 @@ class Project:
         Raises:
             ArenaError: If it is no project, or too large.
         """
-        if len(data) > bytes_max:
-            raise ArenaError(f"{what} must have at most {bytes_max / 2**20:.1f} MiB, but has {len(data) / 2**20:.1f}.")
+        check_size(data, what, bytes_max=bytes_max, error=ArenaError)
+        table = parse_toml(data, what, error=ArenaError)
+        if table.get("kiks") != _VERSION:
+            raise ArenaError(
+                f"{what}: kiks must be {_VERSION}, the version of this format, but it was {shown(table.get('kiks'))}. "
+                f"Write kiks = {_VERSION}, or open a newer file with a newer KiKS."
+            )
+        file = check(ProjectFile, table, what, error=ArenaError)
         try:
-            # Undecodable bytes and endless numbers are ValueErrors too; deep nesting ends in a RecursionError.
-            table = tomllib.loads(data.decode("utf-8"))
-        except (ValueError, RecursionError) as error:
-            raise ArenaError(f"{what} must be TOML in UTF-8, but: {error}. Correct the file at that place.") from None
-        try:
-            return cls(**_settings_of(table), arena=_arena_of(table, name), robots=tuple(_robots_of(table)))
+            arena = replace(file.walls.arena(), name=name if file.name is None else file.name, **places_of(file))
+            settings = {each: getattr(file, each) for each in _SETTINGS}
+            if file.speed == FASTEST:
+                settings["speed"] = None
+            return cls(arena, file.robot, **settings)
         except KiksError as error:
             raise ArenaError(f"{what}: {error}") from None
 
@@ -255,56 +245,46 @@ class Project:
         return ("\n".join(lines) + "\n").encode("utf-8", errors="replace")
 
 
-def _settings_of(table: dict[str, Any]) -> dict[str, Any]:
-    check_keys(table, _TOP_KEYS, "the file")
-    if table.get("kiks") != _VERSION:
-        raise ArenaError(
-            f"kiks must be {_VERSION}, the version of this format, but it was {table.get('kiks')!r}. Write kiks = 1, "
-            "or open a newer file with a newer KiKS."
-        )
-    settings = {name: table[name] for name in _SETTINGS if name in table}
-    if settings.get("speed") == FASTEST:
-        settings["speed"] = None
-    return settings
+@record
+class ProjectWalls(Walls):
+    """The walls of a project: a PNG in base64, or a box in whole millimetres."""
+
+    png: Annotated[str, Rule("a PNG file in base64")] | None = None
+    mm_per_cell: Pitch | None = None
+
+    def __post_init__(self) -> None:
+        if self.png is not None:
+            self.check_is_alone("png")
+        elif self.mm_per_cell is not None:
+            raise ParameterError("mm_per_cell must come with a png, but there is none. Boxes have cells of 1 mm.")
+
+    def arena(self) -> Arena:
+        """Return the walls as an arena.
+
+        Raises:
+            KiksError: If they are none.
+        """
+        return self.box() if self.png is None else raster_of_text(self.png, self.mm_per_cell or 1.0)
 
 
-def _arena_of(table: dict[str, Any], name: str) -> Arena:
-    walls = typed(table, "walls", dict, {}, "the file")
-    check_keys(walls, _WALL_KEYS, "[walls]")
-    if "png" in walls:
-        if given := [key for key in BOX_KEYS if key in walls]:
-            raise ArenaError(f"[walls] must be either a png or a box, but png came with {given[0]}. Remove one.")
-        mm_per_cell = walls.get("mm_per_cell", 1.0)
-        arena = raster_of_text(typed(walls, "png", str, "", "[walls]"), mm_per_cell)
-    elif "mm_per_cell" in walls:
-        raise ArenaError("[walls]: mm_per_cell must come with a png, but there is none. Boxes have cells of 1 mm.")
-    else:
-        width_mm, height_mm = pair_of(walls, "size_mm", "[walls]")
-        arena = Arena.box(width_mm, height_mm, **{key: walls[key] for key in BOX_KEYS[1:] if key in walls})
-    for label in ENTRY_KEYS:
-        if isinstance(table.get(label), list) and len(table[label]) > THINGS_MAX:
-            raise ArenaError(f"{label} must be given at most {THINGS_MAX} times, but was {len(table[label])} times.")
-    return replace(arena, name=typed(table, "name", str, name, "the file"), **places_of(table))
+@record
+class ProjectFile:
+    """A project of KiKS: an arena, its robots, and the settings of the simulation."""
 
-
-def _robots_of(table: dict[str, Any]) -> Iterable[ProjectRobot]:
-    if "robot" not in table:
-        yield ProjectRobot()
-    for who, entry in entries_of(table, "robot", _ROBOT_KEYS):
-        for key in ("turrets", "arguments"):
-            if not isinstance(entry.get(key, []), list):
-                raise ArenaError(f'{who}: {key} must be a list, but it was {entry[key]!r}. Write {key} = ["..."].')
-        values: dict[str, Any] = {
-            key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()
-        }
-        try:
-            yield ProjectRobot(**values)
-        except ParameterError as error:
-            raise ArenaError(f"{who}: {error}") from None
-
-
-def _is_whole(value: object, low: int, high: int) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool) and low <= value <= high
+    kiks: Literal[1]
+    seed: Seed = 0
+    thinking: ThinkingPolicy = "none"
+    baud: Baud | None = None
+    response: Response | None = None
+    noise: Switch = True
+    speed: Annotated[Speed | Literal["fastest"], Rule("a number from 0.001 to 1000, or 'fastest'")] = 1.0
+    name: Text | None = None
+    robot: Robots = (ProjectRobot(),)
+    start: Starts = ()
+    lamp: Lamps = ()
+    ball: Balls = ()
+    cylinder: Cylinders = ()
+    walls: ProjectWalls = ProjectWalls()
 
 
 def _toml(value: Any) -> str:

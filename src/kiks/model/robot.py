@@ -20,7 +20,9 @@ from kiks.model.robot_parts import (
     RESPONSES,
     SENSOR_COUNT,
     Ambient,
+    Baud,
     Body,
+    Brightness,
     Curve,
     FirmwareSpec,
     Motor,
@@ -28,6 +30,7 @@ from kiks.model.robot_parts import (
     Quirks,
     Reflection,
     Reset,
+    Response,
 )
 
 __all__ = [
@@ -38,7 +41,9 @@ __all__ = [
     "RESPONSES",
     "SENSOR_COUNT",
     "Ambient",
+    "Baud",
     "Body",
+    "Brightness",
     "Curve",
     "FirmwareSpec",
     "Motor",
@@ -46,6 +51,7 @@ __all__ = [
     "Quirks",
     "Reflection",
     "Reset",
+    "Response",
     "RobotSpec",
 ]
 

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Annotated, Literal, get_args
+from typing import Annotated
 
 from pydantic import Field
 
 from kiks.errors import ParameterError, shown
-from kiks.model.data_file import Number, Switch, Text, Whole, record
+from kiks.model.data_file import Number, OneOf, Switch, Text, Whole, record
 
 SENSOR_COUNT = 8
 """Infra-red sensors of a Khepera, clockwise from the left side (khepera-protocol.md 4.14)."""
 
-Response = Literal["reflection", "thesis", "fast", "standin", "curve"]
-RESPONSES: tuple[str, ...] = get_args(Response)
+RESPONSES = ("reflection", "thesis", "fast", "standin", "curve")
 """What makes counts of a sensor's rays (`kiks.engine.responses`)."""
 
 JITTER_POINT_LIMIT = 51
@@ -23,17 +22,18 @@ JITTER_POINT_LIMIT = 51
 CURVE_POINT_LIMIT = 32
 """Most points of a measured curve of counts against distance."""
 
-AmbientModel = Literal["flux", "thesis"]
-AMBIENT_MODELS: tuple[str, ...] = get_args(AmbientModel)
+AMBIENT_MODELS = ("flux", "thesis")
 """How several lamps make one reading: their light adds up, or the thesis's formula for the strongest."""
 
 LAMP_POINT_LIMIT = 64
 """Most points of the curve of light against distance."""
 
+Response = Annotated[str, OneOf(RESPONSES)]
 Angle = Annotated[Number, Field(ge=-360, le=360)]
 Counts = Annotated[Number, Field(ge=-1023, le=65535)]
 Share = Annotated[Number, Field(ge=0, le=1)]
 Brightness = Annotated[Whole, Field(ge=1, le=255, description="1 is black, 255 white.")]
+Baud = Annotated[Whole, Field(ge=75, le=4_000_000, description="A Khepera's usual is 9600.")]
 Gains = Annotated[tuple[Annotated[Whole, Field(ge=0, le=32767)], ...], Field(min_length=3, max_length=3)]
 _ONE_EACH = Field(min_length=SENSOR_COUNT, max_length=SENSOR_COUNT, description="One for each sensor.")
 
@@ -54,7 +54,8 @@ class Body:
     slip_ratio_max: Share
 
     def __post_init__(self) -> None:
-        must(self.wheel_base_mm <= self.diameter_mm, self, "wheel_base_mm", "no more than the diameter")
+        # Wheels may stand out a little; calibration also tries robots that nobody would build.
+        must(self.wheel_base_mm <= 2 * self.diameter_mm, self, "wheel_base_mm", "at most twice the diameter")
         must(self.slip_ratio_min <= self.slip_ratio_max, self, "slip_ratio_min", "at most slip_ratio_max")
 
     @property
@@ -172,7 +173,7 @@ class Ambient:
     in the dark is `dark_counts`.
     """
 
-    model: AmbientModel
+    model: Annotated[str, OneOf(AMBIENT_MODELS)]
     direction_deg: Annotated[tuple[Angle, ...], _ONE_EACH]
     dark_counts: Annotated[Number, Field(ge=0, le=1023)]
     noise_counts: Annotated[Number, Field(ge=0, le=1023)]
@@ -198,7 +199,7 @@ class FirmwareSpec:
     bios_version: Text
     protocol_version: Text
     processing_ms: Annotated[Number, Field(ge=0, le=1000)]
-    baud: Annotated[Whole, Field(ge=75, le=4_000_000, description="A Khepera's usual is 9600.")]
+    baud: Baud
     has_user_flash: Switch
 
 
