@@ -227,5 +227,5 @@ def _entries(label: str, kind: type[Any], count: int, found: dict[str, npt.NDArr
             raise ArenaError(f"{label}: brightness must be whole, but it was {rows[:, -1].tolist()[:9]}.")
         return tuple(kind(*row[:-1], int(row[-1])) for row in rows.tolist())
     if kind is Lamp:
-        return tuple(Lamp(*row[:-1], bool(row[-1])) for row in rows.tolist())
+        return tuple(Lamp(row[0], row[1], row[2], bool(row[3])) for row in rows.tolist())
     return tuple(kind(*row) for row in rows.tolist())
