@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from kiks.errors import ArenaError, ParameterError
 from kiks.model.box import Box
+from kiks.model.files import path_of
 from kiks.model.maze import draw_maze
 from kiks.model.places import Ball, Cylinder, Lamp, Pose, checked_places
 from kiks.model.raster import (
@@ -156,7 +157,7 @@ class Arena:
         """
         from kiks.model.picture import read_picture
 
-        path = Path(path)
+        path = path_of(path)
         return cls.from_array(read_picture(path, mm_per_pixel), mm_per_pixel=mm_per_pixel, name=path.stem)
 
     @classmethod
@@ -166,7 +167,7 @@ class Arena:
         Raises:
             ArenaError: If the file is missing, damaged or no arena.
         """
-        path = Path(path)
+        path = path_of(path)
         match path.suffix.lower():
             case ".toml":
                 from kiks.model.arena_file import load_arena

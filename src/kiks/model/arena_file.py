@@ -17,7 +17,7 @@ from kiks.errors import ArenaError, KiksError, ParameterError
 from kiks.model.arena import Arena
 from kiks.model.box import PartMm, SideMm
 from kiks.model.data_file import Coordinate, Number, Point, Rule, Switch, Text, check, parse_toml, read_file, record
-from kiks.model.files import replace_files, within
+from kiks.model.files import path_of, replace_files, within
 from kiks.model.picture import read_picture
 from kiks.model.places import Ball, Brightness, Cylinder, Friction, Lamp, Pose, Power, Radius
 from kiks.model.raster import MM_PER_PIXEL_MAX, MM_PER_PIXEL_MIN
@@ -212,7 +212,7 @@ def save_arena(arena: Arena, path: str | Path) -> None:
     """
     from PIL import Image
 
-    path = Path(path)
+    path = path_of(path)
     if path.suffix.lower() != ".toml":
         raise ParameterError(f"path must end in '.toml', but it was {str(path)!r}. The picture goes beside it as .png.")
     picture, pixels = path.with_suffix(".png"), BytesIO()

@@ -10,6 +10,9 @@ from pathlib import Path
 
 from kiks.errors import ParameterError, shown
 
+NAME_BYTES_MAX, PATH_BYTES_MAX = 255, 4000
+"""Most bytes of a file's name, and of a path, less than Linux allows."""
+
 
 def replace_file(path: str | Path, data: bytes | str, what: str = "The file", *, is_private: bool = False) -> None:
     """Write a file in one step, and see that it is on the disk: whatever happens, it is the old or the new one.
@@ -25,7 +28,7 @@ def replace_file(path: str | Path, data: bytes | str, what: str = "The file", *,
     Raises:
         ParameterError: If it cannot be written; an earlier file is then as it was.
     """
-    replace_files({Path(path): data}, what, is_private=is_private)
+    replace_files({path_of(path, what): data}, what, is_private=is_private)
 
 
 def replace_files(files: Mapping[Path, bytes | str], what: str = "The file", *, is_private: bool = False) -> None:
@@ -74,12 +77,12 @@ def check_writable(path: str | Path, what: str, *, is_new: bool = False) -> None
     if is_new and os.path.lexists(path):
         raise ParameterError(f"{what} must name a new file, but {str(path)!r} is there. Choose another name.")
     try:
-        target = _target(path)
+        target = _target(path_of(path, what))
         if not target.exists() or target.is_file():
             beside = _name_beside(target)
             _write(beside, b"", 0o600)
             beside.unlink()
-    except (OSError, ValueError) as error:
+    except OSError as error:
         raise _unwritable(what, "file", path, error) from None
 
 
@@ -139,6 +142,26 @@ def _unwritable(what: str, kind: str, path: str | Path, error: Exception) -> Par
     why = error.strerror if isinstance(error, OSError) else error
     return ParameterError(
         f"{what} must go to a {kind} that can be written, but {str(path)!r} cannot ({why}). Choose another place."
+    )
+
+
+def path_of(path: object, what: str = "path") -> Path:
+    """Return what names a file as a path.
+
+    Args:
+        path: A text or a path.
+        what: What messages call it.
+
+    Raises:
+        ParameterError: If it is something else, or a text that no path can be.
+    """
+    with suppress(UnicodeEncodeError):
+        if isinstance(path, str | Path) and "\0" not in str(path):
+            parts = os.fsencode(path).split(b"/")
+            if any(parts) and max(map(len, parts)) <= NAME_BYTES_MAX and sum(map(len, parts)) <= PATH_BYTES_MAX:
+                return Path(path)
+    raise ParameterError(
+        f"{what} must be the name of a file, of at most {NAME_BYTES_MAX} bytes, but it was {shown(path)}."
     )
 
 

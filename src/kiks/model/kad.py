@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from kiks.errors import ArenaError, KiksError
 from kiks.model.arena import Arena
-from kiks.model.files import replace_file
+from kiks.model.files import path_of, replace_file
 from kiks.model.mat import FILE_BYTES_MAX, read_numbers
 from kiks.model.picture import read_start
 from kiks.model.places import Ball, Cylinder, Lamp, Pose
@@ -43,7 +43,7 @@ def load_kad(path: str | Path) -> Arena:
     Raises:
         ArenaError: If it is missing, damaged, too large, or no arena.
     """
-    path = Path(path)
+    path = path_of(path)
     what = f"Arena file {str(path)!r}"
     data = read_start(path, FILE_BYTES_MAX + 1, what)
     return decode_kad(data, path.stem, what)

@@ -38,7 +38,7 @@ from kiks.model.data_file import (
     read_file,
     record,
 )
-from kiks.model.files import check_relative, replace_file
+from kiks.model.files import check_relative, path_of, replace_file
 from kiks.model.policy import split_thinking
 from kiks.model.raster_text import box_keys_of, raster_of_text, raster_text
 from kiks.model.robot import Baud, Brightness, Response, robot_names
@@ -158,7 +158,7 @@ class Project:
         Raises:
             ArenaError: If the file is missing, damaged, or neither.
         """
-        path = Path(path)
+        path = path_of(path)
         if path.suffix.lower() != ".kiks":
             return cls.of_arena(Arena.load(path))
         what = f"Project file {str(path)!r}"
@@ -180,7 +180,7 @@ class Project:
         Raises:
             ParameterError: If its name does not end in .kiks, or it cannot be written.
         """
-        path = Path(path)
+        path = path_of(path)
         if path.suffix.lower() != ".kiks":
             raise ParameterError(f"A project's file must end in '.kiks', but it was {str(path)!r}.")
         replace_file(path, self.to_bytes(), "a project")

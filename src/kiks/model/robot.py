@@ -12,6 +12,7 @@ from pydantic import Field
 
 from kiks.errors import ParameterError, nearest
 from kiks.model.data_file import Text, check, parse_toml, read_file, record
+from kiks.model.files import path_of
 from kiks.model.robot_parts import (
     AMBIENT_MODELS,
     CURVE_POINT_LIMIT,
@@ -90,12 +91,13 @@ class RobotSpec:
         Raises:
             ParameterError: If there is no such robot, the file is no TOML, or a key is missing, unknown or wrong.
         """
-        source, known = str(name_or_path), robot_names()
+        path, known = path_of(name_or_path, "robot"), robot_names()
+        source = str(path)
         what = f"Robot file {source!r}"
         if source in known:
             data = (_FOLDER / f"{source}.toml").read_bytes()
-        elif Path(source).suffix or Path(source).exists():
-            data = read_file(Path(source), what)
+        elif path.suffix or len(path.parts) > 1 or path.is_file():
+            data = read_file(path, what)
         else:
             raise ParameterError(
                 f"robot must be one of {known} or a TOML file, but it was {source!r}.{nearest(source, known)} Copy a "
