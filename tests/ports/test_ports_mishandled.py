@@ -52,7 +52,7 @@ def is_http(data: bytes, cuts: list[int]) -> bool:
     """Say whether a line that comes in pieces is taken for a request."""
     line, places = FirstLine(), sorted({cut % (len(data) + 1) for cut in cuts})
     pieces = [data[first:last] for first, last in zip([0, *places], [*places, len(data)], strict=True)]
-    return any([line.is_http(piece) for piece in pieces])
+    return any(line.is_http(piece) for piece in pieces)
 
 
 CUTS = st.lists(st.integers(0, 10_000), max_size=30)
@@ -106,13 +106,12 @@ def test_a_page_in_a_browser_drives_no_robot(
     form = b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 18\r\n\r\nD,10,10\nG,7,7\n\n\n"
     with served([endpoint], thinking=thinking, **({"pace": Pace(wall_ns=Wall())} if thinking == "live" else {})) as run:
         for pieces in ([form], [form[:3], form[3:20], form[20:]], [form[:17], form[17:]]):
-            with connect(endpoint) as browser:
-                with suppress(OSError):
-                    for piece in pieces:
-                        browser.sendall(piece)
-                        run.wait_rounds(2)
-                    while browser.recv(100):
-                        pass
+            with connect(endpoint) as browser, suppress(OSError):
+                for piece in pieces:
+                    browser.sendall(piece)
+                    run.wait_rounds(2)
+                while browser.recv(100):
+                    pass
             run.wait_free()
         robot = run.sim.state.robots[0, 0]
         assert robot["speed_setpoint"].tolist() == [0, 0]

@@ -1,9 +1,9 @@
 """File descriptors: a server that has run out of them says so in one line, and goes on.
 
-Need: each connection and each pseudo-terminal takes descriptors, and a process may have so many and no more. A listener
-that cannot accept stays readable: a loop that only tries again spins, one that lets the error out ends.
-Method: a descriptor is held in reserve. When there is no other, it is given up for the one who waits at the door, who is
-accepted and hung up on; then it is taken back. So the queue at the door is always emptied.
+Need: each connection and each pseudo-terminal takes descriptors, and a process may have only so many. A listener that
+cannot accept stays readable: a loop that only tries again spins, one that lets the error out ends.
+Method: one descriptor is held in reserve. When there is no other, it is given up for the client that waits to come in,
+which is accepted and hung up on; then it is taken back. So the queue is always emptied.
 """
 
 from __future__ import annotations

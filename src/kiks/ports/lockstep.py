@@ -21,7 +21,7 @@ from kiks.units import NS_PER_S
 TERMINATORS = (b"\r", b"\n")
 
 LEFT_BEHIND_COUNT = 50
-"""More commands than that, left behind by a client that has gone, keep the next one waiting for so long that it is said."""
+"""When a client leaves more commands behind, the next one waits for so long that a person is told."""
 
 REPLY_LENGTH = 64
 """Longest usual reply [characters]."""

@@ -104,8 +104,8 @@ class FirstLine:
 
     Need: pages of other sites can make a browser send a request to any port of this computer, with commands for a robot
     in its body. No command of a Khepera looks like a request line, such as `POST / HTTP/1.1`.
-    Method: the bytes of the first line go on to the robot, so that nobody is kept waiting; its end does not, if it was a
-    request line, nor does anything behind it. So no command is ever whole.
+    Method: the bytes of the first line go on to the robot, so that no program is kept waiting; its end does not, if it
+    was a request line, nor does anything behind it. So no command is ever whole.
     """
 
     _METHOD = re.compile(rb"[A-Z]+ \S")

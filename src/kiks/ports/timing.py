@@ -28,8 +28,8 @@ SLICE_NS = NS_PER_S
 """Most simulated time that passes before the ports are looked at again [ns]."""
 
 LEFT_BEHIND_NS = 2 * NS_PER_S
-"""How long the commands of a client that has gone still act [ns]: a driver's buffer and a robot's hold no more for long.
-Without an end, a client that is killed in the middle of a flood would keep the next one waiting for minutes."""
+"""How long the commands of a client that has gone still act [ns]. Without an end, a client that is killed in the middle
+of a flood would keep the next one waiting for minutes."""
 
 _log = logging.getLogger("kiks.serve")
 
