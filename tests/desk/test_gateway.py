@@ -159,6 +159,14 @@ def test_two_browsers_may_drag_at_once(shown: Shown) -> None:
         *("", "{", "[]", "7", "[" * 100_000, '{"kind": 3}', '{"kind": "fly"}'),
         *('{"kind": "grab"}', '{"kind": "grab", "what": "robot"}', '{"kind": "grab", "what": "robot", "index": "0"}'),
         *('{"kind": "move"}', '{"kind": "move", "x_mm": NaN, "y_mm": 3}', '{"kind": "turn", "heading_rad": null}'),
+        *('{"kind": "turn", "heading_rad": 1e20}', '{"kind": "turn", "heading_rad": -1e400}'),
+        *(f'{{"kind": "turn", "heading_rad": {"9" * 400}}}', f'{{"kind": "turn", "heading_rad": {"9" * 9000}}}'),
+        *(
+            '{"kind": "move", "x_mm": {"a": [1]}, "y_mm": 3}',
+            f'{{"kind": "grab", "what": {"[" * 400}0{"]" * 400}}}',
+        ),
+        *('{"kind": "grab", "what": "robot", "index": 1e400}', '{"kind": "grab", "what": "robot", "index": -1}'),
+        *(f'{{"kind": "grab", "what": "robot", "index": {"9" * 400}}}', f'{{"kind": "{"x" * 100_000}"}}'),
     ],
     ids=lambda text: text[:40],
 )
@@ -169,6 +177,9 @@ def test_nonsense_gets_an_answer(shown: Shown, text: str) -> None:
         while not (isinstance(heard := browser.hear(), dict) and heard["kind"] == "error"):
             pass
         assert "must" in heard["text"]
+        assert len(heard["text"]) < 400
+        browser.say("ack", count=-(10**18))
+        browser.say("ack", count=[[]])
         browser.frame()
 
 

@@ -214,12 +214,17 @@ class Gateway:
         kind = message["kind"]
         if kind == "ack":
             count = message.get("count")
-            viewer.in_flight = max(viewer.in_flight - (count if count in range(1, IN_FLIGHT + 1) else 1), 0)
+            shown_count = count if isinstance(count, int) and 1 <= count <= IN_FLIGHT else 1
+            viewer.in_flight = max(viewer.in_flight - shown_count, 0)
             return
         desk, name = self._desk, viewer.name
         if kind == "grab":
             what, index = message.get("what"), message.get("index", -1)
-            await desk.grab(name, what if isinstance(what, str) else "", index if isinstance(index, int) else -1)
+            await desk.grab(
+                name,
+                what[:80] if isinstance(what, str) else "",
+                index if isinstance(index, int) and index < NUMBER_MAX else -1,
+            )
         elif kind == "move":
             x_mm, y_mm = _number(message, "x_mm"), _number(message, "y_mm")
             await desk.do(lambda sim: desk.hands.move(name, x_mm, y_mm))
