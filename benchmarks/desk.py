@@ -26,11 +26,13 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
+from urllib.parse import urlsplit
 
 from calibration import report
 
 import kiks
 from kiks.demos.follow import Follow
+from kiks.desk.key import COOKIE
 from kiks.desk.showing import show
 
 ROBOTS = 20
@@ -61,7 +63,7 @@ sys.stdin.read()
 LISTENER = """
 import sys
 from websockets.sync.client import connect
-with connect(sys.argv[1], compression=None) as socket:
+with connect(sys.argv[1], compression=None, additional_headers={"Cookie": sys.argv[2]}) as socket:
     print("here", flush=True)
     for message in socket:
         if isinstance(message, bytes):
@@ -129,8 +131,9 @@ def follow_s(robot_count: int, *, is_shown: bool, seconds: float) -> float:
     shown = show(sim, speed=None, browser=False) if is_shown else None
     listener = None
     if shown is not None:
-        feed = shown.url.replace("http:", "ws:") + "/feed"
-        listener = subprocess.Popen([sys.executable, "-c", LISTENER, feed], stdout=subprocess.PIPE)
+        url = urlsplit(shown.url)
+        words = [f"ws://{url.netloc}{url.path}/feed", f"{COOKIE}_{url.port}={url.query.removeprefix('token=')}"]
+        listener = subprocess.Popen([sys.executable, "-c", LISTENER, *words], stdout=subprocess.PIPE)
         assert listener.stdout is not None
         listener.stdout.readline()
     end_s, start_s = sim.time_s + seconds, time.perf_counter()

@@ -1,5 +1,5 @@
 """A real desk whose page has the monitor's panel alone. Run as a program, in a process of its own, because NiceGUI
-keeps one application a process; it prints its address when it listens.
+keeps one application a process; it prints the address of the desk when it listens.
 
 `/world` tells what the simulation says of itself, `/ask/WHAT` makes it do something: see `ask`.
 """
@@ -76,7 +76,7 @@ def main() -> None:
             panels[-1].show_robot(1)
         return what
 
-    print(shown.url.split("/desk/")[0], flush=True)
+    print(shown.url, flush=True)
     threading.Event().wait()
 
 

@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 from urllib.error import HTTPError
-from urllib.request import HTTPCookieProcessor, Request, build_opener, urlopen
+from urllib.request import HTTPCookieProcessor, OpenerDirector, Request, build_opener, urlopen
 
 import pytest
 from tests.served import PROGRAMS
@@ -56,10 +56,15 @@ def url_of(output: IO[str]) -> str:
     return found[0]
 
 
+def browser() -> OpenerDirector:
+    """Return what follows addresses and keeps cookies."""
+    return build_opener(HTTPCookieProcessor())
+
+
 def test_desk_serves_a_page_and_ends_with_ctrl_c(tmp_path: Path) -> None:
     with started("desk", "--port", "0", "--no-browser", "--robots", "3", folder=tmp_path) as (process, output):
         url = url_of(output)
-        with urlopen(url, timeout=GUARD_S) as answer:
+        with browser().open(url, timeout=GUARD_S) as answer:
             assert answer.status == 200
             assert b"KiKS" in answer.read()
         with pytest.raises(HTTPError, match="403"):
@@ -69,15 +74,16 @@ def test_desk_serves_a_page_and_ends_with_ctrl_c(tmp_path: Path) -> None:
         assert process.wait(GUARD_S) == 0
 
 
-def test_other_hosts_need_the_token(tmp_path: Path) -> None:
-    with started("desk", "--port", "0", "--no-browser", "--host", "0.0.0.0", folder=tmp_path) as (_, output):
+@pytest.mark.parametrize("host", ["127.0.0.1", "0.0.0.0"])
+def test_without_the_token_there_is_no_desk(host: str, tmp_path: Path) -> None:
+    with started("desk", "--port", "0", "--no-browser", "--host", host, folder=tmp_path) as (_, output):
         url = url_of(output).replace("0.0.0.0", "127.0.0.1")
         bare, token = url.split("?token=")
         assert len(token) >= 32
         for wrong in (bare, f"{bare}?token=guess", f"{bare}/arena/1.png"):
             with pytest.raises(HTTPError, match="403"):
                 urlopen(wrong, timeout=GUARD_S)
-        with build_opener(HTTPCookieProcessor()).open(url, timeout=GUARD_S) as answer:
+        with browser().open(url, timeout=GUARD_S) as answer:
             assert answer.status == 200
             assert "token" not in answer.url
 
@@ -99,7 +105,7 @@ def test_demonstration_on_a_desk(words: tuple[str, ...], said: str, tmp_path: Pa
         url = url_of(output)
         assert line_with(output, said)
         assert line_with(output, "Picture: ")
-        with urlopen(url, timeout=GUARD_S) as answer:
+        with browser().open(url, timeout=GUARD_S) as answer:
             assert answer.status == 200
         process.send_signal(signal.SIGINT)
         assert process.wait(GUARD_S) == 0
@@ -128,10 +134,10 @@ def test_served_robots_on_a_desk(thinking: str, tmp_path: Path) -> None:
         (("--arena", "nowhere.kiks"), "nowhere.kiks"),
         (("--folder", "nowhere"), "--folder must be a folder"),
         (("nowhere.py",), "PROGRAM must be a Python file"),
-        (("--turret", "laser"), "turrets must be of"),
+        (("--turret", "laser"), "turrets[0] must be one of"),
         (("--robots", "3", "--robot", "khepera", "--robot", "khepera_ii"), "--robot must name one kind for all"),
         (("--thinking", "much"), "thinking must be"),
-        (("--speed", "-1"), "speed must be from 0.001 to 1000"),
+        (("--speed", "-1"), "speed must be a number from 0.001 to 1000"),
         (("--host", "192.0.2.1"), "the desk must be able to listen"),
         (("--host", "no such host"), "the desk must be able to listen"),
     ],

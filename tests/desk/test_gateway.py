@@ -9,6 +9,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
+from urllib.parse import urlsplit
 
 import pytest
 from websockets.exceptions import InvalidStatus
@@ -16,6 +17,7 @@ from websockets.sync.client import ClientConnection, connect
 
 import kiks
 from kiks.desk.gateway import IN_FLIGHT, Viewer
+from kiks.desk.key import COOKIE
 from kiks.desk.showing import Shown, show
 from kiks.errors import ParameterError
 
@@ -69,8 +71,10 @@ class Browser:
 
 @contextmanager
 def browsing(shown: Shown, **options: Any) -> Iterator[Browser]:
-    url = shown.url.replace("http:", "ws:") + "/feed"
-    with connect(url, compression=None, open_timeout=GUARD_S, **options) as socket:
+    url = urlsplit(shown.url)
+    cookie = {"Cookie": f"{COOKIE}_{url.port}={url.query.removeprefix('token=')}"}
+    options = {"additional_headers": cookie, **options}
+    with connect(f"ws://{url.netloc}{url.path}/feed", compression=None, open_timeout=GUARD_S, **options) as socket:
         yield Browser(socket)
 
 
@@ -155,6 +159,14 @@ def test_two_browsers_may_drag_at_once(shown: Shown) -> None:
         *("", "{", "[]", "7", "[" * 100_000, '{"kind": 3}', '{"kind": "fly"}'),
         *('{"kind": "grab"}', '{"kind": "grab", "what": "robot"}', '{"kind": "grab", "what": "robot", "index": "0"}'),
         *('{"kind": "move"}', '{"kind": "move", "x_mm": NaN, "y_mm": 3}', '{"kind": "turn", "heading_rad": null}'),
+        *('{"kind": "turn", "heading_rad": 1e20}', '{"kind": "turn", "heading_rad": -1e400}'),
+        *(f'{{"kind": "turn", "heading_rad": {"9" * 400}}}', f'{{"kind": "turn", "heading_rad": {"9" * 9000}}}'),
+        *(
+            '{"kind": "move", "x_mm": {"a": [1]}, "y_mm": 3}',
+            f'{{"kind": "grab", "what": {"[" * 400}0{"]" * 400}}}',
+        ),
+        *('{"kind": "grab", "what": "robot", "index": 1e400}', '{"kind": "grab", "what": "robot", "index": -1}'),
+        *(f'{{"kind": "grab", "what": "robot", "index": {"9" * 400}}}', f'{{"kind": "{"x" * 100_000}"}}'),
     ],
     ids=lambda text: text[:40],
 )
@@ -165,11 +177,17 @@ def test_nonsense_gets_an_answer(shown: Shown, text: str) -> None:
         while not (isinstance(heard := browser.hear(), dict) and heard["kind"] == "error"):
             pass
         assert "must" in heard["text"]
+        assert len(heard["text"]) < 400
+        browser.say("ack", count=-(10**18))
+        browser.say("ack", count=[[]])
         browser.frame()
 
 
-def test_other_pages_are_refused(shown: Shown) -> None:
-    with pytest.raises(InvalidStatus, match="403"), browsing(shown, origin="http://evil.example"):
+@pytest.mark.parametrize(
+    "options", [{"origin": "http://evil.example"}, {"additional_headers": {}}, {"additional_headers": {"Cookie": "="}}]
+)
+def test_other_pages_and_strangers_are_refused(shown: Shown, options: dict[str, Any]) -> None:
+    with pytest.raises(InvalidStatus, match="403"), browsing(shown, **options):
         pass
 
 

@@ -61,9 +61,9 @@ def test_links_do_not_leave_the_folder(tmp_path: Path) -> None:
     (tmp_path / "secret.py").write_text("secret")
     (folder / "link.py").symlink_to(tmp_path / "secret.py")
     link = Script("link.py", is_example=False)
-    with pytest.raises(ParameterError, match=r"must lie in the project's folder"):
+    with pytest.raises(ParameterError, match="leads elsewhere"):
         read_script(folder, link)
-    with pytest.raises(ParameterError, match=r"must lie in the project's folder"):
+    with pytest.raises(ParameterError, match="leads elsewhere"):
         save_script(folder, "link.py", "x", may_replace=link)
     assert (tmp_path / "secret.py").read_text() == "secret"
 

@@ -22,6 +22,7 @@ from kiks.cli.serve import serve
 from kiks.cli.session import session
 from kiks.cli.warmup import warmup
 from kiks.errors import KiksError
+from kiks.ports.descriptors import raise_limit
 
 app = typer.Typer(
     help="KiKS Is a Khepera Simulator: programs for a real Khepera robot run on a simulated one, unchanged.",
@@ -51,6 +52,7 @@ def _options(
 
 def main() -> None:
     """Run the command; what a user did wrong ends in one clear message."""
+    raise_limit()
     try:
         app()
     except KiksError as error:

@@ -102,6 +102,11 @@ class SerialLine:
                 break
         return taken
 
+    def cut_short(self, until_ns: int, now_ns: int) -> None:
+        """Take off the line what would reach the robot later than `until_ns`, and what would reach the host [ns]."""
+        self.sending_until_ns = min(self.sending_until_ns, until_ns)
+        self._answering_until_ns = min(self._answering_until_ns, now_ns)
+
     def forget(self) -> None:
         """Drop every character that nobody has read."""
         self.waiting.clear()

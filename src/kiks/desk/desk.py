@@ -11,12 +11,13 @@ from typing import TypeVar
 
 from kiks.clock.gate import Gate
 from kiks.desk.editing import Editing
+from kiks.desk.scripts import EXAMPLES
 from kiks.desk.speedometer import Speedometer
-from kiks.errors import LinkError
+from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.firmware.k213 import K213
-from kiks.model.files import inside
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, robot_names
+from kiks.ports.permission import Permission, program_in
 from kiks.ports.process import Command
 from kiks.ports.programs import Programs
 from kiks.sim.building import project_of, simulation_of
@@ -48,8 +49,8 @@ class Desk:
         speed: Simulated seconds in a real one; None for as fast as possible.
         folder: Where files are opened and saved.
         owns_world: Whether it may be replaced by another one; False if a program outside holds it.
-        may_run_programs: Whether programs may be started from a browser.
-        commands: Programs that begin with the world, the first for robot 1 and so on.
+        may_run_programs: Whether others than `commands` may be started, from a browser or by a project.
+        commands: Programs that begin with the world, the first for robot 1 and so on; they may always be started.
         new_programs: Makes the host of a world's programs, for who wants other settings than the project's.
 
     Attributes:
@@ -81,7 +82,7 @@ class Desk:
         self.may_run_programs = may_run_programs
         self.scene = 0
         self.news: Tail[str] = Tail(NEWS_LIMIT)
-        self._commands = list(commands)
+        self._commands = self._granted = list(commands)
         self._new_programs = new_programs or self._usual_programs
         self._retired: list[Programs] = []
         self.project = foreign_project(sim) if project is None else project
@@ -90,10 +91,12 @@ class Desk:
 
     def _take(self, sim: Simulation, speed: float | None) -> None:
         gate = Gate(sim.lock, speed=speed)
-        self.sim, self.gate = sim, gate
+        # First, because it may fail: then the world that was there stays.
+        programs = self._new_programs(sim, self._commands, gate)
+        programs.permission = self._permission()
+        self.sim, self.gate, self.programs = sim, gate, programs
         self.hands = Hands(sim)
         self.meter = Speedometer()
-        self.programs = self._new_programs(sim, self._commands, gate)
         self._mark = sim.checkpoint()
         sim.gate = gate
         self.tell()
@@ -102,6 +105,24 @@ class Desk:
         return Programs(
             sim, commands, thinking=self.project.thinking, say=self.say, is_heard=True, new_patience=gate.patience
         )
+
+    def _permission(self) -> Permission:
+        return Permission(self._granted, folders=(self.folder, EXAMPLES), may_start_others=self.may_run_programs)
+
+    def _permitted(self, commands: Sequence[Command | None]) -> list[Command | None]:
+        """Return the programs that may start; people are told of the others."""
+        permission = self._permission()
+
+        def permitted(command: Command | None) -> Command | None:
+            try:
+                if command is not None:
+                    permission.check(command)
+                return command
+            except ParameterError as error:
+                self.say(f"A program was left out: {error}")
+                return None
+
+        return [permitted(command) for command in commands]
 
     def names(self) -> list[str]:
         """Return what people call the robots: their numbers, if nothing else."""
@@ -132,10 +153,10 @@ class Desk:
     # ---- another world ----
 
     async def replace(self, project: Project) -> None:
-        """Put the world of a project on the desk, with its programs; the old one ends.
+        """Put the world of a project on the desk, with those of its programs that may start; the old one ends.
 
         Raises:
-            ParameterError: If the world cannot be replaced, or the project is none.
+            ParameterError: If the world cannot be replaced, the project is none, or a program of it is none.
             ArenaError: If something has no free place.
         """
         await self._put(project, commands_of(project, self.folder))
@@ -155,10 +176,14 @@ class Desk:
                 "there, or open another desk: kiks desk."
             )
         sim = await asyncio.to_thread(simulation_of, project, self.folder)
-        old, programs = self.gate, self.programs
+        old, programs, before = self.gate, self.programs, (self.project, self._commands)
         is_paused = old.is_paused
-        self.project, self._commands = project, list(commands)
-        self._take(sim, old.speed)
+        self.project, self._commands = project, self._permitted(commands)
+        try:
+            self._take(sim, old.speed)
+        except KiksError:
+            self.project, self._commands = before
+            raise
         # Only now: whoever moves the world ends them at once, and must have the new ones to turn to.
         self._retired.append(programs)
         if is_paused:
@@ -301,9 +326,9 @@ def commands_of(project: Project, folder: Path) -> list[Command | None]:
     """Return the program of each robot of a project in a folder; None for a robot that has none.
 
     Raises:
-        ParameterError: If one lies elsewhere.
+        ParameterError: If one lies elsewhere, or is no program.
     """
     return [
-        None if robot.program is None else Command(inside(folder, robot.program, "program"), list(robot.arguments))
+        None if robot.program is None else Command(program_in(folder, robot.program), list(robot.arguments))
         for robot in project.robots
     ]

@@ -30,6 +30,9 @@ SHAPES_FRAMES = 10
 IN_FLIGHT = 3
 """Most frames on their way to one browser."""
 
+NUMBER_MAX = 1e6
+"""Largest number of a message, a place in millimetres or an angle in radians."""
+
 TEXTS = 16
 """Most other messages that wait for one browser: who is that far behind is parted from, and comes back."""
 
@@ -210,12 +213,18 @@ class Gateway:
         message = _parse(text)
         kind = message["kind"]
         if kind == "ack":
-            count = message.get("count", 1)
-            viewer.in_flight = max(viewer.in_flight - (count if isinstance(count, int) else 1), 0)
+            count = message.get("count")
+            shown_count = count if isinstance(count, int) and 1 <= count <= IN_FLIGHT else 1
+            viewer.in_flight = max(viewer.in_flight - shown_count, 0)
             return
         desk, name = self._desk, viewer.name
         if kind == "grab":
-            await desk.grab(name, str(message.get("what")), message.get("index", -1))
+            what, index = message.get("what"), message.get("index", -1)
+            await desk.grab(
+                name,
+                what[:80] if isinstance(what, str) else "",
+                index if isinstance(index, int) and index < NUMBER_MAX else -1,
+            )
         elif kind == "move":
             x_mm, y_mm = _number(message, "x_mm"), _number(message, "y_mm")
             await desk.do(lambda sim: desk.hands.move(name, x_mm, y_mm))
@@ -226,7 +235,8 @@ class Gateway:
             await desk.drop(name)
         else:
             raise ParameterError(
-                f"a message must be one of ack, grab, move, turn and drop, but it was {kind!r}. Load the page anew."
+                f"a message must be one of ack, grab, move, turn and drop, but it was {kind[:80]!r}. Load the page "
+                "anew."
             )
         self._has_moved = True
         self._wake.set()
@@ -246,6 +256,8 @@ def _parse(text: str) -> dict[str, Any]:
 
 def _number(message: dict[str, Any], name: str) -> float:
     value = message.get(name)
-    if not isinstance(value, int | float):
-        raise ParameterError(f"{name} must be a number, but it was {value!r}. Load the page anew.")
+    if not isinstance(value, int | float) or not abs(value) <= NUMBER_MAX:
+        raise ParameterError(
+            f"{name} must be a number of at most {NUMBER_MAX:g}, but it was {repr(value)[:80]}. Load the page anew."
+        )
     return float(value)

@@ -10,6 +10,7 @@ from pathlib import Path
 from kiks.desk.folder import check_name
 from kiks.errors import ParameterError
 from kiks.model.files import inside, replace_file
+from kiks.ports.permission import program_in
 
 SIZE_LIMIT = 200_000
 """Longest program that is edited in the page [bytes]."""
@@ -63,9 +64,9 @@ def path_of(folder: Path, script: Script) -> Path:
     """Return where a program is.
 
     Raises:
-        ParameterError: If its name leads out of the folder.
+        ParameterError: If its name leads out of the folder, or is none of a program.
     """
-    return inside(EXAMPLES if script.is_example else folder, script.name, "the program")
+    return program_in(EXAMPLES if script.is_example else folder, script.name)
 
 
 def read_script(folder: Path, script: Script) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import secrets
 import socket
 import threading
 from dataclasses import dataclass
@@ -15,10 +14,14 @@ from nicegui import ui
 from starlette.responses import RedirectResponse
 
 from kiks.desk.desk import Desk
+from kiks.desk.door import Door
 from kiks.desk.gateway import Gateway
 from kiks.desk.guard import LOOPBACK, Guard
+from kiks.desk.key import Key
 from kiks.desk.page import Page
+from kiks.desk.plain_log import note_fault, speak_plainly
 from kiks.errors import LinkError, ParameterError
+from kiks.ports.descriptors import opening
 
 PORT = 8123
 """Where the desk is found, if nobody else is there."""
@@ -28,6 +31,9 @@ START_S = 30.0
 
 MESSAGE_LIMIT = 1 << 20
 """Largest message on a socket [bytes]: a program that is edited in the page comes in one."""
+
+BACKLOG = 128
+"""Most connections that wait to be accepted."""
 
 CLOSED = "KiKS: this desk is closed. Open it again where it was opened."
 
@@ -54,12 +60,13 @@ class DeskServer:
 
     Attributes:
         desks: What is served, by number.
-        token: What browsers must know; None if only those of this computer can come.
+        key: What browsers must know.
     """
 
     def __init__(self) -> None:
         self.desks: dict[int, Served] = {}
-        self.token: str | None = None
+        self.key = Key()
+        self._is_local = True
         self._count = 0
         self._socket: socket.socket | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -69,7 +76,7 @@ class DeskServer:
         """Begin to serve, unless that is so already.
 
         Args:
-            host: Address to listen at. Any but one of this computer's own makes a token necessary.
+            host: Address to listen at.
             port: TCP port, 0 for a free one; `PORT`, or a free one if that is taken, if left out.
 
         Raises:
@@ -83,7 +90,7 @@ class DeskServer:
                         f"port must be that of the desk that is open, {self.url()}, but it was {port}."
                     )
                 return
-            self.token = None if host in LOOPBACK else secrets.token_urlsafe(24)
+            self._is_local = host in LOOPBACK
             self._socket = _listen(host, PORT, or_free=True) if port is None else _listen(host, port)
             begun = threading.Event()
             threading.Thread(target=self._serve, args=(begun,), name="kiks desk", daemon=True).start()
@@ -108,14 +115,20 @@ class DeskServer:
         served.desk.close()
 
     def url(self, number: int | None = None) -> str:
-        """Return where a browser finds a desk, or the newest one."""
+        """Return where a browser finds a desk, or the newest one, with the token."""
+        return f"{self._address(number)}?token={self.key.token}"
+
+    def url_for_once(self, number: int) -> str:
+        """Return where a browser of this user finds a desk, once: others may see this address."""
+        return f"{self._address(number)}?ticket={self.key.new_ticket()}"
+
+    # ---- inside ----
+
+    def _address(self, number: int | None) -> str:
         assert self._socket is not None
         host, port = self._socket.getsockname()[:2]
         host = f"[{host}]" if ":" in host else host
-        path = "" if number is None else f"desk/{number}"
-        return f"http://{host}:{port}/{path}" + (f"?token={self.token}" if self.token is not None else "")
-
-    # ---- inside ----
+        return f"http://{host}:{port}/" + ("" if number is None else f"desk/{number}")
 
     def _serve(self, begun: threading.Event) -> None:
         """Run the web server, in a thread of its own."""
@@ -125,12 +138,17 @@ class DeskServer:
 
         def begin() -> None:
             self._loop = asyncio.get_running_loop()
+            self._loop.set_exception_handler(note_fault)
             begun.set()
 
         nicegui_app.on_startup(begin)
         config = uvicorn.Config(
-            Guard(app, self.token),
-            log_level="warning",
+            Guard(app, self.key, is_local=self._is_local),
+            http=Door,
+            backlog=BACKLOG,
+            # Who came is asked of the connection, never of what a client says of itself.
+            proxy_headers=False,
+            log_config=None,
             access_log=False,
             lifespan="on",
             ws="websockets-sansio",
@@ -138,6 +156,7 @@ class DeskServer:
             ws_per_message_deflate=False,
             timeout_graceful_shutdown=1,
         )
+        speak_plainly()
         assert self._socket is not None
         uvicorn.Server(config).run(sockets=[self._socket])
 
@@ -177,11 +196,12 @@ class DeskServer:
 
 def _listen(host: str, port: int, *, or_free: bool = False) -> socket.socket:
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    listening = socket.socket(family)
+    with opening("the desk's port"):
+        listening = socket.socket(family)
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listening.bind((host, port))
-        listening.listen(128)
+        listening.listen(BACKLOG)
     except (OSError, OverflowError) as error:
         listening.close()
         if or_free:

@@ -30,7 +30,7 @@ class Shown:
 
     Attributes:
         desk: The desk.
-        url: Where a browser finds it.
+        url: Where a browser finds it, with the token that it needs.
 
     Raises:
         LinkError: If it cannot listen there.
@@ -62,7 +62,8 @@ class Shown:
     def browse(self) -> None:
         """Open it in a browser, where there is a screen."""
         if has_screen():
-            webbrowser.open(self.url)
+            # Other users see with which address a browser is started: not with the token.
+            webbrowser.open(SERVER.url_for_once(self._served.number))
 
     def close(self) -> None:
         """Show it no longer; the world goes its way."""

@@ -16,8 +16,15 @@ from kiks.clock.patience import Patience
 from kiks.ports.timing import IDLE_S, Link
 from kiks.ports.turns import PATIENCE_S, Player, Turns
 from kiks.sim.simulation import Simulation
+from kiks.units import NS_PER_S
 
 TERMINATORS = (b"\r", b"\n")
+
+LEFT_BEHIND_COUNT = 50
+"""When a client leaves more commands behind, the next one waits for so long that a person is told."""
+
+REPLY_LENGTH = 64
+"""Longest usual reply [characters]."""
 
 _TERMINATOR = re.compile(rb"[\r\n]")
 
@@ -124,6 +131,17 @@ class Client(Player):
         """Let what came whole still act, and forget the rest."""
         self._is_leaving = True
         self._look_around()
+        count = len(_TERMINATOR.findall(self._kept))
+        if count > LEFT_BEHIND_COUNT:
+            # None is dropped: which were left when it was noticed that the client has gone is a matter of real time.
+            most_ns = (len(self._kept) + count * REPLY_LENGTH) * self._link.wire.line.character_ns
+            _log.warning(
+                "%s has gone and left %d commands behind, which still act: the next one is let in after that, at most "
+                "%.0f s of simulated time from now.",
+                self.name,
+                count,
+                most_ns / NS_PER_S,
+            )
 
     def drop(self) -> None:
         """Hang up on the client."""

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, NamedTuple
 
-from kiks.errors import KiksError
+from kiks.errors import KiksError, ParameterError
 from kiks.sim.tail import Tail
 
 OUTPUT_LIMIT = 1000
@@ -36,6 +36,17 @@ class Command:
 
     program: Path
     arguments: list[str] = field(default_factory=list)
+
+    def check_file(self) -> None:
+        """Check that the program is there.
+
+        Raises:
+            ParameterError: If it is not.
+        """
+        if not self.program.is_file():
+            raise ParameterError(
+                f"a program must be a Python file, but there is none at {str(self.program)!r}. Save it first."
+            )
 
 
 class OutputLine(NamedTuple):

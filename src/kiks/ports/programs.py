@@ -19,6 +19,7 @@ from kiks.ports.child import LATE, PUNCTUAL
 from kiks.ports.guest import NearGuest, SocketGuest
 from kiks.ports.handle import Handle
 from kiks.ports.names import Names
+from kiks.ports.permission import Anything, Permission
 from kiks.ports.process import Command, Process
 from kiks.ports.turns import PATIENCE_S, START_PATIENCE_S, Turns
 from kiks.sim.simulation import Simulation
@@ -63,6 +64,7 @@ class Programs:
 
     Attributes:
         handles: The programs; of those that have ended the last one of each robot.
+        permission: What may start; anything if nobody says otherwise.
 
     Raises:
         ParameterError: If a value is out of range or unknown.
@@ -85,6 +87,7 @@ class Programs:
         visitors: int = 0,
     ) -> None:
         self.sim = sim
+        self.permission: Permission = Anything()
         self.handles: list[Handle] = []
         self._visitors: list[NearGuest] = []
         self._is_moving = False
@@ -95,8 +98,7 @@ class Programs:
         self._is_heard = is_heard
         self._signals = 0
         self._was_touched = False
-        self._is_closed = False
-        self._count = 0
+        self._is_closed, self._count = False, 0
         begin = [(robot, command) for robot, command in enumerate(commands, 1) if command is not None]
         self._are_numbered = len(begin) > 1
         for number in range(1, len(begin) + 1):
@@ -151,13 +153,10 @@ class Programs:
             robot: Number of the robot that is its own, whatever port it opens.
 
         Raises:
-            ParameterError: If there is no such file or robot, or another program has that robot.
+            ParameterError: If it may not start, there is no such file or robot, or another program has that robot.
             KiksError: If the computer does not let it start.
         """
-        if not command.program.is_file():
-            raise ParameterError(
-                f"a program must be a Python file, but there is none at {str(command.program)!r}. Save it first."
-            )
+        command.check_file()
         with self.sim.lock:
             self._check_open(command.program.name)
             self.sim.index_of(robot)
@@ -308,7 +307,8 @@ class Programs:
         return f".{number}" if self._are_numbered else ""
 
     def _add(self, command: Command, robot: int) -> Handle:
-        """Start a program's process and let it take part."""
+        """Start a program's process, if it may, and let it take part."""
+        self.permission.check(command)
         number = self._count + 1
         name = f"program {number} ({command.program.name})"
         here, there = socket.socketpair()

@@ -24,6 +24,7 @@ import termios
 from pathlib import Path
 
 from kiks.errors import LinkError
+from kiks.ports.descriptors import opening
 from kiks.ports.endpoint import READ_SIZE, Channel, Endpoint
 
 TCGETS2 = 0x802C542A
@@ -49,7 +50,8 @@ class PtyEndpoint(Endpoint):
     def __init__(self, link: str | Path, *, baud: int = 9600) -> None:
         self.name = os.path.abspath(link)
         self._baud = baud
-        self._claim = _claim(self.name)
+        with opening("a serial port"):
+            self._claim = _claim(self.name)
         try:
             self._master, self._slave_name, self._held = -1, "", -1
             self._create()
@@ -59,7 +61,8 @@ class PtyEndpoint(Endpoint):
 
     def _create(self) -> None:
         """Make a pseudo-terminal and point the link to it."""
-        master, held = os.openpty()
+        with opening("a serial port"):
+            master, held = os.openpty()
         os.set_blocking(master, False)
         slave_name = os.ttyname(held)
         try:
@@ -85,8 +88,8 @@ class PtyEndpoint(Endpoint):
 
     def accept(self) -> PtyChannel:
         """Let go of the slave, so that the client's hang-up shows."""
-        os.close(self._held)
-        self._held = -1
+        # Its descriptor stays taken, for the slave again when the client has gone.
+        os.dup2(self._master, self._held, inheritable=False)
         return PtyChannel(self)
 
     def turn_away(self) -> None:
@@ -96,6 +99,7 @@ class PtyEndpoint(Endpoint):
     def renew(self) -> None:
         """Make the port as good as new after a client."""
         self._reset()
+        os.close(self._held)
         try:
             self._held = os.open(self._slave_name, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         except OSError:
@@ -109,8 +113,7 @@ class PtyEndpoint(Endpoint):
         """Remove the link and the pseudo-terminal; a client that is still there sees a hang-up."""
         if os.path.islink(self.name) and os.readlink(self.name) == self._slave_name:
             os.unlink(self.name)
-        if self._held >= 0:
-            os.close(self._held)
+        os.close(self._held)
         os.close(self._master)
         self._claim.close()
 

@@ -24,7 +24,7 @@ class Rfc2217Endpoint(TcpEndpoint):
     def accept(self) -> Rfc2217Channel | None:
         """Let the client in and begin to negotiate."""
         connection = self._connect()
-        return None if connection is None else Rfc2217Channel(self.name, connection)
+        return None if connection is None else Rfc2217Channel(self.name, connection, self)
 
 
 class _Settings:
@@ -66,10 +66,10 @@ class _Answers:
 class Rfc2217Channel(TcpChannel):
     """A client that speaks RFC 2217."""
 
-    def __init__(self, name: str, connection: socket.socket) -> None:
+    def __init__(self, name: str, connection: socket.socket, endpoint: TcpEndpoint | None = None) -> None:
         from serial import rfc2217
 
-        super().__init__(name, connection)
+        super().__init__(name, connection, endpoint)
         settings: Any = _Settings(self)
         answers: Any = _Answers(self)
         self._manager: Any = rfc2217.PortManager(settings, answers)

@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 import ipaddress
+import logging
+import re
 import socket
 
 from kiks.errors import LinkError, ParameterError
+from kiks.ports.descriptors import RESERVE, opening
 from kiks.ports.endpoint import READ_SIZE, Channel, Endpoint
+
+WAITING_MAX = 8
+"""Most clients that wait at a port until the commands of the one before them are done; others are refused."""
+
+_log = logging.getLogger("kiks.serve")
 
 
 class TcpEndpoint(Endpoint):
@@ -32,17 +40,20 @@ class TcpEndpoint(Endpoint):
                 f"host must be an address that only this computer reaches, but it was {host!r}: whoever reaches "
                 "the port can drive the robot. Use 127.0.0.1, and an SSH tunnel from elsewhere."
             )
-        self._listener = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET)
+        with opening("a TCP port"):
+            self._listener = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET)
         try:
             self._listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             self._listener.bind((host, port))
-            self._listener.listen()
+            self._listener.listen(WAITING_MAX)
         except OSError as error:
             self._listener.close()
             raise LinkError(
                 f"port {port} of {host} must be free, but it is not ({error.strerror}). 0 takes a free one."
             ) from None
         self._listener.setblocking(False)
+        RESERVE.hold()
+        self._has_refused_http = False
         self.port = int(self._listener.getsockname()[1])
         self.name = f"[{host}]:{self.port}" if ":" in host else f"{host}:{self.port}"
 
@@ -53,12 +64,14 @@ class TcpEndpoint(Endpoint):
     def accept(self) -> TcpChannel | None:
         """Let the client in."""
         connection = self._connect()
-        return None if connection is None else TcpChannel(self.name, connection)
+        return None if connection is None else TcpChannel(self.name, connection, self)
 
     def _connect(self) -> socket.socket | None:
         try:
-            connection, _ = self._listener.accept()
+            connection = RESERVE.accept(self._listener)
         except OSError:
+            return None
+        if connection is None:
             return None
         connection.setblocking(False)
         # A reply of a few bytes must not wait for the acknowledgement of the one before.
@@ -75,26 +88,79 @@ class TcpEndpoint(Endpoint):
         """Stop listening."""
         self._listener.close()
 
+    def refuse_http(self) -> None:
+        """Tell a person, once, that a browser has come."""
+        if not self._has_refused_http:
+            self._has_refused_http = True
+            _log.warning(
+                "a client of %s must speak as to a serial port, but one spoke HTTP and was hung up on: a page in a "
+                "browser may have tried to drive the robot. Do not open this port in a browser.",
+                self.name,
+            )
+
+
+class FirstLine:
+    """Tells whether a client has begun with an HTTP request, from bytes that come in any pieces.
+
+    Need: pages of other sites can make a browser send a request to any port of this computer, with commands for a robot
+    in its body. No command of a Khepera looks like a request line, such as `POST / HTTP/1.1`.
+    Method: the bytes of the first line go on to the robot, so that no program is kept waiting; its end does not, if it
+    was a request line, nor does anything behind it. So no command is ever whole.
+    """
+
+    _METHOD = re.compile(rb"[A-Z]+ \S")
+    _VERSION = re.compile(rb" HTTP/\d(\.\d)?\Z")
+
+    def __init__(self) -> None:
+        self._is_over = False
+        self._head = b""
+        self._tail = b""
+
+    def is_http(self, data: bytes) -> bool:
+        """Look at the next bytes; say whether they end the line of a request."""
+        if self._is_over:
+            return False
+        end = re.search(rb"[\r\n]", data)
+        line = data if end is None else data[: end.start()]
+        # However long the line is: how it begins and how it ends is all that counts.
+        self._head += line[: 32 - len(self._head)]
+        self._tail = (self._tail + line)[-16:]
+        self._is_over = end is not None
+        return self._is_over and bool(self._METHOD.match(self._head)) and bool(self._VERSION.search(self._tail))
+
 
 class TcpChannel(Channel):
-    """A client on a connection."""
+    """A client on a connection.
 
-    def __init__(self, name: str, connection: socket.socket) -> None:
+    Args:
+        name: Where it came in.
+        connection: The connection.
+        endpoint: Who tells a person if it is a browser.
+    """
+
+    def __init__(self, name: str, connection: socket.socket, endpoint: TcpEndpoint | None = None) -> None:
         super().__init__(name)
         self._connection = connection
+        self._endpoint = endpoint
+        self._first_line = FirstLine()
 
     def fileno(self) -> int:
         """Return the connection."""
         return self._connection.fileno()
 
     def read(self) -> bytes | None:
-        """Return what the client has sent; None when the connection is over."""
+        """Return what the client has sent; None when the connection is over, or was none of a program for a robot."""
         try:
-            return self._connection.recv(READ_SIZE) or None
+            data = self._connection.recv(READ_SIZE)
         except BlockingIOError:
             return b""
         except OSError:
             return None
+        if self._first_line.is_http(data):
+            if self._endpoint is not None:
+                self._endpoint.refuse_http()
+            return None
+        return data or None
 
     def _put(self, data: bytes | bytearray) -> int:
         try:

@@ -6,6 +6,7 @@ Lockstep (`lockstep.py`): the world waits for each command, and then runs to the
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -25,6 +26,12 @@ COALESCE_S = 0.002
 
 SLICE_NS = NS_PER_S
 """Most simulated time that passes before the ports are looked at again [ns]."""
+
+LEFT_BEHIND_NS = 2 * NS_PER_S
+"""How long the commands of a client that has gone still act [ns]. Without an end, a client that is killed in the middle
+of a flood would keep the next one waiting for minutes."""
+
+_log = logging.getLogger("kiks.serve")
 
 
 @dataclass(eq=False)
@@ -96,10 +103,20 @@ class Live:
         """Do nothing: the world runs anyway."""
 
     def leave(self, link: Link) -> None:
-        """Do nothing: what is on the line will act."""
+        """Let what is on the line act, unless that takes too long."""
+        now_ns = self._sim.now_ns
+        dropped_count = link.wire.drop_after(now_ns + LEFT_BEHIND_NS, now_ns)
+        if dropped_count:
+            _log.warning(
+                "the client of robot %d has gone, but its commands were more than %g s ahead of the robot: the last %d "
+                "of them are dropped. Read a line after each command.",
+                link.robot,
+                LEFT_BEHIND_NS / NS_PER_S,
+                dropped_count,
+            )
 
     def has_left(self, link: Link) -> bool:
-        """Say yes: nobody waits for the client."""
+        """Say yes: the next client's commands follow on the line."""
         return True
 
     def _catch_up(self) -> bool:

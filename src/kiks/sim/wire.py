@@ -113,6 +113,10 @@ class Wire:
                 self.line.set_baud(self.firmware.baud)
         else:
             self.firmware.run_demo(now_ns)
+        self._plan()
+
+    def _plan(self) -> None:
+        """Find out when the robot does something next."""
         command_ns = self.pending[0][0] if self.pending else None
         demo_ns = self.firmware.demo_wakes_ns
         if demo_ns is None or command_ns is None:
@@ -163,6 +167,22 @@ class Wire:
         self.hang_up()
         self.send(STOP, now_ns)
         self.hang_up()
+
+    def drop_after(self, until_ns: int, now_ns: int) -> int:
+        """Drop the host's commands that would act late, and all replies; return how many commands.
+
+        Args:
+            until_ns: Until when commands still act [ns].
+            now_ns: The time [ns]: from now on the line is free for replies.
+        """
+        kept = [each for each in self.pending if each[0] <= until_ns or each[2] is not None]
+        dropped_count = len(self.pending) - len(kept)
+        if dropped_count:
+            self.pending = deque(kept)
+            self._last_act_ns = kept[-1][0] if kept else now_ns
+            self._plan()
+        self.line.cut_short(until_ns, now_ns)
+        return dropped_count
 
     def hang_up(self) -> None:
         """Forget what the host left behind: an unfinished command, and replies that nobody will read.

@@ -1,0 +1,124 @@
+"""File descriptors: a server that has run out of them says so in one line, and goes on.
+
+Need: each connection and each pseudo-terminal takes descriptors, and a process may have only so many. A listener that
+cannot accept stays readable: a loop that only tries again spins, one that lets the error out ends.
+Method: one descriptor is held in reserve. When there is no other, it is given up for the client that waits to come in,
+which is accepted and hung up on; then it is taken back. So the queue is always emptied.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import logging
+import os
+import resource
+import socket
+import threading
+from collections.abc import Iterator
+
+from kiks.errors import LinkError
+
+WANTED = 1 << 14
+"""Descriptors that a process asks for at its start, if it may: a thousand robots with three ports and a client each."""
+
+SHORTAGES = (errno.EMFILE, errno.ENFILE)
+"""The errors that mean that there are no more: of this process, of the computer."""
+
+_log = logging.getLogger("kiks.ports")
+
+
+def raise_limit() -> None:
+    """Let this process have as many descriptors as it may, up to `WANTED`."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = WANTED if hard == resource.RLIM_INFINITY else min(WANTED, hard)
+    if soft != resource.RLIM_INFINITY and soft < wanted:
+        with contextlib.suppress(OSError, ValueError):
+            resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
+
+
+def shortage() -> str:
+    """Return the limit that was reached and the way out, for a person."""
+    limit, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    return f"this process may have {limit}, and all are in use. Allow more: ulimit -n {max(4 * limit, 4096)}."
+
+
+@contextlib.contextmanager
+def opening(what: str) -> Iterator[None]:
+    """Say in a line why something could not be opened.
+
+    Args:
+        what: What is opened, as the subject of a sentence.
+
+    Raises:
+        LinkError: If the computer does not let it be opened.
+    """
+    try:
+        yield
+    except LinkError:
+        raise
+    except OSError as error:
+        why = (
+            f"it needs a file descriptor: {shortage()}"
+            if error.errno in SHORTAGES
+            else f"it cannot ({error.strerror})."
+        )
+        raise LinkError(f"{what} must be able to open, but {why}") from None
+
+
+class Reserve:
+    """A descriptor for a client that must be turned away because there is no other; `RESERVE` is the process's."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._spare = -1
+        self._has_warned = False
+
+    def hold(self) -> None:
+        """Take the descriptor, if there is one; to be called when a listener opens."""
+        with self._lock:
+            if self._spare < 0:
+                with contextlib.suppress(OSError):
+                    self._spare = os.open(os.devnull, os.O_RDONLY | os.O_CLOEXEC)
+
+    def accept(self, listener: socket.socket) -> socket.socket | None:
+        """Return the next connection; None if there is none, or no descriptor for it: then it is hung up on.
+
+        Raises:
+            OSError: If the listener is closed.
+        """
+        self.hold()
+        try:
+            connection, _ = listener.accept()
+        except (BlockingIOError, ConnectionAbortedError):
+            return None
+        except OSError as error:
+            if error.errno not in SHORTAGES:
+                raise
+            self._turn_away(listener)
+            return None
+        return connection
+
+    def _turn_away(self, listener: socket.socket) -> None:
+        if not self._has_warned:
+            self._has_warned = True
+            _log.warning(
+                "a client needs a file descriptor: %s Clients are turned away until some are free.", shortage()
+            )
+        with self._lock:
+            if self._spare >= 0:
+                os.close(self._spare)
+                self._spare = -1
+            timeout_s = listener.gettimeout()
+            try:
+                listener.setblocking(False)
+                listener.accept()[0].close()
+            except OSError:
+                pass
+            finally:
+                listener.settimeout(timeout_s)
+        self.hold()
+
+
+RESERVE = Reserve()
+"""The process's."""

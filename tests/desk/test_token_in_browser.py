@@ -1,0 +1,90 @@
+"""The token in a real browser: it leaves the address, lasts for the page, and works within a notebook's page."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from urllib.parse import urlsplit
+
+import pytest
+
+pytest.importorskip("nicegui", reason="the desk needs NiceGUI: install kiks[desk]")
+pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
+
+from playwright.sync_api import Browser
+from tests.desk.visitor import FIRST_PICTURE, SCREENSHOTS, Visitor
+from tests.desk.visits import NewPage
+
+from kiks.desk.serving import SERVER
+from kiks.desk.showing import Shown
+
+pytestmark = pytest.mark.slow
+
+
+def test_the_token_leaves_the_address_and_stays_with_the_browser(visitor: Visitor) -> None:
+    assert "token" not in visitor.page.url
+    assert SERVER.key.token not in visitor.page.content()
+    assert visitor.answer("document.cookie") == ""
+    visitor.page.reload()
+    visitor.page.wait_for_function(FIRST_PICTURE)
+    visitor.picture("with_the_token")
+
+
+def test_a_ticket_opens_the_desk_once(new_page: NewPage, browser: Browser, shown: Shown) -> None:
+    url = SERVER.url_for_once(shown._served.number)
+    page = new_page()
+    page.goto(url)
+    page.wait_for_function(FIRST_PICTURE)
+    assert "ticket" not in page.url
+    other = browser.new_page()
+    answer = other.goto(url)
+    assert answer is not None
+    assert answer.status == 403
+    other.close()
+
+
+def test_without_the_token_a_page_says_what_to_do(browser: Browser, shown: Shown) -> None:
+    for scheme in ("light", "dark"):
+        page = browser.new_page(viewport={"width": 1000, "height": 600}, color_scheme=scheme)
+        answer = page.goto(shown.url.split("?")[0])
+        assert answer is not None
+        assert answer.status == 403
+        assert "Open the whole address that KiKS printed" in page.inner_text("body")
+        SCREENSHOTS.mkdir(exist_ok=True)
+        page.screenshot(path=SCREENSHOTS / f"refused_{scheme}.png")
+        page.close()
+
+
+@pytest.fixture
+def notebook(shown: Shown) -> Iterator[int]:
+    """A server of pages that show the desk within theirs, as a notebook does; its port."""
+
+    class Notebook(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            body = shown._repr_html_().encode() if self.path == "/" else b""
+            self.send_response(200)
+            self.send_header("content-type", "text/html")
+            self.end_headers()
+            self.wfile.write(b"<!doctype html><title>Notebook</title>" + body)
+
+        def log_message(self, *_words: object) -> None:
+            pass
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Notebook)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    yield server.server_port
+    server.shutdown()
+    server.server_close()
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "localhost"])
+def test_a_notebook_shows_the_desk(browser: Browser, shown: Shown, notebook: int, host: str) -> None:
+    page = browser.new_page()
+    page.goto(f"http://{host}:{notebook}/")
+    frame = next(each for each in page.frames if each.parent_frame is not None)
+    frame.wait_for_function(FIRST_PICTURE)
+    assert urlsplit(frame.url).query == ""
+    SCREENSHOTS.mkdir(exist_ok=True)
+    page.screenshot(path=SCREENSHOTS / f"notebook_{host}.png")
+    page.close()

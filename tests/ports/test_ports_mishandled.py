@@ -1,0 +1,316 @@
+"""What reaches a robot's port by mistake or malice: browsers, floods, too many clients, no descriptors."""
+
+from __future__ import annotations
+
+import logging
+import os
+import resource
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from tests.ports.test_server import Wall
+from tests.served import GUARD_S, open_plain, read_line, served
+
+from kiks.clock.line import BACKLOG_LIMIT
+from kiks.clock.pace import Pace
+from kiks.errors import LinkError
+from kiks.firmware.commands import COMMANDS
+from kiks.ports.descriptors import RESERVE
+from kiks.ports.endpoint import Endpoint
+from kiks.ports.pty import PtyEndpoint
+from kiks.ports.rfc2217 import Rfc2217Endpoint
+from kiks.ports.tcp import FirstLine, TcpEndpoint
+from kiks.ports.timing import LEFT_BEHIND_NS
+from kiks.units import NS_PER_S
+
+
+def connect(endpoint: TcpEndpoint) -> socket.socket:
+    return socket.create_connection(("127.0.0.1", endpoint.port), timeout=GUARD_S)
+
+
+def ask(client: socket.socket, command: bytes) -> bytes:
+    client.sendall(command)
+    with client.makefile("rb") as lines:
+        return lines.readline()
+
+
+def warnings(caplog: pytest.LogCaptureFixture) -> list[str]:
+    return [record.getMessage() for record in caplog.records if record.levelno == logging.WARNING]
+
+
+# ---- browsers ----
+
+
+def is_http(data: bytes, cuts: list[int]) -> bool:
+    """Say whether a line that comes in pieces is taken for a request."""
+    line, places = FirstLine(), sorted({cut % (len(data) + 1) for cut in cuts})
+    pieces = [data[first:last] for first, last in zip([0, *places], [*places, len(data)], strict=True)]
+    return any(line.is_http(piece) for piece in pieces)
+
+
+CUTS = st.lists(st.integers(0, 10_000), max_size=30)
+
+
+@given(
+    method=st.sampled_from([b"GET", b"POST", b"PUT", b"OPTIONS", b"HEAD", b"DELETE", b"CONNECT", b"PATCH", b"PRI"]),
+    target=st.text(st.characters(min_codepoint=33, max_codepoint=126), min_size=1, max_size=200).map(str.encode),
+    times=st.sampled_from([1, 1, 100]),
+    version=st.sampled_from([b"1.0", b"1.1", b"2.0"]),
+    end=st.sampled_from([b"\r\n", b"\n"]),
+    cuts=CUTS,
+)
+def test_each_request_is_known_however_it_is_cut(
+    method: bytes, target: bytes, times: int, version: bytes, end: bytes, cuts: list[int]
+) -> None:
+    request = method + b" " + target * times + b" HTTP/" + version + end + b"Host: x\r\n\r\nD,10,10\n"
+    assert is_http(request, cuts)
+
+
+@given(
+    lines=st.lists(
+        st.one_of(
+            st.tuples(
+                st.sampled_from([each.letter for each in COMMANDS]),
+                st.lists(st.integers(-(10**6), 10**6).map(str), max_size=12),
+            ).map(lambda each: ",".join([each[0], *each[1]]).encode()),
+            st.sampled_from([b"serial 38400", b"POS,1,2", b"GET", b"G ET", b"restart", b"T,1,GET", b"HTTP/1.1", b""]),
+            st.binary(max_size=40).map(lambda raw: raw.replace(b"HTTP/", b"")),
+        ),
+        min_size=1,
+        max_size=4,
+    ),
+    end=st.sampled_from([b"\r", b"\n", b"\r\n"]),
+    cuts=CUTS,
+)
+def test_no_program_is_taken_for_a_browser(lines: list[bytes], end: bytes, cuts: list[int]) -> None:
+    assert not is_http(end.join([*lines, b""]), cuts)
+
+
+def test_a_request_behind_the_first_line_is_the_robots() -> None:
+    assert not is_http(b"H\nPOST / HTTP/1.1\r\n", [])
+
+
+@pytest.mark.parametrize("kind", [TcpEndpoint, Rfc2217Endpoint])
+@pytest.mark.parametrize("thinking", ["none", "live"])
+def test_a_page_in_a_browser_drives_no_robot(
+    kind: type[TcpEndpoint], thinking: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    endpoint = kind(0)
+    form = b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 18\r\n\r\nD,10,10\nG,7,7\n\n\n"
+    with served([endpoint], thinking=thinking, **({"pace": Pace(wall_ns=Wall())} if thinking == "live" else {})) as run:
+        for pieces in ([form], [form[:3], form[3:20], form[20:]], [form[:17], form[17:]]):
+            with connect(endpoint) as browser, suppress(OSError):
+                for piece in pieces:
+                    browser.sendall(piece)
+                    run.wait_rounds(2)
+                while browser.recv(100):
+                    pass
+            run.wait_free()
+        robot = run.sim.state.robots[0, 0]
+        assert robot["speed_setpoint"].tolist() == [0, 0]
+        assert not run.sim.wires[0].pending
+        if kind is TcpEndpoint and thinking == "none":
+            with connect(endpoint) as client:
+                assert ask(client, b"H\n") == b"h,0,0\r\n"
+    assert warnings(caplog) == [
+        f"a client of {endpoint.name} must speak as to a serial port, but one spoke HTTP and was hung up on: a page in "
+        "a browser may have tried to drive the robot. Do not open this port in a browser."
+    ]
+
+
+# ---- floods ----
+
+
+@settings(max_examples=6, deadline=None)
+@given(command=st.sampled_from([b"N\n", b"H\n", b"D,5,5\n", b"B\n"]))
+@example(command=b"N\n")
+def test_a_flood_keeps_the_next_client_waiting_for_two_seconds_at_most(command: bytes) -> None:
+    wall, endpoint = Wall(), TcpEndpoint(0)
+    with served([endpoint], thinking="live", pace=Pace(wall_ns=wall)) as run:
+        line = run.sim.wires[0].line
+        with connect(endpoint) as flooder:
+            flooder.sendall(command * (BACKLOG_LIMIT // len(command)))
+            run.wait_for(lambda: line.sending_until_ns - run.sim.now_ns > 2 * LEFT_BEHIND_NS)
+            # Most of it acts, and its replies, of which each is longer than its command, wait for nobody.
+            wall.pass_ns(NS_PER_S)
+            run.wait_for(lambda: run.sim.now_ns >= NS_PER_S)
+        run.wait_free()
+        gone_ns = run.sim.now_ns
+        with connect(endpoint) as client:
+            run.wait_held()
+            client.sendall(b"E\n")
+            run.wait_for(lambda: run.sim.wires[0].firmware.receiver is not None and run.sim.wires[0].pending)
+            run.wait_rounds(2)
+            for _ in range(100):
+                wall.pass_ns(NS_PER_S // 20)
+                run.wait_rounds(2)
+                client.setblocking(False)
+                try:
+                    reply = client.recv(100)
+                    break
+                except BlockingIOError:
+                    continue
+            assert reply.startswith(b"e,")
+            assert run.sim.now_ns - gone_ns <= LEFT_BEHIND_NS + NS_PER_S // 5
+
+
+def test_what_a_flood_has_left_behind_is_told(caplog: pytest.LogCaptureFixture) -> None:
+    endpoint = TcpEndpoint(0)
+    with served([endpoint], thinking="live", pace=Pace(wall_ns=Wall())) as run:
+        with connect(endpoint) as flooder:
+            flooder.sendall(b"D,1,1\n" * 600)
+            run.wait_for(lambda: len(run.sim.wires[0].pending) == 600)
+        run.wait_free()
+        left_count = len(run.sim.wires[0].pending)
+        assert 0 < left_count < 600
+    assert warnings(caplog) == [
+        "the client of robot 1 has gone, but its commands were more than 2 s ahead of the robot: the last "
+        f"{600 - left_count} of them are dropped. Read a line after each command."
+    ]
+
+
+def test_a_few_commands_left_behind_all_act() -> None:
+    wall, endpoint = Wall(), TcpEndpoint(0)
+    with served([endpoint], thinking="live", pace=Pace(wall_ns=wall)) as run:
+        with connect(endpoint) as client:
+            client.sendall(b"D,1,1\n" * 100 + b"D,3,4\n")
+            run.wait_for(lambda: len(run.sim.wires[0].pending) == 101)
+        run.wait_free()
+        wall.pass_ns(2 * NS_PER_S)
+        run.wait_for(lambda: run.sim.state.robots[0, 0]["speed_setpoint"].tolist() == [3, 4])
+
+
+def test_lockstep_tells_how_long_the_next_one_waits(caplog: pytest.LogCaptureFixture) -> None:
+    ways = {1: [TcpEndpoint(0)], 2: [TcpEndpoint(0)]}
+    with served(ways, when_silent="wait") as run:
+        flooder, other = connect(ways[1][0]), connect(ways[2][0])
+        run.wait_held(1)
+        run.wait_held(2)
+        flooder.sendall(b"N\n" * 1000)
+        run.wait_rounds(5)
+        flooder.close()
+        run.wait_for(lambda: warnings(caplog))
+        other.close()
+    (said,) = [text for text in warnings(caplog) if "left" in text]
+    assert said.startswith("the client of robot 1 has gone and left 99")
+    assert "the next one is let in after that, at most" in said
+
+
+# ---- descriptors ----
+
+
+@contextmanager
+def few_descriptors(left: int) -> Iterator[None]:
+    """Leave so many descriptors to this process."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    probes = [os.open(os.devnull, os.O_RDONLY) for _ in range(left)]
+    highest = max(probes)
+    for probe in probes:
+        os.close(probe)
+    # Numbers below that may be taken, and free ones in between are few.
+    resource.setrlimit(resource.RLIMIT_NOFILE, (highest + 1, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+
+
+def test_without_descriptors_clients_are_turned_away_and_the_server_goes_on(caplog: pytest.LogCaptureFixture) -> None:
+    RESERVE._has_warned = False
+    ways: dict[int, list[Endpoint]] = {1: [TcpEndpoint(0)], 2: [TcpEndpoint(0)]}
+    with served(ways) as run, ExitStack() as stack:
+        first = stack.enter_context(connect(ways[1][0]))  # type: ignore[arg-type]
+        run.wait_held(1)
+        # Their own ends are opened before nothing is left.
+        late = [stack.enter_context(socket.socket()) for _ in range(20)]
+        with few_descriptors(1):
+            hogs = [os.open(os.devnull, os.O_RDONLY)]
+            with suppress(OSError):
+                while True:
+                    hogs.append(os.open(os.devnull, os.O_RDONLY))
+            try:
+                for each in late:
+                    each.settimeout(GUARD_S)
+                    each.connect(("127.0.0.1", ways[2][0].port))  # type: ignore[attr-defined]
+                    assert each.recv(1) == b""
+                assert run.sim.wires[1].holder is None
+            finally:
+                for hog in hogs:
+                    os.close(hog)
+        second = stack.enter_context(connect(ways[2][0]))  # type: ignore[arg-type]
+        run.wait_held(2)
+        first.sendall(b"H\n")
+        assert ask(second, b"H\n") == b"h,0,0\r\n"
+        assert first.recv(1) == b"h"
+    (said,) = warnings(caplog)
+    assert "a client needs a file descriptor: this process may have" in said
+    assert "ulimit -n" in said
+
+
+def test_serial_ports_come_back_without_descriptors(tmp_path: Path) -> None:
+    link = f"{tmp_path}/robot"
+    with served([PtyEndpoint(link)]) as run:
+        port = open_plain(link)
+        os.write(port, b"H\n")
+        assert read_line(port) == b"h,0,0\r\n"
+        hogs: list[int] = []
+        with few_descriptors(1):
+            with suppress(OSError):
+                while True:
+                    hogs.append(os.open(os.devnull, os.O_RDONLY))
+            os.close(port)
+            hogs.append(os.open(os.devnull, os.O_RDONLY))
+            run.wait_free()
+            for hog in hogs:
+                os.close(hog)
+        port = open_plain(link)
+        os.write(port, b"H\n")
+        assert read_line(port) == b"h,0,0\r\n"
+        os.close(port)
+
+
+@pytest.mark.parametrize("what", ["a serial port", "a TCP port"])
+def test_a_port_that_cannot_be_opened_says_why(what: str, tmp_path: Path) -> None:
+    hogs: list[int] = []
+    with few_descriptors(1):
+        try:
+            with suppress(OSError):
+                while True:
+                    hogs.append(os.open(os.devnull, os.O_RDONLY))
+            with pytest.raises(LinkError, match=f"^{what} must be able to open, but it needs a file .*ulimit -n"):
+                PtyEndpoint(f"{tmp_path}/robot") if what == "a serial port" else TcpEndpoint(0)
+        finally:
+            for hog in hogs:
+                os.close(hog)
+
+
+@pytest.mark.slow
+def test_more_robots_than_descriptors_end_in_one_line(tmp_path: Path) -> None:
+    words = f"{sys.executable} -m kiks serve --robots 40 --tcp 0 --link {tmp_path}/robot"
+    done = subprocess.run(
+        ["bash", "-c", f"ulimit -n 100; exec {words}"], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 2
+    (said,) = done.stderr.splitlines()
+    assert "this process may have 100" in said
+    assert not list(os.scandir(str(tmp_path)))
+
+
+def test_hundreds_of_clients_leave_the_one_that_has_the_robot_alone() -> None:
+    endpoint = TcpEndpoint(0)
+    with served([endpoint]) as run:
+        client = connect(endpoint)
+        assert ask(client, b"H\n") == b"h,0,0\r\n"
+        for _ in range(300):
+            with connect(endpoint) as other:
+                assert other.recv(1) == b""
+        assert ask(client, b"H\n") == b"h,0,0\r\n"
+        client.close()
+        run.wait_free()
