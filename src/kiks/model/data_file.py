@@ -214,6 +214,7 @@ def _check_keys_are_short(text: str) -> None:
 
 
 def one_line(failure: BaseException) -> str:
+    """Return what a foreign exception says, for the middle of a message."""
     text = " ".join(str(failure).split())
     if isinstance(failure, RecursionError):
         return "it is nested too deeply"
