@@ -145,8 +145,8 @@ def bad_walls() -> dict[str, tuple[object, str]]:
     return {
         "empty": (np.zeros((1, 0)), "width and height"),
         "one number": (row(120), "width and height"),
-        "square": (np.ones((4, 4)), "row of numbers"),
-        "cube": (np.ones((2, 2, 2)), "row of numbers"),
+        "square": (np.ones((4, 4)), "must be a row of 2 to 2000002 numbers"),
+        "cube": (np.ones((2, 2, 2)), "must be a row of 2 to 2000002 numbers"),
         "text": ("hello", "'walls'"),
         "complex": (np.ones(12) * 1j, "'walls'"),
         "fractions": (row(120.5, *whole[1:]), "whole numbers"),
@@ -176,7 +176,7 @@ def test_bad_walls_are_refused(name):
 @pytest.mark.parametrize(
     ("variables", "words"),
     [
-        ({"starts": np.ones((2, 4))}, "rows of 3"),
+        ({"starts": np.ones((2, 4))}, r"\[starts, 3\], but it had the shape \[2, 4\]"),
         ({"starts": np.array([[50, np.nan, 0]])}, "finite"),
         ({"starts": np.array([[2, 108, 0.0]])}, "floor"),
         ({"balls": np.array([[50, 50, 20, 20, 7.5]])}, "whole"),
