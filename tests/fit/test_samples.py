@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -138,13 +139,37 @@ def test_a_table_that_is_none(tmp_path, data):
         load_samples(tmp_path / "wall.npz")
 
 
+def test_a_header_asks_for_no_memory(tmp_path):
+    file = write(tmp_path, f"8 3600 1000 5 2\nTURN 0\n{ROW}\n")
+    tracemalloc.start()
+    with pytest.raises(ParameterError, match=r"line 3: .*the end of the file"):
+        load_samples(file)
+    peak_bytes = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak_bytes < 1e7
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_damaged_text_is_read_or_refused(tmp_path, seed):
+    chance = np.random.default_rng(seed)
+    text = bytearray(GOOD.encode())
+    for place in chance.integers(len(text), size=chance.integers(1, 4)):
+        text[place : place + chance.integers(3)] = chance.bytes(chance.integers(3)) or b"9" * 12
+    file = write(tmp_path, bytes(text))
+    try:
+        counts = load_samples(file).counts
+    except ParameterError:
+        return
+    assert 0 <= counts.min() <= counts.max() <= 1023
+
+
 @pytest.mark.parametrize("name", ["none.sam", "none.npz", "."])
 def test_a_file_that_is_not_there(tmp_path, name):
     with pytest.raises(ParameterError, match=r"Samples '.*' must (exist|be a file), but"):
         load_samples(tmp_path / name)
 
 
-@pytest.mark.parametrize("radius_mm", [0.0, -1.0, math.nan])
+@pytest.mark.parametrize("radius_mm", [0.0, -1.0, math.nan, -math.inf, 1e300, "12", None, True])
 def test_a_radius_is_positive(tmp_path, radius_mm):
     with pytest.raises(ParameterError, match="radius_mm must be positive"):
         load_samples(write(tmp_path, GOOD), radius_mm=radius_mm)

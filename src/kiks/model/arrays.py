@@ -83,8 +83,12 @@ def check_array(values: object, rule: Numbers, name: str, counts: dict[str, int]
     except (TypeError, ValueError, OverflowError):
         raise _broken(name, rule, f"was {shown(values)}") from None
     _check_form(given.dtype, given.shape, rule, name, {} if counts is None else counts)
+    is_float = given.dtype.kind == "f"
+    if is_float:
+        with np.errstate(over="ignore"):
+            given = given.astype(np.float64, copy=False)
     is_good = (given >= rule.low) & (given <= rule.high)
-    if rule.is_whole and given.dtype.kind == "f":
+    if rule.is_whole and is_float:
         is_good &= (given == np.rint(given)) & (np.abs(given) <= _EXACT_MAX)
     if not is_good.all():
         place = tuple(int(part) for part in np.unravel_index(int(np.argmin(is_good)), given.shape))
@@ -164,7 +168,7 @@ def _check_form(kind: np.dtype[Any], shape: tuple[int, ...], rule: Numbers, name
     Raises:
         ParameterError: If they are others than the rule's.
     """
-    if kind.kind not in "iuf" or kind.itemsize > 8:
+    if kind.kind not in "biuf":
         raise _broken(name, rule, f"was of type {shown(str(kind))}")
     known = [counts.get(axis) if isinstance(axis, str) else axis for axis in rule.axes]
     if len(shape) != len(known) or any(

@@ -43,7 +43,7 @@ _THINGS: dict[str, tuple[type[Any], int]] = {
     "cylinders": (Cylinder, 5),
 }
 _CROSSINGS = 1 << 18
-_CROSSING_COST = 8  # in cells that are painted
+_CROSSING_COST = 16  # in cells that are painted
 _WHOLE = Numbers(("number",), 0, 65535, is_whole=True, advice="Is it an arena of KiKS?")
 
 
