@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from kiks.errors import ParameterError, shown
 from kiks.model.arrays import Numbers, read_arrays
 from kiks.model.data_file import COORDINATE_MAX, read_file
+from kiks.model.files import path_of
 from kiks.model.raster import is_number
 from kiks.model.robot import SENSOR_COUNT
 
@@ -178,7 +179,7 @@ def load_samples(file: str | Path, *, name: str = "", radius_mm: float = math.in
     Raises:
         ParameterError: If the file cannot be read or is no file of samples, or the radius is not positive.
     """
-    path = Path(file)
+    path = path_of(file, "file")
     if not (radius_mm == math.inf or (is_number(radius_mm) and radius_mm > 0)):
         raise ParameterError(
             f"radius_mm must be positive, but it was {shown(radius_mm)}. Leave it out for a straight wall."

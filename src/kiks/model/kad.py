@@ -219,15 +219,15 @@ def _polygon(x: npt.NDArray[np.int64], y: npt.NDArray[np.int64], shape: tuple[in
     """
     crossed, edge = np.zeros(shape, np.uint8), np.zeros(shape, np.uint8)
     x1, y1 = np.roll(x, -1), np.roll(y, -1)
-    for side in np.flatnonzero(y == y1).tolist():
-        edge[y[side], min(x[side], x1[side]) : max(x[side], x1[side]) + 1] = 1
+    for level in np.flatnonzero(y == y1).tolist():
+        edge[y[level], min(x[level], x1[level]) : max(x[level], x1[level]) + 1] = 1
     sides = np.flatnonzero(y != y1)
-    height = abs(y1 - y)[sides] + 1
+    heights = abs(y1 - y)[sides] + 1
     # So many sides at a time that all the places where they cross rows take little memory.
-    parts = np.cumsum(height) // _CROSSINGS
+    parts = np.cumsum(heights) // _CROSSINGS
     for some in np.split(np.arange(len(sides)), np.flatnonzero(np.diff(parts)) + 1):
-        side = np.repeat(sides[some], height[some])
-        below = np.arange(len(side)) - np.repeat(np.cumsum(height[some]) - height[some], height[some])
+        side = np.repeat(sides[some], heights[some])
+        below = np.arange(len(side)) - np.repeat(np.cumsum(heights[some]) - heights[some], heights[some])
         row = np.minimum(y, y1)[side] + below
         column, rest = np.divmod((row - y[side]) * (x1 - x)[side], (y1 - y)[side])
         column += x[side]

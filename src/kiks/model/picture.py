@@ -6,6 +6,7 @@ Black is floor. Whatever is not black must stay wall, so every conversion below 
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -144,7 +145,7 @@ def _grey_of_colour(image: Image.Image) -> npt.NDArray[np.uint8]:
     return grey
 
 
-_GREY = {"1": _grey_of_bits, "L": np.asarray}
+_GREY: dict[str, Callable[[Image.Image], npt.NDArray[np.uint8]]] = {"1": _grey_of_bits, "L": np.asarray}
 
 
 def _white(image: Image.Image, low: float, high: float) -> float:
