@@ -5,7 +5,10 @@ import struct
 import time
 import tracemalloc
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -16,7 +19,7 @@ from scipy.io import loadmat, savemat
 
 from kiks.errors import ArenaError, ParameterError
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
-from kiks.model.kad import PIECES_MAX, decode_kad, encode_kad, load_kad, save_kad
+from kiks.model.kad import PIECES_MAX, _polygon, decode_kad, encode_kad, load_kad, save_kad
 from kiks.model.mat import FILE_BYTES_MAX
 
 
@@ -145,8 +148,8 @@ def bad_walls() -> dict[str, tuple[object, str]]:
     return {
         "empty": (np.zeros((1, 0)), "width and height"),
         "one number": (row(120), "width and height"),
-        "square": (np.ones((4, 4)), "row of numbers"),
-        "cube": (np.ones((2, 2, 2)), "row of numbers"),
+        "square": (np.ones((4, 4)), "must be a row of 2 to 2000002 numbers"),
+        "cube": (np.ones((2, 2, 2)), "must be a row of 2 to 2000002 numbers"),
         "text": ("hello", "'walls'"),
         "complex": (np.ones(12) * 1j, "'walls'"),
         "fractions": (row(120.5, *whole[1:]), "whole numbers"),
@@ -176,7 +179,7 @@ def test_bad_walls_are_refused(name):
 @pytest.mark.parametrize(
     ("variables", "words"),
     [
-        ({"starts": np.ones((2, 4))}, "rows of 3"),
+        ({"starts": np.ones((2, 4))}, r"\[starts, 3\], but it had the shape \[2, 4\]"),
         ({"starts": np.array([[50, np.nan, 0]])}, "finite"),
         ({"starts": np.array([[2, 108, 0.0]])}, "floor"),
         ({"balls": np.array([[50, 50, 20, 20, 7.5]])}, "whole"),
@@ -230,22 +233,73 @@ def element(kind: int, data: bytes) -> bytes:
     return struct.pack("<II", kind, len(data)) + data
 
 
-def test_files_that_would_take_endless_memory_are_refused():
-    header = encode_kad(Arena.box(150, 120))[:128]
-    bomb = element(15, zlib.compress(bytes(8 * FILE_BYTES_MAX), 9))
-    huge = element(14, struct.pack("<IIII", 6, 8, 14, 0) + struct.pack("<IIii", 5, 8, 2**31 - 1, 2**31 - 1))
-    longer = struct.pack("<II", 14, 2**32 - 1)
-    full = [4, 1, 8000, 8000, 1, 1, 1, 8000, 8000, 9]
-    over = mat(walls=np.array([8000, 8000, *full * 30], np.uint16))
+@contextmanager
+def traced() -> Iterator[list[int]]:
+    """Give a list that afterwards holds how much memory was taken at most [bytes]."""
+    peak_bytes: list[int] = []
     tracemalloc.start()
+    try:
+        yield peak_bytes
+    finally:
+        peak_bytes.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+
+
+def matrix(sides: bytes, numbers: bytes, *, sides_type: int = 5, name: bytes = b"walls") -> bytes:
+    parts = [(6, struct.pack("<II", 6, 0)), (sides_type, sides), (1, name), (2, numbers)]
+    return element(14, b"".join(element(kind, part) + bytes(-len(part) % 8) for kind, part in parts))
+
+
+@cache
+def hostile() -> dict[str, bytes]:
+    full = [4, 1, 8000, 8000, 1, 1, 1, 8000, 8000, 9]
+    star = np.random.default_rng(3).integers(1, 8000, (2, 30_000))
+    return {
+        "bomb": element(15, zlib.compress(bytes(8 * FILE_BYTES_MAX), 9)),
+        "huge": element(14, struct.pack("<IIII", 6, 8, 14, 0) + struct.pack("<IIii", 5, 8, 2**31 - 1, 2**31 - 1)),
+        "longer than the file": struct.pack("<II", 14, 2**32 - 1),
+        "many numbers": element(15, zlib.compress(matrix(struct.pack("<ii", 1, 46 << 20), bytes(46 << 20)), 9)),
+        "many starts": mat(walls=np.full((1, 2), 200), starts=np.zeros((2_000_000, 3)), compress=True)[128:],
+        "infinite sides": matrix(struct.pack("<dd", 1, np.inf), b"", sides_type=9),
+        "sides that are no numbers": matrix(struct.pack("<dd", 1, np.nan), b"", sides_type=9),
+        "negative sides": matrix(struct.pack("<ii", -1, -5), bytes(5)),
+        "painted over": mat(walls=np.array([8000, 8000, *full * 30], np.uint16))[128:],
+        "a star": mat(walls=np.array([8000, 8000, 30_000, *star.ravel(), 9], np.uint16))[128:],
+    }
+
+
+@pytest.mark.parametrize("name", hostile())
+def test_files_that_would_take_endless_memory_are_refused(name):
+    data = encode_kad(Arena.box(150, 120))[:128] + hostile()[name]
     begin_s = time.process_time()
-    for data in (header + bomb, header + huge, header + longer, over):
-        with pytest.raises(ArenaError):
-            decode_kad(data)
-    _, peak = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert peak < 12 * FILE_BYTES_MAX
+    with traced() as peak_bytes, pytest.raises(ArenaError) as caught:
+        decode_kad(data)
+    assert len(str(caught.value)) < 300
+    assert peak_bytes[0] < 4 * FILE_BYTES_MAX
     assert time.process_time() - begin_s < 30
+
+
+def test_a_polygon_takes_no_more_than_two_bytes_a_cell_beside_the_arena():
+    data = mat(walls=np.array([4000, 4000, 5, 1, 4000, 4000, 7, 2000, 1, 1, 4000, 3999, 2000, 9], np.uint16))
+    with traced() as peak_bytes:
+        decode_kad(data)
+    assert peak_bytes[0] < 3 * 4000 * 4000 + 40e6
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.tuples(st.integers(0, 12), st.integers(0, 9)), min_size=1, max_size=9))
+def test_polygons_are_those_of_the_rule_cell_by_cell(corners):
+    """An odd number of edges to the left, each with its lower and without its upper end; or on an edge."""
+    expected = np.zeros((10, 13), bool)
+    for row, column in np.ndindex(expected.shape):
+        for (x0, y0), (x1, y1) in zip(corners, corners[1:] + corners[:1], strict=True):
+            aside = (column - x0) * (y1 - y0) - (row - y0) * (x1 - x0)
+            if aside == 0 and min(x0, x1) <= column <= max(x0, x1) and min(y0, y1) <= row <= max(y0, y1):
+                expected[row, column] = True
+                break
+            expected[row, column] ^= min(y0, y1) <= row < max(y0, y1) and (aside > 0) == (y1 > y0)
+    x, y = np.array(corners).T
+    assert np.array_equal(_polygon(x, y, expected.shape), expected)
 
 
 def test_what_does_not_fit_is_refused(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -78,7 +79,7 @@ def test_broken_text_files_are_told_by_their_line(tmp_path, text, line, words):
     with pytest.raises(ParameterError) as caught:
         load_samples(write(tmp_path, text))
     message = str(caught.value)
-    assert f"post.sam, line {line}: " in message
+    assert f"post.sam', line {line}: " in message
     assert words in message
     assert message.endswith((".", "?"))
 
@@ -104,15 +105,22 @@ def test_tables_are_read(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"values": None}, "'values' is missing"),
-        ({"gap_mm": None}, "'gap_mm' is missing"),
-        ({"gap_mm": np.array([5])}, "shape (2, 3, 8), where 1 gaps and 3 angles stand"),
-        ({"values": np.zeros((2, 3, 7), int)}, "shape (2, 3, 7)"),
-        ({"values": np.zeros((2, 3, 8))}, "type float64"),
-        ({"values": np.full((2, 3, 8), 1024)}, "a value is 1024"),
-        ({"values": np.full((2, 3, 8), -1)}, "a value is -1"),
-        ({"values": np.zeros((0, 3, 8), int), "gap_mm": np.zeros(0)}, "it is empty"),
-        ({"values": np.array([None])}, "no .npz"),
+        ({"values": None}, "values must be whole numbers from 0 to 1023 [gap, angle, 8], but it is missing."),
+        ({"gap_mm": None}, "gap_mm must be finite numbers from 0 to 1e+09 [gap], but it is missing."),
+        ({"gap_mm": np.array([5])}, "but it had the shape [2, 3, 8], gap = 1, angle = 3."),
+        ({"gap_mm": np.array([5, np.nan])}, "but it was nan at [1]."),
+        ({"gap_mm": np.array([-5, 7])}, "but it was -5 at [0]."),
+        ({"gap_mm": np.array([5, np.inf])}, "but it was inf at [1]."),
+        ({"gap_mm": np.array([5, 7j])}, "but it was of type 'complex128'."),
+        ({"gap_mm": np.array([[5], [7]])}, "gap_mm must be finite numbers from 0 to 1e+09 [gap], but it had the shape"),
+        ({"object_angle_deg_cw": np.array([0, 120, np.nan])}, "object_angle_deg_cw must be finite numbers"),
+        ({"object_angle_deg_cw": np.array(["a", "b", "c"])}, "but it was of type '<U1'."),
+        ({"values": np.zeros((2, 3, 7), int)}, "but it had the shape [2, 3, 7]"),
+        ({"values": np.full((2, 3, 8), 0.5)}, "but it was 0.5 at [0, 0, 0]."),
+        ({"values": np.full((2, 3, 8), 1024)}, "but it was 1024 at [0, 0, 0]."),
+        ({"values": np.full((2, 3, 8), -1)}, "but it was -1 at [0, 0, 0]."),
+        ({"values": np.zeros((0, 3, 8), int), "gap_mm": np.zeros(0)}, "but it had the shape [0]."),
+        ({"values": np.array([None])}, "but it was of type 'object'."),
     ],
 )
 def test_broken_tables_are_told(tmp_path, changes, words):
@@ -120,23 +128,48 @@ def test_broken_tables_are_told(tmp_path, changes, words):
     with pytest.raises(ParameterError) as caught:
         load_samples(tmp_path / "wall.npz")
     assert words in str(caught.value)
-    assert "wall.npz: A table of samples must hold" in str(caught.value)
+    assert "wall.npz': " in str(caught.value)
+    assert str(caught.value).endswith("See the README of the samples.")
 
 
 @pytest.mark.parametrize("data", [b"", b"8 180 20 5 2\n", b"PK\x03\x04broken"])
 def test_a_table_that_is_none(tmp_path, data):
     (tmp_path / "wall.npz").write_bytes(data)
-    with pytest.raises(ParameterError, match=r"it is no \.npz file"):
+    with pytest.raises(ParameterError, match=r"wall.npz' must be a whole \.npz file of NumPy, but: "):
         load_samples(tmp_path / "wall.npz")
+
+
+def test_a_header_asks_for_no_memory(tmp_path):
+    file = write(tmp_path, f"8 3600 1000 5 2\nTURN 0\n{ROW}\n")
+    tracemalloc.start()
+    with pytest.raises(ParameterError, match=r"line 3: .*the end of the file"):
+        load_samples(file)
+    peak_bytes = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak_bytes < 1e7
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_damaged_text_is_read_or_refused(tmp_path, seed):
+    chance = np.random.default_rng(seed)
+    text = bytearray(GOOD.encode())
+    for place in chance.integers(len(text), size=chance.integers(1, 4)):
+        text[place : place + chance.integers(3)] = chance.bytes(chance.integers(3)) or b"9" * 12
+    file = write(tmp_path, bytes(text))
+    try:
+        counts = load_samples(file).counts
+    except ParameterError:
+        return
+    assert 0 <= counts.min() <= counts.max() <= 1023
 
 
 @pytest.mark.parametrize("name", ["none.sam", "none.npz", "."])
 def test_a_file_that_is_not_there(tmp_path, name):
-    with pytest.raises(ParameterError, match="must come from a readable file"):
+    with pytest.raises(ParameterError, match=r"Samples '.*' must (exist|be a file), but"):
         load_samples(tmp_path / name)
 
 
-@pytest.mark.parametrize("radius_mm", [0.0, -1.0, math.nan])
+@pytest.mark.parametrize("radius_mm", [0.0, -1.0, math.nan, -math.inf, 1e300, "12", None, True])
 def test_a_radius_is_positive(tmp_path, radius_mm):
     with pytest.raises(ParameterError, match="radius_mm must be positive"):
         load_samples(write(tmp_path, GOOD), radius_mm=radius_mm)

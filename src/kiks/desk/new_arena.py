@@ -9,6 +9,7 @@ from nicegui import ui
 from kiks.errors import KiksError
 from kiks.model.arena import Arena
 from kiks.model.materials import REFLECTANCES
+from kiks.model.raster import is_number
 
 
 async def ask_for_box() -> Arena | None:
@@ -56,7 +57,7 @@ def _number(label: str, value: int, name: str, low: int, high: int) -> Callable[
     """Build a field for a whole number; return what asks for it, a number out of range where there is none."""
     field = ui.number(label, value=value, min=low, max=high, precision=0).classes("w-full")
     field.props(f"dense data-testid={name}").mark(name)
-    return lambda: -1 if field.value is None else int(field.value)
+    return lambda: int(field.value) if is_number(field.value) else -1
 
 
 def _finish(dialog: ui.dialog, make: Callable[[], Arena]) -> None:

@@ -16,6 +16,7 @@ Grammar of the text files (a table is `[distance, angle, sensor]`; blanks and ta
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, shown
+from kiks.model.arrays import Numbers, read_arrays
+from kiks.model.data_file import COORDINATE_MAX, read_file
+from kiks.model.files import path_of
+from kiks.model.raster import is_number
 from kiks.model.robot import SENSOR_COUNT
 
 Floats = NDArray[np.float64]
@@ -40,7 +45,15 @@ MAXIMUM_COUNTS = 1023
 ACTIVE_COUNTS = (20, 1000)
 """Least and largest reading that tells something: below is noise, above saturation."""
 
-_ARRAYS = ("values", "gap_mm", "object_angle_deg_cw")
+READINGS_MAX = 1 << 20
+"""Most numbers of a file."""
+
+_ADVICE = "See the README of the samples."
+_TABLE = {
+    "gap_mm": Numbers(("gap",), 0.0, COORDINATE_MAX, advice=_ADVICE),
+    "object_angle_deg_cw": Numbers(("angle",), -COORDINATE_MAX, COORDINATE_MAX, advice=_ADVICE),
+    "values": Numbers(("gap", "angle", SENSOR_COUNT), 0, MAXIMUM_COUNTS, is_whole=True, advice=_ADVICE),
+}
 
 _HEADER = "sensors, angles, distances, first distance [mm] and step [mm], like '8 180 20 5 2'"
 
@@ -166,63 +179,34 @@ def load_samples(file: str | Path, *, name: str = "", radius_mm: float = math.in
     Raises:
         ParameterError: If the file cannot be read or is no file of samples, or the radius is not positive.
     """
-    path = Path(file)
-    if not radius_mm > 0:
-        raise ParameterError(f"radius_mm must be positive, but it was {radius_mm!r}. Leave it out for a straight wall.")
-    read = _read_table if path.suffix == ".npz" else _read_text
-    try:
-        gap_mm, angle_deg, counts = read(path)
-    except OSError as error:
+    path = path_of(file, "file")
+    if not (radius_mm == math.inf or (is_number(radius_mm) and radius_mm > 0)):
         raise ParameterError(
-            f"Samples must come from a readable file, but {str(path)!r} is none ({error.strerror or error}). "
-            "Check the path."
-        ) from error
+            f"radius_mm must be positive, but it was {shown(radius_mm)}. Leave it out for a straight wall."
+        )
+    read = _read_table if path.suffix == ".npz" else _read_text
+    gap_mm, angle_deg, counts = read(path, f"Samples {str(path)!r}")
     angle_deg = np.broadcast_to(angle_deg - RIG_OFFSET_DEG, counts.shape[:2])
     return Samples(name or path.stem, radius_mm, gap_mm, angle_deg, counts)
 
 
-def _read_table(path: Path) -> tuple[Floats, Floats, NDArray[np.int64]]:
+def _read_table(path: Path, what: str) -> tuple[Floats, Floats, NDArray[np.int64]]:
     """Return gaps, angles and readings of a .npz."""
-    import zipfile
-
-    def wrong(what: str) -> ParameterError:
-        return ParameterError(
-            f"{path}: A table of samples must hold 'values' [gaps, angles, {SENSOR_COUNT}] of whole numbers from 0 to "
-            f"{MAXIMUM_COUNTS}, 'gap_mm' and 'object_angle_deg_cw', but {what}. See the README of the samples."
-        )
-
-    try:
-        with zipfile.ZipFile(path), np.load(path, allow_pickle=False) as table:
-            arrays = {name: table[name] for name in _ARRAYS if name in table}
-    except (ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise wrong("it is no .npz file") from error
-    for name in _ARRAYS:
-        if name not in arrays:
-            raise wrong(f"{name!r} is missing")
-    values, gap, angle = (arrays[name] for name in _ARRAYS)
-    if values.ndim != 3 or values.shape != (*gap.shape, *angle.shape, SENSOR_COUNT):
-        raise wrong(f"'values' has the shape {values.shape}, where {gap.size} gaps and {angle.size} angles stand")
-    if values.dtype.kind not in "iu":
-        raise wrong(f"'values' is of type {values.dtype}")
-    if values.size == 0:
-        raise wrong("it is empty")
-    if values.min() < 0 or values.max() > MAXIMUM_COUNTS:
-        raise wrong(f"a value is {values.min() if values.min() < 0 else values.max()}")
-    return gap.astype(np.float64), angle.astype(np.float64), values.astype(np.int64)
+    arrays = read_arrays(path, _TABLE, what, numbers_max=READINGS_MAX)
+    return arrays["gap_mm"], arrays["object_angle_deg_cw"], arrays["values"]
 
 
-def _read_text(path: Path) -> tuple[Floats, Floats, NDArray[np.int64]]:
+def _read_text(path: Path, what: str) -> tuple[Floats, Floats, NDArray[np.int64]]:
     """Return gaps, angles and readings of a text file."""
-    lines = _Lines(path)
-    header = lines.numbers(_HEADER, 5)
-    sensors, angles, distances, first_mm, step_mm = header
+    lines = _Lines(read_file(path, what), what)
+    sensors, angles, distances, first_mm, step_mm = lines.numbers(_HEADER, 5)
     if sensors != SENSOR_COUNT:
         raise lines.wrong(f"The first number must be {SENSOR_COUNT}, the sensors of a Khepera", str(sensors))
     if not (1 <= angles <= 3600 and 1 <= distances <= 1000 and first_mm >= 0 and step_mm >= 1):
         raise lines.wrong(
-            f"The first line must hold {_HEADER}, with 1 to 3600 angles and 1 to 1000 distances", repr(lines.text)
+            f"The first line must hold {_HEADER}, with 1 to 3600 angles and 1 to 1000 distances", shown(lines.text)
         )
-    counts = np.empty((distances, angles, sensors), np.int64)
+    rows: list[list[int]] = []
     for distance in range(distances):
         lines.marker(distance)
         for angle in range(angles):
@@ -230,39 +214,31 @@ def _read_text(path: Path) -> tuple[Floats, Floats, NDArray[np.int64]]:
             for count in row:
                 if not 0 <= count <= MAXIMUM_COUNTS:
                     raise lines.wrong(f"A reading must be from 0 to {MAXIMUM_COUNTS}", str(count))
-            counts[distance, angle] = row
+            rows.append(row)
     lines.finish(distances)
     gap_mm = first_mm + step_mm * np.arange(distances, dtype=np.float64)
+    counts = np.array(rows, np.int64).reshape(distances, angles, sensors)
     return gap_mm, np.arange(angles, dtype=np.float64) * (360.0 / angles), counts
 
 
 class _Lines:
     """The lines of a text file one after the other, and whose number an error names."""
 
-    def __init__(self, path: Path) -> None:
-        self.path, self.number, self.text = path, 1, ""
-        data = path.read_bytes()
+    def __init__(self, data: bytes, what: str) -> None:
+        self.what, self.number, self.text = what, 1, ""
         if not data.strip():
             raise self.wrong(f"A file of samples must begin with {_HEADER}", "an empty file", "Was it copied whole?")
-        try:
-            text = data.decode("ascii")
-        except UnicodeDecodeError as error:
-            self.number = data.count(b"\n", 0, error.start) + 1
-            raise self._binary(data[error.start]) from error
-        for place, character in enumerate(text):
-            if character < " " and character not in "\t\n\r":
-                self.number = text.count("\n", 0, place) + 1
-                raise self._binary(ord(character))
-        self._rest = iter([(i, line.strip()) for i, line in enumerate(text.split("\n"), start=1) if line.strip()])
+        if (odd := re.search(rb"[^\t\n\r -\x7f]", data)) is not None:
+            self.number = data.count(b"\n", 0, odd.start()) + 1
+            raise self.wrong(
+                "A file of samples must be plain text", f"binary (byte 0x{odd[0][0]:02x})", "Name a table of *.npz."
+            )
+        lines = enumerate(data.decode("ascii").split("\n"), start=1)
+        self._rest = ((number, line.strip()) for number, line in lines if line.strip())
 
     def wrong(self, rule: str, given: str, advice: str = "Correct that line, or leave the file out.") -> ParameterError:
         """Return the error that something in the present line breaks a rule."""
-        return ParameterError(f"{self.path}, line {self.number}: {rule}, but it was {given}. {advice}")
-
-    def _binary(self, byte: int) -> ParameterError:
-        return self.wrong(
-            "A file of samples must be plain text", f"binary (byte 0x{byte:02x})", "Name a table of NumPy's *.npz."
-        )
+        return ParameterError(f"{self.what}, line {self.number}: {rule}, but it was {given}. {advice}")
 
     def next(self, expected: str) -> str:
         """Return the next line that is not empty."""
@@ -277,7 +253,7 @@ class _Lines:
         words = self.next(expected).split()
         for word in words:
             if not word.removeprefix("-").isdigit() or len(word) > 9:
-                raise self.wrong(f"A line here must hold {expected}, whole numbers", repr(word))
+                raise self.wrong(f"A line here must hold {expected}, whole numbers", shown(word))
         if len(words) != count:
             raise self.wrong(f"A line here must hold {expected}", f"{len(words)} numbers")
         return [int(word) for word in words]
@@ -286,7 +262,7 @@ class _Lines:
         """Go past the line that opens a block."""
         expected = f"'TURN {number}'"
         if self.next(expected).split() != ["TURN", str(number)]:
-            raise self.wrong(f"A line here must be {expected}", repr(self.text))
+            raise self.wrong(f"A line here must be {expected}", shown(self.text))
 
     def finish(self, blocks: int) -> None:
         """Make sure that nothing but 'END' is left."""
@@ -294,5 +270,5 @@ class _Lines:
             self.number, self.text = number, text
             if text != "END":
                 raise self.wrong(
-                    f"After the {blocks} blocks that the first line tells must come nothing", repr(self.text)
+                    f"After the {blocks} blocks that the first line tells must come nothing", shown(self.text)
                 )

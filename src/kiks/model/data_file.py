@@ -178,7 +178,7 @@ def parse_toml(data: bytes, what: str, *, error: type[KiksError] = ParameterErro
         return tomllib.loads(text)
     except (ValueError, RecursionError, OverflowError) as failure:
         raise error(
-            f"{what} must be TOML in UTF-8, but: {_one_line(failure)}. Correct the file at that place."
+            f"{what} must be TOML in UTF-8, but: {one_line(failure)}. Correct the file at that place."
         ) from None
 
 
@@ -192,7 +192,7 @@ def parse_json(data: bytes, what: str, *, error: type[KiksError] = ParameterErro
         return json.loads(data.decode("utf-8"))
     except (ValueError, RecursionError, OverflowError) as failure:
         raise error(
-            f"{what} must be JSON in UTF-8, but: {_one_line(failure)}. Correct the file at that place."
+            f"{what} must be JSON in UTF-8, but: {one_line(failure)}. Correct the file at that place."
         ) from None
 
 
@@ -213,7 +213,8 @@ def _check_keys_are_short(text: str) -> None:
         raise ValueError(f"a key has more than {KEY_PARTS_MAX} parts")
 
 
-def _one_line(failure: BaseException) -> str:
+def one_line(failure: BaseException) -> str:
+    """Return what a foreign exception says, for the middle of a message."""
     text = " ".join(str(failure).split())
     if isinstance(failure, RecursionError):
         return "it is nested too deeply"

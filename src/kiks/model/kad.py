@@ -15,19 +15,26 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from kiks.errors import ArenaError, KiksError
+from kiks.errors import ArenaError, KiksError, shown
 from kiks.model.arena import Arena
+from kiks.model.arrays import Numbers, check_array
+from kiks.model.data_file import COORDINATE_MAX, read_file
 from kiks.model.files import path_of, replace_file
 from kiks.model.mat import FILE_BYTES_MAX, read_numbers
-from kiks.model.picture import read_start
 from kiks.model.places import Ball, Cylinder, Lamp, Pose
 from kiks.model.raster import cells_per_pixel
 
 PIECES_MAX = 200_000
 """Most rectangles of a file."""
 
+WALLS_MAX = 2 + 10 * PIECES_MAX
+"""Most numbers of `walls`."""
+
 PAINTED_MAX = 16
 """How often all the pieces of a file together may paint over the whole arena."""
+
+THINGS_MAX = 1000
+"""Most starts, lamps, balls and cylinders, of each."""
 
 _THINGS: dict[str, tuple[type[Any], int]] = {
     "starts": (Pose, 3),
@@ -35,6 +42,9 @@ _THINGS: dict[str, tuple[type[Any], int]] = {
     "balls": (Ball, 5),
     "cylinders": (Cylinder, 5),
 }
+_CROSSINGS = 1 << 18
+_CROSSING_COST = 16  # in cells that are painted
+_WHOLE = Numbers(("number",), 0, 65535, is_whole=True, advice="Is it an arena of KiKS?")
 
 
 def load_kad(path: str | Path) -> Arena:
@@ -45,8 +55,7 @@ def load_kad(path: str | Path) -> Arena:
     """
     path = path_of(path)
     what = f"Arena file {str(path)!r}"
-    data = read_start(path, FILE_BYTES_MAX + 1, what)
-    return decode_kad(data, path.stem, what)
+    return decode_kad(read_file(path, what, bytes_max=FILE_BYTES_MAX, error=ArenaError), path.stem, what)
 
 
 def decode_kad(data: bytes, name: str = "arena", what: str = "The arena file") -> Arena:
@@ -62,9 +71,11 @@ def decode_kad(data: bytes, name: str = "arena", what: str = "The arena file") -
     """
     found = read_numbers(data, what)
     if "walls" not in found:
-        raise ArenaError(f"{what} must have a variable 'walls', but has {sorted(found)[:9]}. Is it an arena of KiKS?")
+        raise ArenaError(
+            f"{what} must have a variable 'walls', but has {shown(sorted(found))}. Is it an arena of KiKS?"
+        )
     try:
-        raster = _raster(_whole(found["walls"]))
+        raster = _raster(_row(found["walls"]))
         things = {label: _entries(label, kind, count, found) for label, (kind, count) in _THINGS.items()}
         return Arena(raster, 1.0, name, **things)
     except KiksError as error:
@@ -147,18 +158,16 @@ def _walls(brightness: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint16]:
     return np.concatenate([np.array([width, height], np.uint16), *pieces])[None, :]
 
 
-def _whole(walls: npt.NDArray[np.float64]) -> npt.NDArray[np.int64]:
-    if walls.ndim != 2 or min(walls.shape) > 1:
-        raise ArenaError(f"walls must be a row of numbers, but it has {' x '.join(map(str, walls.shape))}.")
-    row = walls.ravel()
-    if not ((row >= 0) & (row <= 65535) & (row == np.floor(row))).all():
-        raise ArenaError("walls must be whole numbers from 0 to 65535, but holds others. Is it an arena of KiKS?")
-    return row.astype(np.int64)
+def _row(walls: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+    if walls.ndim != 2 or min(walls.shape) != 1 or not 2 <= walls.size <= WALLS_MAX:
+        raise ArenaError(
+            f"walls must be a row of 2 to {WALLS_MAX} numbers, width and height first, but its shape was "
+            f"{shown(walls.shape)}. {_WHOLE.advice}"
+        )
+    return check_array(walls.ravel(), _WHOLE, "walls")
 
 
 def _raster(walls: npt.NDArray[np.int64]) -> npt.NDArray[np.uint8]:
-    if len(walls) < 2:
-        raise ArenaError(f"walls must begin with width and height, but it has {len(walls)} numbers.")
     width, height = walls[:2].tolist()
     cells_per_pixel(height, width, 1.0)
     picture = np.zeros((height, width), np.uint8)
@@ -174,13 +183,15 @@ def _raster(walls: npt.NDArray[np.int64]) -> npt.NDArray[np.uint8]:
                 f"{right}, its rows {top} to {bottom}, its grey {grey}. Save the arena again."
             )
         box = picture[top - 1 : bottom, left - 1 : right]
-        is_rectangle = set(zip(x.tolist(), y.tolist(), strict=True)) == {
-            (column, row) for column in (left, right) for row in (top, bottom)
-        }
-        budget -= box.size * (1 if is_rectangle else len(x))
+        corners = {(column, row) for column in (left, right) for row in (top, bottom)}
+        is_rectangle = set(zip(x.tolist(), y.tolist(), strict=True)) == corners
+        crossings = 0 if is_rectangle else int(abs(np.roll(y, -1) - y).sum()) + len(y)
+        budget -= box.size + _CROSSING_COST * crossings
         if budget < 0:
             raise ArenaError(f"walls must not be painted over again and again, but up to {who} it was. Save it again.")
-        box[...] = grey if is_rectangle else np.where(_polygon(x - left, y - top, box.shape), grey, 0)
+        box[...] = grey
+        if not is_rectangle:
+            box *= _polygon(x - left, y - top, box.shape)
     return np.ascontiguousarray(picture[::-1])
 
 
@@ -201,30 +212,41 @@ def _pieces(
         position = last + 1
 
 
-def _polygon(x: npt.NDArray[np.int64], y: npt.NDArray[np.int64], shape: tuple[int, ...]) -> npt.NDArray[np.bool_]:
-    """Tell which whole places lie in a polygon or on its edge."""
-    rows, columns = np.arange(shape[0])[:, None], np.arange(shape[1])
-    is_inside, is_edge = np.zeros(shape, np.bool_), np.zeros(shape, np.bool_)
-    for x0, y0, x1, y1 in zip(x.tolist(), y.tolist(), np.roll(x, -1).tolist(), np.roll(y, -1).tolist(), strict=True):
-        aside = (columns - x0) * (y1 - y0) - (rows - y0) * (x1 - x0)
-        within = (rows >= min(y0, y1)) & (rows <= max(y0, y1)) & (columns >= min(x0, x1)) & (columns <= max(x0, x1))
-        is_edge |= (aside == 0) & within
-        if y0 != y1:
-            is_inside ^= (rows >= min(y0, y1)) & (rows < max(y0, y1)) & ((aside > 0) == (y1 > y0))
-    return is_inside | is_edge
+def _polygon(x: npt.NDArray[np.int64], y: npt.NDArray[np.int64], shape: tuple[int, ...]) -> npt.NDArray[np.uint8]:
+    """Return 1 where whole places lie in a polygon or on its edge, else 0.
+
+    A place lies within if an odd number of edges crosses its row on its left; sums of bytes keep what is odd.
+    """
+    crossed, edge = np.zeros(shape, np.uint8), np.zeros(shape, np.uint8)
+    x1, y1 = np.roll(x, -1), np.roll(y, -1)
+    for level in np.flatnonzero(y == y1).tolist():
+        edge[y[level], min(x[level], x1[level]) : max(x[level], x1[level]) + 1] = 1
+    sides = np.flatnonzero(y != y1)
+    heights = abs(y1 - y)[sides] + 1
+    # So many sides at a time that all the places where they cross rows take little memory.
+    parts = np.cumsum(heights) // _CROSSINGS
+    for some in np.split(np.arange(len(sides)), np.flatnonzero(np.diff(parts)) + 1):
+        side = np.repeat(sides[some], heights[some])
+        below = np.arange(len(side)) - np.repeat(np.cumsum(heights[some]) - heights[some], heights[some])
+        row = np.minimum(y, y1)[side] + below
+        column, rest = np.divmod((row - y[side]) * (x1 - x)[side], (y1 - y)[side])
+        column += x[side]
+        edge[row[rest == 0], column[rest == 0]] = 1
+        is_crossing = (column + 1 < shape[1]) & (row < np.maximum(y, y1)[side])
+        np.add.at(crossed, (row[is_crossing], column[is_crossing] + 1), 1)
+    np.add.accumulate(crossed, axis=1, dtype=np.uint8, out=crossed)
+    return np.bitwise_or(np.bitwise_and(crossed, 1, out=crossed), edge, out=crossed)
 
 
-def _entries(label: str, kind: type[Any], count: int, found: dict[str, npt.NDArray[np.float64]]) -> tuple[Any, ...]:
+def _entries(label: str, kind: type[Any], count: int, found: dict[str, npt.NDArray[Any]]) -> tuple[Any, ...]:
     rows = found.get(label)
     if rows is None or not rows.size:
         return ()
-    if rows.ndim != 2 or rows.shape[1] != count or len(rows) > 1000:
-        raise ArenaError(f"{label} must have up to 1000 rows of {count} numbers, but it has {rows.shape}.")
-    if not np.isfinite(rows).all():
-        raise ArenaError(f"{label} must be finite numbers, but holds others.")
+    if len(rows) > THINGS_MAX:
+        raise ArenaError(f"{label} must have up to {THINGS_MAX} rows, but it has {len(rows)}. Draw a simpler arena.")
+    rows = check_array(rows, Numbers((label, count), -COORDINATE_MAX, COORDINATE_MAX), label)
     if kind is Ball or kind is Cylinder:
-        if (rows[:, -1] != np.floor(rows[:, -1])).any():
-            raise ArenaError(f"{label}: brightness must be whole, but it was {rows[:, -1].tolist()[:9]}.")
+        check_array(rows[:, -1], Numbers((label,), 1, 255, is_whole=True), f"brightness of {label}")
         return tuple(kind(*row[:-1], int(row[-1])) for row in rows.tolist())
     if kind is Lamp:
         return tuple(Lamp(row[0], row[1], row[2], bool(row[3])) for row in rows.tolist())

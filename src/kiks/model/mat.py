@@ -11,11 +11,14 @@ import math
 import struct
 import zlib
 from collections.abc import Iterator
+from itertools import islice
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from kiks.errors import ArenaError
+from kiks.errors import ArenaError, shown
+from kiks.model.data_file import check_size, one_line
 
 FILE_BYTES_MAX = 48 << 20
 """Most bytes of a file, and of what it unpacks to."""
@@ -28,8 +31,8 @@ _COMPLEX_FLAG = 0x0800
 _SAVE_AGAIN = "Save it again in MATLAB with save('name.kad', 'walls', '-MAT', '-v6')."
 
 
-def read_numbers(data: bytes, what: str) -> dict[str, npt.NDArray[np.float64]]:
-    """Return all real numeric variables of a file, with the dimensions that they have there.
+def read_numbers(data: bytes, what: str) -> dict[str, npt.NDArray[Any]]:
+    """Return all real numeric variables of a file, as they stand there: of any type and shape.
 
     Args:
         data: The bytes of the file.
@@ -38,32 +41,35 @@ def read_numbers(data: bytes, what: str) -> dict[str, npt.NDArray[np.float64]]:
     Raises:
         ArenaError: If it is no such file, damaged, or too large.
     """
-    if len(data) > FILE_BYTES_MAX:
-        raise ArenaError(f"{what} must have at most {FILE_BYTES_MAX >> 20} MiB, but has {len(data) >> 20}.")
-    marks = {b"IM": "<", b"MI": ">"}
-    order = marks.get(data[126:128])
+    check_size(data, what, bytes_max=FILE_BYTES_MAX, error=ArenaError)
+    order = {b"IM": "<", b"MI": ">"}.get(data[126:128])
     if order is None or struct.unpack_from(f"{order}H", data, 124)[0] != 0x0100:
         other = "one of MATLAB 7.3" if data[:10] == b"MATLAB 7.3" else "none"
         raise ArenaError(f"{what} must be a MATLAB file of level 5, but it is {other}. {_SAVE_AGAIN}")
-    found: dict[str, npt.NDArray[np.float64]] = {}
-    left = FILE_BYTES_MAX
     try:
-        for kind, content in _elements(memoryview(data)[_HEADER_BYTES:], order):
-            if kind == _COMPRESSED:
-                unpacker = zlib.decompressobj()
-                unpacked = unpacker.decompress(content, left)
-                left -= len(unpacked)
-                if unpacker.unconsumed_tail or left <= 0:
-                    raise ArenaError(f"{what} must unpack to at most {FILE_BYTES_MAX >> 20} MiB, but it is larger.")
-                parts = list(_elements(memoryview(unpacked), order))
-            else:
-                parts = [(kind, content)]
-            for part_kind, part in parts:
-                if part_kind == _MATRIX and (named := _matrix(part, order)) is not None:
-                    found[named[0]] = named[1]
+        matrices = _matrices(memoryview(data)[_HEADER_BYTES:], order)
+        return dict(named for named in (_matrix(content, order) for content in matrices) if named is not None)
     except (ValueError, struct.error, zlib.error) as error:
-        raise ArenaError(f"{what} must be complete, but it is damaged: {error}. {_SAVE_AGAIN}") from None
-    return found
+        raise ArenaError(f"{what} must be whole, but it is damaged: {one_line(error)}. {_SAVE_AGAIN}") from None
+
+
+def _matrices(data: memoryview, order: str) -> Iterator[memoryview]:
+    """Yield the content of each matrix, unpacked.
+
+    Raises:
+        ValueError: If all of them would take more than `FILE_BYTES_MAX`.
+    """
+    left = FILE_BYTES_MAX
+    for kind, content in _elements(data, order):
+        parts = [(kind, content)]
+        if kind == _COMPRESSED:
+            unpacker = zlib.decompressobj()
+            unpacked = unpacker.decompress(content, left)
+            left -= len(unpacked)
+            if unpacker.unconsumed_tail or left <= 0:
+                raise ValueError(f"it unpacks to more than {FILE_BYTES_MAX >> 20} MiB")
+            parts = list(_elements(memoryview(unpacked), order))
+        yield from (part for part_kind, part in parts if part_kind == _MATRIX)
 
 
 def _elements(data: memoryview, order: str) -> Iterator[tuple[int, memoryview]]:
@@ -91,7 +97,7 @@ def _elements(data: memoryview, order: str) -> Iterator[tuple[int, memoryview]]:
         position += step
 
 
-def _matrix(content: memoryview, order: str) -> tuple[str, npt.NDArray[np.float64]] | None:
+def _matrix(content: memoryview, order: str) -> tuple[str, npt.NDArray[Any]] | None:
     """Return name and numbers of a matrix, None if it holds no real numbers.
 
     Raises:
@@ -104,17 +110,19 @@ def _matrix(content: memoryview, order: str) -> tuple[str, npt.NDArray[np.float6
     (flag,) = struct.unpack_from(f"{order}I", flags)
     if flag & 0xFF not in _NUMERIC_CLASSES or flag & _COMPLEX_FLAG:
         return None
-    parts = [_numbers(kind, part, order) for kind, part in elements]
+    parts = [_numbers(kind, part, order) for kind, part in islice(elements, 4)]
     if len(parts) != 3:
-        raise ValueError(f"a matrix has {len(parts)} parts after its flags")
-    shape, name, numbers = parts
-    if not 2 <= len(shape) <= 32 or shape.min() < 0 or math.prod(map(int, shape)) != len(numbers):
-        raise ValueError(f"a matrix of {shape.astype(int).tolist()[:32]} has {len(numbers)} numbers")
-    text = bytes(name.astype(np.uint8)).decode("latin-1")
-    return text, numbers.reshape(shape.astype(int), order="F")
+        raise ValueError("a matrix must have dimensions, name and numbers after its flags")
+    sides, name, numbers = parts
+    if sides.dtype.kind not in "iu" or name.dtype.itemsize != 1 or not 2 <= len(sides) <= 32:
+        raise ValueError("dimensions or name of a matrix are none")
+    shape = sides.tolist()
+    if min(shape) < 0 or math.prod(shape) != len(numbers):
+        raise ValueError(f"a matrix of {shown(shape)} has {len(numbers)} numbers")
+    return name.tobytes().decode("latin-1"), numbers.reshape(shape, order="F")
 
 
-def _numbers(kind: int, part: memoryview, order: str) -> npt.NDArray[np.float64]:
+def _numbers(kind: int, part: memoryview, order: str) -> npt.NDArray[Any]:
     if kind not in _TYPES:
         raise ValueError(f"numbers are of the unknown type {kind}")
-    return np.frombuffer(part, f"{order}{_TYPES[kind]}").astype(np.float64)
+    return np.frombuffer(part, f"{order}{_TYPES[kind]}")

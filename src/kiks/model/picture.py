@@ -6,6 +6,7 @@ Black is floor. Whatever is not black must stay wall, so every conversion below 
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from kiks.errors import ArenaError
+from kiks.errors import ArenaError, ParameterError
+from kiks.model.data_file import check_size, one_line, read_file
 from kiks.model.raster import cells_per_pixel
 
 if TYPE_CHECKING:
@@ -22,12 +24,15 @@ if TYPE_CHECKING:
 PICTURE_TYPES = ("PNG", "TIFF", "PPM", "BMP")
 """The types that are read, in Pillow's words; PPM includes PGM and PBM."""
 
-PICTURE_BYTES_MAX = 64 << 20
-"""Most bytes of a picture that comes from elsewhere than a file of one's own."""
+PICTURE_BYTES_MAX = 256 << 20
+"""Most bytes of a picture's file: those of the largest arena in colours, not compressed."""
 
+_BAND_PIXELS = 1 << 20
 _LOSSY = "Lossy compression smears walls into the floor. "
 _LOSSY_TYPES = ("JPEG", "MPO", "JPEG2000", "WEBP", "AVIF")
 _SAVE_AS = "Save the arena as PNG, TIF, PGM or BMP."
+_SAVE_AGAIN = "Save it again, or fetch it again."
+_TILE_WIDTH, _TILE_LENGTH = 322, 323  # tags of TIFF 6.0, section 15
 
 
 def read_picture(path: Path, mm_per_pixel: float) -> npt.NDArray[np.uint8]:
@@ -45,8 +50,7 @@ def read_picture(path: Path, mm_per_pixel: float) -> npt.NDArray[np.uint8]:
         ArenaError: If the file is missing, damaged, of another type, or too small or too large for an arena.
     """
     what = f"Picture {str(path)!r}"
-    check_is_file(path, what)
-    return _read(path, what, mm_per_pixel)
+    return decode_picture(read_file(path, what, bytes_max=PICTURE_BYTES_MAX, error=ArenaError), mm_per_pixel, what)
 
 
 def decode_picture(data: bytes, mm_per_pixel: float, what: str = "The picture") -> npt.NDArray[np.uint8]:
@@ -61,124 +65,104 @@ def decode_picture(data: bytes, mm_per_pixel: float, what: str = "The picture") 
         ParameterError: If `mm_per_pixel` is out of range.
         ArenaError: If it is damaged, of another type, too small or too large for an arena, or has too many bytes.
     """
-    if len(data) > PICTURE_BYTES_MAX:
-        raise ArenaError(
-            f"{what} must have at most {PICTURE_BYTES_MAX >> 20} MiB, but has {len(data) / 2**20:.1f}. "
-            "Save it as PNG, or draw a smaller one."
-        )
-    return _read(BytesIO(data), what, mm_per_pixel)
-
-
-def _read(source: Path | BytesIO, what: str, mm_per_pixel: float) -> npt.NDArray[np.uint8]:
     from PIL import Image, UnidentifiedImageError
 
+    check_size(data, what, bytes_max=PICTURE_BYTES_MAX, error=ArenaError)
     with warnings.catch_warnings():
         # Pillow warns about large pictures and odd metadata: the size is checked here, and metadata do not matter.
         warnings.simplefilter("ignore")
         try:
-            image = Image.open(source)
-        except Image.DecompressionBombError as error:
-            raise ArenaError(f"{what} must have at most 64 million pixels, but: {error} Draw a smaller one.") from None
+            with Image.open(BytesIO(data)) as image:
+                _check_type(image)
+                cells_per_pixel(image.height, image.width, mm_per_pixel)
+                _check_tiles(image)
+                return _brightness(image)
+        except ArenaError as error:
+            raise ArenaError(f"{what}: {error}") from None
+        except ParameterError:
+            raise
+        except Image.DecompressionBombError:
+            raise ArenaError(f"{what} must have at most 64 million pixels, but has more. Draw a smaller one.") from None
         except UnidentifiedImageError:
             raise ArenaError(f"{what} must be a picture, but it is none or its header is damaged. {_SAVE_AS}") from None
-        except Exception as error:
-            raise _unreadable(what, error) from None
-        with image:
-            _check_type(image, what)
-            try:
-                cells_per_pixel(image.height, image.width, mm_per_pixel)
-            except ArenaError as error:
-                raise ArenaError(f"{what}: {error}") from None
-            try:
-                return _brightness(image, what)
-            except ArenaError:
-                raise
-            except Exception as error:  # Pillow's decoders raise whatever they stumble over in a damaged file.
-                raise _unreadable(what, error) from None
+        except Exception as error:  # Pillow's decoders raise whatever they stumble over in a damaged file.
+            raise ArenaError(f"{what} must be complete and readable, but: {one_line(error)}. {_SAVE_AGAIN}") from None
 
 
-def read_start(path: Path, bytes_max: int, what: str) -> bytes:
-    """Return a file, or its beginning if it is longer than anybody wants to know.
-
-    Args:
-        path: The path.
-        bytes_max: Most bytes that are read.
-        what: What the message calls it.
-
-    Raises:
-        ArenaError: If there is nothing, a folder, or no right to read.
-    """
-    check_is_file(path, what)
-    try:
-        with path.open("rb") as file:
-            return file.read(bytes_max)
-    except OSError as error:
-        raise ArenaError(f"{what} must be readable, but: {error}. Check its rights.") from None
-
-
-def check_is_file(path: Path, what: str) -> None:
-    """Check that a path leads to a file.
-
-    Args:
-        path: The path.
-        what: What the message calls it.
-
-    Raises:
-        ArenaError: If there is nothing, or a folder.
-    """
-    if path.is_dir():
-        raise ArenaError(f"{what} must be a file, but it is a folder. Name a file in it.")
-    if not path.is_file():
-        raise ArenaError(
-            f"{what} must exist, but there is no such file. Check the name and the folder {str(Path.cwd())!r}."
-        )
-
-
-def _unreadable(what: str, error: Exception) -> ArenaError:
-    return ArenaError(f"{what} must be complete and readable, but: {error}. Save it again, or fetch it again.")
-
-
-def _check_type(image: Image.Image, what: str) -> None:
+def _check_type(image: Image.Image) -> None:
     kind = f"of type {image.format}"
     is_lossy = image.format in _LOSSY_TYPES
     if image.format == "TIFF" and image.info.get("compression") in ("jpeg", "tiff_jpeg", "webp"):
         kind, is_lossy = f"a TIFF compressed with {image.info['compression']}", True
     if is_lossy or image.format not in PICTURE_TYPES:
-        raise ArenaError(f"{what} must be a lossless picture, but it is {kind}. {_LOSSY if is_lossy else ''}{_SAVE_AS}")
+        raise ArenaError(f"It must be a lossless picture, but it is {kind}. {_LOSSY if is_lossy else ''}{_SAVE_AS}")
 
 
-def _brightness(image: Image.Image, what: str) -> npt.NDArray[np.uint8]:
-    if image.has_transparency_data and not image.mode.startswith(("I", "F")):
-        layered = image.convert("RGBA")
-        is_clear = np.asarray(layered.getchannel("A")) == 0
-        return np.where(is_clear, np.uint8(0), _grey_of_colour(layered.convert("RGB")))
-    if image.mode == "1":
-        return np.where(np.asarray(image), np.uint8(255), np.uint8(0))
-    if image.mode == "L":
-        return np.array(image)
+def _check_tiles(image: Image.Image) -> None:
+    """Check that no tile of a TIFF, which is unpacked whole, is much larger than the picture."""
+    tags = getattr(image, "tag_v2", {})
+    pixels = tags.get(_TILE_WIDTH, 0) * tags.get(_TILE_LENGTH, 0)
+    if pixels > max(image.width * image.height, _BAND_PIXELS):
+        raise ArenaError(f"Its tiles must be smaller than the picture, but they have {pixels} pixels. {_SAVE_AS}")
+
+
+def _brightness(image: Image.Image) -> npt.NDArray[np.uint8]:
+    """Decode a picture, and turn it grey in bands of rows: a copy of a whole one in colours takes hundreds of MB."""
+    image.load()
+    rows = max(_BAND_PIXELS // image.width, 1)
+    bands = [(top, min(top + rows, image.height)) for top in range(0, image.height, rows)]
+
+    def band(top: int, bottom: int) -> Image.Image:
+        return image.crop((0, top, image.width, bottom))
+
+    grey = np.empty((image.height, image.width), np.uint8)
     if image.mode.startswith(("I", "F")):
-        return _grey_of_deep(np.asarray(image), _full_scale(image), what)
-    return _grey_of_colour(image.convert("RGB"))
-
-
-def _grey_of_colour(image: Image.Image) -> npt.NDArray[np.uint8]:
-    grey: npt.NDArray[np.uint8] = np.array(image.convert("L"))
-    grey[(grey == 0) & np.asarray(image).any(axis=2)] = 1
+        ends = [(values.min(), values.max()) for values in (np.asarray(band(*each)) for each in bands)]
+        white = _white(image, float(np.min(ends)), float(np.max(ends)))
+        for top, bottom in bands:
+            grey[top:bottom] = _grey_of_deep(np.asarray(band(top, bottom)), white)
+        return grey
+    turn = _grey_of_clear if image.has_transparency_data else _GREY.get(image.mode, _grey_of_colour)
+    for top, bottom in bands:
+        grey[top:bottom] = turn(band(top, bottom))
     return grey
 
 
-def _full_scale(image: Image.Image) -> float | None:
-    """Return the white of a deep picture, or nothing where its type does not fix it (32 bit)."""
-    return 65535.0 if image.mode.startswith("I;16") or image.format in ("PNG", "PPM") else None
+def _grey_of_clear(image: Image.Image) -> npt.NDArray[np.uint8]:
+    layered = image.convert("RGBA")
+    is_clear = np.asarray(layered.getchannel("A")) == 0
+    return np.where(is_clear, np.uint8(0), _grey_of_colour(layered))
 
 
-def _grey_of_deep(values: npt.NDArray[Any], white: float | None, what: str) -> npt.NDArray[np.uint8]:
-    low, high = float(values.min()), float(values.max())
+def _grey_of_bits(image: Image.Image) -> npt.NDArray[np.uint8]:
+    return np.where(np.asarray(image), np.uint8(255), np.uint8(0))
+
+
+def _grey_of_colour(image: Image.Image) -> npt.NDArray[np.uint8]:
+    colours = image.convert("RGB")
+    grey: npt.NDArray[np.uint8] = np.array(colours.convert("L"))
+    grey[(grey == 0) & np.asarray(colours).any(axis=2)] = 1
+    return grey
+
+
+_GREY: dict[str, Callable[[Image.Image], npt.NDArray[np.uint8]]] = {"1": _grey_of_bits, "L": np.asarray}
+
+
+def _white(image: Image.Image, low: float, high: float) -> float:
+    """Return the white of a deep picture that has values from `low` to `high`.
+
+    Raises:
+        ArenaError: If there are values below 0, or endless ones.
+    """
     if not (low >= 0 and high < np.inf):
-        raise ArenaError(f"{what} must hold brightness from 0 up, but its values span {low:g}..{high:g}. {_SAVE_AS}")
-    if white is None:
-        # The narrowest usual scale that holds every value: fractions, 8, 16 or 32 bit.
-        scales = [1.0] if values.dtype.kind == "f" else []
-        white = next((scale for scale in [*scales, 255.0, 65535.0] if high <= scale), 4294967295.0)
+        raise ArenaError(f"It must hold brightness from 0 up, but its values span {low:g}..{high:g}. {_SAVE_AS}")
+    if image.mode.startswith("I;16") or image.format in ("PNG", "PPM"):
+        return 65535.0
+    # The narrowest usual scale that holds every value: fractions, 8, 16 or 32 bit.
+    scales = [*([1.0] if image.mode == "F" else []), 255.0, 65535.0]
+    return next((scale for scale in scales if high <= scale), 4294967295.0)
+
+
+def _grey_of_deep(values: npt.NDArray[Any], white: float) -> npt.NDArray[np.uint8]:
     grey = np.minimum(np.rint(values * (255.0 / white)), 255)
     return np.where(values > 0, np.maximum(grey, 1), 0).astype(np.uint8)
