@@ -30,7 +30,7 @@ from typing import (
 )
 
 import pydantic.dataclasses
-from pydantic import ConfigDict, Field, Strict, TypeAdapter, ValidationError
+from pydantic import ConfigDict, Field, Strict, Tag, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import core_schema
 
@@ -122,6 +122,13 @@ def check(
 def adapter(model: Any) -> TypeAdapter[Any]:
     """Return what validates a model and describes it as a JSON schema."""
     return TypeAdapter(model)
+
+
+def descriptions(kind: Any) -> dict[str, str]:
+    """Return what each field of a record must be, in words, and what it says of itself."""
+    places = {name: _declared(hint) for name, hint in _hints(kind).items()}
+    texts = {name: f"{_rule(place)}. {place.description}".rstrip() for name, place in places.items()}
+    return {name: text[0].upper() + text[1:] for name, text in texts.items()}
 
 
 # ---- bytes ----
@@ -246,6 +253,9 @@ def _sentence(model: type[Any], error: ValidationError, advice: str = "") -> str
         return f"{name} must be given, but it is missing. {way_out}".rstrip()
     if isinstance(given, str) and (names := _names(place)):
         way_out = f"{nearest(given, names)} {way_out}".lstrip()
+    if kind == "union_tag_invalid":
+        tags = [bound.tag for each in _alternatives(place.base) for bound in each.bounds if isinstance(bound, Tag)]
+        way_out = f"{nearest(first['ctx']['tag'], tags)} {way_out}".lstrip()
     return f"{name} must be {_rule(place)}, but it was {shown(given)}. {way_out}".rstrip()
 
 
@@ -274,7 +284,12 @@ def _place(model: Any, loc: tuple[int | str, ...]) -> tuple[tuple[int | str, ...
         elif isinstance(part, int) and get_origin(here.base) is tuple:
             inner = _declared(get_args(here.base)[0])
             here = inner._replace(description=inner.description or here.description)
+        elif get_origin(here.base) is dict:
+            here, part = _declared(get_args(here.base)["[key]" not in loc]), str(part)[: SHOWN_MAX // 4]
         else:
+            # pydantic names the alternative that it has taken.
+            tagged = (each for each in _alternatives(here.base) if Tag(str(part)) in each.bounds)
+            here = next(tagged, here)
             continue
         path.append(part)
     return tuple(path), here
@@ -294,6 +309,11 @@ def _declared(hint: Any) -> _Place:
         bounds += said.metadata if isinstance(said, FieldInfo) else [said]
         description = getattr(said, "description", None) or description
     return _Place(inner.base, tuple(bounds), description)
+
+
+def _alternatives(hint: Any) -> list[_Place]:
+    is_union = get_origin(hint) in (Union, types.UnionType)
+    return [_declared(part) for part in get_args(hint)] if is_union else []
 
 
 @cache
@@ -337,6 +357,8 @@ def _rule(place: _Place) -> str:
     if said is not None:
         return said
     if names := _names(place):
+        if len(names) == 1:
+            return names[0]
         return f"one of {', '.join(map(repr, names))}"
     limits = {name: getattr(bound, name) for bound in bounds for name in _LIMITS if hasattr(bound, name)}
     if get_origin(base) is tuple:
