@@ -10,7 +10,7 @@ import typer
 
 from kiks.cli.ending import end_as_with_ctrl_c
 from kiks.cli.engine_start import ready_batch
-from kiks.cli.options import Seed
+from kiks.cli.options import Seed, written_folder
 from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -46,7 +46,10 @@ EXAM_S = 180.0
 def evolve(
     task: Annotated[str, typer.Argument(help="A task (--list shows them), or a Python file that holds one.")] = "avoid",
     out: Annotated[
-        Path | None, typer.Option(help="Folder of champion, log and picture; kiks-evolve-TASK if left out.")
+        Path | None,
+        typer.Option(
+            help="Folder of champion, log and picture; kiks-evolve-TASK if left out.", callback=written_folder
+        ),
     ] = None,
     generations: Annotated[
         int | None, typer.Option(help=f"How many; {GENERATIONS} if neither this nor --seconds is given.", min=1)

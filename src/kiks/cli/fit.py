@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from kiks.cli.accuracy import DataFolder, PlotFolder
+from kiks.cli.options import written_file
 from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -30,8 +31,10 @@ def fit(
         typer.Argument(help="Files of samples; =RADIUS in mm after that of a round object: post.sam=12.5."),
     ] = None,
     data: DataFolder = None,
-    robot: Annotated[Path | None, typer.Option(help="Write the robot that was found here: mine.toml.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Write the networks here: mine.json.")] = None,
+    robot: Annotated[
+        Path | None, typer.Option(help="Write the robot that was found here: mine.toml.", callback=written_file)
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Write the networks here: mine.json.", callback=written_file)] = None,
     plots: PlotFolder = None,
     starts: Annotated[int, typer.Option(help="Random starts for each sensor; the best is kept.", min=1)] = 12,
     seed: Annotated[int, typer.Option(help="Seed: the same seed, the same networks.", min=0)] = 0,
