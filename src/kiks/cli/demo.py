@@ -13,6 +13,7 @@ from kiks.cli.desk import WithDesk, open_desk
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.match import show_match
 from kiks.cli.options import Seed, load_arena
+from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, nearest
 
 if TYPE_CHECKING:
@@ -111,6 +112,7 @@ def _run(scene: Scene, behaviour: str, total_s: float, picture: Path) -> None:
 
     from kiks.drawing import Trace, draw_simulation, save_picture
 
+    end_as_with_ctrl_c()
     sim = scene.sim
     trace = Trace(sim, scene.slice_s)
     working_s = told_s = 0.0

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from kiks.cli.ending import end_as_with_ctrl_c
 from kiks.cli.engine_start import ready_batch
 from kiks.cli.options import Seed, written_folder
+from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -84,7 +84,6 @@ def evolve(
             f"--workers must be left out with --ray, but it was {workers}. Ray has workers of its own."
         )
     ready_batch()
-    end_as_with_ctrl_c()
     chosen = tasks.load(task)
     if controller is not None:
         chosen = tasks.load(task, _controller(controller, chosen))
@@ -97,9 +96,12 @@ def evolve(
         typer.echo(f"Going on after generation {len(evolution.generations)} in {folder}.")
     until = GENERATIONS if generations is None and seconds is None else generations
     where = f"processes:{workers}" if workers else "threads" if ray is None else _ray(ray)
+    end_as_with_ctrl_c()
     stopped = _run(evolution, until, seconds, where)
     if evolution.generations:
         _finish(evolution, folder, stopped=stopped)
+    elif stopped:
+        typer.echo("kiks: stopped.", err=True)
     if stopped:
         raise typer.Exit(130)
 

@@ -12,6 +12,7 @@ import typer
 
 from kiks.cli.accuracy import DataFolder, PlotFolder
 from kiks.cli.options import written_file
+from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -76,6 +77,7 @@ def fit(
                 f"{name}: test set", counts, expected, plots / f"fit-{'-'.join(name.replace('+', ' ').split())}.png"
             )
 
+    end_as_with_ctrl_c()
     with console.status("default response") as status:
         found = fit_reflection(learn, RobotSpec.load("khepera"))
         learn = [rig.moved(table) for rig, table in zip(found.rigs, learn, strict=True)]

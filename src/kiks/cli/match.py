@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from kiks.cli.desk import open_desk
+from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -65,6 +66,7 @@ def _play(match: Match, players: list[Command], picture: Path) -> None:
     from kiks.demos.match import play
     from kiks.drawing import save_picture
 
+    end_as_with_ctrl_c()
     start_s = perf_counter()
     doubt = play(match, players, say=lambda text: typer.echo(f"kiks: {text}", err=True))
     speedup = match.time_s / (perf_counter() - start_s)

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from kiks.cli.ending import end_as_with_ctrl_c
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.options import new_file
+from kiks.ending import end_as_with_ctrl_c
 
 if TYPE_CHECKING:
     from rich.console import Console

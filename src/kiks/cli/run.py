@@ -24,6 +24,7 @@ from kiks.cli.options import (
     load_arena,
     written_file,
 )
+from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -109,6 +110,7 @@ def run(
     if desk:
         _run_on_desk(sim, commands, host, thinking)
         return
+    end_as_with_ctrl_c()
     code, doubt = 1, ""
     try:
         if len(commands) == 1:

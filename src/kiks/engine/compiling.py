@@ -10,7 +10,11 @@ from typing import Any
 
 from numba import njit
 
+from kiks.ending import send_again_what_is_dropped
 from kiks.engine.code_cache import CodeCache, is_kept
+
+# Numba and LLVM call back while they compile and load.
+send_again_what_is_dropped()
 
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "nogil": True}
 
