@@ -24,7 +24,7 @@ def kiks(
 ) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "kiks", *arguments]
     return subprocess.run(
-        command, capture_output=True, text=True, cwd=cwd, env={**os.environ, **(env or {})}, timeout=300, check=False
+        command, capture_output=True, text=True, cwd=cwd, env={**os.environ, **(env or {})}, timeout=470, check=False
     )
 
 
@@ -68,6 +68,7 @@ def test_a_demo_is_the_same_in_two_processes(behaviour: str, tmp_path: Path) -> 
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(480)  # it compiles engine and batch, which takes minutes on a busy computer
 def test_a_cold_start_says_that_it_compiles(tmp_path: Path) -> None:
     result = kiks("warmup", env={"NUMBA_CACHE_DIR": str(tmp_path)})
     assert "Compiling the engine" in result.stderr
