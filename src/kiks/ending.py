@@ -11,8 +11,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
-import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from types import FrameType
 from typing import Any
@@ -25,18 +24,18 @@ _AGAIN_S = 0.01
 
 def end_at_once() -> None:
     """Let Ctrl-C, SIGTERM and SIGHUP end the process where it stands, with one line."""
-    for name in _endings():
-        signal.signal(name, _leave)
+    _handle(_leave)
 
 
 def end_as_with_ctrl_c() -> None:
     """Let Ctrl-C, SIGTERM and SIGHUP raise KeyboardInterrupt; `nohup` keeps a process alive as ever."""
-    for name in _endings():
-        signal.signal(name, signal.default_int_handler)
+    _handle(signal.default_int_handler)
 
 
 def send_again_what_is_dropped() -> None:
     """Send an interruption again that a callback has dropped, until it ends what runs."""
+    import threading  # here, for the process is to be guarded soon after it starts
+
     before = sys.unraisablehook
 
     def note(dropped: Any) -> None:
@@ -50,13 +49,19 @@ def send_again_what_is_dropped() -> None:
     sys.unraisablehook = note
 
 
+def _handle(handler: Callable[[int, FrameType | None], Any]) -> None:
+    # Only the main thread may; where a command runs in another one, signals are none of its business.
+    with suppress(ValueError):
+        for name in _endings():
+            signal.signal(name, handler)
+
+
 def _endings() -> Iterator[signal.Signals]:
     """Yield the signals that end a process, but those that it was started to ignore."""
-    if threading.current_thread() is threading.main_thread():
-        for name in ("SIGINT", "SIGTERM", "SIGHUP"):
-            number = getattr(signal, name, None)
-            if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
-                yield number
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
+            yield number
 
 
 def _leave(_number: int, _frame: FrameType | None) -> None:
@@ -67,6 +72,8 @@ def _leave(_number: int, _frame: FrameType | None) -> None:
 
 def _interrupt() -> None:
     """Send the main thread a signal that raises KeyboardInterrupt, if one does."""
+    import threading
+
     for name in (signal.SIGINT, signal.SIGTERM):
         if signal.getsignal(name) is signal.default_int_handler:
             signal.pthread_kill(threading.main_thread().ident or 0, name)
