@@ -7,8 +7,12 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import get_args, get_type_hints
 
 import pytest
+
+from kiks.cli import app
+from kiks.errors import ParameterError
 
 ROOT = Path(__file__).parents[1]
 ARENA = str(ROOT / "examples" / "arenas" / "office.toml")
@@ -20,7 +24,7 @@ def kiks(
 ) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "kiks", *arguments]
     return subprocess.run(
-        command, capture_output=True, text=True, cwd=cwd, env={**os.environ, **(env or {})}, timeout=300, check=False
+        command, capture_output=True, text=True, cwd=cwd, env={**os.environ, **(env or {})}, timeout=470, check=False
     )
 
 
@@ -64,6 +68,7 @@ def test_a_demo_is_the_same_in_two_processes(behaviour: str, tmp_path: Path) -> 
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(480)  # it compiles engine and batch, which takes minutes on a busy computer
 def test_a_cold_start_says_that_it_compiles(tmp_path: Path) -> None:
     result = kiks("warmup", env={"NUMBA_CACHE_DIR": str(tmp_path)})
     assert "Compiling the engine" in result.stderr
@@ -157,3 +162,58 @@ def test_mistakes_end_in_one_clear_line(arguments: tuple[str, ...], words: str, 
     assert result.returncode == 2, result.stdout + result.stderr
     assert words in result.stderr
     assert "Traceback" not in result.stderr
+
+
+NO_RESULTS = {
+    ("run", "program"),
+    ("accuracy", "data"),
+    ("fit", "data"),
+    ("desk", "folder"),
+    ("drive", "champion"),
+    ("info", "file"),
+    ("serve", "link"),
+    ("session", "listen"),
+}
+"""Paths that are read, and those that are written when a command begins."""
+
+RESULTS = {
+    ("demo", "picture"): ("demo", "--picture", "PLACE"),
+    ("run", "save_thinking"): ("run", "--save-thinking", "PLACE", WANDER),
+    ("accuracy", "page"): ("accuracy", "--page", "PLACE"),
+    ("accuracy", "plots"): ("accuracy", "--plots", "PLACE"),
+    ("fit", "robot"): ("fit", "--robot", "PLACE"),
+    ("fit", "out"): ("fit", "--out", "PLACE"),
+    ("fit", "plots"): ("fit", "--plots", "PLACE"),
+    ("calibrate", "out"): ("calibrate", "--port", "kiks://1", "--out", "PLACE"),
+    ("monitor", "csv"): ("monitor", "--port", "kiks://1", "--csv", "PLACE"),
+    ("evolve", "out"): ("evolve", "--out", "PLACE"),
+    ("maze", "out"): ("arena", "maze", "PLACE"),
+    ("new", "out"): ("arena", "new", "--width-mm", "200", "--height-mm", "200", "PLACE"),
+}
+"""Paths that are written, and how a command is asked to."""
+
+
+def test_every_path_is_known_as_a_result_or_not() -> None:
+    groups = [app, *(each.typer_instance for each in app.registered_groups)]
+    callbacks = [command.callback for group in groups if group for command in group.registered_commands]
+    paths = {
+        (callback.__name__, name)
+        for callback in callbacks
+        if callback is not None
+        for name, kind in get_type_hints(callback).items()
+        if Path in (kind, *get_args(kind))
+    }
+    assert paths == NO_RESULTS | set(RESULTS)
+
+
+@pytest.mark.parametrize("words", RESULTS.values())
+def test_a_result_s_place_is_checked_before_the_run(words: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    def begin() -> None:
+        raise AssertionError("the run has begun")
+
+    for name in ("run", "demo", "accuracy", "calibrate", "monitor", "evolve", "engine_start"):
+        for word in ("ready_engine", "ready_batch"):
+            monkeypatch.setattr(sys.modules[f"kiks.cli.{name}"], word, begin, raising=False)
+    for place in ("/proc/none/x.png", "/dev/null/x.png"):
+        with pytest.raises(ParameterError, match=r"must go to a (file|folder) that can be written"):
+            app([place if word == "PLACE" else word for word in words], standalone_mode=False)

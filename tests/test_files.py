@@ -100,12 +100,12 @@ def test_rights_are_those_of_the_umask_and_of_the_earlier_file(tmp_path: Path) -
     before = os.umask(0o027)
     try:
         replace_file(tmp_path / "new", b"")
-        replace_file(tmp_path / "private", b"", is_private=True)
+        replace_file(tmp_path / "private", b"", rights=0o600)
         (tmp_path / "old").touch()
         (tmp_path / "old").chmod(0o604)
         replace_file(tmp_path / "old", b"")
         (tmp_path / "taken").touch()
-        replace_file(tmp_path / "taken", b"", is_private=True)
+        replace_file(tmp_path / "taken", b"", rights=0o600)
     finally:
         os.umask(before)
     assert [rights(name) for name in ("new", "private", "old", "taken")] == [0o640, 0o600, 0o604, 0o600]

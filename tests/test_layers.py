@@ -15,6 +15,7 @@ ROOT = Path(kiks.__file__).parent
 LAYERS = [
     "errors",
     "units",
+    "ending",
     "model",
     "engine",
     "control",

@@ -85,6 +85,14 @@ def test_a_log_never_replaces_a_file(tmp_path: Path) -> None:
     assert path.read_text() == "precious"
 
 
+def test_a_log_says_that_its_disk_is_full(robot: kiks.Khepera) -> None:
+    log = CsvLog.__new__(CsvLog)
+    log._file = open("/dev/full", "w")  # noqa: SIM115  (closed by close)
+    with pytest.raises(kiks.ParameterError, match=r"'/dev/full' cannot any more \(No space left on device\)"):
+        log.add(next(samples(robot)))
+    log.close()
+
+
 def test_the_picture_shows_each_reading_at_its_place(robot: kiks.Khepera) -> None:
     sample = next(samples(robot))
     sample = sample._replace(proximity=[11, 122, 233, 344, 455, 566, 677, 788])

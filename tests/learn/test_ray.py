@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 import threading
 
 import numpy as np
@@ -11,9 +12,12 @@ from tests.learn import works
 from tests.learn.test_executors import expected
 
 from kiks.errors import ParameterError, WorkError
+from kiks.learn import ray_executor
 from kiks.learn.executors import executor_for
 
 pytestmark = pytest.mark.slow
+
+GUARD_S = 20.0
 
 
 @pytest.fixture(scope="module")
@@ -102,6 +106,21 @@ def test_a_cluster_of_its_own_listens_to_this_computer_alone(ray, caplog):
         assert np.array_equal(executor.evaluate(candidates, seeds), expected(candidates, seeds))
     assert not ray.is_initialized()
     assert not [record for record in caplog.records if record.name.startswith("kiks")]
+
+
+def test_connecting_has_a_time_limit(ray, monkeypatch):
+    is_over, left = threading.Event(), threading.Event()
+    with socket.create_server(("127.0.0.1", 0)) as deaf:
+        address = f"127.0.0.1:{deaf.getsockname()[1]}"
+        monkeypatch.setattr(ray, "init", lambda *words, **settings: is_over.wait(GUARD_S))
+        monkeypatch.setattr(ray, "shutdown", left.set)
+        monkeypatch.setattr(ray_executor, "CONNECT_S", 0.01)
+        with pytest.raises(ParameterError, match=r"was \(no answer within 0\.01 s\)\. Start one with"):
+            executor_for(f"ray:{address}", works.Sums()).__enter__()
+    assert not left.is_set()
+    # What connects after all is let go.
+    is_over.set()
+    assert left.wait(GUARD_S)
 
 
 def test_an_address_where_nobody_listens(ray):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from kiks.cli.engine_start import ready_engine
+from kiks.cli.options import written_file, written_folder
 from kiks.model.files import replace_file
 
 if TYPE_CHECKING:
@@ -18,14 +19,18 @@ DataFolder = Annotated[
     Path | None,
     typer.Option("--data", help="Folder of the measured samples; beside the repository or in KIKS_SHARED if left out."),
 ]
-PlotFolder = Annotated[Path | None, typer.Option("--plots", help="Folder for pictures (needs Matplotlib).")]
+PlotFolder = Annotated[
+    Path | None, typer.Option("--plots", help="Folder for pictures (needs Matplotlib).", callback=written_folder)
+]
 
 
 def accuracy(
     data: DataFolder = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object a line: name, value, unit.")] = False,
     plots: PlotFolder = None,
-    page: Annotated[Path | None, typer.Option(help="Write the card as Markdown here: docs/accuracy.md.")] = None,
+    page: Annotated[
+        Path | None, typer.Option(help="Write the card as Markdown here: docs/accuracy.md.", callback=written_file)
+    ] = None,
 ) -> None:
     """Compare the sensors with a real Khepera's: KiKS's models, and those of other simulators, on measured samples.
 

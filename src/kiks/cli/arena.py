@@ -7,12 +7,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from kiks.cli.options import written_file
 from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
     from kiks.model.arena import Arena
 
-Out = Annotated[Path, typer.Argument(metavar="OUT.toml", help="The arena file; its picture goes beside it as .png.")]
+Out = Annotated[
+    Path,
+    typer.Argument(
+        metavar="OUT.toml", help="The arena file; its picture goes beside it as .png.", callback=written_file
+    ),
+]
 Force = Annotated[bool, typer.Option("--force", help="Replace files that are there.")]
 
 arena = typer.Typer(help="Make arenas, and tell what is in one.", no_args_is_help=True, rich_markup_mode=None)

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from kiks.cli.ending import end_as_with_ctrl_c
 from kiks.cli.engine_start import ready_engine
+from kiks.cli.options import written_file
+from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ REPEAT_MAX_MM = 2000.0
 
 def calibrate(
     port: Annotated[str, typer.Option(help="Port of the robot: /dev/ttyUSB0, COM3, socket://host:port, kiks://1.")],
-    out: Annotated[Path, typer.Option(help="Robot file to write, for --robot.")],
+    out: Annotated[Path, typer.Option(help="Robot file to write, for --robot.", callback=written_file)],
     base: Annotated[str, typer.Option(help="Its kind, for all that is not measured: khepera, khepera_ii, a file.")] = (
         "khepera"
     ),
@@ -46,7 +47,8 @@ def calibrate(
 
     kind = RobotSpec.load(base)
     marks = None if gaps is None else parse_gaps(gaps)
-    check_target(out, overwrite=overwrite)
+    if out.exists() and not overwrite:
+        raise ParameterError(f"--out must name a new file, but {str(out)!r} is there. Add --overwrite to replace it.")
     end_as_with_ctrl_c()
     with Khepera(port, baud=baud) as robot:
         placements = TerminalPlacements(hand_of(robot), asks=not yes)
@@ -130,17 +132,3 @@ def parse_gaps(text: str) -> list[float]:
         return [float(word) for word in text.split(",")]
     except ValueError:
         raise ParameterError(f"--gaps must be numbers with commas, but it was {text!r}. Example: 5,15,25,35.") from None
-
-
-def check_target(out: Path, *, overwrite: bool) -> None:
-    """Raise, before anything is measured, if the file could not be written in the end.
-
-    Raises:
-        ParameterError: If it is there already, or its folder is not.
-    """
-    import os
-
-    if out.exists() and not overwrite:
-        raise ParameterError(f"--out must name a new file, but {str(out)!r} is there. Add --overwrite to replace it.")
-    if not out.parent.is_dir() or not os.access(out.parent, os.W_OK) or out.is_dir():
-        raise ParameterError(f"--out must name a file in a folder that can be written, but it was {str(out)!r}.")

@@ -13,6 +13,7 @@ from kiks.cli.desk import WithDesk, open_desk
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.match import show_match
 from kiks.cli.options import Seed, load_arena
+from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, nearest
 
 if TYPE_CHECKING:
@@ -74,6 +75,11 @@ def demo(
     for name, value in (("--arena", arena), ("--baud", baud)) if is_soccer else (("--left", left), ("--right", right)):
         if value is not None:
             raise ParameterError(f"{name} must be left out with {behaviour}, but it was {value!r}. It is for others.")
+    from kiks.drawing import check_picture
+
+    name = behaviour if behaviour in list(Behaviour) else Path(behaviour).stem
+    picture = picture or Path(f"kiks-{name}.png")
+    check_picture(picture)
     ready_engine()
     if is_soccer:
         show_match(seconds, seed, picture, left, right, on_desk=desk)
@@ -82,12 +88,12 @@ def demo(
     if behaviour in list(Behaviour):
         from kiks.demos.scenes import SCENES
 
-        scene, name = SCENES[behaviour](given, seed=seed, baud=baud), behaviour
+        scene = SCENES[behaviour](given, seed=seed, baud=baud)
     else:
         from kiks.demos.champion import ChampionScene
         from kiks.learn.champion import Champion
 
-        scene, name = ChampionScene(Champion.load(behaviour), given, seed=seed, baud=baud), Path(behaviour).stem
+        scene = ChampionScene(Champion.load(behaviour), given, seed=seed, baud=baud)
     work = partial(_run, scene, name, scene.seconds if seconds is None else seconds, picture)
     if desk:
         from kiks.desk.desk import Desk
@@ -97,7 +103,7 @@ def demo(
         work()
 
 
-def _run(scene: Scene, behaviour: str, total_s: float, picture: Path | None) -> None:
+def _run(scene: Scene, behaviour: str, total_s: float, picture: Path) -> None:
     """Run a demonstration to its end, say how it went, and draw it."""
     from time import perf_counter
 
@@ -106,6 +112,7 @@ def _run(scene: Scene, behaviour: str, total_s: float, picture: Path | None) -> 
 
     from kiks.drawing import Trace, draw_simulation, save_picture
 
+    end_as_with_ctrl_c()
     sim = scene.sim
     trace = Trace(sim, scene.slice_s)
     working_s = told_s = 0.0
@@ -125,7 +132,6 @@ def _run(scene: Scene, behaviour: str, total_s: float, picture: Path | None) -> 
                 told_s = sim.time_s
                 progress.update(task, completed=min(sim.time_s, total_s), description=report())
             start_s = perf_counter()
-    target = picture or Path(f"kiks-{behaviour}.png")
-    save_picture(draw_simulation(sim, trace), target)
+    save_picture(draw_simulation(sim, trace), picture)
     typer.echo(f"{behaviour}: {report().strip()}")
-    typer.echo(f"Picture: {target}   Seed {sim.seed}, state {sim.state_hash()}: the same on every computer.")
+    typer.echo(f"Picture: {picture}   Seed {sim.seed}, state {sim.state_hash()}: the same on every computer.")

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from kiks.cli.ending import end_as_with_ctrl_c
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.log import show_log
+from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -155,8 +155,8 @@ def open_desk(
     from kiks.desk.driver import Driver
     from kiks.desk.showing import Shown
 
-    end_as_with_ctrl_c()
     shown = Shown(desk, host=host, port=port)
+    end_as_with_ctrl_c()
     typer.echo(f"The desk: {shown.url}   Ctrl-C ends it.")
     try:
         if browser:

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from kiks.cli.desk import open_desk
-from kiks.cli.ending import end_as_with_ctrl_c
 from kiks.cli.options import fit_turrets, load_arena
+from kiks.ending import end_as_with_ctrl_c
 
 
 def drive(

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from kiks.cli.ending import end_as_with_ctrl_c
 from kiks.cli.engine_start import ready_batch
-from kiks.cli.options import Seed
+from kiks.cli.options import Seed, written_folder
+from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -46,7 +46,10 @@ EXAM_S = 180.0
 def evolve(
     task: Annotated[str, typer.Argument(help="A task (--list shows them), or a Python file that holds one.")] = "avoid",
     out: Annotated[
-        Path | None, typer.Option(help="Folder of champion, log and picture; kiks-evolve-TASK if left out.")
+        Path | None,
+        typer.Option(
+            help="Folder of champion, log and picture; kiks-evolve-TASK if left out.", callback=written_folder
+        ),
     ] = None,
     generations: Annotated[
         int | None, typer.Option(help=f"How many; {GENERATIONS} if neither this nor --seconds is given.", min=1)
@@ -81,7 +84,6 @@ def evolve(
             f"--workers must be left out with --ray, but it was {workers}. Ray has workers of its own."
         )
     ready_batch()
-    end_as_with_ctrl_c()
     chosen = tasks.load(task)
     if controller is not None:
         chosen = tasks.load(task, _controller(controller, chosen))
@@ -94,9 +96,12 @@ def evolve(
         typer.echo(f"Going on after generation {len(evolution.generations)} in {folder}.")
     until = GENERATIONS if generations is None and seconds is None else generations
     where = f"processes:{workers}" if workers else "threads" if ray is None else _ray(ray)
+    end_as_with_ctrl_c()
     stopped = _run(evolution, until, seconds, where)
     if evolution.generations:
         _finish(evolution, folder, stopped=stopped)
+    elif stopped:
+        typer.echo("kiks: stopped.", err=True)
     if stopped:
         raise typer.Exit(130)
 

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from kiks.cli.accuracy import DataFolder, PlotFolder
+from kiks.cli.options import written_file
+from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -30,8 +32,10 @@ def fit(
         typer.Argument(help="Files of samples; =RADIUS in mm after that of a round object: post.sam=12.5."),
     ] = None,
     data: DataFolder = None,
-    robot: Annotated[Path | None, typer.Option(help="Write the robot that was found here: mine.toml.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Write the networks here: mine.json.")] = None,
+    robot: Annotated[
+        Path | None, typer.Option(help="Write the robot that was found here: mine.toml.", callback=written_file)
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Write the networks here: mine.json.", callback=written_file)] = None,
     plots: PlotFolder = None,
     starts: Annotated[int, typer.Option(help="Random starts for each sensor; the best is kept.", min=1)] = 12,
     seed: Annotated[int, typer.Option(help="Seed: the same seed, the same networks.", min=0)] = 0,
@@ -73,6 +77,7 @@ def fit(
                 f"{name}: test set", counts, expected, plots / f"fit-{'-'.join(name.replace('+', ' ').split())}.png"
             )
 
+    end_as_with_ctrl_c()
     with console.status("default response") as status:
         found = fit_reflection(learn, RobotSpec.load("khepera"))
         learn = [rig.moved(table) for rig, table in zip(found.rigs, learn, strict=True)]

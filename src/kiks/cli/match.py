@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from kiks.cli.desk import open_desk
+from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ SECONDS = 300.0
 def show_match(
     seconds: float | None,
     seed: int,
-    picture: Path | None,
+    picture: Path,
     left: str | None,
     right: str | None,
     *,
@@ -59,24 +60,24 @@ def show_match(
         _play(match, players, picture)
 
 
-def _play(match: Match, players: list[Command], picture: Path | None) -> None:
+def _play(match: Match, players: list[Command], picture: Path) -> None:
     """Let them play to the end, say how it went, and draw it."""
     from kiks.cli.match_picture import draw_match
     from kiks.demos.match import play
     from kiks.drawing import save_picture
 
+    end_as_with_ctrl_c()
     start_s = perf_counter()
     doubt = play(match, players, say=lambda text: typer.echo(f"kiks: {text}", err=True))
     speedup = match.time_s / (perf_counter() - start_s)
-    target = picture or Path("kiks-soccer.png")
-    save_picture(draw_match(match), target)
+    save_picture(draw_match(match), picture)
     left_count, right_count = match.report.score()
     typer.echo(
         f"soccer: left {left_count}, right {right_count}   {match.time_s:.1f} s   {speedup:.0f} x real time   "
         f"{len(match.report.drops_s)} dropped balls"
     )
     repeatable = f"not repeatable: {doubt}" if doubt else f"state {match.state_hash()}: the same on every computer"
-    typer.echo(f"Picture: {target}   Seed {match.seed}, {repeatable}.")
+    typer.echo(f"Picture: {picture}   Seed {match.seed}, {repeatable}.")
 
 
 def player(words: str | None, robot: int, side: str) -> Command:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from kiks.cli.ending import end_as_with_ctrl_c
 from kiks.cli.engine_start import ready_engine
+from kiks.cli.options import new_file
+from kiks.ending import end_as_with_ctrl_c
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -30,7 +31,7 @@ def monitor(
     port: Annotated[str, typer.Option(help="Port of the robot: /dev/ttyUSB0, COM3, socket://host:port, kiks://1.")],
     baud: Annotated[int, typer.Option(help="Line speed [bit/s].", min=75, max=4_000_000)] = 9600,
     rate: Annotated[float, typer.Option(help="Samples a second; the line may allow fewer.")] = 10.0,
-    csv: Annotated[Path | None, typer.Option(help="Log everything to this new file.")] = None,
+    csv: Annotated[Path | None, typer.Option(help="Log everything to this new file.", callback=new_file)] = None,
     seconds: Annotated[float | None, typer.Option(help="End after so many seconds; else Ctrl-C ends.")] = None,
 ) -> None:
     """Show all readings of a real or simulated robot as they come, and log them.

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from kiks.errors import ParameterError
+from kiks.model.files import check_writable, make_folder
 
 if TYPE_CHECKING:
     from kiks.model.arena import Arena
@@ -30,6 +32,43 @@ WhenSilent = Annotated[
 ]
 PatienceS = Annotated[float, typer.Option("--patience", help="How long it may be silent, in real seconds.")]
 Seed = Annotated[int, typer.Option(help="Seed: the same seed, the same run.", min=0)]
+
+
+def written_file(param: typer.CallbackParam, value: Path | None) -> Path | None:
+    """Check an option's file before the run whose result goes there: callback of every option that names one.
+
+    Raises:
+        ParameterError: If it could not be written.
+    """
+    if value is not None:
+        check_writable(value, _name(param))
+    return value
+
+
+def new_file(param: typer.CallbackParam, value: Path | None) -> Path | None:
+    """Check the file of an option that replaces none.
+
+    Raises:
+        ParameterError: If it is there or could not be written.
+    """
+    if value is not None:
+        check_writable(value, _name(param), is_new=True)
+    return value
+
+
+def written_folder(param: typer.CallbackParam, value: Path | None) -> Path | None:
+    """Make the folder of an option whose results go there.
+
+    Raises:
+        ParameterError: If nothing could be written into it.
+    """
+    if value is not None:
+        make_folder(value, _name(param))
+    return value
+
+
+def _name(param: typer.CallbackParam) -> str:
+    return param.opts[0] if param.opts[0].startswith("-") else param.opts[0].upper()
 
 
 def load_arena(file: str | None) -> Arena:

@@ -13,7 +13,18 @@ import typer
 from kiks.cli.desk import WithDesk, open_desk
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.log import show_log
-from kiks.cli.options import ArenaFile, PatienceS, RobotKinds, Seed, Turrets, WhenSilent, fit_turrets, load_arena
+from kiks.cli.options import (
+    ArenaFile,
+    PatienceS,
+    RobotKinds,
+    Seed,
+    Turrets,
+    WhenSilent,
+    fit_turrets,
+    load_arena,
+    written_file,
+)
+from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -45,7 +56,8 @@ def run(
         typer.Option("--map", help="Port name and robot, like /dev/ttyS0=1; else in the order of opening."),
     ] = None,
     save_thinking: Annotated[
-        Path | None, typer.Option(help="Write the thinking times of a live run here, for replay:FILE.")
+        Path | None,
+        typer.Option(help="Write the thinking times of a live run here, for replay:FILE.", callback=written_file),
     ] = None,
     when_silent: WhenSilent = "ignore",
     patience: PatienceS = 2.0,
@@ -63,6 +75,8 @@ def run(
     """
     ready_engine()
     show_log()
+    # A program may go to another folder.
+    record = None if save_thinking is None else save_thinking.absolute()
     if program.suffix == ".toml":
         from kiks.cli.drive import run_champion
 
@@ -88,7 +102,7 @@ def run(
         Programs,
         told=mapping,
         thinking=thinking,
-        record=save_thinking,
+        record=record,
         when_silent=when_silent,
         patience_s=patience,
         say=lambda text: typer.echo(f"kiks: {text}", err=True),
@@ -96,10 +110,11 @@ def run(
     if desk:
         _run_on_desk(sim, commands, host, thinking)
         return
+    end_as_with_ctrl_c()
     code, doubt = 1, ""
     try:
         if len(commands) == 1:
-            code = _run_one(sim, commands[0], mapping, save_thinking)
+            code = _run_one(sim, commands[0], mapping, record)
         else:
             programs = host(sim, commands)
             code = programs.run()

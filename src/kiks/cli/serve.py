@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from kiks.cli.desk import WithDesk
-from kiks.cli.ending import end_as_with_ctrl_c
 from kiks.cli.engine_start import compile_everything, ready_engine
 from kiks.cli.log import show_log
 from kiks.cli.options import (
@@ -23,6 +22,7 @@ from kiks.cli.options import (
     fit_turrets,
     load_arena,
 )
+from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import LinkError
 
 if TYPE_CHECKING:

@@ -10,9 +10,9 @@ from typing import Annotated
 
 import typer
 
-from kiks.cli.ending import end_as_with_ctrl_c
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.log import show_log
+from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import KiksError
 
 

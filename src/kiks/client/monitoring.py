@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple, TextIO
 
@@ -134,16 +135,28 @@ class CsvLog:
         self._write(",".join(COLUMNS))
 
     def add(self, sample: Sample) -> None:
-        """Write a sample."""
+        """Write a sample.
+
+        Raises:
+            ParameterError: If the disk is full or gone.
+        """
         self._write(sample.row())
 
     def close(self) -> None:
         """Close the file."""
-        self._file.close()
+        # What a full disk did not take is said once, by `add`.
+        with suppress(OSError):
+            self._file.close()
 
     def _write(self, line: str) -> None:
-        self._file.write(line + "\n")
-        self._file.flush()
+        try:
+            self._file.write(line + "\n")
+            self._file.flush()
+        except OSError as error:
+            raise ParameterError(
+                f"a log must go to a file that can be written, but {self._file.name!r} cannot any more "
+                f"({error.strerror}). The samples before are in it."
+            ) from None
 
 
 def logged(stream: Iterable[Sample], log: CsvLog | None) -> Iterator[Sample]:

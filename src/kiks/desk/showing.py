@@ -17,6 +17,9 @@ from kiks.sim.simulation import Simulation
 
 _log = logging.getLogger("kiks.desk")
 
+STOP_S = 10.0
+"""How long the world's thread may take to stop [s]."""
+
 
 class Shown:
     """A desk that browsers can see.
@@ -71,7 +74,8 @@ class Shown:
         if self._driver is not None:
             self._driver.stop()
         if self._thread is not None:
-            self._thread.join()
+            # It may be in a long step; as a daemon it holds up no end.
+            self._thread.join(STOP_S)
         SERVER.close(self._served)
 
     def __repr__(self) -> str:

@@ -1,24 +1,20 @@
 """How kernels are compiled: the same bits on every machine, and from the disk cache at the second start.
 
 Need: `fastmath` would let the compiler reorder sums, and then the bits depend on the width of the processor's vectors.
-Need: Numba's cache notices changes in the file of the cached function alone, but an entry point is made of functions
-from many files.
-Method: the cache folder carries a digest of the source of all folders that hold kernels, so that any change starts a
-fresh one.
 """
 
 from __future__ import annotations
 
-import hashlib
-import os
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
-from numba import config, njit
+from numba import njit
 
-KERNEL_FOLDERS = ("engine", "control", "batch")
-"""Folders beside one another whose files hold kernels."""
+from kiks.ending import send_again_what_is_dropped
+from kiks.engine.code_cache import CodeCache, is_kept
+
+# Numba and LLVM call back while they compile and load.
+send_again_what_is_dropped()
 
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "nogil": True}
 
@@ -46,29 +42,15 @@ def spliced(function: Callable[..., Any]) -> Any:
 
 def entry(function: Callable[..., Any]) -> Any:
     """Compile a function that Python calls, and keep the machine code on disk."""
-    settings: Any = config
-    folder_before = settings.CACHE_DIR
-    settings.CACHE_DIR = str(cache_folder())
-    try:
-        return njit(cache=True, **_OPTIONS)(function)
-    finally:
-        settings.CACHE_DIR = folder_before
-
-
-def cache_folder() -> Path:
-    """Return the folder that holds the compiled engine: under `NUMBA_CACHE_DIR`, else the user's cache folder."""
-    digest = hashlib.sha256()
-    for folder in KERNEL_FOLDERS:
-        for source in sorted((Path(__file__).parent.parent / folder).glob("*.py")):
-            digest.update(source.read_bytes())
-    root = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(root) / "kiks" / digest.hexdigest()[:16]
+    dispatcher: Any = njit(**_OPTIONS)(function)
+    dispatcher._cache = CodeCache(function)
+    return dispatcher
 
 
 def is_compiled(name: str = "advance") -> bool:
-    """Say whether the machine code of a function that Python calls lies in the cache, so that its first call is quick.
+    """Say whether the machine code of a function that Python calls is on the disk, so that its first call is quick.
 
     Args:
         name: Name of the function; that of the tick, without which nothing moves, if left out.
     """
-    return any(cache_folder().rglob(f"*.{name}-*.nbc"))
+    return is_kept(name)

@@ -145,9 +145,10 @@ class _Process:
         self._process.join(PATIENCE_S)
         if self._process.is_alive():
             self._process.kill()
-            self._process.join()
+            self._process.join(PATIENCE_S)
         code = self._process.exitcode
-        self._process.close()
+        if code is not None:
+            self._process.close()
         return Lost(f"was ended by signal {-code}" if code is not None and code < 0 else f"ended with exit code {code}")
 
 

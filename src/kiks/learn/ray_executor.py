@@ -14,6 +14,7 @@ import os
 import signal
 import socket
 import threading
+from concurrent.futures import Future
 from contextlib import suppress
 from typing import Any
 
@@ -27,6 +28,9 @@ LOOPBACK = "127.0.0.1"
 
 PATIENCE_S = 10.0
 """After how long without an answer it is looked whether there are other workers to be had [s]."""
+
+CONNECT_S = 60.0
+"""How long connecting to a cluster may take [s]: a second or so, but more on a busy computer."""
 
 
 class RayCrew:
@@ -87,10 +91,11 @@ class RayCrew:
         try:
             if self._address is None:
                 core_count = len(os.sched_getaffinity(0))
+                # Ray gives up by itself when what it starts does not answer.
                 ray.init("local", num_cpus=core_count, include_dashboard=False, _node_ip_address=LOOPBACK)
             else:
                 _knock(self._address)
-                ray.init(self._address)
+                _connect_to(ray, self._address)
         except (OSError, RuntimeError, ValueError, ray.exceptions.RayError) as error:
             raise ParameterError(
                 f"A Ray cluster must be reached, but at {self._address or 'this computer'} none was ({error}). Start"
@@ -185,6 +190,38 @@ class RayWorker:
     def evaluate(self, candidates: Floats, seeds: Integers) -> Values | Raised:
         """Evaluate a chunk: candidates [candidate, parameter] with their seeds [candidate]."""
         return self._worker.evaluate(candidates, seeds)
+
+
+def _connect_to(ray: Any, address: str) -> None:
+    """Connect, in a thread: Ray goes on asking a port that does not answer for minutes, and cannot be told to stop.
+
+    It logs that it sets no handler of signals in a thread. What it starts would end with that thread, but to connect it
+    starts nothing.
+
+    Raises:
+        TimeoutError: If it takes too long.
+        Exception: What Ray raises.
+    """
+    done: Future[None] = Future()
+
+    def connect() -> None:
+        trouble: Exception | None = None
+        try:
+            ray.init(address, logging_level=logging.ERROR)
+        except Exception as error:
+            trouble = error
+        if done.set_running_or_notify_cancel():
+            done.set_exception(trouble) if trouble else done.set_result(None)
+        elif trouble is None:
+            ray.shutdown()
+
+    threading.Thread(target=connect, name="kiks ray", daemon=True).start()
+    try:
+        done.result(CONNECT_S)
+    except TimeoutError:
+        if not done.cancel():
+            return done.result()
+        raise TimeoutError(f"no answer within {CONNECT_S:g} s") from None
 
 
 def _knock(address: str) -> None:

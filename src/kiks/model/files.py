@@ -14,7 +14,7 @@ NAME_BYTES_MAX, PATH_BYTES_MAX = 255, 4000
 """Most bytes of a file's name, and of a path, less than Linux allows."""
 
 
-def replace_file(path: str | Path, data: bytes | str, what: str = "The file", *, is_private: bool = False) -> None:
+def replace_file(path: str | Path, data: bytes | str, what: str = "The file", *, rights: int | None = None) -> None:
     """Write a file in one step, and see that it is on the disk: whatever happens, it is the old or the new one.
 
     A link stays one, an earlier file's rights stay; what is no file (a pipe, a terminal) is written to as it is.
@@ -23,15 +23,15 @@ def replace_file(path: str | Path, data: bytes | str, what: str = "The file", *,
         path: Where it goes.
         data: What it holds; text becomes UTF-8.
         what: What messages call it.
-        is_private: Whether this user alone may read it; else a new file has the rights that the umask leaves.
+        rights: Its rights, at most; those of the earlier file, or those that the umask leaves, if left out.
 
     Raises:
         ParameterError: If it cannot be written; an earlier file is then as it was.
     """
-    replace_files({path_of(path, what): data}, what, is_private=is_private)
+    replace_files({path_of(path, what): data}, what, rights=rights)
 
 
-def replace_files(files: Mapping[Path, bytes | str], what: str = "The file", *, is_private: bool = False) -> None:
+def replace_files(files: Mapping[Path, bytes | str], what: str = "The file", *, rights: int | None = None) -> None:
     """Write files that belong together as `replace_file` writes one: none is replaced before all are on the disk.
 
     Raises:
@@ -47,14 +47,14 @@ def replace_files(files: Mapping[Path, bytes | str], what: str = "The file", *, 
                 target.write_bytes(content)
                 continue
             fresh[target] = _name_beside(target)
-            _write(fresh[target], content, 0o600 if is_private else 0o666)
-            if target.exists() and not is_private:
+            _write(fresh[target], content, 0o666 if rights is None else rights)
+            if target.exists() and rights is None:
                 fresh[target].chmod(stat.S_IMODE(target.stat().st_mode))
         for path, beside in fresh.items():
             os.replace(beside, path)
             _settle(path.parent)
     except (OSError, ValueError) as error:
-        raise _unwritable(what, "file", path, error) from None
+        raise _unwritable(what, "file", path, error) from error
     finally:
         for beside in fresh.values():
             with suppress(OSError):
@@ -83,7 +83,7 @@ def check_writable(path: str | Path, what: str, *, is_new: bool = False) -> None
             _write(beside, b"", 0o600)
             beside.unlink()
     except OSError as error:
-        raise _unwritable(what, "file", path, error) from None
+        raise _unwritable(what, "file", path, error) from error
 
 
 def make_folder(path: str | Path, what: str) -> None:
@@ -98,7 +98,7 @@ def make_folder(path: str | Path, what: str) -> None:
         _write(beside, b"", 0o600)
         beside.unlink()
     except (OSError, ValueError) as error:
-        raise _unwritable(what, "folder", path, error) from None
+        raise _unwritable(what, "folder", path, error) from error
 
 
 def _target(path: str | Path) -> Path:

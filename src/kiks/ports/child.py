@@ -11,6 +11,7 @@ from pathlib import Path
 
 from kiks.clock.program import Program
 from kiks.clock.thinking import save_thinking
+from kiks.errors import KiksError
 from kiks.ports.far import FarLine, SocketConnection
 from kiks.ports.messages import Kind
 from kiks.ports.port import VirtualPort
@@ -55,7 +56,14 @@ def main(descriptor: int, is_late: bool, thinking: str, record: str, program: Pa
     finally:
         connection.tell(Kind.REACHED)
         if record:
-            save_thinking(policy.measured_ns, record)
+            _save(policy.measured_ns, record)
+
+
+def _save(measured_ns: list[int], record: str) -> None:
+    try:
+        save_thinking(measured_ns, record)
+    except KiksError as error:
+        print(f"kiks: {error}", file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -24,6 +24,9 @@ OUTPUT_LIMIT = 1000
 LINE_LIMIT = 2000
 """Longest line of it [bytes]; a longer one is cut."""
 
+ENDING_S = 10.0
+"""How long the end of a process that was killed is waited for [s of real time]."""
+
 LAST_WORDS_S = 1.0
 """How long the last output of a process that has ended is waited for [s of real time]: others may hold its pipes."""
 
@@ -122,8 +125,8 @@ class Process:
         self._signal(signal.SIGKILL)
 
     def wait(self) -> None:
-        """Wait until it has ended and has been heard to its last word."""
-        self._is_over.wait()
+        """Wait until it has ended and has been heard to its last word; no longer than a killed one takes for that."""
+        self._is_over.wait(ENDING_S)
 
     # ---- inside ----
 

@@ -220,7 +220,7 @@ def write_door(door: Door, path: Path) -> None:
     Raises:
         ParameterError: If the file cannot be written.
     """
-    replace_file(path, door.line(), "where a session is found", is_private=True)
+    replace_file(path, door.line(), "where a session is found", rights=0o600)
 
 
 def _connect(door: Door) -> socket.socket:

@@ -1,0 +1,209 @@
+"""Machine code on the disk, in files that are checked before they are believed.
+
+Need: Numba keeps machine code as pickles. A damaged one raises anything in the middle of a call, or ends the process,
+and one that another user has written runs that user's code.
+Method: each file holds one function for one signature, and the digests of what is in it. It is read only if it belongs
+to this user or the superuser and others cannot write it. What is damaged is thrown away and compiled again. The name
+of the folder is a digest of all that the code depends on, so that what another version has left is never read.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import logging
+import os
+import pickle
+import stat
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import llvmlite
+import numba
+import numpy as np
+from llvmlite import binding
+from numba.core import serialize
+from numba.core.compiler import CompileResult
+
+from kiks.errors import ParameterError
+from kiks.model.files import replace_file
+
+KERNEL_FOLDERS = ("engine", "control", "batch")
+"""Folders beside one another whose files hold kernels."""
+
+# Numba has no types for these.
+_numba: Any = serialize
+_Result: Any = CompileResult
+
+_FORMAT = b"kiks-code-1"
+_ENDING = ".code"
+
+
+class CodeCache:
+    """What Numba asks for the machine code of a function, in place of a cache of its own.
+
+    Args:
+        function: The function, of a module.
+    """
+
+    cache_path = ""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._name = f"{function.__module__}.{function.__qualname__}-{function.__code__.co_firstlineno}"
+
+    def enable(self) -> None:
+        """Do nothing; Numba asks for it."""
+
+    def disable(self) -> None:
+        """Do nothing; Numba asks for it."""
+
+    def flush(self) -> None:
+        """Do nothing; Numba asks for it."""
+
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        """Return what was compiled for a signature; None if it has to be compiled."""
+        context.refresh()
+        key = signature, context.codegen().magic_tuple()
+        for path in _files(self._name):
+            try:
+                payload = _payload(path, key)
+                if payload is not None:
+                    return _Result._rebuild(context, *payload)
+            except OSError:
+                continue
+            except _ForeignError:
+                _tell(
+                    f"The compiled engine must be in files that you alone can write, but others can write those in "
+                    f"{str(path.parent)!r}. It is compiled again; set NUMBA_CACHE_DIR to a folder of yours."
+                )
+            except Exception:  # what unpickling raises has no common base
+                _tell(f"Damaged files in {str(path.parent)!r} are thrown away; what they held is compiled again.")
+                with contextlib.suppress(OSError):
+                    path.unlink()
+        return None
+
+    def save_overload(self, signature: Any, compiled: Any) -> None:
+        """Keep what was compiled for a signature, where there is room for it."""
+        if compiled.library.has_dynamic_globals:
+            return
+        key = _numba.dumps((signature, compiled.library.codegen.magic_tuple()))
+        payload = _numba.dumps(compiled._reduce())
+        head = b" ".join((_FORMAT, str(len(key)).encode(), _digest(key), _digest(payload)))
+        data, name = head + b"\n" + key + payload, f"{self._name}-{_digest(key)[:16].decode()}{_ENDING}"
+        troubles = []
+        for folder in cache_folders():
+            try:
+                _make_own(folder)
+                # Others may read it, so that one user can compile for all, whatever the umask.
+                replace_file(folder / name, data, rights=0o644)
+            except (OSError, ParameterError) as error:
+                cause = error if isinstance(error, OSError) else error.__cause__
+                troubles.append(f"{str(folder)!r} ({getattr(cause, 'strerror', cause)})")
+            else:
+                result = f"it is in {str(folder)!r}"
+                break
+        else:
+            result = "each start compiles it"
+        if troubles:
+            _tell(
+                f"The compiled engine cannot be kept in {' or '.join(troubles)}, so {result}. "
+                "Set NUMBA_CACHE_DIR to a folder of yours with room."
+            )
+
+
+def is_kept(name: str) -> bool:
+    """Say whether there is machine code of a function on the disk."""
+    return any(_files(f"*.{name}"))
+
+
+def cache_folders() -> Iterator[Path]:
+    """Yield the folders for the compiled engine: the user's, then one among temporary files for when that fails."""
+    for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME"):
+        if root := os.environ.get(name):
+            yield Path(root).absolute() / "kiks" / _version()
+            break
+    else:
+        # A user may have none, or one that leads nowhere.
+        with contextlib.suppress(RuntimeError):
+            yield Path.home().absolute() / ".cache" / "kiks" / _version()
+    with contextlib.suppress(OSError):
+        yield Path(tempfile.gettempdir(), f"kiks-code-{_user()}-{_version()}")
+
+
+@functools.cache
+def _version() -> str:
+    """Return a digest of all that machine code depends on: sources, compilers, Python, this computer's processor."""
+    digest = hashlib.sha256()
+    for folder in KERNEL_FOLDERS:
+        for source in sorted((Path(__file__).parent.parent / folder).glob("*.py")):
+            digest.update(source.read_bytes())
+    processor = binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
+    config: Any = numba.config
+    settings = config.CPU_NAME, config.CPU_FEATURES, config.OPT, config.BOUNDSCHECK
+    versions = numba.__version__, llvmlite.__version__, np.__version__, sys.implementation.cache_tag
+    digest.update(repr((processor, settings, versions)).encode())
+    return digest.hexdigest()[:16]
+
+
+def _files(name: str) -> Iterator[Path]:
+    """Yield the files of a function."""
+    for folder in cache_folders():
+        with contextlib.suppress(OSError):
+            yield from sorted(folder.glob(f"{name}-*{_ENDING}"))
+
+
+class _ForeignError(Exception):
+    """A file that another user may have written."""
+
+
+def _payload(path: Path, key: object) -> Any:
+    """Return what a file holds, None if it is of another key.
+
+    Raises:
+        OSError: If it cannot be read.
+        _ForeignError: If another user may have written it.
+        Exception: If it is damaged.
+    """
+    with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW), "rb") as file:
+        about = os.fstat(file.fileno())
+        if about.st_uid not in (0, _user()) or about.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+            raise _ForeignError
+        head, _, rest = file.read().partition(b"\n")
+    form, size, key_digest, payload_digest = head.split(b" ")
+    own_key, payload = rest[: int(size)], rest[int(size) :]
+    if form != _FORMAT or _digest(own_key) != key_digest or _digest(payload) != payload_digest:
+        raise ValueError("damaged")
+    # Only now it is sure that these are pickles of ours.
+    return pickle.loads(payload) if pickle.loads(own_key) == key else None
+
+
+def _make_own(folder: Path) -> None:
+    """Make a folder into which nobody else can write.
+
+    Raises:
+        OSError: If that cannot be.
+    """
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    is_shared = str(folder.parent) != tempfile.gettempdir()
+    folder.mkdir(mode=0o755 if is_shared else 0o700, exist_ok=True)
+    about = folder.lstat()
+    if not stat.S_ISDIR(about.st_mode) or about.st_uid != _user() or about.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        raise PermissionError(None, "others may write there")
+
+
+def _user() -> int:
+    return os.geteuid()
+
+
+def _digest(data: bytes) -> bytes:
+    return hashlib.sha256(data).hexdigest().encode()
+
+
+@functools.cache
+def _tell(text: str) -> None:
+    """Say something once, not for each function."""
+    logging.getLogger("kiks.engine").warning(text)

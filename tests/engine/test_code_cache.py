@@ -1,0 +1,187 @@
+"""Compiled code on the disk: whatever has become of it, calls give what they should, and one line tells of it."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import random
+import resource
+import stat
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+import pytest
+
+from kiks.engine import code_cache
+from kiks.engine.compiling import entry, is_compiled
+
+Damage = Callable[[bytes], bytes]
+
+
+def double_of(number: Any) -> Any:
+    return number + number
+
+
+def call(argument: Any = 21) -> bool:
+    """Call the function as a new process would; return whether it came from the disk."""
+    function = entry(double_of)
+    assert function(argument) == 2 * argument
+    return sum(function.stats.cache_hits.values()) == 1
+
+
+def files(folder: Path) -> list[Path]:
+    return sorted(folder.rglob("*.code"))
+
+
+@pytest.fixture(autouse=True)
+def _fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    code_cache._tell.cache_clear()
+
+
+def test_the_second_call_comes_from_the_disk(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    assert not is_compiled("double_of")
+    assert [call(), call(), call(0.5), call(0.5), call()] == [False, True, False, True, True]
+    assert is_compiled("double_of")
+    assert not is_compiled("double")
+    assert len(files(tmp_path)) == 2
+    assert not caplog.records
+
+
+def flipped(seed: int) -> Damage:
+    def flip(data: bytes) -> bytes:
+        place = random.Random(seed).randrange(len(data))
+        return data[:place] + bytes([data[place] ^ 1 << seed % 8]) + data[place + 1 :]
+
+    return flip
+
+
+def cut(share: float) -> Damage:
+    return lambda data: data[: int(share * len(data))]
+
+
+class Bomb:
+    """What a pickle may be."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return os.mkdir, (os.environ["KIKS_TEST_BOMB"],)
+
+
+def damages() -> list[Damage]:
+    whole: list[Damage] = [
+        lambda data: b"\n" + data,
+        lambda data: data * 2,
+        lambda data: bytes(1000),
+        lambda data: b"1 2",
+    ]
+    return whole + [cut(share) for share in (0, 0.001, 0.1, 0.5, 0.999)] + [flipped(seed) for seed in range(20)]
+
+
+@pytest.mark.parametrize("number", range(len(damages())))
+def test_a_damaged_file_is_thrown_away(number: int, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    call()
+    (file,) = files(tmp_path)
+    file.write_bytes(damages()[number](file.read_bytes()))
+    assert not call()
+    assert [record.getMessage().split(" in ")[0] for record in caplog.records] == ["Damaged files"]
+    assert call()
+    assert len(files(tmp_path)) == 1
+
+
+@pytest.mark.parametrize("rights", [0o620, 0o602, 0o600])
+def test_what_others_may_have_written_is_not_run(
+    rights: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    call()
+    (file,) = files(tmp_path)
+    monkeypatch.setenv("KIKS_TEST_BOMB", str(tmp_path / "bombed"))
+    key, payload = pickle.dumps(Bomb()), pickle.dumps(Bomb())
+    head = [code_cache._FORMAT, b"%d" % len(key), code_cache._digest(key), code_cache._digest(payload)]
+    file.write_bytes(b" ".join(head) + b"\n" + key + payload)
+    file.chmod(rights)
+    if rights == 0o600:
+        # All that tells it from a file of ours is whose it is.
+        here = file.stat().st_uid
+        monkeypatch.setattr(code_cache, "_user", lambda: here + 1)
+        if here == 0:
+            os.chown(file, 4321, -1)
+    assert not call()
+    assert not (tmp_path / "bombed").exists()
+    assert "files that you alone can write" in caplog.text
+    monkeypatch.undo()
+
+
+def test_what_programs_wrote_at_once_is_all_there() -> None:
+    one, other = entry(double_of), entry(double_of)
+    contexts = one.targetctx, other.targetctx
+    whole, real = (numba.int64,), (numba.float64,)
+    # Both look before either writes.
+    assert one._cache.load_overload(whole, contexts[0]) is None
+    assert other._cache.load_overload(real, contexts[1]) is None
+    one.compile(whole)
+    other.compile(real)
+    other.compile(whole)
+    assert [call(1), call(1.5)] == [True, True]
+
+
+def test_another_version_has_a_folder_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    call()
+    monkeypatch.setattr(numba, "__version__", "0.0")
+    code_cache._version.cache_clear()
+    assert not is_compiled("double_of")
+    monkeypatch.undo()
+    code_cache._version.cache_clear()
+
+
+@pytest.mark.parametrize("home", ["/proc/none", "/dev/null/none", "nul"])
+def test_without_a_home_it_is_among_temporary_files(
+    home: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    if home == "nul":
+        home = str(tmp_path / ("n" * 300))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", home)
+    assert [call(), call(), call(0.5)] == [False, True, False]
+    (line,) = [record.getMessage() for record in caplog.records]
+    assert line.startswith(f"The compiled engine cannot be kept in '{home}/kiks/")
+    assert "NUMBA_CACHE_DIR" in line
+    (folder,) = (tmp_path / "temporary").iterdir()
+    assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+
+
+def test_a_folder_that_others_can_write_to_is_not_used(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    call()
+    (file,) = files(tmp_path)
+    file.unlink()
+    file.parent.chmod(0o777)
+    assert [call(), call()] == [False, True]
+    assert "(others may write there)" in caplog.text
+    assert not file.exists()
+
+
+def test_on_a_full_disk_the_run_goes_on(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
+    try:
+        assert [call(), call(), call(0.5)] == [False] * 3
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    (line,) = [record.getMessage() for record in caplog.records]
+    assert "(File too large)" in line
+    assert line.endswith("so each start compiles it. Set NUMBA_CACHE_DIR to a folder of yours with room.")
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
+
+
+def test_a_user_without_a_home(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def lost() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.delenv("NUMBA_CACHE_DIR")
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setattr(Path, "home", lost)
+    assert [call(), call()] == [False, True]
+    assert [path.parent.parent for path in files(tmp_path)] == [tmp_path / "temporary"]
