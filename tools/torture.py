@@ -20,7 +20,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from tools.campaigns import calls, files, messages, planted
+from tools.campaigns import calls, files, messages, planted, wire
 from tools.campaigns.runner import (
     Broken,
     Campaign,
@@ -33,7 +33,7 @@ from tools.campaigns.runner import (
     verdicts,
 )
 
-GROUPS = {"files": files.campaigns, "calls": calls.campaigns, "messages": messages.campaigns, "planted": planted.campaigns}
+GROUPS = {"files": files.campaigns, "calls": calls.campaigns, "messages": messages.campaigns, "wire": wire.campaigns, "planted": planted.campaigns}
 """What makes the campaigns of each group."""
 
 PEAK_MAX_MB = 2000
