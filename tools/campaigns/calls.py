@@ -8,6 +8,7 @@ import os
 import random
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cache, partial
 from typing import Any
@@ -37,7 +38,17 @@ DURATIONS = ("seconds", "every_s", "period_s", "think_s", "timeout", "poll_s", "
 
 DURATION_MAX, DURATION_ENDLESS = 5.0, 1e12
 
-INTERNAL = ("sync", "tick_to", "freedom", "check_start_poses", "show", "run_until", "with_traceback", "add_note", "prepare")
+INTERNAL = (
+    "sync",
+    "tick_to",
+    "freedom",
+    "check_start_poses",
+    "show",
+    "run_until",
+    "with_traceback",
+    "add_note",
+    "prepare",
+)
 """Public names that programs have no use for, or that open a browser."""
 
 
@@ -59,7 +70,11 @@ def hostile_argument(rng: random.Random, name: str) -> Any:
     while True:
         value = hostile_value(rng)
         is_number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-        if name not in DURATIONS or not is_number or not DURATION_MAX < value * (1e-9 if name == "time_ns" else 1.0) < DURATION_ENDLESS:
+        if (
+            name not in DURATIONS
+            or not is_number
+            or not DURATION_MAX < value * (1e-9 if name == "time_ns" else 1.0) < DURATION_ENDLESS
+        ):
             return value
 
 
@@ -79,7 +94,9 @@ def arguments(rng: random.Random, call: Callable[..., Any], good: dict[str, Any]
     return given
 
 
-def _methods(thing: object, good: Mapping[str, Any], **special: dict[str, Any]) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
+def _methods(
+    thing: object, good: Mapping[str, Any], **special: dict[str, Any]
+) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
     """Return the public methods of a thing, each with what a good call gives it."""
     found = {}
     for name in dir(thing):
@@ -119,7 +136,8 @@ _PLACE = {"robot": 1, "x_mm": 150.0, "y_mm": 120.0, "heading_rad": 0.7}
 def _simulation(rng: random.Random) -> Subject:
     sim = _world()
     good = _PLACE | {
-        "body": 1, "lamp": 1, "seconds": 0.02, "speed_mm_s": 10.0, "sensor": 2, "turret": "k213", "every_s": 0.1, "power_w": 1.0,
+        "body": 1, "lamp": 1, "seconds": 0.02, "speed_mm_s": 10.0, "sensor": 2, "turret": "k213", "every_s": 0.1,
+        "power_w": 1.0,
         "is_on": True, "arena": _box(), "checkpoint": sim.checkpoint(), "time_ns": 10**7, "seed": 1, "noise": True,
     }  # fmt: skip
     body = {"radius_mm": 10.0, "friction_mm_s2": 10.0, "brightness": 100}
@@ -128,7 +146,10 @@ def _simulation(rng: random.Random) -> Subject:
         sim.lamps[int(row) % len(sim.lamps), int(column) % 4] = value
 
     calls = _methods(sim, good, add_robot={"robot": "khepera"}, add_ball=body, add_cylinder=body)
-    calls["Simulation"] = Simulation, {"arena": _box(), "robots": 2, "seed": 3, "thinking": "none", "robot": "khepera", "response": "thesis"}
+    calls["Simulation"] = (
+        Simulation,
+        {"arena": _box(), "robots": 2, "seed": 3, "thinking": "none", "robot": "khepera", "response": "thesis"},
+    )
     # Documented as an array to be written to: whatever NumPy takes, the engine has to live with.
     value = rng.choice((math.nan, math.inf, 1e308, -1e20, 5e-324, 0.0))
     calls["lamps"] = partial(write_lamps, 0, rng.randrange(4), value), {}
@@ -140,8 +161,10 @@ def _khepera(rng: random.Random) -> Subject:
     sim.fit(1, "k213")
     robot = kiks.Khepera(sim.port(1))
     good = {
-        "left": 5, "right": -5, "kp": 1, "ki": 2, "kd": 3, "speed": 4, "acceleration": 5, "channel": 1, "led": 0, "action": 2, "address": 3,
-        "data": 7, "text": "N", "number": 2, "order": "N", "seconds": 0.02, "poll_s": 0.02, "wait": False, "request": b"N", "count": 8,
+        "left": 5, "right": -5, "kp": 1, "ki": 2, "kd": 3, "speed": 4, "acceleration": 5, "channel": 1, "led": 0,
+        "action": 2, "address": 3,
+        "data": 7, "text": "N", "number": 2, "order": "N", "seconds": 0.02, "poll_s": 0.02, "wait": False,
+        "request": b"N", "count": 8,
     }  # fmt: skip
     calls = _methods(robot, good)
     calls["Khepera"] = kiks.Khepera, {"port": sim.port(1), "baud": 9600}
@@ -154,9 +177,12 @@ def _functions(rng: random.Random) -> Subject:
     sim = _world()
     ref = kiks.kopen([-1, 9600, 1])
     calls: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
-        "kopen": (kiks.kopen, {"settings": [-2, 9600, 1]}), "ksend": (kiks.ksend, {"text": "N\n", "ref": ref, "timeout": 1.0}),
-        "ktime": (kiks.ktime, {"port": ref}), "kclose": (kiks.kclose, {"ref": ref}), "pause": (kiks.pause, {"seconds": 0.01}),
-        "drive": (kiks.drive, {"port": sim.port(2), "controller": _controller(), "parameters": [0.1] * 18, "seconds": 0.2, "period_s": 0.1, "baud": 9600}),
+        "kopen": (kiks.kopen, {"settings": [-2, 9600, 1]}), "ksend": (kiks.ksend, {"text": "N\n", "ref": ref,
+        "timeout": 1.0}),
+        "ktime": (kiks.ktime, {"port": ref}), "kclose": (kiks.kclose, {"ref": ref}), "pause": (kiks.pause,
+        {"seconds": 0.01}),
+        "drive": (kiks.drive, {"port": sim.port(2), "controller": _controller(), "parameters": [0.1] * 18,
+        "seconds": 0.2, "period_s": 0.1, "baud": 9600}),
         "executor_for": (kiks.executor_for, {"where": "threads:1", "work": _task()}),
         "parse_thinking": (parse_thinking, {"text": "none"}),
     }  # fmt: skip
@@ -167,8 +193,10 @@ def _arena(rng: random.Random) -> Subject:
     arena, array = _box(), np.zeros((120, 130), np.uint8)
     made = kiks.Arena
     good = {
-        "width_mm": 200, "height_mm": 200, "wall_mm": 5, "rounded_mm": 10, "brightness": 99, "mm_per_pixel": 1.0, "name": "a", "columns": 3,
-        "rows": 3, "path_mm": 120, "seed": 1, "radius_mm": 20.0, "x_mm": 100.0, "y_mm": 100.0, "path": "/nonexistent/a.png",
+        "width_mm": 200, "height_mm": 200, "wall_mm": 5, "rounded_mm": 10, "brightness": 99, "mm_per_pixel": 1.0,
+        "name": "a", "columns": 3,
+        "rows": 3, "path_mm": 120, "seed": 1, "radius_mm": 20.0, "x_mm": 100.0, "y_mm": 100.0,
+        "path": "/nonexistent/a.png",
     }  # fmt: skip
     calls = _methods(arena, good, from_array={"brightness": array})
     things = {"starts": (Pose(100.0, 100.0, 0.0),), "lamps": (), "balls": (), "cylinders": ()}
@@ -178,7 +206,9 @@ def _arena(rng: random.Random) -> Subject:
         kinds = {"starts": (Pose, 3), "lamps": (Lamp, 4), "balls": (Ball, 5), "cylinders": (Cylinder, 5)}
         label = rng.choice(list(kinds))
         kind, count = kinds[label]
-        drive(Simulation(made(array, 1.0, "a", **{label: (kind(*(x_mm, y_mm, third, fourth, fifth)[:count]),)}), seed=1))
+        drive(
+            Simulation(made(array, 1.0, "a", **{label: (kind(*(x_mm, y_mm, third, fourth, fifth)[:count]),)}), seed=1)
+        )
 
     calls["things"] = with_things, {"x_mm": 60.0, "y_mm": 60.0, "third": 10.0, "fourth": 10.0, "fifth": 100}
     return Subject(calls)
@@ -218,9 +248,11 @@ def _task() -> Any:
 
 def _control(rng: random.Random) -> Subject:
     good = {
-        "neurons": 2, "period_s": 0.1, "time_constant_s": 0.4, "senses": ("proximity",), "speed_limit": 5.0, "units": 2, "feedback": False,
+        "neurons": 2, "period_s": 0.1, "time_constant_s": 0.4, "senses": ("proximity",), "speed_limit": 5.0,
+        "units": 2, "feedback": False,
         "hidden": (3,), "controller": _controller(), "count": 2, "seed": 1, "folder": ".", "recipe": {"kind": "linear"},
-        "arena": _box(), "square_mm": 50.0, "x_mm": 50.0, "y_mm": 50.0, "radius_mm": 50.0, "side": "left", "counts": 300.0,
+        "arena": _box(), "square_mm": 50.0, "x_mm": 50.0, "y_mm": 50.0, "radius_mm": 50.0, "side": "left",
+        "counts": 300.0,
     }  # fmt: skip
     found = {}
     wanted = ("ctrnn", "gru", "linear", "mlp", "random_parameters", "from_recipe", "recipe_for")
@@ -234,9 +266,12 @@ def _control(rng: random.Random) -> Subject:
 def _batch(rng: random.Random) -> Subject:
     batch = kiks.Batch(_box(), 3, seed=1, threads=1, senses=("proximity", "ambient"))
     good = {
-        "arena": _box(), "worlds": 3, "robot": "khepera", "robots": 1, "seed": 1, "starts": np.array([[[100.0, 100.0, 0.0]]] * 3),
-        "senses": ("proximity",), "measures": (), "timing": kiks.Timing(), "response": None, "threads": 1, "seeds": [1, 2, 3],
-        "controller": _controller(), "parameters": [0.1] * 18, "seconds": 0.2, "world": 1, "wheels": np.zeros((3, 1, 2)),
+        "arena": _box(), "worlds": 3, "robot": "khepera", "robots": 1, "seed": 1, "starts": np.array([[[100.0, 100.0,
+        0.0]]] * 3),
+        "senses": ("proximity",), "measures": (), "timing": kiks.Timing(), "response": None, "threads": 1,
+        "seeds": [1, 2, 3],
+        "controller": _controller(), "parameters": [0.1] * 18, "seconds": 0.2, "world": 1, "wheels": np.zeros((3, 1,
+        2)),
     }  # fmt: skip
     calls = _methods(batch, good, reset={"worlds": [0, 1]})
     taken = inspect.signature(kiks.Batch).parameters
@@ -261,16 +296,31 @@ def _learning(rng: random.Random) -> Subject:
     champion = kiks.Champion(task.controller, (0.1,) * 18)
     sim = _world()
     good = {
-        "task": task, "algorithm": "ga", "seed": 1, "population": 4, "folder": None, "values": np.arange(4.0), "generations": 1, "each": None,
-        "executor": "threads:1", "seconds": 0.5, "candidates": np.zeros((1, 18)), "seeds": np.array([1]), "threads": 1, "measure": "contacts",
-        "low": 0.0, "high": 1.0, "cells": 10, "period_s": 0.1, "baud": 9600, "think_s": 0.01, "path": "champion.toml", "arena": _box(),
+        "task": task, "algorithm": "ga", "seed": 1, "population": 4, "folder": None, "values": np.arange(4.0),
+        "generations": 1, "each": None,
+        "executor": "threads:1", "seconds": 0.5, "candidates": np.zeros((1, 18)), "seeds": np.array([1]),
+        "threads": 1, "measure": "contacts",
+        "low": 0.0, "high": 1.0, "cells": 10, "period_s": 0.1, "baud": 9600, "think_s": 0.01, "path": "champion.toml",
+        "arena": _box(),
         "robots": 1, "port": sim.port(1), "name": "avoid", "spec": sim.spec, "controller": task.controller,
     }  # fmt: skip
-    changes = {"seconds": 1.0, "worlds": 3, "robots": 1, "robot": "khepera", "starts": "random", "timing": kiks.Timing(), "axes": ()}
+    changes = {
+        "seconds": 1.0,
+        "worlds": 3,
+        "robots": 1,
+        "robot": "khepera",
+        "starts": "random",
+        "timing": kiks.Timing(),
+        "axes": (),
+    }
     calls: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {}
     for thing, label in ((evolution, "evolution"), (champion, "champion"), (task, "task")):
         known = _methods(thing, good, with_changes=changes)
-        calls |= {f"{label}.{name}": call for name, call in known.items() if name not in ("fitness", "controller", "run", "drive")}
+        calls |= {
+            f"{label}.{name}": call
+            for name, call in known.items()
+            if name not in ("fitness", "controller", "run", "drive")
+        }
     for made in (kiks.Evolution, kiks.Axis, kiks.Timing):
         calls[made.__name__] = made, {key: good[key] for key in inspect.signature(made).parameters}
     calls["tasks.load"] = kiks.tasks.load, {"name": "avoid", "controller": None}
@@ -296,10 +346,14 @@ def _environments(rng: random.Random) -> Subject:
         env = KheperaVectorEnv(2, "Avoid", threads=1)
         good = {"actions": np.zeros((2, 2), np.float32), "seed": 1, "options": None}
     env.reset(seed=1)
-    calls = {name: (getattr(env, name), {key: value for key, value in good.items() if key in taken}) for name, taken in (
+    calls = {name: (getattr(env, name), {key: value for key, value in good.items() if key in taken}) for name,
+    taken in (
         ("reset", ("seed", "options")), ("step", ("action", "actions")), ("step", ("action", "actions")),
     )}  # fmt: skip
-    calls["KheperaEnv"] = KheperaEnv, {"lesson": "Avoid", "render_mode": None, "arenas": (_box(),), "timing": kiks.Timing(), "robot": "khepera"}
+    calls["KheperaEnv"] = (
+        KheperaEnv,
+        {"lesson": "Avoid", "render_mode": None, "arenas": (_box(),), "timing": kiks.Timing(), "robot": "khepera"},
+    )
 
     def go_on() -> None:
         env.reset(seed=1)
@@ -310,8 +364,10 @@ def _environments(rng: random.Random) -> Subject:
 
 def _project(rng: random.Random) -> Subject:
     good = {
-        "arena": _box(), "robots": (ProjectRobot(),), "seed": 1, "thinking": "none", "baud": 9600, "response": "thesis", "noise": True,
-        "speed": 1.0, "kind": "khepera", "turrets": ("k213",), "name": "a", "program": "a.py", "arguments": ("a",), "brightness": 99,
+        "arena": _box(), "robots": (ProjectRobot(),), "seed": 1, "thinking": "none", "baud": 9600,
+        "response": "thesis", "noise": True,
+        "speed": 1.0, "kind": "khepera", "turrets": ("k213",), "name": "a", "program": "a.py", "arguments": ("a",),
+        "brightness": 99,
     }  # fmt: skip
 
     def project(**settings: Any) -> None:
@@ -367,8 +423,10 @@ def _signed_as(call: Callable[..., Any], wrapped: Callable[..., Any]) -> Callabl
 
 
 SUBJECTS: dict[str, tuple[Callable[[random.Random], Subject], float]] = {
-    "simulation": (_simulation, 0.3), "khepera": (_khepera, 0.1), "port": (_port, 0.05), "functions": (_functions, 0.08),
-    "arena": (_arena, 0.1), "robot": (_robot, 0.1), "control": (_control, 0.05), "batch": (_batch, 0.07), "learning": (_learning, 0.05),
+    "simulation": (_simulation, 0.3), "khepera": (_khepera, 0.1), "port": (_port, 0.05), "functions": (_functions,
+    0.08),
+    "arena": (_arena, 0.1), "robot": (_robot, 0.1), "control": (_control, 0.05), "batch": (_batch, 0.07),
+    "learning": (_learning, 0.05),
     "environments": (_environments, 0.05), "project": (_project, 0.05),
 }  # fmt: skip
 """What is called, and its share of all calls."""
@@ -398,10 +456,9 @@ def _prepare(make: Callable[[random.Random], Subject]) -> Play:
 
 
 def _tolerantly(call: Callable[..., Any], given: dict[str, Any]) -> None:
-    try:
+    # What Gymnasium itself checks, it refuses in its own way.
+    with suppress(gymnasium.error.Error):
         call(**given)
-    except gymnasium.error.Error:
-        pass  # What Gymnasium itself checks, it refuses in its own way.
 
 
 def campaigns() -> Iterator[Campaign]:

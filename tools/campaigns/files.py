@@ -26,7 +26,6 @@ from kiks.clock.thinking import parse_thinking
 from kiks.desk.folder import decode
 from kiks.fit.models import thesis
 from kiks.fit.samples import load_samples, nearnesses
-from kiks.learn.records import Folder
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
 from kiks.model.arena_file import save_arena
 from kiks.model.kad import encode_kad
@@ -195,16 +194,35 @@ def npy(header: bytes, data: bytes, version: int = 1) -> bytes:
     return b"\x93NUMPY" + bytes([version, 0]) + size + header + data
 
 
-_DESCRIPTIONS = ("<f8", "<i8", "|O", "<c16", "|S5", "<U3", "<M8[s]", "|V8", "<f2", "|b1", "<f4", ">i4", "<u8", "|i1", "x" * 300)
+_DESCRIPTIONS = (
+    "<f8",
+    "<i8",
+    "|O",
+    "<c16",
+    "|S5",
+    "<U3",
+    "<M8[s]",
+    "|V8",
+    "<f2",
+    "|b1",
+    "<f4",
+    ">i4",
+    "<u8",
+    "|i1",
+    "x" * 300,
+)
 _SHAPES = (
-    "()", "(1,)", "(0,)", "(3, 4)", "(10**12,)", "(1000000000000,)", "(4611686018427387904, 4)", "(-1,)", "(2.5,)", "(True,)",
+    "()", "(1,)", "(0,)", "(3, 4)", "(10**12,)", "(1000000000000,)", "(4611686018427387904, 4)", "(-1,)", "(2.5,)",
+    "(True,)",
     "(9" * 1 + "9" * 400 + ",)", "'a'", "(" * 200 + ")" * 200, "None", "(1, 1, 8)", "(65536, 65536)",
 )  # fmt: skip
 
 
 def _strange_npy(rng: random.Random) -> bytes:
     if rng.random() < 0.2:
-        header = rng.choice((b"(" * 50_000, b"{" * 3000, b"[" * 90 + b"]" * 90, b"-" * 9000 + b"1", b"\xff" * 100, SECRET.encode()))
+        header = rng.choice(
+            (b"(" * 50_000, b"{" * 3000, b"[" * 90 + b"]" * 90, b"-" * 9000 + b"1", b"\xff" * 100, SECRET.encode())
+        )
     else:
         shape, order = rng.choice(_SHAPES), rng.choice(("False", "True", "None"))
         header = f"{{'descr': '{rng.choice(_DESCRIPTIONS)}', 'fortran_order': {order}, 'shape': {shape}}}".encode()
@@ -222,7 +240,9 @@ def _hostile_array(rng: random.Random, array: Any) -> Any:
                 wide.flat[rng.randrange(max(wide.size, 1))] = rng.choice(NUMBERS)
         return wide
     if choice == 4:
-        return array.astype(rng.choice((np.complex128, np.float16, np.int8, np.uint64, np.bool_, "S5", "U5", np.float32)))
+        return array.astype(
+            rng.choice((np.complex128, np.float16, np.int8, np.uint64, np.bool_, "S5", "U5", np.float32))
+        )
     if choice == 5:
         return array.reshape(rng.choice(((-1,), (1, *array.shape), (*array.shape, 1), array.shape[::-1])))
     if choice == 6:
@@ -239,7 +259,9 @@ def _hostile_array(rng: random.Random, array: Any) -> Any:
 def _strange_npz(members: dict[str, Any], rng: random.Random) -> bytes:
     """Return a zip of arrays that are not what they should be."""
     file = io.BytesIO()
-    method = rng.choice((zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA))
+    method = rng.choice(
+        (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA)
+    )
     chosen = rng.choice(list(members))
     if rng.random() < 0.03:
         return _zip_bomb(f"{chosen}.npy", rng)
@@ -256,7 +278,9 @@ def _strange_npz(members: dict[str, Any], rng: random.Random) -> bytes:
         # Another method of compression, or the mark of one that is encrypted, in the heads of all members.
         for mark, place in ((b"PK\x01\x02", 8), (b"PK\x03\x04", 6)):
             begin = data.find(mark)
-            word = rng.choice(((1).to_bytes(2, "little") + b"\0\0", b"\0\0" + rng.choice((1, 6, 9, 12, 14, 99)).to_bytes(2, "little")))
+            word = rng.choice(
+                ((1).to_bytes(2, "little") + b"\0\0", b"\0\0" + rng.choice((1, 6, 9, 12, 14, 99)).to_bytes(2, "little"))
+            )
             while begin >= 0 and len(data) >= begin + place + 4:
                 data[begin + place : begin + place + 4] = word
                 begin = data.find(mark, begin + 4)
@@ -287,8 +311,13 @@ def _strange_mat(rng: random.Random) -> bytes:
     if rng.random() < 0.05:
         return head + struct.pack("<II", 15, len(bomb("zlib"))) + bomb("zlib")
     numbers = [rng.choice(NUMBERS) for _ in range(rng.choice((0, 1, 2, 12)))]
-    dims_kind, shape_code = rng.choice(((5, "i"), (9, "d"), (9, "d"), (7, "f"), (12, "q"), (13, "Q"), (1, "b"), (16, "i"), (99, "i")))
-    shape = [rng.choice((0, 1, -1, 2, 7, 300, 2**31 - 1, 2**40, math.inf, math.nan, 1e300, 0.5)) for _ in range(rng.choice((1, 2, 2, 2, 3, 33)))]
+    dims_kind, shape_code = rng.choice(
+        ((5, "i"), (9, "d"), (9, "d"), (7, "f"), (12, "q"), (13, "Q"), (1, "b"), (16, "i"), (99, "i"))
+    )
+    shape = [
+        rng.choice((0, 1, -1, 2, 7, 300, 2**31 - 1, 2**40, math.inf, math.nan, 1e300, 0.5))
+        for _ in range(rng.choice((1, 2, 2, 2, 3, 33)))
+    ]
     content, sound = b"", b""
     for value in shape:
         try:
@@ -296,7 +325,7 @@ def _strange_mat(rng: random.Random) -> bytes:
         except (struct.error, ValueError, OverflowError):
             sound += b"\xff" * struct.calcsize(f"<{shape_code}")
     if rng.random() < 0.5:
-        numbers = [12.0, 9.0] + numbers
+        numbers = [12.0, 9.0, *numbers]
         sound, dims_kind = struct.pack("<ii", 1, len(numbers)), 5
     for number in numbers:
         content += struct.pack("<d", number if abs(number) < 1e308 or number != number else math.inf)
@@ -326,7 +355,11 @@ def _strange_kad(rng: random.Random) -> bytes:
             rows = np.array([[150.0, 100.0, 1.0, 20.0, 255.0][:width]] * rng.choice((1, 1, 2, 1001)))
             found[label] = _hostile_array(rng, rows)
     file = io.BytesIO()
-    savemat(file, {name: array for name, array in found.items() if array.dtype.kind in "fiub"}, do_compression=rng.random() < 0.5)
+    savemat(
+        file,
+        {name: array for name, array in found.items() if array.dtype.kind in "fiub"},
+        do_compression=rng.random() < 0.5,
+    )
     return file.getvalue()
 
 
@@ -338,12 +371,18 @@ def _strange_png(rng: random.Random) -> bytes:
     """Return a PNG with any head and any other chunks, all of them with the right check sum."""
     width, height = (rng.choice((0, 1, 99, 100, 300, 8000, 65535, 2**31 - 1, 2**32 - 1)) for _ in "12")
     depth, colour = rng.choice((1, 2, 4, 8, 8, 16, 3)), rng.choice((0, 0, 2, 3, 4, 6, 9))
-    head = _chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, depth, colour, rng.choice((0, 0, 0, 1)), 0, rng.choice((0, 0, 1))))
+    head = _chunk(
+        b"IHDR",
+        struct.pack(">IIBBBBB", width, height, depth, colour, rng.choice((0, 0, 0, 1)), 0, rng.choice((0, 0, 1))),
+    )
     image = zlib.compress(bytes(300 * 301)) if rng.random() < 0.7 else bomb("zlib")
     others = (
-        _chunk(b"zTXt", b"a\0\0" + bomb("zlib")), _chunk(b"iCCP", b"a\0\0" + bomb("zlib")), _chunk(b"PLTE", b"\1\2\3" * rng.choice((1, 256, 400))),
-        _chunk(b"tRNS", b"\0" * rng.choice((1, 2, 6, 300))), _chunk(b"gAMA", b""), _chunk(b"eXIf", rng.randbytes(30)), _chunk(b"pHYs", b"\xff" * 9),
-        _chunk(b"acTL", struct.pack(">II", 2**31, 0)), _chunk(b"IDAT", b""), _chunk(b"iTXt", b"a\0\1\0\0\0" + bomb("zlib")),
+        _chunk(b"zTXt", b"a\0\0" + bomb("zlib")), _chunk(b"iCCP", b"a\0\0" + bomb("zlib")), _chunk(b"PLTE",
+        b"\1\2\3" * rng.choice((1, 256, 400))),
+        _chunk(b"tRNS", b"\0" * rng.choice((1, 2, 6, 300))), _chunk(b"gAMA", b""), _chunk(b"eXIf", rng.randbytes(30)),
+        _chunk(b"pHYs", b"\xff" * 9),
+        _chunk(b"acTL", struct.pack(">II", 2**31, 0)), _chunk(b"IDAT", b""), _chunk(b"iTXt",
+        b"a\0\1\0\0\0" + bomb("zlib")),
     )  # fmt: skip
     middle = b"".join(rng.choice(others) for _ in range(rng.choice((0, 0, 1, 3))))
     return b"\x89PNG\r\n\x1a\n" + head + middle[: BYTES_MAX // 2] + _chunk(b"IDAT", image) + _chunk(b"IEND", b"")
@@ -353,7 +392,17 @@ def _strange_netpbm(rng: random.Random) -> bytes:
     kind = rng.choice((b"P1", b"P2", b"P3", b"P4", b"P5", b"P6", b"P7", b"Pf", b"PF"))
     sizes = b" ".join(str(rng.choice((0, 1, 120, 300, 8000, 65536, -5, 10**30))).encode() for _ in "12")
     depth = rng.choice((b"255", b"65535", b"1", b"0", b"-1", b"9" * 400, b"nan", SECRET.encode()))
-    return kind + b"\n# " + SECRET.encode() + b"\n" + sizes + b"\n" + depth + b"\n" + rng.randbytes(rng.choice((0, 9, 40_000)))
+    return (
+        kind
+        + b"\n# "
+        + SECRET.encode()
+        + b"\n"
+        + sizes
+        + b"\n"
+        + depth
+        + b"\n"
+        + rng.randbytes(rng.choice((0, 9, 40_000)))
+    )
 
 
 # ---- sound files ----
@@ -396,7 +445,11 @@ def _evolved() -> tuple[bytes, bytes, dict[str, Any]]:
         evolution.tell(np.linspace(0.0, 1.0, 4))
         identity = (Path(folder) / "evolution.json").read_bytes()
         generation = (Path(folder) / "generations" / "000001.npz").read_bytes()
-    return identity, generation, {"candidates": asked, "values": np.linspace(0.0, 1.0, 4)[:, None], "seconds": np.float64(1.0)}
+    return (
+        identity,
+        generation,
+        {"candidates": asked, "values": np.linspace(0.0, 1.0, 4)[:, None], "seconds": np.float64(1.0)},
+    )
 
 
 _ARENA_TOML = b"""name = "sound"
@@ -430,7 +483,9 @@ arguments = ["a"]
 brightness = 90
 """
 
-_TEXT_SAMPLES = ("8 2 3 5 2\n" + "".join(f"TURN {n}\n0 1 2 3 4 5 6 1023\n9 8 7 6 5 4 3 2\n" for n in range(3)) + "END\n").encode()
+_TEXT_SAMPLES = (
+    "8 2 3 5 2\n" + "".join(f"TURN {n}\n0 1 2 3 4 5 6 1023\n9 8 7 6 5 4 3 2\n" for n in range(3)) + "END\n"
+).encode()
 
 
 def _kinds() -> Iterator[Kind]:
@@ -440,20 +495,43 @@ def _kinds() -> Iterator[Kind]:
     with tempfile.TemporaryDirectory() as folder:
         save_arena(_arena(), Path(folder) / "sound.toml")
         pictured, png = (Path(folder) / "sound.toml").read_bytes(), (Path(folder) / "sound.png").read_bytes()
-    yield Kind("arena", "own.toml", [_ARENA_TOML, pictured], lambda path: drive_in(Arena.load(path)), "toml", beside=(("sound.png", png),))
+    yield Kind(
+        "arena",
+        "own.toml",
+        [_ARENA_TOML, pictured],
+        lambda path: drive_in(Arena.load(path)),
+        "toml",
+        beside=(("sound.png", png),),
+    )
 
-    pictures = {suffix: _picture_bytes(kind) for suffix, kind in (("png", "PNG"), ("tif", "TIFF"), ("bmp", "BMP"), ("pgm", "PPM"), ("jpg", "JPEG"))}
+    pictures = {
+        suffix: _picture_bytes(kind)
+        for suffix, kind in (("png", "PNG"), ("tif", "TIFF"), ("bmp", "BMP"), ("pgm", "PPM"), ("jpg", "JPEG"))
+    }
     strange = {"png": (_strange_png,), "pgm": (_strange_netpbm,)}
     for suffix, data in pictures.items():
-        yield Kind(suffix, f"own.{suffix}", [data], lambda path: drive_in(Arena.load(path)), strange=strange.get(suffix, ()))
+        yield Kind(
+            suffix, f"own.{suffix}", [data], lambda path: drive_in(Arena.load(path)), strange=strange.get(suffix, ())
+        )
     beside = tuple((name, data) for name, data in (("own.toml", pictured.replace(b"sound.png", b"own.png")),))
-    yield Kind("arena_picture", "own.png", [png, *pictures.values()], lambda path: drive_in(Arena.load(path.with_suffix(".toml"))), beside=beside)
+    yield Kind(
+        "arena_picture",
+        "own.png",
+        [png, *pictures.values()],
+        lambda path: drive_in(Arena.load(path.with_suffix(".toml"))),
+        beside=beside,
+    )
 
     kad = encode_kad(_arena())
     yield Kind("kad", "own.kad", [kad], lambda path: drive_in(Arena.load(path)), strange=(_strange_mat, _strange_kad))
     yield Kind("mat", "own.mat", [kad], lambda path: drive_in(Arena.load(path)))
 
-    project = Project(_arena(), robots=(ProjectRobot(turrets=("k213",)), ProjectRobot(kind="khepera_ii", name="b")), seed=3, thinking="fixed:2").to_bytes()
+    project = Project(
+        _arena(),
+        robots=(ProjectRobot(turrets=("k213",)), ProjectRobot(kind="khepera_ii", name="b")),
+        seed=3,
+        thinking="fixed:2",
+    ).to_bytes()
     projects = [project, project.partition(b"[[start]]")[0] + _PROJECT_EXTRA + b"[walls]\nsize_mm = [300, 260]\n"]
     files = (("own.toml", robots[0]),)
     yield Kind("project", "own.kiks", projects, _project, "toml", (partial(_project_of, png),), files)
@@ -470,11 +548,22 @@ def _kinds() -> Iterator[Kind]:
     identity, generation, arrays = _evolved()
     there = (("evolution.json", identity), ("generations/000001.npz", generation))
     yield Kind("evolution", "evolution.json", [identity], _evolution, "json")
-    yield Kind("generation", "generations/000001.npz", [generation], _evolution, strange=(partial(_strange_npz, arrays),), beside=there[:1])
+    yield Kind(
+        "generation",
+        "generations/000001.npz",
+        [generation],
+        _evolution,
+        strange=(partial(_strange_npz, arrays),),
+        beside=there[:1],
+    )
 
     yield Kind("network", "own.json", [THESIS.read_bytes()[:200_000]], _network, "json")
 
-    table = {"values": np.arange(3 * 4 * 8).reshape(3, 4, 8), "gap_mm": np.array([5.0, 7.0, 9.0]), "object_angle_deg_cw": np.arange(4) * 90.0}
+    table = {
+        "values": np.arange(3 * 4 * 8).reshape(3, 4, 8),
+        "gap_mm": np.array([5.0, 7.0, 9.0]),
+        "object_angle_deg_cw": np.arange(4) * 90.0,
+    }
     yield Kind("samples_table", "own.npz", [_npz(**table)], _samples, strange=(partial(_strange_npz, table),))
     yield Kind("samples_text", "own.sam", [_TEXT_SAMPLES], _samples, "toml")
     yield Kind("replay", "own.txt", [b"".join(b"%d\n" % (n * 1000) for n in range(40))], _replay, "toml")
@@ -487,7 +576,10 @@ def _project_of(png: bytes, rng: random.Random) -> bytes:
 
     picture = _strange_png(rng) if rng.random() < 0.7 else mutated(rng, png)
     text = base64.b64encode(picture[: BYTES_MAX // 2]) + rng.choice((b"", b"", b"=", b"\xff", SECRET.encode()))
-    return b"kiks = 1\n[walls]\nmm_per_cell = %s\npng = '''%s'''\n" % (rng.choice((b"1.0", b"0.1", b"nan", b"1e308")), text)
+    return b"kiks = 1\n[walls]\nmm_per_cell = %s\npng = '''%s'''\n" % (
+        rng.choice((b"1.0", b"0.1", b"nan", b"1e308")),
+        text,
+    )
 
 
 def _files(folder: str) -> list[Any]:

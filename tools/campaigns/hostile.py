@@ -23,11 +23,14 @@ NUMBERS: tuple[Any, ...] = (
 
 OTHERS: tuple[Any, ...] = (
     None, True, False, "", " ", "1", "nan", "\0", "\x1b[31m", "\ud800", SECRET, "x" * 10_000, "../../etc/passwd",
-    "/dev/zero/x", "nowhere.toml", b"", b"\xff" * 300, (), [], {}, [SECRET] * 40, {SECRET: SECRET}, (1.0, 2.0), [1e308] * 2,
+    "/dev/zero/x", "nowhere.toml", b"", b"\xff" * 300, (), [], {}, [SECRET] * 40, {SECRET: SECRET}, (1.0, 2.0),
+    [1e308] * 2,
     [[1], [2, 3]], [float("nan")] * 3, object(), 1j, len, int, range(3), slice(1), Ellipsis,
-    np.float64("nan"), np.float32(1e30), np.int64(-1), np.uint64(2**64 - 1), np.bool_(True), np.array(5.0), np.array([]),
+    np.float64("nan"), np.float32(1e30), np.int64(-1), np.uint64(2**64 - 1), np.bool_(True), np.array(5.0),
+    np.array([]),
     np.array([1e308, -1e308]), np.full((3, 3), np.nan), np.array(["a", "b"]), np.array([None, 1], object),
-    np.zeros((2, 2, 2)), np.arange(4, dtype=np.uint8), np.array([1 + 2j]), np.datetime64("NaT"), np.zeros((120, 120), np.uint8),
+    np.zeros((2, 2, 2)), np.arange(4, dtype=np.uint8), np.array([1 + 2j]), np.datetime64("NaT"), np.zeros((120, 120),
+    np.uint8),
 )  # fmt: skip
 """Values of other types."""
 
@@ -107,21 +110,28 @@ _KEY = re.compile(rb"^[ \t]*\"?([A-Za-z_]\w*)\"?(?=\s*[=:])", re.MULTILINE)
 _LINE = re.compile(rb"^.*\n", re.MULTILINE)
 
 _LITERALS = [
-    repr(number).encode() for number in NUMBERS if abs(number) < 10**40 or number != number or number in (np.inf, -np.inf)
+    repr(number).encode()
+    for number in NUMBERS
+    if abs(number) < 10**40 or number != number or number in (np.inf, -np.inf)
 ]
 _TEXTS = ("", " ", "kiks", "../../etc/passwd", "/dev/zero", "x" * 5000, SECRET)
 _TOML_LITERALS = (
-    *_LITERALS, b"9" * 400, b"9" * 5000, b"-" + b"9" * 400 + b".5", b"1e400", b"1e99999999", b"0x" + b"f" * 300, b"true",
+    *_LITERALS, b"9" * 400, b"9" * 5000, b"-" + b"9" * 400 + b".5", b"1e400", b"1e99999999", b"0x" + b"f" * 300,
+    b"true",
     b"[]", b"{}", b"[[]]", b"[nan, inf]", b"[1, 'a', 2.5]", b"1979-05-27T07:32:00Z", b"07:32:00", b"1979-05-27",
-    b"[" * 300 + b"]" * 300, b"[" * 5000 + b"]" * 5000, b"{a=" * 2000 + b"1" + b"}" * 2000, b"[" + b"1," * 20_000 + b"]",
-    b'"\\u0000"', b'"\\u001b[31m"', b"'''\n\n'''", *(f'"{text}"'.encode() for text in _TEXTS), b'["' + SECRET.encode() + b'"]',
+    b"[" * 300 + b"]" * 300, b"[" * 5000 + b"]" * 5000, b"{a=" * 2000 + b"1" + b"}" * 2000,
+    b"[" + b"1," * 20_000 + b"]",
+    b'"\\u0000"', b'"\\u001b[31m"', b"'''\n\n'''", *(f'"{text}"'.encode() for text in _TEXTS),
+    b'["' + SECRET.encode() + b'"]',
     b'{"' + SECRET.encode() + b'" = 1}', b"[[1, 2], [3]]", b"[1e308, 1e308, 1e308, 1e308, 1e308, 1e308, 1e308, 1e308]",
     b"[nan, nan, nan, nan, nan, nan, nan, nan]", b"[1e20, 0, 0, 0, 0, 0, 0, 0]",
 )  # fmt: skip
 _JSON_LITERALS = (
-    *(word.replace(b"inf", b"Infinity").replace(b"nan", b"NaN") for word in _LITERALS), b"9" * 400, b"9" * 5000, b"1e400",
+    *(word.replace(b"inf", b"Infinity").replace(b"nan", b"NaN") for word in _LITERALS), b"9" * 400, b"9" * 5000,
+    b"1e400",
     b"null", b"true", b"[]", b"{}", b"[[]]", b"[NaN, Infinity]", b'[1, "a"]', b"[" * 300 + b"]" * 300,
-    b"[" * 100_000 + b"]" * 100_000, b'{"a":' * 50_000 + b"1" + b"}" * 50_000, b"[" + b"1," * 20_000 + b"1]", b'"\\u0000"',
+    b"[" * 100_000 + b"]" * 100_000, b'{"a":' * 50_000 + b"1" + b"}" * 50_000, b"[" + b"1," * 20_000 + b"1]",
+    b'"\\u0000"',
     b'"\\ud800"', *(f'"{text}"'.encode() for text in _TEXTS), b'{"' + SECRET.encode() + b'": 1}',
 )  # fmt: skip
 
@@ -140,7 +150,11 @@ def mutated_text(rng: random.Random, data: bytes, others: Sequence[bytes] = (), 
         elif choice < 0.85:
             data = data.replace(_one(rng, data, _VALUE) or b"\0", rng.choice(_TOML_LITERALS))
         elif choice < 0.88 and not is_json:
-            data += b"\n" + rng.choice((b".".join([b"a"] * rng.choice((200, 20_000, 60_000))), _one(rng, data, _KEY))) + b" = 1\n"
+            data += (
+                b"\n"
+                + rng.choice((b".".join([b"a"] * rng.choice((200, 20_000, 60_000))), _one(rng, data, _KEY)))
+                + b" = 1\n"
+            )
         elif choice < 0.9 and not is_json:
             data += b"\n" + rng.choice((b"[a]\n", b"[[robot]]\n", b"[walls.x]\n", b"[" + b"a." * 20_000 + b"b]\n"))
         else:
@@ -156,7 +170,9 @@ def _one(rng: random.Random, data: bytes, pattern: re.Pattern[bytes]) -> bytes:
 
 def _key(rng: random.Random, data: bytes) -> bytes:
     other = _one(rng, data, _KEY) or b"a"
-    return rng.choice((other, other + b"x", b"a.b", b"a." * 20_000 + b"b", SECRET.encode(), b'"' + SECRET.encode() * 3 + b'"'))
+    return rng.choice(
+        (other, other + b"x", b"a.b", b"a." * 20_000 + b"b", SECRET.encode(), b'"' + SECRET.encode() * 3 + b'"')
+    )
 
 
 def _with(rng: random.Random, data: bytes, pattern: re.Pattern[bytes], new: bytes) -> bytes:

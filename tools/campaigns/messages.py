@@ -110,7 +110,9 @@ def _number_text(rng: random.Random) -> str:
     if choice < 0.7:
         number = rng.choice(NUMBERS)
         return str(number) if abs(number) < 2**70 or number != number else "9" * 400
-    return rng.choice(("NaN", "Inf", "-Inf", "1e400", "0x10", "1_0", "٣", "", SECRET, "x" * 5000, "-1", "1", "2", "\\n", "\0"))
+    return rng.choice(
+        ("NaN", "Inf", "-Inf", "1e400", "0x10", "1_0", "٣", "", SECRET, "x" * 5000, "-1", "1", "2", "\\n", "\0")
+    )
 
 
 def _matrix_text(rng: random.Random) -> str:
@@ -131,11 +133,14 @@ def _request(rng: random.Random) -> str:
     """Return what Octave may ask for."""
     name = rng.choice([*REQUESTS, "open", "open", "set_robot", "set_robot", "set_object", "spawn", "send", "nonsense"])
     port = rng.choice(("1", "1", "1", "2", _number_text(rng)))
-    numbers = [_number_text(rng) if rng.random() < 0.5 else rng.choice(("1", "2", "100", "150", "0.5")) for _ in range(5)]
+    numbers = [
+        _number_text(rng) if rng.random() < 0.5 else rng.choice(("1", "2", "100", "150", "0.5")) for _ in range(5)
+    ]
     words = {
         "open": f"{port} {rng.choice(('9600', '9600', _number_text(rng)))}",
         "set": f"{rng.choice([each.name for each in fields(Settings)])} {_number_text(rng)}",
-        "world": rng.choice(("default", f"matrix {_matrix_text(rng)}", f"matrix {_matrix_text(rng)} {_matrix_text(rng)}", f"file {_number_text(rng)}")),
+        "world": rng.choice(("default", f"matrix {_matrix_text(rng)}",
+        f"matrix {_matrix_text(rng)} {_matrix_text(rng)}", f"file {_number_text(rng)}")),
         "send": f"{port} " + rng.choice(("N", "N\\n", "D,5,5\\n", _number_text(rng) + "\\n")),
         "ask": f"{port} {rng.choice(('N', 'T,2,N', _number_text(rng)))}",
         "pause": _pause_text(rng),
@@ -149,7 +154,9 @@ def _request(rng: random.Random) -> str:
     if rng.random() < 0.1:
         line = mutated(rng, line.encode()).decode("utf-8", errors="replace")
     # What comes on a line has no end in it, and mutations must not make pauses that are rightly waited for.
-    return line.replace("\n", " ") if "pause" not in line or name == "pause" and line == f"{name} {words}" else "time 1"
+    return (
+        line.replace("\n", " ") if "pause" not in line or (name == "pause" and line == f"{name} {words}") else "time 1"
+    )
 
 
 def _pause_text(rng: random.Random) -> str:
@@ -226,7 +233,9 @@ def _check_answer(line: str, said: str, failure: Any) -> None:
         try:
             check_message(ParameterError(unescape(said[21:])))
         except Broken as broken:
-            raise Broken("message", f"{line[:80]!r}: {broken}", f"{broken.where.partition(',')[0]}, request {name[:20]}") from None
+            raise Broken(
+                "message", f"{line[:80]!r}: {broken}", f"{broken.where.partition(',')[0]}, request {name[:20]}"
+            ) from None
 
 
 def campaigns() -> Iterator[Campaign]:

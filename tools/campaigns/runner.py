@@ -48,7 +48,7 @@ CASE, BEGUN_NS, PLAYED, TRIED, REFUSED, PEAK_KB, PEAK_CASE = range(7)
 Play = Callable[[random.Random], "int | None"]
 
 
-class Broken(Exception):
+class Broken(Exception):  # noqa: N818  (a verdict)
     """A case that breaks a promise.
 
     Args:
@@ -212,9 +212,7 @@ class _Child:
             _live(play, campaign, range(self.next, cases.stop, cases.step), seed, self.row, self.errors, report)
 
 
-def _live(
-    play: Play, campaign: Campaign, cases: range, seed: int, row: Any, errors: Path, report: Path
-) -> NoReturn:
+def _live(play: Play, campaign: Campaign, cases: range, seed: int, row: Any, errors: Path, report: Path) -> NoReturn:
     """Play cases until there are no more, then end this process at once."""
     code = 1
     try:
