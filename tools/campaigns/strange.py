@@ -67,6 +67,7 @@ _SHAPES = (
 
 
 def strange_npy(rng: random.Random) -> bytes:
+    """Return a .npy file whose head lies."""
     if rng.random() < 0.2:
         header = rng.choice(
             (b"(" * 50_000, b"{" * 3000, b"[" * 90 + b"]" * 90, b"-" * 9000 + b"1", b"\xff" * 100, SECRET.encode())
@@ -237,6 +238,7 @@ def strange_png(rng: random.Random) -> bytes:
 
 
 def strange_netpbm(rng: random.Random) -> bytes:
+    """Return a PBM, PGM, PPM or PFM with any head."""
     kind = rng.choice((b"P1", b"P2", b"P3", b"P4", b"P5", b"P6", b"P7", b"Pf", b"PF"))
     sizes = b" ".join(str(rng.choice((0, 1, 120, 300, 8000, 65536, -5, 10**30))).encode() for _ in "12")
     depth = rng.choice((b"255", b"65535", b"1", b"0", b"-1", b"9" * 400, b"nan", SECRET.encode()))
