@@ -1,0 +1,111 @@
+"""The campaign against KiKS: a share of each part with fixed seeds, and that it notices what is planted."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+TOOL = Path(__file__).parents[1] / "tools" / "torture.py"
+
+
+def torture(*words: str) -> tuple[int, dict[str, float], str]:
+    """Return exit code, figures and table of a campaign."""
+    done = subprocess.run([sys.executable, str(TOOL), "--json", *words], capture_output=True, text=True, check=False)
+    figures: dict[str, Any] = json.loads(done.stdout) if done.stdout else {}
+    return done.returncode, figures, done.stderr
+
+
+def check(*words: str) -> None:
+    """Check that no promise is broken."""
+    code, _, table = torture(*words)
+    assert code == 0, table
+
+
+# ---- the tool itself ----
+
+
+@cache
+def planted() -> tuple[int, dict[str, float], str]:
+    return torture("--only", "planted")
+
+
+@pytest.mark.parametrize(
+    ("figure", "count"),
+    [("deaths", 4), ("hangs", 3), ("files_lost", 3), ("foreign_exceptions", 4 + 3 + 2)],
+)
+def test_what_is_planted_is_found(figure: str, count: int) -> None:
+    code, figures, table = planted()
+    assert code == 1
+    assert figures[f"torture.{figure}"] == count, table
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "4 x foreign: ZeroDivisionError",
+        "SIGABRT; first --only planted.dies",
+        "3 x foreign: MemoryError",
+        "message: secret, ParameterError",
+        "campaigns/planted.py, _hangs: longer than 0.5 s",
+    ],
+)
+def test_a_finding_tells_its_cause_and_its_case(words: str) -> None:
+    assert words in planted()[2]
+
+
+def test_a_case_that_dies_ends_no_other() -> None:
+    _, figures, table = planted()
+    tried = {name.rpartition(".")[2]: count for name, count in figures.items() if ".tried." in name}
+    assert tried == {"raises": 12, "dies": 12, "eats": 12, "tells": 12, "loses": 12, "refuses": 12, "hangs": 3}, table
+
+
+def test_a_case_can_be_played_alone() -> None:
+    done = subprocess.run(
+        [sys.executable, str(TOOL), "--only", "planted.raises", "--case", "1"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert "ZeroDivisionError: planted" in done.stderr
+
+
+def test_what_is_refused_breaks_nothing() -> None:
+    check("--only", "planted.refuses")
+
+
+# ---- KiKS ----
+
+
+def test_a_few_hostile_bytes() -> None:
+    check("--only", "wire", "--cases", "2", "--seed", "11")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("group", ["files", "calls", "messages"])
+def test_a_share_of_hostile_cases(group: str) -> None:
+    check("--only", group, "--cases", "60", "--seed", "12")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scene", ["kill_writer", "fill_disk", "write_nowhere", "no_descriptors"])
+def test_files_are_whole(scene: str) -> None:
+    check("--only", f"faults.{scene}", "--cases", "60", "--seed", "13")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scene", ["evolution", "worker", "client", "server", "session", "desk"])
+def test_who_is_killed_takes_nothing_along(scene: str) -> None:
+    check("--only", f"faults.kill_{scene}", "--cases", "1", "--seed", "14")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("door", ["serve", "desk", "session", "many_robots"])
+def test_a_crowd_keeps_nobody_out(door: str) -> None:
+    check("--only", f"crowd.{door}", "--cases", "1", "--seed", "15")

@@ -1,0 +1,1 @@
+"""The campaigns of `tools/torture.py`, one file a subject."""

@@ -1,0 +1,380 @@
+"""Every kind of file that KiKS reads, mutated, read, and what was read used as it would be."""
+
+from __future__ import annotations
+
+import io
+import random
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache, partial
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from tools.campaigns.hostile import BYTES_MAX, mutated, mutated_text
+from tools.campaigns.runner import SECRET, Campaign, Play
+from tools.campaigns.strange import bomb, strange_kad, strange_mat, strange_netpbm, strange_npz, strange_png
+
+import kiks
+from kiks.clock.thinking import parse_thinking
+from kiks.desk.folder import decode
+from kiks.fit.models import thesis
+from kiks.fit.samples import load_samples, nearnesses
+from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
+from kiks.model.arena_file import save_arena
+from kiks.model.kad import encode_kad
+from kiks.model.network import THESIS, NetworkResponse
+from kiks.model.project import Project, ProjectRobot
+from kiks.sim.building import simulation_of
+from kiks.sim.simulation import Simulation
+from kiks.toolbox.host import Door
+
+CASES = 10_000
+"""Mutations of each kind of file."""
+
+MEMORY_MB = 2000
+"""Most memory for a file [MB]."""
+
+CELLS_MAX = 2_000_000
+"""Larger arenas are read, and driven in but seldom: that takes many seconds and is right."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of file.
+
+    Args:
+        name: What the campaign is called.
+        file: Its name in its folder.
+        sound: Good files of the kind.
+        read: Reads one and uses what it has read.
+        text: Whether it is 'toml' or 'json', or neither.
+        strange: What makes files of the kind that mutations would hardly find.
+        beside: Other files of the folder.
+    """
+
+    name: str
+    file: str
+    sound: Sequence[bytes]
+    read: Callable[[Path], object]
+    text: str = ""
+    strange: Sequence[Callable[[random.Random], bytes]] = ()
+    beside: tuple[tuple[str, bytes], ...] = ()
+
+    def make(self, rng: random.Random) -> bytes:
+        """Return a hostile file."""
+        data, choice = rng.choice(self.sound), rng.random()
+        if self.strange and choice < 0.4:
+            return rng.choice(self.strange)(rng)
+        if self.text and choice < 0.85:
+            return mutated_text(rng, data, self.sound, is_json=self.text == "json")
+        return mutated(rng, data, self.sound)
+
+    def prepare(self) -> Play:
+        """Return what plays a case."""
+
+        def play(rng: random.Random) -> None:
+            with tempfile.TemporaryDirectory(prefix="kiks-torture-") as folder:
+                for name, data in self.beside:
+                    (Path(folder) / name).write_bytes(data)
+                file = Path(folder) / self.file
+                file.parent.mkdir(exist_ok=True)
+                file.write_bytes(self.make(rng)[:BYTES_MAX])
+                self.read(file)
+
+        return play
+
+
+# ---- what is done with what was read ----
+
+
+def drive(sim: Simulation) -> None:
+    """Let the robots of a world sense and drive."""
+    for number in range(1, min(sim.robot_count, 3) + 1):
+        port = sim.port(number)
+        port.timeout = 5.0
+        port.write(b"D,9,-7\nN\nO\nE\n")
+        port.read(200)
+        if sim.turrets(number):
+            port.write(b"T,2,N\nT,1,F\n")
+            port.read(400)
+    sim.run(0.05)
+    sim.look()
+    sim.state_hash()
+
+
+def drive_in(arena: Arena) -> None:
+    """Let a robot drive in an arena."""
+    if arena.brightness.size <= CELLS_MAX:
+        drive(Simulation(arena, robots=max(1, min(len(arena.starts), 20)), seed=1))
+
+
+def _robot(path: Path) -> None:
+    drive(Simulation(_BOX, robot=[str(path), "khepera"], seed=1))
+
+
+def _project(path: Path) -> None:
+    project = Project.load(path)
+    project.to_bytes()
+    if project.arena.brightness.size <= CELLS_MAX and len(project.robots) <= 20:
+        drive(simulation_of(project, path.parent))
+
+
+def _uploaded(path: Path) -> None:
+    project = decode(path.name, path.read_bytes())
+    if project.arena.brightness.size <= CELLS_MAX and len(project.robots) <= 20:
+        drive(simulation_of(project, path.parent))
+
+
+def _champion(path: Path) -> None:
+    champion = kiks.Champion.load(path)
+    sim, ports = champion.simulation(_BOX, seed=1)
+    driver = champion.driver(ports)
+    for _ in range(3):
+        driver.step()
+    sim.state_hash()
+
+
+def _evolution(path: Path) -> None:
+    folder = path.parent if path.name == "evolution.json" else path.parents[1]
+    evolution = kiks.Evolution(_task(), "ga", seed=3, population=4, folder=folder)
+    evolution.ask()
+    if evolution.generations:
+        evolution.champion._text({})
+
+
+def _network(path: Path) -> None:
+    thesis(_SAMPLES[0], NetworkResponse.load(path))
+
+
+def _samples(path: Path) -> None:
+    samples = load_samples(path)
+    if samples.counts.size <= 100_000:
+        nearnesses(samples, _FAN)
+
+
+def _replay(path: Path) -> None:
+    sim = Simulation(_BOX, thinking=f"replay:{path}", seed=1)
+    parse_thinking(f"replay:{path}")
+    drive(sim)
+
+
+# ---- sound files ----
+
+
+def _picture_bytes(suffix: str) -> bytes:
+    from PIL import Image
+
+    file = io.BytesIO()
+    raster = np.zeros((120, 140), np.uint8)
+    raster[:10], raster[60:70, 30:90] = 255, 128
+    Image.fromarray(raster).save(file, suffix)
+    return file.getvalue()
+
+
+def _arena() -> Arena:
+    box = Arena.box(300, 260, rounded_mm=40)
+    return Arena(
+        box.brightness, 1.0, "sound", (Pose(100.0, 100.0, 1.0), Pose(200.0, 120.0, -2.0)), (Lamp(50.0, 50.0, 1.0),),
+        (Ball(150.0, 200.0),), (Cylinder(220.0, 200.0),),
+    )  # fmt: skip
+
+
+def _npz(**arrays: Any) -> bytes:
+    file = io.BytesIO()
+    np.savez(file, **arrays)
+    return file.getvalue()
+
+
+@cache
+def _task() -> kiks.Task:
+    return kiks.tasks.avoid(seconds=1.0, worlds=3)
+
+
+def _evolved() -> tuple[bytes, bytes, dict[str, Any]]:
+    """Return what an evolution leaves: its identity, its first generation, and the arrays of that."""
+    with tempfile.TemporaryDirectory() as folder:
+        evolution = kiks.Evolution(_task(), "ga", seed=3, population=4, folder=folder)
+        asked = evolution.ask()
+        evolution.tell(np.linspace(0.0, 1.0, 4))
+        identity = (Path(folder) / "evolution.json").read_bytes()
+        generation = (Path(folder) / "generations" / "000001.npz").read_bytes()
+    return (
+        identity,
+        generation,
+        {"candidates": asked, "values": np.linspace(0.0, 1.0, 4)[:, None], "seconds": np.float64(1.0)},
+    )
+
+
+_ARENA_TOML = b"""name = "sound"
+size_mm = [300, 260]
+wall_mm = 10
+rounded_mm = 30
+brightness = 200
+[[start]]
+at_mm = [100, 100]
+heading_deg = 45
+[[lamp]]
+at_mm = [50.5, 60]
+power_w = 1.0
+is_on = true
+[[ball]]
+at_mm = [150, 200]
+radius_mm = 20.0
+friction_mm_s2 = 20.0
+brightness = 255
+[[cylinder]]
+at_mm = [220, 200]
+radius_mm = 14
+"""
+
+_PROJECT_EXTRA = b"""
+[[robot]]
+name = "one"
+kind = "own.toml"
+turrets = ["k213", "gripper"]
+arguments = ["a"]
+brightness = 90
+"""
+
+_TEXT_SAMPLES = (
+    "8 2 3 5 2\n" + "".join(f"TURN {n}\n0 1 2 3 4 5 6 1023\n9 8 7 6 5 4 3 2\n" for n in range(3)) + "END\n"
+).encode()
+
+
+def _kinds() -> Iterator[Kind]:
+    robots = [path.read_bytes() for path in _files("robots") if path.name.endswith(".toml")]
+    yield Kind("robot", "own.toml", robots, _robot, "toml")
+
+    with tempfile.TemporaryDirectory() as folder:
+        save_arena(_arena(), Path(folder) / "sound.toml")
+        pictured, png = (Path(folder) / "sound.toml").read_bytes(), (Path(folder) / "sound.png").read_bytes()
+    yield Kind(
+        "arena",
+        "own.toml",
+        [_ARENA_TOML, pictured],
+        lambda path: drive_in(Arena.load(path)),
+        "toml",
+        beside=(("sound.png", png),),
+    )
+
+    pictures = {
+        suffix: _picture_bytes(kind)
+        for suffix, kind in (("png", "PNG"), ("tif", "TIFF"), ("bmp", "BMP"), ("pgm", "PPM"), ("jpg", "JPEG"))
+    }
+    strange = {"png": (strange_png,), "pgm": (strange_netpbm,)}
+    for suffix, data in pictures.items():
+        yield Kind(
+            suffix, f"own.{suffix}", [data], lambda path: drive_in(Arena.load(path)), strange=strange.get(suffix, ())
+        )
+    beside = tuple((name, data) for name, data in (("own.toml", pictured.replace(b"sound.png", b"own.png")),))
+    yield Kind(
+        "arena_picture",
+        "own.png",
+        [png, *pictures.values()],
+        lambda path: drive_in(Arena.load(path.with_suffix(".toml"))),
+        beside=beside,
+    )
+
+    kad = encode_kad(_arena())
+    yield Kind("kad", "own.kad", [kad], lambda path: drive_in(Arena.load(path)), strange=(strange_mat, strange_kad))
+    yield Kind("mat", "own.mat", [kad], lambda path: drive_in(Arena.load(path)))
+
+    project = Project(
+        _arena(),
+        robots=(ProjectRobot(turrets=("k213",)), ProjectRobot(kind="khepera_ii", name="b")),
+        seed=3,
+        thinking="fixed:2",
+    ).to_bytes()
+    projects = [project, project.partition(b"[[start]]")[0] + _PROJECT_EXTRA + b"[walls]\nsize_mm = [300, 260]\n"]
+    files = (("own.toml", robots[0]),)
+    yield Kind("project", "own.kiks", projects, _project, "toml", (partial(_project_of, png),), files)
+    yield Kind("upload_project", "own.kiks", projects, _uploaded, "toml")
+    yield Kind("upload_arena", "own.toml", [_ARENA_TOML, pictured], _uploaded, "toml")
+
+    task = _task()
+    champion = kiks.Champion(task.controller, (0.1,) * task.parameter_count, task="avoid", measures={"a": 1.0})
+    with tempfile.TemporaryDirectory() as folder:
+        champion.save(Path(folder) / "own.toml")
+        saved = (Path(folder) / "own.toml").read_bytes()
+    yield Kind("champion", "own.toml", [saved], _champion, "toml")
+
+    identity, generation, arrays = _evolved()
+    there = (("evolution.json", identity), ("generations/000001.npz", generation))
+    yield Kind("evolution", "evolution.json", [identity], _evolution, "json")
+    yield Kind(
+        "generation",
+        "generations/000001.npz",
+        [generation],
+        _evolution,
+        strange=(partial(strange_npz, arrays),),
+        beside=there[:1],
+    )
+
+    yield Kind("network", "own.json", [THESIS.read_bytes()[:200_000]], _network, "json")
+
+    table = {
+        "values": np.arange(3 * 4 * 8).reshape(3, 4, 8),
+        "gap_mm": np.array([5.0, 7.0, 9.0]),
+        "object_angle_deg_cw": np.arange(4) * 90.0,
+    }
+    yield Kind("samples_table", "own.npz", [_npz(**table)], _samples, strange=(partial(strange_npz, table),))
+    yield Kind("samples_text", "own.sam", [_TEXT_SAMPLES], _samples, "toml")
+    yield Kind("replay", "own.txt", [b"".join(b"%d\n" % (n * 1000) for n in range(40))], _replay, "toml")
+    yield Kind("door", "session-1", [Door(1, 4711, SECRET).line().encode()], Door.read, "toml")
+
+
+def _project_of(png: bytes, rng: random.Random) -> bytes:
+    """Return a project with any picture for its walls."""
+    import base64
+
+    picture = strange_png(rng) if rng.random() < 0.7 else mutated(rng, png)
+    text = base64.b64encode(picture[: BYTES_MAX // 2]) + rng.choice((b"", b"", b"=", b"\xff", SECRET.encode()))
+    return b"kiks = 1\n[walls]\nmm_per_cell = %s\npng = '''%s'''\n" % (
+        rng.choice((b"1.0", b"0.1", b"nan", b"1e308")),
+        text,
+    )
+
+
+def _files(folder: str) -> list[Any]:
+    return list((resources.files("kiks.model") / folder).iterdir())
+
+
+_BOX = Arena.box(300, 300)
+_FAN: Any = None
+_SAMPLES: list[Any] = []
+
+
+def _warm() -> None:
+    """Have everything loaded and compiled that cases need."""
+    global _FAN
+    if _FAN is not None:
+        return
+    from kiks.fit.networks import PLACES
+    from kiks.fit.samples import Fan
+
+    drive(Simulation(_arena(), robots=2, seed=1))
+    drive(simulation_of(Project(_arena(), robots=(ProjectRobot(turrets=("k213", "gripper")),), response="thesis")))
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "own.sam").write_bytes(_TEXT_SAMPLES)
+        _SAMPLES.append(load_samples(Path(folder) / "own.sam"))
+        _champion_file = Path(folder) / "own.toml"
+        task = _task()
+        kiks.Champion(task.controller, (0.1,) * task.parameter_count).save(_champion_file)
+        _champion(_champion_file)
+    _FAN = Fan.spread(*PLACES["rim"])
+    for kind in ("zlib", "deflate"):
+        bomb(kind)
+
+
+def _prepared(kind: Kind) -> Play:
+    _warm()
+    return kind.prepare()
+
+
+def campaigns() -> Iterator[Campaign]:
+    """Yield one for each kind of file."""
+    for kind in _kinds():
+        yield Campaign(f"files.{kind.name}", CASES, partial(_prepared, kind), memory_mb=MEMORY_MB)
