@@ -76,7 +76,7 @@ def test_a_slower_computer_lets_more_time_pass() -> None:
         ("fixed:-1", "'fixed:-1'"),
         ("live:nan", "a factor from 0"),
         ("replay:", "must be 'none'"),
-        ("replay:/no/such/file", "must be readable text"),
+        ("replay:/no/such/file", "must exist, but there is no such file"),
     ],
 )
 def test_errors_name_the_rule_and_the_value(text: str, words: str) -> None:
@@ -85,11 +85,18 @@ def test_errors_name_the_rule_and_the_value(text: str, words: str) -> None:
     assert words in str(caught.value)
 
 
-def test_a_bad_replay_file_is_named_with_its_line(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "line", ["hunter2", "-1", "1.5", "1" * 19, "1" * 5000, "\u0663", "\u00b2", "", "1 2", "\0", "nan"]
+)
+def test_a_bad_line_of_a_replay_file_is_named_but_not_repeated(line: str, tmp_path: Path) -> None:
     path = tmp_path / "times.txt"
-    path.write_text("100\nfast\n")
-    with pytest.raises(kiks.ParameterError, match=r"line 2, must be a whole number.*'fast'"):
+    path.write_text(f"100\n{line}\n7\n", encoding="utf-8")
+    with pytest.raises(kiks.ParameterError, match=r"line 2, must be a whole number of ns") as caught:
         parse_thinking(f"replay:{path}")
+    assert str(caught.value).replace(str(path), "") == (
+        "replay file '', line 2, must be a whole number of ns of at most 18 digits, but it is something else. "
+        "Record a run again with thinking 'live'."
+    )
 
 
 def test_threads_that_ran_before_keep_real_time() -> None:

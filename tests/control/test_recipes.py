@@ -53,7 +53,8 @@ def test_a_file(tmp_path: Path) -> None:
     assert found.recipe == made.recipe
     elsewhere = kiks.controllers.recipe_for(made, tmp_path / "deeper")
     assert elsewhere == made.recipe
-    assert kiks.controllers.from_recipe(elsewhere) is found
+    with pytest.raises(kiks.ParameterError, match="must lead to a file in the"):
+        kiks.controllers.from_recipe(elsewhere, tmp_path)
 
 
 def test_a_module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -78,26 +79,46 @@ def test_nobody_finds_what_is_inside_a_function() -> None:
 @pytest.mark.parametrize(
     ("recipe", "message"),
     [
-        ("mlp", "a recipe must be a table"),
-        ({}, "a recipe must have a kind, or a function, or a file and a name, but it had nothing"),
-        ({"file": "mine.py"}, "but it had file"),
-        ({"file": "mine.py", "name": 3}, "texts for function, file and name"),
-        ({"kind": "mpl"}, "kind in a recipe must be one of linear, mlp, ctrnn, gru, but it was 'mpl'. Did you mean"),
-        ({"kind": ["mlp"]}, "kind in a recipe must be one of"),
-        ({"kind": "mlp", "hiden": [3]}, "but it had 'hiden'. Did you mean 'hidden'"),
-        ({"kind": "mlp", "hidden": [3.5]}, "hidden units must be a whole number"),
-        ({"function": "shy"}, "function in a recipe must be 'module:name'"),
+        ("mlp", "must be a table with a kind .*, or a function, or a file and a name, but it was 'mlp'"),
+        ({}, "must be a table with a kind .*, or a function, or a file and a name, but it was {}"),
+        ({"file": "mine.py"}, "name must be given, but it is missing"),
+        ({"file": "mine.py", "name": 3}, "name must be a text .*, but it was 3"),
+        ({"kind": "mpl"}, "Did you mean 'mlp'"),
+        ({"kind": ["mlp"]}, "must be a table with a kind"),
+        ({"kind": "mlp", "hiden": [3]}, "but it has 'hiden'. Did you mean 'hidden'"),
+        ({"kind": "mlp", "hidden": [3.5]}, r"hidden\[0\] must be a whole number from 1 to 256, but it was 3.5"),
+        ({"kind": "mlp", "hidden": [10**9]}, r"hidden\[0\] must be a whole number from 1 to 256, but it was 1000000000"),
+        ({"kind": "mlp", "hidden": [256] * 9}, "hidden must be a list of 0 to 8 values"),
+        ({"kind": "gru", "speed_limit": float("nan")}, "speed_limit must be a number from 0 to 127, but it was nan"),
+        ({"kind": "gru", "senses": ["ambient", "ambient"]}, "senses must name each sense once"),
+        ({"function": "shy"}, "function must be 'package.module:name', but it was 'shy'"),
         ({"function": "no_such_module_here:shy"}, "module 'no_such_module_here' must be one that Python can import"),
         ({"function": "kiks.errors:shy"}, "the module 'kiks.errors' must define 'shy', but does not"),
         ({"function": "kiks.errors:nearest"}, "must name a controller, but it names <function nearest"),
-        ({"file": "nowhere.py", "name": "shy"}, "the recipe's file must exist, but there was none at .*nowhere.py"),
+        ({"file": "nowhere.py", "name": "shy"}, "must be a Python program that is there, .* but it was 'nowhere.py'"),
         ({"file": "mine.py", "name": "shi"}, "must define 'shi', but does not. Did you mean 'shy'"),
         ({"file": "mine.py", "name": "plain"}, "Write @kiks.controller over the function"),
-        ({"file": "mine.txt", "name": "shy"}, "must be a Python program"),
+        ({"file": "mine.txt", "name": "shy"}, "file must be a Python file"),
+        ({"file": "bad.py", "name": "shy"}, r"must be a Python file that runs, but it raised ZeroDivisionError\("),
+        ({"file": "quits.py", "name": "shy"}, r"must be a Python file that runs, but it raised SystemExit\("),
+        ({"file": ".git/mine.py", "name": "shy"}, "in no hidden folder, but it was '.git/mine.py'"),
+        ({"file": ".mine.py", "name": "shy"}, "in no hidden folder, but it was '.mine.py'"),
+        ({"file": "../mine.py", "name": "shy"}, "must lead to a file in the"),
+        ({"file": "/tmp/mine.py", "name": "shy"}, "must lead to a file in the"),
+        ({"file": "linked/mine.py", "name": "shy"}, "must lie in the folder of the file that names it"),
+        ({"file": "link.py", "name": "shy"}, "must lie in the folder of the file that names it"),
     ],
 )
 def test_what_is_no_recipe(recipe: Any, message: str, tmp_path: Path) -> None:
-    (tmp_path / "mine.py").write_text(SHY)
-    (tmp_path / "mine.txt").write_text(SHY)
+    folder, elsewhere = tmp_path / "folder", tmp_path / "elsewhere"
+    for place in (elsewhere, folder / ".git"):
+        place.mkdir(parents=True)
+        (place / "mine.py").write_text(SHY)
+    for name in ("mine.py", "mine.txt", ".mine.py"):
+        (folder / name).write_text(SHY)
+    (folder / "bad.py").write_text("1 / 0\n")
+    (folder / "quits.py").write_text("raise SystemExit('no')\n")
+    (folder / "linked").symlink_to(elsewhere)
+    (folder / "link.py").symlink_to(elsewhere / "mine.py")
     with pytest.raises(kiks.ParameterError, match=message):
-        kiks.controllers.from_recipe(recipe, tmp_path)
+        kiks.controllers.from_recipe(recipe, folder)

@@ -294,13 +294,15 @@ def test_a_champion_drives_on_the_wire_as_in_the_batch() -> None:
 @pytest.mark.parametrize(
     ("before", "after", "said"),
     [
-        ("champion = 1", "champion = 9", "the version of the format"),
+        ("champion = 1", "champion = 9", "champion must be one of 1, but it was 9. It is the version of the format"),
         ('kind = "linear"', 'kind = "linaer"', "Did you mean 'linear'"),
         ("parameters = [", "parameters = [\n    1.0,", "must be given 18 parameters, but got 19"),
-        ("period_s = 0.1", "period_s = -1", "period_s must be from 0"),
+        ("period_s = 0.1", "period_s = -1", "timing.period_s must be a number from 0 to 1000, but it was -1"),
         ("seed = 3", "sed = 3", "Did you mean 'seed'"),
-        ('robot = "khepera"\n', "", "there must be a key 'robot'"),
-        ("champion = 1", "champion = ", "must be a champion's file"),
+        ('robot = "khepera"\n', "", "robot must be given, but it is missing"),
+        ("champion = 1", "champion = ", "must be TOML in UTF-8"),
+        ("fitness = ", "fitness = nan #", "fitness must be a finite number, but it was nan"),
+        ("[controller]", "[measures.deep]\na = 1\n[controller]", "measures must be a table|measures.* must be"),
     ],
 )
 def test_wrong_champions_are_named(before: str, after: str, said: str, tmp_path: Path) -> None:

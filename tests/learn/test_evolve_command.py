@@ -70,8 +70,8 @@ def test_the_tasks_are_listed() -> None:
         (("evolve", "avoyd"), "Did you mean 'avoid'"),
         (("evolve", "avoid", "--workers", "2", "--ray", "auto"), "--workers must be left out with --ray"),
         (("demo", "folow"), "Did you mean 'follow'"),
-        (("run", "nowhere.toml"), "must be a champion's file"),
-        (("drive", "nowhere.toml", "--port", "kiks://1"), "must be a champion's file"),
+        (("run", "nowhere.toml"), "Champion's file 'nowhere.toml' must exist"),
+        (("drive", "nowhere.toml", "--port", "kiks://1"), "Champion's file 'nowhere.toml' must exist"),
     ],
 )
 def test_wrong_words_are_named(words: tuple[str, ...], said: str) -> None:

@@ -9,24 +9,29 @@ times, so how long a loop takes depends on what the robots say: `n,0,...` is sho
 
 from __future__ import annotations
 
-import math
 from collections import namedtuple
-from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import Field
 
 from kiks.engine.compiling import kernel
 from kiks.errors import ParameterError
+from kiks.model.data_file import Number, Whole, record
 from kiks.model.robot import RobotSpec
 from kiks.units import character_ns, ns_from_s
 
 Line: Any = namedtuple("Line", ("character_ns", "processing_ns", "think_ns", "period_ns", "done_length"))
 """What kernels know of it: times [ns], and the characters of the reply to D."""
 
+Baud = Annotated[
+    Whole, Field(ge=110, le=10_000_000, description="The Khepera knows 9600, 19200, 38400 and 57600.")
+]
+
 ASK_LENGTH = 2
 """Characters of a sense's command: its letter and a line feed."""
 
 
-@dataclass(frozen=True)
+@record
 class Timing:
     """The pace of a control loop.
 
@@ -44,20 +49,13 @@ class Timing:
         Timing(period_s=0.05, baud=None, think_s=0.0)
     """
 
-    period_s: float = 0.1
-    baud: int | None = 9600
-    think_s: float = 0.0
+    period_s: Annotated[Number, Field(ge=0, le=1000)] = 0.1
+    baud: Baud | None = 9600
+    think_s: Annotated[Number, Field(ge=0, le=1000)] = 0.0
 
     def __post_init__(self) -> None:
-        for name, least in (("period_s", 0.01 if self.baud is None else 0.0), ("think_s", 0.0)):
-            value = getattr(self, name)
-            if not (isinstance(value, int | float) and math.isfinite(value) and least <= value <= 1000):
-                raise ParameterError(f"{name} must be from {least:g} to 1000 s, but it was {value!r}.")
-        if self.baud is not None and not (isinstance(self.baud, int) and 110 <= self.baud <= 10_000_000):
-            raise ParameterError(
-                f"baud must be from 110 to 10000000 bit/s, or None for no line, but it was {self.baud!r}. "
-                "The Khepera knows 9600, 19200, 38400 and 57600."
-            )
+        if self.baud is None and self.period_s < 0.01:
+            raise ParameterError(f"period_s must be at least 0.01 without a line, but it was {self.period_s:g}.")
 
     def line(self, spec: RobotSpec) -> Any:
         """Return what kernels need to know of the line to a robot of a kind."""

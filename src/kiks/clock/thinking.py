@@ -13,9 +13,15 @@ from time import perf_counter_ns
 from typing import Protocol
 
 from kiks.errors import ParameterError
+from kiks.model.data_file import read_file
 from kiks.model.files import replace_file
 from kiks.model.policy import split_thinking
-from kiks.units import NS_PER_S
+
+FILE_BYTES_MAX = 64 << 20
+"""Most bytes of a replay file."""
+
+DIGITS_MAX = 18
+"""Most digits of a time [ns]: thirty years."""
 
 
 class Thinking(Protocol):
@@ -113,14 +119,13 @@ def save_thinking(measured_ns: list[int], path: str | Path) -> None:
 
 
 def _read_times(path: Path) -> list[int]:
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise ParameterError(f"a replay file must be readable text, but {str(path)!r} is not ({error}).") from None
+    what = f"replay file {str(path)!r}"
+    lines = read_file(path, what, bytes_max=FILE_BYTES_MAX).splitlines()
     for number, line in enumerate(lines, 1):
-        if not (line.isascii() and line.isdigit() and len(line) < 19):
+        if not line.isdigit() or len(line) > DIGITS_MAX:
+            # What the line says is left out: whatever file was named by mistake, its content stays there.
             raise ParameterError(
-                f"replay file {str(path)!r}, line {number}, must be a whole number of at most {3600 * NS_PER_S} ns, "
-                f"but it was {line!r}. Record a run again with thinking 'live'."
+                f"{what}, line {number}, must be a whole number of ns of at most {DIGITS_MAX} digits, but it is "
+                "something else. Record a run again with thinking 'live'."
             )
     return [int(line) for line in lines]

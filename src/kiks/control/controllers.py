@@ -9,29 +9,35 @@ eight proximity counts, eight ambient ones (500 in the dark, less in the light),
 from __future__ import annotations
 
 import functools
-import inspect
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.control import networks, recipes
-from kiks.control.controller import Controller, check_senses
-from kiks.control.functions import check_count, check_number
-from kiks.errors import ParameterError, nearest
+from kiks.control import networks
+from kiks.control.controller import Controller
+from kiks.control.functions import check_count
+from kiks.control.recipes import (
+    PERIOD_S,
+    SPEED_LIMIT,
+    TIME_CONSTANT_S,
+    Ctrnn,
+    Gru,
+    InFile,
+    InModule,
+    Linear,
+    Mlp,
+    Recipe,
+    Shape,
+    find,
+    relative_to,
+)
+from kiks.errors import ParameterError, shown
+from kiks.model.data_file import adapter, check
 from kiks.model.robot import SENSOR_COUNT
-
-SPEED_LIMIT = 10.0
-"""Speed that an output of 1 stands for, unless another is given [pulses/10 ms]: 80 mm/s."""
-
-HIDDEN_LIMIT, UNIT_LIMIT = 8, 256
-"""Most hidden layers, and most units in one: scratch lies on the stack."""
-
-PERIOD_S, TIME_CONSTANT_S = 0.1, 0.4
-
 
 def linear(
     *, senses: Sequence[str] = ("proximity",), speed_limit: float = SPEED_LIMIT, feedback: bool = False
@@ -53,7 +59,7 @@ def linear(
         >>> kiks.controllers.linear().parameter_count
         18
     """
-    return _linear(check_senses(senses), _speed_limit(speed_limit), bool(feedback))
+    return _made("linear", senses=senses, speed_limit=speed_limit, feedback=feedback)
 
 
 def mlp(
@@ -83,12 +89,7 @@ def mlp(
         >>> kiks.controllers.mlp(hidden=(6,)).parameter_count
         68
     """
-    if isinstance(hidden, str | int) or len(hidden) > HIDDEN_LIMIT:
-        raise ParameterError(
-            f"hidden must be the units of up to {HIDDEN_LIMIT} layers, like (6,), but it was {hidden!r}."
-        )
-    counts = tuple(check_count("hidden units", count, 1, UNIT_LIMIT) for count in hidden)
-    return _mlp(counts, check_senses(senses), _speed_limit(speed_limit), bool(feedback))
+    return _made("mlp", hidden=hidden, senses=senses, speed_limit=speed_limit, feedback=feedback)
 
 
 def ctrnn(
@@ -118,12 +119,13 @@ def ctrnn(
     Raises:
         ParameterError: If an argument is out of range.
     """
-    return _ctrnn(
-        check_count("neurons", neurons, 2, UNIT_LIMIT),
-        check_number("period_s", period_s, 0.001, 10),
-        check_number("time_constant_s", time_constant_s, 0.001, 1000),
-        check_senses(senses),
-        _speed_limit(speed_limit),
+    return _made(
+        "ctrnn",
+        neurons=neurons,
+        period_s=period_s,
+        time_constant_s=time_constant_s,
+        senses=senses,
+        speed_limit=speed_limit,
     )
 
 
@@ -144,11 +146,7 @@ def gru(*, units: int = 4, senses: Sequence[str] = ("proximity",), speed_limit: 
     Raises:
         ParameterError: If an argument is out of range.
     """
-    return _gru(check_count("units", units, 1, UNIT_LIMIT), check_senses(senses), _speed_limit(speed_limit))
-
-
-KINDS: dict[str, Callable[..., Controller]] = {"linear": linear, "mlp": mlp, "ctrnn": ctrnn, "gru": gru}
-"""What a recipe's `kind` may be; its other entries are the arguments."""
+    return _made("gru", units=units, senses=senses, speed_limit=speed_limit)
 
 
 def from_recipe(recipe: Mapping[str, Any], folder: str | Path = ".") -> Controller:
@@ -168,31 +166,34 @@ def from_recipe(recipe: Mapping[str, Any], folder: str | Path = ".") -> Controll
         >>> kiks.controllers.from_recipe({"kind": "gru", "units": 3}) is kiks.controllers.gru(units=3)
         True
     """
-    if not isinstance(recipe, Mapping):
-        raise ParameterError(f"a recipe must be a table of names and values, but it was {recipe!r:.80}.")
-    if "kind" not in recipe:
-        found = recipes.find(recipe, folder)
-        if not isinstance(found, Controller):
-            raise ParameterError(
-                f"the recipe {dict(recipe)} must name a controller, but it names {found!r:.80}. "
-                "Write @kiks.controller over the function."
-            )
-        return found
-    make = KINDS.get(str(recipe["kind"]))
-    if make is None:
+    return controller_of(check_recipe(recipe), folder)
+
+
+def check_recipe(recipe: object) -> Recipe:
+    """Return the recipe of a table; nothing that it names is run.
+
+    Raises:
+        ParameterError: If it is none.
+    """
+    made: Recipe = check(Recipe, recipe, "the recipe")
+    return made
+
+
+def controller_of(recipe: Recipe, folder: str | Path) -> Controller:
+    """Return the controller of a recipe in a file of a folder. A user's own module or file is run.
+
+    Raises:
+        ParameterError: If what it names is not there or no controller.
+    """
+    if not isinstance(recipe, InModule | InFile):
+        return _shaped(recipe)
+    found = find(recipe, folder)
+    if not isinstance(found, Controller):
         raise ParameterError(
-            f"kind in a recipe must be one of {', '.join(KINDS)}, but it was {recipe['kind']!r}."
-            f"{nearest(str(recipe['kind']), tuple(KINDS))}"
+            f"the recipe {shown(recipe)} must name a controller, but it names {shown(found)}. "
+            "Write @kiks.controller over the function."
         )
-    given = {name: value for name, value in recipe.items() if name != "kind"}
-    known = tuple(inspect.signature(make).parameters)
-    for name in given:
-        if name not in known:
-            raise ParameterError(
-                f"a recipe of the kind {recipe['kind']!r} must have none but {', '.join(known)}, but it had {name!r}."
-                f"{nearest(str(name), known)}"
-            )
-    return make(**given)
+    return found
 
 
 def recipe_for(controller: Controller, folder: str | Path = ".") -> dict[str, Any]:
@@ -206,7 +207,7 @@ def recipe_for(controller: Controller, folder: str | Path = ".") -> dict[str, An
             f"the controller {controller.name!r} must be defined at the top of a module or file to be found again, but "
             "it was defined inside another function or typed into a console."
         )
-    return recipes.relative_to(controller.recipe, folder)
+    return relative_to(controller.recipe, folder)
 
 
 def random_parameters(controller: Controller, count: int, *, seed: int) -> NDArray[np.float64]:
@@ -224,67 +225,40 @@ def random_parameters(controller: Controller, count: int, *, seed: int) -> NDArr
     return np.random.default_rng(seed).standard_normal((check_count("count", count), controller.parameter_count))
 
 
+_SHAPES = {"linear": Linear, "mlp": Mlp, "ctrnn": Ctrnn, "gru": Gru}
+
+
 # ---- one object for the same arguments: what is compiled for it is compiled once ----
 
 
-@functools.lru_cache(maxsize=256)
-def _linear(senses: tuple[str, ...], speed_limit: float, feedback: bool) -> Controller:
-    recipe = {"kind": "linear", "senses": list(senses), "speed_limit": speed_limit, "feedback": feedback}
-    return _feed_forward((), senses, speed_limit, feedback, recipe)
+def _made(kind: str, **arguments: Any) -> Controller:
+    return _shaped(_SHAPES[kind](kind=kind, **arguments))
 
 
-@functools.lru_cache(maxsize=256)
-def _mlp(hidden: tuple[int, ...], senses: tuple[str, ...], speed_limit: float, feedback: bool) -> Controller:
-    recipe = {"kind": "mlp", "hidden": list(hidden), "senses": list(senses)}
-    return _feed_forward(
-        hidden, senses, speed_limit, feedback, recipe | {"speed_limit": speed_limit, "feedback": feedback}
-    )
-
-
-def _feed_forward(
-    hidden: tuple[int, ...], senses: tuple[str, ...], speed_limit: float, feedback: bool, recipe: dict[str, Any]
-) -> Controller:
-    counts = (SENSOR_COUNT * len(senses) + 2 * feedback, *hidden, 2)
-    decide = networks.feed_forward(
-        counts, has_feedback=feedback, is_cut=recipe["kind"] == "linear", speed_limit=speed_limit
-    )
-    size = sum(networks.layer_size(*pair) for pair in itertools.pairwise(counts))
-    return _ready_made(decide, senses, 2 * feedback, size, recipe)
-
-
-@functools.lru_cache(maxsize=256)
-def _ctrnn(
-    neurons: int, period_s: float, time_constant_s: float, senses: tuple[str, ...], speed_limit: float
-) -> Controller:
-    sense_count = SENSOR_COUNT * len(senses)
-    decide = networks.continuous(
-        sense_count, neurons, period_s=period_s, time_constant_s=time_constant_s, speed_limit=speed_limit
-    )
-    recipe = {
-        "kind": "ctrnn",
-        "neurons": neurons,
-        "period_s": period_s,
-        "time_constant_s": time_constant_s,
-        "senses": list(senses),
-        "speed_limit": speed_limit,
-    }
-    return _ready_made(decide, senses, neurons, neurons * (2 + sense_count + neurons), recipe)
-
-
-@functools.lru_cache(maxsize=256)
-def _gru(units: int, senses: tuple[str, ...], speed_limit: float) -> Controller:
-    sense_count = SENSOR_COUNT * len(senses)
-    size = 3 * networks.layer_size(sense_count + units, units) + networks.layer_size(units, 2)
-    recipe = {"kind": "gru", "units": units, "senses": list(senses), "speed_limit": speed_limit}
-    return _ready_made(networks.gated(sense_count, units, speed_limit=speed_limit), senses, units, size, recipe)
-
-
-def _ready_made(
-    decide: Callable[..., Any], senses: tuple[str, ...], memory: int, parameters: int, recipe: dict[str, Any]
-) -> Controller:
-    decide.__name__ = decide.__qualname__ = recipe["kind"]
-    return Controller(decide, senses=senses, memory=memory, parameters=parameters, recipe=recipe)
-
-
-def _speed_limit(speed_limit: object) -> float:
-    return check_number("speed_limit", speed_limit, 0, 127)
+@functools.lru_cache(maxsize=1024)
+def _shaped(recipe: Shape) -> Controller:
+    sense_count, limit = SENSOR_COUNT * len(recipe.senses), recipe.speed_limit
+    if isinstance(recipe, Ctrnn):
+        memory = recipe.neurons
+        size = memory * (2 + sense_count + memory)
+        decide = networks.continuous(
+            sense_count,
+            memory,
+            period_s=recipe.period_s,
+            time_constant_s=recipe.time_constant_s,
+            speed_limit=limit,
+        )
+    elif isinstance(recipe, Gru):
+        memory = recipe.units
+        size = 3 * networks.layer_size(sense_count + memory, memory) + networks.layer_size(memory, 2)
+        decide = networks.gated(sense_count, memory, speed_limit=limit)
+    else:
+        memory = 2 * recipe.feedback
+        hidden = recipe.hidden if isinstance(recipe, Mlp) else ()
+        counts = (sense_count + memory, *hidden, 2)
+        size = sum(networks.layer_size(*pair) for pair in itertools.pairwise(counts))
+        is_cut = isinstance(recipe, Linear)
+        decide = networks.feed_forward(counts, has_feedback=recipe.feedback, is_cut=is_cut, speed_limit=limit)
+    decide.__name__ = decide.__qualname__ = recipe.kind
+    said = adapter(type(recipe)).dump_python(recipe, mode="json")
+    return Controller(decide, senses=recipe.senses, memory=memory, parameters=size, recipe=said)

@@ -1,7 +1,8 @@
-"""Recipes: what a file says of a user's own controller, so that it can be found again.
+"""Recipes: what a file says of a controller, so that it can be made or found again.
 
+{"kind": "mlp", "hidden": [6]}          one that comes with KiKS, and its arguments
 {"function": "package.module:name"}     a name in a module that Python can import
-{"file": "shy.py", "name": "shy"}       a name in a file, which lies relative to the recipe's folder
+{"file": "shy.py", "name": "shy"}       a name in a file, which lies in the recipe's folder or below
 """
 
 from __future__ import annotations
@@ -12,9 +13,119 @@ import importlib.util
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from kiks.errors import ParameterError, nearest
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
+
+from kiks.errors import ParameterError, nearest, shown
+from kiks.model.data_file import Number, Rule, Switch, Text, Whole, record
+from kiks.model.files import inside
+
+SPEED_LIMIT = 10.0
+"""Speed that an output of 1 stands for, unless another is given [pulses/10 ms]: 80 mm/s."""
+
+LAYERS_MAX, UNITS_MAX = 8, 256
+"""Most hidden layers, and most units in one: scratch lies on the stack."""
+
+PERIOD_S, TIME_CONSTANT_S = 0.1, 0.4
+
+
+def _each_once(senses: tuple[str, ...]) -> tuple[str, ...]:
+    if len(set(senses)) != len(senses):
+        raise ValueError(f"must name each sense once, but they were {', '.join(senses)}.")
+    return senses
+
+
+Senses = Annotated[
+    tuple[Literal["proximity", "ambient"], ...],
+    Field(min_length=1, description="Each is eight counts."),
+    AfterValidator(_each_once),
+    BeforeValidator(lambda given: (given,) if isinstance(given, str) else given),
+]
+SpeedLimit = Annotated[Number, Field(ge=0, le=127, description="Speed of an output of 1 [pulses/10 ms].")]
+Units = Annotated[Whole, Field(ge=1, le=UNITS_MAX)]
+Feedback = Annotated[Switch, Field(description="Whether its last outputs are inputs, too.")]
+
+
+@record
+class Linear:
+    """Arguments of `kiks.controllers.linear`."""
+
+    kind: Literal["linear"]
+    senses: Senses = ("proximity",)
+    speed_limit: SpeedLimit = SPEED_LIMIT
+    feedback: Feedback = False
+
+
+@record
+class Mlp:
+    """Arguments of `kiks.controllers.mlp`."""
+
+    kind: Literal["mlp"]
+    hidden: Annotated[tuple[Units, ...], Field(max_length=LAYERS_MAX, description="One for each hidden layer.")] = (6,)
+    senses: Senses = ("proximity",)
+    speed_limit: SpeedLimit = SPEED_LIMIT
+    feedback: Feedback = False
+
+
+@record
+class Ctrnn:
+    """Arguments of `kiks.controllers.ctrnn`."""
+
+    kind: Literal["ctrnn"]
+    neurons: Annotated[Whole, Field(ge=2, le=UNITS_MAX, description="The first two are the wheels.")] = 6
+    period_s: Annotated[Number, Field(ge=0.001, le=10, description="Time that passes in a call.")] = PERIOD_S
+    time_constant_s: Annotated[Number, Field(ge=0.001, le=1000, description="Of a parameter of 0.")] = TIME_CONSTANT_S
+    senses: Senses = ("proximity",)
+    speed_limit: SpeedLimit = SPEED_LIMIT
+
+
+@record
+class Gru:
+    """Arguments of `kiks.controllers.gru`."""
+
+    kind: Literal["gru"]
+    units: Annotated[Units, Field(description="Gated recurrent units.")] = 4
+    senses: Senses = ("proximity",)
+    speed_limit: SpeedLimit = SPEED_LIMIT
+
+
+@record
+class InModule:
+    """A user's own controller, found by importing a module."""
+
+    function: Annotated[Text, Field(pattern=r"^[\w.]+:[\w.]+$"), Rule("'package.module:name'")]
+
+
+@record
+class InFile:
+    """A user's own controller, found by running a file that lies in the folder of the recipe's file or below."""
+
+    file: Annotated[Text, Field(pattern=r"\.py$"), Rule("a Python file, *.py, in the folder of this file")]
+    name: Annotated[Text, Field(min_length=1)]
+
+
+Shape = Linear | Mlp | Ctrnn | Gru
+
+
+def _tag(given: Any) -> str | None:
+    """Return which recipe is meant."""
+    if not isinstance(given, Mapping):
+        return None
+    return str(given["kind"]) if "kind" in given else next((key for key in ("function", "file") if key in given), None)
+
+
+Recipe = Annotated[
+    Annotated[Linear, Tag("linear")]
+    | Annotated[Mlp, Tag("mlp")]
+    | Annotated[Ctrnn, Tag("ctrnn")]
+    | Annotated[Gru, Tag("gru")]
+    | Annotated[InModule, Tag("function")]
+    | Annotated[InFile, Tag("file")],
+    Discriminator(_tag),
+    Rule("a table with a kind (linear, mlp, ctrnn or gru), or a function, or a file and a name"),
+]
+"""What a file says of a controller."""
 
 
 def recipe_of(function: Callable[..., Any]) -> dict[str, Any] | None:
@@ -40,39 +151,60 @@ def relative_to(recipe: Mapping[str, Any], folder: str | Path) -> dict[str, Any]
     return {**recipe, "file": path.relative_to(root).as_posix() if path.is_relative_to(root) else str(path)}
 
 
-def find(recipe: Mapping[str, Any], folder: str | Path) -> Any:
-    """Return what a recipe of the above two kinds names. The module or file is run, as by `import`.
+def find(recipe: InModule | InFile, folder: str | Path) -> Any:
+    """Return what a recipe of a user's own controller names. The module or file is run, as by `import`.
 
     Raises:
-        ParameterError: If it is no such recipe, or there is no such module, file or name.
+        ParameterError: If there is no such module, file or name, or the file lies elsewhere.
     """
-    keys = set(recipe)
-    if not all(isinstance(value, str) for value in recipe.values()):
-        raise ParameterError(f"a recipe must have texts for function, file and name, but it was {dict(recipe)!r}.")
-    if keys == {"function"}:
-        module_name, colon, name = recipe["function"].partition(":")
-        if not (module_name and colon and name):
-            raise ParameterError(
-                f"function in a recipe must be 'module:name', but it was {recipe['function']!r}. "
-                "Write the module's full name, a colon and the controller's name."
-            )
-        try:
-            module = importlib.import_module(module_name)
-        except ModuleNotFoundError as error:
-            raise ParameterError(
-                f"the recipe's module {module_name!r} must be one that Python can import, but: {error}. "
-                "Start Python where it lies, or name its file instead."
-            ) from None
-        return _named(module, name, f"module {module_name!r}")
-    if keys == {"file", "name"}:
-        path = (Path(folder) / recipe["file"]).absolute()
-        if not path.is_file():
-            raise ParameterError(f"the recipe's file must exist, but there was none at {path}. Put it there.")
-        return _named(_module_in(path, path.stat().st_mtime_ns), recipe["name"], f"file {path}")
-    raise ParameterError(
-        "a recipe must have a kind, or a function, or a file and a name, but it had "
-        f"{', '.join(sorted(keys)) or 'nothing'}."
-    )
+    if isinstance(recipe, InFile):
+        path = program_in(Path(folder), recipe.file, "the recipe's file")
+        return _named(module_in(path), recipe.name, f"file {str(path)!r}")
+    module_name, _, name = recipe.function.partition(":")
+    try:
+        module = importlib.import_module(module_name)
+    except (Exception, SystemExit) as error:
+        raise ParameterError(
+            f"the recipe's module {shown(module_name)} must be one that Python can import, but: {shown(str(error))}. "
+            "Start Python where it lies, or name its file instead."
+        ) from None
+    return _named(module, name, f"module {shown(module_name)}")
+
+
+def program_in(folder: Path, text: str, what: str) -> Path:
+    """Return the path of a Python program that a file may name: in that file's folder or below, in the open.
+
+    Raises:
+        ParameterError: If it lies elsewhere or in a hidden folder, or is no program.
+    """
+    path = inside(folder, text, what)
+    if path.suffix != ".py" or any(part.startswith(".") for part in Path(text).parts) or not path.is_file():
+        raise ParameterError(
+            f"{what} must be a Python program that is there, *.py, in no hidden folder, but it was {shown(text)}."
+        )
+    return path
+
+
+def module_in(path: Path) -> Any:
+    """Run a Python file as a module of its own; once, until it has changed.
+
+    Raises:
+        ParameterError: If it does not run.
+    """
+    try:
+        return _run(path, path.stat().st_mtime_ns)
+    except (Exception, SystemExit) as error:
+        raise ParameterError(f"{str(path)!r} must be a Python file that runs, but it raised {shown(error)}.") from error
+
+
+@functools.lru_cache(maxsize=256)
+def _run(path: Path, changed_ns: int) -> Any:
+    spec = importlib.util.spec_from_file_location(f"kiks file {path.stem}", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def _named(module: Any, name: str, where: str) -> Any:
@@ -80,17 +212,7 @@ def _named(module: Any, name: str, where: str) -> Any:
     found = module
     for part in name.split("."):
         if not hasattr(found, part):
-            raise ParameterError(f"the {where} must define {name!r}, but does not.{nearest(name, tuple(vars(module)))}")
+            known = tuple(vars(module))
+            raise ParameterError(f"the {where} must define {shown(name)}, but does not.{nearest(name, known)}")
         found = getattr(found, part)
     return found
-
-
-@functools.lru_cache(maxsize=256)
-def _module_in(path: Path, changed_ns: int) -> Any:
-    """Run a file as a module of its own; once, until it has changed."""
-    spec = importlib.util.spec_from_file_location(f"kiks recipe {path.stem}", path)
-    if spec is None or spec.loader is None:
-        raise ParameterError(f"the recipe's file must be a Python program, *.py, but it was {path}.")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module

@@ -144,10 +144,11 @@ def copy_rays(seen: Any, rays: Any) -> Any:
 def pack_networks(response: NetworkResponse) -> NDArray[np.void]:
     """Return the weights of networks for the kernels, without a table, shape [1]."""
     packed = np.zeros(1, NETWORKS)
-    packed["hidden"][0, :, :, :TANH_COUNT] = response.hidden.transpose(0, 2, 1)
-    last, bias = response.last[:, :-1], response.last[:, -1]
-    packed["output"][0, :, :TANH_COUNT] = np.einsum("sl,slt->st", last, response.middle[:, :, :-1])
-    packed["bias"][0] = bias + (last * response.middle[:, :, -1]).sum(axis=1)
+    hidden, middle, last = response.weights
+    packed["hidden"][0, :, :, :TANH_COUNT] = hidden.transpose(0, 2, 1)
+    last, bias = last[:, :-1], last[:, -1]
+    packed["output"][0, :, :TANH_COUNT] = np.einsum("sl,slt->st", last, middle[:, :, :-1])
+    packed["bias"][0] = bias + (last * middle[:, :, -1]).sum(axis=1)
     return packed
 
 

@@ -257,10 +257,9 @@ def predictions(
 
 def response_of(networks: Sequence[Network], *, places: str = "rim") -> NetworkResponse:
     """Return eight networks of the thesis's size as the response that a robot's file can name."""
-    hidden, middle, last = (np.stack([network.weights[layer] for network in networks]) for layer in range(3))
-    return NetworkResponse(
-        *PLACES[places], field_of_view_deg=120.0, range_mm=50.0, hidden=hidden, middle=middle, last=last[:, 0]
-    )
+    hidden, middle, last = ([network.weights[layer].tolist() for network in networks] for layer in range(3))
+    weights: Any = {"hidden": hidden, "middle": middle, "last": [row for (row,) in last]}
+    return NetworkResponse(*PLACES[places], field_of_view_deg=120.0, range_mm=50.0, **weights)
 
 
 def fan_of(response: NetworkResponse) -> Fan:

@@ -2,31 +2,59 @@
 
 from __future__ import annotations
 
-import json
-import math
-import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
 
 import kiks
-from kiks.batch.timing import Timing
+from kiks.batch.timing import Baud, Timing
 from kiks.client.drive import Driver, drive
 from kiks.client.khepera import Port
 from kiks.control.controller import Controller
-from kiks.control.controllers import from_recipe, recipe_for
-from kiks.errors import ParameterError, nearest
+from kiks.control.controllers import controller_of, recipe_for
+from kiks.control.recipes import Recipe
 from kiks.model.arena import Arena
+from kiks.model.arena_file import quoted
+from kiks.model.data_file import Number, Text, Whole, check, parse_toml, read_file, record
 from kiks.model.files import replace_files
 from kiks.sim.simulation import Simulation
 
 FORMAT = 1
 """Version of the file's format."""
 
-_TOP = ("champion", "task", "fitness", "generation", "algorithm", "seed", "robot", "kiks", "parameters")
-_SECTIONS = ("timing", "controller", "measures")
-_NEEDED = ("champion", "robot", "parameters", "timing", "controller")
+FILE_BYTES_MAX = 32 << 20
+"""Most bytes of a champion's file."""
+
+PARAMETERS_MAX = 1_000_000
+"""Most parameters of a champion."""
+
+
+@record
+class _FileTiming(Timing):
+    """The pace of its loop; without a baud rate there is no line."""
+
+    baud: Baud | None = None
+
+
+@record
+class _ChampionFile:
+    """What a champion's file holds."""
+
+    champion: Annotated[Literal[1], Field(description="It is the version of the format.")]
+    parameters: Annotated[tuple[Number, ...], Field(max_length=PARAMETERS_MAX)]
+    robot: Text
+    timing: _FileTiming
+    controller: Recipe
+    task: Text = ""
+    fitness: Number = 0.0
+    generation: Annotated[Whole, Field(ge=0)] = 0
+    algorithm: Text = ""
+    seed: Annotated[Whole, Field(ge=0, lt=2**63)] = 0
+    kiks: Text = ""
+    measures: Annotated[dict[Text, Number], Field(max_length=1000)] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,16 +143,17 @@ class Champion:
         files: dict[Path, bytes | str] = {}
         if "file" in recipe:
             beside = target.with_name(f"{target.stem}_controller.py")
-            files[beside] = _bytes_of(target.parent / recipe["file"])
+            files[beside] = read_file(target.parent / recipe["file"], "the file of the controller")
             recipe = {"file": beside.name, "name": recipe["name"]}
         files[target] = self._text(recipe)
         replace_files(files, "a champion")
 
     def _text(self, recipe: Mapping[str, Any]) -> str:
-        top = {"champion": FORMAT} | {name: getattr(self, name) for name in _TOP[1:-1]}
+        top = ("task", "fitness", "generation", "algorithm", "seed", "robot", "kiks")
         lines = [
             "# A controller for Khepera robots. See it: kiks demo FILE. Let it drive: kiks run FILE.",
-            *(f"{name} = {_word(value)}" for name, value in top.items()),
+            f"champion = {FORMAT}",
+            *(f"{name} = {_word(getattr(self, name))}" for name in top),
             "parameters = [",
             *(f"    {value!r}," for value in self.parameters),
             "]",
@@ -132,88 +161,32 @@ class Champion:
         sections = {"timing": asdict(self.timing), "controller": recipe, "measures": self.measures}
         for section, entries in sections.items():
             lines += ["", f"[{section}]"]
-            lines += [f"{name} = {_word(value)}" for name, value in entries.items() if value is not None]
+            lines += [f"{_key(name)} = {_word(value)}" for name, value in entries.items() if value is not None]
         return "\n".join(lines) + "\n"
 
     @classmethod
     def load(cls, path: str | Path) -> Champion:
-        """Read a champion's file. If its controller is a user's, the file of that is run.
+        """Read a champion's file. If its controller is a user's, the file or module of that is run.
 
         Raises:
             ParameterError: If it is none.
         """
-        try:
-            content = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise ParameterError(f"{str(path)!r} must be a champion's file, but: {error}.") from None
-        try:
-            return _champion_of(content, Path(path).parent)
-        except (ParameterError, TypeError) as error:
-            raise ParameterError(f"{str(path)!r} must be a champion's file, but: {error}") from None
+        what = f"Champion's file {str(path)!r}"
+        read = check(_ChampionFile, parse_toml(read_file(Path(path), what, bytes_max=FILE_BYTES_MAX), what), what)
+        controller = controller_of(read.controller, Path(path).parent)
+        controller.check_parameters(read.parameters)
+        given = {each.name: getattr(read, each.name) for each in fields(cls)}
+        timing = Timing(**asdict(read.timing))
+        return cls(**given | {"controller": controller, "timing": timing})
 
 
-def is_champion(path: str | Path) -> bool:
-    """Say whether a file says that it is a champion's, right or wrong in all else."""
-    try:
-        return "champion" in tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return False
+def _key(name: str) -> str:
+    """Return a name as TOML has keys: a measure may be called what Python allows."""
+    return name if name.isascii() and name.isidentifier() else quoted(name)
 
 
-def _champion_of(content: dict[str, Any], folder: Path) -> Champion:
-    """Return the champion of a file's content."""
-    known = (*_TOP, *_SECTIONS)
-    for key in content:
-        if key not in known:
-            raise ParameterError(f"there is a key {key!r}, which is unknown.{nearest(key, known)}")
-    for key in _NEEDED:
-        if key not in content:
-            raise ParameterError(f"there must be a key {key!r}, and there is none.")
-    if content["champion"] != FORMAT:
-        raise ParameterError(
-            f"champion must be {FORMAT}, the version of the format, but it was {content['champion']!r}."
-        )
-    texts = {"task": str, "algorithm": str, "robot": str, "kiks": str, "generation": int, "seed": int, "fitness": float}
-    given: dict[str, Any] = {}
-    for key, kind in texts.items():
-        value = content.get(key)
-        if value is not None:
-            if not isinstance(value, (int, float) if kind is float else kind):
-                raise ParameterError(f"{key} must be a {kind.__name__}, but it was {value!r}.")
-            given[key] = value
-    parameters = content["parameters"]
-    if not isinstance(parameters, list) or not all(_is_number(value) for value in parameters):
-        raise ParameterError(f"parameters must be a list of finite numbers, but they were {parameters!r:.60}.")
-    timing: dict[str, Any] = {"baud": None} | dict(content["timing"])
-    controller = from_recipe(content["controller"], folder)
-    controller.check_parameters(parameters)
-    return Champion(
-        controller,
-        tuple(float(value) for value in parameters),
-        timing=Timing(**timing),
-        measures=dict(content.get("measures", {})),
-        **given,
-    )
-
-
-def _bytes_of(path: Path) -> bytes:
-    """Return what is in the file of a user's controller.
-
-    Raises:
-        ParameterError: If it cannot be read.
-    """
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise ParameterError(f"the file of the controller, {str(path)!r}, must be there, but: {error}.") from None
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-
-
-def _word(value: object) -> str:
+def _word(value: Any) -> str:
     """Return a value as TOML has it."""
-    if isinstance(value, float):
-        return repr(value)
-    return json.dumps(list(value) if isinstance(value, tuple) else value, ensure_ascii=False)
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_word, value))}]"
+    return quoted(value) if isinstance(value, str) else repr(value).lower()

@@ -30,7 +30,7 @@ from typing import (
 )
 
 import pydantic.dataclasses
-from pydantic import ConfigDict, Field, Strict, TypeAdapter, ValidationError
+from pydantic import ConfigDict, Field, Strict, Tag, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import core_schema
 
@@ -246,6 +246,9 @@ def _sentence(model: type[Any], error: ValidationError, advice: str = "") -> str
         return f"{name} must be given, but it is missing. {way_out}".rstrip()
     if isinstance(given, str) and (names := _names(place)):
         way_out = f"{nearest(given, names)} {way_out}".lstrip()
+    if kind == "union_tag_invalid":
+        tags = [bound.tag for each in _alternatives(place.base) for bound in each.bounds if isinstance(bound, Tag)]
+        way_out = f"{nearest(first['ctx']['tag'], tags)} {way_out}".lstrip()
     return f"{name} must be {_rule(place)}, but it was {shown(given)}. {way_out}".rstrip()
 
 
@@ -274,7 +277,12 @@ def _place(model: Any, loc: tuple[int | str, ...]) -> tuple[tuple[int | str, ...
         elif isinstance(part, int) and get_origin(here.base) is tuple:
             inner = _declared(get_args(here.base)[0])
             here = inner._replace(description=inner.description or here.description)
+        elif get_origin(here.base) is dict:
+            here, part = _declared(get_args(here.base)["[key]" not in loc]), str(part)[: SHOWN_MAX // 4]
         else:
+            # pydantic names the alternative that it has taken.
+            tagged = (each for each in _alternatives(here.base) if Tag(str(part)) in each.bounds)
+            here = next(tagged, here)
             continue
         path.append(part)
     return tuple(path), here
@@ -294,6 +302,11 @@ def _declared(hint: Any) -> _Place:
         bounds += said.metadata if isinstance(said, FieldInfo) else [said]
         description = getattr(said, "description", None) or description
     return _Place(inner.base, tuple(bounds), description)
+
+
+def _alternatives(hint: Any) -> list[_Place]:
+    is_union = get_origin(hint) in (Union, types.UnionType)
+    return [_declared(part) for part in get_args(hint)] if is_union else []
 
 
 @cache

@@ -6,17 +6,17 @@ the file that comes with KiKS were trained by `kiks fit`; `responses/SOURCE.md` 
 
 from __future__ import annotations
 
-import json
-from dataclasses import dataclass
+from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
-from kiks.errors import ParameterError
+from kiks.model.data_file import Number, check, parse_json, read_file, record
 from kiks.model.files import replace_file
-from kiks.model.robot import SENSOR_COUNT
+from kiks.model.robot_parts import SENSOR_COUNT, Angle
 
 INPUT_COUNT, TANH_COUNT, LINEAR_COUNT = 7, 13, 7
 """Rays, neurons of the first and of the second hidden layer (thesis 3.3)."""
@@ -27,15 +27,15 @@ BODY_RADIUS_MM = 27.5
 THESIS = Path(__file__).with_name("responses") / "thesis_khepera.json"
 """The networks that come with KiKS."""
 
-_PLACES = ("mount_angle_deg", "mount_radius_mm", "direction_deg")
-_WEIGHTS = {
-    "hidden": (SENSOR_COUNT, TANH_COUNT, INPUT_COUNT + 1),
-    "middle": (SENSOR_COUNT, LINEAR_COUNT, TANH_COUNT + 1),
-    "last": (SENSOR_COUNT, LINEAR_COUNT + 1),
-}
+_ONE_EACH = Field(min_length=SENSOR_COUNT, max_length=SENSOR_COUNT)
+Numbers = NDArray[np.float64]
+Weight = Annotated[Number, Field(ge=-1e6, le=1e6)]
+Inputs = Annotated[tuple[Weight, ...], Field(min_length=INPUT_COUNT + 1, max_length=INPUT_COUNT + 1)]
+Bent = Annotated[tuple[Weight, ...], Field(min_length=TANH_COUNT + 1, max_length=TANH_COUNT + 1)]
+Angles = Annotated[tuple[Angle, ...], _ONE_EACH]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class NetworkResponse:
     """Networks of eight sensors; of each row of weights the last one is the bias.
 
@@ -45,46 +45,31 @@ class NetworkResponse:
         direction_deg: Where the middle ray looks, left positive [deg].
         field_of_view_deg: From the leftmost ray to the rightmost [deg].
         range_mm: Longest length of a ray [mm]; inputs are 1 - length/range.
-        hidden: Weights of the tanh neurons, shape [8, 13, 8].
-        middle: Weights of the linear neurons, shape [8, 7, 14].
-        last: Weights of the output [counts], shape [8, 8].
+        hidden: Weights of the tanh neurons, 8 sensors of 13 neurons of 8 weights.
+        middle: Weights of the linear neurons, 8 of 7 of 14.
+        last: Weights of the output [counts], 8 of 8.
 
     Raises:
-        ParameterError: If a list or an array has another shape, or a number is not finite.
+        ParameterError: If a list has another length, or a number is out of range.
     """
 
-    mount_angle_deg: tuple[float, ...]
-    mount_radius_mm: tuple[float, ...]
-    direction_deg: tuple[float, ...]
-    field_of_view_deg: float
-    range_mm: float
-    hidden: NDArray[np.float64]
-    middle: NDArray[np.float64]
-    last: NDArray[np.float64]
-
-    def __post_init__(self) -> None:
-        shapes = dict.fromkeys(_PLACES, (SENSOR_COUNT,)) | {"field_of_view_deg": (), "range_mm": ()} | _WEIGHTS
-        for name, shape in shapes.items():
-            try:
-                given = np.array(getattr(self, name), np.float64)
-                fits = given.shape == shape and bool(np.isfinite(given).all())
-            except (TypeError, ValueError):
-                fits = False
-            if not fits:
-                raise ParameterError(
-                    f"{name} must be finite numbers of the shape {list(shape)}, but it was not. "
-                    "Let `kiks fit` write the file of networks."
-                )
-            if name in _WEIGHTS:
-                given.setflags(write=False)
-                object.__setattr__(self, name, given)
-            elif name in _PLACES:
-                object.__setattr__(self, name, tuple(given.tolist()))
+    mount_angle_deg: Angles
+    mount_radius_mm: Annotated[tuple[Annotated[Number, Field(gt=0, le=250)], ...], _ONE_EACH]
+    direction_deg: Angles
+    field_of_view_deg: Annotated[Number, Field(gt=0, le=180)]
+    range_mm: Annotated[Number, Field(ge=1, le=1000)]
+    hidden: Annotated[
+        tuple[Annotated[tuple[Inputs, ...], Field(min_length=TANH_COUNT, max_length=TANH_COUNT)], ...], _ONE_EACH
+    ]
+    middle: Annotated[
+        tuple[Annotated[tuple[Bent, ...], Field(min_length=LINEAR_COUNT, max_length=LINEAR_COUNT)], ...], _ONE_EACH
+    ]
+    last: Annotated[tuple[Inputs, ...], _ONE_EACH]
 
     @property
-    def weights(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """What the kernels of `kiks.engine.networks` want: hidden, middle and last."""
-        return self.hidden, self.middle, self.last
+    def weights(self) -> tuple[Numbers, Numbers, Numbers]:
+        """What the kernels of `kiks.engine.networks` want: hidden [8, 13, 8], middle [8, 7, 14] and last [8, 8]."""
+        return np.array(self.hidden), np.array(self.middle), np.array(self.last)
 
     @classmethod
     def load(cls, file: str | Path = THESIS) -> NetworkResponse:
@@ -97,21 +82,8 @@ class NetworkResponse:
             >>> NetworkResponse.load().range_mm
             50.0
         """
-        try:
-            data: Any = json.loads(Path(file).read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise ParameterError(
-                f"Networks must come from a readable JSON file, but {str(file)!r} is none ({error}). "
-                "`kiks fit --out FILE` writes one."
-            ) from error
-        names = {"field_of_view_deg", "range_mm", *_PLACES, *_WEIGHTS}
-        if not isinstance(data, dict) or set(data) != names:
-            given = sorted(data) if isinstance(data, dict) else type(data).__name__
-            raise ParameterError(
-                f"{file}: A file of networks must hold {', '.join(sorted(names))} and nothing else, but it holds "
-                f"{given}. `kiks fit --out FILE` writes one."
-            )
-        return cls(**data)
+        what = f"The file of networks {str(file)!r}"
+        return check(NetworkResponse, parse_json(read_file(Path(file), what), what), what, advice=_ADVICE)
 
     def save(self, file: str | Path) -> None:
         """Write the networks to a file, weights with six digits, one neuron a line.
@@ -119,13 +91,16 @@ class NetworkResponse:
         Raises:
             ParameterError: If the file cannot be written.
         """
-        parts = [f'"{name}": {json.dumps(getattr(self, name))}' for name in (*_PLACES, "field_of_view_deg", "range_mm")]
-        parts += [f'"{name}": {_written(getattr(self, name))}' for name in _WEIGHTS]
+        parts = [f'"{each.name}": {_written(getattr(self, each.name))}' for each in fields(self)]
         replace_file(file, "{\n" + ",\n".join(parts) + "\n}\n", "networks")
 
 
-def _written(array: NDArray[np.float64]) -> str:
-    """Return an array as JSON with six significant digits, each of its last rows on a line of its own."""
-    if array.ndim == 1:
-        return "[" + ", ".join(f"{value:.6g}" for value in array) + "]"
-    return "[\n" + ",\n".join(_written(part) for part in array) + "\n]"
+_ADVICE = "`kiks fit --out FILE` writes one."
+
+
+def _written(value: Any) -> str:
+    """Return numbers as JSON with six significant digits, each of the last rows of a matrix on a line of its own."""
+    if not isinstance(value, tuple):
+        return f"{value:.6g}"
+    is_matrix = isinstance(value[0], tuple)
+    return "[\n" + ",\n".join(map(_written, value)) + "\n]" if is_matrix else f"[{', '.join(map(_written, value))}]"
