@@ -23,9 +23,9 @@ from kiks.units import character_ns, ns_from_s
 Line: Any = namedtuple("Line", ("character_ns", "processing_ns", "think_ns", "period_ns", "done_length"))
 """What kernels know of it: times [ns], and the characters of the reply to D."""
 
-Baud = Annotated[
-    Whole, Field(ge=110, le=10_000_000, description="The Khepera knows 9600, 19200, 38400 and 57600.")
-]
+Baud = Annotated[Whole, Field(ge=110, le=10_000_000, description="The Khepera knows 9600, 19200, 38400 and 57600.")]
+
+Milliseconds = Annotated[Number, Field(ge=0, le=1e6)]
 
 ASK_LENGTH = 2
 """Characters of a sense's command: its letter and a line feed."""

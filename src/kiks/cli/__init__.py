@@ -18,6 +18,7 @@ from kiks.cli.fit import fit
 from kiks.cli.matlab import matlab
 from kiks.cli.monitor import monitor
 from kiks.cli.run import run
+from kiks.cli.schema import schema
 from kiks.cli.serve import serve
 from kiks.cli.session import session
 from kiks.cli.warmup import warmup
@@ -30,7 +31,22 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for _command in (desk, demo, run, drive, evolve, serve, matlab, session, monitor, calibrate, accuracy, fit, warmup):
+for _command in (
+    desk,
+    demo,
+    run,
+    drive,
+    evolve,
+    serve,
+    matlab,
+    session,
+    monitor,
+    calibrate,
+    accuracy,
+    fit,
+    schema,
+    warmup,
+):
     # A program's own options, and whatever stands after its name, belong to the program.
     app.command(context_settings={"allow_interspersed_args": _command is not run})(_command)
 app.add_typer(arena, name="arena")

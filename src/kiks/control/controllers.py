@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +38,7 @@ from kiks.control.recipes import (
 from kiks.errors import ParameterError, shown
 from kiks.model.data_file import adapter, check
 from kiks.model.robot import SENSOR_COUNT
+
 
 def linear(
     *, senses: Sequence[str] = ("proximity",), speed_limit: float = SPEED_LIMIT, feedback: bool = False

@@ -37,7 +37,9 @@ class Compiled:
     def __init__(self, function: Callable[..., Any], *, what: str, arguments: tuple[str, ...]) -> None:
         wanted = f"{what}({', '.join(arguments)})"
         if not inspect.isfunction(function):
-            raise ParameterError(f"a {what} must be a function {wanted}, but it was {shown(function)}. Define one with def.")
+            raise ParameterError(
+                f"a {what} must be a function {wanted}, but it was {shown(function)}. Define one with def."
+            )
         count = len(inspect.signature(function).parameters)
         if count != len(arguments):
             raise ParameterError(

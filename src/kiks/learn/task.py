@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import pickle
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from kiks.batch.batch import Batch
 from kiks.batch.beginning import random_starts
@@ -20,6 +20,7 @@ from kiks.control.controller import Controller
 from kiks.control.measure import Measure
 from kiks.errors import ParameterError
 from kiks.model.arena import Arena
+from kiks.model.data_file import Number, OneOf, Text, Whole, read_file, record
 from kiks.model.robot import RobotSpec
 
 Floats = NDArray[np.float64]
@@ -34,7 +35,14 @@ CLEAR_MM = 8.0
 """How far from everything robots start at least [mm]."""
 
 
-@dataclass(frozen=True)
+WORLDS_MAX, ROBOTS_MAX = 100_000, 1000
+"""Most worlds of a candidate, and most robots in each."""
+
+Seconds = Annotated[Number, Field(ge=1e-3, le=1e6)]
+Starts = Annotated[str, OneOf(("random", "arena"))]
+
+
+@record
 class Axis:
     """A direction in which behaviours differ, cut into cells.
 
@@ -43,20 +51,19 @@ class Axis:
         low: Its lower end.
         high: Its upper end; who is beyond an end counts to the last cell.
         cells: How many cells.
+
+    Raises:
+        ParameterError: If an argument is out of range.
     """
 
-    measure: str
-    low: float
-    high: float
-    cells: int = 20
+    measure: Text
+    low: Number
+    high: Number
+    cells: Annotated[Whole, Field(ge=1, le=10_000)] = 20
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
-            raise ParameterError(
-                f"an axis must lead from low to high, but {self.measure!r} led {self.low} to {self.high}."
-            )
-        if not isinstance(self.cells, int) or not 1 <= self.cells <= 10_000:
-            raise ParameterError(f"an axis must have 1 to 10000 cells, but {self.measure!r} had {self.cells!r}.")
+        if self.low >= self.high:
+            raise ParameterError(f"an axis must lead from low to high, but it led from {self.low:g} to {self.high:g}.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +197,7 @@ class Task:
         how = (self.worlds, self.axes, self.robots, self.timing, self.starts)
         said.update(repr((self.name, made_of, how, RobotSpec.load(self.robot))).encode())
         if self.file:
-            said.update(Path(self.file).read_bytes())
+            said.update(read_file(Path(self.file), "the task's file"))
         return said.hexdigest()[:16]
 
     # ---- work ----

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +12,8 @@ from numpy.typing import NDArray
 
 from kiks.control import controllers, measures
 from kiks.control.controller import Controller
-from kiks.errors import ParameterError, nearest
+from kiks.control.recipes import module_in
+from kiks.errors import ParameterError, nearest, shown
 from kiks.learn import mazes, rooms
 from kiks.learn.task import Axis, Task, cautious_mean
 from kiks.model.arena import Arena, Cylinder, Lamp
@@ -236,10 +236,13 @@ TASKS: dict[str, Callable[..., Task]] = {
 
 
 def load(name: str, controller: Controller | None = None) -> Task:
-    """Return a task: by its name, or that of a user's Python file, which is run and must hold a `task`.
+    """Return a task: by its name, or that of a file.
+
+    A task file (.toml) may name a user's own controller, whose file is run. A Python file (.py) is run, and must hold a
+    `task`.
 
     Args:
-        name: A name of `TASKS`, or a path that ends in .py.
+        name: A name of `TASKS`, or a path that ends in .toml or .py.
         controller: What is evolved in place of the task's own.
 
     Raises:
@@ -248,20 +251,18 @@ def load(name: str, controller: Controller | None = None) -> Task:
     if name in TASKS:
         return TASKS[name](controller)
     path = Path(name)
+    if path.suffix == ".toml":
+        # A task file is a change of one of the tasks here.
+        from kiks.learn.task_file import load_task_file
+
+        return load_task_file(path, controller)
     if path.suffix != ".py" or not path.is_file():
         raise ParameterError(
-            f"a task must be one of {', '.join(TASKS)}, or a Python file, but it was {name!r}.{nearest(name, TASKS)}"
+            f"a task must be one of {', '.join(TASKS)}, a task file *.toml or a Python file, but it was {shown(name)}."
+            f"{nearest(name, TASKS)}"
         )
-    spec = importlib.util.spec_from_file_location(f"kiks task {path.stem}", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    try:
-        spec.loader.exec_module(module)
-    except Exception as error:
-        raise ParameterError(f"{name!r} must be a Python file that runs, but it raised {error!r}.") from error
-    task = getattr(module, "task", None)
+    task = getattr(module_in(path.absolute()), "task", None)
     if not isinstance(task, Task):
-        raise ParameterError(f"{name!r} must hold a `task = kiks.Task(...)`, but `task` was {task!r:.80}.")
+        raise ParameterError(f"{name!r} must hold a `task = kiks.Task(...)`, but `task` was {shown(task)}.")
     task = replace(task, file=str(path.absolute()))
     return task if controller is None else replace(task, controller=controller)

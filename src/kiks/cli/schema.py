@@ -1,0 +1,68 @@
+"""`kiks schema`."""
+
+from __future__ import annotations
+
+import enum
+import json
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from pydantic.json_schema import JsonSchemaValue
+
+
+class FileKind(enum.StrEnum):
+    """Files that people write."""
+
+    ROBOT = "robot"
+    ARENA = "arena"
+    PROJECT = "project"
+    TASK = "task"
+
+
+def schema(kind: Annotated[FileKind, typer.Argument(help="The kind of file.")]) -> None:
+    """Print the JSON schema of a kind of file, by which an editor completes and checks it.
+
+    Example: kiks schema robot > robot.schema.json
+    """
+    typer.echo(json.dumps(schema_of(kind), indent=2))
+
+
+def schema_of(kind: FileKind) -> JsonSchemaValue:
+    """Return the JSON schema, 2020-12, of a kind of file: of the very model that reading checks it by."""
+    from pydantic.json_schema import GenerateJsonSchema
+
+    from kiks.learn.task_file import TaskFile
+    from kiks.model.arena_file import ArenaFile
+    from kiks.model.data_file import adapter, descriptions
+    from kiks.model.project import ProjectFile
+    from kiks.model.robot import RobotSpec
+
+    class Generator(GenerateJsonSchema):
+        """TOML has no null: a key that may be None is one that may be left out."""
+
+        def nullable_schema(self, schema: Any) -> JsonSchemaValue:
+            return self.generate_inner(schema["schema"])
+
+        def default_schema(self, schema: Any) -> JsonSchemaValue:
+            made = super().default_schema(schema)
+            return {key: value for key, value in made.items() if key != "default" or value is not None}
+
+        def field_title_should_be_set(self, schema: Any) -> bool:
+            return False
+
+        def dataclass_schema(self, schema: Any) -> JsonSchemaValue:
+            made = super().dataclass_schema(schema)
+            for name, text in descriptions(schema["cls"]).items():
+                made["properties"][name]["description"] = text
+            return made
+
+    models: dict[FileKind, Any] = {
+        FileKind.ROBOT: RobotSpec,
+        FileKind.ARENA: ArenaFile,
+        FileKind.PROJECT: ProjectFile,
+        FileKind.TASK: TaskFile,
+    }
+    made = adapter(models[kind]).json_schema(schema_generator=Generator)
+    return {"$schema": Generator.schema_dialect} | made | {"title": f"KiKS {kind} file"}

@@ -1,0 +1,107 @@
+"""Task files: a ready-made task and what is to be otherwise, in a few lines of TOML (docs/evolution.md)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from kiks.batch.timing import Milliseconds
+from kiks.control.controller import Controller
+from kiks.control.controllers import controller_of
+from kiks.control.recipes import Recipe
+from kiks.errors import KiksError, ParameterError
+from kiks.learn.task import ROBOTS_MAX, WORLDS_MAX, Seconds, Starts, Task
+from kiks.learn.tasks import TASKS
+from kiks.model.arena import Arena
+from kiks.model.data_file import OneOf, Rule, Text, Whole, check, parse_toml, read_file, record
+from kiks.model.files import inside
+from kiks.model.robot import robot_names
+
+Name = Annotated[
+    Text,
+    Field(pattern=r"^\w[\w .-]{0,59}$", description="The folder of its evolution is called by it."),
+    Rule("a text of 1 to 60 letters, digits, blanks, dots, - and _"),
+]
+ArenaPath = Annotated[Text, Field(min_length=1, description="An arena file in the folder of this file or below it.")]
+
+
+@record
+class TaskFile:
+    """A task for KiKS to evolve controllers for: a ready-made one, with changes."""
+
+    task: Annotated[Literal[1], Field(description="Version of the format.")]
+    base: Annotated[str, OneOf(tuple(TASKS)), Field(description="The ready-made task: what is measured, and fitness.")]
+    name: Name | None = None
+    about: Annotated[Text, Field(description="What it is about, in a line.")] | None = None
+    seconds: Annotated[Seconds, Field(description="How long a candidate drives in each world.")] | None = None
+    worlds: (
+        Annotated[Whole, Field(ge=1, le=WORLDS_MAX, description="Worlds of a candidate, a multiple of the arenas.")]
+        | None
+    ) = None
+    arenas: (
+        Annotated[tuple[ArenaPath, ...], Field(min_length=1, max_length=100, description="Arena files to train in.")]
+        | None
+    ) = None
+    exam: ArenaPath | None = None
+    robot: (
+        Annotated[Text, Field(min_length=1, description="'khepera', 'khepera_ii', or a robot file beside.")] | None
+    ) = None
+    robots: Annotated[Whole, Field(ge=1, le=ROBOTS_MAX, description="Robots in each world.")] | None = None
+    starts: (
+        Annotated[Starts, Field(description="'random' places, or those of the 'arena'; for several robots 'arena'.")]
+        | None
+    ) = None
+    period_ms: Annotated[Milliseconds, Field(description="From one loop to the next.")] | None = None
+    think_ms: Annotated[Milliseconds, Field(description="What the program needs before each command.")] | None = None
+    baud: Annotated[Whole, Field(ge=0, le=10_000_000, description="Bits a second; 0 for no line.")] | None = None
+    controller: Annotated[Recipe, Field(description="What is evolved.")] | None = None
+
+
+def load_task_file(path: Path, controller: Controller | None = None) -> Task:
+    """Return the task of a file. If its controller is a user's, the Python file or module of that is run.
+
+    Args:
+        path: The file; what it names lies in its folder or below.
+        controller: What is evolved in place of the file's.
+
+    Raises:
+        ParameterError: If it is no task's file, or something that it names is none.
+    """
+    what = f"Task file {str(path)!r}"
+    given = check(TaskFile, parse_toml(read_file(path, what), what), what)
+    try:
+        return _task_of(given, path, controller)
+    except KiksError as error:
+        raise ParameterError(f"{what}: {error}") from None
+
+
+def _task_of(given: TaskFile, path: Path, controller: Controller | None) -> Task:
+    folder, base = path.parent, TASKS[given.base]()
+    changes: dict[str, Any] = {
+        name: value
+        for name in ("about", "seconds", "worlds", "robots", "starts")
+        if (value := getattr(given, name)) is not None
+    }
+    if given.arenas is not None:
+        changes["arenas"] = tuple(Arena.load(inside(folder, each, "arenas")) for each in given.arenas)
+    if given.exam is not None:
+        changes["exam"] = Arena.load(inside(folder, given.exam, "exam"))
+    if given.robot is not None:
+        is_ours = given.robot in robot_names()
+        changes["robot"] = given.robot if is_ours else str(inside(folder, given.robot, "robot"))
+    timing: dict[str, Any] = {}
+    if given.period_ms is not None:
+        timing["period_s"] = given.period_ms / 1000
+    if given.think_ms is not None:
+        timing["think_s"] = given.think_ms / 1000
+    if given.baud is not None:
+        timing["baud"] = given.baud or None
+    changes["timing"] = replace(base.timing, **timing)
+    if controller is None and given.controller is not None:
+        controller = controller_of(given.controller, folder)
+    if controller is not None:
+        changes["controller"] = controller
+    return replace(base, name=given.name or path.stem, file=str(path.absolute()), **changes)
