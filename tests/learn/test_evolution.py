@@ -117,8 +117,18 @@ def test_a_folder_of_another_evolution_is_refused(tmp_path: Path) -> None:
     run("cma", tmp_path)
     with pytest.raises(ParameterError, match="must hold the same evolution, but its seed is 3, not 4"):
         kiks.Evolution(small(), "cma", population=8, seed=4, folder=tmp_path)
-    with pytest.raises(ParameterError, match="but its task digest is"):
+    with pytest.raises(ParameterError, match="but its task_digest is"):
         kiks.Evolution(small(seconds=2.0), "cma", population=8, seed=3, folder=tmp_path)
+
+
+@pytest.mark.parametrize(
+    "data", [b"", b"[]", b"[" * 100_000, b'"x"', b"{}", b"\xff", b'{"seed": 1' + b"0" * 5000, b'{"task": ' + b"9" * 400]
+)
+def test_a_broken_record_of_an_evolution_is_named(data: bytes, tmp_path: Path) -> None:
+    (tmp_path / "evolution.json").write_bytes(data)
+    with pytest.raises(ParameterError, match=r"^The record of an evolution '.*evolution.json'") as caught:
+        kiks.Evolution(small(), "cma", population=8, seed=3, folder=tmp_path)
+    assert len(str(caught.value).replace(str(tmp_path), "")) < 300
 
 
 def test_a_broken_generation_is_named(tmp_path: Path) -> None:
@@ -294,7 +304,7 @@ def test_a_champion_drives_on_the_wire_as_in_the_batch() -> None:
 @pytest.mark.parametrize(
     ("before", "after", "said"),
     [
-        ("champion = 1", "champion = 9", "champion must be one of 1, but it was 9. It is the version of the format"),
+        ("champion = 1", "champion = 9", "champion must be 1, but it was 9. It is the version of the format"),
         ('kind = "linear"', 'kind = "linaer"', "Did you mean 'linear'"),
         ("parameters = [", "parameters = [\n    1.0,", "must be given 18 parameters, but got 19"),
         ("period_s = 0.1", "period_s = -1", "timing.period_s must be a number from 0 to 1000, but it was -1"),

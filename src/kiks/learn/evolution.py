@@ -20,7 +20,7 @@ from kiks.errors import ParameterError
 from kiks.learn.algorithms import make_algorithm
 from kiks.learn.champion import Champion
 from kiks.learn.executors import Executor, executor_for
-from kiks.learn.records import Folder, Generation
+from kiks.learn.records import Folder, Generation, Identity
 from kiks.learn.task import Task
 
 Floats = NDArray[np.float64]
@@ -261,16 +261,11 @@ class Evolution:
         Raises:
             ParameterError: If it holds another evolution.
         """
+        task = self.task
         folder.check_identity(
-            {
-                "task": self.task.name,
-                "algorithm": self.name,
-                "seed": self.seed,
-                "population": self.population,
-                "controller": self.task.controller.name,
-                "task digest": self.task.digest(),
-                "kiks": kiks.__version__,
-            }
+            Identity(
+                task.name, self.name, self.seed, self.population, task.controller.name, task.digest(), kiks.__version__
+            )
         )
         for saved in folder.generations():
             if not np.array_equal(self.ask(), saved["candidates"]):

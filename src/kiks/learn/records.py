@@ -10,7 +10,7 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -18,14 +18,28 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, shown
 from kiks.learn.algorithms import library
+from kiks.model.data_file import Text, Whole, check, parse_json, read_file, record
 from kiks.model.files import make_folder, replace_file
 
 Floats = NDArray[np.float64]
 
 IDENTITY, GENERATIONS, LOG = "evolution.json", "generations", "log.parquet"
 """Names in the folder."""
+
+
+@record
+class Identity:
+    """By what an evolution is told from others."""
+
+    task: Text
+    algorithm: Text
+    seed: Whole
+    population: Whole
+    controller: Text
+    task_digest: Text
+    kiks: Text
 
 
 @dataclass(frozen=True)
@@ -66,7 +80,7 @@ class Folder:
         self.path = Path(path)
         make_folder(self.path / GENERATIONS, "an evolution")
 
-    def check_identity(self, identity: dict[str, Any]) -> None:
+    def check_identity(self, identity: Identity) -> None:
         """Make the folder that of an evolution.
 
         Raises:
@@ -74,19 +88,15 @@ class Folder:
         """
         file = self.path / IDENTITY
         if not file.exists():
-            replace_file(file, json.dumps(identity, indent=1) + "\n", "an evolution")
+            replace_file(file, json.dumps(asdict(identity), indent=1) + "\n", "an evolution")
             return
-        try:
-            known = json.loads(file.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise ParameterError(
-                f"{str(file)!r} must tell whose folder this is, but: {error}. Take a new folder."
-            ) from None
-        for name, value in identity.items():
-            if known.get(name) != value:
+        what = f"The record of an evolution {str(file)!r}"
+        found = check(Identity, parse_json(read_file(file, what), what), what, advice="Take a new folder.")
+        for name, value in asdict(identity).items():
+            if (known := getattr(found, name)) != value:
                 raise ParameterError(
                     f"the folder {str(self.path)!r} must hold the same evolution, but its {name} is "
-                    f"{known.get(name)!r}, not {value!r}. Take a new folder, or ask for what it holds."
+                    f"{shown(known)}, not {shown(value)}. Take a new folder, or ask for what it holds."
                 )
 
     def generations(self) -> Iterator[dict[str, Any]]:

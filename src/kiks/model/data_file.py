@@ -357,6 +357,8 @@ def _rule(place: _Place) -> str:
     if said is not None:
         return said
     if names := _names(place):
+        if len(names) == 1:
+            return names[0]
         return f"one of {', '.join(map(repr, names))}"
     limits = {name: getattr(bound, name) for bound in bounds for name in _LIMITS if hasattr(bound, name)}
     if get_origin(base) is tuple:

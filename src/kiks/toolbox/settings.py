@@ -2,17 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
-from kiks.errors import ParameterError, nearest
+from pydantic import BeforeValidator, Field
+
 from kiks.model.arena import Arena
-from kiks.model.project import Project, ProjectRobot
+from kiks.model.data_file import Number, OneOf, Rule, Switch, Text, Whole, check, record
+from kiks.model.project import TURRETS, Project, ProjectRobot, Seed, ThinkingPolicy
+from kiks.model.robot import Brightness, Response
 
 
-@dataclass(frozen=True)
+def _number(given: object) -> object:
+    """Return the number that a text is, a whole one if it is; anything else as it came."""
+    try:
+        number = float(given) if isinstance(given, str) else given
+    except ValueError:
+        return given
+    return int(number) if isinstance(number, float) and number.is_integer() else number
+
+
+def _switch(given: object) -> object:
+    return {"0": False, "1": True}.get(given, given) if isinstance(given, str) else given
+
+
+def _words(given: object) -> object:
+    return given.split() if isinstance(given, str) else given
+
+
+_NUMBER = BeforeValidator(_number)
+Count = Annotated[Whole, Field(ge=1, le=1000)]
+
+
+@record
 class Settings:
     """Preferences, as far as the simulator has to know them.
 
@@ -32,19 +55,21 @@ class Settings:
         latency_s: What each exchange takes on top of all else [s], as a calibration has measured it.
     """
 
-    seed: int = 0
-    thinking: str = "live"
-    robot: str = "khepera"
-    robots: int | None = None
-    response: str | None = None
-    noise: bool = True
-    turrets: tuple[str, ...] = ("k213", "radio", "battle")
-    wall: int = 255
-    ball: int | None = None
-    cylinder: int | None = None
-    brightness: int | None = None
-    programs: int = 1
-    latency_s: float = 0.0
+    seed: Annotated[Seed, _NUMBER] = 0
+    thinking: ThinkingPolicy = "live"
+    robot: Text = "khepera"
+    robots: Annotated[Count, _NUMBER] | None = None
+    response: Response | None = None
+    noise: Annotated[Switch, BeforeValidator(_switch), Rule("0 or 1")] = True
+    turrets: Annotated[
+        tuple[Annotated[str, OneOf(TURRETS)], ...], Field(max_length=len(TURRETS)), BeforeValidator(_words)
+    ] = ("k213", "radio", "battle")
+    wall: Annotated[Brightness, _NUMBER] = 255
+    ball: Annotated[Brightness, _NUMBER] | None = None
+    cylinder: Annotated[Brightness, _NUMBER] | None = None
+    brightness: Annotated[Brightness, _NUMBER] | None = None
+    programs: Annotated[Count, _NUMBER] = 1
+    latency_s: Annotated[Number, Field(ge=0, le=10), _NUMBER] = 0.0
 
     def changed(self, name: str, value: str) -> Settings:
         """Return a copy with one value that the user has written; the usual one if that is nothing.
@@ -56,15 +81,8 @@ class Settings:
             >>> Settings().changed("seed", "7").seed
             7
         """
-        if name not in _READERS:
-            raise ParameterError(
-                f"a setting must be one of {list(_READERS)}, but it was {name!r}.{nearest(name, _READERS)}"
-            )
-        read, what = _READERS[name]
-        try:
-            return replace(self, **{name: read(value) if value else getattr(Settings(), name)})
-        except (ValueError, OverflowError):
-            raise ParameterError(f"{name} must be {what}, but it was {value!r}. Look into kiks_preferences.") from None
+        values = {known: given for known, given in asdict(self).items() if known != name}
+        return check(Settings, values | ({name: value} if value else {}), "kiks_preferences")
 
     @property
     def folder(self) -> Path:
@@ -88,52 +106,3 @@ class Settings:
             response=self.response,
             noise=self.noise,
         )
-
-
-def _whole(text: str) -> int:
-    number = float(text)
-    if number != int(number):
-        raise ValueError
-    return int(number)
-
-
-def _grey(text: str) -> int:
-    number = _whole(text)
-    if not 1 <= number <= 255:
-        raise ValueError
-    return number
-
-
-def _switch(text: str) -> bool:
-    if text not in ("0", "1"):
-        raise ValueError
-    return text == "1"
-
-
-def _seconds(text: str) -> float:
-    number = float(text)
-    if not 0 <= number <= 10:
-        raise ValueError
-    return number
-
-
-def _words(text: str) -> tuple[str, ...]:
-    return tuple(text.split())
-
-
-_READERS: dict[str, tuple[Callable[[str], Any], str]] = {
-    "seed": (_whole, "a whole number from 0"),
-    "thinking": (str, "a text"),
-    "robot": (str, "a text"),
-    "robots": (_whole, "a whole number from 1"),
-    "response": (str, "a text"),
-    "noise": (_switch, "0 or 1"),
-    "turrets": (_words, "names with blanks between them"),
-    "wall": (_grey, "a whole number from 1 to 255"),
-    "ball": (_grey, "a whole number from 1 to 255"),
-    "cylinder": (_grey, "a whole number from 1 to 255"),
-    "brightness": (_grey, "a whole number from 1 to 255"),
-    "programs": (_whole, "a whole number from 1"),
-    "latency_s": (_seconds, "a time from 0 to 10 s"),
-}
-"""How the value of each setting is read, and what it has to be."""
