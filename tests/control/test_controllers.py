@@ -243,7 +243,10 @@ def test_what_cannot_be_compiled_is_refused_by_its_name() -> None:
         (lambda: kiks.controllers.ctrnn(neurons=1), "neurons must be a whole number from 2"),
         (lambda: kiks.controllers.ctrnn(period_s=0), "period_s must be a number from 0.001 to 10, but it was 0"),
         (lambda: kiks.controllers.gru(units=2.5), "units must be a whole number from 1 to 256, but it was 2.5"),
-        (lambda: kiks.controllers.linear(speed_limit="fast"), "speed_limit must be a number from 0 to 127, but it was 'fast'"),
+        (
+            lambda: kiks.controllers.linear(speed_limit="fast"),
+            "speed_limit must be a number from 0 to 127, but it was 'fast'",
+        ),
         (lambda: kiks.controllers.linear(senses=("proximty",)), "Did you mean 'proximity'"),
         (lambda: kiks.controllers.linear(senses=()), "senses must be a list of 1 or more values"),
     ],

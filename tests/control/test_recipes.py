@@ -87,7 +87,10 @@ def test_nobody_finds_what_is_inside_a_function() -> None:
         ({"kind": ["mlp"]}, "must be a table with a kind"),
         ({"kind": "mlp", "hiden": [3]}, "but it has 'hiden'. Did you mean 'hidden'"),
         ({"kind": "mlp", "hidden": [3.5]}, r"hidden\[0\] must be a whole number from 1 to 256, but it was 3.5"),
-        ({"kind": "mlp", "hidden": [10**9]}, r"hidden\[0\] must be a whole number from 1 to 256, but it was 1000000000"),
+        (
+            {"kind": "mlp", "hidden": [10**9]},
+            r"hidden\[0\] must be a whole number from 1 to 256, but it was 1000000000",
+        ),
         ({"kind": "mlp", "hidden": [256] * 9}, "hidden must be a list of 0 to 8 values"),
         ({"kind": "gru", "speed_limit": float("nan")}, "speed_limit must be a number from 0 to 127, but it was nan"),
         ({"kind": "gru", "senses": ["ambient", "ambient"]}, "senses must name each sense once"),

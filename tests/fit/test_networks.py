@@ -171,7 +171,10 @@ def test_files_that_hold_no_networks(tmp_path, text, words):
     ("change", "words"),
     [
         ({"hidden": [[1.0]]}, "hidden must be a list of 8 values, each a list of 13 values, each a list of 8 values"),
-        ({"hidden": [[[0.0] * 8] * 13] * 7 + [[[0.0] * 8] * 12 + [[1e7] * 8]]}, r"hidden\[7\]\[12\]\[0\] must be a number"),
+        (
+            {"hidden": [[[0.0] * 8] * 13] * 7 + [[[0.0] * 8] * 12 + [[1e7] * 8]]},
+            r"hidden\[7\]\[12\]\[0\] must be a number",
+        ),
         ({"last": "x"}, "last must be a list of 8 values"),
         ({"range_mm": [1.0]}, "range_mm must be a number from 1 to 1000"),
         ({"range_mm": 0}, "range_mm must be a number from 1 to 1000, but it was 0"),

@@ -1,0 +1,121 @@
+"""Task files: a ready-made task with changes, without a line of Python."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import kiks
+from kiks.model.arena_file import save_arena
+
+SHY = """
+import kiks
+
+@kiks.controller(parameters=1)
+def shy(sensors, memory, parameters, wheels):
+    wheels[0] = wheels[1] = 5.0 - parameters[0] * sensors[2]
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    save_arena(kiks.Arena.box(400, 300), tmp_path / "room.toml")
+    save_arena(kiks.Arena.box(500, 300), tmp_path / "hall.toml")
+    (tmp_path / "shy.py").write_text(SHY)
+    return tmp_path
+
+
+def load(folder: Path, text: str, name: str = "mine.toml") -> kiks.Task:
+    (folder / name).write_text("task = 1\n" + text)
+    return kiks.tasks.load(str(folder / name))
+
+
+def test_what_is_not_said_is_as_in_the_ready_made_task(folder: Path) -> None:
+    base = kiks.tasks.load("light")
+    task = load(folder, 'base = "light"\n')
+    assert task.name == "mine"
+    for name in ("measures", "fitness", "seconds", "worlds", "axes", "robot", "robots", "timing", "starts", "about"):
+        assert getattr(task, name) == getattr(base, name), name
+    assert task.controller is base.controller
+
+
+def test_all_that_can_be_said(folder: Path) -> None:
+    (folder / "my.toml").write_bytes((Path(kiks.__file__).parent / "model/robots/khepera.toml").read_bytes())
+    task = load(
+        folder,
+        'base = "avoid"\nname = "in a room"\nabout = "x"\nseconds = 2\nworlds = 4\narenas = ["room.toml", "hall.toml"]\n'
+        'exam = "hall.toml"\nrobot = "my.toml"\nrobots = 1\nstarts = "arena"\nperiod_ms = 50\nthink_ms = 2.5\n'
+        'baud = 38400\n[controller]\nkind = "gru"\nunits = 2\n',
+    )
+    assert (task.name, task.about, task.seconds, task.worlds, task.starts) == ("in a room", "x", 2.0, 4, "arena")
+    assert [arena.width_mm for arena in task.arenas] == [400, 500]
+    assert task.exam is not None
+    assert task.exam.width_mm == 500
+    assert task.robot == str((folder / "my.toml").resolve())
+    assert task.timing == kiks.Timing(0.05, 38400, 0.0025)
+    assert task.controller is kiks.controllers.gru(units=2)
+    assert load(folder, 'base = "avoid"\nbaud = 0\n').timing.baud is None
+    assert kiks.tasks.load(str(folder / "mine.toml"), kiks.controllers.linear()).controller.name == "linear"
+    own = load(folder, 'base = "avoid"\n[controller]\nfile = "shy.py"\nname = "shy"\n')
+    assert (own.controller.name, own.parameter_count) == ("shy", 1)
+
+
+def test_its_digest_tells_of_the_file_and_its_arenas(folder: Path) -> None:
+    text = 'base = "avoid"\narenas = ["room.toml"]\n'
+    first = load(folder, text).digest()
+    assert load(folder, text).digest() == first
+    assert load(folder, text + "# a word\n").digest() != first
+    save_arena(kiks.Arena.box(401, 300), folder / "room.toml")
+    assert load(folder, text).digest() != first
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "base must be given"),
+        ('base = "avoyd"', "base must be one of .* Did you mean 'avoid'"),
+        ('base = "avoid"\nworld = 3', "Did you mean 'worlds'"),
+        ('base = "avoid"\nworlds = 4', "worlds must be a multiple of the number of arenas, 3"),
+        ('base = "avoid"\nseconds = nan', "seconds must be a number from 0.001 to 1e6, but it was nan"),
+        ('base = "avoid"\nname = "../../out"', "name must be a text of 1 to 60 letters"),
+        ('base = "avoid"\narenas = []', "arenas must be a list of 1 to 100 values"),
+        ('base = "avoid"\narenas = ["../room.toml"]', "arenas must lead to a file in"),
+        ('base = "avoid"\narenas = ["/etc/passwd"]', "arenas must lead to a file in"),
+        ('base = "avoid"\nworlds = 1\narenas = ["nowhere.toml"]', "must exist, but there is no such file"),
+        ('base = "avoid"\nexam = "nowhere.toml"', "must exist, but there is no such file"),
+        ('base = "avoid"\nrobot = "kepera"', "Robot file|robot must|must exist"),
+        ('base = "avoid"\nbaud = 50', "baud must be a whole number from 110"),
+        ('base = "avoid"\nperiod_ms = 1\nbaud = 0', "period_s must be at least 0.01 without a line"),
+        ('base = "avoid"\nrobots = 2', "with several robots 'arena'"),
+        (
+            'base = "avoid"\n[controller]\nkind = "mlp"\nhidden = [1000000000]',
+            r"controller.hidden\[0\] must be a whole",
+        ),
+        ('base = "avoid"\n[controller]\nfile = "../shy.py"\nname = "shy"', "must lead to a file in"),
+    ],
+)
+def test_one_line_says_what_is_wrong(text: str, message: str, folder: Path) -> None:
+    with pytest.raises(kiks.ParameterError, match=message) as caught:
+        load(folder, text).digest()
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value).replace(str(folder), "")) < 400
+
+
+def test_an_evolution_of_a_task_file_goes_on_only_with_the_same_file(folder: Path) -> None:
+    pytest.importorskip("pyarrow")
+    text = 'base = "avoid"\nseconds = 0.5\nworlds = 1\narenas = ["room.toml"]\n'
+    options: dict[str, Any] = {"population": 4, "folder": folder / "out"}
+    kiks.Evolution(load(folder, text), "ga", **options).run(generations=2, executor="threads:1")
+    assert len(kiks.Evolution(load(folder, text), "ga", **options).generations) == 2
+    with pytest.raises(kiks.ParameterError, match="but its task_digest is"):
+        kiks.Evolution(load(folder, text + "# a word\n"), "ga", **options)
+
+
+def test_the_example_stands_in_the_documents_and_is_a_task() -> None:
+    root = Path(__file__).parents[2]
+    text = (root / "examples/office_task.toml").read_text(encoding="utf-8")
+    assert f"```toml\n{text}```" in (root / "docs/evolution.md").read_text(encoding="utf-8")
+    task = kiks.tasks.load(str(root / "examples/office_task.toml"))
+    assert (task.name, task.controller.name, task.arenas[0].name) == ("office_task", "mlp", "Office")
