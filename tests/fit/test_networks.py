@@ -170,7 +170,8 @@ def test_files_that_hold_no_networks(tmp_path, text, words):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"hidden": [[1.0]]}, "hidden must be a list of 8 values, each a list of 13 values, each a list of 8 values"),
+        ({"hidden": [[1.0]]}, r"hidden\[0\]\[0\] must be a list of 8 values, each a number from -1e6 to 1e6"),
+        ({"hidden": []}, "hidden must be a list of 8 values, each a list of 13 values, each a list of 8 values"),
         (
             {"hidden": [[[0.0] * 8] * 13] * 7 + [[[0.0] * 8] * 12 + [[1e7] * 8]]},
             r"hidden\[7\]\[12\]\[0\] must be a number",

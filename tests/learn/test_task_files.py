@@ -45,7 +45,8 @@ def test_all_that_can_be_said(folder: Path) -> None:
     (folder / "my.toml").write_bytes((Path(kiks.__file__).parent / "model/robots/khepera.toml").read_bytes())
     task = load(
         folder,
-        'base = "avoid"\nname = "in a room"\nabout = "x"\nseconds = 2\nworlds = 4\narenas = ["room.toml", "hall.toml"]\n'
+        'base = "avoid"\nname = "in a room"\nabout = "x"\nseconds = 2\nworlds = 4\n'
+        'arenas = ["room.toml", "hall.toml"]\n'
         'exam = "hall.toml"\nrobot = "my.toml"\nrobots = 1\nstarts = "arena"\nperiod_ms = 50\nthink_ms = 2.5\n'
         'baud = 38400\n[controller]\nkind = "gru"\nunits = 2\n',
     )

@@ -176,7 +176,8 @@ def check_recipe(recipe: object) -> Recipe:
     Raises:
         ParameterError: If it is none.
     """
-    made: Recipe = check(Recipe, recipe, "the recipe")
+    model: Any = Recipe
+    made: Recipe = check(model, recipe, "the recipe")
     return made
 
 
@@ -261,5 +262,6 @@ def _shaped(recipe: Shape) -> Controller:
         is_cut = isinstance(recipe, Linear)
         decide = networks.feed_forward(counts, has_feedback=recipe.feedback, is_cut=is_cut, speed_limit=limit)
     decide.__name__ = decide.__qualname__ = recipe.kind
-    said = adapter(type(recipe)).dump_python(recipe, mode="json")
+    model: Any = type(recipe)
+    said = adapter(model).dump_python(recipe, mode="json")
     return Controller(decide, senses=recipe.senses, memory=memory, parameters=size, recipe=said)

@@ -124,7 +124,7 @@ def adapter(model: Any) -> TypeAdapter[Any]:
     return TypeAdapter(model)
 
 
-def descriptions(kind: type[Any]) -> dict[str, str]:
+def descriptions(kind: Any) -> dict[str, str]:
     """Return what each field of a record must be, in words, and what it says of itself."""
     places = {name: _declared(hint) for name, hint in _hints(kind).items()}
     texts = {name: f"{_rule(place)}. {place.description}".rstrip() for name, place in places.items()}
