@@ -133,9 +133,29 @@ def test_a_broken_record_of_an_evolution_is_named(data: bytes, tmp_path: Path) -
 
 def test_a_broken_generation_is_named(tmp_path: Path) -> None:
     run("cma", tmp_path)
-    (tmp_path / "generations/000002.npz").write_bytes(b"nothing")
-    with pytest.raises(ParameterError, match=r"000002.npz' must be a generation"):
-        kiks.Evolution(small(), "cma", population=8, seed=3, folder=tmp_path)
+    file = tmp_path / "generations/000002.npz"
+    with np.load(file) as saved:
+        good = dict(saved)
+    wrong: list[dict[str, Any]] = [
+        {"seconds": good["values"]},
+        {"seconds": np.float64(np.nan)},
+        {"values": np.full_like(good["values"], np.inf)},
+        {"values": good["values"][:, 0]},
+        {"values": np.zeros((len(good["values"]), 10**6), np.int8)},
+        {"candidates": good["candidates"][:-1]},
+        {"candidates": good["candidates"].astype(complex)},
+        {"candidates": good["candidates"].astype(object)},
+    ]
+    for change in wrong:
+        np.savez_compressed(file, **good | change)
+        with pytest.raises(ParameterError, match=rf"000002.npz': {next(iter(change))} |000002.npz' must be a whole"):
+            kiks.Evolution(small(), "cma", population=8, seed=3, folder=tmp_path)
+    for data in (b"nothing", b"", (tmp_path / "generations/000001.npz").read_bytes()[:-30]):
+        file.write_bytes(data)
+        with pytest.raises(ParameterError, match=r"000002.npz' must be a whole .npz file"):
+            kiks.Evolution(small(), "cma", population=8, seed=3, folder=tmp_path)
+    np.savez(file, **good)
+    assert len(kiks.Evolution(small(), "cma", population=8, seed=3, folder=tmp_path).generations) == 4
 
 
 @pytest.mark.parametrize("algorithm", ["ga", "map-elites"])

@@ -267,7 +267,8 @@ class Evolution:
                 task.name, self.name, self.seed, self.population, task.controller.name, task.digest(), kiks.__version__
             )
         )
-        for saved in folder.generations():
+        most = len(task.value_names)
+        while (saved := folder.generation(len(self.generations), self.ask().shape, most)) is not None:
             if not np.array_equal(self.ask(), saved["candidates"]):
                 raise ParameterError(
                     f"the evolution in {str(folder.path)!r} must go on to the bit, but generation "

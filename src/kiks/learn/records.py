@@ -9,17 +9,17 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kiks.errors import ParameterError, shown
 from kiks.learn.algorithms import library
+from kiks.model.arrays import Numbers, read_arrays
 from kiks.model.data_file import Text, Whole, check, parse_json, read_file, record
 from kiks.model.files import make_folder, replace_file
 
@@ -27,6 +27,9 @@ Floats = NDArray[np.float64]
 
 IDENTITY, GENERATIONS, LOG = "evolution.json", "generations", "log.parquet"
 """Names in the folder."""
+
+
+_ADVICE = "Remove the file, and those after it."
 
 
 @record
@@ -99,22 +102,27 @@ class Folder:
                     f"{shown(known)}, not {shown(value)}. Take a new folder, or ask for what it holds."
                 )
 
-    def generations(self) -> Iterator[dict[str, Any]]:
-        """Yield candidates, values and seconds of each generation, as they were saved.
+    def generation(self, number: int, shape: tuple[int, int], value_count: int) -> dict[str, NDArray[Any]] | None:
+        """Return candidates, values and seconds of a generation as they were saved; None if it was not.
+
+        Args:
+            number: Which, from 0.
+            shape: How many candidates it must have, and parameters of each.
+            value_count: How many values a candidate has at most.
 
         Raises:
-            ParameterError: If a file is broken.
+            ParameterError: If its file is broken, or that of another evolution.
         """
-        number = 0
-        while (file := self._file(number)).exists():
-            try:
-                with np.load(file, allow_pickle=False) as arrays:
-                    yield {name: arrays[name] for name in ("candidates", "values", "seconds")}
-            except (OSError, ValueError, KeyError, BadZipFile) as error:
-                raise ParameterError(
-                    f"{str(file)!r} must be a generation, but: {error}. Remove it, and those after it."
-                ) from None
-            number += 1
+        file = self._file(number)
+        if not file.exists():
+            return None
+        rules = {
+            "candidates": Numbers(shape, advice=_ADVICE),
+            "values": Numbers((shape[0], "value"), advice=_ADVICE),
+            "seconds": Numbers((), low=0.0, advice=_ADVICE),
+        }
+        most = shape[0] * (shape[1] + value_count) + 1
+        return read_arrays(file, rules, f"Generation {str(file)!r}", numbers_max=most)
 
     def save(self, number: int, generation: Generation) -> None:
         """Save a generation.
