@@ -101,7 +101,7 @@ class CodeCache:
                 # Others may read it, so that one user can compile for all, whatever the umask.
                 replace_file(folder / name, data, rights=0o644)
             except (OSError, ParameterError) as error:
-                cause = error if isinstance(error, OSError) else error.__cause__
+                cause = error.__cause__ or error
                 troubles.append(f"{str(folder)!r} ({getattr(cause, 'strerror', cause)})")
             else:
                 result = f"it is in {str(folder)!r}"
