@@ -212,4 +212,4 @@ def _ready(scene: Callable[[random.Random], int]) -> Play:
 def campaigns() -> Iterator[Campaign]:
     """Yield one for each of them."""
     for name, (scene, count) in SCENES.items():
-        yield Campaign(f"crowd.{name}", count, partial(_ready, scene), limit_s=400.0)
+        yield Campaign(f"crowd.{name}", count, partial(_ready, scene), limit_s=100.0)
