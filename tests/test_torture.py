@@ -52,7 +52,7 @@ def test_what_is_planted_is_found(figure: str, count: int) -> None:
         "SIGABRT; first --only planted.dies",
         "3 x foreign: MemoryError",
         "message: secret, ParameterError",
-        "campaigns/planted.py, _hangs: longer than 0.5 s",
+        "campaigns/planted.py, _hangs: computes longer than 0.5 s",
     ],
 )
 def test_a_finding_tells_its_cause_and_its_case(words: str) -> None:

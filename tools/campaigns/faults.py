@@ -438,14 +438,14 @@ SCENES: dict[str, tuple[Callable[[random.Random], None], int, float]] = {
     "fill_disk": (_fill_disk, 400, 30.0),
     "write_nowhere": (_write_nowhere, 100, 30.0),
     "no_descriptors": (_no_descriptors, 300, 60.0),
-    "kill_evolution": (_kill_evolution, 6, 300.0),
-    "kill_worker": (_kill_worker, 4, 300.0),
-    "kill_client": (_kill_client, 4, 300.0),
-    "kill_server": (_kill_server, 4, 300.0),
-    "kill_session": (_kill_session, 4, 300.0),
-    "kill_desk": (_kill_desk, 3, 300.0),
-    "damage_cache": (_damage_cache, 8, 600.0),
-    "no_home": (_no_home, 2, 600.0),
+    "kill_evolution": (_kill_evolution, 6, 100.0),
+    "kill_worker": (_kill_worker, 4, 100.0),
+    "kill_client": (_kill_client, 4, 100.0),
+    "kill_server": (_kill_server, 4, 100.0),
+    "kill_session": (_kill_session, 4, 100.0),
+    "kill_desk": (_kill_desk, 3, 100.0),
+    "damage_cache": (_damage_cache, 8, 200.0),
+    "no_home": (_no_home, 2, 200.0),
 }
 """What happens, how often, and how long it may take [s]."""
 

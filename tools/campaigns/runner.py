@@ -39,10 +39,13 @@ FOREIGN_MAX = 80
 SECRET = "".join(chr(ord("a") + number * number % 23) + str(number % 10) for number in range(100))
 """A text of 200 characters in which hostile data are written, so that a message that repeats too much is known."""
 
+WAIT_FACTOR = 4
+"""How much longer a case may wait than it may compute."""
+
 LOOK_S = 0.05
 """How often children are looked after [s]."""
 
-CASE, BEGUN_NS, PLAYED, TRIED, REFUSED, PEAK_KB, PEAK_CASE = range(7)
+CASE, BEGUN_NS, BEGUN_CPU_NS, PLAYED, TRIED, REFUSED, PEAK_KB, PEAK_CASE = range(8)
 """What a child writes about itself, in this order."""
 
 Play = Callable[[random.Random], "int | None"]
@@ -83,7 +86,8 @@ class Campaign:
         name: A group and a kind, 'files.robot'.
         cases: How many there are in a whole run.
         prepare: Makes everything ready and returns what plays a case; called once, before children begin.
-        limit_s: Longest time of a case [s]; one that takes longer hangs.
+        limit_s: Longest time of a case [s of the processor], and a quarter of the longest that it may wait; one that
+            takes longer hangs.
         memory_mb: Most memory that the process of a case may have, all in all [MB]; any if None.
         is_planted: Whether it is there to see that the runner notices.
     """
@@ -204,7 +208,7 @@ class _Child:
         self.pid = 0
 
     def begin(self, play: Play, campaign: Campaign, cases: range, seed: int, report: Path) -> None:
-        self.row[CASE], self.row[BEGUN_NS] = self.next, time.monotonic_ns()
+        self.row[CASE], self.row[BEGUN_CPU_NS], self.row[BEGUN_NS] = self.next, 0, time.monotonic_ns()
         sys.stdout.flush()
         sys.stderr.flush()
         self.pid = os.fork()
@@ -225,7 +229,7 @@ def _live(play: Play, campaign: Campaign, cases: range, seed: int, row: Any, err
         limit_memory(campaign)
         with report.open("a", buffering=1, encoding="utf-8") as lines:
             for case in cases:
-                row[CASE], row[BEGUN_NS] = case, time.monotonic_ns()
+                row[CASE], row[BEGUN_CPU_NS], row[BEGUN_NS] = case, time.process_time_ns(), time.monotonic_ns()
                 os.ftruncate(said, 0)
                 os.lseek(said, 0, os.SEEK_SET)
                 try:
@@ -309,13 +313,19 @@ def _look_after(child: _Child, campaign: Campaign, report: Path) -> bool | None:
     """Return None for a child that goes on, True for one that is done, False for one that its case has ended."""
     pid, status = os.waitpid(child.pid, os.WNOHANG)
     if pid == 0:
-        if time.monotonic_ns() - int(child.row[BEGUN_NS]) < campaign.limit_s * 1e9:
+        if not _is_late(child, campaign):
+            return None
+        # It may have come to its next case meanwhile: it is stopped, and looked at again.
+        os.kill(child.pid, signal.SIGSTOP)
+        if not _is_late(child, campaign):
+            os.kill(child.pid, signal.SIGCONT)
             return None
         # faulthandler writes down where it is.
         os.kill(child.pid, signal.SIGABRT)
+        os.kill(child.pid, signal.SIGCONT)
         time.sleep(0.5)
         _kill(child.pid)
-        verdict, text = "hang", f"longer than {campaign.limit_s:g} s"
+        verdict, text = "hang", f"computes longer than {campaign.limit_s:g} s, or waits longer than four times that"
     else:
         _kill_group(child.pid)
         code = os.waitstatus_to_exitcode(status)
@@ -331,6 +341,17 @@ def _look_after(child: _Child, campaign: Campaign, report: Path) -> bool | None:
     with report.open("a", encoding="utf-8") as lines:
         lines.write(json.dumps([verdict, where, text, int(child.row[CASE])]) + "\n")
     return False
+
+
+def _is_late(child: _Child, campaign: Campaign) -> bool:
+    """Say whether a case takes too long: computing, or by the clock, which on a busy computer goes faster."""
+    limit_ns = campaign.limit_s * 1e9
+    waited_ns = time.monotonic_ns() - int(child.row[BEGUN_NS])
+    if not limit_ns < waited_ns:
+        return False
+    words = Path(f"/proc/{child.pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
+    computed_ns = (int(words[11]) + int(words[12])) * 1e9 / os.sysconf("SC_CLK_TCK") - int(child.row[BEGUN_CPU_NS])
+    return computed_ns > limit_ns or waited_ns > WAIT_FACTOR * limit_ns
 
 
 def _kill(pid: int) -> None:

@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 
 from tools.campaigns.processes import Looker, desk
-from tools.campaigns.runner import Broken, Campaign, Figure, Play
+from tools.campaigns.runner import WAIT_FACTOR, Broken, Campaign, Figure, Play
 
 HOURS = 24.0
 """How long the programs drive [h of simulated time]."""
@@ -119,4 +119,4 @@ def _prepare(hours: float) -> Play:
 def campaigns() -> Iterator[Campaign]:
     """Yield the only one; KIKS_TORTURE_HOURS shortens it."""
     hours = float(os.environ.get("KIKS_TORTURE_HOURS", HOURS))
-    yield Campaign("soak.day", 1, partial(_prepare, hours), limit_s=LIMIT_S)
+    yield Campaign("soak.day", 1, partial(_prepare, hours), limit_s=LIMIT_S / WAIT_FACTOR)
