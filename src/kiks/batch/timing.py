@@ -9,13 +9,12 @@ times, so how long a loop takes depends on what the robots say: `n,0,...` is sho
 
 from __future__ import annotations
 
-import math
 from collections import namedtuple
 from dataclasses import dataclass
 from typing import Any
 
 from kiks.engine.compiling import kernel
-from kiks.errors import ParameterError
+from kiks.model.ranges import check_count, check_number
 from kiks.model.robot import RobotSpec
 from kiks.units import character_ns, ns_from_s
 
@@ -50,14 +49,10 @@ class Timing:
 
     def __post_init__(self) -> None:
         for name, least in (("period_s", 0.01 if self.baud is None else 0.0), ("think_s", 0.0)):
-            value = getattr(self, name)
-            if not (isinstance(value, int | float) and math.isfinite(value) and least <= value <= 1000):
-                raise ParameterError(f"{name} must be from {least:g} to 1000 s, but it was {value!r}.")
-        if self.baud is not None and not (isinstance(self.baud, int) and 110 <= self.baud <= 10_000_000):
-            raise ParameterError(
-                f"baud must be from 110 to 10000000 bit/s, or None for no line, but it was {self.baud!r}. "
-                "The Khepera knows 9600, 19200, 38400 and 57600."
-            )
+            check_number(name, getattr(self, name), least, 1000)
+        if self.baud is not None:
+            advice = "None is for no line; the Khepera knows 9600, 19200, 38400 and 57600."
+            check_count("baud", self.baud, 110, 10_000_000, advice)
 
     def line(self, spec: RobotSpec) -> Any:
         """Return what kernels need to know of the line to a robot of a kind."""

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from kiks.control import networks, recipes
 from kiks.control.controller import Controller, check_senses
-from kiks.control.functions import check_count, check_number
-from kiks.errors import ParameterError, nearest
+from kiks.errors import ParameterError, nearest, shown
+from kiks.model.ranges import check_count, check_number
 from kiks.model.robot import SENSOR_COUNT
 
 SPEED_LIMIT = 10.0
@@ -83,9 +83,9 @@ def mlp(
         >>> kiks.controllers.mlp(hidden=(6,)).parameter_count
         68
     """
-    if isinstance(hidden, str | int) or len(hidden) > HIDDEN_LIMIT:
+    if not isinstance(hidden, list | tuple) or len(hidden) > HIDDEN_LIMIT:
         raise ParameterError(
-            f"hidden must be the units of up to {HIDDEN_LIMIT} layers, like (6,), but it was {hidden!r}."
+            f"hidden must be the units of up to {HIDDEN_LIMIT} layers, like (6,), but it was {shown(hidden)}."
         )
     counts = tuple(check_count("hidden units", count, 1, UNIT_LIMIT) for count in hidden)
     return _mlp(counts, check_senses(senses), _speed_limit(speed_limit), bool(feedback))

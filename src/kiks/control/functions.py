@@ -10,7 +10,7 @@ from numba import extending, types
 from numba.core import errors
 
 from kiks.engine.compiling import kernel
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, shown
 
 # Numba annotates these in part, and not as they are used.
 _intrinsic: Any = extending.intrinsic
@@ -37,7 +37,9 @@ class Compiled:
     def __init__(self, function: Callable[..., Any], *, what: str, arguments: tuple[str, ...]) -> None:
         wanted = f"{what}({', '.join(arguments)})"
         if not inspect.isfunction(function):
-            raise ParameterError(f"a {what} must be a function {wanted}, but it was {function!r}. Define one with def.")
+            raise ParameterError(
+                f"a {what} must be a function {wanted}, but it was {shown(function)}. Define one with def."
+            )
         count = len(inspect.signature(function).parameters)
         if count != len(arguments):
             raise ParameterError(
@@ -91,25 +93,3 @@ def caller_of(argument_types: tuple[Any, ...]) -> Any:
         return types.none(types.int64, arguments), generate
 
     return call
-
-
-def check_count(name: str, count: object, least: int = 0, most: int = 1_000_000) -> int:
-    """Return a whole number.
-
-    Raises:
-        ParameterError: If it is none, or out of range.
-    """
-    if not isinstance(count, int) or isinstance(count, bool) or not least <= count <= most:
-        raise ParameterError(f"{name} must be a whole number from {least} to {most}, but it was {count!r}.")
-    return count
-
-
-def check_number(name: str, number: object, least: float, most: float) -> float:
-    """Return a number as a float.
-
-    Raises:
-        ParameterError: If it is none, or out of range.
-    """
-    if not isinstance(number, int | float) or isinstance(number, bool) or not least <= number <= most:
-        raise ParameterError(f"{name} must be from {least:g} to {most:g}, but it was {number!r}.")
-    return float(number)

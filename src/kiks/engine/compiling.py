@@ -56,8 +56,12 @@ def entry(function: Callable[..., Any]) -> Any:
 
 
 def cache_folder() -> Path:
-    """Return the folder that holds the compiled engine: under `NUMBA_CACHE_DIR`, else the user's cache folder."""
-    digest = hashlib.sha256()
+    """Return the folder that holds the compiled engine: under `NUMBA_CACHE_DIR`, else the user's cache folder.
+
+    Code that checks its indices (`NUMBA_BOUNDSCHECK=1`) has one of its own: Numba's cache does not tell the two apart.
+    """
+    settings: Any = config
+    digest = hashlib.sha256(b"checked" if settings.BOUNDSCHECK else b"")
     for folder in KERNEL_FOLDERS:
         for source in sorted((Path(__file__).parent.parent / folder).glob("*.py")):
             digest.update(source.read_bytes())
