@@ -25,8 +25,8 @@ from kiks.engine.vectors import corners, floor
 PIECE_MM = 1.0
 """Longest piece of a motion near a wall [mm]: short against the radius, so that no wall is jumped over."""
 
-PIECES_MAX = 10_000.0
-"""Most pieces of a motion: beyond any robot or ball, and no tick lasts for ever."""
+PIECES_MAX = 100.0
+"""Most pieces of a motion in a tick: three times what the fastest robot that a file may describe needs."""
 
 SETTLED_MM = 1e-5
 """Penetration that counts as none [mm]."""

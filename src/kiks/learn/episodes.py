@@ -103,7 +103,8 @@ class Episodes:
         """Let all robots of all worlds act, and sense again.
 
         Args:
-            actions: Speeds of the left and right wheels, shares of the speed limit, [world, robot, 2]; or [world, 2] of robots that are alone.
+            actions: Speeds of the left and right wheels, shares of the speed limit, [world, robot, 2]; or
+                [world, 2] of robots that are alone.
 
         Returns:
             Their rewards, float64 [world, robot].
