@@ -13,7 +13,7 @@ from kiks.engine.numbers import sin_cos
 from kiks.engine.state import BALL, BODY, CYLINDER
 from kiks.errors import ArenaError, KiksError, ParameterError, shown
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp
-from kiks.model.ranges import check_count, check_heading, check_number, check_numbers
+from kiks.model.ranges import check_heading, check_number, check_numbers
 from kiks.model.robot import RobotSpec
 from kiks.model.room import OVERLAP_MM
 from kiks.sim.floor import PRESSED_MM
@@ -110,13 +110,8 @@ class Things(World):
     def _add_checked(
         self, kind: Callable[..., Ball | Cylinder], x_mm: float, y_mm: float, changes: dict[str, Any]
     ) -> int:
-        x_mm, y_mm = check_number("x_mm", x_mm), check_number("y_mm", y_mm)
-        numbers = {"radius_mm", "friction_mm_s2"} & changes.keys()
-        given: dict[str, Any] = {name: check_number(name, changes[name]) for name in numbers}
-        if not isinstance(changes.get("brightness"), str | None):
-            given["brightness"] = check_count("brightness", changes["brightness"], 1, 255)
         try:
-            body = kind(x_mm, y_mm, **changes | given)
+            body = kind(x_mm, y_mm, **changes)
         except TypeError:
             raise ParameterError(
                 f"changes of a body must be radius_mm, friction_mm_s2 or brightness, but they were {list(changes)}."
@@ -152,8 +147,6 @@ class Things(World):
         Raises:
             ParameterError: If it would hang outside the arena, or a value is out of range.
         """
-        x_mm, y_mm, power_w = (check_number(*pair) for pair in (("x_mm", x_mm), ("y_mm", y_mm), ("power_w", power_w)))
-        is_on = bool(check_count("is_on", int(is_on) if isinstance(is_on, bool | np.bool_) else is_on, 0, 1))
         hung: tuple[Lamp, ...] = (Lamp(x_mm, y_mm, power_w, is_on),)
         try:
             hung = replace(self.arena, starts=(), balls=(), cylinders=(), lamps=hung).lamps
