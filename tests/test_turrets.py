@@ -153,9 +153,9 @@ def test_general_io_is_wired_to_the_outside() -> None:
         (lambda io: setattr(io, "inputs", 256), "inputs must be a whole number from 0 to 255, but it was 256"),
         (lambda io: setattr(io, "inputs", 1.5), "inputs must be a whole number from 0 to 255, but it was 1.5"),
         (lambda io: io.set_input(8, True), "wire must be a whole number from 0 to 7, but it was 8"),
-        (lambda io: io.set_analog(2, 1.0), "channel must be 3, 4 or 5, but it was 2"),
-        (lambda io: io.set_analog(3, float("nan")), "volts must be a number, but it was nan"),
-        (lambda io: io.set_analog(3, "1"), "volts must be a number, but it was '1'"),
+        (lambda io: io.set_analog(2, 1.0), "channel must be a whole number from 3 to 5, but it was 2"),
+        (lambda io: io.set_analog(3, float("nan")), "volts must be a finite number, but it was nan"),
+        (lambda io: io.set_analog(3, "1"), "volts must be a finite number, but it was '1'"),
     ],
 )
 def test_general_io_minds_its_numbers(call: Any, words: str) -> None:

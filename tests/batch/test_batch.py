@@ -206,7 +206,7 @@ def test_steps_say_what_is_wrong() -> None:
     batch.reset()
     with pytest.raises(kiks.ParameterError, match="wheels must be"):
         batch.step(np.zeros((2, 2)))
-    with pytest.raises(kiks.ParameterError, match="world must be from 0 to 1"):
+    with pytest.raises(kiks.ParameterError, match="world must be a whole number from 0 to 1"):
         batch.state_hash(2)
 
 

@@ -34,7 +34,7 @@ from tools.campaigns.runner import Broken, Campaign, Play, judge
 import kiks
 from kiks.clock.thinking import save_thinking
 from kiks.desk.showing import show
-from kiks.engine.compiling import cache_folder
+from kiks.engine.code_cache import cache_folders
 from kiks.model.arena import Arena
 from kiks.model.arena_file import save_arena
 from kiks.model.kad import save_kad
@@ -403,9 +403,9 @@ def _no_home(rng: random.Random) -> None:
 def _damage_cache(rng: random.Random) -> None:
     """Drive a robot with a compiled engine some of whose files are damaged."""
     with tempfile.TemporaryDirectory(prefix="kiks-torture-") as folder:
-        there = cache_folder()
+        there = next(cache_folders())
         shutil.copytree(there, Path(folder) / "kiks" / there.name)
-        files = sorted(path for path in Path(folder).rglob("*.nb?") if path.is_file())
+        files = sorted(path for path in Path(folder).rglob("*.code") if path.is_file())
         way = rng.choice((_truncate, _empty, _scribble, _swap))
         for path in rng.sample(files, rng.choice((1, 3, len(files)))):
             way(rng, path, files)

@@ -26,8 +26,9 @@ from kiks.engine.rays import sight_of
 from kiks.engine.scene import enter_worlds, make_scene
 from kiks.engine.state import State
 from kiks.engine.vectors import LANES
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, shown
 from kiks.model.arena import PAD, Arena
+from kiks.model.ranges import SECONDS_MAX, array_of, check_count, check_number, check_numbers
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
 from kiks.units import NS_PER_S, ns_from_s
 
@@ -77,7 +78,6 @@ class Batch:
         threads: How many threads; as many as the computer has cores if left out. Results do not depend on it.
 
     Attributes:
-        lamps: x_mm, y_mm, power_w, and 1 for on or 0 for off, float64 [world, lamp, 4]. Write to it to move or switch.
         notes: What the measures have noted step by step, one after the other, float64 [world, robot, note].
 
     Raises:
@@ -111,16 +111,16 @@ class Batch:
         threads: int | None = None,
     ) -> None:
         self.timing = Timing() if timing is None else timing
+        if not isinstance(self.timing, Timing):
+            raise ParameterError(f"timing must be a kiks.Timing, but it was {shown(timing)}.")
         self._beginning = beginning = Beginning(arena, worlds, robot, robots, response)
         self.arenas, self.arena_indices = beginning.arenas, beginning.arena_indices
         self.specs, self.networks = beginning.specs, beginning.networks
         self.world_count, self.robot_count = beginning.state.robots.shape
-        self.threads = (os.cpu_count() or 1) if threads is None else threads
-        if not isinstance(self.threads, int) or not 1 <= self.threads <= 4096:
-            raise ParameterError(f"threads must be a whole number from 1 to 4096, but it was {threads!r}.")
+        self.threads = check_count("threads", (os.cpu_count() or 1) if threads is None else threads, 1, 4096)
         self.senses = check_senses(senses)
         self.state = beginning.state
-        self.lamps = beginning.lamps.copy()
+        self._lamps = beginning.lamps.copy()
         self.seeds = beginning.seeds_of(seed)
         self._starts = beginning.starts_of(self.seeds, starts)
         widths_mm, heights_mm = zip(*((each.width_mm, each.height_mm) for each in self.arenas), strict=True)
@@ -161,11 +161,10 @@ class Batch:
         """
         if not isinstance(controller, Controller):
             raise ParameterError(
-                f"controller must be one that @kiks.controller has made, but it was {controller!r}. "
+                f"controller must be one that @kiks.controller has made, but it was {shown(controller)}. "
                 "Write @kiks.controller over the function."
             )
-        if not (isinstance(seconds, int | float) and 0 <= seconds <= 1e9):
-            raise ParameterError(f"seconds must be from 0 to 1e9, but it was {seconds!r}.")
+        until_ns = ns_from_s(check_number("seconds", seconds, 0, SECONDS_MAX))
         watching = Watching(measures, controller.senses, repr(controller.name))
         given = controller.check_parameters(parameters)
         if given.ndim == 2:
@@ -187,7 +186,7 @@ class Batch:
             notes=np.zeros((*shape, watching.note_count)),
         )
         decider = decider_of(controller)
-        address, until_ns = address_of(decider, DECIDER), ns_from_s(seconds)
+        address = address_of(decider, DECIDER)
         self._on_all_cores(worlds, controller.senses, (0, EVER), until_ns, address, watching.watchers)
         return Rollouts(watching.values(worlds.notes), worlds.steps.copy())
 
@@ -213,8 +212,18 @@ class Batch:
         Raises:
             ParameterError: If an argument is out of range or a start is not free.
         """
-        chosen = np.arange(self.world_count) if worlds is None else np.arange(self.world_count)[np.asarray(worlds)]
-        chosen = np.atleast_1d(chosen)
+        chosen = np.arange(self.world_count)
+        if worlds is not None:
+            try:
+                given = np.atleast_1d(np.asarray(worlds))
+                chosen = chosen[given.astype(np.int64) if given.size == 0 else given]
+            except (IndexError, TypeError, ValueError, OverflowError):
+                given = np.zeros((0, 0))
+            if given.ndim != 1:
+                raise ParameterError(
+                    f"worlds must be numbers from 0 to {self.world_count - 1}, or a bool for each world, but they were "
+                    f"{shown(worlds)}."
+                )
         if seeds is not None:
             self.seeds[chosen] = self._beginning.check_seeds(seeds, len(chosen))
         if starts is not None or seeds is not None:
@@ -236,20 +245,36 @@ class Batch:
             What the robots sensed, float64 [world, robot, sensor]; a copy.
 
         Raises:
-            ParameterError: If the shape is another, or `reset` was not called before.
+            ParameterError: If the shape is another, one is no number, or `reset` was not called before.
         """
-        given = np.asarray(wheels, np.float64)
-        if given.shape != self._wheels.shape:
-            raise ParameterError(
-                f"wheels must be [world, robot, 2], here {self._wheels.shape}, but their shape was {given.shape}."
-            )
+        given = array_of(wheels)
+        if given is None or given.shape != self._wheels.shape:
+            found = "they were no numbers" if given is None else f"their shape was {given.shape}"
+            raise ParameterError(f"wheels must be [world, robot, 2], here {self._wheels.shape}, but {found}.")
         if not self._is_sensed:
             raise ParameterError("reset() must be called before the first step(), and after a run().")
+        if np.isnan(given).any():
+            raise ParameterError("wheels must be numbers, but some were none. Look at what your program has divided.")
         self._wheels[...] = given
         self._do_halves(1, 3)
         return self._sensors.copy()
 
     # ---- what there is ----
+
+    @property
+    def lamps(self) -> NDArray[np.float64]:
+        """The lamps: x_mm, y_mm, power_w, and 1 for on or 0 for off, float64 [world, lamp, 4].
+
+        Write to it to move or switch them; a lamp at a place that is no number is nowhere.
+
+        Raises:
+            ParameterError: If it is set to anything but finite numbers of that shape.
+        """
+        return self._lamps
+
+    @lamps.setter
+    def lamps(self, lamps: ArrayLike) -> None:
+        self._lamps = check_numbers("lamps", lamps, (self.world_count, None, 4))
 
     @property
     def times_s(self) -> NDArray[np.float64]:
@@ -273,8 +298,7 @@ class Batch:
         Raises:
             ParameterError: If there is no such world.
         """
-        if not isinstance(world, int | np.integer) or not 0 <= world < self.world_count:
-            raise ParameterError(f"world must be from 0 to {self.world_count - 1}, but it was {world!r}.")
+        world = check_count("world", world, 0, self.world_count - 1)
         robots: Any = self.state.robots[world : world + 1].copy()
         # A simulation numbers the kinds of its own robots alone.
         kinds = robots["kind"][0].tolist()
@@ -297,7 +321,7 @@ class Batch:
         arrays = {"sensors": self._sensors, "memory": nothing, "parameters": nothing, "notes": self.notes} | given
         return Worlds(
             self._scene,
-            self.lamps,
+            self._lamps,
             self.seeds,
             self._ticks,
             self._begins_ns,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,10 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 from kiks.engine.networks import networks_for
 from kiks.engine.parameters import PARAMETERS, pack
 from kiks.engine.state import State
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, shown
 from kiks.model.arena import Arena
+from kiks.model.ranges import HEADING_KEPT_RAD, check_count, check_numbers, wrapped
 from kiks.model.robot import RobotSpec
 from kiks.sim.simulation import Simulation
+from kiks.sim.world import check_kinds
 
 WORLDS_LIMIT = 10_000_000
 """Most worlds in a batch: their robots alone would fill the memory of any computer."""
@@ -55,12 +57,10 @@ class Beginning:
         robots: int,
         response: str | None,
     ) -> None:
-        self.arenas = [arena] if isinstance(arena, Arena) else list(arena)
+        self.arenas = list(arena) if isinstance(arena, Iterable) else [arena]
         if not self.arenas or not all(isinstance(each, Arena) for each in self.arenas):
-            raise ParameterError(f"arena must be a kiks.Arena or several, but it was {arena!r:.80}.")
-        for name, count, most in (("worlds", worlds, WORLDS_LIMIT), ("robots", robots, 1000)):
-            if not isinstance(count, int) or isinstance(count, bool) or not 1 <= count <= most:
-                raise ParameterError(f"{name} must be a whole number from 1 to {most}, but it was {count!r}.")
+            raise ParameterError(f"arena must be a kiks.Arena or several, but it was {shown(arena)}.")
+        worlds, robots = check_count("worlds", worlds, 1, WORLDS_LIMIT), check_count("robots", robots, 1, 1000)
         named = _kinds_of(robot, worlds, robots, response)
         self.specs = list(dict.fromkeys(spec for row in named for spec in row))
         numbers = {spec: number for number, spec in enumerate(self.specs)}
@@ -99,11 +99,14 @@ class Beginning:
         Raises:
             ParameterError: If they are no whole numbers from 0 to 2^63 - 1, or not so many.
         """
-        given = np.asarray(seeds)
+        try:
+            given = np.asarray(seeds)
+        except (TypeError, ValueError, OverflowError):
+            given = np.zeros(0)
         if given.dtype.kind not in "iu" or given.shape != (count,) or (given < 0).any() or (given >= 2**63).any():
             raise ParameterError(
                 f"seeds must be {count} whole numbers from 0 to 2^63 - 1, one for each world, but they were "
-                f"{seeds!r:.60}."
+                f"{shown(seeds)}."
             )
         return given.astype(np.int64)
 
@@ -143,12 +146,13 @@ class Beginning:
             for k, world in enumerate(chosen):
                 poses[k] = self._models[self.arena_indices[world]].start_poses(int(seeds[k]))
             return poses
+        given = check_numbers("starts", starts)
         try:
-            poses = np.array(np.broadcast_to(np.asarray(starts, np.float64), shape))
-        except (TypeError, ValueError):
+            poses = np.array(np.broadcast_to(given, shape))
+        except ValueError:
             raise ParameterError(
                 f"starts must be poses x_mm, y_mm, heading_rad [world, robot, 3], here {shape}, but their shape was "
-                f"{np.shape(starts)}."
+                f"{given.shape}."
             ) from None
         for k, world in enumerate(chosen):
             self._models[self.arena_indices[world]].check_start_poses(poses[k], f"of world {world}")
@@ -168,6 +172,9 @@ class Beginning:
             state.bodies[here] = model.state.bodies[0]
         robots: Any = state.robots[worlds]
         robots["kind"] = self._kind_numbers[np.minimum(worlds, len(self._kind_numbers) - 1)]
+        if (np.abs(starts[:, :, 2]) > HEADING_KEPT_RAD).any():
+            starts = starts.copy()
+            starts[:, :, 2] = np.vectorize(wrapped, [float])(starts[:, :, 2])
         for axis, name in enumerate(("x_mm", "y_mm", "heading_rad")):
             robots[name] = starts[:, :, axis]
         robots["start_x_mm"], robots["start_y_mm"] = starts[:, :, 0], starts[:, :, 1]
@@ -185,18 +192,23 @@ def _kinds_of(
     """
 
     def spec_of(kind: Any) -> RobotSpec:
+        check_kinds(kind, response)
         spec = kind if isinstance(kind, RobotSpec) else RobotSpec.load(kind)
         return spec if response is None else spec.with_changes(proximity__response=response)
 
     def row_of(row: Any) -> tuple[RobotSpec, ...]:
         if isinstance(row, str | RobotSpec):
             return (spec_of(row),) * robots
+        if not isinstance(row, Sequence):
+            raise ParameterError(f"robot must name the robots of each world, but for one it was {shown(row)}.")
         if len(row) != robots:
             raise ParameterError(f"robot must name {robots} robots for a world, but it named {len(row)}.")
         return tuple(spec_of(each) for each in row)
 
     if isinstance(robot, str | RobotSpec):
         return [row_of(robot)]
+    if not isinstance(robot, Sequence):
+        raise ParameterError(f"robot must name one kind for all, or one for each world, but it was {shown(robot)}.")
     if len(robot) != worlds:
         raise ParameterError(
             f"robot must name one kind for all, or one for each of {worlds} worlds, but it named {len(robot)}."

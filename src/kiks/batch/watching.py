@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import accumulate, pairwise
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from kiks.batch.callbacks import watchers_of
 from kiks.control.measure import Measure
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, shown
 
 
 class Watching:
@@ -31,11 +31,14 @@ class Watching:
     """
 
     def __init__(self, measures: Sequence[Measure], senses: Sequence[str], who: str) -> None:
+        if not isinstance(measures, Iterable):
+            raise ParameterError(f"measures must be a list of measures, but they were {shown(measures)}.")
         self.measures = tuple(measures)
         for each in self.measures:
             if not isinstance(each, Measure):
                 raise ParameterError(
-                    f"measures must be made by @kiks.measure or be some of kiks.measures, but {each!r} was among them."
+                    "measures must be made by @kiks.measure or be some of kiks.measures, but "
+                    f"{shown(each)} was among them."
                 )
             if tuple(senses[: len(each.senses)]) != each.senses:
                 raise ParameterError(

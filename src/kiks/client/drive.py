@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,7 +9,8 @@ from numpy.typing import ArrayLike
 
 from kiks.client.khepera import Khepera, Port
 from kiks.control.controller import Controller, whole_speeds
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, shown
+from kiks.model.ranges import SECONDS_MAX, check_number
 from kiks.model.robot import SENSOR_COUNT
 from kiks.units import ns_from_s, s_from_ns
 
@@ -57,10 +57,9 @@ def drive(
         >>> kiks.drive(sim.port(1), ahead, seconds=1.0)
         10
     """
-    if not (isinstance(seconds, int | float) and math.isfinite(seconds) and seconds >= 0):
-        raise ParameterError(f"seconds must be a finite number of at least 0, but it was {seconds!r}.")
+    driving_ns = ns_from_s(check_number("seconds", seconds, 0, SECONDS_MAX))
     driver = Driver(port, controller, parameters, period_s=period_s, baud=baud)
-    until_ns = driver.begin_ns + ns_from_s(seconds)
+    until_ns = driver.begin_ns + driving_ns
     try:
         while driver.begin_ns < until_ns:
             driver.step()
@@ -90,8 +89,12 @@ class Driver:
         period_s: float = 0.1,
         baud: int = 9600,
     ) -> None:
-        if not (isinstance(period_s, int | float) and math.isfinite(period_s) and period_s >= 0):
-            raise ParameterError(f"period_s must be a finite number of at least 0, but it was {period_s!r}.")
+        self._period_ns = ns_from_s(check_number("period_s", period_s, 0, SECONDS_MAX))
+        if not isinstance(controller, Controller):
+            raise ParameterError(
+                f"controller must be one that @kiks.controller has made, but it was {shown(controller)}. "
+                "Write @kiks.controller over the function."
+            )
         ports = [port] if isinstance(port, str) or not isinstance(port, Sequence) else list(port)
         if not ports:
             raise ParameterError("port must be one or more robots' ports, but there was none.")
@@ -105,7 +108,7 @@ class Driver:
             controller(self._sensors[k], self._memory[k].copy(), self._given[k], self._wheels[k])
         self._wheels[:] = 0.0
         self._robots = [Khepera(each, baud=baud) for each in ports]
-        self._period_ns, self.begin_ns = ns_from_s(period_s), ns_from_s(self._robots[0].time_s)
+        self.begin_ns = ns_from_s(self._robots[0].time_s)
         self.loop_count = 0
 
     def step(self) -> None:

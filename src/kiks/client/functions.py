@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from kiks.client.khepera import Port, open_port
-from kiks.errors import LinkError, ParameterError
+from kiks.errors import LinkError, ParameterError, shown
+from kiks.model.ranges import SECONDS_MAX, check_number, check_numbers
 from kiks.ports.port import VirtualPort
 
 
@@ -60,18 +61,15 @@ def kopen(settings: Sequence[float]) -> Reference:
         'd'
         >>> kclose(ref)
     """
-    values = list(settings)
-    if (
-        not 1 <= len(values) <= 3
-        or not all(isinstance(value, int | float) for value in values)
-        or values[0] != int(values[0])
-    ):
+    values = check_numbers("settings", settings).tolist()
+    is_list = isinstance(values, list) and 1 <= len(values) <= 3
+    if not is_list or isinstance(values[0], list) or abs(values[0]) > 9999 or values[0] != int(values[0]):
         raise ParameterError(
-            f"settings must be [port, baud, timeout], but it was {settings!r}. Simulated: [-1, 9600, 1]."
+            f"settings must be [port, baud, timeout], but it was {shown(settings)}. Simulated: [-1, 9600, 1]."
         )
     number = int(values[0])
     baud = int(values[1]) if len(values) > 1 else 9600
-    timeout_s = float(values[2]) if len(values) > 2 else 1.0
+    timeout_s = values[2] if len(values) > 2 else 1.0
     if number in _OPENINGS.by_number:
         raise LinkError(
             f"port {number} must be closed before it is opened, but it is open. Call kclose(ref) or kclose([]) first."
@@ -120,10 +118,10 @@ def ksend(text: str, ref: Sequence[float], timeout: float | None = None) -> str:
 
 def kclose(ref: Sequence[float]) -> None:
     """Close a port; `[]` closes every simulated one. It is no error if it is not open. The robot drives on."""
-    if len(ref):
-        numbers = [int(ref[0])]
-    else:
+    if isinstance(ref, list | tuple) and not ref:
         numbers = [number for number in _OPENINGS.by_number if number < 0]
+    else:
+        numbers = [_number_of(ref)]
     for number in numbers:
         reference = _OPENINGS.by_number.pop(number, None)
         if reference is not None and reference.port is not None:
@@ -137,8 +135,7 @@ def ktime(port: int | Sequence[float]) -> float | None:
     Args:
         port: The port's number, or what `kopen` returned.
     """
-    number = int(port) if isinstance(port, int | float) else int(port[0])
-    reference = _OPENINGS.by_number.get(number)
+    reference = _OPENINGS.by_number.get(_number_of(port))
     if reference is None or reference.port is None:
         return None
     return _now_s(reference.port) - reference.opened_s
@@ -154,17 +151,29 @@ def pause(seconds: float) -> None:
     if reference is not None and isinstance(reference.port, VirtualPort):
         reference.port.sleep(seconds)
     else:
-        time.sleep(seconds)
+        time.sleep(check_number("seconds", seconds, 0, SECONDS_MAX, "Time never runs backwards."))
 
 
 def _opened(ref: Sequence[float]) -> Reference:
-    reference = _OPENINGS.by_number.get(int(ref[0])) if len(ref) >= 4 else None
+    reference = _OPENINGS.by_number.get(_number_of(ref)) if isinstance(ref, list | tuple) and len(ref) >= 4 else None
     if reference is None or reference.port is None:
         raise LinkError(
-            f"ref must be what kopen returned and still be open, but it was {list(ref)!r}. "
+            f"ref must be what kopen returned and still be open, but it was {shown(ref)}. "
             f"Open it with kopen([-1, 9600, 1])."
         )
     return reference
+
+
+def _number_of(ref: Any) -> int:
+    """Return the number of the port that a reference, or the number itself, names.
+
+    Raises:
+        ParameterError: If it names none.
+    """
+    numbers = check_numbers("ref", ref).ravel()
+    if not len(numbers):
+        raise ParameterError("ref must be what kopen returned, or a port's number, but it was empty.")
+    return int(numbers[0])
 
 
 def _device(number: int) -> str:

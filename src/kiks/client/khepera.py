@@ -5,10 +5,13 @@ from __future__ import annotations
 import os
 import select
 import time
+from collections.abc import Callable
 from types import TracebackType
 from typing import Any, NamedTuple, Protocol
 
-from kiks.errors import LinkError, ParameterError
+from kiks.errors import LinkError, ParameterError, shown
+from kiks.firmware.receiver import LINE_LIMIT
+from kiks.model.ranges import SECONDS_MAX, check_count, check_number
 from kiks.ports.port import VirtualPort
 
 TIMEOUT_S = 2.0
@@ -56,6 +59,7 @@ class Khepera:
 
     Raises:
         LinkError: If the port cannot be opened, or (every method) if the robot does not answer as it should.
+        ParameterError: If it is no port, or (every method) if a number is none that fits into a command.
 
     Example:
         >>> import kiks
@@ -69,9 +73,14 @@ class Khepera:
 
     def __init__(self, port: str | Port, *, baud: int = 9600) -> None:
         if isinstance(port, str):
-            self.port: Port = open_port(port, baud)
-        else:
+            self.port: Port = open_port(port, check_count("baud", baud, 1, 10_000_000, "Usual: 9600 bit/s."))
+        elif all(hasattr(port, name) for name in ("write", "read_until", "close")):
             self.port = port
+        else:
+            raise ParameterError(
+                f"port must be a simulation's port, a name or an open pyserial port, but it was {shown(port)}. "
+                "Write kiks.Khepera(sim.port(1))."
+            )
         if isinstance(self.port, VirtualPort) and self.port.timeout is None:
             self.port.timeout = TIMEOUT_S
 
@@ -99,13 +108,13 @@ class Khepera:
         if isinstance(self.port, VirtualPort):
             self.port.sleep(seconds)
         else:
-            time.sleep(seconds)
+            time.sleep(check_number("seconds", seconds, 0, SECONDS_MAX, "Time never runs backwards."))
 
     # ---- motion ----
 
     def set_speed(self, left: float, right: float) -> None:
         """Turn the wheels (D). Speeds [pulses/10 ms] are rounded; 1 is 8 mm/s, 127 the most."""
-        self._order(b"D,%d,%d\n" % (round(left), round(right)))
+        self._order(request_of(b"D,%d,%d\n", left, right, convert=round))
 
     def stop(self) -> None:
         """Set both speeds to 0."""
@@ -123,7 +132,7 @@ class Khepera:
 
     def set_encoders(self, left: int = 0, right: int = 0) -> None:
         """Set the position counters [pulses] (G)."""
-        self._order(b"G,%d,%d\n" % (left, right))
+        self._order(request_of(b"G,%d,%d\n", left, right))
 
     def move_to(self, left: int, right: int, *, wait: bool = False, poll_s: float = 0.02) -> None:
         """Move the wheels to counter readings [pulses] along a trapezoid of speed (C).
@@ -134,25 +143,25 @@ class Khepera:
             wait: True to return when both wheels report their arrival.
             poll_s: Pause between two questions while waiting [s].
         """
-        self._order(b"C,%d,%d\n" % (left, right))
+        self._order(request_of(b"C,%d,%d\n", left, right))
         while wait and not all(motor.on_target for motor in self.status()):
             self.pause(poll_s)
 
     def set_profile(self, speed: int = 20, acceleration: int = 64) -> None:
         """Set the trapezoid of both wheels (J): speed [pulses/10 ms], acceleration [pulses/256 per (10 ms)^2]."""
-        self._order(b"J,%d,%d,%d,%d\n" % (speed, acceleration, speed, acceleration))
+        self._order(request_of(b"J,%d,%d,%d,%d\n", speed, acceleration, speed, acceleration))
 
     def set_pwm(self, left: int, right: int) -> None:
         """Feed the motors without control, -255 to 255 (P)."""
-        self._order(b"P,%d,%d\n" % (left, right))
+        self._order(request_of(b"P,%d,%d\n", left, right))
 
     def set_speed_gains(self, kp: int = 3800, ki: int = 800, kd: int = 100) -> None:
         """Set the gains of the speed controllers (A)."""
-        self._order(b"A,%d,%d,%d\n" % (kp, ki, kd))
+        self._order(request_of(b"A,%d,%d,%d\n", kp, ki, kd))
 
     def set_position_gains(self, kp: int = 3000, ki: int = 20, kd: int = 4000) -> None:
         """Set the gains of the position controllers (F)."""
-        self._order(b"F,%d,%d,%d\n" % (kp, ki, kd))
+        self._order(request_of(b"F,%d,%d,%d\n", kp, ki, kd))
 
     def status(self) -> tuple[Status, Status]:
         """Return what the two controllers report, left and right (K)."""
@@ -171,13 +180,13 @@ class Khepera:
 
     def analog(self, channel: int) -> int:
         """Return an analogue input [4 mV], channel 0 to 6 (I)."""
-        return self._ask(b"I,%d\n" % channel, 1)[0]
+        return self._ask(request_of(b"I,%d\n", channel), 1)[0]
 
     # ---- the rest ----
 
     def led(self, led: int, action: int) -> None:
         """Switch an LED (L): 0 lateral, 1 frontal; 0 off, 1 on, 2 toggle."""
-        self._order(b"L,%d,%d\n" % (led, action))
+        self._order(request_of(b"L,%d,%d\n", led, action))
 
     def version(self) -> tuple[str, str]:
         """Return the versions of BIOS and protocol (B)."""
@@ -188,15 +197,17 @@ class Khepera:
 
     def read_bus(self, address: int) -> int:
         """Return a byte of the extension bus (R)."""
-        return self._ask(b"R,%d\n" % address, 1)[0]
+        return self._ask(request_of(b"R,%d\n", address), 1)[0]
 
     def write_bus(self, data: int, address: int) -> None:
         """Write a byte to the extension bus (W)."""
-        self._order(b"W,%d,%d\n" % (data, address))
+        self._order(request_of(b"W,%d,%d\n", data, address))
 
     def turret(self, number: int, order: str) -> list[int]:
         """Pass an order such as 'N' or 'D,1' to a turret (T) and return the values of its answer."""
-        request = f"T,{number},{order}"
+        if not isinstance(order, str):
+            raise ParameterError(f"order must be a text such as 'N' or 'D,1', but it was {shown(order)}.")
+        request = f"T,{check_count('number', number, 0, 99)},{order}"
         reply = self.send(request)
         start = f"t,{number},{order[:1].lower()}"
         if not reply.startswith(start):
@@ -219,8 +230,10 @@ class Khepera:
 
     def send(self, text: str) -> str:
         """Send any line and return the first line of the reply, both without their ends."""
-        if "\n" in text or "\r" in text or not text.isascii():
-            raise ParameterError(f"text must be one line of ASCII, but it was {text!r}. The line end is added here.")
+        if not isinstance(text, str) or "\n" in text or "\r" in text or not text.isascii():
+            raise ParameterError(
+                f"text must be one line of ASCII, but it was {shown(text)}. The line end is added here."
+            )
         self.port.write(text.encode() + b"\n")
         reply = self.port.read_until(b"\n")
         if reply[-1:] != b"\n":
@@ -272,6 +285,28 @@ class Khepera:
             f"a reply to {request!r} must come before the time-out, but only {reply!r} came. "
             f"Check the cable, the robot's switch and the baud rate."
         )
+
+
+def request_of(form: bytes, *numbers: float, convert: Callable[[float], int] = int) -> bytes:
+    """Return a command with its numbers.
+
+    Args:
+        form: The command, with `%d` for each number.
+        *numbers: The numbers.
+        convert: Makes a whole number of each.
+
+    Raises:
+        ParameterError: If one is no number, or the line would be longer than any that a robot takes.
+    """
+    try:
+        request = form % tuple(map(convert, numbers))
+    except (TypeError, ValueError, OverflowError, AttributeError):
+        request = b""
+    if not 0 < len(request) <= LINE_LIMIT:
+        raise ParameterError(
+            f"a command must be given numbers of a few digits, but {form[:1].decode()} was given {shown(numbers)}."
+        )
+    return request
 
 
 def open_port(name: str, baud: int = 9600, timeout_s: float | None = TIMEOUT_S) -> Port:

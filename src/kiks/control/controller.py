@@ -6,17 +6,18 @@ The same function runs compiled in a batch and drives one robot on any port, sim
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kiks.control.functions import Compiled, check_count
+from kiks.control.functions import Compiled
 from kiks.control.recipes import recipe_of
 from kiks.engine.compiling import entry, kernel
 from kiks.engine.motor import SPEED_MAX
-from kiks.errors import ParameterError, nearest
+from kiks.errors import ParameterError, nearest, shown
+from kiks.model.ranges import check_count, check_numbers
 from kiks.model.robot import SENSOR_COUNT
 
 SENSES = ("proximity", "ambient")
@@ -98,18 +99,13 @@ class Controller(Compiled):
         Raises:
             ParameterError: If they are no finite numbers, or not as many as the controller has.
         """
-        try:
-            given = np.ascontiguousarray(parameters, np.float64)
-        except (TypeError, ValueError):
-            raise ParameterError(f"parameters must be numbers, but they were {parameters!r:.60}.") from None
+        given = check_numbers("parameters", parameters)
         given = given.reshape(1) if given.ndim == 0 else given
         if self.parameter_count not in (None, given.shape[-1]):
             raise ParameterError(
                 f"the controller {self.name!r} must be given {self.parameter_count} parameters, but got "
                 f"{given.shape[-1]} (shape {given.shape}; the last axis is one controller's)."
             )
-        if not np.isfinite(given).all():
-            raise ParameterError("parameters must be finite numbers, but some were infinite or no numbers.")
         return given
 
 
@@ -164,12 +160,14 @@ def check_senses(senses: str | Sequence[str]) -> tuple[str, ...]:
     Raises:
         ParameterError: If there is another among them, or one twice.
     """
+    if not isinstance(senses, Iterable):
+        raise ParameterError(f"senses must be some of {', '.join(SENSES)}, but they were {shown(senses)}.")
     given = (senses,) if isinstance(senses, str) else tuple(senses)
     for sense in given:
-        if sense not in SENSES:
+        if not isinstance(sense, str) or sense not in SENSES:
             raise ParameterError(
-                f"senses must be some of {', '.join(SENSES)}, but {sense!r} was among them."
-                f"{nearest(str(sense), SENSES)}"
+                f"senses must be some of {', '.join(SENSES)}, but {shown(sense)} was among them."
+                f"{nearest(shown(sense), SENSES)}"
             )
     if len(set(given)) != len(given):
         raise ParameterError(f"senses must name each sense once, but they were {given}.")

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from kiks.control import networks
 from kiks.control.controller import Controller
-from kiks.control.functions import check_count
 from kiks.control.recipes import (
     PERIOD_S,
     SPEED_LIMIT,
@@ -37,6 +36,7 @@ from kiks.control.recipes import (
 )
 from kiks.errors import ParameterError, shown
 from kiks.model.data_file import adapter, check
+from kiks.model.ranges import check_count
 from kiks.model.robot import SENSOR_COUNT
 
 

@@ -93,25 +93,3 @@ def caller_of(argument_types: tuple[Any, ...]) -> Any:
         return types.none(types.int64, arguments), generate
 
     return call
-
-
-def check_count(name: str, count: object, least: int = 0, most: int = 1_000_000) -> int:
-    """Return a whole number.
-
-    Raises:
-        ParameterError: If it is none, or out of range.
-    """
-    if not isinstance(count, int) or isinstance(count, bool) or not least <= count <= most:
-        raise ParameterError(f"{name} must be a whole number from {least} to {most}, but it was {shown(count)}.")
-    return count
-
-
-def check_number(name: str, number: object, least: float, most: float) -> float:
-    """Return a number as a float.
-
-    Raises:
-        ParameterError: If it is none, or out of range.
-    """
-    if not isinstance(number, int | float) or isinstance(number, bool) or not least <= number <= most:
-        raise ParameterError(f"{name} must be from {least:g} to {most:g}, but it was {shown(number)}.")
-    return float(number)

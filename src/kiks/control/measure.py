@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.control.controller import check_senses
-from kiks.control.functions import Compiled, check_count
-from kiks.errors import ParameterError
+from kiks.control.functions import Compiled
+from kiks.errors import ParameterError, shown
+from kiks.model.ranges import check_count
 
 Moment: Any = namedtuple(
     "Moment",
@@ -78,7 +79,7 @@ class Measure(Compiled):
         super().__init__(function, what="measure", arguments=("moment", "notes"))
         self.note_count = check_count("notes", notes, least=1)
         if not callable(result):
-            raise ParameterError(f"result must be a function from notes to values, but it was {result!r}.")
+            raise ParameterError(f"result must be a function from notes to values, but it was {shown(result)}.")
         self.result = result
         self.senses = check_senses(senses)
 

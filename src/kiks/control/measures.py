@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.control.functions import check_number
 from kiks.control.measure import Measure, measure
 from kiks.engine.compiling import kernel
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, shown
 from kiks.model.arena import Arena
+from kiks.model.ranges import check_number
 
 FULL_SPEED = 10.0
 """Speed that counts as 1 [pulses/10 ms]: 80 mm/s, at which Floreano and Mondada's robot drove at most."""
@@ -141,8 +141,8 @@ def wall_following(side: str = "left", *, counts: float = 300.0) -> Measure:
     Raises:
         ParameterError: If an argument is out of range.
     """
-    if side not in ("left", "right"):
-        raise ParameterError(f"side must be 'left' or 'right', but it was {side!r}.")
+    if not isinstance(side, str) or side not in ("left", "right"):
+        raise ParameterError(f"side must be 'left' or 'right', but it was {shown(side)}.")
     return _wall_following(0 if side == "left" else 5, check_number("counts", counts, 1, FULL_COUNT - 1))
 
 
@@ -184,6 +184,8 @@ def coverage(arena: Arena, *, square_mm: float = 100.0) -> Measure:
     Raises:
         ParameterError: If an argument is out of range or there are more than a million squares.
     """
+    if not isinstance(arena, Arena):
+        raise ParameterError(f"arena must be a kiks.Arena, but it was {shown(arena)}.")
     edge_mm = check_number("square_mm", square_mm, 1, PLACE_LIMIT_MM)
     columns, rows = int(np.ceil(arena.width_mm / edge_mm)), int(np.ceil(arena.height_mm / edge_mm))
     if columns * rows > SQUARE_LIMIT:

@@ -47,7 +47,7 @@ _FARTHEST_MM = 1e9  # farther off is nowhere, as is a place that is no number
 def curve(parameters: Any, distance_mm: Any) -> Any:
     """Return what a sensor reads that looks straight at a lamp of 1 W [counts]."""
     last = parameters.lamp_point_count - 1
-    place = distance_mm / parameters.lamp_step_mm
+    place = max(0.0, distance_mm / parameters.lamp_step_mm)
     if place >= last:
         rest = parameters.dark_counts - parameters.lamp_counts[last]
         return parameters.dark_counts - rest * (last / place) * (last / place)

@@ -45,6 +45,7 @@ _PIXEL_COS, _PIXEL_SIN = 0.999950266955943, 0.009973144676492593
 _EDGE_COS, _EDGE_SIN = 0.9510565162951535, 0.3090169943749474
 
 _BEGIN_MM = 50.0
+_NEAREST_MM = 1e-3  # a camera within a wall
 _ANYWHERE = 1e9  # cells: the border of the world is always nearer
 _SHARP_MM = 250.0
 _DEFOCUS_PIXELS = 7.0  # to each side, for what is infinitely far
@@ -62,7 +63,7 @@ _SHAKE_PIXELS_PER_MM, _SHAKE_PIXELS = 1.5, 6.0  # by the way during the exposure
 def integral(sums: Any, grey: Any, place: Any) -> Any:
     """Return the integral of a row of pixels from its left edge to a place; beyond the edges it goes on unchanged."""
     last = grey.shape[0]
-    if place <= 0.0:
+    if not place > 0.0:
         return place * grey[0]
     if place >= last:
         return sums[last] + (place - last) * grey[last - 1]
@@ -115,7 +116,7 @@ def look(sight: Any, seen: Any, seen_count: Any, x: Any, y: Any, heading: Any, g
             if shade > 0.0:
                 start, length, brightness = 0.0, to_disc, shade
         grey[p] = _BLACK + brightness * ((_WHITE - _BLACK) / 255.0)
-        distance_mm[p] = (start + length) * cell
+        distance_mm[p] = max(_NEAREST_MM, (start + length) * cell)
 
 
 @kernel
@@ -211,5 +212,5 @@ def take_image(
     out[:] = (1.0 - _LINE_NOISE) * out + _LINE_NOISE * 255.0 * chance[2]
     if is_noisy:
         for p in range(PIXEL_COUNT):
-            out[p] = min(max(np.floor(out[p] + 0.5), 0.0), 255.0)
+            out[p] = min(max(0.0, np.floor(out[p] + 0.5)), 255.0)
     return np.int64(np.floor(light + 0.5))

@@ -143,7 +143,7 @@ def _version() -> str:
             digest.update(source.read_bytes())
     processor = binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
     config: Any = numba.config
-    settings = config.CPU_NAME, config.CPU_FEATURES, config.OPT, config.BOUNDSCHECK
+    settings = config.CPU_NAME, config.CPU_FEATURES, config.OPT, bool(config.BOUNDSCHECK)
     versions = numba.__version__, llvmlite.__version__, np.__version__, sys.implementation.cache_tag
     digest.update(repr((processor, settings, versions)).encode())
     return digest.hexdigest()[:16]

@@ -20,11 +20,12 @@ import numpy as np
 
 from kiks.engine.bodies import collide, kick, roll, speed_of
 from kiks.engine.compiling import kernel
-from kiks.engine.contact import clearance_mm, outward
+from kiks.engine.contact import PIECES_MAX, clearance_mm, outward
 from kiks.engine.hold import begin_holds, carry_along, go_back_together, keep_holds, turn_back, way_of_held
 from kiks.engine.lanes import stack_integers
 from kiks.engine.motion import give_way, move, note_contact
 from kiks.engine.scene import count_discs, disc_at, enter_all, find_near, is_on_floor
+from kiks.engine.vectors import floor
 from kiks.units import NS_PER_S, TICK_NS
 
 PIECE_MM = 2.0
@@ -149,7 +150,7 @@ def move_together(scene: Any, ground: Any, world: Any, room: Any, neighbour_coun
             left, right, slip_ratio = room.ways[disc, 0], room.ways[disc, 1], room.ways[disc, 2]
             room.is_touching[disc] = move_alone(scene, ground, world, disc, left, right, slip_ratio)
     fastest_mm = max(fastest_mm, held_mm)
-    pieces = max(math.ceil(fastest_mm / PIECE_MM), 1)
+    pieces = np.int64(min(max(1.0, -floor(-fastest_mm / PIECE_MM)), PIECES_MAX))
     for _ in range(pieces):
         drive_and_roll(scene, ground, world, room, pieces)
         carry_along(scene, world, room, TICK_S / pieces)

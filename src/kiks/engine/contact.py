@@ -25,6 +25,9 @@ from kiks.engine.vectors import corners, floor
 PIECE_MM = 1.0
 """Longest piece of a motion near a wall [mm]: short against the radius, so that no wall is jumped over."""
 
+PIECES_MAX = 100.0
+"""Most pieces of a motion in a tick: three times what the fastest robot that a file may describe needs."""
+
 SETTLED_MM = 1e-5
 """Penetration that counts as none [mm]."""
 
@@ -41,8 +44,8 @@ ROUND_A_CORNER = 1.001
 @kernel
 def clearance_mm(field: Any, cell: Any, pad: Any, x: Any, y: Any) -> Any:
     """Return the distance from a point to the nearest wall's surface [mm], interpolated between cell centres."""
-    column = min(max(x / cell + (pad - 0.5), 0.0), field.shape[1] - 1.001)
-    row = min(max(y / cell + (pad - 0.5), 0.0), field.shape[0] - 1.001)
+    column = min(max(0.0, x / cell + (pad - 0.5)), field.shape[1] - 1.001)
+    row = min(max(0.0, y / cell + (pad - 0.5)), field.shape[0] - 1.001)
     i = floor(column)
     j = floor(row)
     fx = column - i
@@ -67,8 +70,8 @@ def slope(field: Any, cell: Any, pad: Any, x: Any, y: Any) -> Any:
     That is 1 at a wall, less between two walls, and 0 where there is none, with the vector (0, 0). It is taken across a
     cell, from half a cell on one side to half a cell on the other; those places lie among three times three cells.
     """
-    column = min(max(x / cell + (pad - 1.0), 0.0), field.shape[1] - 2.001)
-    row = min(max(y / cell + (pad - 1.0), 0.0), field.shape[0] - 2.001)
+    column = min(max(0.0, x / cell + (pad - 1.0)), field.shape[1] - 2.001)
+    row = min(max(0.0, y / cell + (pad - 1.0)), field.shape[0] - 2.001)
     i = floor(column)
     j = floor(row)
     fx = column - i

@@ -26,6 +26,9 @@ from kiks.model.raster import LEAPS_PER_CELL
 WAY_SIZE = 72
 """Numbers of a fan, float32: eight times eight, and the two of where it begins and its reach."""
 
+LONGEST = 16000.0
+"""Longest ray [cells]: up to here a nudge still moves a float32, and none stands still for ever."""
+
 # Places of what a fan has.
 _DX, _DY, _PER_DX, _PER_DY, _RIGHT, _UP, _LENGTH, _MET, _REST = (8 * k for k in range(9))
 
@@ -54,9 +57,9 @@ def enter(
     """
     field = sight[0]
     # Who is out of the arena is in the wall around it, a cell from its edge, so that no look-up leaves the raster.
-    i = np.int64(min(max(column, 1.0), field.shape[1] - 2.0))
-    j = np.int64(min(max(row, 1.0), field.shape[0] - 2.0))
-    x, y = min(max(column - i, 0.0), 1.0), min(max(row - j, 0.0), 1.0)
+    i = np.int64(min(max(1.0, column), field.shape[1] - 2.0))
+    j = np.int64(min(max(1.0, row), field.shape[0] - 2.0))
+    x, y = min(max(0.0, column - i), 1.0), min(max(0.0, row - j), 1.0)
     origins[k] = j * field.shape[1] + i
     dx, dy = narrow(rays_x), narrow(rays_y)
     dx, dy = if_less(_FLAT, dx * dx, dx, 0.0), if_less(_FLAT, dy * dy, dy, 0.0)
@@ -68,7 +71,7 @@ def enter(
     store_narrow(ways, way + _RIGHT, if_less(dx, 0.0, 0.0, narrow(1.0)) - x)
     store_narrow(ways, way + _UP, if_less(dy, 0.0, 0.0, narrow(1.0)) - y)
     store_narrow(ways, way + _LENGTH, narrow(0.0))
-    ways[way + _REST], ways[way + _REST + 1], ways[way + _REST + 2] = x, y, reach
+    ways[way + _REST], ways[way + _REST + 1], ways[way + _REST + 2] = x, y, min(LONGEST, reach)
 
 
 @inlined

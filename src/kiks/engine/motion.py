@@ -13,7 +13,7 @@ import numpy as np
 from numba import extending, types
 
 from kiks.engine.compiling import inlined, kernel
-from kiks.engine.contact import PIECE_MM, clearance_mm, is_free, slide
+from kiks.engine.contact import PIECE_MM, PIECES_MAX, clearance_mm, is_free, slide
 from kiks.engine.eights import one_of, only
 from kiks.engine.masks import anywhere, choose, everywhere, holds, lane_count, opposite
 from kiks.engine.numbers import SMALL_RAD, sin_cos, sin_cos_of_small, sinc, uniform
@@ -63,7 +63,7 @@ def move(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, left: Any
     room = clearance_mm(field, cell, pad, robot.x_mm, robot.y_mm)
     is_near = room < parameters.radius_mm + travel + 2.0 * cell
     if anywhere(is_near):
-        pieces = choose(is_near, max(-floor(-travel / PIECE_MM), 1.0), 1.0)
+        pieces = choose(is_near, min(max(1.0, -floor(-travel / PIECE_MM)), PIECES_MAX), 1.0)
         return move_near(field, cell, pad, robot, parameters, (left, right), (arc, turn), pieces, chance)
     x, y, _, _ = end_of_arc(robot, arc * sinc(0.5 * turn), turn)
     drive(robot, x, y, turn, arc)

@@ -27,6 +27,9 @@ _LN2_LOW = 7.440617110012397e-11
 SMALL_RAD = 0.78
 """Angles below this need not be cut to within a quarter of a circle."""
 
+FARTHEST_RAD = 1e9
+"""Angles beyond this count as this: the quarters in it still fit 32 bits, and what is left of one stays below pi/4."""
+
 _RECIPROCALS = (0.0, *(1.0 / k for k in range(1, 22)))  # a multiplication costs a fraction of a division
 
 
@@ -60,7 +63,12 @@ def sin_cos_of_small(r: Any) -> Any:
 
 @kernel
 def sin_cos(angle_rad: Any) -> Any:
-    """Return sine and cosine, each within 2e-16 for angles up to a million radians."""
+    """Return sine and cosine, each within 2e-16 for angles up to a million radians.
+
+    Of any other number, and of what is no number, they are those of some angle: directions are always of length 1, and
+    what follows one never leaves the raster.
+    """
+    angle_rad = min(max(-FARTHEST_RAD, angle_rad), FARTHEST_RAD)
     turns = floor(angle_rad * 0.6366197723675814 + 0.5)
     r = (angle_rad - turns * _HALF_PI_HIGH) - turns * _HALF_PI_LOW
     sine, cosine = sin_cos_of_small(r)
@@ -83,9 +91,10 @@ def sinc(angle_rad: Any) -> Any:
 
 @kernel
 def exponential(x: Any) -> Any:
-    """Return e to the power of x, 0 below -700."""
-    if x < -700.0:
+    """Return e to the power of x, 0 below -700 and for what is no number."""
+    if not x >= -700.0:
         return 0.0
+    x = min(x, 800.0)  # infinity, from there on
     shift = math.floor(x * 1.4426950408889634 + 0.5)
     r = (x - shift * _LN2_HIGH) - shift * _LN2_LOW
     total = 1.0

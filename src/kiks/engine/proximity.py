@@ -217,7 +217,7 @@ def chances(stream: Any, turn: Any, sensor: Any) -> Any:
 def quantize(parameters: Any, count: Any) -> Any:
     """Return a count as the converter gives it: whole steps, within its range; of a robot or of eight."""
     steps = floor(count / parameters.step_counts + 0.5)
-    return min(max(steps * parameters.step_counts, 0.0), parameters.maximum_counts)
+    return min(max(0.0, steps * parameters.step_counts), parameters.maximum_counts)
 
 
 @inlined

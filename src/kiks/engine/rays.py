@@ -54,7 +54,8 @@ def scale(sight: Any) -> Any:
 @kernel
 def cell_at(raster: Any, column: Any, row: Any) -> Any:
     """Return the column and row of the cell that a place is in; outside the raster, of the nearest one."""
-    return min(max(np.int64(column), 0), raster.shape[1] - 1), min(max(np.int64(row), 0), raster.shape[0] - 1)
+    i, j = min(max(0.0, column), raster.shape[1] - 1.0), min(max(0.0, row), raster.shape[0] - 1.0)
+    return np.int64(i), np.int64(j)
 
 
 @kernel
@@ -127,8 +128,7 @@ def cast_many(sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, len
     field, surface, _, _, cell, _ = sight
     per_cell = 1.0 / cell
     clearances, width = pointer_to(field), np.int32(field.shape[1])
-    last_column, last_row = np.int32(field.shape[1] - 1), np.int32(field.shape[0] - 1)
-    nought = np.int32(0)
+    last_column, last_row = field.shape[1] - 1.0, field.shape[0] - 1.0
     column, row = stack_floats(_LANES), stack_floats(_LANES)
     cosine, sine = stack_floats(_LANES), stack_floats(_LANES)
     per_column, per_row = stack_floats(_LANES), stack_floats(_LANES)
@@ -145,12 +145,11 @@ def cast_many(sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, len
             length[lane] = 0.0
         under_way = np.int32(1)
         while under_way != 0:
-            under_way = nought
+            under_way = np.int32(0)
             for lane in range(_LANES):
                 px = column[lane] + length[lane] * cosine[lane]
                 py = row[lane] + length[lane] * sine[lane]
-                i = min(max(np.int32(px), nought), last_column)
-                j = min(max(np.int32(py), nought), last_row)
+                i, j = np.int32(min(max(0.0, px), last_column)), np.int32(min(max(0.0, py), last_row))
                 clearance = element(clearances, np.int32(j * width + i)) * per_cell
                 to_column = (i + right[lane] - px) * per_column[lane] if per_column[lane] < _FAR else _FAR
                 to_row = (j + up[lane] - py) * per_row[lane] if per_row[lane] < _FAR else _FAR
@@ -160,8 +159,7 @@ def cast_many(sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, len
                 under_way |= np.int32(clearance > 0.0)
         for lane in range(min(_LANES, lengths.shape[0] - first)):
             ray = first + lane
-            i = min(max(np.int32(column[lane] + length[lane] * cosine[lane]), nought), last_column)
-            j = min(max(np.int32(row[lane] + length[lane] * sine[lane]), nought), last_row)
+            i, j = cell_at(field, column[lane] + length[lane] * cosine[lane], row[lane] + length[lane] * sine[lane])
             lengths[ray], brightnesses[ray] = length[lane], surface[j, i]
 
 
@@ -193,7 +191,9 @@ def is_lit(sight: Any, seen: Any, seen_count: Any, x: Any, y: Any, lamp_x: Any, 
     length, brightness = cast(sight, column, row, dx / reach, dy / reach, reach)
     if brightness == 0:
         return True
-    while length < reach:
+    # Beyond the raster all is wall, however far the lamp hangs.
+    end = min(reach, length + field.shape[0] + field.shape[1])
+    while length < end:
         i, j = cell_at(field, column + dx * length / reach, row + dy * length / reach)
         if field[j, i] > 0.0:
             return False

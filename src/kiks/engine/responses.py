@@ -98,7 +98,7 @@ def curve_count(parameters: Any, sensor: Any, lengths_mm: Any, brightnesses: Any
     """Return the count of a measured curve, whose values up to its range stand in the robot's record."""
     total, points_per_mm = 0.0, (CURVE_POINT_COUNT - 1) / parameters.range_mm
     for ray in range(RAY_COUNT):
-        place = min(max(lengths_mm[ray] * points_per_mm, 0.0), CURVE_POINT_COUNT - 1.001)
+        place = min(max(0.0, lengths_mm[ray] * points_per_mm), CURVE_POINT_COUNT - 1.001)
         i = np.int64(place)
         low, high = parameters.curve_counts[i], parameters.curve_counts[i + 1]
         weight = parameters.ray_weight[sensor, ray] * reflectance(brightnesses[ray])

@@ -81,8 +81,9 @@ def is_on_floor(scene: Any, world: Any, disc: Any) -> Any:
 @kernel
 def square_of(begins: Any, x: Any, y: Any) -> Any:
     """Return column and row of the square over a place [mm], of the nearest one outside the arena."""
-    column = min(max(np.int64(x * (1.0 / SQUARE_MM)), 0), begins.shape[2] - 2)
-    return column, min(max(np.int64(y * (1.0 / SQUARE_MM)), 0), begins.shape[1] - 1)
+    column = min(max(0.0, x * (1.0 / SQUARE_MM)), begins.shape[2] - 2.0)
+    row = min(max(0.0, y * (1.0 / SQUARE_MM)), begins.shape[1] - 1.0)
+    return np.int64(column), np.int64(row)
 
 
 @kernel

@@ -261,14 +261,11 @@ def greatest(typing: Any, lanes: Any) -> Any:
 
 def _cells(builder: Any, places: Any, count: Any) -> Any:
     """Return the cells that places along an axis are in, of so many; beyond the ends, the outermost."""
-    cells = builder.fptosi(places, _INTEGERS)
-    last = builder.sub(builder.trunc(count, _INTEGER), ir.Constant(_INTEGER, 1))
-    filled = ir.Constant(_INTEGERS, ir.Undefined)
-    for lane in range(LANES):
-        filled = builder.insert_element(filled, last, ir.Constant(_INTEGER, lane))
-    nought = ir.Constant(_INTEGERS, [0] * LANES)
-    cells = builder.select(builder.icmp_signed("<", cells, nought), nought, cells)
-    return builder.select(builder.icmp_signed("<", cells, filled), cells, filled)
+    nought, last = ir.Constant(_VECTOR, [0.0] * LANES), _splat(builder, builder.sub(count, ir.Constant(count.type, 1)))
+    # What is no number is not above 0 either.
+    places = builder.select(builder.fcmp_ordered(">", places, nought), places, nought)
+    places = builder.select(builder.fcmp_ordered("<", places, last), places, last)
+    return builder.fptosi(places, _INTEGERS)
 
 
 @_intrinsic
@@ -298,8 +295,8 @@ def pick(raster: Any, column: Any, row: Any) -> Any:
 @_overloads(pick)
 def _overload_pick(raster: Any, column: Any, row: Any) -> Any:
     def at_one(raster: Any, column: Any, row: Any) -> Any:
-        i = min(max(np.int64(column), 0), raster.shape[1] - 1)
-        j = min(max(np.int64(row), 0), raster.shape[0] - 1)
+        i = np.int64(min(max(0.0, column), raster.shape[1] - 1.0))
+        j = np.int64(min(max(0.0, row), raster.shape[0] - 1.0))
         return np.float64(raster[j, i])
 
     def at_eight(raster: Any, column: Any, row: Any) -> Any:

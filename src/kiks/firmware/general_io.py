@@ -13,8 +13,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from kiks.errors import ParameterError
 from kiks.firmware.turret import Shape, Turret
+from kiks.model.ranges import check_count, check_number
 
 ADDRESS = 32
 """Its place on the extension bus (khepera-protocol.md 10.1)."""
@@ -50,10 +50,9 @@ class GeneralIO(Turret):
 
     @inputs.setter
     def inputs(self, value: int) -> None:
-        if not isinstance(value, int) or not 0 <= value <= 255:
-            raise ParameterError(f"inputs must be a whole number from 0 to 255, but it was {value!r}. One bit a wire.")
+        byte = check_count("inputs", value, 0, 255, "One bit a wire.")
         with self.site.lock:
-            self.site.record["bus_inputs"][ADDRESS] = value
+            self.site.record["bus_inputs"][ADDRESS] = byte
 
     def set_input(self, wire: int, is_high: bool) -> None:
         """Set one digital input.
@@ -65,8 +64,7 @@ class GeneralIO(Turret):
         Raises:
             ParameterError: If there is no such wire.
         """
-        if not isinstance(wire, int) or not 0 <= wire <= 7:
-            raise ParameterError(f"wire must be a whole number from 0 to 7, but it was {wire!r}. There are eight.")
+        wire = check_count("wire", wire, 0, 7, "There are eight.")
         with self.site.lock:
             self.inputs = self.inputs | 1 << wire if is_high else self.inputs & ~(1 << wire)
 
@@ -80,10 +78,8 @@ class GeneralIO(Turret):
         Raises:
             ParameterError: If there is no such channel, or the voltage is not a number.
         """
-        if channel not in CHANNELS:
-            raise ParameterError(f"channel must be 3, 4 or 5, but it was {channel!r}. Command I has the same numbers.")
-        if not isinstance(volts, int | float) or volts != volts:
-            raise ParameterError(f"volts must be a number, but it was {volts!r}. Inputs read 0 to 4.09 V.")
+        channel = check_count("channel", channel, CHANNELS[0], CHANNELS[-1], "Command I has the same numbers.")
+        volts = check_number("volts", volts, advice="Inputs read 0 to 4.09 V.")
         counts = min(max(volts, 0.0) / VOLTS_PER_COUNT, float(COUNTS_MAX))
         with self.site.lock:
             self.site.record["analog_inputs"][channel - CHANNELS[0]] = int(counts + 0.5)

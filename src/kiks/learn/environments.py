@@ -18,10 +18,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.errors import ParameterError
-from kiks.learn.episodes import Episodes
+from kiks.batch.beginning import WORLDS_LIMIT
+from kiks.errors import ParameterError, shown
+from kiks.learn.episodes import SEED_LIMIT, Episodes
 from kiks.learn.lesson import Lesson
 from kiks.learn.lessons import LESSONS, lesson_of
+from kiks.model.ranges import check_count
 
 try:
     import gymnasium
@@ -69,8 +71,12 @@ class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Floats32, dict[str, Any]]:
-        """Begin an episode; one with the same seed is the same."""
-        super().reset(seed=seed)
+        """Begin an episode; one with the same seed is the same.
+
+        Raises:
+            ParameterError: If the seed is no whole number from 0 to 2^63 - 1.
+        """
+        super().reset(seed=checked_seed(seed))
         self.episodes.begin([0], [self.np_random])
         return self.episodes.observations()[0, 0], self._info()
 
@@ -80,7 +86,7 @@ class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
         Raises:
             ParameterError: If the action is not two numbers from -1 to 1.
         """
-        reward = self.episodes.step(np.asarray(action)[None, None])[0, 0]
+        reward = self.episodes.step([action])[0, 0]
         is_over = bool(self.episodes.are_over()[0])
         return self.episodes.observations()[0, 0], float(reward), is_over, False, self._info()
 
@@ -124,10 +130,16 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
         **changes: Any,
     ) -> None:
         self.render_mode = checked_mode(render_mode)
-        self.num_envs = num_envs
-        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.num_envs = num_envs = check_count("num_envs", num_envs, 1, WORLDS_LIMIT)
+        try:
+            self.autoreset_mode = AutoresetMode(autoreset_mode)
+        except ValueError:
+            modes = [mode.value for mode in AutoresetMode]
+            raise ParameterError(
+                f"autoreset_mode must be one of {modes}, but it was {shown(autoreset_mode)}."
+            ) from None
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
-        self.max_episode_steps = max_episode_steps
+        self.max_episode_steps = checked_limit("max_episode_steps", max_episode_steps)
         self.episodes = episodes_of(lesson, num_envs, changes | {"threads": threads})
         self.single_observation_space, self.single_action_space = spaces_of(self.episodes.lesson)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -149,14 +161,12 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
         Raises:
             ParameterError: If there are not as many seeds as worlds, or the mask is none.
         """
-        mask = None if options is None else options.get("reset_mask")
-        if mask is not None and not (np.shape(mask) == (self.num_envs,) and np.asarray(mask).dtype == np.bool_):
-            raise ParameterError(f"reset_mask must be bool [{self.num_envs}], but it was {mask!r:.60}.")
-        seeds = [seed + k for k in range(self.num_envs)] if isinstance(seed, int) else seed
-        if seeds is not None and len(seeds) != self.num_envs:
-            raise ParameterError(
-                f"seed must be one number, or one for each of {self.num_envs} worlds, but there were {len(seeds)}."
-            )
+        mask = options.get("reset_mask") if isinstance(options, dict) else None
+        if mask is not None and not (
+            isinstance(mask, np.ndarray) and (mask.shape, mask.dtype) == ((self.num_envs,), bool)
+        ):
+            raise ParameterError(f"reset_mask must be bool [{self.num_envs}], but it was {shown(mask)}.")
+        seeds = self._seeds(seed)
         chosen = np.arange(self.num_envs)
         if not self._chances:
             self._chances = [np_random(None if seeds is None else seeds[k])[0] for k in range(self.num_envs)]
@@ -181,8 +191,7 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
                 "worlds that have come to an end must begin anew before the next step, but "
                 f"{np.count_nonzero(self._are_done)} have not. Call reset(options={{'reset_mask': mask}})."
             )
-        given = np.asarray(actions)
-        rewards = self.episodes.step(given[:, None] if given.ndim == 2 else given)[:, 0]
+        rewards = self.episodes.step(actions)[:, 0]
         self._step_counts += 1
         terminations = self.episodes.are_over()
         truncations = np.zeros(self.num_envs, np.bool_)
@@ -203,6 +212,19 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
         return None if self.render_mode is None else tuple(map(self.episodes.picture, range(self.num_envs)))
 
     # ---- inside ----
+
+    def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None] | None:
+        """Return a seed for each world, or None for none at all."""
+        if seed is None:
+            return None
+        if isinstance(seed, list | tuple | np.ndarray):
+            if len(seed) != self.num_envs:
+                raise ParameterError(
+                    f"seed must be one number, or one for each of {self.num_envs} worlds, but there were {len(seed)}."
+                )
+            return [checked_seed(each) for each in seed]
+        first = check_count("seed", seed, 0, SEED_LIMIT - self.num_envs)
+        return [first + k for k in range(self.num_envs)]
 
     def _begin(self, chosen: NDArray[np.int64]) -> None:
         self.episodes.begin(chosen, [self._chances[k] for k in chosen.tolist()])
@@ -236,14 +258,32 @@ def episodes_of(lesson: str | Lesson, worlds: int, changes: dict[str, Any]) -> E
     return Episodes(lesson_of(lesson).with_changes(**of_lesson), worlds, **of_episodes)
 
 
+def checked_seed(seed: int | None) -> int | None:
+    """Return a seed, or None for none.
+
+    Raises:
+        ParameterError: If it is neither.
+    """
+    return None if seed is None else check_count("seed", seed, 0, SEED_LIMIT)
+
+
+def checked_limit(name: str, steps: int | None) -> int | None:
+    """Return a number of steps, or None for no limit.
+
+    Raises:
+        ParameterError: If it is neither.
+    """
+    return None if steps is None else check_count(name, steps, 1, SEED_LIMIT)
+
+
 def checked_mode(render_mode: str | None) -> str | None:
     """Return a render mode.
 
     Raises:
         ParameterError: If it is unknown.
     """
-    if render_mode not in (None, "rgb_array"):
-        raise ParameterError(f"render_mode must be 'rgb_array' or None, but it was {render_mode!r}.")
+    if not isinstance(render_mode, str | None) or render_mode not in (None, "rgb_array"):
+        raise ParameterError(f"render_mode must be 'rgb_array' or None, but it was {shown(render_mode)}.")
     return render_mode
 
 

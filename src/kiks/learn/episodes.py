@@ -103,7 +103,8 @@ class Episodes:
         """Let all robots of all worlds act, and sense again.
 
         Args:
-            actions: Speeds of the left and right wheels, shares of the speed limit, [world, robot, 2].
+            actions: Speeds of the left and right wheels, shares of the speed limit, [world, robot, 2]; or
+                [world, 2] of robots that are alone.
 
         Returns:
             Their rewards, float64 [world, robot].
@@ -111,7 +112,12 @@ class Episodes:
         Raises:
             ParameterError: If the shape is another, or a number is not from -1 to 1.
         """
-        given = np.asarray(actions)
+        try:
+            given = np.asarray(actions)
+        except (TypeError, ValueError, OverflowError):
+            given = np.zeros(0)
+        if given.ndim == 2:
+            given = given[:, None]
         if given.shape != (*self.shape, 2) or given.dtype.kind not in "fiu":
             raise ParameterError(
                 f"actions must be numbers of the shape {(*self.shape, 2)}, two for each robot, but they were "

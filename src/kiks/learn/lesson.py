@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from kiks.batch.timing import Timing
-from kiks.control.controller import SENSES
+from kiks.control.controller import SENSES, check_senses
 from kiks.control.measure import Measure
 from kiks.engine.motor import SPEED_MAX
-from kiks.errors import ParameterError, nearest
+from kiks.errors import ParameterError, nearest, shown
 from kiks.model.arena import Arena
+from kiks.model.ranges import check_number
 from kiks.model.robot import SENSOR_COUNT
 
 
@@ -45,22 +46,23 @@ class Lesson:
 
     def __post_init__(self) -> None:
         arenas: Arena | Sequence[Arena] = self.arenas
-        object.__setattr__(self, "arenas", (arenas,) if isinstance(arenas, Arena) else tuple(arenas))
+        object.__setattr__(self, "arenas", tuple(arenas) if isinstance(arenas, Iterable) else (arenas,))
         if not self.arenas or not all(isinstance(arena, Arena) for arena in self.arenas):
-            raise ParameterError(f"arenas must be one or more kiks.Arena, but they were {arenas!r:.80}.")
+            raise ParameterError(f"arenas must be one or more kiks.Arena, but they were {shown(arenas)}.")
         for name, measure in (("reward", self.reward), ("goal", self.goal)):
             if not (isinstance(measure, Measure) or (name == "goal" and measure is None)):
                 raise ParameterError(
-                    f"{name} must be a measure, but it was {measure!r}. Write @kiks.measure over the function."
+                    f"{name} must be a measure, but it was {shown(measure)}. Write @kiks.measure over the function."
                 )
-        if not self.senses or not set(self.senses) <= set(SENSES):
-            raise ParameterError(f"senses must be some of {', '.join(SENSES)}, but they were {self.senses!r}.")
-        if self.starts not in ("random", "arena"):
-            raise ParameterError(f"starts must be 'random' or 'arena', but it was {self.starts!r}.")
-        if not (isinstance(self.speed_limit, int | float) and 0 < self.speed_limit <= SPEED_MAX):
-            raise ParameterError(
-                f"speed_limit must be above 0 and at most {SPEED_MAX} pulses/10 ms, but it was {self.speed_limit!r}."
-            )
+        object.__setattr__(self, "senses", check_senses(self.senses))
+        if not self.senses:
+            raise ParameterError(f"senses must be some of {', '.join(SENSES)}, but there were none.")
+        if not isinstance(self.starts, str) or self.starts not in ("random", "arena"):
+            raise ParameterError(f"starts must be 'random' or 'arena', but it was {shown(self.starts)}.")
+        if not isinstance(self.timing, Timing):
+            raise ParameterError(f"timing must be a kiks.Timing, but it was {shown(self.timing)}.")
+        if not check_number("speed_limit", self.speed_limit, 0, SPEED_MAX):
+            raise ParameterError("speed_limit must be above 0, but it was 0: robots that stand learn nothing.")
 
     @property
     def sensor_count(self) -> int:

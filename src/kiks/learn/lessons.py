@@ -9,7 +9,7 @@ from typing import Any
 
 from kiks.control.measure import measure
 from kiks.control.measures import avoidance, near_light_share, nearest_lamp_mm, wall_following
-from kiks.errors import ParameterError, nearest
+from kiks.errors import ParameterError, nearest, shown
 from kiks.learn.lesson import Lesson
 from kiks.learn.rooms import corridors, pillars
 from kiks.model.arena import Arena, Cylinder, Lamp, Pose
@@ -95,9 +95,9 @@ def lesson_of(lesson: str | Lesson) -> Lesson:
     """
     if isinstance(lesson, Lesson):
         return lesson
-    if lesson not in LESSONS:
+    if not isinstance(lesson, str) or lesson not in LESSONS:
         raise ParameterError(
-            f"lesson must be a Lesson or one of {', '.join(LESSONS)}, but it was {lesson!r}."
-            f"{nearest(str(lesson), tuple(LESSONS))}"
+            f"lesson must be a Lesson or one of {', '.join(LESSONS)}, but it was {shown(lesson)}."
+            f"{nearest(shown(lesson), tuple(LESSONS))}"
         )
     return _named(lesson)

@@ -7,9 +7,11 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.errors import ParameterError
-from kiks.learn.environments import STEP_LIMIT, checked_mode, episodes_of, spaces_of
+from kiks.errors import ParameterError, shown
+from kiks.learn.environments import STEP_LIMIT, checked_mode, checked_seed, episodes_of, spaces_of
+from kiks.learn.episodes import SEED_LIMIT
 from kiks.learn.lesson import Lesson
+from kiks.model.ranges import check_count
 
 try:
     from gymnasium.utils.seeding import np_random
@@ -50,7 +52,7 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
         **changes: Any,
     ) -> None:
         self.render_mode = checked_mode(render_mode)
-        self.max_cycles = max_cycles
+        self.max_cycles = check_count("max_cycles", max_cycles, 1, SEED_LIMIT)
         self.episodes = episodes_of(lesson, 1, changes | {"threads": 1, "robots": robots})
         self.possible_agents = [f"robot_{number + 1}" for number in range(robots)]
         self.agents: list[str] = []
@@ -71,9 +73,13 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Floats32], dict[str, dict[str, Any]]]:
-        """Begin an episode; one with the same seed is the same."""
+        """Begin an episode; one with the same seed is the same.
+
+        Raises:
+            ParameterError: If the seed is no whole number from 0 to 2^63 - 1.
+        """
         if seed is not None or self._chance is None:
-            self._chance, _ = np_random(seed)
+            self._chance, _ = np_random(checked_seed(seed))
         self.episodes.begin([0], [self._chance])
         self.agents = list(self.possible_agents)
         self._step_count = 0
@@ -87,12 +93,12 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
         Raises:
             ParameterError: If an action is not two numbers from -1 to 1, or there is not one for each robot.
         """
-        if not self.agents or set(actions) != set(self.agents):
+        if not self.agents or not isinstance(actions, dict) or set(actions) != set(self.agents):
             raise ParameterError(
                 f"actions must be given for {', '.join(self.agents) or 'nobody: the episode is over, reset() it'}, "
-                f"but they were for {', '.join(actions) or 'nobody'}."
+                f"but they were for {shown(list(actions) if isinstance(actions, dict) else actions)}."
             )
-        rewards = self.episodes.step(np.stack([actions[agent] for agent in self.agents])[None])[0]
+        rewards = self.episodes.step([[actions[agent] for agent in self.agents]])[0]
         self._step_count += 1
         is_over, is_late = bool(self.episodes.are_over()[0]), self._step_count >= self.max_cycles
         told = (

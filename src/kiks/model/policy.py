@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from kiks.errors import ParameterError, nearest
+from kiks.errors import ParameterError, nearest, shown
 
 _FORMS = "'none', 'fixed:MS', 'live', 'live:FACTOR' or 'replay:FILE'"
 
@@ -29,7 +29,7 @@ def split_thinking(text: str) -> tuple[str, float | str]:
     if name == "replay" and value:
         return name, value
     raise ParameterError(
-        f"thinking must be {_FORMS}, but it was {text!r}.{nearest(name, ['none', 'fixed', 'live', 'replay'])}"
+        f"thinking must be {_FORMS}, but it was {shown(text)}.{nearest(name, ['none', 'fixed', 'live', 'replay'])}"
     )
 
 
@@ -39,5 +39,7 @@ def _number(text: str, value: str, meaning: str, most: float) -> float:
     except ValueError:
         number = math.nan
     if not 0 <= number <= most:
-        raise ParameterError(f"thinking must give {meaning} from 0 to {most:g} after the colon, but it was {text!r}.")
+        raise ParameterError(
+            f"thinking must give {meaning} from 0 to {most:g} after the colon, but it was {shown(text)}."
+        )
     return number

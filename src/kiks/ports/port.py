@@ -7,12 +7,11 @@ program's thinking, asking and waiting cost; the line lets that time pass and ca
 
 from __future__ import annotations
 
-import math
 from contextlib import AbstractContextManager
 from typing import Any, Protocol
 
 from kiks.clock.program import Program
-from kiks.errors import ParameterError
+from kiks.model.ranges import SECONDS_MAX, check_count, check_number
 from kiks.units import ns_from_s, s_from_ns
 
 BAUD_MIN = 75
@@ -86,17 +85,31 @@ class VirtualPort:
         line: The way to the robot.
         program: The program whose port this is: what its thinking and its waiting cost.
 
-    Attributes:
-        timeout: Longest time a read waits [s] of simulated time; None waits for ever.
     """
 
     def __init__(self, line: Line, program: Program) -> None:
-        self.timeout: float | None = None
+        self.timeout = None
         self._line = line
         self._program = program
         self._has_read = True
 
     # ---- what pyserial's ports have ----
+
+    @property
+    def timeout(self) -> float | None:
+        """Longest time a read waits [s] of simulated time; None waits for ever.
+
+        Raises:
+            ParameterError: If it is set to a negative number, or to none.
+        """
+        return self._timeout_s
+
+    @timeout.setter
+    def timeout(self, timeout_s: float | None) -> None:
+        checked_s = None if timeout_s is None else check_number("timeout", timeout_s, 0)
+        self._timeout_s = timeout_s
+        # What is longer than any run is for ever.
+        self._timeout_ns = None if checked_s is None or checked_s > SECONDS_MAX else ns_from_s(checked_s)
 
     @property
     def baudrate(self) -> int:
@@ -105,11 +118,7 @@ class VirtualPort:
 
     @baudrate.setter
     def baudrate(self, baud: int) -> None:
-        if not isinstance(baud, int) or not BAUD_MIN <= baud <= BAUD_MAX:
-            raise ParameterError(
-                f"baudrate must be a whole number from {BAUD_MIN} to {BAUD_MAX} bit/s, but it was {baud!r}. "
-                "Usual: 9600."
-            )
+        baud = check_count("baudrate", baud, BAUD_MIN, BAUD_MAX, "Usual: 9600 bit/s.")
         with self._line.lock:
             self._line.set_baud(baud)
 
@@ -201,16 +210,13 @@ class VirtualPort:
         """Let simulated time pass [s] without waiting for it.
 
         Raises:
-            ParameterError: If it is negative or not finite.
+            ParameterError: If it is negative, longer than 1e9 s or no number.
         """
-        if not (isinstance(seconds, int | float) and math.isfinite(seconds) and seconds >= 0):
-            raise ParameterError(
-                f"seconds must be a finite number of at least 0, but it was {seconds!r}. Time never runs backwards."
-            )
+        passing_ns = ns_from_s(check_number("seconds", seconds, 0, SECONDS_MAX, "Time never runs backwards."))
         with self._line.lock:
             if self._program.thinks:
                 self._think(is_command=False)
-            self._line.pass_to(self._line.now_ns + ns_from_s(seconds))
+            self._line.pass_to(self._line.now_ns + passing_ns)
             self._program.leave(has_acted=True)
 
     # ---- inside ----
@@ -231,17 +237,13 @@ class VirtualPort:
         self._program.leave(has_acted=False)
 
     def _read(self, size: int | None, terminator: bytes | None) -> bytes:
-        line, program, timeout_s = self._line, self._program, self.timeout
+        line, program, timeout_ns = self._line, self._program, self._timeout_ns
         with line.lock:
             if program.thinks:
                 self._think(is_command=False)
             self._has_read = True
-            timeout_ns, poll_ns = None, 0
-            if timeout_s is not None:
-                timeout_ns = ns_from_s(timeout_s)
-                # A read that does not wait is a question like any other.
-                if timeout_s == 0 and size != 0:
-                    poll_ns = program.ask()
+            # A read that does not wait is a question like any other.
+            poll_ns = program.ask() if timeout_ns == 0 and size != 0 else 0
             data = line.read(size, terminator, timeout_ns, poll_ns)
             program.leave(has_acted=bool(data))
         return data

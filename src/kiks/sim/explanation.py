@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from kiks.engine import reasons
 from kiks.engine.gaze import NOTHING
 from kiks.engine.parameters import RAY_COUNT
-from kiks.errors import ParameterError
+from kiks.model.ranges import check_count
 from kiks.model.robot import SENSOR_COUNT
 from kiks.sim.look import name_of
 
@@ -305,11 +305,7 @@ def _parameters(sim: Simulation, index: int) -> Any:
 
 
 def _check_sensor(sensor: int) -> None:
-    if not isinstance(sensor, int) or not 0 <= sensor < SENSOR_COUNT:
-        raise ParameterError(
-            f"sensor must be a whole number from 0 to {SENSOR_COUNT - 1}, but it was {sensor!r}. 0 looks to the left, "
-            "2 and 3 ahead, 6 and 7 back."
-        )
+    check_count("sensor", sensor, 0, SENSOR_COUNT - 1, "0 looks to the left, 2 and 3 ahead, 6 and 7 back.")
 
 
 def _state_of(sim: Simulation, how: int, hider: int) -> str:

@@ -13,6 +13,7 @@ from kiks.engine.numbers import uniform
 from kiks.engine.state import BALL, State
 from kiks.errors import ArenaError, ParameterError
 from kiks.model.arena import Arena
+from kiks.model.ranges import check_number
 from kiks.model.robot import RobotSpec
 from kiks.model.room import OVERLAP_MM
 
@@ -75,7 +76,8 @@ class Floor:
         discs = self._discs()
         discs[: self.robot_count, :2] = poses[:, :2]
         for index, (x_mm, y_mm, heading_rad) in enumerate(poses.tolist()):
-            check_finite(x_mm=x_mm, y_mm=y_mm, heading_rad=heading_rad)
+            for name, value in zip(("x_mm", "y_mm", "heading_rad"), (x_mm, y_mm, heading_rad), strict=True):
+                check_number(name, value)
             obstacle = self._obstacle(x_mm, y_mm, self.specs[index].body.radius_mm, discs, index, PRESSED_MM)
             if obstacle is not None:
                 raise ParameterError(
@@ -196,10 +198,3 @@ class Floor:
                 f"The arena is {self.arena.width_mm:g} x {self.arena.height_mm:g} mm; a radius of "
                 f"{radius_mm:g} mm is needed."
             )
-
-
-def check_finite(**numbers: float) -> None:
-    """Raise a ParameterError if one of the numbers, named, is none or not finite."""
-    for name, value in numbers.items():
-        if not isinstance(value, int | float) or not math.isfinite(value):
-            raise ParameterError(f"{name} must be a finite number, but it was {value!r}.")

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from kiks.errors import ParameterError
-from kiks.sim.floor import check_finite
+from kiks.errors import ParameterError, shown
+from kiks.model.ranges import check_heading, check_number
 from kiks.sim.simulation import Simulation
 
 STEP_MM = 0.5
@@ -82,9 +82,11 @@ class Hands:
         """
         self.drop(owner)
         counts = self._counts()
-        if what not in KINDS or not isinstance(index, int) or not 0 <= index < counts[what]:
+        is_kind = isinstance(what, str) and what in KINDS
+        if not is_kind or not isinstance(index, int) or not 0 <= index < counts[what]:
             raise ParameterError(
-                f"a hand must take one of {counts} by its kind and index, but it was to take {what!r} {index!r}."
+                f"a hand must take one of {counts} by its kind and index, but it was to take {shown(what)} "
+                f"{shown(index)}."
             )
         if self.holds(what, index):
             raise ParameterError(f"one hand must let go before another takes {what} {index + 1}, but it holds it.")
@@ -96,7 +98,7 @@ class Hands:
         Raises:
             ParameterError: If a number is not finite.
         """
-        check_finite(x_mm=x_mm, y_mm=y_mm)
+        x_mm, y_mm = check_number("x_mm", x_mm), check_number("y_mm", y_mm)
         held = self._held.get(owner)
         if held is None:
             return
@@ -113,7 +115,7 @@ class Hands:
         Raises:
             ParameterError: If the heading is not finite.
         """
-        check_finite(heading_rad=heading_rad)
+        heading_rad = check_heading("heading_rad", heading_rad)
         held = self._held.get(owner)
         if held is not None and held.what == "robot":
             held.heading_rad = heading_rad

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -14,12 +13,13 @@ from kiks.clock.gate import Gate
 from kiks.clock.program import Program
 from kiks.engine import ambient, proximity
 from kiks.engine.networks import networks_for
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, shown
 from kiks.firmware.k213 import K213
 from kiks.firmware.khepera import Firmware
 from kiks.firmware.radio import Radio, deliver
 from kiks.firmware.turret import Turret
 from kiks.model.arena import Arena
+from kiks.model.ranges import SECONDS_MAX, check_count, check_number
 from kiks.model.robot import SENSOR_COUNT, RobotSpec, specs_of
 from kiks.sim.cameras import Cameras
 from kiks.sim.explanation import Explanation, LightExplanation, explain_ambient, explain_proximity
@@ -28,6 +28,7 @@ from kiks.sim.sites import Place, first_memory, named
 from kiks.sim.table import TABLE
 from kiks.sim.things import Things
 from kiks.sim.wire import Agenda, Wire
+from kiks.sim.world import check_arena, check_kinds
 from kiks.units import ns_from_s
 
 if TYPE_CHECKING:
@@ -52,8 +53,6 @@ class Simulation(Things):
 
     Attributes:
         gate: Where its time passes while somebody watches; None while nobody does.
-        lamps: The lamps, float64 [lamp, 4]: x_mm, y_mm, power_w, and 1 for on or 0 for off. Write to it to move or
-            switch them.
 
     Raises:
         ParameterError: If a number is out of range or a name unknown.
@@ -80,13 +79,13 @@ class Simulation(Things):
         robot: str | RobotSpec | Sequence[str | RobotSpec] = "khepera",
         response: str | None = None,
     ) -> None:
-        if not isinstance(arena, Arena | None):
-            raise ParameterError(
-                f"arena must be a kiks.Arena, but it was {arena!r}. Read a file with kiks.Arena.load(path)."
-            )
+        if arena is not None:
+            check_arena(arena)
+        check_kinds(robot, response)
+        robots = None if robots is None else check_count("robots", robots, 1, 1000, "Say how many you need.")
         if not isinstance(seed, int) or not 0 <= seed < 2**63:
             raise ParameterError(
-                f"seed must be a whole number from 0 to 2^63 - 1, but it was {seed!r}. Any small number will do."
+                f"seed must be a whole number from 0 to 2^63 - 1, but it was {shown(seed)}. Any small number will do."
             )
         self.thinking = thinking
         self.program = Program(thinking)
@@ -120,6 +119,8 @@ class Simulation(Things):
 
     def _sense(self, read: Callable[..., Any], given: NDArray[Any], index: int, is_noisy: bool) -> list[Any]:
         """Return what an entry of the engine reads, which besides what rays meet needs one thing more."""
+        if not isinstance(is_noisy, bool):
+            raise ParameterError(f"noise must be True or False, but it was {shown(is_noisy)}.")
         out = self._counts if is_noisy else self._expected
         read(
             self.scene,
@@ -140,17 +141,14 @@ class Simulation(Things):
         """Let simulated time pass: robots drive on, and commands on the line act when they are due.
 
         Args:
-            seconds: How long [s].
+            seconds: How long [s], at most 1e9.
 
         Raises:
-            ParameterError: If it is negative or not finite.
+            ParameterError: If it is negative, too long or no number.
         """
-        if not (isinstance(seconds, int | float) and math.isfinite(seconds) and seconds >= 0):
-            raise ParameterError(
-                f"seconds must be a finite number of at least 0, but it was {seconds!r}. Time never runs backwards."
-            )
+        passing_ns = ns_from_s(check_number("seconds", seconds, 0, SECONDS_MAX, "Time never runs backwards."))
         with self.lock:
-            self.advance_to(self.now_ns + ns_from_s(seconds))
+            self.advance_to(self.now_ns + passing_ns)
 
     def advance_to(self, time_ns: int) -> None:
         """Let time pass up to a time [ns]; nothing happens if it is over already."""
@@ -229,6 +227,7 @@ class Simulation(Things):
             >>> sim.add_robot("khepera_ii")
             2
         """
+        check_kinds(robot)
         (spec,) = specs_of(robot, 1, None)
         with self.lock:
             self.sync()

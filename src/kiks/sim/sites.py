@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 from kiks.engine.gripper import find_object
 from kiks.engine.probe import chance, probe
 from kiks.engine.state import MEMORY_COUNT
-from kiks.errors import ParameterError, nearest
+from kiks.errors import ParameterError, nearest, shown
 from kiks.firmware.battle import Battle
 from kiks.firmware.general_io import GeneralIO
 from kiks.firmware.gripper import Gripper
 from kiks.firmware.radio import Radio
 from kiks.firmware.turret import AnyTurret, Met, Turret
+from kiks.model.ranges import check_heading
 from kiks.model.robot import RobotSpec
 
 if TYPE_CHECKING:
@@ -89,7 +90,8 @@ class Place:
         sim = self._sim
         sim.sync()
         ticks, now_ns = sim.state.tick_count, sim.now_ns
-        distance_mm, disc, brightness = probe(sim.scene, sim.sight, ticks, now_ns, self._index, float(angle_rad))
+        angle_rad = check_heading("angle_rad", angle_rad)
+        distance_mm, disc, brightness = probe(sim.scene, sim.sight, ticks, now_ns, self._index, angle_rad)
         if disc < 0:
             return Met(distance_mm, brightness)
         if disc < sim.robot_count:
@@ -136,13 +138,14 @@ def named(turret: object, camera: Callable[[], Turret]) -> Turret:
             return camera()
         if turret not in KINDS:
             raise ParameterError(
-                f"turret must be one of {', '.join(map(repr, NAMES))} or an object of your own, but it was {turret!r}."
+                f"turret must be one of {', '.join(map(repr, NAMES))} or an object of your own, but it was "
+                f"{shown(turret)}."
                 f"{nearest(turret, NAMES)} docs/turrets.md says how to make one."
             )
         return KINDS[turret]()
     if not isinstance(turret, Turret):
         raise ParameterError(
-            f"turret must be a name or a kiks.firmware.turret.Turret, but it was {turret!r}. Inherit from Turret: "
+            f"turret must be a name or a kiks.firmware.turret.Turret, but it was {shown(turret)}. Inherit from Turret: "
             "docs/turrets.md says how."
         )
     if not isinstance(turret, GeneralIO):
@@ -159,8 +162,11 @@ def _check(turret: Turret) -> None:
     if not isinstance(name, str) or not name.isascii() or not name.isprintable() or not name:
         raise ParameterError(f"name of a turret must be a line of ASCII, but it was {name!r}. Tool 'net' prints it.")
     revision = turret.revision
-    if len(revision) != 2 or not all(isinstance(part, int) and part >= 0 for part in revision):
-        raise ParameterError(f"revision of a turret must be two whole numbers, but it was {revision!r}. Take (1, 0).")
+    is_pair = isinstance(revision, tuple) and len(revision) == 2
+    if not is_pair or not all(isinstance(part, int) and part >= 0 for part in revision):
+        raise ParameterError(
+            f"revision of a turret must be two whole numbers, but it was {shown(revision)}. Take (1, 0)."
+        )
     for letter, row in turret.orders.items():
         if len(letter) != 1 or not "A" <= letter <= "Z" or letter == "B":
             raise ParameterError(

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from kiks.engine.numbers import sin_cos
 from kiks.engine.state import BALL, BODY, CYLINDER
-from kiks.errors import ArenaError, KiksError, ParameterError
+from kiks.errors import ArenaError, KiksError, ParameterError, shown
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp
+from kiks.model.ranges import check_heading, check_number, check_numbers
 from kiks.model.robot import RobotSpec
 from kiks.model.room import OVERLAP_MM
-from kiks.sim.floor import PRESSED_MM, check_finite
+from kiks.sim.floor import PRESSED_MM
 from kiks.sim.world import World
 
 
@@ -42,9 +43,6 @@ class Things(World):
         specs: What each robot is.
         seed: Seed of all random numbers.
 
-    Attributes:
-        lamps: x_mm, y_mm, power_w, and 1 for on or 0 for off: float64 [lamp, 4]. Write to it to move or switch them.
-
     Raises:
         ArenaError: If something has no free place where the arena puts it.
     """
@@ -58,6 +56,21 @@ class Things(World):
                 self._add(body, PRESSED_MM)
             except ParameterError as error:
                 raise ArenaError(f"Arena {arena.name!r}: {error}") from None
+
+    @property
+    def lamps(self) -> NDArray[np.float64]:
+        """The lamps: x_mm, y_mm, power_w, and 1 for on or 0 for off: float64 [lamp, 4].
+
+        Write to it to move or switch them; a lamp at a place that is no number is nowhere.
+
+        Raises:
+            ParameterError: If it is set to anything but finite numbers of that shape.
+        """
+        return self._lamps
+
+    @lamps.setter
+    def lamps(self, lamps: NDArray[np.float64]) -> None:
+        self._lamps = check_numbers("lamps", lamps, (None, 4))
 
     def add_ball(self, x_mm: float, y_mm: float, **changes: Any) -> int:
         """Put a ball into the arena, at rest; return its number.
@@ -134,13 +147,14 @@ class Things(World):
         Raises:
             ParameterError: If it would hang outside the arena, or a value is out of range.
         """
+        hung: tuple[Lamp, ...] = (Lamp(x_mm, y_mm, power_w, is_on),)
         try:
-            replace(self.arena, starts=(), balls=(), cylinders=(), lamps=(Lamp(x_mm, y_mm, power_w, is_on),))
+            hung = replace(self.arena, starts=(), balls=(), cylinders=(), lamps=hung).lamps
         except KiksError as error:
             raise ParameterError(str(error)) from None
         with self.lock:
             self.sync()
-            self.lamps = np.vstack([self.lamps, (x_mm, y_mm, power_w, float(is_on))])
+            self.lamps = np.vstack([self.lamps, hung])
             return len(self.lamps)
 
     def remove_lamp(self, lamp: int) -> None:
@@ -151,7 +165,9 @@ class Things(World):
         """
         with self.lock:
             if not isinstance(lamp, int) or not 1 <= lamp <= len(self.lamps):
-                raise ParameterError(f"lamp must be a row of lamps from 1 to {len(self.lamps)}, but it was {lamp!r}.")
+                raise ParameterError(
+                    f"lamp must be a row of lamps from 1 to {len(self.lamps)}, but it was {shown(lamp)}."
+                )
             self.sync()
             self.lamps = np.delete(self.lamps, lamp - 1, axis=0)
 
@@ -181,9 +197,9 @@ class Things(World):
         Raises:
             ParameterError: If there is no such body, a number is out of range, or something is in the way.
         """
-        check_finite(x_mm=x_mm, y_mm=y_mm, heading_rad=heading_rad)
-        if not 0 <= speed_mm_s <= 1000:
-            raise ParameterError(f"speed_mm_s must be a number from 0 to 1000, but it was {speed_mm_s!r}.")
+        x_mm, y_mm = check_number("x_mm", x_mm), check_number("y_mm", y_mm)
+        speed_mm_s = check_number("speed_mm_s", speed_mm_s, 0, 1000)
+        sine, cosine = sin_cos(check_heading("heading_rad", heading_rad))
         with self.lock:
             self.sync()
             index = self._body_index(body)
@@ -192,7 +208,6 @@ class Things(World):
             self._check_free(f"the place of body {body}", x_mm, y_mm, radius_mm, but=self.robot_count + index)
             self._release(index)
             record["x_mm"], record["y_mm"], record["trail"][:] = x_mm, y_mm, (x_mm, y_mm)
-            sine, cosine = sin_cos(heading_rad)
             record["velocity_x"], record["velocity_y"] = speed_mm_s * cosine, speed_mm_s * sine
             self._look_again()
 
@@ -211,7 +226,9 @@ class Things(World):
     def _body_index(self, body: int) -> int:
         numbers = self.state.bodies["number"][0].tolist()
         if not isinstance(body, int) or body not in numbers:
-            raise ParameterError(f"body must be the number of one there is, but it was {body!r}. There are {numbers}.")
+            raise ParameterError(
+                f"body must be the number of one there is, but it was {shown(body)}. There are {shown(numbers)}."
+            )
         return int(numbers.index(body))
 
     def _release(self, index: int) -> None:
@@ -222,7 +239,10 @@ class Things(World):
         """Return where everything stands, for `reset`."""
         with self.lock:
             self.sync()
-            return Checkpoint(self.poses(), self.state.bodies.copy(), self.lamps.copy())
+            saved = Checkpoint(self.poses(), self.state.bodies.copy(), self.lamps.copy())
+        for array in (saved.poses, saved.bodies, saved.lamps):
+            array.setflags(write=False)
+        return saved
 
     def reset(self, checkpoint: Checkpoint) -> None:
         """Put everything back where it stood at a checkpoint; what was added since goes, what was removed comes back.
@@ -230,17 +250,22 @@ class Things(World):
         Time goes on, and so do programs, wheels and counters: it is as if a hand had tidied up.
 
         Raises:
-            ParameterError: If the checkpoint is of a simulation with another number of robots.
+            ParameterError: If it is no checkpoint, or one of a simulation with another number of robots.
         """
+        if not isinstance(checkpoint, Checkpoint):
+            raise ParameterError(
+                f"checkpoint must be what checkpoint() has returned, but it was {shown(checkpoint)}. Call that before."
+            )
         if len(checkpoint.poses) != self.robot_count:
             raise ParameterError(
                 f"checkpoint must be of {self.robot_count} robots, but it was of {len(checkpoint.poses)}. "
                 "Take it from the same simulation."
             )
+        check_numbers("poses of a checkpoint", checkpoint.poses, (self.robot_count, 3))
         with self.lock:
             self.sync()
             self.state.bodies = checkpoint.bodies.copy()
-            self.lamps = checkpoint.lamps.copy()
+            self._lamps = checkpoint.lamps.copy()
             for index, pose in enumerate(checkpoint.poses.tolist()):
                 self._put(index, *pose)
             self._enter()

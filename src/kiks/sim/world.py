@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import os
 import threading
 from collections.abc import Sequence
 from typing import Any
@@ -15,13 +15,17 @@ from kiks.engine.parameters import PARAMETERS, pack
 from kiks.engine.rays import sight_of
 from kiks.engine.scene import enter_everybody, make_scene
 from kiks.engine.state import State
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, shown
 from kiks.model.arena import PAD, Arena
+from kiks.model.ranges import check_heading, check_number, wrapped
 from kiks.model.robot import RobotSpec
 from kiks.model.room import OVERLAP_MM
-from kiks.sim.floor import Floor, check_finite
+from kiks.sim.floor import Floor
 from kiks.sim.paths import Paths
 from kiks.units import TICK_NS, s_from_ns
+
+TICKS_AT_ONCE = 10_000
+"""Most ticks that a kernel does before Python may look for Ctrl-C: some milliseconds for a lone robot."""
 
 
 class World(Floor):
@@ -77,6 +81,7 @@ class World(Floor):
         Raises:
             ParameterError: If a robot, ball or cylinder would be deeper in a wall than it is.
         """
+        check_arena(arena)
         # What follows from the walls may take a while: it is found before anybody has to wait.
         ground = (arena.clearance, float(arena.mm_per_cell), PAD)
         sight_of(arena)
@@ -119,7 +124,9 @@ class World(Floor):
         """Do the ticks that have begun up to a time [ns]."""
         ticks = -(-time_ns // TICK_NS) - self.state.tick_count
         while ticks > 0:
-            count = ticks if self._paths is None else min(ticks, self._paths.ticks_left(self.state.tick_count))
+            count = min(ticks, TICKS_AT_ONCE)
+            if self._paths is not None:
+                count = min(count, self._paths.ticks_left(self.state.tick_count))
             step.advance(self.scene, self.ground, self.seed, self.state.tick_count, count)
             self.state.tick_count += count
             ticks -= count
@@ -134,12 +141,12 @@ class World(Floor):
         Raises:
             ParameterError: If there is no such robot.
         """
-        if not isinstance(robot, int) or not 1 <= robot <= self.robot_count:
+        if not isinstance(robot, int | np.integer) or not 1 <= robot <= self.robot_count:
             numbers = "robot 1" if self.robot_count == 1 else f"robots 1 to {self.robot_count}"
             raise ParameterError(
-                f"robot must be the number of one there is, but it was {robot!r}. This simulation has {numbers}."
+                f"robot must be the number of one there is, but it was {shown(robot)}. This simulation has {numbers}."
             )
-        return robot - 1
+        return int(robot) - 1
 
     def pose(self, robot: int) -> tuple[float, float, float]:
         """Return where a robot is at this very instant: x_mm, y_mm, heading_rad (not wrapped).
@@ -164,18 +171,19 @@ class World(Floor):
             robot: Number of the robot, from 1.
             x_mm: From the arena's lower left corner to the right.
             y_mm: From the arena's lower left corner upwards.
-            heading_rad: Counter-clockwise from the x axis.
+            heading_rad: Counter-clockwise from the x axis; wrapped to one turn beyond a million.
 
         Raises:
             ParameterError: If there is no such robot, a number is not finite, or something is in the way.
         """
         index = self.index_of(robot)
-        check_finite(x_mm=x_mm, y_mm=y_mm, heading_rad=heading_rad)
+        x_mm, y_mm = check_number("x_mm", x_mm), check_number("y_mm", y_mm)
+        heading_rad = check_heading("heading_rad", heading_rad)
         with self.lock:
             self.sync()
             radius_mm = self.specs[index].body.radius_mm
             self._check_free(f"the place of robot {robot}", x_mm, y_mm, radius_mm, but=index)
-            self._put(index, float(x_mm), float(y_mm), float(heading_rad))
+            self._put(index, x_mm, y_mm, heading_rad)
             self._look_again()
 
     def _add_robot(self, spec: RobotSpec) -> int:
@@ -198,6 +206,7 @@ class World(Floor):
 
     def _put(self, index: int, x_mm: float, y_mm: float, heading_rad: float) -> None:
         robot: Any = self.state.robots[0, index]
+        heading_rad = wrapped(heading_rad)
         robot["x_mm"], robot["y_mm"], robot["heading_rad"] = x_mm, y_mm, heading_rad
         robot["trail"][:] = (x_mm, y_mm, heading_rad)
         robot["start_x_mm"], robot["start_y_mm"] = x_mm, y_mm
@@ -232,9 +241,9 @@ class World(Floor):
         Raises:
             ParameterError: If it is none of these.
         """
-        ticks = every_s * 100 if isinstance(every_s, int | float) else math.nan
-        if not 1 - 1e-9 <= ticks <= 1e9 or abs(ticks - round(ticks)) > 1e-6:
-            raise ParameterError(f"every_s must be a multiple of 0.01 s, but it was {every_s!r}. Take 0.1.")
+        ticks = 100 * check_number("every_s", every_s, 0, 1e7, "Take 0.1.")
+        if ticks < 1 - 1e-9 or abs(ticks - round(ticks)) > 1e-6:
+            raise ParameterError(f"every_s must be a multiple of 0.01 s, but it was {shown(every_s)}. Take 0.1.")
         with self.lock:
             self.sync()
             self._paths = Paths(round(ticks), self.state)
@@ -267,3 +276,31 @@ class World(Floor):
         with self.lock:
             self.sync()
             return self.state.hash()
+
+
+def check_kinds(kinds: object, response: object = None) -> None:
+    """Raise a ParameterError unless robots may be named so.
+
+    Args:
+        kinds: The name of a kind, a robot file or a `RobotSpec`, or a list of such.
+        response: The name of a response of their proximity sensors, or None.
+
+    Raises:
+        ParameterError: If one is something else.
+    """
+    for kind in kinds if isinstance(kinds, list | tuple) else (kinds,):
+        if not isinstance(kind, str | os.PathLike | RobotSpec):
+            raise ParameterError(
+                f"robot must be the name of a kind, a robot file or a kiks.RobotSpec, but it was {shown(kind)}. "
+                "Take 'khepera'."
+            )
+    if response is not None and not isinstance(response, str):
+        raise ParameterError(f"response must be a name such as 'thesis', but it was {shown(response)}.")
+
+
+def check_arena(arena: object) -> None:
+    """Raise a ParameterError unless this is an arena."""
+    if not isinstance(arena, Arena):
+        raise ParameterError(
+            f"arena must be a kiks.Arena, but it was {shown(arena)}. Read a file with kiks.Arena.load(path)."
+        )

@@ -1,0 +1,122 @@
+"""Numbers that a caller gives: each has a range, and one line says so where it is not kept.
+
+All that enters the engine from Python passes one of these checks, so no kernel needs to ask.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.errors import ParameterError, shown
+
+SECONDS_MAX = 1e9
+"""Longest time that may pass at once [s]: a clock of 64 bits counts nine of them in nanoseconds."""
+
+HEADING_KEPT_RAD = 1e6
+"""Headings up to this stay as they are: their sines are exact (`kiks.engine.numbers`), and turns may be counted."""
+
+
+def check_number(
+    name: str, number: object, least: float = -math.inf, most: float = math.inf, advice: str = ""
+) -> float:
+    """Return a finite number as a float.
+
+    Args:
+        name: What it is called in the message.
+        number: The number.
+        least: The least that it may be.
+        most: The most.
+        advice: What else the message says.
+
+    Raises:
+        ParameterError: If it is no number, not finite, or out of range.
+    """
+    if isinstance(number, int | float | np.integer | np.floating) and not isinstance(number, bool):
+        try:
+            value = float(number)
+        except OverflowError:  # a whole number of more than 308 digits
+            value = math.inf
+        if math.isfinite(value) and least <= value <= most:
+            return value
+    rule = "a finite number" if math.isinf(most) else f"from {least:g} to {most:g}"
+    if math.isinf(most) and math.isfinite(least):
+        rule += f" of at least {least:g}"
+    raise ParameterError(f"{name} must be {rule}, but it was {shown(number)}.{advice and ' ' + advice}")
+
+
+def check_count(name: str, count: object, least: int = 0, most: int = 1_000_000, advice: str = "") -> int:
+    """Return a whole number as an int.
+
+    Args:
+        name: What it is called in the message.
+        count: The number.
+        least: The least that it may be.
+        most: The most.
+        advice: What else the message says.
+
+    Raises:
+        ParameterError: If it is no whole number or out of range.
+    """
+    if isinstance(count, int | np.integer) and not isinstance(count, bool) and least <= count <= most:
+        return int(count)
+    raise ParameterError(
+        f"{name} must be a whole number from {least} to {most}, but it was {shown(count)}.{advice and ' ' + advice}"
+    )
+
+
+def check_heading(name: str, heading_rad: object) -> float:
+    """Return a heading [rad], wrapped to one turn if it is beyond `HEADING_KEPT_RAD`.
+
+    Raises:
+        ParameterError: If it is no finite number.
+    """
+    return wrapped(check_number(name, heading_rad))
+
+
+def wrapped(heading_rad: float) -> float:
+    """Return a finite heading [rad], wrapped to one turn if it is beyond `HEADING_KEPT_RAD`.
+
+    Example:
+        >>> wrapped(7.0), wrapped(1e20) == math.remainder(1e20, 2 * math.pi)
+        (7.0, True)
+    """
+    return heading_rad if abs(heading_rad) <= HEADING_KEPT_RAD else math.remainder(heading_rad, 2 * math.pi)
+
+
+def check_numbers(name: str, numbers: Any, shape: tuple[int | None, ...] | None = None) -> NDArray[np.float64]:
+    """Return finite numbers as a float64 array.
+
+    Args:
+        name: What they are called in the message.
+        numbers: An array, or a list of numbers.
+        shape: The shape that it must have, None for any length along an axis; any shape if left out.
+
+    Raises:
+        ParameterError: If one is no finite number, or the shape is another.
+    """
+    values = array_of(numbers)
+    if values is None or not np.isfinite(values).all():
+        raise ParameterError(f"{name} must be finite numbers, but they were {shown(numbers)}.")
+    if shape is not None and not _fits(values.shape, shape):
+        wanted = "[" + ", ".join("any" if length is None else str(length) for length in shape) + "]"
+        raise ParameterError(f"{name} must be numbers of the shape {wanted}, but their shape was {values.shape}.")
+    return values
+
+
+def array_of(numbers: Any) -> NDArray[np.float64] | None:
+    """Return real numbers as a new float64 array, infinite ones and what is no number too; None if they are others."""
+    try:
+        given = np.asarray(numbers)
+        with np.errstate(over="ignore"):
+            return np.array(given, np.float64, order="C") if given.dtype.kind in "iuf" else None
+    except (TypeError, ValueError, OverflowError):
+        return None
+
+
+def _fits(given: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:
+    pairs = zip(given, wanted, strict=False)
+    return len(given) == len(wanted) and all(length in (None, there) for there, length in pairs)
