@@ -36,3 +36,29 @@ def nearest(given: str, known: Iterable[str]) -> str:
 
     matches = difflib.get_close_matches(given, list(known), n=1)
     return f" Did you mean {matches[0]!r}?" if matches else ""
+
+
+SHOWN_MAX = 80
+"""Most characters of a value that a message repeats."""
+
+
+def shown(value: object) -> str:
+    """Return how a message shows a value that was given: cut to `SHOWN_MAX` characters, on one line.
+
+    Example:
+        >>> shown("a" * 100)[-10:]
+        "aaaaaa...'"
+    """
+    import reprlib
+
+    short = reprlib.Repr()
+    short.maxstring = short.maxother = short.maxlong = SHOWN_MAX
+    short.maxlist = short.maxtuple = short.maxdict = short.maxarray = 9
+    short.maxlevel = 3
+    try:
+        text = short.repr(value)
+    except Exception:
+        # Python prints no whole number of more than 4300 digits, and an object's own repr may fail.
+        text = f"a {type(value).__name__} that cannot be shown"
+    text = " ".join(text.split())
+    return text if len(text) <= SHOWN_MAX else f"{text[: SHOWN_MAX - 4]}...{text[-1]}"

@@ -38,16 +38,25 @@ class Session:
         self.to, self.out = self.process.stdin.fileno(), self.process.stdout.fileno()
         self.greeting = self.hear()
 
-    def hear(self) -> str:
-        head = self._read(8)
-        length = int(head)
+    def hear(self, *, confirms: bool = True) -> str:
+        """Return the next answer; confirm that it is waited for where it takes long, if nothing else is said."""
+        while (heard := self.hear_frame()) == "~":
+            if confirms:
+                os.write(self.to, b"\n")
+        return heard
+
+    def hear_frame(self) -> str:
+        length = int(self._read(8))
         return self._read(max(length, 88))[:length]
 
+    def say(self, request: str) -> None:
+        os.write(self.to, f"{request}\n".encode())
+
     def ask(self, request: str) -> str:
-        os.write(self.to, f"t{request}\n".encode())
+        self.say(request)
         heard = self.hear()
-        assert heard[:2] == "t+", heard
-        return heard[21:]
+        assert heard[0] == "+", heard
+        return heard[20:]
 
     def hang_up(self) -> None:
         assert self.process.stdin is not None
@@ -145,7 +154,7 @@ def test_without_the_token_nobody_gets_in(tmp_path: Path) -> None:
         for token in ("", "x" * 32, words[7][:-1], "y" * 10_000):
             with socket.create_connection(("127.0.0.1", int(words[5]))) as client:
                 client.settimeout(GUARD_S)
-                client.sendall(f"{token}\nt version\n".encode())
+                client.sendall(f"{token}\nversion\n".encode())
                 heard = b""
                 with suppress(ConnectionResetError):
                     heard = client.recv(100)
@@ -173,16 +182,16 @@ def test_a_paused_world_does_not_keep_a_session_whose_octave_has_gone(tmp_path: 
         session.ask("set thinking none")
         session.ask("world default")
         session.ask("open 1 9600")
-        os.write(session.to, b"tpause 100000\n")  # at real speed, with a window: longer than anybody waits
-        os.write(session.to, b"task 1 N\n")
+        os.write(session.to, b"pause 100000\n")  # at real speed, with a window: longer than anybody waits
+        os.write(session.to, b"ask 1 N\n")
         session.hang_up()
         assert session.wait() == 0
 
 
 def test_what_is_printed_never_mixes_with_answers(tmp_path: Path) -> None:
     with started(folder=tmp_path) as session:
-        os.write(session.to, f"tworld file {tmp_path / 'none.kad'}\n".encode())
-        assert session.hear().startswith("t-")
+        os.write(session.to, f"world file {tmp_path / 'none.kad'}\n".encode())
+        assert session.hear().startswith("-")
         assert session.ask("version")
 
 

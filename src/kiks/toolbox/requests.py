@@ -36,21 +36,20 @@ Act = Callable[[Visitor, str], str]
 
 def answer(visitor: Visitor, line: str) -> str:
     """Return the answer to a line, never an exception."""
-    ticket, request = line[:1], line[1:]
-    name, _, words = request.partition(" ")
+    name, _, words = line.partition(" ")
     visitor.asked = 0
     try:
         act = REQUESTS.get(name)
         if act is None:
             raise ParameterError(f"a request must be one of {sorted(REQUESTS)}, but it was {name!r}.")
         result = act(visitor, words)
-        return f"{ticket}+{visitor.clock()}{result}"
+        return f"+{visitor.clock()}{result}"
     except KiksError as error:
         why = str(error)
     except Exception as error:
         _log.exception("request %r failed", request[:200])
         why = f"KiKS itself has failed at {name!r}: {error!r}. Please tell its makers."
-    return f"{ticket}-{visitor.clock()}{escape(why)}"
+    return f"-{visitor.clock()}{escape(why)}"
 
 
 # ---- worlds ----

@@ -1,13 +1,8 @@
-r"""What the toolbox and the simulator say to each other: a line there, a frame back.
+r"""What the toolbox and the simulator say to each other, word by word; `exchange.py` has how it gets there.
 
-A request is a ticket (a character), a name and words. The answer has the same ticket, `+` or `-`, the number of the
-port that was asked and its time in 19 characters, and what was asked for or why not. Texts of several lines are one
-line with `\n`, `\r` and `\\`; matrices are run lengths down their columns, as MATLAB keeps them: most of an arena is
-floor.
-
-Octave cannot read a line from a pipe without waiting for what comes after it (its `fgetl` looks one character ahead),
-but it can read so many characters. So an answer is sent as a frame: its length in eight digits, itself, and blanks up
-to 96 characters. One read is enough for nearly all.
+A request is a name and words. The answer is `+` or `-`, the number of the port that was asked and its time in 19
+characters, and what was asked for or why not. Texts of several lines are one line with `\n`, `\r` and `\\`; matrices are
+run lengths down their columns, as MATLAB keeps them: most of an arena is floor.
 """
 
 from __future__ import annotations
@@ -21,22 +16,8 @@ from numpy.typing import NDArray
 
 from kiks.errors import ParameterError
 
-FRAME_MIN = 96
-"""Shortest frame [bytes]."""
-
 CELLS_MAX = 64_000_000
 """Most elements of a matrix."""
-
-
-def frame(text: str) -> bytes:
-    """Return an answer as it is sent.
-
-    Example:
-        >>> frame("a+").rstrip()
-        b'       2a+'
-    """
-    data = text.encode()
-    return (b"%8d" % len(data) + data).ljust(FRAME_MIN)
 
 
 def escape(text: str) -> str:
