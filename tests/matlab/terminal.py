@@ -59,8 +59,8 @@ class Terminal:
         os.write(self._end, f"{line}\n".encode())
 
     def press_ctrl_c(self) -> None:
-        """Press Ctrl-C: whatever runs at the terminal gets SIGINT."""
-        os.write(self._end, CTRL_C)
+        """Press Ctrl-C: whatever runs at the terminal gets SIGINT. Octave forgets a line that it waits for then."""
+        os.write(self._end, CTRL_C + b"\n")
 
     def wait_for(self, pattern: str, seconds: float = GUARD_S) -> str:
         """Wait until something has been printed, and return it; what was printed before is forgotten."""
@@ -77,10 +77,19 @@ class Terminal:
         self.type(f"fprintf('<%s%s%.15g>\\n', 'a', 'nswer ', double({expression}))")
         return self.wait_for(r"<answer [^>]*>")[8:-1]
 
+    def has_printed(self, text: str) -> bool:
+        """Say whether something has been printed that was not waited for."""
+        self._hear(0)
+        return text in self._text
+
+    def kill(self) -> None:
+        """Kill Octave, and nothing else."""
+        os.kill(self.number, signal.SIGKILL)
+
     def sessions(self) -> list[int]:
         """Return the numbers of the processes that Octave has started and that run."""
         children = Path(f"/proc/{self.number}/task/{self.number}/children").read_text(encoding="ascii").split()
-        return [int(child) for child in children if not is_zombie(int(child))]
+        return [int(child) for child in children if state(int(child)) != "Z"]
 
     def _hear(self, seconds: float) -> None:
         if select.select([self._end], [], [], seconds)[0]:
@@ -90,9 +99,20 @@ class Terminal:
                 raise AssertionError(f"Octave has ended:\n{self._text}") from error
 
 
-def is_zombie(number: int) -> bool:
-    """Say whether a process has ended, whatever its parent knows."""
+def state(number: int) -> str:
+    """Return the letter for what a process does: S sleeps, Z has ended, and so has one that is not there."""
+    words = _words(number)
+    return words[0] if words else "Z"
+
+
+def processor_ticks(number: int) -> float:
+    """Return how much processor time a process has had [ticks of 10 ms]; infinite if it has ended."""
+    words = _words(number)
+    return int(words[11]) + int(words[12]) if words and words[0] != "Z" else float("inf")
+
+
+def _words(number: int) -> list[str]:
     try:
-        return Path(f"/proc/{number}/stat").read_text(encoding="ascii").rpartition(")")[2].split()[0] == "Z"
+        return Path(f"/proc/{number}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
     except (FileNotFoundError, ProcessLookupError):
-        return True
+        return []

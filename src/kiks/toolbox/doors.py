@@ -58,25 +58,37 @@ class Door(NamedTuple):
 
 
 class DoorFile:
-    """The file that tells of a session of this process, until `close` or the end of the process, however it ends.
+    """The file that tells of a session of this process, from `open` on until `close` or the end of the process.
 
     Args:
         door: Where the session is found.
 
     Raises:
-        LinkError: If it cannot be written.
+        LinkError: If this user has no folder for it.
     """
 
     def __init__(self, door: Door) -> None:
+        self._door = door
         self._path = default_folder() / f"{_PREFIX}{door.number}"
-        # What another process of this number has left behind.
-        self._path.unlink(missing_ok=True)
-        self._file = _create(self._path, door)
+        self._file = -1
+
+    def open(self) -> None:
+        """Write it, if it is not there.
+
+        Raises:
+            LinkError: If it cannot be written.
+        """
+        if self._file < 0:
+            # What another process of this number has left behind.
+            self._path.unlink(missing_ok=True)
+            self._file = _create(self._path, self._door)
 
     def close(self) -> None:
-        """Remove it."""
-        self._path.unlink(missing_ok=True)
-        os.close(self._file)
+        """Remove it, if it is there."""
+        if self._file >= 0:
+            self._path.unlink(missing_ok=True)
+            os.close(self._file)
+            self._file = -1
 
 
 def find_door(number: int) -> Door:

@@ -15,6 +15,7 @@ import select
 import socket
 import threading
 
+from kiks.errors import LinkError
 from kiks.ports.accepting import Accepting
 from kiks.ports.lobby import Lobby
 from kiks.toolbox.doors import Door, DoorFile
@@ -79,7 +80,8 @@ class Host:
 
     def close(self) -> None:
         """Let nobody in any more, and end the world."""
-        self._file.close()
+        with self._lock:
+            self._file.close()
         self._lobby.close()
         self._session.close()
 
@@ -96,6 +98,7 @@ class Host:
         try:
             with contextlib.suppress(OSError):
                 if exchange.greet(self.door.line()):
+                    self._announce()
                     for line in exchange.lines():
                         exchange.reply(answer(visitor, line))
         finally:
@@ -106,6 +109,14 @@ class Host:
             visitor.leave()
             self._part_if_others_stay(exchange)
             self._go_if_alone()
+
+    def _announce(self) -> None:
+        """Let others find the session, now that somebody takes part."""
+        with self._lock:
+            try:
+                self._file.open()
+            except LinkError as error:
+                _log.warning("others cannot join this session: %s", error)
 
     def _part_if_others_stay(self, exchange: Exchange) -> None:
         """Let a program know that it has left; else the end of this process does."""
