@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import logging
 import os
@@ -65,10 +66,8 @@ class Accepting:
         if self._spare >= 0:
             os.close(self._spare)
             self._spare = -1
-        try:
+        with contextlib.suppress(OSError):
             self._listener.accept()[0].close()
-        except OSError:
-            pass
         self._reserve()
 
     def _reserve(self) -> bool:

@@ -19,7 +19,6 @@ from kiks.ports.programs import Programs
 from kiks.sim.simulation import Simulation
 from kiks.units import NS_PER_S
 
-
 LOOK_S = 0.05
 """How often a program that waits for others looks whether it still has to [s of real time]."""
 

@@ -26,6 +26,9 @@ from collections.abc import Callable, Iterator
 LINE_MAX = 1 << 26
 """Longest request [bytes]: an arena of 64 million cells in which no two neighbours are alike is longer."""
 
+HEARD_MAX = 1000
+"""So many requests are taken before the first of them has been answered."""
+
 FRAME_MIN = 96
 """Shortest frame [bytes]."""
 
@@ -179,7 +182,9 @@ class Exchange:
                 return
             self._listen(0)
             self.has_left = self.has_left or self.is_orphaned
-            self.is_called_off = self.is_called_off or self.has_left or any(line.startswith(CANCEL) for line in self._heard)
+            self.is_called_off = (
+                self.is_called_off or self.has_left or any(line.startswith(CANCEL) for line in self._heard)
+            )
             self.is_held = self._is_unconfirmed
             if not self._is_unconfirmed and not self.has_left and _has_room(self._sink):
                 with contextlib.suppress(OSError):

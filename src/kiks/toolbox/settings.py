@@ -7,9 +7,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from kiks.errors import ParameterError, nearest
+from kiks.errors import ParameterError, nearest, shown
 from kiks.model.arena import Arena
 from kiks.model.project import Project, ProjectRobot
+
+TEXT_MAX = 1000
+"""Longest text of a setting: a path has fewer characters."""
+
+PROGRAMS_MAX = 1000
+"""Most robots, and most programs, that a setting may ask for."""
 
 
 @dataclass(frozen=True)
@@ -58,13 +64,15 @@ class Settings:
         """
         if name not in _READERS:
             raise ParameterError(
-                f"a setting must be one of {list(_READERS)}, but it was {name!r}.{nearest(name, _READERS)}"
+                f"a setting must be one of {list(_READERS)}, but it was {shown(name)}.{nearest(name[:100], _READERS)}"
             )
         read, what = _READERS[name]
         try:
             return replace(self, **{name: read(value) if value else getattr(Settings(), name)})
         except (ValueError, OverflowError):
-            raise ParameterError(f"{name} must be {what}, but it was {value!r}. Look into kiks_preferences.") from None
+            raise ParameterError(
+                f"{name} must be {what}, but it was {shown(value)}. Look into kiks_preferences."
+            ) from None
 
     @property
     def folder(self) -> Path:
@@ -90,18 +98,16 @@ class Settings:
         )
 
 
-def _whole(text: str) -> int:
-    number = float(text)
-    if number != int(number):
-        raise ValueError
-    return int(number)
+def _whole(low: int, high: int) -> tuple[Callable[[str], int], str]:
+    """Return how a whole number of a range is read, and what it has to be."""
 
+    def read(text: str) -> int:
+        number = float(text)
+        if not low <= number <= high or number % 1:
+            raise ValueError
+        return int(number)
 
-def _grey(text: str) -> int:
-    number = _whole(text)
-    if not 1 <= number <= 255:
-        raise ValueError
-    return number
+    return read, f"a whole number from {low} to {high}"
 
 
 def _switch(text: str) -> bool:
@@ -117,23 +123,29 @@ def _seconds(text: str) -> float:
     return number
 
 
+def _text(text: str) -> str:
+    if len(text) > TEXT_MAX or not text.isprintable():
+        raise ValueError
+    return text
+
+
 def _words(text: str) -> tuple[str, ...]:
-    return tuple(text.split())
+    return tuple(_text(text).split())
 
 
 _READERS: dict[str, tuple[Callable[[str], Any], str]] = {
-    "seed": (_whole, "a whole number from 0"),
-    "thinking": (str, "a text"),
-    "robot": (str, "a text"),
-    "robots": (_whole, "a whole number from 1"),
-    "response": (str, "a text"),
+    "seed": _whole(0, 1 << 53),
+    "thinking": (_text, f"a text of one line and at most {TEXT_MAX} characters"),
+    "robot": (_text, f"a text of one line and at most {TEXT_MAX} characters"),
+    "robots": _whole(1, PROGRAMS_MAX),
+    "response": (_text, f"a text of one line and at most {TEXT_MAX} characters"),
     "noise": (_switch, "0 or 1"),
     "turrets": (_words, "names with blanks between them"),
-    "wall": (_grey, "a whole number from 1 to 255"),
-    "ball": (_grey, "a whole number from 1 to 255"),
-    "cylinder": (_grey, "a whole number from 1 to 255"),
-    "brightness": (_grey, "a whole number from 1 to 255"),
-    "programs": (_whole, "a whole number from 1"),
+    "wall": _whole(1, 255),
+    "ball": _whole(1, 255),
+    "cylinder": _whole(1, 255),
+    "brightness": _whole(1, 255),
+    "programs": _whole(1, PROGRAMS_MAX),
     "latency_s": (_seconds, "a time from 0 to 10 s"),
 }
 """How the value of each setting is read, and what it has to be."""
