@@ -175,16 +175,16 @@ class Exchange:
 
     def beat(self) -> None:
         """Say that the answer is still awaited if it takes long, and hear whether the program waits."""
-        if not self._is_awaited or time.monotonic_ns() - self._since_ns < PULSE_S * 1e9:
+        if not self._takes_long():
             return
         with self._lock:
-            if not self._is_awaited:
+            if not self._takes_long():
                 return
-            self._listen(0)
+            if len(self._heard) < HEARD_MAX:
+                self._listen(0)
             self.has_left = self.has_left or self.is_orphaned
-            self.is_called_off = (
-                self.is_called_off or self.has_left or any(line.startswith(CANCEL) for line in self._heard)
-            )
+            is_cancelled = any(line.startswith(CANCEL) for line in self._heard)
+            self.is_called_off = self.is_called_off or self.has_left or is_cancelled
             self.is_held = self._is_unconfirmed
             if not self._is_unconfirmed and not self.has_left and _has_room(self._sink):
                 with contextlib.suppress(OSError):
@@ -194,6 +194,9 @@ class Exchange:
             self.called_off()
 
     # ---- inside ----
+
+    def _takes_long(self) -> bool:
+        return self._is_awaited and time.monotonic_ns() - self._since_ns >= PULSE_S * 1e9
 
     def _next(self) -> bytes | None:
         """Return the next line; None when there will be none."""

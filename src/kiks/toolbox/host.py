@@ -144,7 +144,7 @@ def join(door: Door, exchange: Exchange, source: int, sink: int) -> None:
     with door.connect() as connection, contextlib.suppress(OSError):
         connection.sendall(exchange.hand_over())
         while not exchange.is_orphaned:
-            ready, _, _ = select.select([source, connection], [], [], LOOK_MS / 1000)
+            ready, _, _ = select.select([source, connection.fileno()], [], [], LOOK_MS / 1000)
             for each in ready:
                 piece = os.read(source, _READ_SIZE) if each == source else connection.recv(_READ_SIZE)
                 if not piece:

@@ -33,6 +33,9 @@ ANSWER_MAX = 90_000_000
 
 BAUD_MAX = 1e7
 
+REASON_MAX = 400
+"""Longest reason for a refusal; a longer one is cut in the middle."""
+
 PATH_MAX = 4000
 """Longest name of a file."""
 
@@ -75,6 +78,8 @@ def answer(visitor: Visitor, line: str) -> str:
     except Exception as error:
         _log.debug("a request failed", exc_info=True)
         why = f"KiKS itself has failed at {shown(name)}: {shown(error)}. Please tell its makers."
+    if len(why) > REASON_MAX:
+        why = f"{why[: REASON_MAX // 2]} ... {why[-REASON_MAX // 4 :]}"
     return f"-{visitor.clock()}{escape(why)}"
 
 

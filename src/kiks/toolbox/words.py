@@ -95,7 +95,8 @@ def matrices_of(text: str) -> list[NDArray[Any]]:
         >>> [matrix.tolist() for matrix in matrices_of("2 2 2 0 2 1 1 1 1 -7.5")]
         [[[0, 1], [0, 1]], [[-7.5]]]
     """
-    numbers, matrices = _all_numbers(text), []
+    numbers = _all_numbers(text)
+    matrices: list[NDArray[Any]] = []
     while len(numbers):
         matrix, numbers = _take_matrix(numbers)
         if matrix is None or len(matrices) == 2:
