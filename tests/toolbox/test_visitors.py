@@ -15,6 +15,7 @@ import pytest
 from tests.served import GUARD_S
 
 from kiks.model.arena import Arena
+from kiks.ports.near import Patient
 from kiks.sim.simulation import Simulation
 from kiks.toolbox.requests import REQUESTS, answer
 from kiks.toolbox.session import Session
@@ -255,6 +256,56 @@ def test_another_world_ends_ports_with_a_word(session: Session) -> None:
     assert "another world has taken its place" in ask.refused("ask 1 N")
     ask("open 1 9600")
     assert ask("ask 1 N").startswith("n,")
+
+
+@pytest.mark.parametrize("request_", ["ask 1 N", "pause 5", "time 1", "pose 1", "close 1", "listen 1"])
+def test_what_a_paused_world_keeps_waiting_can_be_called_off(session: Session, request_: str) -> None:
+    awaited = Patient()
+    ask = begun(session)
+    ask.visitor.leave()
+    ask.visitor = Visitor(session, 1, awaited)
+    told: list[str] = []
+    is_paused = threading.Event()
+
+    def drive() -> None:
+        ask("open 1 9600")
+        assert session.desk is not None
+        session.desk.gate.pause(session.world.now_ns)
+        is_paused.set()
+        told.append(ask.told(request_))
+        awaited.is_called_off = False
+        session.desk.gate.go_on()
+        told.append(ask.told("ask 1 N"))
+
+    thread = threading.Thread(target=drive)
+    thread.start()
+    assert is_paused.wait(GUARD_S)
+    for _ in range(1000):
+        if told:
+            break
+        awaited.is_called_off = True
+        ask.visitor.call_off()
+        thread.join(GUARD_S / 1000)
+    thread.join(GUARD_S)
+    assert not thread.is_alive()
+    assert told[0][0] == "+" or "the program was interrupted" in told[0]
+    assert told[1][HEAD:].startswith("n,") or request_ == "close 1", told
+
+
+def test_waiting_for_others_to_begin_can_be_called_off(session: Session) -> None:
+    awaited = Patient()
+    ask = begun(session, "programs 2")
+    ask.visitor.leave()
+    ask.visitor = Visitor(session, 1, awaited)
+    told: list[str] = []
+    thread = threading.Thread(target=lambda: told.append(ask.told("open 1 9600")))
+    thread.start()
+    for _ in range(1000):
+        if told:
+            break
+        awaited.is_called_off = True
+        thread.join(GUARD_S / 1000)
+    assert "the program was interrupted" in told[0]
 
 
 def test_two_programs_drive_two_robots_in_one_world(session: Session) -> None:
