@@ -13,11 +13,6 @@ function kiks_quit(silent)
 
 open_ports('remove', 0);
 if simulator('--is-running', [])
-    try
-        simulator('close 0');
-    catch
-        % The process may be gone already: then all that is left is to forget it.
-    end
     simulator('--end', []);
     if nargin < 1 || isempty(silent) || ~any(silent)
         disp('The KiKS session has ended.');

@@ -10,15 +10,16 @@ function payload = simulator(request, argument)
 %   simulator('--clock', port)     time of a port [s] as the last answer told it; [] if that was another port's, or
 %                                  thinking is measured and it was more than a few milliseconds ago
 %
-%   Each request has a ticket, which its answer repeats: what Ctrl-C has kept us from reading answers nothing else.
+%   An answer that takes long is preceded by frames that say so, four a second: between two of them Ctrl-C is heard. What
+%   it has kept us from reading is skipped before the next request.
 
-persistent link is_pipe to from tickets ticket line_feed answer answered
+persistent link is_pipe to from line_feed answer answered is_behind ending
 if nargin > 1
     payload = [];
     switch request
         case '--clock'
-            if ~isempty(answer)
-                told = sscanf(answer(3:21), '%f');
+            if ~isempty(answer) && ~is_behind
+                told = sscanf(answer(2:20), '%f');
                 % A negative number says that thinking is measured: then the time soon grows old.
                 if told(1) == argument || (told(1) == -argument && toc(answered) < 0.005)
                     payload = told(2);
@@ -30,14 +31,19 @@ if nargin > 1
             if ~isempty(link)
                 error('kiks:session', 'A session must be left before another is joined. Call kiks_quit first.');
             end
-            link = simulator_link('open', {'--join', sprintf('%d', argument)});
+            mlock
             is_pipe = [];
+            link = simulator_link('open', {'--join', sprintf('%d', argument)});
+            simulator('version');  % a process that is asked for nothing takes itself for forgotten
         case '--end'
-            ending = link;
-            link = [];
+            if ~isempty(link)
+                ending = link;
+                link = [];
+            end
             answer = '';
             if ~isempty(ending)
                 simulator_link('close', ending);
+                ending = [];
             end
     end
     return
@@ -46,23 +52,26 @@ if isempty(link)
     if any(strcmp(strtok(request), {'ask', 'send', 'listen', 'pass', 'pause'}))
         error('kiks:session', 'A port must be open for that, but none is. Open it with ref = kiks_kopen([-1 9600 1]).');
     end
-    link = simulator_link('open', {});
+    mlock  % `clear all` in a user's program would lose the process
+    if ~isempty(ending)
+        simulator_link('close', ending);  % Ctrl-C came between
+        ending = [];
+    end
     is_pipe = [];
+    link = simulator_link('open', {});
 end
 if isempty(is_pipe)
-    mlock  % `clear all` in a user's program would lose the process
-    is_pipe = link.is_pipe;
     to = link.to;
     from = link.from;
-    tickets = char(33:126);
-    ticket = 0;
     line_feed = char(10);
+    is_behind = false;
+    is_pipe = link.is_pipe;
 end
-ticket = ticket + 1;
-if ticket > 94
-    ticket = 1;
+if is_behind
+    link = simulator_link('catch up', link);
 end
-line = [tickets(ticket) request line_feed];
+line = [request line_feed];
+is_behind = true;
 while true
     if is_pipe
         % In line here, as this is what a program does thousands of times a second.
@@ -83,20 +92,20 @@ while true
             break
         end
     end
-    if answer(1) == tickets(ticket)
+    if answer(1) == '+'
+        is_behind = false;
         answered = tic();
-        payload = answer(22:end);
-        if answer(2) == '-'
-            error('kiks:simulator', '%s', unescaped(payload));
-        end
+        payload = answer(21:end);
         return
+    elseif answer(1) == '-'
+        is_behind = false;
+        answered = tic();
+        error('kiks:simulator', '%s', unescaped(answer(21:end)));
     end
-    line = '';
+    % Still at it: we still wait.
+    line = line_feed;
 end
-answer = '';
-ending = link;
-link = [];
-simulator_link('close', ending);
+simulator('--end', []);
 error('kiks:session', ['The simulator must answer, but its process has ended. The world is lost: ' ...
     'start another one with kiks(ARENA).']);
 end

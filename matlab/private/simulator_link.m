@@ -4,6 +4,8 @@ function [result, link] = simulator_link(what, varargin)
 %   link = simulator_link('open', options)              starts the process, or joins one
 %   [answer, link] = simulator_link('ask', link, line)  for a connection: sends a line, returns the next answer; ''
 %                                                       if the process is gone
+%   link = simulator_link('catch up', link)             calls off what Ctrl-C has kept us from waiting for, and skips
+%                                                       what is left of it
 %   simulator_link('close', link)                       hangs up; the process ends with the last who does
 %
 %   MATLAB has no pipes to a process that it has started, so there the process listens. Setting the environment
@@ -19,29 +21,48 @@ switch what
         end
     case 'ask'
         [result, link] = ask(varargin{:});
+    case 'catch up'
+        result = caught_up(varargin{1});
     case 'close'
         hang_up(varargin{1});
 end
 end
 
 function link = open_pipes(options)
+persistent unfinished
+if ~isempty(unfinished)
+    % Ctrl-C has ended the start of another one.
+    forgotten = unfinished;
+    unfinished = [];
+    hang_up(forgotten);
+end
 command = kiks_command();
 % Octave's `true`, which its help leaves out, makes reading wait until something comes.
 [to, from, process] = popen2(command{1}, [command(2:end) {'session'} options], true);
-link = struct('is_pipe', true, 'to', to, 'from', from, 'process', process);
-% Its first words say that it is there, or why not.
-first = fread(from, [1 96], '*char');
-if numel(first) == 96
-    rest = str2double(first(1:8)) - 88;
-    if rest > 0
-        first = [first, fread(from, [1 rest], '*char')];
+link = struct('is_pipe', true, 'to', to, 'from', from, 'process', process, 'is_joined', ~isempty(options));
+unfinished = link;
+% Its first words say that it is there, or why not; before them come frames that say that it is still to come.
+first = '~';
+while strcmp(first, '~')
+    first = fread(from, [1 96], '*char');
+    if numel(first) == 96
+        length_ = str2double(first(1:8));
+        if length_ > 88
+            first = [first, fread(from, [1 length_ - 88], '*char')];
+        end
+        first = first(9:length_ + 8);
     end
-    first = first(9:end);
+    if strcmp(first, '~')
+        fputs(to, char(10));
+        fflush(to);
+    end
 end
 if isempty(door_of(first))
     hang_up(link);
+    unfinished = [];
     refuse(first, command);
 end
+unfinished = [];
 end
 
 function link = open_connection(options)
@@ -56,15 +77,21 @@ if isempty(number)
     refuse(first, command);
 end
 name = sprintf('127.0.0.1:%d', number);
-link = struct('is_pipe', false, 'to', [], 'from', [], 'name', name, 'port', robot_port('open', name, 9600), 'rest', '');
+link = struct('is_pipe', false, 'to', [], 'from', [], 'port', robot_port('open', name, 9600), 'rest', '');
 robot_port('write', link.port, [token 10]);
 % Every connection begins with who is there.
 [~, link] = ask(link, '');
 end
 
 function first = started(command)
-% The process writes its first line into a file of ours as soon as it listens.
-file = tempname();
+% The process writes its first line into a file of ours as soon as it listens: in a new folder, so that no other user can
+% lay down another one.
+folder = tempname();
+[is_made, why] = mkdir(folder);
+if ~is_made || ~isempty(why)
+    error('kiks:session', 'A folder %s must be made for the session''s file, but it was not: %s.', folder, why);
+end
+file = fullfile(folder, 'session');
 line = words_line([command {'session', '--listen', file}]);
 if ispc()
     system(['start /B "" ' line]);
@@ -80,6 +107,7 @@ while isempty(first) && toc(begin) < 60
         delete(file);
     end
 end
+rmdir(folder);
 end
 
 function [number, token] = door_of(first)
@@ -110,9 +138,9 @@ end
 
 function [answer, link] = ask(link, line)
 answer = '';
+silence = tic();
 try
     robot_port('write', link.port, line);
-    begin = tic();
     while true
         [answer, link.rest] = first_frame(link.rest);
         if ~isempty(answer)
@@ -120,15 +148,60 @@ try
         end
         news = robot_port('read', link.port, 0.5);
         link.rest = [link.rest news];
-        % A world that is paused is silent, and so is one that has gone: only the latter lets nobody in.
-        if isempty(news) && toc(begin) > 1
-            robot_port('close', robot_port('open', link.name, 9600));
-            begin = tic();
+        if ~isempty(news)
+            silence = tic();
+        elseif toc(silence) > 60
+            % Even where an answer takes long, something comes four times a second.
+            return
         end
     end
 catch failure
     link.rest = '';
     answer = '';
+    if ~strcmp(failure.identifier, 'kiks:link')
+        rethrow(failure);
+    end
+end
+end
+
+function link = caught_up(link)
+% The answer to char(24) and a character begins with many char(1) and ends with char(2), the only one that there is, and
+% that character: another each time, as Ctrl-C may have come between here, too.
+persistent number
+number = mod(sum(number), 94) + 1;
+sign = char(32 + number);
+ending = char([2 sign]);
+line = char([24 sign 10]);
+if link.is_pipe
+    fputs(link.to, line);
+    fflush(link.to);
+    count = 96;
+    last = '';
+    news = 'x';
+    while ~isempty(news) && ~strcmp(last, ending)
+        news = fread(link.from, [1 count], '*char');
+        if any(news == 1)
+            count = 1;
+        end
+        last = [last news];
+        last = last(max(1, end - 1):end);
+    end
+    return
+end
+try
+    robot_port('write', link.port, line);
+    link.rest = '';
+    silence = tic();
+    while isempty(strfind(link.rest, ending)) && toc(silence) < 60 %#ok<STREMP>
+        news = robot_port('read', link.port, 0.5);
+        if ~isempty(news)
+            silence = tic();
+        end
+        link.rest = [link.rest(max(1, end):end) news];
+    end
+    link.rest = link.rest(strfind(link.rest, ending) + 2:end);
+catch failure
+    % That it is gone is found by the request that follows.
     if ~strcmp(failure.identifier, 'kiks:link')
         rethrow(failure);
     end
@@ -149,13 +222,31 @@ end
 
 function hang_up(link)
 if ~link.is_pipe
+    try
+        robot_port('write', link.port, char([4 10]));
+    catch
+        % It is gone already.
+    end
     robot_port('close', link.port);
     return
 end
-fclose(link.to);
+% Good-bye in words, as other processes that Octave has started may keep the pipe open.
+try
+    fputs(link.to, char([4 10]));
+    fclose(link.to);
+catch
+    % Ctrl-C came between here.
+end
 % When it has nobody left it ends, and closes its end: so nothing of it is there when we go on.
-while ~isempty(fread(link.from, 64))
+last = '';
+news = 'x';
+while ~isempty(news)
+    news = fread(link.from, [1 64], '*char');
+    last = [last(max(1, end - 95):end) news];
 end
 fclose(link.from);
-waitpid(link.process);
+% Its last frame says so if it goes on for others.
+if link.is_joined || numel(last) < 96 || last(end - 87) ~= '>'
+    waitpid(link.process);
+end
 end

@@ -156,6 +156,25 @@ def test_default_folder_belongs_to_the_user(tmp_path: Path, monkeypatch: pytest.
         default_folder()
 
 
+def test_a_folder_that_others_can_write_is_not_trusted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    runtime = tmp_path / "runtime"
+    runtime.mkdir()
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(runtime))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    (runtime / "kiks").mkdir()
+    (runtime / "kiks").chmod(0o777)
+    with pytest.raises(LinkError, match="others can write there"):
+        default_folder()
+    (runtime / "kiks").chmod(0o755)
+    assert default_folder().stat().st_mode & 0o777 == 0o700
+    runtime.chmod(0o777)
+    assert default_folder() == tmp_path / f"kiks-{os.getuid()}", "what is in that folder anybody could replace"
+    runtime.chmod(0o700)
+    (tmp_path / "link").symlink_to(runtime)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "link"))
+    assert default_folder() == tmp_path / f"kiks-{os.getuid()}"
+
+
 def test_link_of_a_dead_server_is_replaced(link: str) -> None:
     os.symlink("/dev/pts/123456", link)
     endpoint = PtyEndpoint(link)

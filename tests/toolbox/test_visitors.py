@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+import tracemalloc
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import resources
@@ -14,14 +15,15 @@ import pytest
 from tests.served import GUARD_S
 
 from kiks.model.arena import Arena
+from kiks.ports.near import Patient
 from kiks.sim.simulation import Simulation
 from kiks.toolbox.requests import REQUESTS, answer
 from kiks.toolbox.session import Session
 from kiks.toolbox.visitor import Visitor
-from kiks.toolbox.words import matrix_text, take_matrix
+from kiks.toolbox.words import matrices_of, matrix_text
 
-HEAD = 21
-"""Ticket, sign, port and time come before what was asked for."""
+HEAD = 20
+"""Sign, port and time come before what was asked for."""
 
 
 class Asker:
@@ -32,17 +34,15 @@ class Asker:
 
     def __call__(self, request: str) -> str:
         told = self.told(request)
-        assert told[1] == "+", told
+        assert told[0] == "+", told
         return told[HEAD:]
 
     def told(self, request: str) -> str:
-        told = answer(self.visitor, f"t{request}")
-        assert told[0] == "t"
-        return told
+        return answer(self.visitor, request)
 
     def refused(self, request: str) -> str:
         told = self.told(request)
-        assert told[1] == "-", told
+        assert told[0] == "-", told
         return told[HEAD:]
 
     def numbers(self, request: str) -> list[float]:
@@ -193,7 +193,7 @@ def test_distances_and_paths_begin_when_the_port_is_opened(session: Session) -> 
         ask("ask 1 D,0,0")
         ask("pause 0.2")
         assert ask.numbers("distances 1")[0] == pytest.approx(40, abs=5)
-        path = take_matrix(ask("path 1").split())[0]
+        path = matrices_of(ask("path 1"))[0]
         assert path.shape[0] == 2
         assert 20 < path.shape[1] < 60
         assert np.ptp(path[0]) < 1
@@ -258,6 +258,56 @@ def test_another_world_ends_ports_with_a_word(session: Session) -> None:
     assert ask("ask 1 N").startswith("n,")
 
 
+@pytest.mark.parametrize("request_", ["ask 1 N", "pause 5", "time 1", "pose 1", "close 1", "listen 1"])
+def test_what_a_paused_world_keeps_waiting_can_be_called_off(session: Session, request_: str) -> None:
+    awaited = Patient()
+    ask = begun(session)
+    ask.visitor.leave()
+    ask.visitor = Visitor(session, 1, awaited)
+    told: list[str] = []
+    is_paused = threading.Event()
+
+    def drive() -> None:
+        ask("open 1 9600")
+        assert session.desk is not None
+        session.desk.gate.pause(session.world.now_ns)
+        is_paused.set()
+        told.append(ask.told(request_))
+        awaited.is_called_off = False
+        session.desk.gate.go_on()
+        told.append(ask.told("ask 1 N"))
+
+    thread = threading.Thread(target=drive)
+    thread.start()
+    assert is_paused.wait(GUARD_S)
+    for _ in range(1000):
+        if told:
+            break
+        awaited.is_called_off = True
+        ask.visitor.call_off()
+        thread.join(GUARD_S / 1000)
+    thread.join(GUARD_S)
+    assert not thread.is_alive()
+    assert told[0][0] == "+" or "the program was interrupted" in told[0]
+    assert told[1][HEAD:].startswith("n,") or request_ == "close 1", told
+
+
+def test_waiting_for_others_to_begin_can_be_called_off(session: Session) -> None:
+    awaited = Patient()
+    ask = begun(session, "programs 2")
+    ask.visitor.leave()
+    ask.visitor = Visitor(session, 1, awaited)
+    told: list[str] = []
+    thread = threading.Thread(target=lambda: told.append(ask.told("open 1 9600")))
+    thread.start()
+    for _ in range(1000):
+        if told:
+            break
+        awaited.is_called_off = True
+        thread.join(GUARD_S / 1000)
+    assert "the program was interrupted" in told[0]
+
+
 def test_two_programs_drive_two_robots_in_one_world(session: Session) -> None:
     """Each in a thread of its own, as two Octaves are; what happens does not depend on who is faster."""
     codes = np.zeros((500, 500))
@@ -305,18 +355,18 @@ def test_objects_are_listed_lights_first_and_can_be_moved(session: Session) -> N
     ask = begun(session, world=f"matrix {matrix_text(np.zeros((500, 600)))}")
     for spawned in ("2 100 400", "1 50 60", "3 200 400"):
         ask(f"spawn {spawned}")
-    objects = take_matrix(ask("objects").split())[0]
+    objects = matrices_of(ask("objects"))[0]
     assert objects[:, 0].tolist() == [1, 2, 3]
     assert objects[:, 1:3].tolist() == [[50, 60], [100, 400], [200, 400]]
     assert ask("set_object 2 101 400 100 1.5") == "1", "a short move, too: what it stands on itself is free"
     assert ask("set_object 2 NaN NaN 100 1.5") == "1"
-    row = take_matrix(ask("objects").split())[0][1]
+    row = matrices_of(ask("objects"))[0][1]
     assert row.tolist() == [2, 101, 400, pytest.approx(100), pytest.approx(1.5)]
     assert ask("set_object 2 200 400 50 0") == "0", "there is the cylinder"
-    row = take_matrix(ask("objects").split())[0][1]
+    row = matrices_of(ask("objects"))[0][1]
     assert row.tolist() == [2, 101, 400, pytest.approx(50), pytest.approx(0)], "but it rolls"
     assert ask("set_object 1 70 80 0 0") == "1"
-    assert take_matrix(ask("objects").split())[0][0, 1:3].tolist() == [70, 80]
+    assert matrices_of(ask("objects"))[0][0, 1:3].tolist() == [70, 80]
     assert "row must be one of the 3" in ask.refused("set_object 4 1 1 1 1")
 
 
@@ -325,7 +375,7 @@ def test_what_is_spawned_without_a_place_finds_one(session: Session) -> None:
     for _ in range(5):
         ask("spawn 3 NaN NaN")
     ask("spawn 1 NaN NaN")
-    objects = take_matrix(ask("objects").split())[0]
+    objects = matrices_of(ask("objects"))[0]
     assert objects[:, 0].tolist() == [1, 3, 3, 3, 3, 3]
     assert len({tuple(place) for place in objects[:, 1:3].tolist()}) == 6
     assert "must lie in the arena" in ask.refused("spawn 2 700 10")
@@ -363,10 +413,10 @@ def test_worlds_are_saved_and_read(session: Session, tmp_path: Path) -> None:
     for name in ("a.kad", "b.kiks", "c.toml"):
         ask(f"save {tmp_path / name}")
         assert np.array_equal(Arena.load(tmp_path / name).brightness[::-1] > 0, codes == 1)
-        greys = take_matrix(ask(f"read {tmp_path / name}").split())[0]
+        greys = matrices_of(ask(f"read {tmp_path / name}"))[0]
         assert np.array_equal(greys > 0, codes == 1)
         ask(f"world file {tmp_path / name}")
-        assert take_matrix(ask("objects").split())[0][:, 1:3].tolist() == [[300, 150]]
+        assert matrices_of(ask("objects"))[0][:, 1:3].tolist() == [[300, 150]]
     assert "must end in .kad" in ask.refused(f"save {tmp_path / 'd.txt'}")
     assert "no such file" in ask.refused(f"read {tmp_path / 'none.kad'}").lower()
 
@@ -428,18 +478,76 @@ def test_bad_requests_are_refused_with_a_word(session: Session, request_: str) -
 @pytest.mark.parametrize("request_", ["pose 1", "path 1", "objects", "state", "save x.kad", "checkpoint", "reset"])
 def test_without_a_world_one_is_asked_for(session: Session, request_: str) -> None:
     told = Asker(session).told(request_)
-    assert (told[1] == "+" and told[HEAD:] == "") or "there must be a world first" in told
+    assert (told[0] == "+" and told[HEAD:] == "") or "there must be a world first" in told
 
 
-def test_whatever_words_come_an_answer_goes_out(session: Session) -> None:
-    """No request may end the process or fail inside: not even one that nobody would write."""
-    ask = begun(session)
+HOSTILE = (
+    *("", "x", "-1", "1 2 3 4 5 6 7", "nan", "1e300", "-5 nan inf", "99999999999999999999", "\\", "\0", "1\0"),
+    *("\ufffd", "1 " + "9" * 400, "9" * 5000, "1 1e400", "1 100 100 1e20", "1 -1e308 1e308 -1e308", "1 1e9 1e9 1e6"),
+    *("1 1 1 1e9 1e9", "1 nan nan 1e308 1e308", "1 nan nan -1e9 nan", "2 1e308 1e308", "2 1e9 -1e9", "1e-320", "1_0"),
+    *("0x10", "\u0661", "1 " * 20_000, "a" * 99_000, "x" * 200_000, "a.kad/" * 500, "[" * 50_000),
+    *("1 " + "D,9" * 3000, "1 " + "\r" * 3000, "robots 1e9", "robots nan", "seed 1e300", "seed -1", "noise 2"),
+    *("turrets " + "k213 " * 9000, "thinking live:1e308", "latency_s 1e9", "wall 1e400", "robot \0", "programs 1001"),
+    "response " + "9" * 5000,
+)
+
+
+@pytest.mark.parametrize(
+    "name", sorted({*REQUESTS, "nothing", "", "x" * 70_000, "\ufffd", "\0"}), ids=lambda name: name[:20]
+)
+def test_whatever_words_come_an_answer_goes_out(
+    session: Session, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No request may end the process or fail inside, and what is refused is refused in a line."""
+    monkeypatch.chdir(tmp_path)
+    ask = begun(session, world=f"matrix {matrix_text(np.zeros((200, 200), np.int16))}")
+    ask("spawn 1 50 50")
+    ask("spawn 2 150 150")
     ask("open 1 9600")
-    for name in sorted(set(REQUESTS) - {"world", "save", "pause"}):
-        for words in ("", "x", "-1", "1 2 3 4 5 6 7", "nan", "1e300", "-5 nan inf", "99999999999999999999", "\\"):
-            told = ask.told(f"{name} {words}")
-            assert told[1] in "+-"
-            assert "KiKS itself has failed" not in told, (name, words, told)
+    for words in HOSTILE:
+        told = ask.told(f"{name} {words}")
+        assert told[0] in "+-"
+        assert "KiKS itself has failed" not in told, (words[:80], told)
+        if told[0] == "-":
+            assert len(told) < 500, words[:80]
+            assert told.isprintable(), words[:80]
+            # What is wrong with a file says the reader of files.
+            assert len(words) <= 80 or words[:81] not in told or name in ("read", "save")
+    assert ask("active") == "1"
+    for setting in ("seed", "robot", "robots", "response", "turrets", "thinking", "programs", "latency_s"):
+        ask(f"set {setting} ")
+    ask("world default")
+    ask("open 1 9600")
+    assert ask("ask 1 N").startswith("n,")
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        ("2000 2000 4000000 3", "at most 10000 robots"),
+        ("64000000 64000000 1 1", "a matrix must be"),
+        ("8000 8000 64000000 1e300", "a matrix must be"),
+        ("200 200 40000 nan", "a matrix must be"),
+        ("200 200 40000 -inf", "a matrix must be"),
+        ("200 200 39999.5 0 0.5 0", "a matrix must be"),
+        ("1e9 1", "a matrix must be"),
+        ("200 200 40000 0 200 200 40000 0 200 200 40000 0", "a matrix must be"),
+        ("200 200 40000 1.5", "an arena's elements must be"),
+        ("200 200 40000 1 200 200 40000 256", "greys of walls must be"),
+        (" ".join("9" * 3000), "a matrix must be"),
+    ],
+)
+def test_no_memory_is_taken_on_the_word_of_a_matrix(session: Session, words: str, why: str) -> None:
+    ask = begun(session)
+    tracemalloc.start()
+    try:
+        told = ask.refused(f"world matrix {words}")
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert why in told
+    assert len(told) < 500
+    assert peak < 100e6
 
 
 def test_a_robot_may_be_a_file(session: Session, tmp_path: Path) -> None:

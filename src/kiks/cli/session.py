@@ -14,6 +14,7 @@ from kiks.cli.engine_start import ready_engine
 from kiks.cli.log import show_log
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import KiksError
+from kiks.toolbox.exchange import Exchange, Pulse
 
 
 def session(
@@ -38,40 +39,49 @@ def session(
     # What is written there is an answer: whatever else prints shall not come in between.
     sink = os.dup(1)
     os.dup2(2, 1)
-    # Ctrl-C in Octave is meant for the program there.
+    # Ctrl-C in Octave is meant for the program there. Octave keeps its children from all signals.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_SETMASK, ())
     show_log(is_quiet=True)
+    exchange = Exchange(0, sink, close=lambda: _close(0, sink), parent=os.getppid())
     try:
         if where is not None:
-            from kiks.toolbox.host import find_door
+            from kiks.toolbox.doors import find_door
 
             os.write(sink, find_door(where).line().encode())
-        elif join is not None:
-            from kiks.toolbox.host import find_door
-            from kiks.toolbox.host import join as take_part
-
-            take_part(find_door(join), 0, sink)
+        elif listen is not None:
+            _serve(Pulse(), window, listen=listen)
         else:
-            _serve(listen, window, sink)
-    except KiksError as error:
-        from kiks.toolbox.words import frame
+            pulse = Pulse()
+            pulse.acts.append(exchange.beat)
+            if join is None:
+                _serve(pulse, window, exchange=exchange)
+            else:
+                from kiks.toolbox.doors import find_door
+                from kiks.toolbox.host import join as take_part
 
+                take_part(find_door(join), exchange, 0, sink)
+    except KiksError as error:
         text = f"kiks: {error}\n"
-        os.write(sink, text.encode() if where is not None else frame(text))
+        if where is not None:
+            os.write(sink, text.encode())
+        else:
+            exchange.reply(text)
         raise typer.Exit(2) from None
 
 
-def _serve(listen: Path | None, window: bool | None, sink: int) -> None:
+def _serve(pulse: Pulse, window: bool | None, *, exchange: Exchange | None = None, listen: Path | None = None) -> None:
     from kiks.desk.screen import has_screen
-    from kiks.toolbox.host import Host, write_door
+    from kiks.toolbox.doors import write_door
+    from kiks.toolbox.host import Host
     from kiks.toolbox.session import Session
 
     end_as_with_ctrl_c()
-    host = Host(Session(ready=ready_engine, has_window=has_screen() if window is None else window))
+    host = Host(Session(ready=ready_engine, has_window=has_screen() if window is None else window), pulse)
     try:
-        if listen is None:
-            host.speak_on(0, sink)
-        else:
+        if exchange is not None:
+            host.speak_with(exchange)
+        if listen is not None:
             write_door(host.door, listen)
         host.run()
     except KeyboardInterrupt:
@@ -81,3 +91,11 @@ def _serve(listen: Path | None, window: bool | None, sink: int) -> None:
     # Threads that still read are of no use any more.
     sys.stdout.flush()
     os._exit(0)
+
+
+def _close(*descriptors: int) -> None:
+    """Let nothing go to descriptors any more. They stay open, lest another file takes their numbers."""
+    nothing = os.open(os.devnull, os.O_RDWR)
+    for descriptor in descriptors:
+        os.dup2(nothing, descriptor)
+    os.close(nothing)

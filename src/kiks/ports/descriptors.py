@@ -22,8 +22,8 @@ from kiks.errors import LinkError
 WANTED = 1 << 14
 """Descriptors that a process asks for at its start, if it may: a thousand robots with three ports and a client each."""
 
-SHORTAGES = (errno.EMFILE, errno.ENFILE)
-"""The errors that mean that there are no more: of this process, of the computer."""
+SHORTAGES = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
+"""The errors that mean that there are no more: of this process, of the computer, no memory for one."""
 
 _log = logging.getLogger("kiks.ports")
 

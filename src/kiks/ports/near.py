@@ -6,28 +6,63 @@ alone has nobody to wait for: then the line is that of the port in memory, and a
 
 from __future__ import annotations
 
+import contextlib
+import threading
+from dataclasses import dataclass
+from typing import Protocol
+
 from kiks.errors import LinkError
 from kiks.ports.far import Connection, FarLine
 from kiks.ports.memory import NearLine
 from kiks.ports.messages import Answer, Kind, Request
 from kiks.ports.programs import Programs
 from kiks.sim.simulation import Simulation
+from kiks.units import NS_PER_S
+
+LOOK_S = 0.05
+"""How often a program that waits for others looks whether it still has to [s of real time]."""
+
+SLICE_NS = NS_PER_S
+"""Simulated time that passes in one go while a program pauses [ns]."""
+
+
+class Awaited(Protocol):
+    """What a program lets be known of the answer that it waits for.
+
+    Attributes:
+        is_called_off: Whether it does not wait any more.
+        is_held: Whether it does not say so at present: then no time is to pass for it.
+    """
+
+    is_called_off: bool
+    is_held: bool
+
+
+@dataclass
+class Patient:
+    """A program that waits for whatever it has asked for."""
+
+    is_called_off: bool = False
+    is_held: bool = False
 
 
 class NearConnection(Connection):
-    """A program's way to a world of this process; `close` ends it.
+    """A program's way to a world of this process; `close` ends it. It belongs to the thread that makes it.
 
     Args:
         programs: Those who share the world.
         name: Who it is, for a person.
         rank: Its place among those who act at the same instant.
+        awaited: Whether it still waits for its answer.
 
     Raises:
         KiksError: If the world has ended.
     """
 
-    def __init__(self, programs: Programs, name: str, rank: int) -> None:
+    def __init__(self, programs: Programs, name: str, rank: int, awaited: Awaited) -> None:
         super().__init__(is_late=True)
+        self._awaited = awaited
+        self._thread = threading.get_ident()
         self._programs = programs
         self._world = programs.sim.lock
         self._guest = programs.admit(name, rank)
@@ -48,10 +83,40 @@ class NearConnection(Connection):
             while (answer := guest.answer) is None or answer.ticket != ticket:
                 if guest.is_closed:
                     raise LinkError("the world must be there to answer, but it has ended. Open the port again.")
+                self._check_awaited()
                 wait_s = programs.move()
                 if guest.answer is None or guest.answer.ticket != ticket:
-                    programs.wait(wait_s)
+                    programs.wait(LOOK_S if wait_s is None else min(wait_s, LOOK_S))
         return answer
+
+    def attend(self) -> None:
+        """Let others look at the world, and wait while the program does not say that it waits; the lock is held.
+
+        Raises:
+            LinkError: If it does not wait any more.
+        """
+        self._programs.wait(0)
+        self._check_awaited()
+        while self._awaited.is_held:
+            self._programs.wait(LOOK_S)
+            self._check_awaited()
+
+    def call_off(self) -> None:
+        """Let what the program waits for end at once, even if the world stands still; any thread may say so."""
+        gate = self._programs.sim.gate
+        if gate is not None:
+            gate.keep(self._look_at_gate)
+
+    def _look_at_gate(self) -> None:
+        gate = self._programs.sim.gate
+        if threading.get_ident() == self._thread or not self._awaited.is_called_off:
+            assert gate is not None
+            gate.leave(self._look_at_gate)
+            self._check_awaited()
+
+    def _check_awaited(self) -> None:
+        if self._awaited.is_called_off:
+            raise LinkError("the answer must be waited for, but the program was interrupted. Ask again.")
 
     @property
     def is_alone(self) -> bool:
@@ -90,7 +155,9 @@ class NearConnection(Connection):
         """Leave; what was said is still done."""
         with self._world:
             self._guest.leave()
-            self._programs.move()
+            # Who has gone waits for nothing: others move the world on.
+            with contextlib.suppress(LinkError):
+                self._programs.move()
 
 
 class VisitorLine(FarLine):
@@ -120,6 +187,17 @@ class VisitorLine(FarLine):
 
     def pass_to(self, time_ns: int) -> None:
         """Let time pass up to a time [ns]."""
+        now_ns = self.now_ns
+        while now_ns + SLICE_NS < time_ns:
+            now_ns += SLICE_NS
+            self._pass_to(now_ns)
+            if self._way.is_alone:
+                # What has passed is done here, not in one go when it is looked at.
+                self._sim.sync()
+            self._way.attend()
+        self._pass_to(time_ns)
+
+    def _pass_to(self, time_ns: int) -> None:
         if self._way.is_alone:
             self._near.pass_to(time_ns)
             self._way.come_to(self._sim.now_ns)

@@ -158,25 +158,40 @@ class PtyChannel(Channel):
 
 
 def default_folder() -> Path:
-    """Return the folder of the links, made for this user alone: `$XDG_RUNTIME_DIR/kiks`, else `/tmp/kiks-<uid>`.
+    """Return the folder of links and sessions, this user's alone: `$XDG_RUNTIME_DIR/kiks`, else `/tmp/kiks-<uid>`.
 
     Raises:
         LinkError: If something else has that name.
     """
-    runtime = os.environ.get("XDG_RUNTIME_DIR", "")
-    folder = Path(runtime, "kiks") if os.path.isdir(runtime) else Path(tempfile.gettempdir(), f"kiks-{os.getuid()}")
+    runtime = Path(os.environ.get("XDG_RUNTIME_DIR", ""))
+    folder = runtime / "kiks" if _is_own(runtime) else Path(tempfile.gettempdir(), f"kiks-{os.getuid()}")
     try:
         folder.mkdir(mode=0o700, exist_ok=True)
-        found = folder.lstat()
     except OSError as error:
         raise LinkError(
             f"{str(folder)!r} must be a folder of yours, but it is not ({error.strerror}). Give a link of your own."
         ) from None
-    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid():
+    if not _is_own(folder):
         raise LinkError(
-            f"{str(folder)!r} must be a folder of yours, but it is another user's. Give a link of your own."
+            f"{str(folder)!r} must be a folder of yours, but it is another user's, or others can write there. Give a "
+            "link of your own."
         )
+    folder.chmod(0o700)
     return folder
+
+
+def _is_own(folder: Path) -> bool:
+    """Say whether a folder, and no link to one, is this user's, and nobody else can change what is in it."""
+    try:
+        found = folder.lstat()
+    except OSError:
+        return False
+    return (
+        folder.is_absolute()
+        and stat.S_ISDIR(found.st_mode)
+        and found.st_uid == os.getuid()
+        and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    )
 
 
 def _claim(path: str) -> socket.socket:

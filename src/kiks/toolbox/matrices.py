@@ -20,6 +20,9 @@ from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
 WALL, LIGHT, BALL, CYLINDER = 1, 2, 3, 4
 """What positive elements stand for; negative ones are starts of robots, with the heading in degrees."""
 
+OBJECTS_MAX = 10_000
+"""Most elements of an arena that are not walls or floor."""
+
 
 def place_mm(arena: Arena, x: float, y: float) -> tuple[float, float]:
     """Return where a user's place is [mm], from the lower left corner."""
@@ -32,8 +35,8 @@ def user_place(arena: Arena, x_mm: float, y_mm: float) -> tuple[float, float]:
 
 
 def arena_of(
-    codes: NDArray[np.float64],
-    greys: NDArray[np.float64] | None = None,
+    codes: NDArray[Any],
+    greys: NDArray[Any] | None = None,
     *,
     wall: int = 255,
     ball: int | None = None,
@@ -58,24 +61,32 @@ def arena_of(
         >>> arena.starts[0][:2], round(math.degrees(arena.starts[0].heading_rad))
         ((99.5, 150.5), 270)
     """
-    known = (codes < 0) | np.isin(codes, (0, WALL, LIGHT, BALL, CYLINDER))
+    known = (codes <= CYLINDER) & ((codes < 0) | (np.floor(codes) == codes))
     if not known.all():
         row, column = np.argwhere(~known)[0]
         raise ParameterError(
             f"an arena's elements must be 0 (free), 1 (wall), 2 (light), 3 (ball), 4 (cylinder) or negative (a robot's "
             f"heading in degrees), but ARENA({row + 1},{column + 1}) is {codes[row, column]:g}. Correct it there."
         )
-    picture = np.where(codes == WALL, float(wall), 0.0)
+    count = np.count_nonzero(codes) - np.count_nonzero(codes == WALL)
+    if count > OBJECTS_MAX:
+        raise ParameterError(
+            f"an arena must have at most {OBJECTS_MAX} robots, lights, balls and cylinders, but it has {count}. Walls "
+            "are 1."
+        )
+    picture = np.where(codes == WALL, np.uint8(wall), np.uint8(0))
     if greys is not None:
         if greys.shape != codes.shape:
             raise ParameterError(
                 f"a colour mask must be of the arena's size, {codes.shape[0]} x {codes.shape[1]}, but it is "
                 f"{greys.shape[0]} x {greys.shape[1]}. Make it with zeros(size(ARENA))."
             )
-        picture = np.where((codes == WALL) & (greys != 0), greys, picture)
-    if not ((picture >= 0) & (picture <= 255) & (picture == np.floor(picture))).all():
-        raise ParameterError("greys of walls must be whole numbers from 1 to 255, but others were given. 255 is white.")
-    arena = Arena.from_array(picture.astype(np.int64), name="matrix")
+        if not ((greys >= 0) & (greys <= 255) & (np.floor(greys) == greys)).all():
+            raise ParameterError(
+                "greys of walls must be whole numbers from 1 to 255, but others were given. 255 is white."
+            )
+        np.copyto(picture, greys, where=(codes == WALL) & (greys != 0), casting="unsafe")
+    arena = Arena.from_array(picture, name="matrix")
 
     def places(elements: NDArray[np.bool_]) -> list[tuple[float, float]]:
         """Return where elements are, down the columns, from the left."""

@@ -3,31 +3,44 @@
 from __future__ import annotations
 
 import logging
-import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from kiks import __version__
-from kiks.engine.numbers import uniform
-from kiks.engine.state import BALL
-from kiks.errors import KiksError, ParameterError
+from kiks.errors import KiksError, ParameterError, shown
 from kiks.model.arena import Arena
 from kiks.model.arena_file import save_arena
 from kiks.model.kad import save_kad
-from kiks.sim.floor import ATTEMPTS
-from kiks.sim.simulation import Simulation
-from kiks.toolbox.matrices import arena_of, place_mm, user_place
+from kiks.toolbox.matrices import arena_of
+from kiks.toolbox.things import (
+    ask_distances,
+    ask_objects,
+    ask_path,
+    ask_pose,
+    ask_set_object,
+    ask_set_robot,
+    ask_spawn,
+    port_of,
+)
 from kiks.toolbox.visitor import Visitor
-from kiks.toolbox.words import escape, matrix_text, number_text, numbers_of, numbers_text, take_matrix, unescape
+from kiks.toolbox.words import escape, matrices_of, matrix_text, number_text, numbers_of, numbers_text, unescape
 
-STREAM_SPAWN = 6
-"""Random stream of what is put at random places, and of headings that nobody has given."""
+WORDS_MAX = 100_000
+"""Longest request other than for a world."""
 
-LIGHT_ROW, BALL_ROW, CYLINDER_ROW = 1, 2, 3
-"""What an object is in lists, and to kiks_spawn."""
+ANSWER_MAX = 90_000_000
+"""Longest answer: a frame tells its length in eight digits."""
+
+BAUD_MAX = 1e7
+
+REASON_MAX = 400
+"""Longest reason for a refusal; a longer one is cut in the middle."""
+
+PATH_MAX = 4000
+"""Longest name of a file."""
+
+PAUSE_MAX_S = 1e6
+"""Longest pause: eleven days."""
 
 _log = logging.getLogger("kiks.toolbox")
 
@@ -36,21 +49,38 @@ Act = Callable[[Visitor, str], str]
 
 def answer(visitor: Visitor, line: str) -> str:
     """Return the answer to a line, never an exception."""
-    ticket, request = line[:1], line[1:]
-    name, _, words = request.partition(" ")
+    name, _, words = line.partition(" ")
     visitor.asked = 0
     try:
         act = REQUESTS.get(name)
         if act is None:
-            raise ParameterError(f"a request must be one of {sorted(REQUESTS)}, but it was {name!r}.")
+            raise ParameterError(
+                f"a request must be one that this KiKS knows, but it was {shown(name)}. Use the toolbox of the same "
+                "version: `kiks matlab` tells where it is."
+            )
+        if len(words) > WORDS_MAX and act is not _world:
+            raise ParameterError(
+                f"a request must have at most {WORDS_MAX} characters, but this one, {shown(name)}, has {len(words)}."
+            )
         result = act(visitor, words)
-        return f"{ticket}+{visitor.clock()}{result}"
+        if len(result) > ANSWER_MAX:
+            raise ParameterError(
+                f"an answer must have at most {ANSWER_MAX} characters, but this one, to {shown(name)}, has "
+                f"{len(result)}. Ask for less: a path begins anew when the port is opened anew."
+            )
+        return f"+{visitor.clock()}{result}"
     except KiksError as error:
         why = str(error)
+    except OSError as error:
+        why = f"{shown(name)} must be able to use its file, but is not: {shown(error.strerror)}. Give another."
+    except MemoryError:
+        why = f"this computer must have enough memory for {shown(name)}, but it has not. Give a smaller arena."
     except Exception as error:
-        _log.exception("request %r failed", request[:200])
-        why = f"KiKS itself has failed at {name!r}: {error!r}. Please tell its makers."
-    return f"{ticket}-{visitor.clock()}{escape(why)}"
+        _log.debug("a request failed", exc_info=True)
+        why = f"KiKS itself has failed at {shown(name)}: {shown(error)}. Please tell its makers."
+    if len(why) > REASON_MAX:
+        why = f"{why[: REASON_MAX // 2]} ... {why[-REASON_MAX // 4 :]}"
+    return f"-{visitor.clock()}{escape(why)}"
 
 
 # ---- worlds ----
@@ -58,6 +88,16 @@ def answer(visitor: Visitor, line: str) -> str:
 
 def _version(visitor: Visitor, words: str) -> str:
     return __version__
+
+
+def _path(text: str) -> str:
+    """Return the name of a file that a text is."""
+    path = unescape(text)
+    if "\0" in path or not 0 < len(path) <= PATH_MAX:
+        raise ParameterError(
+            f"a file's name must have 1 to {PATH_MAX} characters, none of them NUL, but it was {shown(path)}."
+        )
+    return path
 
 
 def _set(visitor: Visitor, words: str) -> str:
@@ -72,18 +112,20 @@ def _world(visitor: Visitor, words: str) -> str:
     if kind == "default":
         session.begin_default()
     elif kind == "file":
-        session.begin_file(unescape(rest))
+        session.begin_file(_path(rest))
     elif kind == "matrix":
-        codes, left = take_matrix(rest.split())
-        greys = take_matrix(left)[0] if left else None
-        settings = session.settings
-        arena = arena_of(codes, greys, wall=settings.wall, ball=settings.ball, cylinder=settings.cylinder)
-        session.begin_arena(arena)
+        session.begin_arena(_arena(visitor, rest))
     else:
-        raise ParameterError(f"a world must be default, file or matrix, but it was {kind!r}.")
+        raise ParameterError(f"a world must be default, file or matrix, but it was {shown(kind)}.")
     # Its ports were those of the world before; nobody is surprised who has asked for another.
     visitor.close(0)
     return ""
+
+
+def _arena(visitor: Visitor, text: str) -> Arena:
+    codes, *greys = matrices_of(text)
+    settings = visitor.session.settings
+    return arena_of(codes, *greys, wall=settings.wall, ball=settings.ball, cylinder=settings.cylinder)
 
 
 def _active(visitor: Visitor, words: str) -> str:
@@ -95,7 +137,7 @@ def _desk(visitor: Visitor, words: str) -> str:
 
 
 def _save(visitor: Visitor, words: str) -> str:
-    path = unescape(words)
+    path = _path(words)
     project = visitor.session.present_project()
     suffix = Path(path).suffix.lower()
     if suffix == ".kiks":
@@ -105,12 +147,12 @@ def _save(visitor: Visitor, words: str) -> str:
     elif suffix == ".toml":
         save_arena(project.arena, path)
     else:
-        raise ParameterError(f"a world's file must end in .kad, .kiks or .toml, but it was {path!r}.")
+        raise ParameterError(f"a world's file must end in .kad, .kiks or .toml, but it was {shown(path)}.")
     return ""
 
 
 def _read(visitor: Visitor, words: str) -> str:
-    return matrix_text(Arena.load(unescape(words)).brightness[::-1])
+    return matrix_text(Arena.load(_path(words)).brightness[::-1])
 
 
 def _print(visitor: Visitor, words: str) -> str:
@@ -138,241 +180,56 @@ def _state(visitor: Visitor, words: str) -> str:
 # ---- ports ----
 
 
-def _port(word: str) -> int:
-    """Return the number of a port; 1 stands for -1."""
-    if not (word.isascii() and word.isdigit() and len(word) < 10):
-        raise ParameterError(f"a port must be a whole number, -1, -2 and so on, but it was {word!r}.")
-    return int(word)
-
-
 def _open(visitor: Visitor, words: str) -> str:
     number, _, rest = words.partition(" ")
     (baud,) = numbers_of(rest.split(), 1, "baud")
-    if not _port(number) or math.isnan(baud):
-        raise ParameterError(f"a simulated port must be -1, -2 and so on, and have a speed, but it was {words!r}.")
-    visitor.open(_port(number), round(baud))
+    if not port_of(number) or not 0 < baud <= BAUD_MAX:
+        raise ParameterError(
+            f"a simulated port must be -1, -2 and so on, and have a speed, but it was {shown(words)}. Open [-1 9600 1]."
+        )
+    visitor.open(port_of(number), round(baud))
     return ""
 
 
 def _close(visitor: Visitor, words: str) -> str:
-    visitor.close(_port(words))
+    visitor.close(port_of(words))
     return ""
 
 
 def _send(visitor: Visitor, words: str) -> str:
     number, _, text = words.partition(" ")
-    return escape(visitor.send(_port(number), unescape(text)))
+    return escape(visitor.send(port_of(number), unescape(text)))
 
 
 def _ask(visitor: Visitor, words: str) -> str:
     number, _, text = words.partition(" ")
-    return escape(visitor.send(_port(number), text + "\n"))
+    return escape(visitor.send(port_of(number), text + "\n"))
 
 
 def _listen(visitor: Visitor, words: str) -> str:
-    return escape(visitor.listen(_port(words)))
+    return escape(visitor.listen(port_of(words)))
 
 
 def _time(visitor: Visitor, words: str) -> str:
-    time_s = visitor.time_s(_port(words))
+    time_s = visitor.time_s(port_of(words))
     return "" if time_s is None else number_text(time_s)
 
 
 def _pass(visitor: Visitor, words: str) -> str:
-    visitor.opened(_port(words)).port.ask_ns()
+    visitor.opened(port_of(words)).port.ask_ns()
     return ""
 
 
 def _pause(visitor: Visitor, words: str) -> str:
-    visitor.pause(*numbers_of(words.split(), 1, "a pause"))
+    (seconds,) = numbers_of(words.split(), 1, "a pause")
+    if not 0 <= seconds <= PAUSE_MAX_S:
+        raise ParameterError(f"a pause must be a time from 0 to {PAUSE_MAX_S:g} s, but it was {seconds:g}.")
+    visitor.pause(seconds)
     return ""
 
 
 def _pace(visitor: Visitor, words: str) -> str:
     return numbers_text(100.0 * speed for speed in visitor.pace())
-
-
-# ---- robots ----
-
-
-def _pose(visitor: Visitor, words: str) -> str:
-    number = _port(words)
-    if visitor.session.desk is None:
-        return ""
-
-    def pose(sim: Simulation) -> str:
-        robot = visitor.robot(number)
-        if robot is None:
-            return ""
-        x_mm, y_mm, heading_rad = sim.pose(robot)
-        return numbers_text((*user_place(sim.arena, x_mm, y_mm), heading_rad))
-
-    return visitor.do(pose)
-
-
-def _path(visitor: Visitor, words: str) -> str:
-    number = _port(words)
-    opened = visitor.openings.get(number)
-
-    def path(sim: Simulation) -> str:
-        robot = visitor.robot(number)
-        if robot is None:
-            return "2 0"
-        points = sim.paths()[robot - 1]
-        if opened is not None:
-            points = points[points[:, 0] >= opened.opened_ns * 1e-9 - 1e-9]
-        points = points[~np.isnan(points[:, 1])]
-        x, y = user_place(sim.arena, points[:, 1], points[:, 2])
-        # A micrometre is more than anybody wants to know; it keeps the line short.
-        return matrix_text(np.round(np.vstack([x, y]), 3))
-
-    visitor.session.trace()
-    return visitor.do(path)
-
-
-def _distances(visitor: Visitor, words: str) -> str:
-    number = _port(words)
-    opened = visitor.openings.get(number)
-
-    def distances(sim: Simulation) -> str:
-        robot = visitor.robot(number)
-        if robot is None:
-            return "0 0 0"
-        forwards_mm, backwards_mm, straight_mm = sim.distances_mm()[robot - 1].tolist()
-        if opened is not None:
-            x_mm, y_mm, _ = sim.pose(robot)
-            forwards_mm, backwards_mm = forwards_mm - opened.way_mm[0], backwards_mm - opened.way_mm[1]
-            straight_mm = math.hypot(x_mm - opened.start_mm[0], y_mm - opened.start_mm[1])
-        return numbers_text((forwards_mm, backwards_mm, straight_mm))
-
-    return visitor.do(distances)
-
-
-def _set_robot(visitor: Visitor, words: str) -> str:
-    word, _, rest = words.partition(" ")
-    number = _port(word)
-    x, y, angle = numbers_of(rest.split(), 3, "x, y and angle")
-
-    def set_robot(sim: Simulation) -> str:
-        robot = visitor.robot(number)
-        if robot is None:
-            raise ParameterError(f"port {-number} must have a robot, but it has none. Open it with kiks_kopen.")
-        turn = uniform(sim.seed, 0, 0, STREAM_SPAWN, sim.now_ns, 0)
-        heading_rad = 2 * math.pi * turn if math.isnan(angle) else angle
-        return _is_done(lambda: sim.place(robot, *place_mm(sim.arena, x, y), heading_rad))
-
-    return visitor.do(set_robot)
-
-
-# ---- objects ----
-
-
-def _objects(visitor: Visitor, words: str) -> str:
-    def objects(sim: Simulation) -> str:
-        rows = [(LIGHT_ROW, *user_place(sim.arena, *lamp[:2]), 0.0, 0.0) for lamp in sim.lamps.tolist()]
-        for body in sim.bodies():
-            x, y = user_place(sim.arena, float(body["x_mm"]), float(body["y_mm"]))
-            velocity = float(body["velocity_x"]), float(body["velocity_y"])
-            angle = math.atan2(velocity[1], velocity[0])
-            rows.append((BALL_ROW if body["what"] == BALL else CYLINDER_ROW, x, y, math.hypot(*velocity), angle))
-        return matrix_text(np.array(rows, np.float64).reshape(-1, 5))
-
-    return visitor.do(objects)
-
-
-def _set_object(visitor: Visitor, words: str) -> str:
-    number, x, y, speed, angle = numbers_of(words.split(), 5, "row, x, y, speed and angle")
-
-    def set_object(sim: Simulation) -> str:
-        lamps, bodies = sim.lamps, sim.bodies()
-        if number not in range(1, len(lamps) + len(bodies) + 1):
-            raise ParameterError(
-                f"row must be one of the {len(lamps) + len(bodies)} that kiks_siminfo_objects lists, but it was "
-                f"{number:g}."
-            )
-        row = int(number) - 1
-        if row < len(lamps):
-            x_mm, y_mm = _kept(place_mm(sim.arena, x, y), lamps[row, :2].tolist())
-            is_inside = 0 <= x_mm <= sim.arena.width_mm and 0 <= y_mm <= sim.arena.height_mm
-            if is_inside:
-                lamps[row, :2] = x_mm, y_mm
-            return str(int(is_inside))
-        body: Any = bodies[row - len(lamps)]
-        here, velocity = (float(body["x_mm"]), float(body["y_mm"])), (body["velocity_x"], body["velocity_y"])
-        there = _kept(place_mm(sim.arena, x, y), here)
-        speed_mm_s = math.hypot(*velocity) if math.isnan(speed) else speed
-        heading_rad = math.atan2(velocity[1], velocity[0]) if math.isnan(angle) else angle
-        if speed_mm_s < 0:
-            speed_mm_s, heading_rad = -speed_mm_s, heading_rad + math.pi
-
-        def roll_from(place: tuple[float, float]) -> None:
-            sim.move_body(int(body["number"]), *place, speed_mm_s=min(speed_mm_s, 1000.0), heading_rad=heading_rad)
-
-        is_moved = _is_done(lambda: roll_from(there))
-        if is_moved == "0":
-            # Speed and angle count wherever it is (kiks-behaviour.md 1.4).
-            _is_done(lambda: roll_from(here))
-        return is_moved
-
-    return visitor.do(set_object)
-
-
-def _spawn(visitor: Visitor, words: str) -> str:
-    kind, x, y = numbers_of(words.split(), 3, "type, x and y")
-    if kind not in (LIGHT_ROW, BALL_ROW, CYLINDER_ROW):
-        raise ParameterError(f"type must be 1 (light), 2 (ball) or 3 (cylinder), but it was {kind:g}.")
-
-    def spawn(sim: Simulation) -> None:
-        arena = sim.arena
-        add: Callable[..., object] = sim.add_lamp
-        greys = {}
-        if kind != LIGHT_ROW:
-            add = sim.add_ball if kind == BALL_ROW else sim.add_cylinder
-            settings = visitor.session.settings
-            brightness = settings.ball if kind == BALL_ROW else settings.cylinder
-            greys = {} if brightness is None else {"brightness": brightness}
-        place_given = None
-        if not math.isnan(x) and not math.isnan(y):
-            place_given = place_mm(arena, x, y)
-            if not (0 <= place_given[0] <= arena.width_mm and 0 <= place_given[1] <= arena.height_mm):
-                raise ParameterError(
-                    f"a place must lie in the arena, x from 1 to {arena.width_mm:g} and y from 1 to "
-                    f"{arena.height_mm:g}, but it was ({x:g}, {y:g})."
-                )
-        elif kind != LIGHT_ROW:
-            place_given = (arena.width_mm / 2, arena.height_mm / 2)
-        if place_given is not None and _is_done(lambda: add(*place_given, **greys)) == "1":
-            return
-        there = len(sim.lamps) + len(sim.bodies())
-        for attempt in range(ATTEMPTS):
-            shares = [uniform(sim.seed, 0, there, STREAM_SPAWN, attempt, axis) for axis in (1, 2)]
-            place = shares[0] * arena.width_mm, shares[1] * arena.height_mm
-            # A lamp may hang anywhere; it is of use over the floor.
-            is_good = kind != LIGHT_ROW or arena.clearance_at_mm(*place) > 0
-            if is_good and _is_done(lambda place=place: add(*place, **greys)) == "1":  # type: ignore[misc]
-                return
-        raise ParameterError("there must be room for one more object, but none was found. Take something away.")
-
-    visitor.do(spawn)
-    if visitor.session.desk is not None:
-        visitor.session.desk.tell()
-    visitor.session.mark()
-    return ""
-
-
-def _kept(wanted: tuple[float, float], there: Any) -> tuple[float, float]:
-    """Return a place of which what nobody has given stays as it is."""
-    x_mm, y_mm = (old if math.isnan(new) else new for new, old in zip(wanted, there, strict=True))
-    return float(x_mm), float(y_mm)
-
-
-def _is_done(act: Callable[[], object]) -> str:
-    """Do something and say 1, or 0 if the place for it is not free."""
-    try:
-        act()
-    except ParameterError:
-        return "0"
-    return "1"
 
 
 REQUESTS: dict[str, Act] = {
@@ -396,12 +253,12 @@ REQUESTS: dict[str, Act] = {
     "pass": _pass,
     "pause": _pause,
     "pace": _pace,
-    "pose": _pose,
-    "path": _path,
-    "distances": _distances,
-    "set_robot": _set_robot,
-    "objects": _objects,
-    "set_object": _set_object,
-    "spawn": _spawn,
+    "pose": ask_pose,
+    "path": ask_path,
+    "distances": ask_distances,
+    "set_robot": ask_set_robot,
+    "objects": ask_objects,
+    "set_object": ask_set_object,
+    "spawn": ask_spawn,
 }
 """Requests by name."""

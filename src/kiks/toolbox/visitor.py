@@ -10,7 +10,7 @@ from typing import NoReturn, TypeVar
 from kiks.clock.program import Program
 from kiks.errors import LinkError
 from kiks.ports.messages import Kind
-from kiks.ports.near import NearConnection, VisitorLine
+from kiks.ports.near import Awaited, NearConnection, Patient, VisitorLine
 from kiks.ports.port import VirtualPort
 from kiks.sim.simulation import Simulation
 from kiks.toolbox.session import Session
@@ -63,6 +63,7 @@ class Visitor:
     Args:
         session: The session.
         number: Its number, from 1 in the order in which they came.
+        awaited: Whether it still waits for the answer under way; as long as it takes if left out.
 
     Attributes:
         ports: The ports that are open, by number: 1 for port -1.
@@ -70,8 +71,9 @@ class Visitor:
         asked: Number of the port that the present request has to do with; 0 for none.
     """
 
-    def __init__(self, session: Session, number: int) -> None:
+    def __init__(self, session: Session, number: int, awaited: Awaited | None = None) -> None:
         self.session = session
+        self._awaited = Patient() if awaited is None else awaited
         self.number = number
         self.name = f"program {number} (Octave or MATLAB)"
         self.asked = 0
@@ -103,7 +105,7 @@ class Visitor:
             self._sim = sim
         if self._connection is None:
             assert session.desk is not None
-            self._connection = NearConnection(session.desk.programs, self.name, self.number)
+            self._connection = NearConnection(session.desk.programs, self.name, self.number, self._awaited)
         if not self.ports:
             self._connection.wake()
             # Anew, so that what passed while no port was open is not taken for thinking.
@@ -145,6 +147,12 @@ class Visitor:
         self._lose_world()
         self.session.leave(self)
         self.session.visitors.remove(self)
+
+    def call_off(self) -> None:
+        """Let the request end that is under way; any thread may say so."""
+        connection = self._connection
+        if connection is not None:
+            connection.call_off()
 
     def opened(self, number: int) -> OpenPort:
         """Return a port that is open.

@@ -1,13 +1,8 @@
-r"""What the toolbox and the simulator say to each other: a line there, a frame back.
+r"""What the toolbox and the simulator say to each other, word by word; `exchange.py` has how it gets there.
 
-A request is a ticket (a character), a name and words. The answer has the same ticket, `+` or `-`, the number of the
-port that was asked and its time in 19 characters, and what was asked for or why not. Texts of several lines are one
-line with `\n`, `\r` and `\\`; matrices are run lengths down their columns, as MATLAB keeps them: most of an arena is
-floor.
-
-Octave cannot read a line from a pipe without waiting for what comes after it (its `fgetl` looks one character ahead),
-but it can read so many characters. So an answer is sent as a frame: its length in eight digits, itself, and blanks up
-to 96 characters. One read is enough for nearly all.
+A request is a name and words. The answer is `+` or `-`, the number of the port that was asked and its time in 19
+characters, and what was asked for or why not. Texts of several lines are one line with `\n`, `\r` and `\\`; matrices
+are run lengths down their columns, as MATLAB keeps them: most of an arena is floor.
 """
 
 from __future__ import annotations
@@ -19,24 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, shown
 
-FRAME_MIN = 96
-"""Shortest frame [bytes]."""
+NUMBER_MAX = 1e9
+"""Largest number of a request: no place, angle, speed or time needs a larger one."""
 
 CELLS_MAX = 64_000_000
 """Most elements of a matrix."""
-
-
-def frame(text: str) -> bytes:
-    """Return an answer as it is sent.
-
-    Example:
-        >>> frame("a+").rstrip()
-        b'       2a+'
-    """
-    data = text.encode()
-    return (b"%8d" % len(data) + data).ljust(FRAME_MIN)
 
 
 def escape(text: str) -> str:
@@ -66,17 +50,20 @@ def numbers_text(values: Iterable[float]) -> str:
 
 
 def numbers_of(words: Sequence[str], count: int, what: str) -> list[float]:
-    """Return as many numbers as words must be.
+    """Return as many numbers as words must be: `NaN` where none is given, and none beyond `NUMBER_MAX`.
 
     Raises:
         ParameterError: If they are others.
     """
     try:
-        numbers = [float(word) for word in words]
+        numbers = [float(word) for word in words] if len(words) == count else []
     except ValueError:
         numbers = []
-    if len(numbers) != count or any(math.isinf(number) for number in numbers):
-        raise ParameterError(f"{what} must be {count} finite numbers, but {' '.join(words)!r} was given.")
+    if len(numbers) != count or any(abs(number) > NUMBER_MAX for number in numbers):
+        raise ParameterError(
+            f"{what} must be {count} finite numbers from -{NUMBER_MAX:g} to {NUMBER_MAX:g}, but "
+            f"{shown(' '.join(words[:9]))} was given."
+        )
     return numbers
 
 
@@ -87,37 +74,73 @@ def matrix_text(matrix: NDArray[Any]) -> str:
         >>> matrix_text(np.array([[0, 1], [0, 1]]))
         '2 2 2 0 2 1'
     """
-    values = np.asarray(matrix, np.float64).ravel(order="F")
-    firsts = np.flatnonzero(np.diff(values, prepend=np.nan) != 0)
+    values = matrix.ravel(order="F")
+    is_first = np.ones(len(values), np.bool_)
+    is_first[1:] = values[1:] != values[:-1]
+    firsts = np.flatnonzero(is_first)
     counts = np.diff(np.append(firsts, len(values)))
-    runs = (f"{count} {number_text(value)}" for count, value in zip(counts.tolist(), values[firsts], strict=True))
-    return " ".join([f"{matrix.shape[0]} {matrix.shape[1]}", *runs])
+    runs = zip(counts.tolist(), values[firsts].tolist(), strict=True)
+    return " ".join(
+        [f"{matrix.shape[0]} {matrix.shape[1]}", *(f"{count} {number_text(value)}" for count, value in runs)]
+    )
 
 
-def take_matrix(words: Sequence[str]) -> tuple[NDArray[np.float64], list[str]]:
-    """Return the matrix that words begin with, and the words behind it.
+def matrices_of(text: str) -> list[NDArray[Any]]:
+    """Return the matrices of a text, one or two, each of as small a type as holds it.
 
     Raises:
-        ParameterError: If there is none.
+        ParameterError: If there are others than matrices in it.
+
+    Example:
+        >>> [matrix.tolist() for matrix in matrices_of("2 2 2 0 2 1 1 1 1 -7.5")]
+        [[[0, 1], [0, 1]], [[-7.5]]]
     """
-    try:
-        rows, columns = int(words[0]), int(words[1])
-        if not (rows >= 0 and columns >= 0 and rows * columns <= CELLS_MAX):
-            raise ValueError
-        left, place, counts, values = rows * columns, 2, [], []
-        while left > 0:
-            counts.append(int(words[place]))
-            values.append(float(words[place + 1]))
-            left -= counts[-1]
-            place += 2
-            if counts[-1] < 1:
-                raise ValueError
-        if left:
-            raise ValueError
-    except (ValueError, IndexError):
+    numbers = _all_numbers(text)
+    matrices: list[NDArray[Any]] = []
+    while len(numbers):
+        matrix, numbers = _take_matrix(numbers)
+        if matrix is None or len(matrices) == 2:
+            matrices.clear()
+            break
+        matrices.append(matrix)
+    if not matrices:
         raise ParameterError(
-            f"a matrix must be rows, columns and run lengths that fill it, at most {CELLS_MAX} elements, but "
-            f"{' '.join(words[:9])!r}... was given."
-        ) from None
-    filled = np.repeat(np.array(values, np.float64), counts).reshape((rows, columns), order="F")
-    return filled, list(words[place:])
+            "a matrix must be rows, columns and run lengths that fill it, of finite numbers, at most "
+            f"{CELLS_MAX} elements, and one more may follow, but {shown(text)} was given."
+        )
+    return matrices
+
+
+def _take_matrix(numbers: NDArray[np.float64]) -> tuple[NDArray[Any] | None, NDArray[np.float64]]:
+    """Return the matrix with which numbers begin, and the numbers behind it; None if there is none."""
+    sizes, values = numbers[:2], numbers[3::2]
+    if len(sizes) < 2 or not _are_whole(sizes, 0) or sizes.prod() > CELLS_MAX:
+        return None, numbers
+    ends = np.cumsum(numbers[2::2][: len(values)])
+    count = int(np.argmax(ends == sizes.prod())) + 1 if len(ends) and sizes.prod() else 0
+    counts = numbers[2 : 2 + 2 * count : 2]
+    if counts.sum() != sizes.prod() or not _are_whole(counts, 1):
+        return None, numbers
+    # All of it has been looked at by now: only here is memory asked for.
+    filled = np.repeat(_narrowed(values[:count]), counts.astype(np.int64))
+    rows, columns = sizes.astype(np.int64).tolist()
+    return filled.reshape((rows, columns), order="F"), numbers[2 + 2 * count :]
+
+
+def _are_whole(numbers: NDArray[np.float64], low: int) -> bool:
+    return bool(((numbers >= low) & (numbers % 1 == 0)).all())
+
+
+def _all_numbers(text: str) -> NDArray[np.float64]:
+    """Return the numbers of a text, with one blank between two; none if there is anything else, or too large a one."""
+    try:
+        numbers = np.fromstring(text if text.isascii() else "", np.float64, sep=" ")
+    except (ValueError, DeprecationWarning):
+        numbers = np.empty(0)
+    is_good = len(numbers) == text.count(" ") + 1 and bool((np.abs(numbers) <= NUMBER_MAX).all())
+    return numbers if is_good else np.empty(0)
+
+
+def _narrowed(values: NDArray[np.float64]) -> NDArray[Any]:
+    small = values.astype(np.int16, casting="unsafe") if (np.abs(values) < 1 << 15).all() else values
+    return small if (small == values).all() else values

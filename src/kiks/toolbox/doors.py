@@ -1,0 +1,184 @@
+"""Where sessions are found: files that this user alone can read and write, each locked while its session lives."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import socket
+import stat
+from pathlib import Path
+from typing import NamedTuple
+
+from kiks import __version__
+from kiks.errors import LinkError, shown
+from kiks.ports.pty import default_folder
+
+FILE_MAX = 1000
+"""Most bytes of a file that tells of a session."""
+
+CONNECT_S = 10.0
+"""How long a session on this computer is waited for that does not let anybody in [s of real time]."""
+
+_PREFIX = "session-"
+
+
+class Door(NamedTuple):
+    """Where a session is found.
+
+    Attributes:
+        number: Its number, that of its process.
+        port: Its TCP port.
+        token: What has to be said first there.
+    """
+
+    number: int
+    port: int
+    token: str
+
+    def line(self) -> str:
+        """Return it as the toolbox reads it."""
+        return f"KiKS {__version__} session {self.number} port {self.port} token {self.token}\n"
+
+    def connect(self) -> socket.socket:
+        """Return a connection that is let in.
+
+        Raises:
+            LinkError: If the session has ended.
+        """
+        try:
+            connection = socket.create_connection(("127.0.0.1", self.port), timeout=CONNECT_S)
+            connection.settimeout(None)
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            connection.sendall(f"{self.token}\n".encode())
+        except OSError as error:
+            reason = error.strerror or error
+            raise LinkError(f"session {self.number} must run to be joined, but it has ended ({reason}).") from None
+        return connection
+
+
+class DoorFile:
+    """The file that tells of a session of this process, from `open` on until `close` or the end of the process.
+
+    Args:
+        door: Where the session is found.
+
+    Raises:
+        LinkError: If this user has no folder for it.
+    """
+
+    def __init__(self, door: Door) -> None:
+        self._door = door
+        self._path = default_folder() / f"{_PREFIX}{door.number}"
+        self._file = -1
+
+    def open(self) -> None:
+        """Write it, if it is not there.
+
+        Raises:
+            LinkError: If it cannot be written.
+        """
+        if self._file < 0:
+            # What another process of this number has left behind.
+            self._path.unlink(missing_ok=True)
+            self._file = _create(self._path, self._door)
+
+    def close(self) -> None:
+        """Remove it, if it is there."""
+        if self._file >= 0:
+            self._path.unlink(missing_ok=True)
+            os.close(self._file)
+            self._file = -1
+
+
+def find_door(number: int) -> Door:
+    """Return where a session of this user runs on this computer.
+
+    Args:
+        number: Its number; 0 for the one that was started last.
+
+    Raises:
+        LinkError: If there is none.
+    """
+    doors = [door for path in _newest_first(default_folder()) if (door := _read(path)) is not None]
+    for door in doors:
+        if number in (0, door.number):
+            return door
+    known = f"those that run are {[door.number for door in doors]}" if doors else "none runs on this computer"
+    which = "a session" if number == 0 else f"session {number}"
+    raise LinkError(f"{which} must run before it is joined, but {known}. Start one with kiks(ARENA) in another Octave.")
+
+
+def write_door(door: Door, path: Path) -> None:
+    """Write where a session is found into a new file that this user alone can read.
+
+    Raises:
+        LinkError: If the file is there already, or cannot be written.
+    """
+    beside = path.with_name(f".{path.name}-{os.getpid()}")
+    os.close(_create(beside, door))
+    try:
+        # A link fails where a file is; so whoever reads the file finds all of it, and finds this one.
+        os.link(beside, path)
+    except OSError as error:
+        raise _not_new(path, error) from None
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def _create(path: Path, door: Door) -> int:
+    """Write a new file and return it, locked."""
+    try:
+        file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o600)
+    except OSError as error:
+        raise _not_new(path, error) from None
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        os.write(file, door.line().encode("ascii"))
+    except OSError as error:
+        os.close(file)
+        path.unlink(missing_ok=True)
+        raise _not_new(path, error) from None
+    return file
+
+
+def _not_new(path: Path, error: OSError) -> LinkError:
+    return LinkError(f"{shown(str(path))} must be a new file that can be written, but it is not ({error.strerror}).")
+
+
+def _newest_first(folder: Path) -> list[Path]:
+    times = {}
+    for path in folder.glob(f"{_PREFIX}*"):
+        with contextlib.suppress(OSError):
+            times[path] = path.lstat().st_mtime_ns
+    return sorted(times, key=times.__getitem__, reverse=True)
+
+
+def _read(path: Path) -> Door | None:
+    """Return the door of a session that lives; the file of one that was killed goes, any other file is left alone."""
+    try:
+        file = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+    except OSError:
+        return None
+    try:
+        found = os.fstat(file)
+        if not stat.S_ISREG(found.st_mode) or found.st_uid != os.getuid() or found.st_mode & 0o077:
+            return None
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return _door_of(os.read(file, FILE_MAX))
+        path.unlink(missing_ok=True)
+    except OSError:
+        return None
+    finally:
+        os.close(file)
+    return None
+
+
+def _door_of(line: bytes) -> Door | None:
+    try:
+        words = line.decode("ascii").split()
+        return Door(int(words[3]), int(words[5]), words[7])
+    except (ValueError, IndexError):
+        return None

@@ -1,0 +1,118 @@
+"""Octave at a terminal, as a person has it: lines are typed, Ctrl-C is pressed, and what is printed is waited for."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pty
+import re
+import select
+import signal
+import time
+from pathlib import Path
+
+from tests.matlab.octave import GUARD_S, OCTAVE, SUPPORT, TOOLBOX
+
+CTRL_C = b"\x03"
+
+BEGIN = (
+    f"PS1(''); more off; addpath('{TOOLBOX}'); addpath('{SUPPORT}'); "
+    "global KIKS_THINKING, KIKS_THINKING = 'none'; disp(['be' 'gun'])"
+)
+
+
+class Terminal:
+    """Octave, which reads from a terminal.
+
+    Args:
+        folder: Where it runs, and where its sessions are found.
+        environment: Variables of the environment besides those that there are.
+    """
+
+    def __init__(self, folder: Path, environment: dict[str, str] | None = None) -> None:
+        assert OCTAVE is not None
+        self.doors = folder / "doors"
+        self.doors.mkdir(mode=0o700)
+        hidden = ("DISPLAY", "WAYLAND_DISPLAY", "KIKS_COMMAND", "KIKS_TRANSPORT")
+        own = {name: value for name, value in os.environ.items() if name not in hidden}
+        own |= {"KIKS_WINDOW": "0", "XDG_RUNTIME_DIR": str(self.doors), **(environment or {})}
+        self.number, self._end = pty.fork()
+        if self.number == 0:
+            os.chdir(folder)
+            os.execve(OCTAVE, [OCTAVE, "--no-gui", "-qf", "--no-line-editing", "--no-history"], own)
+        self._text = ""
+        self.type(BEGIN)
+        self.wait_for("begun")
+
+    def __enter__(self) -> Terminal:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.number, signal.SIGKILL)
+        os.close(self._end)
+        with contextlib.suppress(ChildProcessError):
+            os.waitpid(self.number, 0)
+
+    def type(self, line: str) -> None:
+        """Type a line."""
+        os.write(self._end, f"{line}\n".encode())
+
+    def press_ctrl_c(self) -> None:
+        """Press Ctrl-C: whatever runs at the terminal gets SIGINT. Octave forgets a line that it waits for then."""
+        os.write(self._end, CTRL_C + b"\n")
+
+    def wait_for(self, pattern: str, seconds: float = GUARD_S) -> str:
+        """Wait until something has been printed, and return it; what was printed before is forgotten."""
+        end_s = time.monotonic() + seconds
+        while (found := re.search(pattern, self._text)) is None:
+            left_s = end_s - time.monotonic()
+            assert left_s > 0, f"it has not printed {pattern!r}:\n{self._text}"
+            self._hear(left_s)
+        self._text = self._text[found.end() :]
+        return found[0]
+
+    def ask(self, expression: str) -> str:
+        """Return what Octave prints for an expression that is a number."""
+        self.type(f"fprintf('<%s%s%.15g>\\n', 'a', 'nswer ', double({expression}))")
+        return self.wait_for(r"<answer [^>]*>")[8:-1]
+
+    def has_printed(self, text: str) -> bool:
+        """Say whether something has been printed that was not waited for."""
+        self._hear(0)
+        return text in self._text
+
+    def kill(self) -> None:
+        """Kill Octave, and nothing else."""
+        os.kill(self.number, signal.SIGKILL)
+
+    def sessions(self) -> list[int]:
+        """Return the numbers of the processes that Octave has started and that run."""
+        children = Path(f"/proc/{self.number}/task/{self.number}/children").read_text(encoding="ascii").split()
+        return [int(child) for child in children if state(int(child)) != "Z"]
+
+    def _hear(self, seconds: float) -> None:
+        if select.select([self._end], [], [], seconds)[0]:
+            try:
+                self._text += os.read(self._end, 1 << 16).decode(errors="replace")
+            except OSError as error:
+                raise AssertionError(f"Octave has ended:\n{self._text}") from error
+
+
+def state(number: int) -> str:
+    """Return the letter for what a process does: S sleeps, Z has ended, and so has one that is not there."""
+    words = _words(number)
+    return words[0] if words else "Z"
+
+
+def processor_ticks(number: int) -> float:
+    """Return how much processor time a process has had [ticks of 10 ms]; infinite if it has ended."""
+    words = _words(number)
+    return int(words[11]) + int(words[12]) if words and words[0] != "Z" else float("inf")
+
+
+def _words(number: int) -> list[str]:
+    try:
+        return Path(f"/proc/{number}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
+    except (FileNotFoundError, ProcessLookupError):
+        return []
