@@ -159,8 +159,8 @@ class Reflection:
     light: Annotated[tuple[Annotated[Number, Field(ge=1e-3, le=1e3)], ...], _ONE_EACH]
     threshold: Annotated[tuple[Annotated[Number, Field(ge=0, le=10)], ...], _ONE_EACH]
     lobe_deg: Annotated[tuple[Annotated[Number, Field(ge=1, le=180)], ...], _ONE_EACH]
-    faint: Annotated[Number, Field(ge=1e-3, le=0.5)]
-    bright: Annotated[Number, Field(ge=1e-3, le=0.5)]
+    faint: Annotated[Number, Field(ge=1e-3, le=1)]
+    bright: Annotated[Number, Field(ge=1e-3, le=1)]
 
 
 @record
