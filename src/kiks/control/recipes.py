@@ -19,7 +19,7 @@ from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
 
 from kiks.errors import ParameterError, nearest, shown
 from kiks.model.data_file import Number, Rule, Switch, Text, Whole, record
-from kiks.model.files import inside
+from kiks.model.files import program_in
 
 SPEED_LIMIT = 10.0
 """Speed that an output of 1 stands for, unless another is given [pulses/10 ms]: 80 mm/s."""
@@ -169,20 +169,6 @@ def find(recipe: InModule | InFile, folder: str | Path) -> Any:
             "Start Python where it lies, or name its file instead."
         ) from None
     return _named(module, name, f"module {shown(module_name)}")
-
-
-def program_in(folder: Path, text: str, what: str) -> Path:
-    """Return the path of a Python program that a file may name: in that file's folder or below, in the open.
-
-    Raises:
-        ParameterError: If it lies elsewhere or in a hidden folder, or is no program.
-    """
-    path = inside(folder, text, what)
-    if path.suffix != ".py" or any(part.startswith(".") for part in Path(text).parts) or not path.is_file():
-        raise ParameterError(
-            f"{what} must be a Python program that is there, *.py, in no hidden folder, but it was {shown(text)}."
-        )
-    return path
 
 
 def module_in(path: Path) -> Any:

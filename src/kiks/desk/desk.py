@@ -15,9 +15,10 @@ from kiks.desk.scripts import EXAMPLES
 from kiks.desk.speedometer import Speedometer
 from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.firmware.k213 import K213
+from kiks.model.files import program_in
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, robot_names
-from kiks.ports.permission import Permission, program_in
+from kiks.ports.permission import Permission
 from kiks.ports.process import Command
 from kiks.ports.programs import Programs
 from kiks.sim.building import project_of, simulation_of

@@ -9,8 +9,7 @@ from pathlib import Path
 
 from kiks.desk.folder import check_name
 from kiks.errors import ParameterError
-from kiks.model.files import inside, replace_file
-from kiks.ports.permission import program_in
+from kiks.model.files import inside, program_in, replace_file
 
 SIZE_LIMIT = 200_000
 """Longest program that is edited in the page [bytes]."""

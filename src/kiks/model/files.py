@@ -6,7 +6,7 @@ import os
 import stat
 from collections.abc import Mapping
 from contextlib import suppress
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from kiks.errors import ParameterError, shown
 
@@ -216,4 +216,25 @@ def within(folder: Path, text: str, what: str) -> Path:
             f"{what} must lie in the folder of the file that names it, or below, but {shown(text)} leads elsewhere. "
             "Copy it there."
         )
+    return path
+
+
+def program_in(folder: Path, name: str, what: str = "program") -> Path:
+    """Return the path of a Python program that a file or a browser names.
+
+    Args:
+        folder: The folder in which it must lie, there or below.
+        name: Its path from there, with / between its parts.
+        what: What messages call it.
+
+    Raises:
+        ParameterError: If it leads elsewhere, is no .py file, or lies in a folder whose name begins with a dot.
+    """
+    path = inside(folder, name, what)
+    for parts in (PurePosixPath(name).parts, path.relative_to(folder.resolve()).parts):
+        if not parts[-1].endswith(".py") or any(part.startswith(".") for part in parts):
+            raise ParameterError(
+                f"{what} must be a .py file in no folder whose name begins with a dot, but it was {shown(name)}. "
+                "Rename it, or start it at a terminal."
+            )
     return path

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
 from kiks.errors import ParameterError
-from kiks.model.files import inside
+from kiks.model.files import program_in
 from kiks.ports.process import Command
 
 
@@ -56,23 +56,3 @@ class Anything(Permission):
 
     def check(self, command: Command) -> None:
         """Let it start."""
-
-
-def program_in(folder: Path, name: str) -> Path:
-    """Return the path of a program that a file or a browser names.
-
-    Args:
-        folder: The folder in which it must lie, there or below.
-        name: Its path from there, with / between its parts.
-
-    Raises:
-        ParameterError: If it leads elsewhere, is no .py file, or lies in a folder whose name begins with a dot.
-    """
-    path = inside(folder, name, "program")
-    for parts in (PurePosixPath(name).parts, path.relative_to(folder.resolve()).parts):
-        if not parts[-1].endswith(".py") or any(part.startswith(".") for part in parts):
-            raise ParameterError(
-                f"program must be a .py file in no folder whose name begins with a dot, but it was {name[:80]!r}. "
-                "Rename it, or start it at a terminal."
-            )
-    return path
