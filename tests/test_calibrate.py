@@ -120,7 +120,7 @@ def test_the_command_refuses_before_it_measures(tmp_path: Path) -> None:
     sim = kiks.Simulation()
     for arguments, words in (
         (["--out", str(out)], "Add --overwrite to replace it"),
-        (["--out", str(tmp_path / "no" / "x.toml")], "a folder that can be written"),
+        (["--out", str(tmp_path / "no" / "x.toml")], "a file that can be written"),
         (["--out", str(tmp_path / "x.toml"), "--gaps", "5;15"], "--gaps must be numbers with commas"),
         (["--out", str(tmp_path / "x.toml"), "--gaps", "5"], "at least two different numbers from 2 to"),
         (["--out", str(tmp_path / "x.toml"), "--base", "kephera"], "Did you mean 'khepera'"),

@@ -28,6 +28,7 @@ def hook(event, args):
         from llvmlite.binding.executionengine import ExecutionEngine
         real = ExecutionEngine._find_module_ptr
         def find(*args):
+            ExecutionEngine._find_module_ptr = real
             signal.raise_signal(number)
             return real(*args)
         ExecutionEngine._find_module_ptr = find
@@ -66,7 +67,9 @@ def test_a_command_ends_wherever_it_is_interrupted_while_it_loads(command: str, 
     words = [str(tmp_path / "out") if word == "OUT" else word for word in COMMANDS[command]]
     ending = (signal.SIGINT, signal.SIGTERM)[(PLACES.index(place) + len(command)) % 2]
     result = python(AT_A_PLACE, place, str(int(ending)), *words)
-    assert (result.returncode, result.stderr) == (130, "kiks: stopped.\n")
+    *before, last = result.stderr.splitlines()
+    assert (result.returncode, last) == (130, "kiks: stopped.")
+    assert all(line.startswith("Compiling the ") for line in before)
 
 
 IN_A_CALLBACK = """
@@ -93,6 +96,35 @@ except KeyboardInterrupt:
 def test_what_a_callback_drops_is_sent_again() -> None:
     result = python(IN_A_CALLBACK)
     assert (result.returncode, result.stdout, result.stderr) == (0, "dropped\nended\n", "")
+
+
+IN_THE_HOOK = """
+import signal, sys
+from kiks.ending import send_again_what_is_dropped
+
+class Broken:
+    def __del__(self) -> None:
+        raise ValueError("mine")
+
+def show(dropped) -> None:
+    print("shown", flush=True)
+    signal.raise_signal(signal.SIGINT)
+
+sys.unraisablehook = show
+signal.signal(signal.SIGINT, signal.default_int_handler)
+send_again_what_is_dropped()
+try:
+    Broken()
+    while True:
+        signal.pause()
+except KeyboardInterrupt:
+    print("ended")
+"""
+
+
+def test_what_comes_while_another_error_is_shown_is_sent_again() -> None:
+    result = python(IN_THE_HOOK)
+    assert (result.returncode, result.stdout, result.stderr) == (0, "shown\nended\n", "")
 
 
 IN_A_DESTRUCTOR = """

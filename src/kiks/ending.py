@@ -38,13 +38,20 @@ def send_again_what_is_dropped() -> None:
 
     before = sys.unraisablehook
 
+    def send_again() -> None:
+        again = threading.Timer(_AGAIN_S, _interrupt)
+        again.daemon = True
+        again.start()
+
     def note(dropped: Any) -> None:
-        if issubclass(dropped.exc_type, KeyboardInterrupt):
-            again = threading.Timer(_AGAIN_S, _interrupt)
-            again.daemon = True
-            again.start()
-        else:
-            before(dropped)
+        try:
+            if issubclass(dropped.exc_type, KeyboardInterrupt):
+                send_again()
+            else:
+                before(dropped)
+        except KeyboardInterrupt:
+            # Another one has come meanwhile, and would be dropped here.
+            send_again()
 
     sys.unraisablehook = note
 
