@@ -44,6 +44,7 @@ from kiks.model.robot_file import save_robot
 from kiks.ports.pty import PtyEndpoint
 from kiks.ports.tcp import TcpEndpoint
 from kiks.sim.simulation import Simulation
+from kiks.toolbox.exchange import Pulse
 from kiks.toolbox.host import Host
 from kiks.toolbox.session import Session
 
@@ -179,7 +180,7 @@ def _write_nowhere(rng: random.Random) -> None:
 
 def _no_descriptors(rng: random.Random) -> None:
     """Do something when no file can be opened any more."""
-    sim = Simulation(kiks.Arena.box(300, 300), seed=1)
+    sim, pulse = Simulation(kiks.Arena.box(300, 300), seed=1), Pulse()
     acts: list[Callable[[Path], object]] = [
         *(partial(writer, is_new=True) for writer in _WRITERS.values()),
         lambda folder: kiks.Arena.load(folder / "own.toml"),
@@ -188,7 +189,7 @@ def _no_descriptors(rng: random.Random) -> None:
         lambda folder: Project.load(folder / "own.kiks"),
         lambda folder: PtyEndpoint(folder / "link").close(),
         lambda folder: TcpEndpoint(0).close(),
-        lambda folder: Host(Session()).close(),
+        lambda folder: Host(Session(), pulse).close(),
         lambda folder: show(sim, port=0, browser=False).close(),
     ]
     with tempfile.TemporaryDirectory(prefix="kiks-torture-") as folder:
@@ -208,6 +209,7 @@ def _no_descriptors(rng: random.Random) -> None:
             resource.setrlimit(resource.RLIMIT_NOFILE, before)
             for descriptor in taken:
                 os.close(descriptor)
+            pulse.close()
 
 
 # ---- evolutions ----
@@ -328,12 +330,12 @@ def _kill_session(rng: random.Random) -> None:
         with started("session", "--join", "0", folder=home) as command:
             command.end()
         again = SessionClient(home)
-        if not again.ask("open 1 9600").startswith("t+"):
+        if not again.ask("open 1 9600").startswith("+"):
             raise Broken("foreign", "a session after one that was killed must work", "session")
         # Its client is killed: all that it sees is that its pipe ends, in the middle of a request.
         assert again.process.stdin is not None
         assert again.process.stdout is not None
-        os.write(again.process.stdin.fileno(), b"task 1 N\nta"[: rng.randint(1, 11)])
+        os.write(again.process.stdin.fileno(), b"ask 1 N\nas"[: rng.randint(1, 10)])
         again.process.stdin.close()
         again.process.stdout.close()
         try:

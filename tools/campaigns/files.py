@@ -29,7 +29,7 @@ from kiks.model.network import THESIS, NetworkResponse
 from kiks.model.project import Project, ProjectRobot
 from kiks.sim.building import simulation_of
 from kiks.sim.simulation import Simulation
-from kiks.toolbox.host import Door
+from kiks.toolbox.doors import Door
 
 CASES = 10_000
 """Mutations of each kind of file."""
@@ -323,7 +323,11 @@ def _kinds() -> Iterator[Kind]:
     yield Kind("samples_table", "own.npz", [_npz(**table)], _samples, strange=(partial(strange_npz, table),))
     yield Kind("samples_text", "own.sam", [_TEXT_SAMPLES], _samples, "toml")
     yield Kind("replay", "own.txt", [b"".join(b"%d\n" % (n * 1000) for n in range(40))], _replay, "toml")
-    yield Kind("door", "session-1", [Door(1, 4711, SECRET).line().encode()], Door.read, "toml")
+    yield Kind("door", "session-1", [Door(1, 4711, SECRET).line().encode()], _door, "toml")
+
+
+def _door(path: Path) -> None:
+    Door.parse(path.read_bytes())
 
 
 def _project_of(png: bytes, rng: random.Random) -> bytes:

@@ -174,12 +174,12 @@ class _Failures(logging.Handler):
     """Keeps what a session says of exceptions that it did not expect."""
 
     def __init__(self) -> None:
-        super().__init__(logging.ERROR)
+        super().__init__(logging.DEBUG)
         self.last: BaseException | None = None
 
     def emit(self, record: logging.LogRecord) -> None:
         """Keep it."""
-        self.last = record.exc_info[1] if record.exc_info else None
+        self.last = record.exc_info[1] if record.exc_info else self.last
 
 
 @contextmanager
@@ -207,6 +207,7 @@ def _prepare_session() -> Play:
     failures = _Failures()
     log = logging.getLogger("kiks.toolbox")
     log.handlers, log.propagate = [failures], False
+    log.setLevel(logging.DEBUG)
 
     def play(rng: random.Random) -> int:
         with _running() as session:
@@ -214,7 +215,7 @@ def _prepare_session() -> Play:
             lines = ["set thinking none", "world default", "open 1 9600", *(_request(rng) for _ in range(PER_CASE))]
             for line in lines:
                 failures.last = None
-                said = answer(visitor, f"t{line}")
+                said = answer(visitor, line)
                 _check_answer(line, said, failures.last)
             visitor.leave()
         return PER_CASE
@@ -227,11 +228,11 @@ def _check_answer(line: str, said: str, failure: Any) -> None:
     if failure is not None:
         kind = type(failure).__name__
         raise Broken("foreign", f"{line[:80]!r}: {kind}: {str(failure)[:120]!r}", f"{kind}, {place_of(failure)}")
-    if not said.startswith(("t+", "t-")):
+    if not said.startswith(("+", "-")):
         raise Broken("foreign", f"{line[:80]!r} was answered by {said[:80]!r}", f"answer to {name[:20]}")
-    if said[1] == "-":
+    if said[0] == "-":
         try:
-            check_message(ParameterError(unescape(said[21:])))
+            check_message(ParameterError(unescape(said[20:])))
         except Broken as broken:
             raise Broken(
                 "message", f"{line[:80]!r}: {broken}", f"{broken.where.partition(',')[0]}, request {name[:20]}"

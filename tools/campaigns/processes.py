@@ -222,14 +222,21 @@ class SessionClient:
         Raises:
             Broken: If none comes.
         """
-        length = int(self._read(8))
-        return self._read(max(length, 88))[:length].decode()
+        while True:
+            length = int(self._read(8))
+            said = self._read(max(length, 88))[:length].decode()
+            if said != "~":
+                return said
+            self._say("")  # it takes long, and is still waited for
 
     def ask(self, request: str) -> str:
         """Return the answer to a request."""
-        assert self.process.stdin is not None
-        os.write(self.process.stdin.fileno(), f"t{request}\n".encode())
+        self._say(request)
         return self.hear()
+
+    def _say(self, line: str) -> None:
+        assert self.process.stdin is not None
+        os.write(self.process.stdin.fileno(), f"{line}\n".encode())
 
     def _read(self, count: int) -> bytes:
         assert self.process.stdout is not None

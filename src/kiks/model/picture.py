@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from kiks.errors import ArenaError, ParameterError
+from kiks.errors import ArenaError, ParameterError, shown
 from kiks.model.data_file import check_size, one_line, read_file
 from kiks.model.raster import cells_per_pixel
 
@@ -49,7 +49,7 @@ def read_picture(path: Path, mm_per_pixel: float) -> npt.NDArray[np.uint8]:
         ParameterError: If `mm_per_pixel` is out of range.
         ArenaError: If the file is missing, damaged, of another type, or too small or too large for an arena.
     """
-    what = f"Picture {str(path)!r}"
+    what = f"Picture {shown(str(path))}"
     return decode_picture(read_file(path, what, bytes_max=PICTURE_BYTES_MAX, error=ArenaError), mm_per_pixel, what)
 
 

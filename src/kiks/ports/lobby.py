@@ -85,7 +85,10 @@ class Lobby:
                 self._part(number)
 
     def _meet(self) -> None:
-        connection = RESERVE.accept(self._listener)
+        connection = None
+        # A newcomer that has gone again is no reason to end.
+        with contextlib.suppress(OSError):
+            connection = RESERVE.accept(self._listener)
         if connection is None:
             return
         if len(self._strangers) >= STRANGERS_MAX:

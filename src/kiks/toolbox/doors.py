@@ -40,6 +40,15 @@ class Door(NamedTuple):
         """Return it as the toolbox reads it."""
         return f"KiKS {__version__} session {self.number} port {self.port} token {self.token}\n"
 
+    @staticmethod
+    def parse(line: bytes) -> Door | None:
+        """Return the door that a file tells of; None if it tells of none."""
+        try:
+            words = line.decode("ascii").split()
+            return Door(int(words[3]), int(words[5]), words[7])
+        except (ValueError, IndexError):
+            return None
+
     def connect(self) -> socket.socket:
         """Return a connection that is let in.
 
@@ -167,18 +176,10 @@ def _read(path: Path) -> Door | None:
         try:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
         except BlockingIOError:
-            return _door_of(os.read(file, FILE_MAX))
+            return Door.parse(os.read(file, FILE_MAX))
         path.unlink(missing_ok=True)
     except OSError:
         return None
     finally:
         os.close(file)
     return None
-
-
-def _door_of(line: bytes) -> Door | None:
-    try:
-        words = line.decode("ascii").split()
-        return Door(int(words[3]), int(words[5]), words[7])
-    except (ValueError, IndexError):
-        return None

@@ -16,6 +16,7 @@ import socket
 import threading
 
 from kiks.errors import LinkError
+from kiks.ports.descriptors import opening
 from kiks.ports.lobby import Lobby
 from kiks.toolbox.doors import Door, DoorFile
 from kiks.toolbox.exchange import LOOK_MS, Exchange, Pulse, write_all
@@ -47,14 +48,16 @@ class Host:
     def __init__(self, session: Session, pulse: Pulse) -> None:
         self._session = session
         self._pulse = pulse
-        listener = socket.create_server(("127.0.0.1", 0))
-        self.door = Door(os.getpid(), listener.getsockname()[1], secrets.token_urlsafe(TOKEN_BYTES))
-        self._file = DoorFile(self.door)
+        with opening("the port of a session"), contextlib.ExitStack() as undo:
+            listener = undo.enter_context(socket.create_server(("127.0.0.1", 0)))
+            self.door = Door(os.getpid(), listener.getsockname()[1], secrets.token_urlsafe(TOKEN_BYTES))
+            self._file = DoorFile(self.door)
+            self._lobby = Lobby(listener, self.door.token, self._let_in)
+            undo.pop_all()
         self._there: list[Exchange] = []
         self._count = 0
         self._lock = threading.Lock()
         self._is_over = threading.Event()
-        self._lobby = Lobby(listener, self.door.token, self._let_in)
         threading.Thread(target=self._lobby.run, name="kiks lobby", daemon=True).start()
 
     def speak_with(self, exchange: Exchange) -> None:
