@@ -23,6 +23,7 @@ from tools.campaigns.processes import (
     Looker,
     SessionClient,
     check_robot,
+    compile_engine,
     connect,
     desk,
     python,
@@ -44,6 +45,7 @@ from kiks.model.robot_file import save_robot
 from kiks.ports.pty import PtyEndpoint
 from kiks.ports.tcp import TcpEndpoint
 from kiks.sim.simulation import Simulation
+from kiks.toolbox.exchange import Pulse
 from kiks.toolbox.host import Host
 from kiks.toolbox.session import Session
 
@@ -188,7 +190,7 @@ def _no_descriptors(rng: random.Random) -> None:
         lambda folder: Project.load(folder / "own.kiks"),
         lambda folder: PtyEndpoint(folder / "link").close(),
         lambda folder: TcpEndpoint(0).close(),
-        lambda folder: Host(Session()).close(),
+        lambda folder: Host(Session(), Pulse()).close(),
         lambda folder: show(sim, port=0, browser=False).close(),
     ]
     with tempfile.TemporaryDirectory(prefix="kiks-torture-") as folder:
@@ -328,12 +330,12 @@ def _kill_session(rng: random.Random) -> None:
         with started("session", "--join", "0", folder=home) as command:
             command.end()
         again = SessionClient(home)
-        if not again.ask("open 1 9600").startswith("t+"):
+        if not again.ask("open 1 9600").startswith("+"):
             raise Broken("foreign", "a session after one that was killed must work", "session")
         # Its client is killed: all that it sees is that its pipe ends, in the middle of a request.
         assert again.process.stdin is not None
         assert again.process.stdout is not None
-        os.write(again.process.stdin.fileno(), b"task 1 N\nta"[: rng.randint(1, 11)])
+        os.write(again.process.stdin.fileno(), b"ask 1 N\na"[: rng.randint(1, 9)])
         again.process.stdin.close()
         again.process.stdout.close()
         try:
@@ -451,6 +453,7 @@ SCENES: dict[str, tuple[Callable[[random.Random], None], int, float]] = {
 
 
 def _ready(scene: Callable[[random.Random], None]) -> Play:
+    compile_engine()
     if scene in (_kill_writer, _fill_disk, _no_descriptors):
         for name in _WRITERS:
             _versions(name, False)

@@ -31,6 +31,9 @@ from kiks.toolbox.words import unescape
 MESSAGES, REQUESTS_SENT = 50_000, 50_000
 """How many of both are sent."""
 
+HEAD = 20
+"""Sign, port and time come before what was asked for."""
+
 PER_CASE = 8
 """How many of them a world gets, one after the other."""
 
@@ -174,12 +177,13 @@ class _Failures(logging.Handler):
     """Keeps what a session says of exceptions that it did not expect."""
 
     def __init__(self) -> None:
-        super().__init__(logging.ERROR)
+        super().__init__(logging.DEBUG)
         self.last: BaseException | None = None
 
     def emit(self, record: logging.LogRecord) -> None:
         """Keep it."""
-        self.last = record.exc_info[1] if record.exc_info else None
+        if record.exc_info:
+            self.last = record.exc_info[1]
 
 
 @contextmanager
@@ -207,6 +211,7 @@ def _prepare_session() -> Play:
     failures = _Failures()
     log = logging.getLogger("kiks.toolbox")
     log.handlers, log.propagate = [failures], False
+    log.setLevel(logging.DEBUG)
 
     def play(rng: random.Random) -> int:
         with _running() as session:
@@ -214,7 +219,7 @@ def _prepare_session() -> Play:
             lines = ["set thinking none", "world default", "open 1 9600", *(_request(rng) for _ in range(PER_CASE))]
             for line in lines:
                 failures.last = None
-                said = answer(visitor, f"t{line}")
+                said = answer(visitor, line)
                 _check_answer(line, said, failures.last)
             visitor.leave()
         return PER_CASE
@@ -227,11 +232,11 @@ def _check_answer(line: str, said: str, failure: Any) -> None:
     if failure is not None:
         kind = type(failure).__name__
         raise Broken("foreign", f"{line[:80]!r}: {kind}: {str(failure)[:120]!r}", f"{kind}, {place_of(failure)}")
-    if not said.startswith(("t+", "t-")):
+    if not said.startswith(("+", "-")) or "KiKS itself has failed" in said:
         raise Broken("foreign", f"{line[:80]!r} was answered by {said[:80]!r}", f"answer to {name[:20]}")
-    if said[1] == "-":
+    if said[0] == "-":
         try:
-            check_message(ParameterError(unescape(said[21:])))
+            check_message(ParameterError(unescape(said[HEAD:])))
         except Broken as broken:
             raise Broken(
                 "message", f"{line[:80]!r}: {broken}", f"{broken.where.partition(',')[0]}, request {name[:20]}"
