@@ -67,14 +67,12 @@ class Subject:
 
 def hostile_argument(rng: random.Random, name: str) -> Any:
     """Return a hostile value for a parameter."""
+    second = 10**9 if name == "time_ns" else 1
     while True:
         value = hostile_value(rng)
         is_number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-        if (
-            name not in DURATIONS
-            or not is_number
-            or not DURATION_MAX < value * (1e-9 if name == "time_ns" else 1.0) < DURATION_ENDLESS
-        ):
+        is_waited_for = is_number and DURATION_MAX * second < value < DURATION_ENDLESS * second
+        if name not in DURATIONS or not is_waited_for:
             return value
 
 

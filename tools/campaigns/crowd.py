@@ -21,6 +21,7 @@ from tools.campaigns.processes import (
     Looker,
     SessionClient,
     check_robot,
+    compile_engine,
     connect,
     desk,
     serving,
@@ -141,8 +142,6 @@ def _session(rng: random.Random) -> int:
         words = client.greeting.split()
         port, token = int(words[words.index("port") + 1]), words[words.index("token") + 1]
         try:
-            # A session of which nothing is asked takes itself for forgotten.
-            client.ask("version")
             crowd(rng, port, _OTHERS + _HTTP)
             if not client.ask("version").startswith("+"):
                 raise Broken("hang", "who was there must still be answered", "a session")
@@ -156,7 +155,7 @@ def _join(port: int, token: str) -> None:
     with connect(port, LATE_S) as line:
         line.sendall(f"{token}\nversion\n".encode())
         heard = b""
-        while b"+ " not in heard:
+        while b"+  0" not in heard:
             piece = line.recv(1000)
             if not piece:
                 raise ConnectionError("hung up")
@@ -208,6 +207,7 @@ SCENES: dict[str, tuple[Callable[[random.Random], int], int]] = {
 
 
 def _ready(scene: Callable[[random.Random], int]) -> Play:
+    compile_engine()
     return scene
 
 

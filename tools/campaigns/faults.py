@@ -23,6 +23,7 @@ from tools.campaigns.processes import (
     Looker,
     SessionClient,
     check_robot,
+    compile_engine,
     connect,
     desk,
     python,
@@ -180,7 +181,7 @@ def _write_nowhere(rng: random.Random) -> None:
 
 def _no_descriptors(rng: random.Random) -> None:
     """Do something when no file can be opened any more."""
-    sim, pulse = Simulation(kiks.Arena.box(300, 300), seed=1), Pulse()
+    sim = Simulation(kiks.Arena.box(300, 300), seed=1)
     acts: list[Callable[[Path], object]] = [
         *(partial(writer, is_new=True) for writer in _WRITERS.values()),
         lambda folder: kiks.Arena.load(folder / "own.toml"),
@@ -189,7 +190,7 @@ def _no_descriptors(rng: random.Random) -> None:
         lambda folder: Project.load(folder / "own.kiks"),
         lambda folder: PtyEndpoint(folder / "link").close(),
         lambda folder: TcpEndpoint(0).close(),
-        lambda folder: Host(Session(), pulse).close(),
+        lambda folder: Host(Session(), Pulse()).close(),
         lambda folder: show(sim, port=0, browser=False).close(),
     ]
     with tempfile.TemporaryDirectory(prefix="kiks-torture-") as folder:
@@ -209,7 +210,6 @@ def _no_descriptors(rng: random.Random) -> None:
             resource.setrlimit(resource.RLIMIT_NOFILE, before)
             for descriptor in taken:
                 os.close(descriptor)
-            pulse.close()
 
 
 # ---- evolutions ----
@@ -335,7 +335,7 @@ def _kill_session(rng: random.Random) -> None:
         # Its client is killed: all that it sees is that its pipe ends, in the middle of a request.
         assert again.process.stdin is not None
         assert again.process.stdout is not None
-        os.write(again.process.stdin.fileno(), b"ask 1 N\nas"[: rng.randint(1, 10)])
+        os.write(again.process.stdin.fileno(), b"ask 1 N\na"[: rng.randint(1, 9)])
         again.process.stdin.close()
         again.process.stdout.close()
         try:
@@ -453,6 +453,7 @@ SCENES: dict[str, tuple[Callable[[random.Random], None], int, float]] = {
 
 
 def _ready(scene: Callable[[random.Random], None]) -> Play:
+    compile_engine()
     if scene in (_kill_writer, _fill_disk, _no_descriptors):
         for name in _WRITERS:
             _versions(name, False)

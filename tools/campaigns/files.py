@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import fcntl
 import io
+import os
 import random
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
@@ -27,9 +29,10 @@ from kiks.model.arena_file import save_arena
 from kiks.model.kad import encode_kad
 from kiks.model.network import THESIS, NetworkResponse
 from kiks.model.project import Project, ProjectRobot
+from kiks.ports.pty import default_folder
 from kiks.sim.building import simulation_of
 from kiks.sim.simulation import Simulation
-from kiks.toolbox.doors import Door
+from kiks.toolbox.doors import Door, find_door
 
 CASES = 10_000
 """Mutations of each kind of file."""
@@ -159,6 +162,17 @@ def _replay(path: Path) -> None:
     sim = Simulation(_BOX, thinking=f"replay:{path}", seed=1)
     parse_thinking(f"replay:{path}")
     drive(sim)
+
+
+def _door(path: Path) -> None:
+    """Look for a session, whose file is locked while it lives."""
+    os.environ["XDG_RUNTIME_DIR"] = str(path.parent)
+    door = default_folder() / path.name
+    door.write_bytes(path.read_bytes())
+    door.chmod(0o600)
+    with door.open() as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        find_door(0)
 
 
 # ---- sound files ----
@@ -324,10 +338,6 @@ def _kinds() -> Iterator[Kind]:
     yield Kind("samples_text", "own.sam", [_TEXT_SAMPLES], _samples, "toml")
     yield Kind("replay", "own.txt", [b"".join(b"%d\n" % (n * 1000) for n in range(40))], _replay, "toml")
     yield Kind("door", "session-1", [Door(1, 4711, SECRET).line().encode()], _door, "toml")
-
-
-def _door(path: Path) -> None:
-    Door.parse(path.read_bytes())
 
 
 def _project_of(png: bytes, rng: random.Random) -> bytes:

@@ -31,6 +31,9 @@ from kiks.toolbox.words import unescape
 MESSAGES, REQUESTS_SENT = 50_000, 50_000
 """How many of both are sent."""
 
+HEAD = 20
+"""Sign, port and time come before what was asked for."""
+
 PER_CASE = 8
 """How many of them a world gets, one after the other."""
 
@@ -179,7 +182,8 @@ class _Failures(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Keep it."""
-        self.last = record.exc_info[1] if record.exc_info else self.last
+        if record.exc_info:
+            self.last = record.exc_info[1]
 
 
 @contextmanager
@@ -228,11 +232,11 @@ def _check_answer(line: str, said: str, failure: Any) -> None:
     if failure is not None:
         kind = type(failure).__name__
         raise Broken("foreign", f"{line[:80]!r}: {kind}: {str(failure)[:120]!r}", f"{kind}, {place_of(failure)}")
-    if not said.startswith(("+", "-")):
+    if not said.startswith(("+", "-")) or "KiKS itself has failed" in said:
         raise Broken("foreign", f"{line[:80]!r} was answered by {said[:80]!r}", f"answer to {name[:20]}")
     if said[0] == "-":
         try:
-            check_message(ParameterError(unescape(said[20:])))
+            check_message(ParameterError(unescape(said[HEAD:])))
         except Broken as broken:
             raise Broken(
                 "message", f"{line[:80]!r}: {broken}", f"{broken.where.partition(',')[0]}, request {name[:20]}"

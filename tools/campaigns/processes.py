@@ -13,6 +13,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit, urlunsplit
@@ -106,6 +107,12 @@ def started(*words: str, folder: Path, environment: dict[str, str] | None = None
 def quiet(folder: Path) -> dict[str, str]:
     """Return an environment without a screen, whose sessions and ports are a folder's own."""
     return {**os.environ, "PYTHONUNBUFFERED": "1", "DISPLAY": "", "WAYLAND_DISPLAY": "", "XDG_RUNTIME_DIR": str(folder)}
+
+
+@cache
+def compile_engine() -> None:
+    """Have the engine compiled, so that commands begin at once."""
+    subprocess.run([sys.executable, "-m", "kiks", "warmup"], stdout=subprocess.DEVNULL, check=True)
 
 
 def python(program: str, folder: Path, environment: dict[str, str] | None = None, **options: Any) -> tuple[int, str]:
@@ -217,17 +224,17 @@ class SessionClient:
         self.greeting = self.hear()
 
     def hear(self) -> str:
-        """Return the next answer.
+        """Return the next answer, and confirm meanwhile that it is waited for.
 
         Raises:
             Broken: If none comes.
         """
         while True:
             length = int(self._read(8))
-            said = self._read(max(length, 88))[:length].decode()
-            if said != "~":
-                return said
-            self._say("")  # it takes long, and is still waited for
+            heard = self._read(max(length, 88))[:length].decode()
+            if heard != "~":
+                return heard
+            self._say("")
 
     def ask(self, request: str) -> str:
         """Return the answer to a request."""

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
-from tools.campaigns.processes import Looker, desk
+from tools.campaigns.processes import Looker, compile_engine, desk
 from tools.campaigns.runner import WAIT_FACTOR, Broken, Campaign, Figure, Play
 
 HOURS = 24.0
@@ -113,6 +113,7 @@ def _soak(hours: float, rng: random.Random) -> None:
 
 
 def _prepare(hours: float) -> Play:
+    compile_engine()
     return partial(_soak, hours)
 
 
