@@ -4,7 +4,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV   := .venv
 BIN    := $(VENV)/bin
 
-.PHONY: demo test quick setup system lint types docs benchmarks clean
+.PHONY: demo test quick checked setup system lint types docs benchmarks clean
 
 demo: setup
 	$(BIN)/kiks demo follow --arena examples/arenas/office.toml --seconds 300 --picture kiks-demo.png
@@ -14,6 +14,10 @@ test: setup system
 
 quick: setup system
 	$(BIN)/python -m pytest -n auto -m "not slow"
+
+# The tests of kernels once more, in code that checks every index: some minutes, as all is compiled anew.
+checked: setup
+	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest -n auto -m "not slow" tests/engine tests/batch
 
 setup: $(VENV)/.ready
 

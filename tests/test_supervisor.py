@@ -118,7 +118,7 @@ def test_a_mistake_is_explained_and_changes_nothing(sim, act, words):
 
 def test_a_speed_of_a_body_out_of_range(sim):
     ball = sim.add_ball(100, 100)
-    with pytest.raises(ParameterError, match="speed_mm_s must be a number from 0 to 1000"):
+    with pytest.raises(ParameterError, match="speed_mm_s must be from 0 to 1000"):
         sim.move_body(ball, 100, 100, speed_mm_s=1500)
 
 

@@ -15,6 +15,7 @@ from kiks.engine import code_cache
 ROOT = Path(__file__).parent.parent.parent
 
 
+@pytest.mark.timeout(470)  # it compiles engine and batch, with the checks for the first time
 @pytest.mark.parametrize("checks", ["0", pytest.param("1", marks=pytest.mark.slow)])
 def test_every_index_is_within_its_array(checks: str) -> None:
     """Where it is not, Numba raises an IndexError with the checks, and without them the process may end."""
