@@ -213,6 +213,7 @@ def of_batch(batch: kiks.Batch, h: Any) -> dict[str, Callable[[], Any]]:
     }
 
 
+@pytest.mark.timeout(470)  # the first one may compile the batch
 @pytest.mark.parametrize("hostile", HOSTILE, ids=NAMES)
 def test_a_batch_stays_sane(hostile: Any) -> None:
     batch = kiks.Batch(ARENA, 2, seed=1)
@@ -223,6 +224,7 @@ def test_a_batch_stays_sane(hostile: Any) -> None:
     assert np.isfinite(batch.poses).all()
 
 
+@pytest.mark.timeout(470)  # the first one may compile the batch
 @pytest.mark.parametrize("hostile", HOSTILE, ids=NAMES)
 def test_environments_stay_sane(hostile: Any) -> None:
     from kiks.learn.environments import KheperaEnv, KheperaVectorEnv
