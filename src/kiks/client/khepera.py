@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import select
 import time
-from collections.abc import Callable
 from types import TracebackType
 from typing import Any, NamedTuple, Protocol
 
@@ -114,7 +113,12 @@ class Khepera:
 
     def set_speed(self, left: float, right: float) -> None:
         """Turn the wheels (D). Speeds [pulses/10 ms] are rounded; 1 is 8 mm/s, 127 the most."""
-        self._order(request_of(b"D,%d,%d\n", left, right, convert=round))
+        speeds: tuple[float, float]
+        try:
+            speeds = round(left), round(right)
+        except (TypeError, ValueError, OverflowError):
+            speeds = left, right  # What is no number is refused with the command.
+        self._order(request_of(b"D,%d,%d\n", *speeds))
 
     def stop(self) -> None:
         """Set both speeds to 0."""
@@ -287,20 +291,19 @@ class Khepera:
         )
 
 
-def request_of(form: bytes, *numbers: float, convert: Callable[[float], int] = int) -> bytes:
+def request_of(form: bytes, *numbers: float) -> bytes:
     """Return a command with its numbers.
 
     Args:
         form: The command, with `%d` for each number.
         *numbers: The numbers.
-        convert: Makes a whole number of each.
 
     Raises:
         ParameterError: If one is no number, or the line would be longer than any that a robot takes.
     """
     try:
-        request = form % tuple(map(convert, numbers))
-    except (TypeError, ValueError, OverflowError, AttributeError):
+        request = form % numbers
+    except (TypeError, ValueError, OverflowError):
         request = b""
     if not 0 < len(request) <= LINE_LIMIT:
         raise ParameterError(

@@ -124,7 +124,7 @@ class World(Floor):
         """Do the ticks that have begun up to a time [ns]."""
         ticks = -(-time_ns // TICK_NS) - self.state.tick_count
         while ticks > 0:
-            count = min(ticks, TICKS_AT_ONCE)
+            count = ticks if ticks < TICKS_AT_ONCE else TICKS_AT_ONCE
             if self._paths is not None:
                 count = min(count, self._paths.ticks_left(self.state.tick_count))
             step.advance(self.scene, self.ground, self.seed, self.state.tick_count, count)
