@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import socket
 import threading
 from dataclasses import dataclass
@@ -21,7 +22,7 @@ from kiks.desk.key import Key
 from kiks.desk.page import Page
 from kiks.desk.plain_log import note_fault, speak_plainly
 from kiks.errors import LinkError, ParameterError
-from kiks.ports.descriptors import opening
+from kiks.ports.descriptors import SHORTAGES, opening, shortage
 
 PORT = 8123
 """Where the desk is found, if nobody else is there."""
@@ -93,9 +94,14 @@ class DeskServer:
             self._is_local = host in LOOPBACK
             self._socket = _listen(host, PORT, or_free=True) if port is None else _listen(host, port)
             begun = threading.Event()
-            threading.Thread(target=self._serve, args=(begun,), name="kiks desk", daemon=True).start()
-            if not begun.wait(START_S):
-                raise LinkError(f"the desk must begin to serve within {START_S:g} s, but it did not. Try again.")
+            server = threading.Thread(target=self._serve, args=(begun,), name="kiks desk", daemon=True)
+            server.start()
+            if not begun.wait(START_S) or self._loop is None:
+                self._socket.close()
+                self._socket = None
+                raise LinkError(
+                    f"the desk must begin to serve within {START_S:g} s, but it did not. Look above for the reason."
+                )
 
     def open(self, desk: Desk) -> Served:
         """Show a desk to browsers; `start` must have been called."""
@@ -145,6 +151,8 @@ class DeskServer:
         config = uvicorn.Config(
             Guard(app, self.key, is_local=self._is_local),
             http=Door,
+            # uvloop ends the process when there is no file descriptor for its loop.
+            loop="asyncio",
             backlog=BACKLOG,
             # Who came is asked of the connection, never of what a client says of itself.
             proxy_headers=False,
@@ -158,7 +166,14 @@ class DeskServer:
         )
         speak_plainly()
         assert self._socket is not None
-        uvicorn.Server(config).run(sockets=[self._socket])
+        try:
+            uvicorn.Server(config).run(sockets=[self._socket])
+        except OSError as error:
+            if error.errno not in SHORTAGES:
+                raise
+            logging.getLogger("kiks.desk").error("the desk cannot serve: %s", shortage())
+        finally:
+            begun.set()
 
     def _add_routes(self, app: FastAPI) -> None:
         """Say what is found where."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, field
-from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -95,7 +94,7 @@ class RobotSpec:
         source = str(path)
         what = f"Robot file {source!r}"
         if source in known:
-            data = (_FOLDER / f"{source}.toml").read_bytes()
+            data = read_file(_FOLDER / f"{source}.toml", what)
         elif path.suffix or len(path.parts) > 1 or path.is_file():
             data = read_file(path, what)
         else:
@@ -160,12 +159,13 @@ class RobotSpec:
         return check(RobotSpec, table, self.name, advice=_ADVICE)
 
 
-_FOLDER = resources.files("kiks.model") / "robots"
+_FOLDER = Path(__file__).with_name("robots")
+_NAMES = sorted(path.stem for path in _FOLDER.glob("*.toml"))
 
 
 def robot_names() -> list[str]:
     """Return the names of the robots that come with KiKS."""
-    return sorted(entry.name[:-5] for entry in _FOLDER.iterdir() if entry.name.endswith(".toml"))
+    return list(_NAMES)
 
 
 _ADVICE = "Compare it with 'khepera.toml'."

@@ -16,6 +16,7 @@ from kiks.clock.patience import Patience
 from kiks.clock.thinking import parse_thinking
 from kiks.errors import KiksError, ParameterError
 from kiks.ports.child import LATE, PUNCTUAL
+from kiks.ports.descriptors import opening
 from kiks.ports.guest import NearGuest, SocketGuest
 from kiks.ports.handle import Handle
 from kiks.ports.names import Names
@@ -117,10 +118,11 @@ class Programs:
         self._names = Names(sim, told or {}, 0)
         for robot, _ in begin:
             self._names.own(robot)
-        self._bell, self._bell_rope = socket.socketpair()
+        with opening("the programs of a world"):
+            self._bell, self._bell_rope = socket.socketpair()
+            self._selector = selectors.DefaultSelector()
         self._bell.setblocking(False)
         self._bell_rope.setblocking(False)
-        self._selector = selectors.DefaultSelector()
         self._selector.register(self._bell, selectors.EVENT_READ)
         try:
             for robot, command in begin:

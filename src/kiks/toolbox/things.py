@@ -62,7 +62,9 @@ def ask_path(visitor: Visitor, words: str) -> str:
         robot = visitor.robot(number)
         if robot is None:
             return "2 0"
-        points = sim.paths()[robot - 1]
+        paths = sim.paths()
+        # A robot that came after the recording began has no path yet.
+        points: Any = paths[robot - 1] if robot <= len(paths) else paths[0, :0]
         if opened is not None:
             points = points[points[:, 0] >= opened.opened_ns * 1e-9 - 1e-9]
         points = points[~np.isnan(points[:, 1])]
