@@ -101,9 +101,9 @@ def test_a_robot_may_have_no_noise() -> None:
 @pytest.mark.parametrize(
     ("key", "value", "words"),
     [
-        ("jitter_counts", (), "a list of 1 to 51, none below the one before"),
-        ("jitter_counts", (3.0, 1.0), "a list of 1 to 51, none below the one before"),
-        ("noise_down", 1.5, "between 0 and 1"),
+        ("jitter_counts", (), "a list of 1 to 51 values, each a number from -1023 to 65535"),
+        ("jitter_counts", (3.0, 1.0), "a list in which none is below the one before"),
+        ("noise_down", 1.5, "a number from 0 to 1"),
     ],
 )
 def test_what_is_wrong_is_named(key: str, value: object, words: str) -> None:

@@ -166,7 +166,7 @@ def test_a_family_differs_and_repeats() -> None:
         ({"seed": [1, 2]}, "seeds must be 4 whole numbers"),
         ({"starts": (10, 10, 0)}, "start of robot 1 of world 0 must be free"),
         ({"starts": [[1, 2]]}, "starts must be poses"),
-        ({"starts": (np.nan, 10, 0)}, "must be a finite number"),
+        ({"starts": (np.nan, 10, 0)}, "starts must be finite numbers"),
         ({"robot": ["khepera"] * 3}, "one for each of 4 worlds"),
         ({"senses": ("smell",)}, "senses must be some of"),
     ],

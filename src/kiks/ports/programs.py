@@ -14,6 +14,7 @@ from types import FrameType
 
 from kiks.clock.patience import Patience
 from kiks.clock.thinking import parse_thinking
+from kiks.ending import INTERRUPTED
 from kiks.errors import KiksError, ParameterError
 from kiks.ports.child import LATE, PUNCTUAL
 from kiks.ports.descriptors import opening
@@ -33,9 +34,6 @@ GRACE_S = 1.0
 
 VISIT_PATIENCE_S = 60.0
 """How long the beginning is waited for if programs come that a person starts elsewhere [s of real time]."""
-
-INTERRUPTED = 130
-"""Exit code after Ctrl-C."""
 
 _log = logging.getLogger("kiks.run")
 
