@@ -11,7 +11,7 @@ if exist(fullfile(pwd(), 'kiks_preferences.m'), 'file') == 2
         changes = constants_of(pwd());
     catch failure
         error('kiks:argument', 'kiks_preferences.m in %s must run, but it did not: %s. Mend it or delete it.', ...
-            pwd(), regexprep(failure.message, '\.$', ''));
+            pwd(), regexprep(one_line(failure.message), '\.$', ''));
     end
 end
 names = fieldnames(changes);
@@ -19,7 +19,8 @@ for k = 1:numel(names)
     if isfield(preferences, names{k})
         preferences.(names{k}) = changes.(names{k});
     else
-        say_once(names{k}, sprintf('kiks_preferences: KiKS knows no %s. See help kiks_preferences.', names{k}));
+        say_once(names{k}, sprintf('kiks_preferences: KiKS knows no %s. See help kiks_preferences.', ...
+            one_line(names{k})));
     end
 end
 names = fieldnames(preferences);

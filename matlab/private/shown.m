@@ -2,7 +2,7 @@ function text = shown(value)
 % shown  Say in a few words what somebody has given, for messages.
 
 if ischar(value) && size(value, 1) <= 1
-    text = ['''' value ''''];
+    text = ['''' one_line(value) ''''];
 elseif isnumeric(value) && isscalar(value)
     text = sprintf('%g', value);
 elseif (isnumeric(value) || islogical(value)) && numel(value) <= 6 && ~isempty(value)

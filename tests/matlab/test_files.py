@@ -223,3 +223,38 @@ def test_mazes_have_their_size_and_every_cell_can_be_reached(tmp_path: Path) -> 
     assert said["demo_1"].shape == (640, 880)
     assert said["pose"][0] == pytest.approx([55, 60, 0], abs=1e-9)
     assert said["lamp"][0, :3].tolist() == [1, 830, 580]
+
+
+HOSTILE = (
+    "KIKS_SEED = 1e400;",
+    "KIKS_SEED = " + "9" * 5000 + ";",
+    "KIKS_SEED = struct();",
+    "KIKS_THINKING = ones(3000);",
+    "KIKS_ROBOT = '" + "x" * 5000 + "';",
+    "KIKS_ROBOT = char(zeros(1, 300));",
+    "KIKS_ARENA_CODING = '" + "x" * 5000 + "';",
+    "KIKS_TURRETS = {1, 2};",
+    "x = [",
+    "\0\x01",
+    "error('no\nsuch\nluck')",
+    'error("no\\nsuch\\nluck")',
+    "error(repmat('x', 1, 5000))",
+)
+
+
+def test_a_hostile_preference_file_is_refused_in_a_line(tmp_path: Path) -> None:
+    for number, text in enumerate(HOSTILE):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        (folder / "kiks_preferences.m").write_text(text, encoding="latin-1")
+    # What is set globally counts more than what the file says.
+    lines = ["clear -global KIKS_SEED KIKS_THINKING"]
+    for number in range(len(HOSTILE)):
+        lines += [f"cd('{tmp_path / str(number)}')", f"say('w{number}', caught(@() kiks(zeros(300))))"]
+    said = run("\n".join(lines), tmp_path).said
+    for number, text in enumerate(HOSTILE):
+        why = said[f"w{number}"]
+        assert why.startswith("kiks:"), text[:80]
+        assert "must" in why
+        assert why.isprintable(), text[:80]
+        assert len(why) < 400, text[:80]
