@@ -9,10 +9,13 @@ BIN    := $(VENV)/bin
 demo: setup
 	$(BIN)/kiks demo follow --arena examples/arenas/office.toml --seconds 300 --picture kiks-demo.png
 
+# Tests have a time limit each, and compiling is none of theirs.
 test: setup system
+	$(BIN)/kiks warmup
 	$(BIN)/python -m pytest -n auto
 
 quick: setup system
+	$(BIN)/kiks warmup
 	$(BIN)/python -m pytest -n auto -m "not slow"
 
 # The tests of kernels once more, in code that checks every index: some minutes, as all is compiled anew.

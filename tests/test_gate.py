@@ -204,6 +204,15 @@ def test_held_things_slide_and_never_land_in_anything() -> None:
     assert sim.pose(1)[:2] == (x_mm, y_mm)
 
 
+def test_what_has_gone_is_held_no_longer() -> None:
+    sim = world()
+    hands = Hands(sim)
+    hands.grab("a", "body", len(sim.bodies()) - 1)
+    sim.remove_body(len(sim.bodies()))
+    hands.move("a", 100, 100)
+    assert hands.are_empty
+
+
 def test_two_hands_and_all_kinds_of_things() -> None:
     sim = world()
     hands = Hands(sim)

@@ -88,24 +88,30 @@ def test_a_few_hostile_bytes() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("group", ["files", "calls", "messages"])
+@pytest.mark.timeout(470)  # a campaign of many cases, in processes of its own
+@pytest.mark.parametrize(
+    "group", ["files", "calls.robot", "calls.batch", "calls.environments", "calls.project", "messages"]
+)
 def test_a_share_of_hostile_cases(group: str) -> None:
-    check("--only", group, "--cases", "60", "--seed", "12")
+    check("--only", group, "--cases", "30", "--seed", "12")
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(470)  # a campaign of many cases, in processes of its own
 @pytest.mark.parametrize("scene", ["kill_writer", "fill_disk", "write_nowhere", "no_descriptors"])
 def test_files_are_whole(scene: str) -> None:
-    check("--only", f"faults.{scene}", "--cases", "60", "--seed", "13")
+    check("--only", f"faults.{scene}", "--cases", "30", "--seed", "13")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scene", ["evolution", "worker", "client", "server", "session", "desk"])
+@pytest.mark.timeout(470)  # a campaign of many cases, in processes of its own
+@pytest.mark.parametrize("scene", ["evolution", "worker", "server", "session", "desk"])
 def test_who_is_killed_takes_nothing_along(scene: str) -> None:
     check("--only", f"faults.kill_{scene}", "--cases", "1", "--seed", "14")
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(470)  # a campaign of many cases, in processes of its own
 @pytest.mark.parametrize("door", ["serve", "desk", "session", "many_robots"])
 def test_a_crowd_keeps_nobody_out(door: str) -> None:
     check("--only", f"crowd.{door}", "--cases", "1", "--seed", "15")

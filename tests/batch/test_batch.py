@@ -91,6 +91,7 @@ def test_running_again_begins_again(expected: list[str]) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(470)  # it compiles the batch for another processor
 def test_the_processor_does_not_matter() -> None:
     """In a process of its own, compiled for a processor without wide vectors: all that a batch does, to the bit."""
     environment = os.environ | {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}

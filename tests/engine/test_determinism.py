@@ -82,6 +82,7 @@ def test_in_another_process(record: str) -> None:
     assert record_of_process() == record
 
 
+@pytest.mark.timeout(470)  # it compiles the engine for another processor
 @pytest.mark.slow
 @pytest.mark.parametrize(("processor", "surpassed_by"), [("generic", "avx"), ("x86-64-v3", "avx512f")])
 def test_for_another_processor(record: str, processor: str, surpassed_by: str) -> None:

@@ -99,7 +99,7 @@ class Hands:
             ParameterError: If a number is not finite.
         """
         x_mm, y_mm = check_number("x_mm", x_mm), check_number("y_mm", y_mm)
-        held = self._held.get(owner)
+        held = self._held_by(owner)
         if held is None:
             return
         if held.what == "lamp":
@@ -116,7 +116,7 @@ class Hands:
             ParameterError: If the heading is not finite.
         """
         heading_rad = check_heading("heading_rad", heading_rad)
-        held = self._held.get(owner)
+        held = self._held_by(owner)
         if held is not None and held.what == "robot":
             held.heading_rad = heading_rad
             self._put(held)
@@ -131,11 +131,9 @@ class Hands:
 
     def keep(self) -> None:
         """Put everything that is held back where its hand is; what has gone meanwhile is held no longer."""
-        for owner, held in list(self._held.items()):
-            if held.index >= self._counts()[held.what]:
-                self.drop(owner)
-                continue
-            if held.what == "lamp":
+        for owner in list(self._held):
+            held = self._held_by(owner)
+            if held is None or held.what == "lamp":
                 continue
             found = self._found(held.what, held.index)
             if (found.x_mm, found.y_mm, found.heading_rad) != (held.x_mm, held.y_mm, held.heading_rad):
@@ -144,6 +142,14 @@ class Hands:
                 self._put(held)
 
     # ---- inside ----
+
+    def _held_by(self, owner: str) -> Held | None:
+        """Return what a hand holds; what has gone meanwhile is held no longer."""
+        held = self._held.get(owner)
+        if held is not None and held.index >= self._counts()[held.what]:
+            self.drop(owner)
+            return None
+        return held
 
     def _counts(self) -> dict[str, int]:
         """Return how many there are of each kind of thing."""
