@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from kiks.errors import ArenaError, ParameterError
+from kiks.errors import ArenaError, ParameterError, shown
 from kiks.model.box import Box
 from kiks.model.files import path_of
 from kiks.model.maze import draw_maze
 from kiks.model.places import Ball, Cylinder, Lamp, Pose, checked_places
+from kiks.model.ranges import check_number
 from kiks.model.raster import (
     MAX_CELLS,
     PAD,
@@ -94,7 +95,7 @@ class Arena:
             )
         if given.all():
             raise ArenaError(
-                f"Arena {self.name!r} must have floor, but every cell is wall. Black (0) is floor and all else wall: "
+                f"Arena {shown(self.name)} must have floor, but every cell is wall. Black (0) is floor and all else wall: "
                 "invert the picture if it was drawn the other way round."
             )
         if given.flags.writeable or given.base is not None or not given.flags.c_contiguous:
@@ -315,10 +316,7 @@ class Arena:
         Raises:
             ParameterError: If a coordinate is not finite.
         """
-        if not (math.isfinite(x_mm) and math.isfinite(y_mm)):
-            raise ParameterError(
-                f"x_mm and y_mm must be finite, but they were {x_mm!r} and {y_mm!r}. Give a place [mm]."
-            )
+        x_mm, y_mm = check_number("x_mm", x_mm), check_number("y_mm", y_mm)
         column, column_share = between(x_mm / self.mm_per_cell + PAD - 0.5, self.clearance.shape[1])
         row, row_share = between(y_mm / self.mm_per_cell + PAD - 0.5, self.clearance.shape[0])
         square = self.clearance[row : row + 2, column : column + 2].astype(np.float64)
@@ -331,10 +329,8 @@ class Arena:
         Raises:
             ParameterError: If a coordinate is not finite or `radius_mm` is not positive and finite.
         """
-        if not 0 < radius_mm < math.inf:
-            raise ParameterError(
-                f"radius_mm must be positive and finite, but it was {radius_mm!r}. A Khepera has 27.5."
-            )
+        if check_number("radius_mm", radius_mm, 0, advice="A Khepera has 27.5.") == 0:
+            raise ParameterError("radius_mm must be positive, but it was 0. A Khepera has 27.5.")
         return self.clearance_at_mm(x_mm, y_mm) >= radius_mm
 
     def find_start(self, radius_mm: float) -> Pose:
@@ -359,7 +355,7 @@ class Arena:
                 else ("its widest place has room for", "Draw wider passages or give a larger mm_per_pixel.")
             )
             raise ArenaError(
-                f"Arena {self.name!r} must have room for a robot {2 * radius_mm:g} mm across, but {where} "
+                f"Arena {shown(self.name)} must have room for a robot {2 * radius_mm:g} mm across, but {where} "
                 f"{room_mm:.1f} mm only. {advice}"
             )
         return pose

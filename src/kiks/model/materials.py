@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from kiks.errors import ParameterError, nearest
+from kiks.errors import ParameterError, nearest, shown
 
 BLACK_REFLECTANCE = 0.02
 """What the darkest surface sends back, and brightness 0 would."""
@@ -40,7 +40,7 @@ def brightness_of(material: Any) -> Any:
         return material
     if material not in REFLECTANCES:
         raise ParameterError(
-            f"brightness must be a number from 1 to 255 or one of {list(REFLECTANCES)}, but it was {material!r}."
+            f"brightness must be a number from 1 to 255 or one of {list(REFLECTANCES)}, but it was {shown(material)}."
             f"{nearest(material, REFLECTANCES)} 1 is a black wall, 255 a white one."
         )
     share = (REFLECTANCES[material] - BLACK_REFLECTANCE) / (1.0 - BLACK_REFLECTANCE)

@@ -12,13 +12,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from hashlib import blake2b
 from itertools import count, product
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from kiks.errors import ParameterError
 from kiks.model.places import Lamp, Pose
+from kiks.model.ranges import check_count
 from kiks.model.raster import cells_per_pixel
 
 SIDE_MAX = 100
@@ -50,14 +49,14 @@ def draw_maze(
         ParameterError: If a number is not whole or out of range.
         ArenaError: If the maze is too small or too large for an arena.
     """
-    _check_whole("columns", columns, 1, SIDE_MAX, "It counts the cells side by side.")
-    _check_whole("rows", rows, 1, SIDE_MAX, "It counts the cells one above the other.")
-    _check_whole("wall_mm", wall_mm, 1, _WALL_MAX_MM, "Mazes are drawn in whole millimetres.")
+    columns = check_count("columns", columns, 1, SIDE_MAX, "It counts the cells side by side.")
+    rows = check_count("rows", rows, 1, SIDE_MAX, "It counts the cells one above the other.")
+    wall_mm = check_count("wall_mm", wall_mm, 1, _WALL_MAX_MM, "Mazes are drawn in whole millimetres.")
     # The lamp hangs in the middle of the exit as it was before a wall's thickness was cut off its right side.
     narrowest_mm = 2 * (wall_mm + _FRAME_LAST_MM) + _ROBOT_MM
     room = f"A Khepera is {_ROBOT_MM} mm across and has to fit under the lamp, beside the outer wall."
-    _check_whole("path_mm", path_mm, narrowest_mm, _PATH_MAX_MM, room)
-    _check_whole("seed", seed, 0, 2**63 - 1, "Any small number will do.")
+    path_mm = check_count("path_mm", path_mm, narrowest_mm, _PATH_MAX_MM, room)
+    seed = check_count("seed", seed, 0, 2**63 - 1, "Any small number will do.")
     step_mm = path_mm + wall_mm
     width_mm, height_mm = (columns + 2) * path_mm + (columns - 1) * wall_mm, rows * step_mm - wall_mm
     cells_per_pixel(height_mm, width_mm, 1.0)
@@ -100,8 +99,3 @@ def _passages(columns: int, rows: int, seed: int) -> Iterable[tuple[_Cell, _Cell
 def _draw(seed: int, number: int) -> int:
     """Return 64 random bits that depend on seed and number alone."""
     return int.from_bytes(blake2b(f"{seed} {number}".encode(), digest_size=8).digest(), "big")
-
-
-def _check_whole(name: str, value: Any, low: int, high: int, advice: str) -> None:
-    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-        raise ParameterError(f"{name} must be a whole number from {low} to {high}, but it was {value!r}. {advice}")

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import BeforeValidator, Field
 
-from kiks.errors import ArenaError
+from kiks.errors import ArenaError, ParameterError, shown
 from kiks.model.data_file import Coordinate, Number, Switch, Whole, check
 from kiks.model.materials import brightness_of
 
@@ -95,7 +95,13 @@ def checked_places(
     """
     places: list[_Place] = []
     model: Any = kind
-    for number, entry in enumerate(entries, start=1):
+    try:
+        given = [tuple(entry) for entry in entries]
+    except TypeError:
+        raise ParameterError(
+            f"{label}s must be a list, and each of them a list of its values, but they were {shown(entries)}."
+        ) from None
+    for number, entry in enumerate(given, start=1):
         who = f"{label} {number}"
         values = [value.item() if isinstance(value, np.generic) else value for value in entry]
         place = check(model, dict(zip(model._fields, values, strict=False)), who)
