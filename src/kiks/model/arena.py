@@ -95,8 +95,8 @@ class Arena:
             )
         if given.all():
             raise ArenaError(
-                f"Arena {shown(self.name)} must have floor, but every cell is wall. Black (0) is floor and all else wall: "
-                "invert the picture if it was drawn the other way round."
+                f"Arena {shown(self.name)} must have floor, but every cell is wall. Black (0) is floor and all else "
+                "wall: invert the picture if it was drawn the other way round."
             )
         if given.flags.writeable or given.base is not None or not given.flags.c_contiguous:
             given = given.copy(order="C")
