@@ -41,6 +41,9 @@ class Session:
         assert self.process.stdin is not None
         assert self.process.stdout is not None
         self.to, self.out = self.process.stdin.fileno(), self.process.stdout.fileno()
+        # select.select() refuses descriptors from 1024 on, and a test opens a thousand first.
+        self.poll = select.poll()
+        self.poll.register(self.out, select.POLLIN)
         self.greeting = self.hear()
 
     def hear(self, *, confirms: bool = True) -> str:
@@ -79,7 +82,7 @@ class Session:
     def _read(self, count: int) -> str:
         data = b""
         while len(data) < count:
-            assert select.select([self.out], [], [], 3 * GUARD_S)[0], "nothing came"
+            assert self.poll.poll(3 * GUARD_S * 1000), "nothing came"
             piece = os.read(self.out, count - len(data))
             assert piece, f"it has ended after {data!r}"
             data += piece
