@@ -4,23 +4,39 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import BeforeValidator, Field
 
 from kiks.engine.networks import networks_for
 from kiks.engine.parameters import PARAMETERS, pack
 from kiks.engine.state import State
 from kiks.errors import ParameterError, shown
-from kiks.model.arena import Arena
+from kiks.model.arena import AnArena, Arena
+from kiks.model.data_file import OneOf
 from kiks.model.ranges import HEADING_KEPT_RAD, check_count, check_numbers, wrapped
 from kiks.model.robot import RobotSpec
 from kiks.sim.simulation import Simulation
 from kiks.sim.world import check_kinds
 
+ARENAS_LIMIT = 10_000
+"""Most arenas that worlds share."""
+
 WORLDS_LIMIT = 10_000_000
 """Most worlds in a batch: their robots alone would fill the memory of any computer."""
+
+
+def _listed(arenas: object) -> object:
+    return (arenas,) if isinstance(arenas, Arena) else arenas
+
+
+Arenas = Annotated[tuple[AnArena, ...], BeforeValidator(_listed), Field(min_length=1, max_length=ARENAS_LIMIT)]
+"""Arenas that worlds take in turn; one alone may be given as it is."""
+
+Starts = Annotated[str, OneOf(("random", "arena"))]
+"""Where robots start: at random places, or where the arena puts them."""
 
 
 class Beginning:
@@ -245,7 +261,7 @@ def random_starts(
         found += int(free.sum())
     if found < count:
         raise ParameterError(
-            f"the arena {arena.name!r} must have free places for a robot of {radius_mm:g} mm, but only {found} of "
+            f"the arena {shown(arena.name)} must have free places for a robot of {radius_mm:g} mm, but only {found} of "
             f"{count} were found. Take a larger one, or a smaller clear_mm."
         )
     return np.concatenate(poses)[:count]

@@ -42,7 +42,8 @@ class Watching:
                 )
             if tuple(senses[: len(each.senses)]) != each.senses:
                 raise ParameterError(
-                    f"the measure {each.name!r} must find {' and '.join(each.senses)} first among what is sensed, but "
+                    f"the measure {shown(each.name)} must find {' and '.join(each.senses)} first among what is "
+                    "sensed, but "
                     f"{who} senses {', '.join(senses)}. Let it sense that, too."
                 )
         self._ends = list(accumulate((each.note_count for each in self.measures), initial=0))

@@ -14,7 +14,7 @@ from kiks.cli.engine_start import ready_engine
 from kiks.cli.match import show_match
 from kiks.cli.options import Seed, load_arena
 from kiks.ending import end_as_with_ctrl_c
-from kiks.errors import ParameterError, nearest
+from kiks.errors import ParameterError, nearest, shown
 
 if TYPE_CHECKING:
     from kiks.demos.scene import Scene
@@ -68,13 +68,15 @@ def demo(
     """
     if behaviour not in list(Behaviour) and not Path(behaviour).is_file():
         raise ParameterError(
-            f"BEHAVIOUR must be one of {', '.join(Behaviour)}, or a champion's file, but it was {behaviour!r}."
+            f"BEHAVIOUR must be one of {', '.join(Behaviour)}, or a champion's file, but it was {shown(behaviour)}."
             f"{nearest(behaviour, [each.value for each in Behaviour])}"
         )
     is_soccer = behaviour == Behaviour.SOCCER
     for name, value in (("--arena", arena), ("--baud", baud)) if is_soccer else (("--left", left), ("--right", right)):
         if value is not None:
-            raise ParameterError(f"{name} must be left out with {behaviour}, but it was {value!r}. It is for others.")
+            raise ParameterError(
+                f"{name} must be left out with {behaviour}, but it was {shown(value)}. It is for others."
+            )
     from kiks.drawing import check_picture
 
     name = behaviour if behaviour in list(Behaviour) else Path(behaviour).stem

@@ -13,7 +13,7 @@ import typer
 from kiks.cli.accuracy import DataFolder, PlotFolder
 from kiks.cli.options import written_file
 from kiks.ending import end_as_with_ctrl_c
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, shown
 
 if TYPE_CHECKING:
     from kiks.fit.samples import Floats, Samples
@@ -131,7 +131,7 @@ def parse_file(entry: str) -> tuple[str, float]:
         radius_mm = math.nan
     if not radius_mm > 0:
         raise ParameterError(
-            f"The radius after a file's name must be a positive number of mm, but it was {entry!r}. "
+            f"The radius after a file's name must be a positive number of mm, but it was {shown(entry)}. "
             "Example: round.sam=27; a wall's file has none."
         )
     return path, radius_mm

@@ -11,7 +11,7 @@ import typer
 
 from kiks.cli.desk import open_desk
 from kiks.ending import end_as_with_ctrl_c
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, shown
 
 if TYPE_CHECKING:
     from kiks.demos.match import Match, Report
@@ -100,7 +100,7 @@ def player(words: str | None, robot: int, side: str) -> Command:
     is_program = bool(words.split()) and (Path(words).is_file() or Path(words.split()[0]).is_file())
     if not is_program:
         raise ParameterError(
-            f"--{side} must be a Python file, with its arguments behind it in quotes, but it was {words!r}. "
+            f"--{side} must be a Python file, with its arguments behind it in quotes, but it was {shown(words)}. "
             f"Example: --{side} 'mine.py --fast'."
         )
     command = parse_words([words])[0]

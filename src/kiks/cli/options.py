@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, shown
 from kiks.model.files import check_writable, make_folder
 
 if TYPE_CHECKING:
@@ -110,6 +110,6 @@ def parse_turret(entry: str, robot_count: int) -> tuple[str, int | None]:
     if not (number.isascii() and number.isdigit() and 1 <= int(number) <= robot_count):
         raise ParameterError(
             f"--turret must be a turret, or one with = and a robot's number from 1 to {robot_count}, but it was "
-            f"{entry!r}. Example: gripper=2."
+            f"{shown(entry)}. Example: gripper=2."
         )
     return name, int(number)

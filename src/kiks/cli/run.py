@@ -25,7 +25,7 @@ from kiks.cli.options import (
     written_file,
 )
 from kiks.ending import end_as_with_ctrl_c
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, shown
 
 if TYPE_CHECKING:
     from kiks.clock.gate import Gate
@@ -189,7 +189,7 @@ def parse_words(words: list[str]) -> list[Command]:
             commands[-1].arguments.append(word)
         else:
             raise ParameterError(
-                f"PROGRAM must be a Python file, but {word!r} is none. Give its path before its own arguments."
+                f"PROGRAM must be a Python file, but {shown(word)} is none. Give its path before its own arguments."
             )
     return commands
 
@@ -215,6 +215,6 @@ def parse_map(entry: str) -> tuple[str, int]:
     name, equals, number = entry.rpartition("=")
     if not (equals and name and number.isascii() and number.isdigit()):
         raise ParameterError(
-            f"--map must be a port's name, = and a robot's number, but it was {entry!r}. Example: /dev/ttyUSB0=1."
+            f"--map must be a port's name, = and a robot's number, but it was {shown(entry)}. Example: /dev/ttyUSB0=1."
         )
     return name, int(number)

@@ -26,7 +26,7 @@ from kiks.client.measuring import (
 from kiks.client.placements import Instruction, Place, Placements
 from kiks.client.wall_fit import Fit, Stand, fit_runs, guess_pulse
 from kiks.engine.networks import NETWORK_RESPONSES
-from kiks.errors import LinkError, ParameterError
+from kiks.errors import LinkError, ParameterError, shown
 from kiks.model.robot import RESPONSES, SENSOR_COUNT, RobotSpec
 
 GAP_SHARES, FAINT_SHARE = (0.15, 0.45, 0.7, 0.95), 0.03
@@ -146,7 +146,7 @@ def check_response(base: RobotSpec) -> None:
     if base.proximity.response in NETWORK_RESPONSES:
         others = [response for response in RESPONSES if response not in NETWORK_RESPONSES]
         raise ParameterError(
-            f"the response of the --base must be one of {others}, but it was {base.proximity.response!r}, whose "
+            f"the response of the --base must be one of {others}, but it was {shown(base.proximity.response)}, whose "
             "directions are those of the robot it was trained on. Calibrate with the response that a robot of ours has."
         )
 
@@ -166,7 +166,8 @@ def checked_gaps(gaps_mm: Sequence[float] | None, run_up_mm: float, base: RobotS
         )
     if not 3 * range_mm <= run_up_mm <= 2000:
         raise ParameterError(
-            f"run_up_mm must be between {3 * range_mm:g} and 2000 mm, but it was {run_up_mm!r}. The longer, the better."
+            f"run_up_mm must be between {3 * range_mm:g} and 2000 mm, but it was {shown(run_up_mm)}. The longer, "
+            "the better."
         )
     return gaps
 
@@ -359,7 +360,7 @@ def _check_fit(fit: Fit, runs: Sequence[Run]) -> None:
     if fit.misfit > MISFIT_MAX:
         raise CalibrationError(
             f"the measurements must be those of a robot before a white wall, but they miss by {fit.misfit:.1f} times "
-            f"their noise. Is {fit.spec.name!r} the right --base, and was nothing else near the robot?"
+            f"their noise. Is {shown(fit.spec.name)} the right --base, and was nothing else near the robot?"
         )
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from kiks.client.khepera import Port, open_port
 from kiks.errors import LinkError, ParameterError, shown
-from kiks.model.ranges import SECONDS_MAX, check_number, check_numbers
+from kiks.model.ranges import SECONDS_MAX, check_kind, check_number, check_numbers
 from kiks.ports.port import VirtualPort
 
 
@@ -96,8 +96,10 @@ def ksend(text: str, ref: Sequence[float], timeout: float | None = None) -> str:
         The reply; what came of it if the time-out was over first.
 
     Raises:
+        ParameterError: If the text is none.
         LinkError: If the port is not open.
     """
+    check_kind("text", text, str, r'Write ksend("N\n", ref).')
     port = _opened(ref).port
     assert port is not None
     if not text:

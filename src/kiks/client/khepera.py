@@ -8,9 +8,9 @@ import time
 from types import TracebackType
 from typing import Any, NamedTuple, Protocol
 
-from kiks.errors import LinkError, ParameterError, shown
+from kiks.errors import SHOWN_MAX, LinkError, ParameterError, shown
 from kiks.firmware.receiver import LINE_LIMIT
-from kiks.model.ranges import SECONDS_MAX, check_count, check_number
+from kiks.model.ranges import SECONDS_MAX, check_count, check_kind, check_number
 from kiks.ports.port import VirtualPort
 
 TIMEOUT_S = 2.0
@@ -216,13 +216,15 @@ class Khepera:
         start = f"t,{number},{order[:1].lower()}"
         if not reply.startswith(start):
             raise LinkError(
-                f"the reply to {request!r} must begin with {start!r}, but it was {reply!r}. Is the turret fitted?"
+                f"the reply to {shown(request)} must begin with {shown(start)}, but it was {shown(reply)}. Is the "
+                "turret fitted?"
             )
         try:
             return [int(word) for word in reply[len(start) :].split(",")[1:]]
         except ValueError:
             raise LinkError(
-                f"the reply to {request!r} must be whole numbers, but it was {reply!r}. Use send() for its text."
+                f"the reply to {shown(request)} must be whole numbers, but it was {shown(reply)}. Use send() for "
+                "its text."
             ) from None
 
     def image(self) -> list[int]:
@@ -247,13 +249,28 @@ class Khepera:
     # ---- replies, for who has sent a command to several robots before reading the first reply ----
 
     def hear_done(self, request: bytes) -> None:
-        """Read the reply to a command whose reply is its bare letter."""
+        """Read the reply to a command whose reply is its bare letter.
+
+        Raises:
+            ParameterError: If the request is not bytes.
+            LinkError: If another reply comes, or none.
+        """
+        if request.__class__ is not bytes:
+            check_kind("request", request, bytes)
         reply = self.port.read_until(b"\n")
         if reply != request[:1].lower() + b"\r\n":
             raise self._surprise(request, reply)
 
     def hear_numbers(self, request: bytes, count: int) -> list[int]:
-        """Read the reply to a command whose reply is whole numbers, so many."""
+        """Read the reply to a command whose reply is whole numbers, so many.
+
+        Raises:
+            ParameterError: If the request is not bytes, or the count no whole number.
+            LinkError: If another reply comes, or none.
+        """
+        if request.__class__ is not bytes or count.__class__ is not int:
+            check_kind("request", request, bytes)
+            count = check_count("count", count)
         reply = self.port.read_until(b"\n")
         words = reply.split(b",")
         if len(words) == count + 1 and words[0] == request[:1].lower() and reply[-2:] == b"\r\n":
@@ -279,14 +296,14 @@ class Khepera:
         if reply[-1:] != b"\n":
             return self._silence(request, reply)
         return LinkError(
-            f"the reply to {request!r} must be that of a Khepera, but it was {reply!r}. "
+            f"the reply to {shown(request)} must be that of a Khepera, but it was {shown(reply)}. "
             f"Was an earlier reply left unread, or is another program on the line?"
         )
 
     @staticmethod
     def _silence(request: bytes, reply: bytes) -> LinkError:
         return LinkError(
-            f"a reply to {request!r} must come before the time-out, but only {reply!r} came. "
+            f"a reply to {shown(request)} must come before the time-out, but only {shown(reply)} came. "
             f"Check the cable, the robot's switch and the baud rate."
         )
 
@@ -327,7 +344,7 @@ def open_port(name: str, baud: int = 9600, timeout_s: float | None = TIMEOUT_S) 
         from kiks.ports.url import find_port
 
         sim_port = find_port(name)
-        sim_port.claim(f"the program that opened {name!r}")
+        sim_port.claim(f"the program that opened {shown(name)}")
         sim_port.baudrate = baud
         sim_port.timeout = timeout_s
         return sim_port
@@ -338,8 +355,9 @@ def open_port(name: str, baud: int = 9600, timeout_s: float | None = TIMEOUT_S) 
     try:
         port: Any = serial.serial_for_url(name, baudrate=baud, timeout=timeout_s, stopbits=2)
     except (serial.SerialException, ValueError, OSError) as error:
+        why = str(error).replace(name, name[:SHOWN_MAX])
         raise LinkError(
-            f"port {name!r} must be one that can be opened, but: {error}. A simulated robot is 'kiks://1'."
+            f"port {shown(name)} must be one that can be opened, but: {why}. A simulated robot is 'kiks://1'."
         ) from None
     # A simulated port, as under `kiks run`, has quick lines of its own.
     return port if isinstance(port, protocol_kiks.Serial) else QuickLines(port)
@@ -388,11 +406,11 @@ class QuickLines:
             some = os.read(self._descriptor, 4096)
         except (OSError, ValueError) as error:
             raise LinkError(
-                f"port {self.port.port!r} must stay open while it is used, but it is gone: {error}."
+                f"port {shown(self.port.port)} must stay open while it is used, but it is gone: {error}."
             ) from None
         if not some:
             raise LinkError(
-                f"port {self.port.port!r} must stay open while it is used, but the other end has closed it."
+                f"port {shown(self.port.port)} must stay open while it is used, but the other end has closed it."
             )
         return some
 

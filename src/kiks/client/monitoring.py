@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple, TextIO
 
 from kiks.client.khepera import Khepera, Status
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, shown
 from kiks.model.robot import SENSOR_COUNT
 
 RATE_MIN_HZ, RATE_MAX_HZ = 0.01, 100.0
@@ -73,11 +73,13 @@ def samples(robot: Khepera, *, rate_hz: float = 10.0, seconds: float | None = No
     """
     if not (isinstance(rate_hz, int | float) and RATE_MIN_HZ <= rate_hz <= RATE_MAX_HZ):
         raise ParameterError(
-            f"rate_hz must be between {RATE_MIN_HZ:g} and {RATE_MAX_HZ:g}, but it was {rate_hz!r}. "
+            f"rate_hz must be between {RATE_MIN_HZ:g} and {RATE_MAX_HZ:g}, but it was {shown(rate_hz)}. "
             "At 9600 baud about 6 are possible."
         )
     if seconds is not None and not (math.isfinite(seconds) and seconds > 0):
-        raise ParameterError(f"seconds must be positive and finite, but it was {seconds!r}. Leave it out for no end.")
+        raise ParameterError(
+            f"seconds must be positive and finite, but it was {shown(seconds)}. Leave it out for no end."
+        )
     return _samples(robot, 1.0 / rate_hz, math.inf if seconds is None else seconds)
 
 
@@ -154,7 +156,7 @@ class CsvLog:
             self._file.flush()
         except OSError as error:
             raise ParameterError(
-                f"a log must go to a file that can be written, but {self._file.name!r} cannot any more "
+                f"a log must go to a file that can be written, but {shown(self._file.name)} cannot any more "
                 f"({error.strerror}). The samples before are in it."
             ) from None
 

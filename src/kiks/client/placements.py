@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, shown
 from kiks.sim.simulation import Simulation
 
 
@@ -70,7 +70,7 @@ class SimPlacements:
         if not arena.free_for(x_mm, y_mm, radius_mm):
             raise ParameterError(
                 f"the arena must have room for a robot {instruction.gap_mm:g} mm below the middle of its upper wall, "
-                f"but {arena.name!r} has none. Take a box of at least 500 x 650 mm, empty, or shorten the run-up."
+                f"but {shown(arena.name)} has none. Take a box of at least 500 x 650 mm, empty, or shorten the run-up."
             )
         self.sim.place(self.robot, x_mm, y_mm, math.pi / 2 + self.skew_rad)
         return instruction.gap_mm

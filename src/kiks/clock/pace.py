@@ -7,7 +7,7 @@ import math
 import time
 from collections.abc import Callable
 
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, shown
 from kiks.units import NS_PER_S, s_from_ns
 
 SPEED_MIN = 1e-3
@@ -117,7 +117,7 @@ def _check_speed(speed: float | None) -> float | None:
         isinstance(speed, int | float) and math.isfinite(speed) and SPEED_MIN <= speed <= SPEED_MAX
     ):
         raise ParameterError(
-            f"speed must be a number from {SPEED_MIN:g} to {SPEED_MAX:g}, but it was {speed!r}. "
+            f"speed must be a number from {SPEED_MIN:g} to {SPEED_MAX:g}, but it was {shown(speed)}. "
             "1 is real time; a program that waits for its replies runs as fast as it can with thinking 'none'."
         )
     return speed

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable
 
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, shown
 from kiks.units import s_from_ns
 
 LONGEST_S = 86_400.0
@@ -38,7 +38,7 @@ class Patience:
     def __init__(self, seconds: float, *, wall_ns: Callable[[], int] = time.monotonic_ns) -> None:
         if not (isinstance(seconds, int | float) and math.isfinite(seconds) and 0 < seconds <= LONGEST_S):
             raise ParameterError(
-                f"patience must be a number of seconds above 0 and up to {LONGEST_S:g}, but it was {seconds!r}. "
+                f"patience must be a number of seconds above 0 and up to {LONGEST_S:g}, but it was {shown(seconds)}. "
                 "2 is usual; --when-silent wait waits for ever."
             )
         self.seconds = float(seconds)

@@ -36,7 +36,7 @@ from kiks.control.recipes import (
 )
 from kiks.errors import ParameterError, shown
 from kiks.model.data_file import adapter, check
-from kiks.model.ranges import check_count
+from kiks.model.ranges import check_count, check_kind
 from kiks.model.robot import SENSOR_COUNT
 
 
@@ -204,9 +204,11 @@ def recipe_for(controller: Controller, folder: str | Path = ".") -> dict[str, An
     Raises:
         ParameterError: If the controller has none.
     """
+    check_kind("controller", controller, Controller)
     if controller.recipe is None:
         raise ParameterError(
-            f"the controller {controller.name!r} must be defined at the top of a module or file to be found again, but "
+            f"the controller {shown(controller.name)} must be defined at the top of a module or file to be found "
+            "again, but "
             "it was defined inside another function or typed into a console."
         )
     return relative_to(controller.recipe, folder)
@@ -218,9 +220,10 @@ def random_parameters(controller: Controller, count: int, *, seed: int) -> NDArr
     Raises:
         ParameterError: If the controller takes any number of parameters, or `count` or `seed` is out of range.
     """
+    check_kind("controller", controller, Controller)
     if controller.parameter_count is None:
         raise ParameterError(
-            f"the controller {controller.name!r} must say how many parameters it has, but takes any number. "
+            f"the controller {shown(controller.name)} must say how many parameters it has, but takes any number. "
             "Write @kiks.controller(parameters=...)."
         )
     check_count("seed", seed, most=2**63 - 1)

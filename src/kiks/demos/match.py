@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from kiks.demos import pitch
 from kiks.engine.numbers import uniform
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, shown
 from kiks.model.robot import RobotSpec
 from kiks.ports.process import Command
 from kiks.ports.programs import Programs
@@ -93,7 +93,9 @@ class Match(Simulation):
         self, seconds: float = 300.0, seed: int = 0, on_goal: Callable[[Report], None] = lambda report: None
     ) -> None:
         if not (math.isfinite(seconds) and seconds >= LOOK_S):
-            raise ParameterError(f"seconds must be a number of at least {LOOK_S}, but it was {seconds!r}. Take 300.")
+            raise ParameterError(
+                f"seconds must be a number of at least {LOOK_S}, but it was {shown(seconds)}. Take 300."
+            )
         jersey = RobotSpec.load("khepera").with_changes(body__brightness=pitch.JERSEY)
         self._period_ns, self._end_ns = ns_from_s(LOOK_S), ns_from_s(seconds)
         self._next_ns = 0

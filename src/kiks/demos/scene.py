@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from kiks.client.khepera import Khepera
 from kiks.engine.numbers import uniform
-from kiks.errors import ArenaError
+from kiks.errors import ArenaError, shown
 from kiks.model.arena import Arena
 from kiks.sim.simulation import Simulation
 
@@ -140,6 +140,7 @@ class Scene:
             ):
                 return x, y
         raise ArenaError(
-            f"Arena {arena.name!r} must have room for everything, but {ATTEMPTS} random places for thing {about} of "
+            f"Arena {shown(arena.name)} must have room for everything, but {ATTEMPTS} random places for thing "
+            f"{about} of "
             f"{radius_mm:g} mm radius, {gap_mm:g} mm from all else, were all taken. Take a larger one."
         )

@@ -15,7 +15,7 @@ from nicegui import ui
 from nicegui.element import Element
 from nicegui.events import GenericEventArguments
 
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, shown
 
 __all__ = ["SHOWN", "ArenaView", "Pick", "Stroke", "Tool"]
 
@@ -132,7 +132,7 @@ class ArenaView(
             ParameterError: If there is no such view.
         """
         if view not in VIEWS:
-            raise ParameterError(f"view must be one of {list(VIEWS)}, but it was {view!r}.")
+            raise ParameterError(f"view must be one of {list(VIEWS)}, but it was {shown(view)}.")
         self._props["view"] = view
         self.update()
 

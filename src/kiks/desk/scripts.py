@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from kiks.desk.folder import check_name
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, shown
 from kiks.model.files import inside, program_in, replace_file
 
 SIZE_LIMIT = 200_000
@@ -78,12 +78,12 @@ def read_script(folder: Path, script: Script) -> str:
     try:
         if path.stat().st_size > SIZE_LIMIT:
             raise ParameterError(
-                f"a program must have at most {SIZE_LIMIT} bytes to be edited here, but {script.name!r} has "
+                f"a program must have at most {SIZE_LIMIT} bytes to be edited here, but {shown(script.name)} has "
                 f"{path.stat().st_size}. Edit it elsewhere."
             )
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise ParameterError(f"a program must be a readable text, but {script.name!r} is none: {error}.") from None
+        raise ParameterError(f"a program must be a readable text, but {shown(script.name)} is none: {error}.") from None
 
 
 def save_script(folder: Path, name: str, text: str, *, may_replace: Script | None = None) -> Script:
@@ -103,7 +103,8 @@ def save_script(folder: Path, name: str, text: str, *, may_replace: Script | Non
     check_name(name, (".py",))
     if "/" in name:
         raise ParameterError(
-            f"a program's name must be one without folders, but it was {name!r}. Take letters and digits: square.py."
+            f"a program's name must be one without folders, but it was {shown(name)}. Take letters and digits: "
+            "square.py."
         )
     data = text.encode("utf-8", errors="replace")
     if len(data) > SIZE_LIMIT:
@@ -111,7 +112,8 @@ def save_script(folder: Path, name: str, text: str, *, may_replace: Script | Non
     script, path = Script(name, is_example=False), inside(folder, name, "the program")
     if path.exists() and script != may_replace:
         raise ParameterError(
-            f"a program must have a name that is free, but there is a {name!r} already. Take another name, or open "
+            f"a program must have a name that is free, but there is a {shown(name)} already. Take another name, or "
+            "open "
             "that one and change it."
         )
     replace_file(path, data, "a program")
@@ -167,6 +169,6 @@ def split_arguments(text: str) -> list[str]:
         return shlex.split(text)
     except ValueError as error:
         raise ParameterError(
-            f"arguments must be words with blanks between them, but they were {text!r}: {str(error).lower()}. "
+            f"arguments must be words with blanks between them, but they were {shown(text)}: {str(error).lower()}. "
             "Close the quotes."
         ) from None

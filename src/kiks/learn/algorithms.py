@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.errors import ParameterError, nearest
+from kiks.errors import ParameterError, nearest, shown
 from kiks.learn.task import Axis
 
 Floats = NDArray[np.float64]
@@ -190,7 +190,8 @@ def make_algorithm(name: str, parameter_count: int, population: int, seed: int, 
     """
     if name not in ALGORITHMS:
         raise ParameterError(
-            f"algorithm must be one of {', '.join(ALGORITHMS)}, but it was {name!r}.{nearest(str(name), ALGORITHMS)}"
+            f"algorithm must be one of {', '.join(ALGORITHMS)}, but it was "
+            f"{shown(name)}.{nearest(str(name), ALGORITHMS)}"
         )
     return ALGORITHMS[name](parameter_count, population, seed, axes)
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, field, fields
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 import kiks
 from kiks.batch.timing import Baud, Timing
@@ -18,8 +18,8 @@ from kiks.control.controllers import controller_of, recipe_for
 from kiks.control.recipes import Recipe
 from kiks.model.arena import Arena
 from kiks.model.arena_file import quoted
-from kiks.model.data_file import Number, Text, Whole, check, parse_toml, read_file, record
-from kiks.model.files import replace_files
+from kiks.model.data_file import Number, Text, Whole, as_list, check, parse_toml, read_file, record
+from kiks.model.files import path_of, replace_files
 from kiks.sim.simulation import Simulation
 
 FORMAT = 1
@@ -30,6 +30,12 @@ FILE_BYTES_MAX = 32 << 20
 
 PARAMETERS_MAX = 1_000_000
 """Most parameters of a champion."""
+
+
+Parameters = Annotated[tuple[Number, ...], BeforeValidator(as_list), Field(max_length=PARAMETERS_MAX)]
+Measures = Annotated[dict[Text, Number], Field(max_length=1000)]
+Generation = Annotated[Whole, Field(ge=0, lt=2**63)]
+Seed = Annotated[Whole, Field(ge=0, lt=2**63)]
 
 
 @record
@@ -44,20 +50,20 @@ class _ChampionFile:
     """What a champion's file holds."""
 
     champion: Annotated[Literal[1], Field(description="It is the version of the format.")]
-    parameters: Annotated[tuple[Number, ...], Field(max_length=PARAMETERS_MAX)]
+    parameters: Parameters
     robot: Text
     timing: _FileTiming
     controller: Recipe
     task: Text = ""
     fitness: Number = 0.0
-    generation: Annotated[Whole, Field(ge=0)] = 0
+    generation: Generation = 0
     algorithm: Text = ""
-    seed: Annotated[Whole, Field(ge=0, lt=2**63)] = 0
+    seed: Seed = 0
     kiks: Text = ""
-    measures: Annotated[dict[Text, Number], Field(max_length=1000)] = field(default_factory=dict)
+    measures: Measures = field(default_factory=dict)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Champion:
     """A controller with its parameters.
 
@@ -76,16 +82,23 @@ class Champion:
     """
 
     controller: Controller
-    parameters: tuple[float, ...]
-    task: str = ""
-    fitness: float = 0.0
-    measures: Mapping[str, float] = field(default_factory=dict)
-    generation: int = 0
-    algorithm: str = ""
-    seed: int = 0
-    robot: str = "khepera"
+    parameters: Parameters
+    task: Text = ""
+    fitness: Number = 0.0
+    measures: Measures = field(default_factory=dict)
+    generation: Generation = 0
+    algorithm: Text = ""
+    seed: Seed = 0
+    robot: Text = "khepera"
     timing: Timing = field(default_factory=Timing)
-    kiks: str = kiks.__version__
+    kiks: Text = kiks.__version__
+
+    # Functions cannot be compared: a champion equals itself alone.
+    __eq__ = object.__eq__
+    __hash__ = object.__hash__
+
+    def __post_init__(self) -> None:
+        self.controller.check_parameters(self.parameters)
 
     def drive(self, port: str | Port | Sequence[str | Port], *, seconds: float) -> int:
         """Let it drive one or more robots, simulated or real; see `kiks.drive`.
@@ -138,7 +151,7 @@ class Champion:
         Raises:
             ParameterError: If the file cannot be written, or the controller stands in no file.
         """
-        target = Path(path)
+        target = path_of(path)
         recipe = recipe_for(self.controller, target.parent)
         files: dict[Path, bytes | str] = {}
         if "file" in recipe:
@@ -171,10 +184,10 @@ class Champion:
         Raises:
             ParameterError: If it is none.
         """
+        path = path_of(path)
         what = f"Champion's file {str(path)!r}"
-        read = check(_ChampionFile, parse_toml(read_file(Path(path), what, bytes_max=FILE_BYTES_MAX), what), what)
-        controller = controller_of(read.controller, Path(path).parent)
-        controller.check_parameters(read.parameters)
+        read = check(_ChampionFile, parse_toml(read_file(path, what, bytes_max=FILE_BYTES_MAX), what), what)
+        controller = controller_of(read.controller, path.parent)
         given = {each.name: getattr(read, each.name) for each in fields(cls)}
         timing = Timing(**asdict(read.timing))
         return cls(**given | {"controller": controller, "timing": timing})

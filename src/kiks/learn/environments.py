@@ -217,12 +217,13 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
         """Return a seed for each world, or None for none at all."""
         if seed is None:
             return None
-        if isinstance(seed, list | tuple | np.ndarray):
-            if len(seed) != self.num_envs:
+        given: Any = seed
+        if isinstance(given, list | tuple) or (isinstance(given, np.ndarray) and given.ndim == 1):
+            if len(given) != self.num_envs:
                 raise ParameterError(
-                    f"seed must be one number, or one for each of {self.num_envs} worlds, but there were {len(seed)}."
+                    f"seed must be one number, or one for each of {self.num_envs} worlds, but there were {len(given)}."
                 )
-            return [checked_seed(each) for each in seed]
+            return [checked_seed(each) for each in given]
         first = check_count("seed", seed, 0, SEED_LIMIT - self.num_envs)
         return [first + k for k in range(self.num_envs)]
 

@@ -16,12 +16,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import kiks
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, shown
 from kiks.learn.algorithms import make_algorithm
 from kiks.learn.champion import Champion
 from kiks.learn.executors import Executor, executor_for
 from kiks.learn.records import Folder, Generation, Identity
 from kiks.learn.task import Task
+from kiks.model.ranges import check_count, check_kind, check_number, check_numbers
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -77,13 +78,10 @@ class Evolution:
         population: int | None = None,
         folder: str | Path | None = None,
     ) -> None:
-        self.task, self.name = task, algorithm
-        self.population = POPULATION if population is None else population
-        if not isinstance(self.population, int) or not 4 <= self.population <= 1_000_000:
-            raise ParameterError(f"population must be a whole number from 4 to 1000000, but it was {population!r}.")
-        if not isinstance(seed, int) or not 0 <= seed < 2**63:
-            raise ParameterError(f"seed must be a whole number from 0 to 2^63 - 1, but it was {seed!r}.")
-        self.seed = seed
+        self.task = check_kind("task", task, Task, "kiks.tasks.load() returns one.")
+        self.name = check_kind("algorithm", algorithm, str)
+        self.population = check_count("population", POPULATION if population is None else population, 4)
+        self.seed = check_count("seed", seed, most=2**63 - 1)
         self.generations: list[Generation] = []
         self.algorithm = make_algorithm(
             algorithm, task.parameter_count, self.population, self._seed_for(_OF_ALGORITHM), task.axes
@@ -137,12 +135,12 @@ class Evolution:
     def _tell(self, values: ArrayLike, seconds: float) -> None:
         if self._asked is None:
             raise ParameterError("ask() must come before each tell(), but it did not.")
-        given = np.array(values, np.float64)
+        given = check_numbers("values", values)
         given = given[:, None] if given.ndim == 1 else given
         count, most = len(self._asked), len(self.task.value_names)
-        if given.ndim != 2 or len(given) != count or given.shape[1] not in (1, most) or not np.isfinite(given).all():
+        if given.ndim != 2 or len(given) != count or given.shape[1] not in (1, most):
             raise ParameterError(
-                f"values must be finite numbers [candidate] or [candidate, value], here ({count},) or {(count, most)}, "
+                f"values must be numbers [candidate] or [candidate, value], here ({count},) or {(count, most)}, "
                 f"but their shape was {given.shape}."
             )
         fitness, trials = given[: self.population, 0], given[self.population :]
@@ -186,8 +184,10 @@ class Evolution:
         if generations is None and seconds is None:
             raise ParameterError("generations or seconds must be given, or it would never end, but neither was.")
         for name, value in (("generations", generations), ("seconds", seconds)):
-            if value is not None and not (isinstance(value, int | float) and value >= 0):
-                raise ParameterError(f"{name} must be a number of at least 0, but it was {value!r}.")
+            if value is not None:
+                check_number(name, value, 0)
+        if not isinstance(executor, Executor | str):
+            raise ParameterError(f"executor must be one, or a place such as 'threads', but it was {shown(executor)}.")
         if isinstance(executor, str):
             with executor_for(executor, self.task) as opened:
                 return self.run(generations=generations, seconds=seconds, executor=opened, each=each)

@@ -8,8 +8,9 @@ from typing import Self
 
 import numpy as np
 
-from kiks.errors import ParameterError, WorkError, nearest
-from kiks.learn.work import Floats, Integers, Raised, Ready, Work, Worker
+from kiks.errors import ParameterError, WorkError, nearest, shown
+from kiks.learn.work import Floats, Integers, Raised, Ready, Work, Worker, check_candidates
+from kiks.model.ranges import check_kind
 
 KINDS = ("threads", "processes", "ray")
 
@@ -38,11 +39,14 @@ def executor_for(where: str, work: Work) -> Executor:
                [4.],
                [9.]])
     """
+    check_kind("the place of evaluations", where, str, "Usual: 'threads'.")
+    if not callable(getattr(work, "evaluate", None)):
+        raise ParameterError(f"work must be a kiks.Task, or another Work, but it was {shown(work)}.")
     kind, colon, detail = where.partition(":")
     if kind not in KINDS or (colon and not detail):
         raise ParameterError(
             "Evaluations must run on 'threads[:COUNT]', 'processes[:COUNT]', 'ray' or 'ray:ADDRESS', but it was"
-            f" {where!r}.{nearest(kind, KINDS)}"
+            f" {shown(where)}.{nearest(kind, KINDS)}"
         )
     if kind == "threads":
         return ThreadsExecutor(work, thread_count=_count(where, detail))
@@ -63,7 +67,8 @@ def _count(where: str, detail: str) -> int:
         return len(os.sched_getaffinity(0))
     if not detail.isdecimal() or int(detail) < 1:
         raise ParameterError(
-            f"The count in {where!r} must be a whole number from 1, but it was {detail!r}. Left out, it is one a core."
+            f"The count in {shown(where)} must be a whole number from 1, but it was {shown(detail)}. Left out, it "
+            "is one a core."
         )
     return int(detail)
 
@@ -107,18 +112,7 @@ class Executor(ABC):
             raise WorkError(
                 "An executor must be open, but it is closed. Use it inside `with executor_for(...) as executor:`."
             )
-        candidates = np.asarray(candidates)
-        if candidates.ndim != 2 or candidates.dtype != np.float64:
-            raise ParameterError(
-                f"candidates must be a float64 array [candidate, parameter], but it was {candidates.dtype} of shape"
-                f" {candidates.shape}. A single candidate is parameters[np.newaxis]."
-            )
-        seeds = np.asarray(seeds)
-        if seeds.shape != candidates.shape[:1] or seeds.dtype != np.int64:
-            raise ParameterError(
-                f"seeds must be an int64 array with one seed for each of {len(candidates)} candidates, but it was"
-                f" {seeds.dtype} of shape {seeds.shape}. np.full(count, seed) gives the same seed to all."
-            )
+        candidates, seeds = check_candidates(candidates, seeds)
         return self._evaluate(candidates, seeds) if len(candidates) else np.empty((0, 0))
 
     @abstractmethod

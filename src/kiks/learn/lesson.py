@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, fields, replace
-from typing import Any
+from dataclasses import field, replace
+from typing import Annotated, Any
 
+from pydantic import BeforeValidator, Field
+
+from kiks.batch.beginning import Arenas, Starts
 from kiks.batch.timing import Timing
-from kiks.control.controller import SENSES, check_senses
+from kiks.control.controller import check_senses
 from kiks.control.measure import Measure
 from kiks.engine.motor import SPEED_MAX
-from kiks.errors import ParameterError, nearest, shown
-from kiks.model.arena import Arena
-from kiks.model.ranges import check_number
+from kiks.model.data_file import Number, Text, record
 from kiks.model.robot import SENSOR_COUNT
 
+_Watch = Annotated[Measure, Field(description="Write @kiks.measure over the function.")]
 
-@dataclass(frozen=True, eq=False)
+
+@record
 class Lesson:
     """What environments of all kinds are made of: a place, what is sensed there, what is good and when it is over.
 
@@ -35,34 +37,18 @@ class Lesson:
         ParameterError: If an argument is out of range.
     """
 
-    name: str
-    arenas: tuple[Arena, ...]
-    reward: Measure
-    goal: Measure | None = None
-    senses: tuple[str, ...] = ("proximity",)
-    starts: str = "random"
-    speed_limit: float = 10.0
+    name: Text
+    arenas: Arenas
+    reward: _Watch
+    goal: _Watch | None = None
+    senses: Annotated[tuple[Text, ...], BeforeValidator(check_senses), Field(min_length=1)] = ("proximity",)
+    starts: Starts = "random"
+    speed_limit: Annotated[Number, Field(gt=0, le=SPEED_MAX)] = 10.0
     timing: Timing = field(default_factory=Timing)
 
-    def __post_init__(self) -> None:
-        arenas: Arena | Sequence[Arena] = self.arenas
-        object.__setattr__(self, "arenas", tuple(arenas) if isinstance(arenas, Iterable) else (arenas,))
-        if not self.arenas or not all(isinstance(arena, Arena) for arena in self.arenas):
-            raise ParameterError(f"arenas must be one or more kiks.Arena, but they were {shown(arenas)}.")
-        for name, measure in (("reward", self.reward), ("goal", self.goal)):
-            if not (isinstance(measure, Measure) or (name == "goal" and measure is None)):
-                raise ParameterError(
-                    f"{name} must be a measure, but it was {shown(measure)}. Write @kiks.measure over the function."
-                )
-        object.__setattr__(self, "senses", check_senses(self.senses))
-        if not self.senses:
-            raise ParameterError(f"senses must be some of {', '.join(SENSES)}, but there were none.")
-        if not isinstance(self.starts, str) or self.starts not in ("random", "arena"):
-            raise ParameterError(f"starts must be 'random' or 'arena', but it was {shown(self.starts)}.")
-        if not isinstance(self.timing, Timing):
-            raise ParameterError(f"timing must be a kiks.Timing, but it was {shown(self.timing)}.")
-        if not check_number("speed_limit", self.speed_limit, 0, SPEED_MAX):
-            raise ParameterError("speed_limit must be above 0, but it was 0: robots that stand learn nothing.")
+    # Functions cannot be compared: a lesson equals itself alone.
+    __eq__ = object.__eq__
+    __hash__ = object.__hash__
 
     @property
     def sensor_count(self) -> int:
@@ -75,11 +61,4 @@ class Lesson:
         Raises:
             ParameterError: If one of them is unknown or out of range.
         """
-        known = tuple(entry.name for entry in fields(self))
-        for name in changes:
-            if name not in known:
-                raise ParameterError(
-                    f"what is changed of a lesson must be one of {', '.join(known)}, but it was {name!r}."
-                    f"{nearest(name, known)}"
-                )
         return replace(self, **changes)

@@ -21,7 +21,7 @@ from kiks.errors import ParameterError, shown
 from kiks.learn.algorithms import library
 from kiks.model.arrays import Numbers, read_arrays
 from kiks.model.data_file import Text, Whole, check, parse_json, read_file, record
-from kiks.model.files import make_folder, replace_file
+from kiks.model.files import make_folder, path_of, replace_file
 
 Floats = NDArray[np.float64]
 
@@ -80,7 +80,7 @@ class Folder:
     """
 
     def __init__(self, path: str | Path) -> None:
-        self.path = Path(path)
+        self.path = path_of(path, "folder")
         make_folder(self.path / GENERATIONS, "an evolution")
 
     def check_identity(self, identity: Identity) -> None:

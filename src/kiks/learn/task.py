@@ -5,26 +5,25 @@ from __future__ import annotations
 import hashlib
 import pickle
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import field, fields, replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from kiks.batch.batch import Batch
-from kiks.batch.beginning import random_starts
+from kiks.batch.beginning import Arenas, Starts, random_starts
 from kiks.batch.timing import Timing
 from kiks.control.controller import Controller
 from kiks.control.measure import Measure
-from kiks.errors import ParameterError
-from kiks.model.arena import Arena
-from kiks.model.data_file import Number, OneOf, Text, Whole, read_file, record
+from kiks.errors import ParameterError, shown
+from kiks.learn.work import Floats, Integers, check_candidates
+from kiks.model.arena import AnArena
+from kiks.model.data_file import Number, Text, Whole, read_file, record
+from kiks.model.ranges import check_number
 from kiks.model.robot import RobotSpec
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Fitness = Callable[[Mapping[str, Floats]], Floats]
 
 WORLDS_AT_ONCE = 20_000
@@ -35,11 +34,10 @@ CLEAR_MM = 8.0
 """How far from everything robots start at least [mm]."""
 
 
-WORLDS_MAX, ROBOTS_MAX = 100_000, 1000
-"""Most worlds of a candidate, and most robots in each."""
+WORLDS_MAX, ROBOTS_MAX, MEASURES_MAX = 100_000, 1000, 100
+"""Most worlds of a candidate, most robots in each, and most that is measured there."""
 
 Seconds = Annotated[Number, Field(ge=1e-3, le=1e6)]
-Starts = Annotated[str, OneOf(("random", "arena"))]
 
 
 @record
@@ -66,7 +64,7 @@ class Axis:
             raise ParameterError(f"an axis must lead from low to high, but it led from {self.low:g} to {self.high:g}.")
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Task:
     """A task that controllers are evolved for: a `kiks.learn.work.Work`.
 
@@ -105,51 +103,46 @@ class Task:
                [20.4, 20.4]])
     """
 
-    name: str
-    arenas: tuple[Arena, ...]
-    controller: Controller
-    measures: tuple[Measure, ...]
+    name: Text
+    arenas: Arenas
+    controller: Annotated[Controller, Field(description="Write @kiks.controller(parameters=COUNT) over the function.")]
+    measures: Annotated[tuple[Measure, ...], Field(min_length=1, max_length=MEASURES_MAX)]
     fitness: Fitness | None = None
-    seconds: float = 30.0
-    worlds: int = 1
+    seconds: Seconds = 30.0
+    worlds: Annotated[Whole, Field(ge=1, le=WORLDS_MAX)] = 1
     axes: tuple[Axis, ...] = ()
-    robot: str = "khepera"
-    robots: int = 1
+    robot: Text = "khepera"
+    robots: Annotated[Whole, Field(ge=1, le=ROBOTS_MAX)] = 1
     timing: Timing = field(default_factory=Timing)
-    starts: str = "random"
-    exam: Arena | None = None
-    about: str = ""
+    starts: Starts = "random"
+    exam: AnArena | None = None
+    about: Text = ""
     file: str = ""
 
+    # Functions cannot be compared: a task equals itself alone.
+    __eq__ = object.__eq__
+    __hash__ = object.__hash__
+
     def __post_init__(self) -> None:
-        given: Any = self.arenas
-        arenas = (given,) if isinstance(given, Arena) else tuple(given)
-        object.__setattr__(self, "arenas", arenas)
-        object.__setattr__(self, "measures", tuple(self.measures))
-        object.__setattr__(self, "axes", tuple(self.axes))
-        if not arenas or not all(isinstance(arena, Arena) for arena in arenas):
-            raise ParameterError(f"arenas must be one or more kiks.Arena, but they were {self.arenas!r:.80}.")
-        if not isinstance(self.controller, Controller) or not self.controller.parameter_count:
+        if not self.controller.parameter_count:
             raise ParameterError(
-                f"the controller of a task must have parameters, and say how many, but it was {self.controller!r}. "
-                "Write @kiks.controller(parameters=COUNT) over the function."
+                f"the controller of a task must have parameters, and say how many, but {shown(self.controller)} does "
+                "not. Write @kiks.controller(parameters=COUNT) over the function."
             )
-        if not isinstance(self.worlds, int) or self.worlds < 1 or self.worlds % len(arenas):
+        if self.worlds % len(self.arenas):
             raise ParameterError(
-                f"worlds must be a multiple of the number of arenas, {len(arenas)}, but it was {self.worlds!r}."
+                f"worlds must be a multiple of the number of arenas, {len(self.arenas)}, but it was {self.worlds}."
             )
-        if not (isinstance(self.seconds, int | float) and 1e-3 <= self.seconds <= 1e6):
-            raise ParameterError(f"seconds must be from 0.001 to 1e6, but it was {self.seconds!r}.")
-        if self.starts not in ("random", "arena") or (self.starts == "random" and self.robots > 1):
-            raise ParameterError(
-                f"starts must be 'random' or 'arena', with several robots 'arena', but it was {self.starts!r}."
-            )
+        if self.starts == "random" and self.robots > 1:
+            raise ParameterError("starts must be 'arena' with several robots, but it was 'random'.")
         names = self.measure_names
-        if not names or not all(isinstance(each, Measure) for each in self.measures) or len(set(names)) != len(names):
-            raise ParameterError(f"measures must be one or more, each with another name, but they were {names}.")
+        if len(set(names)) != len(names):
+            raise ParameterError(f"measures must have a name of their own each, but they were called {shown(names)}.")
         for axis in self.axes:
             if axis.measure not in names:
-                raise ParameterError(f"an axis must name one of {', '.join(names)}, but it named {axis.measure!r}.")
+                raise ParameterError(
+                    f"an axis must name one of {', '.join(names)}, but it named {shown(axis.measure)}."
+                )
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Functions go by value: a worker elsewhere has no file of the user's.
@@ -170,7 +163,7 @@ class Task:
     @property
     def measure_names(self) -> tuple[str, ...]:
         """What the measures are called."""
-        return tuple(getattr(each, "name", repr(each)) for each in self.measures)
+        return tuple(each.name for each in self.measures)
 
     @property
     def value_names(self) -> tuple[str, ...]:
@@ -219,13 +212,18 @@ class Task:
             Fitness, then the mean of each measure, float64 [candidate, 1 + measure].
 
         Raises:
-            ParameterError: If a measure or the fitness is no finite number, or the fitness has another shape.
+            ParameterError: If candidates or seeds have another shape, a measure or the fitness is no finite number, or
+                the fitness has another shape.
         """
+        candidates, seeds = check_candidates(candidates, seeds)
+        if not len(candidates):
+            return np.empty((0, len(self.value_names)))
+        seconds = self.seconds if seconds is None else check_number("seconds", seconds, 1e-3, 1e6)
         at_once = max(1, WORLDS_AT_ONCE // self.worlds)
         parts = []
         for first in range(0, len(candidates), at_once):
             part = slice(first, first + at_once)
-            parts.append(self._evaluate(candidates[part], seeds[part], threads, seconds or self.seconds))
+            parts.append(self._evaluate(candidates[part], seeds[part], threads, seconds))
         return np.concatenate(parts)
 
     def _evaluate(self, candidates: Floats, seeds: Integers, threads: int, seconds: float) -> Floats:
@@ -246,13 +244,13 @@ class Task:
         values = values.mean(axis=1).reshape(count, self.worlds, len(self.measures))
         for number, name in enumerate(self.measure_names):
             if not np.isfinite(values[:, :, number]).all():
-                raise ParameterError(f"measures must be finite, but {name!r} was not. Look at what it divides by.")
+                raise ParameterError(f"measures must be finite, but {shown(name)} was not. Look at what it divides by.")
         named = {name: values[:, :, number] for number, name in enumerate(self.measure_names)}
         made = cautious_mean(values[:, :, 0]) if self.fitness is None else self.fitness(named)
         fitness = np.asarray(made, np.float64)
         if fitness.shape != (count,) or not np.isfinite(fitness).all():
             raise ParameterError(
-                f"fitness must return a finite number for each of {count} candidates, but returned {made!r:.80}. The "
+                f"fitness must return a finite number for each of {count} candidates, but returned {shown(made)}. The "
                 "measures it gets are [candidate, world]: take a mean over axis 1."
             )
         return np.column_stack([fitness, values.mean(axis=1)])

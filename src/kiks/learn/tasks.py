@@ -17,6 +17,7 @@ from kiks.errors import ParameterError, nearest, shown
 from kiks.learn import mazes, rooms
 from kiks.learn.task import Axis, Task, cautious_mean
 from kiks.model.arena import Arena, Cylinder, Lamp
+from kiks.model.files import path_of
 
 Floats = NDArray[np.float64]
 Values = Mapping[str, Floats]
@@ -235,7 +236,7 @@ TASKS: dict[str, Callable[..., Task]] = {
 """The tasks that come with KiKS."""
 
 
-def load(name: str, controller: Controller | None = None) -> Task:
+def load(name: str | Path, controller: Controller | None = None) -> Task:
     """Return a task: by its name, or that of a file.
 
     A task file (.toml) may name a user's own controller, whose file is run. A Python file (.py) is run, and must hold a
@@ -248,6 +249,7 @@ def load(name: str, controller: Controller | None = None) -> Task:
     Raises:
         ParameterError: If there is no such task, or the file does not hold one.
     """
+    name = str(path_of(name, "the name of a task"))
     if name in TASKS:
         return TASKS[name](controller)
     path = Path(name)
@@ -263,6 +265,6 @@ def load(name: str, controller: Controller | None = None) -> Task:
         )
     task = getattr(module_in(path.absolute()), "task", None)
     if not isinstance(task, Task):
-        raise ParameterError(f"{name!r} must hold a `task = kiks.Task(...)`, but `task` was {shown(task)}.")
+        raise ParameterError(f"{shown(name)} must hold a `task = kiks.Task(...)`, but `task` was {shown(task)}.")
     task = replace(task, file=str(path.absolute()))
     return task if controller is None else replace(task, controller=controller)

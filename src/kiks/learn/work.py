@@ -6,10 +6,12 @@ import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+from kiks.errors import ParameterError
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -37,6 +39,37 @@ class Work(Protocol):
             Values [candidate, value].
         """
         ...
+
+
+def check_candidates(candidates: object, seeds: object) -> tuple[Floats, Integers]:
+    """Return what is evaluated, as arrays.
+
+    Args:
+        candidates: Parameters, float64 [candidate, parameter].
+        seeds: A seed for each, int64 [candidate].
+
+    Raises:
+        ParameterError: If they have not these shapes and types.
+    """
+    candidates, seeds = _array(candidates), _array(seeds)
+    if candidates.ndim != 2 or candidates.dtype != np.float64:
+        raise ParameterError(
+            f"candidates must be a float64 array [candidate, parameter], but it was {candidates.dtype} of shape"
+            f" {candidates.shape}. A single candidate is parameters[np.newaxis]."
+        )
+    if seeds.shape != candidates.shape[:1] or seeds.dtype != np.int64:
+        raise ParameterError(
+            f"seeds must be an int64 array with one seed for each of {len(candidates)} candidates, but it was"
+            f" {seeds.dtype} of shape {seeds.shape}. np.full(count, seed) gives the same seed to all."
+        )
+    return candidates, seeds
+
+
+def _array(values: object) -> NDArray[Any]:
+    try:
+        return np.asarray(values)
+    except ValueError:  # lists of different lengths
+        return np.empty(0, object)
 
 
 @dataclass(frozen=True)

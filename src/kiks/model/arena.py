@@ -9,13 +9,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import InstanceOf
 
 from kiks.errors import ArenaError, ParameterError, shown
 from kiks.model.box import Box
+from kiks.model.data_file import Rule
 from kiks.model.files import path_of
 from kiks.model.maze import draw_maze
 from kiks.model.places import Ball, Cylinder, Lamp, Pose, checked_places
@@ -90,7 +92,7 @@ class Arena:
         cells_per_pixel(given.shape[0], given.shape[1], self.mm_per_cell)
         if self.mm_per_cell > 1:
             raise ParameterError(
-                f"mm_per_cell must be at most 1, but it was {self.mm_per_cell!r}. "
+                f"mm_per_cell must be at most 1, but it was {shown(self.mm_per_cell)}. "
                 "Arena.from_array cuts coarser pixels into cells."
             )
         if given.all():
@@ -374,3 +376,7 @@ def _described(value: object) -> str:
     if isinstance(value, np.ndarray):
         return f"an array of {value.dtype} with {value.ndim} dimensions"
     return f"of type {type(value).__name__}"
+
+
+AnArena = Annotated[InstanceOf[Arena], Rule("a kiks.Arena")]
+"""An arena as a field of a record."""

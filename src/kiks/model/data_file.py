@@ -13,7 +13,7 @@ import json
 import re
 import tomllib
 import types
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
 from typing import (
@@ -29,6 +29,7 @@ from typing import (
     get_type_hints,
 )
 
+import numpy as np
 import pydantic.dataclasses
 from pydantic import ConfigDict, Field, Strict, Tag, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
@@ -71,7 +72,7 @@ def record(kind: type[_Model]) -> type[_Model]:
 
     Rules between fields stand in `__post_init__`, which raises a ParameterError.
     """
-    config = ConfigDict(extra="forbid", allow_inf_nan=False)
+    config = ConfigDict(extra="forbid", allow_inf_nan=False, arbitrary_types_allowed=True)
     made: Any = pydantic.dataclasses.dataclass(frozen=True, config=config)(kind)
     initialise = made.__init__
 
@@ -79,7 +80,7 @@ def record(kind: type[_Model]) -> type[_Model]:
         try:
             initialise(self, *args, **values)
         except ValidationError as error:
-            raise ParameterError(_sentence(made, error)) from None
+            raise ParameterError(_sentence(made, error, whole=kind.__name__)) from None
 
     made.__init__ = checked
     return made  # type: ignore[no-any-return]
@@ -129,6 +130,11 @@ def descriptions(kind: Any) -> dict[str, str]:
     places = {name: _declared(hint) for name, hint in _hints(kind).items()}
     texts = {name: f"{_rule(place)}. {place.description}".rstrip() for name, place in places.items()}
     return {name: text[0].upper() + text[1:] for name, text in texts.items()}
+
+
+def as_list(values: object) -> object:
+    """Return the numbers of an array as a list, anything else as it is: records hold no arrays."""
+    return values.tolist() if isinstance(values, np.ndarray) else values
 
 
 # ---- bytes ----
@@ -233,13 +239,13 @@ def one_line(failure: BaseException) -> str:
 # ---- what a message says of a broken rule ----
 
 
-def _sentence(model: type[Any], error: ValidationError, advice: str = "") -> str:
+def _sentence(model: type[Any], error: ValidationError, advice: str = "", whole: str = "the file") -> str:
     """Return rule, value and way out of the first rule that is broken; an unknown key comes before all others."""
     found = error.errors(include_url=False)
     first = next((each for each in found if each["type"] in _UNKNOWN), found[0])
     kind, given = first["type"], first["input"]
     path, place = _place(model, first["loc"])
-    name = _named(model, path) or "the file"
+    name = _named(model, path) or whole
     if kind in _UNKNOWN:
         key, known = str(first["loc"][-1]), list(_hints(place.base))
         rule = f"{name} must have known keys only, but it has {shown(key)}."
@@ -365,7 +371,8 @@ def _rule(place: _Place) -> str:
         inner = _declared(get_args(base)[0])
         low, high = limits.get("min_length", 0), limits.get("max_length")
         count = f"{low} " if low == high else f"{low} to {high} " if high else f"{low} or more " if low else ""
-        of = f", each {_rule(inner)}" if not _hints(inner.base) else ""
+        is_table = _hints(inner.base) and not any(isinstance(bound, Rule) for bound in inner.bounds)
+        of = "" if is_table else f", each {_rule(inner)}"
         return f"a list of {count}{'tables' if not of else 'values'}{of}"
     if base is str:
         count = f"{'1 to' if 'min_length' in limits else 'up to'} {limits.get('max_length', TEXT_MAX)}"
@@ -375,7 +382,10 @@ def _rule(place: _Place) -> str:
     if base in (int, float):
         span = _span(limits)
         return f"a {'whole ' if base is int else '' if span else 'finite '}number{span}"
-    return "a table"
+    if base is Callable or get_origin(base) is Callable:
+        return "a function"
+    is_other = isinstance(base, type) and base.__module__.startswith("kiks.") and not _hints(base)
+    return f"a kiks.{base.__name__}" if is_other else "a table"
 
 
 _LIMITS = ("ge", "gt", "le", "lt", "min_length", "max_length")

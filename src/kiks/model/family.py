@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, shown
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
 
 
@@ -41,11 +41,11 @@ def family(
         3
     """
     if not isinstance(count, int) or count < 1:
-        raise ParameterError(f"count must be a whole number from 1, but it was {count!r}.")
+        raise ParameterError(f"count must be a whole number from 1, but it was {shown(count)}.")
     shares = {"gain_spread": gain_spread, "wheel_spread": wheel_spread, "motor_spread": motor_spread}
     for name, share in (shares | {"dead_share": dead_share}).items():
         if not (isinstance(share, int | float) and 0.0 <= share <= 0.9):
-            raise ParameterError(f"{name} must be a share from 0 to 0.9, but it was {share!r}.")
+            raise ParameterError(f"{name} must be a share from 0 to 0.9, but it was {shown(share)}.")
     rng = np.random.default_rng(seed)
 
     def spread(share: float, values: tuple[float, ...]) -> tuple[float, ...]:

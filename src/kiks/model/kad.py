@@ -104,7 +104,7 @@ def encode_kad(arena: Arena) -> bytes:
 
     if arena.mm_per_cell != 1.0 or max(arena.brightness.shape) > 65535:
         raise ArenaError(
-            f"A .kad file has cells of 1 mm, at most 65535 side by side, but arena {arena.name!r} has "
+            f"A .kad file has cells of 1 mm, at most 65535 side by side, but arena {shown(arena.name)} has "
             f"{arena.brightness.shape[1]} x {arena.brightness.shape[0]} of {arena.mm_per_cell:g} mm. Save it as .kiks."
         )
     variables: dict[str, npt.NDArray[Any]] = {"walls": _walls(arena.brightness)}

@@ -9,10 +9,10 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, InstanceOf
+from pydantic import AfterValidator, Field
 
 from kiks.errors import ArenaError, KiksError, ParameterError, nearest, shown
-from kiks.model.arena import Arena
+from kiks.model.arena import AnArena, Arena
 from kiks.model.arena_file import (
     THINGS_MAX,
     Balls,
@@ -137,7 +137,7 @@ class Project:
         ('gripper',)
     """
 
-    arena: Annotated[InstanceOf[Arena], Rule("a kiks.Arena")] = Field(default_factory=Arena.default)
+    arena: AnArena = Field(default_factory=Arena.default)
     robots: Robots = (ProjectRobot(),)
     seed: Seed = 0
     thinking: ThinkingPolicy = "none"

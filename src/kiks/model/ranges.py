@@ -1,4 +1,4 @@
-"""Numbers that a caller gives: each has a range, and one line says so where it is not kept.
+"""What a caller gives: each number has a range, each object a type, and one line says so where it is another.
 
 All that enters the engine from Python passes one of these checks, so no kernel needs to ask.
 """
@@ -6,7 +6,7 @@ All that enters the engine from Python passes one of these checks, so no kernel 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,9 @@ from kiks.errors import ParameterError, shown
 
 SECONDS_MAX = 1e9
 """Longest time that may pass at once [s]: a clock of 64 bits counts nine of them in nanoseconds."""
+
+CLOCK_END_NS = 4 * 10**18
+"""Last time that a clock may be told to reach [ns]; four times `SECONDS_MAX`, and less than its 64 bits hold."""
 
 HEADING_KEPT_RAD = 1e6
 """Headings up to this stay as they are: their sines are exact (`kiks.engine.numbers`), and turns may be counted."""
@@ -66,6 +69,30 @@ def check_count(name: str, count: object, least: int = 0, most: int = 1_000_000,
     raise ParameterError(
         f"{name} must be a whole number from {least} to {most}, but it was {shown(count)}.{advice and ' ' + advice}"
     )
+
+
+_Kind = TypeVar("_Kind")
+
+
+def check_kind(name: str, value: object, kind: type[_Kind], advice: str = "") -> _Kind:
+    """Return a value of a type.
+
+    Args:
+        name: What it is called in the message.
+        value: The value.
+        kind: The type.
+        advice: What else the message says.
+
+    Raises:
+        ParameterError: If it is of another type.
+    """
+    if isinstance(value, kind):
+        return value
+    wanted = _KINDS.get(kind, f"a {kind.__module__.partition('.')[0]}.{kind.__name__}")
+    raise ParameterError(f"{name} must be {wanted}, but it was {shown(value)}.{advice and ' ' + advice}")
+
+
+_KINDS: dict[type, str] = {str: "a text", bytes: "bytes"}
 
 
 def check_heading(name: str, heading_rad: object) -> float:

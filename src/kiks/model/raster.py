@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from kiks.errors import ArenaError, ParameterError
+from kiks.errors import ArenaError, ParameterError, shown
 
 PAD = 2
 """Wall cells that stand around the raster in `Arena.surface` and `Arena.clearance`: the world outside is wall.
@@ -55,7 +55,7 @@ def cells_per_pixel(row_count: int, column_count: int, mm_per_pixel: float) -> i
     if not is_number(mm_per_pixel) or not MM_PER_PIXEL_MIN <= mm_per_pixel <= MM_PER_PIXEL_MAX:
         raise ParameterError(
             f"mm_per_pixel must be a number from {MM_PER_PIXEL_MIN:g} to {MM_PER_PIXEL_MAX:g}, but it was "
-            f"{mm_per_pixel!r}. Most arenas are drawn with 1 mm per pixel."
+            f"{shown(mm_per_pixel)}. Most arenas are drawn with 1 mm per pixel."
         )
     shape = f"{column_count} x {row_count} pixels of {mm_per_pixel:g} mm"
     # The tiny allowance is for products such as 1429 * 0.07 that fall a rounding error short.

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from kiks.errors import ParameterError, nearest
+from kiks.errors import ParameterError, nearest, shown
 from kiks.model.data_file import Text, check, parse_toml, read_file, record
 from kiks.model.files import path_of
 from kiks.model.robot_parts import (
@@ -99,7 +99,8 @@ class RobotSpec:
             data = read_file(path, what)
         else:
             raise ParameterError(
-                f"robot must be one of {known} or a TOML file, but it was {source!r}.{nearest(source, known)} Copy a "
+                f"robot must be one of {known} or a TOML file, but it was {shown(source)}.{nearest(source, known)} "
+                "Copy a "
                 "robot of ours to begin with one of your own."
             )
         spec = check(RobotSpec, parse_toml(data, what), what, advice=_ADVICE)
@@ -109,7 +110,9 @@ class RobotSpec:
         response = self.proximity.response
         is_known = response not in ("curve", "reflection") or getattr(self, response) is not None
         if not is_known:
-            raise ParameterError(f"proximity.response {response!r} needs a section [{response}], but there is none.")
+            raise ParameterError(
+                f"proximity.response {shown(response)} needs a section [{response}], but there is none."
+            )
         for number, radius_mm in enumerate(self.proximity.mount_radius_mm):
             if radius_mm > self.body.radius_mm:
                 raise ParameterError(
@@ -152,7 +155,7 @@ class RobotSpec:
             if not isinstance(table.get(section), dict):
                 sections = [known for known, values in table.items() if isinstance(values, dict)]
                 raise ParameterError(
-                    f"a change must be named 'section__key' of a section that the robot has, but it was {name!r}. "
+                    f"a change must be named 'section__key' of a section that the robot has, but it was {shown(name)}. "
                     f"Sections: {sections}."
                 )
             table[section][key] = value
@@ -188,7 +191,7 @@ def specs_of(
     count = len(named) if robots is None else robots
     if not isinstance(count, int) or not 1 <= count <= 1000:
         raise ParameterError(
-            f"robots must be a whole number from 1 to 1000, but it was {count!r}. Say how many you need."
+            f"robots must be a whole number from 1 to 1000, but it was {shown(count)}. Say how many you need."
         )
     if len(named) not in (1, count):
         raise ParameterError(

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 import numpy.typing as npt
 
-from kiks.errors import ArenaError
+from kiks.errors import ArenaError, shown
 from kiks.model.arena import PAD, Arena
 from kiks.model.raster import between, clearance_mm
 
@@ -77,7 +77,8 @@ def free_place(
     is_free = room >= radius_mm
     if not is_free.any():
         raise ArenaError(
-            f"There must be room for {what}, {2 * radius_mm:g} mm across, but in arena {arena.name!r} is none. Take a "
+            f"There must be room for {what}, {2 * radius_mm:g} mm across, but in arena {shown(arena.name)} is none. "
+            "Take a "
             "larger one, or take something away."
         )
     if near is None:

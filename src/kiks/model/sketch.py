@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from kiks.errors import ArenaError, KiksError, ParameterError
+from kiks.errors import ArenaError, KiksError, ParameterError, shown
 from kiks.model.arena import Arena
 from kiks.model.brush import Area, Point, rectangle_cells, stroke_cells
 from kiks.model.materials import brightness_of
@@ -210,7 +210,7 @@ class Sketch:
             ArenaError: If something stands there, or no floor would remain.
         """
         if not is_number(width_mm) or not 0 < width_mm <= WIDTH_MAX_MM:
-            raise ParameterError(f"width_mm must be above 0 and up to {WIDTH_MAX_MM:g}, but it was {width_mm!r}.")
+            raise ParameterError(f"width_mm must be above 0 and up to {WIDTH_MAX_MM:g}, but it was {shown(width_mm)}.")
         if not 1 <= len(points_mm) <= POINTS_MAX:
             raise ParameterError(
                 f"points_mm must be 1 to {POINTS_MAX} points, but they were {len(points_mm)}. Draw in shorter strokes."
@@ -230,13 +230,13 @@ class Sketch:
     def _cells(self, points_mm: Sequence[Point]) -> list[Point]:
         for point in points_mm:
             if len(point) != 2 or not all(is_number(value) and abs(value) <= _FAR_MM for value in point):
-                raise ParameterError(f"A point must be x and y, up to {_FAR_MM:g} mm away, but it was {point!r}.")
+                raise ParameterError(f"A point must be x and y, up to {_FAR_MM:g} mm away, but it was {shown(point)}.")
         return [(x_mm / self._canvas.mm_per_cell, y_mm / self._canvas.mm_per_cell) for x_mm, y_mm in points_mm]
 
     def _paint(self, areas: Iterable[Area], brightness: int | str) -> None:
         grey = brightness_of(brightness)
         if isinstance(grey, bool) or not isinstance(grey, int) or not 0 <= grey <= 255:
-            raise ParameterError(f"brightness must be 0 (floor) to 255 or a material, but it was {brightness!r}.")
+            raise ParameterError(f"brightness must be 0 (floor) to 255 or a material, but it was {shown(brightness)}.")
         covered = list(areas)
         if not covered:
             return
@@ -332,7 +332,9 @@ class Sketch:
 
     def _thing(self, number: int) -> Thing:
         if number not in self.things:
-            raise ParameterError(f"number must be that of a thing, but it was {number!r}. There are {[*self.things]}.")
+            raise ParameterError(
+                f"number must be that of a thing, but it was {shown(number)}. There are {[*self.things]}."
+            )
         return self.things[number]
 
     def _add(self, thing: Thing) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kiks.errors import LinkError
+from kiks.errors import LinkError, shown
 from kiks.sim.simulation import Simulation
 
 
@@ -59,7 +59,7 @@ class Names:
             if not free:
                 known = self._told | {found: robot for (who, found), robot in self._found.items() if who == program}
                 raise LinkError(
-                    f"a port must belong to a robot, but {name!r} is one more than there are: {known}. "
+                    f"a port must belong to a robot, but {shown(name)} is one more than there are: {known}. "
                     f"Run it with --robots {self._sim.robot_count + 1}, or map two names to one robot with --map."
                 )
             self._found[program, name] = free[0]
@@ -70,12 +70,13 @@ class Names:
 
         if "?" in name:
             raise LinkError(
-                f"a port's name must be without options where several programs share a world, but it was {name!r}. "
+                f"a port's name must be without options where several programs share a world, but it was "
+                f"{shown(name)}. "
                 f"Give the options to kiks run."
             )
         port = find_port(name)
         if port.sim is not self._sim:
             raise LinkError(
-                f"a port must belong to the world that the programs share, but it was {name!r}. Open 'kiks://1'."
+                f"a port must belong to the world that the programs share, but it was {shown(name)}. Open 'kiks://1'."
             )
         return port.robot

@@ -8,14 +8,19 @@ program's thinking, asking and waiting cost; the line lets that time pass and ca
 from __future__ import annotations
 
 from contextlib import AbstractContextManager
+from operator import index
 from typing import Any, Protocol
 
 from kiks.clock.program import Program
+from kiks.errors import ParameterError, shown
 from kiks.model.ranges import SECONDS_MAX, check_count, check_number
 from kiks.units import ns_from_s, s_from_ns
 
 BAUD_MIN = 75
 BAUD_MAX = 4_000_000
+
+ZEROS_MAX = 1_000_000
+"""Most zeros that a number in place of bytes stands for."""
 
 
 class Line(Protocol):
@@ -123,7 +128,14 @@ class VirtualPort:
             self._line.set_baud(baud)
 
     def write(self, data: bytes) -> int:
-        """Send characters; return how many. They leave one after the other while the program goes on."""
+        """Send characters; return how many. They leave one after the other while the program goes on.
+
+        Raises:
+            TypeError: If they are a text; as pyserial has it.
+            ParameterError: If they are no characters.
+        """
+        if data.__class__ is not bytes:
+            data = _characters(data)
         line, program = self._line, self._program
         with line.lock:
             if program.thinks:
@@ -139,7 +151,7 @@ class VirtualPort:
         Raises:
             LinkError: If there is no time-out and no reply can come any more.
         """
-        return self._read(size, None)
+        return self._read(_count(size), None)
 
     def read_until(self, expected: bytes = b"\n", size: int | None = None) -> bytes:
         """Return everything up to and including a terminator, less if the time-out is over first.
@@ -147,7 +159,9 @@ class VirtualPort:
         Raises:
             LinkError: If there is no time-out and no reply can come any more.
         """
-        return self._read(size, expected)
+        if expected.__class__ is not bytes:
+            expected = _characters(expected)
+        return self._read(None if size is None else _count(size), expected)
 
     def readline(self, size: int | None = -1) -> bytes:
         """Return a line with its end, or what came of it before the time-out.
@@ -155,7 +169,7 @@ class VirtualPort:
         Raises:
             LinkError: If there is no time-out and no reply can come any more.
         """
-        return self._read(None if size is None or size < 0 else size, b"\n")
+        return self._read(None if size is None or (count := index(size)) < 0 else count, b"\n")
 
     @property
     def in_waiting(self) -> int:
@@ -247,3 +261,25 @@ class VirtualPort:
             data = line.read(size, terminator, timeout_ns, poll_ns)
             program.leave(has_acted=bool(data))
         return data
+
+
+def _characters(data: Any) -> bytes:
+    """Return what a program hands over as pyserial takes it: bytes, or numbers from 0 to 255.
+
+    Raises:
+        TypeError: If it is a text.
+        ParameterError: If it is neither.
+    """
+    if isinstance(data, str):
+        raise TypeError(f"unicode strings are not supported, please encode to bytes: {shown(data)}")
+    if isinstance(data, int):
+        check_count("a count of zeros", data, most=ZEROS_MAX)  # As pyserial has it: a number is so many zeros.
+    try:
+        return bytes(data)
+    except (TypeError, ValueError, OverflowError):
+        raise ParameterError(f"data must be bytes, or numbers from 0 to 255, but it was {shown(data)}.") from None
+
+
+def _count(size: Any) -> int:
+    """Return how many characters are wanted; TypeError if it is no whole number, as pyserial has it."""
+    return max(index(size), 0)

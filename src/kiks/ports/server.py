@@ -12,7 +12,7 @@ from kiks.clock.line import BACKLOG_LIMIT
 from kiks.clock.pace import Pace
 from kiks.clock.patience import Patience
 from kiks.clock.thinking import ThinkingFixed, parse_thinking
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, shown
 from kiks.ports.endpoint import Endpoint
 from kiks.ports.lockstep import Lockstep
 from kiks.ports.port import BAUD_MAX, BAUD_MIN
@@ -231,7 +231,7 @@ def _fixed_ns(thinking: str) -> int:
     policy = parse_thinking(thinking)
     if not isinstance(policy, ThinkingFixed):
         raise ParameterError(
-            f"thinking of a server must be 'live', 'none' or 'fixed:MS', but it was {thinking!r}. "
+            f"thinking of a server must be 'live', 'none' or 'fixed:MS', but it was {shown(thinking)}. "
             "The other policies are for ports in memory."
         )
     return policy.time_ns
@@ -241,7 +241,7 @@ def _check_programs(programs: int, robots: int) -> int:
     if not isinstance(programs, int) or not 1 <= programs <= max(robots, 1):
         raise ParameterError(
             f"programs must be a whole number from 1 to {max(robots, 1)}, the number of robots, but it was "
-            f"{programs!r}. Each program has a robot of its own."
+            f"{shown(programs)}. Each program has a robot of its own."
         )
     return programs
 
@@ -249,6 +249,7 @@ def _check_programs(programs: int, robots: int) -> int:
 def _index(sim: Simulation, robot: int) -> int:
     if not isinstance(robot, int) or not 1 <= robot <= sim.robot_count:
         raise ParameterError(
-            f"endpoints must be those of robots 1 to {sim.robot_count}, but one was of robot {robot!r}. Count from 1."
+            f"endpoints must be those of robots 1 to {sim.robot_count}, but one was of robot {shown(robot)}. Count "
+            "from 1."
         )
     return robot - 1

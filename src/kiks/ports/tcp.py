@@ -7,7 +7,7 @@ import logging
 import re
 import socket
 
-from kiks.errors import LinkError, ParameterError
+from kiks.errors import LinkError, ParameterError, shown
 from kiks.ports.descriptors import RESERVE, opening
 from kiks.ports.endpoint import READ_SIZE, Channel, Endpoint
 
@@ -32,12 +32,12 @@ class TcpEndpoint(Endpoint):
     def __init__(self, port: int, *, host: str = "127.0.0.1") -> None:
         if not isinstance(port, int) or not 0 <= port <= 65535:
             raise ParameterError(
-                f"port must be a whole number from 0 to 65535, but it was {port!r}. 0 takes a free one."
+                f"port must be a whole number from 0 to 65535, but it was {shown(port)}. 0 takes a free one."
             )
         host = "127.0.0.1" if host == "localhost" else host
         if not _is_loopback(host):
             raise LinkError(
-                f"host must be an address that only this computer reaches, but it was {host!r}: whoever reaches "
+                f"host must be an address that only this computer reaches, but it was {shown(host)}: whoever reaches "
                 "the port can drive the robot. Use 127.0.0.1, and an SSH tunnel from elsewhere."
             )
         with opening("a TCP port"):

@@ -32,7 +32,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 
 from kiks.clock.patience import Patience
-from kiks.errors import ParameterError, nearest
+from kiks.errors import ParameterError, nearest, shown
 from kiks.ports.reading import NEVER_NS
 from kiks.sim.simulation import Simulation
 
@@ -351,7 +351,7 @@ def check_policy(when_silent: str, patience_s: float) -> None:
     """
     if when_silent not in POLICIES:
         raise ParameterError(
-            f"when_silent must be 'wait', 'drop' or 'ignore', but it was {when_silent!r}."
+            f"when_silent must be 'wait', 'drop' or 'ignore', but it was {shown(when_silent)}."
             f"{nearest(str(when_silent), POLICIES)}"
         )
     Patience(patience_s)

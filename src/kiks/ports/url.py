@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl, urlsplit
 
-from kiks.errors import LinkError, ParameterError, nearest
+from kiks.errors import LinkError, ParameterError, nearest, shown
 from kiks.sim.table import TABLE
 
 if TYPE_CHECKING:
@@ -37,7 +37,8 @@ def find_port(url: str) -> SimPort:
     name, number = (parts.netloc, path) if path else ("", parts.netloc)
     if parts.scheme != "kiks" or not (number.isascii() and number.isdigit()):
         raise LinkError(
-            f"a simulated port must be named like 'kiks://1', but it was {url!r}. The number is the robot's, from 1."
+            f"a simulated port must be named like 'kiks://1', but it was {shown(url)}. The number is the robot's, "
+            "from 1."
         )
     options = dict(parse_qsl(parts.query, keep_blank_values=True))
     if options:
@@ -50,7 +51,8 @@ def find_port(url: str) -> SimPort:
     if not 1 <= robot <= sim.robot_count:
         known = "robot 1 only" if sim.robot_count == 1 else f"robots 1 to {sim.robot_count}"
         raise LinkError(
-            f"a port must belong to a robot there is, but {url!r} names robot {robot} and the simulation has {known}. "
+            f"a port must belong to a robot there is, but {shown(url)} names robot {robot} and the simulation has "
+            f"{known}. "
             f"Open {sim.url(min(max(robot, 1), sim.robot_count))!r}, or create it with more robots."
         )
     return SimPort(sim, robot)
@@ -64,12 +66,13 @@ def _fresh(options: dict[str, str], url: str) -> Simulation:
     for key, value in options.items():
         if key not in _OPTIONS:
             raise ParameterError(
-                f"an option of {url!r} must be one of {list(_OPTIONS)}, but it was {key!r}.{nearest(key, _OPTIONS)}"
+                f"an option of {shown(url)} must be one of {list(_OPTIONS)}, but it was "
+                f"{shown(key)}.{nearest(key, _OPTIONS)}"
             )
         if key in ("robots", "seed"):
             if not (value.isascii() and value.isdigit()):
                 raise ParameterError(
-                    f"option {key} of {url!r} must be a whole number, but it was {value!r}. Write {key}=1."
+                    f"option {key} of {shown(url)} must be a whole number, but it was {shown(value)}. Write {key}=1."
                 )
             settings[key] = int(value)
         else:

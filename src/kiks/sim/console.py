@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from kiks.clock.line import BACKLOG_LIMIT
-from kiks.errors import LinkError, ParameterError
+from kiks.errors import LinkError, ParameterError, shown
 from kiks.firmware.receiver import LINE_LIMIT
 from kiks.sim.simulation import Simulation
 from kiks.units import s_from_ns
@@ -73,7 +73,7 @@ def type_lines(sim: Simulation, robot: int, text: str) -> list[Typed]:
     for line in lines:
         if not (line.isascii() and line.isprintable() and len(line) <= LINE_LIMIT):
             raise ParameterError(
-                f"a command must be at most {LINE_LIMIT} plain letters, digits and signs, but it was {line!r}. "
+                f"a command must be at most {LINE_LIMIT} plain letters, digits and signs, but it was {shown(line)}. "
                 "Type D,5,5 to drive."
             )
     with sim.lock:

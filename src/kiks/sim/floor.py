@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from kiks.engine import contact
 from kiks.engine.numbers import uniform
 from kiks.engine.state import BALL, State
-from kiks.errors import ArenaError, ParameterError
+from kiks.errors import ArenaError, ParameterError, shown
 from kiks.model.arena import Arena
 from kiks.model.ranges import check_number
 from kiks.model.robot import RobotSpec
@@ -103,7 +103,7 @@ class Floor:
             obstacle = self._obstacle(start.x_mm, start.y_mm, radius_mm, robots, overlap_mm=PRESSED_MM)
             if obstacle is not None:
                 raise ArenaError(
-                    f"Arena {self.arena.name!r}: start {index + 1} at ({start.x_mm:g}, {start.y_mm:g}) mm must be "
+                    f"Arena {shown(self.arena.name)}: start {index + 1} at ({start.x_mm:g}, {start.y_mm:g}) mm must be "
                     f"free, but {self._is_inside(obstacle)}. Move it."
                 )
             return start
@@ -123,7 +123,7 @@ class Floor:
             if self._obstacle(x, y, radius_mm, others) is None:
                 return x, y, 2 * math.pi * turn
         raise ArenaError(
-            f"Arena {self.arena.name!r} must have room for {count} robots, but {ATTEMPTS} random places for "
+            f"Arena {shown(self.arena.name)} must have room for {count} robots, but {ATTEMPTS} random places for "
             f"robot {index + 1} were all taken. Ask for fewer, give start poses, or take a larger arena."
         )
 

@@ -19,7 +19,7 @@ from kiks.firmware.khepera import Firmware
 from kiks.firmware.radio import Radio, deliver
 from kiks.firmware.turret import Turret
 from kiks.model.arena import Arena
-from kiks.model.ranges import SECONDS_MAX, check_count, check_number
+from kiks.model.ranges import CLOCK_END_NS, SECONDS_MAX, check_count, check_number
 from kiks.model.robot import SENSOR_COUNT, RobotSpec, specs_of
 from kiks.sim.cameras import Cameras
 from kiks.sim.explanation import Explanation, LightExplanation, explain_ambient, explain_proximity
@@ -151,7 +151,13 @@ class Simulation(Things):
             self.advance_to(self.now_ns + passing_ns)
 
     def advance_to(self, time_ns: int) -> None:
-        """Let time pass up to a time [ns]; nothing happens if it is over already."""
+        """Let time pass up to a time [ns]; nothing happens if it is over already.
+
+        Raises:
+            ParameterError: If it is no whole number, or beyond the end of the clock.
+        """
+        if not (time_ns.__class__ is int and time_ns <= CLOCK_END_NS):
+            time_ns = check_count("time_ns", time_ns, -CLOCK_END_NS, CLOCK_END_NS)
         gate = self.gate
         if gate is not None and gate.is_up:
             while (until_ns := gate.admit(self.now_ns, time_ns)) < time_ns:
@@ -293,7 +299,7 @@ class Simulation(Things):
             there = [each for each in firmware.fitted if each.number == fitted.number]
             if there:
                 raise ParameterError(
-                    f"turret must be one that robot {robot} has not got, but {there[0].name!r} has its number, "
+                    f"turret must be one that robot {robot} has not got, but {shown(there[0].name)} has its number, "
                     f"{fitted.number}. Give a turret of your own another, 24 to 31."
                 )
             fitted.fit(Place(self, index, fitted, first_memory(fitted, firmware.fitted)))

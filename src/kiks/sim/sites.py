@@ -157,10 +157,13 @@ def _check(turret: Turret) -> None:
     number, name = getattr(turret, "number", None), getattr(turret, "name", None)
     if not isinstance(number, int) or not 0 <= number <= 99:
         raise ParameterError(
-            f"number of a turret must be a whole number from 0 to 99, but it was {number!r}. 24 to 31 are for users."
+            f"number of a turret must be a whole number from 0 to 99, but it was {shown(number)}. 24 to 31 are for "
+            "users."
         )
     if not isinstance(name, str) or not name.isascii() or not name.isprintable() or not name:
-        raise ParameterError(f"name of a turret must be a line of ASCII, but it was {name!r}. Tool 'net' prints it.")
+        raise ParameterError(
+            f"name of a turret must be a line of ASCII, but it was {shown(name)}. Tool 'net' prints it."
+        )
     revision = turret.revision
     is_pair = isinstance(revision, tuple) and len(revision) == 2
     if not is_pair or not all(isinstance(part, int) and part >= 0 for part in revision):
@@ -170,11 +173,12 @@ def _check(turret: Turret) -> None:
     for letter, row in turret.orders.items():
         if len(letter) != 1 or not "A" <= letter <= "Z" or letter == "B":
             raise ParameterError(
-                f"orders of a turret must be capital letters other than B, but one was {letter!r}. B is its revision."
+                f"orders of a turret must be capital letters other than B, but one was {shown(letter)}. B is its "
+                "revision."
             )
         if not isinstance(row, tuple) or len(row) != 2 or not isinstance(row[0], int) or not callable(row[1]):
             raise ParameterError(
-                f"orders of a turret must be a count of numbers and a function, but {letter} was {row!r}. "
+                f"orders of a turret must be a count of numbers and a function, but {letter} was {shown(row)}. "
                 "Write 'orders = {\"R\": (0, read)}'."
             )
 
@@ -188,7 +192,8 @@ def first_memory(turret: Turret, fitted: list[Turret]) -> int:
     first = sum(each.memory_count for each in fitted)
     if not isinstance(turret.memory_count, int) or not 0 <= turret.memory_count <= MEMORY_COUNT - first:
         raise ParameterError(
-            f"memory_count of a turret must be at most {MEMORY_COUNT - first}, but it was {turret.memory_count!r}. "
+            f"memory_count of a turret must be at most {MEMORY_COUNT - first}, but it was "
+            f"{shown(turret.memory_count)}. "
             f"All turrets of a robot share {MEMORY_COUNT} numbers."
         )
     return first

@@ -9,10 +9,14 @@ from __future__ import annotations
 import weakref
 from typing import TYPE_CHECKING
 
-from kiks.errors import LinkError, nearest
+from kiks.errors import LinkError, shown
 
 if TYPE_CHECKING:
     from kiks.sim.simulation import Simulation
+
+
+SHOWN_NAMES = 5
+"""How many of the simulations that are alive a message names: the newest."""
 
 
 class Table:
@@ -37,9 +41,10 @@ class Table:
         """
         sim = self._simulations.get(name)
         if sim is None:
-            known = sorted(self._simulations)
+            known = sorted(self._simulations, key=lambda name: int(name[3:]))[-SHOWN_NAMES:]
+            alive = " or ".join(known) or "none now"
             raise LinkError(
-                f"a simulation's name must be one of {known}, but it was {name!r}.{nearest(name, known)} "
+                f"a simulation's name must be one that is alive, such as {alive}, but it was {shown(name)}. "
                 f"'kiks://1' without a name is robot 1 of the newest simulation."
             )
         return sim

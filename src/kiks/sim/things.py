@@ -55,7 +55,7 @@ class Things(World):
             try:
                 self._add(body, PRESSED_MM)
             except ParameterError as error:
-                raise ArenaError(f"Arena {arena.name!r}: {error}") from None
+                raise ArenaError(f"Arena {shown(arena.name)}: {error}") from None
 
     @property
     def lamps(self) -> NDArray[np.float64]:

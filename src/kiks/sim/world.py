@@ -17,7 +17,7 @@ from kiks.engine.scene import enter_everybody, make_scene
 from kiks.engine.state import State
 from kiks.errors import ParameterError, shown
 from kiks.model.arena import PAD, Arena
-from kiks.model.ranges import check_heading, check_number, wrapped
+from kiks.model.ranges import check_heading, check_kind, check_number, wrapped
 from kiks.model.robot import RobotSpec
 from kiks.model.room import OVERLAP_MM
 from kiks.sim.floor import Floor
@@ -300,7 +300,4 @@ def check_kinds(kinds: object, response: object = None) -> None:
 
 def check_arena(arena: object) -> None:
     """Raise a ParameterError unless this is an arena."""
-    if not isinstance(arena, Arena):
-        raise ParameterError(
-            f"arena must be a kiks.Arena, but it was {shown(arena)}. Read a file with kiks.Arena.load(path)."
-        )
+    check_kind("arena", arena, Arena, "Read a file with kiks.Arena.load(path).")

@@ -7,7 +7,7 @@ from typing import Any
 # pyserial imports this module itself, when a program opens such a name: it is there already.
 from serial import PortNotOpenError, SerialBase, SerialException  # noqa: TID253
 
-from kiks.errors import KiksError
+from kiks.errors import KiksError, shown
 from kiks.ports import url
 from kiks.ports.port import VirtualPort
 
@@ -35,7 +35,7 @@ class Serial(SerialBase):  # type: ignore[misc, unused-ignore]
             raise SerialException(f"port {self.port!r} must be closed before it is opened, but it is open.")
         try:
             self._sim_port = self.find(str(self.port))
-            self._sim_port.claim(f"the program that opened {self.port!r}")
+            self._sim_port.claim(f"the program that opened {shown(self.port)}")
         except KiksError as error:
             raise SerialException(str(error)) from None
         self.is_open = True
@@ -95,9 +95,7 @@ class Serial(SerialBase):  # type: ignore[misc, unused-ignore]
 
     def write(self, b: Any, /) -> int:
         """Write bytes; text must be encoded first, as for any serial port."""
-        if isinstance(b, str):
-            raise TypeError(f"unicode strings are not supported, please encode to bytes: {b!r}")
-        return self._open_port.write(bytes(b))
+        return self._open_port.write(b)
 
     def flush(self) -> None:
         """Wait until everything has been sent."""
