@@ -325,7 +325,7 @@ def test_command_runs_two_programs() -> None:
     [
         (("--when-silent", "igno"), "when_silent must be 'wait', 'drop' or 'ignore', but it was 'igno'. Did you mean"),
         (("--patience", "-1"), "patience must be a number of seconds above 0"),
-        (("--thinking", "replay:nowhere"), "a replay file must be readable text, but 'nowhere.1' is not"),
+        (("--thinking", "replay:nowhere"), "replay file 'nowhere.1' must exist, but there is no such file"),
         (("--map", "COM1=5"), "This simulation has robots 1 to 2"),
     ],
 )

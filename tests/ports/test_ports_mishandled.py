@@ -171,9 +171,38 @@ def test_what_a_flood_has_left_behind_is_told(caplog: pytest.LogCaptureFixture) 
         left_count = len(run.sim.wires[0].pending)
         assert 0 < left_count < 600
     assert warnings(caplog) == [
-        "the client of robot 1 has gone, but its commands were more than 2 s ahead of the robot: the last "
-        f"{600 - left_count} of them are dropped. Read a line after each command."
+        "the client of robot 1 has gone, but its commands were more than 2 s ahead of the robot: the rest of them is "
+        "dropped. Read a line after each command."
     ]
+
+
+def test_a_flood_that_was_not_even_read_is_dropped_with_its_client(caplog: pytest.LogCaptureFixture) -> None:
+    endpoint = TcpEndpoint(0)
+    with served([endpoint], thinking="live", pace=Pace(wall_ns=Wall())) as run:
+        flooder = connect(endpoint)
+        flooder.setblocking(False)
+        flood = b"D,1,1\n" * (BACKLOG_LIMIT * 20)
+        assert flooder.send(flood) > BACKLOG_LIMIT * 10
+        run.wait_for(lambda: run.sim.wires[0].line.sending_until_ns > BACKLOG_LIMIT * NS_PER_S // 1000)
+        flooder.close()
+        # The wall clock stands still: no character more is carried, and the port is free all the same.
+        with connect(endpoint):
+            run.wait_for(lambda: "the rest of them is dropped" in "".join(warnings(caplog)))
+            run.wait_held()
+
+
+def test_a_flood_is_carried_whole_although_another_client_knocks() -> None:
+    wall, endpoint = Wall(), TcpEndpoint(0)
+    with served([endpoint], thinking="live", pace=Pace(wall_ns=wall)) as run, connect(endpoint) as flooder:
+        count = BACKLOG_LIMIT
+        flooder.sendall(b"D,1,1\n" * count + b"D,3,4\n")
+        run.wait_for(lambda: run.sim.wires[0].line.sending_until_ns > BACKLOG_LIMIT * NS_PER_S // 1000)
+        with connect(endpoint) as other:
+            assert other.recv(1) == b""
+        while run.sim.state.robots[0, 0]["speed_setpoint"].tolist() != [3, 4]:
+            wall.pass_ns(NS_PER_S)
+            run.wait_rounds(2)
+            assert run.sim.now_ns < 2 * 6 * count * NS_PER_S // 960
 
 
 def test_a_few_commands_left_behind_all_act() -> None:

@@ -154,7 +154,7 @@ def check_robot(port: int) -> None:
     while time.monotonic() < end_s:
         with contextlib.suppress(OSError), connect(port, GUARD_S / 10) as line:
             line.sendall(b"\nN\n")
-            if line.recv(100).startswith(b"n,"):
+            if line.recv(2, socket.MSG_WAITALL) == b"n,":
                 return
         time.sleep(0.2)
     raise Broken("hang", "a new client must be answered, but none was", "a robot's port")

@@ -48,6 +48,15 @@ class Channel(ABC):
         """Part from the client and forget what it did not read."""
 
     @property
+    def has_ahead(self) -> bool:
+        """Say whether characters of the client were read ahead and not yet taken."""
+        return False
+
+    def find_end(self) -> bool:
+        """Read ahead and keep what comes; say whether the client has gone."""
+        return False
+
+    @property
     def has_unsent(self) -> bool:
         """Say whether characters wait because the client does not read; `flush` when the descriptor is writable."""
         return bool(self._unsent)

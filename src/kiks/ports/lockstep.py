@@ -47,6 +47,8 @@ class Lockstep:
         ParameterError: If there is no such policy, or the patience is out of range.
     """
 
+    forgets = False
+
     def __init__(
         self,
         sim: Simulation,

@@ -96,6 +96,8 @@ class Server:
                         self._leave(link)
                     if link.is_leaving and self._timing.has_left(link):
                         self._free(link)
+                    if link.channel is not None and link.channel.has_ahead and not self._timing.is_full(link):
+                        self._exchange(link, selectors.EVENT_READ)
                     self._wait_for(link)
             for key, events in self._selector.select(wait_s):
                 with self.sim.lock:
@@ -125,6 +127,9 @@ class Server:
         wire = link.wire
         if link.is_leaving:
             return  # Who comes meanwhile waits at the door.
+        if self._has_fled(link):
+            self._leave(link)
+            return
         if wire.holder is not None:
             endpoint.turn_away()
             if endpoint.name not in link.refused:
@@ -168,6 +173,11 @@ class Server:
         _log.info("robot %d has lost its client at %s", link.robot, channel.name)
         if self._timing.has_left(link):
             self._free(link)
+
+    def _has_fled(self, link: Link) -> bool:
+        """Say whether a client has gone that is so far ahead of its robot that nobody has read up to its end."""
+        channel = link.channel
+        return channel is not None and self._timing.forgets and self._timing.is_full(link) and channel.find_end()
 
     def _free(self, link: Link) -> None:
         """Let the next client come."""

@@ -14,6 +14,10 @@ from kiks.ports.endpoint import READ_SIZE, Channel, Endpoint
 WAITING_MAX = 8
 """Most clients that wait at a port until the commands of the one before them are done; others are refused."""
 
+AHEAD_MAX = 16 << 20
+"""Most characters that are read ahead of a robot [bytes]: more than the operating system holds for a client that is
+gone, and read only when another one knocks."""
+
 _log = logging.getLogger("kiks.serve")
 
 
@@ -143,6 +147,7 @@ class TcpChannel(Channel):
         self._connection = connection
         self._endpoint = endpoint
         self._first_line = FirstLine()
+        self._ahead = bytearray()
 
     def fileno(self) -> int:
         """Return the connection."""
@@ -150,17 +155,44 @@ class TcpChannel(Channel):
 
     def read(self) -> bytes | None:
         """Return what the client has sent; None when the connection is over, or was none of a program for a robot."""
+        if self._ahead:
+            data: bytes | None = bytes(self._ahead[:READ_SIZE])
+            del self._ahead[:READ_SIZE]
+        else:
+            data = self._receive()
+        if data and self._first_line.is_http(data):
+            if self._endpoint is not None:
+                self._endpoint.refuse_http()
+            return None
+        return data
+
+    def _receive(self) -> bytes | None:
+        """Return what has come, perhaps nothing; None when the connection is over."""
         try:
-            data = self._connection.recv(READ_SIZE)
+            return self._connection.recv(READ_SIZE) or None
         except BlockingIOError:
             return b""
         except OSError:
             return None
-        if self._first_line.is_http(data):
-            if self._endpoint is not None:
-                self._endpoint.refuse_http()
-            return None
-        return data or None
+
+    @property
+    def has_ahead(self) -> bool:
+        """Say whether characters were read ahead and not yet taken."""
+        return bool(self._ahead)
+
+    def find_end(self) -> bool:
+        """Read ahead and keep what comes, up to `AHEAD_MAX`; say whether the client has gone.
+
+        The end of a connection comes behind its last character: without reading it is not known.
+        """
+        while len(self._ahead) < AHEAD_MAX:
+            data = self._receive()
+            if data is None:
+                return True
+            if not data:
+                return False
+            self._ahead += data
+        return False
 
     def _put(self, data: bytes | bytearray) -> int:
         try:

@@ -64,7 +64,14 @@ class Link:
 
 
 class Timing(Protocol):
-    """One of the two ways. All of it is called with the simulation's lock held."""
+    """One of the two ways. All of it is called with the simulation's lock held.
+
+    Attributes:
+        forgets: Whether commands of a client that has gone may be dropped. Which were read then is a matter of real
+            time.
+    """
+
+    forgets: bool
 
     def start(self) -> None:
         """Begin now."""
@@ -91,6 +98,8 @@ class Timing(Protocol):
 class Live:
     """The world runs at the pace of the wall clock."""
 
+    forgets = True
+
     def __init__(self, sim: Simulation, pace: Pace) -> None:
         self._sim = sim
         self._pace = pace
@@ -105,14 +114,12 @@ class Live:
     def leave(self, link: Link) -> None:
         """Let what is on the line act, unless that takes too long."""
         now_ns = self._sim.now_ns
-        dropped_count = link.wire.drop_after(now_ns + LEFT_BEHIND_NS, now_ns)
-        if dropped_count:
+        if link.wire.drop_after(now_ns + LEFT_BEHIND_NS, now_ns):
             _log.warning(
-                "the client of robot %d has gone, but its commands were more than %g s ahead of the robot: the last %d "
-                "of them are dropped. Read a line after each command.",
+                "the client of robot %d has gone, but its commands were more than %g s ahead of the robot: the rest of "
+                "them is dropped. Read a line after each command.",
                 link.robot,
                 LEFT_BEHIND_NS / NS_PER_S,
-                dropped_count,
             )
 
     def has_left(self, link: Link) -> bool:
