@@ -89,9 +89,7 @@ def test_a_few_hostile_bytes() -> None:
 
 @pytest.mark.slow
 @pytest.mark.timeout(470)  # a campaign of many cases, in processes of its own
-@pytest.mark.parametrize(
-    "group", ["files", "calls.robot", "calls.batch", "calls.environments", "calls.project", "messages"]
-)
+@pytest.mark.parametrize("group", ["files", "calls", "messages"])
 def test_a_share_of_hostile_cases(group: str) -> None:
     check("--only", group, "--cases", "30", "--seed", "12")
 
@@ -105,7 +103,7 @@ def test_files_are_whole(scene: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.timeout(470)  # a campaign of many cases, in processes of its own
-@pytest.mark.parametrize("scene", ["evolution", "worker", "server", "session", "desk"])
+@pytest.mark.parametrize("scene", ["evolution", "worker", "client", "server", "session", "desk"])
 def test_who_is_killed_takes_nothing_along(scene: str) -> None:
     check("--only", f"faults.kill_{scene}", "--cases", "1", "--seed", "14")
 
