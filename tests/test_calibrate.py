@@ -57,8 +57,7 @@ def measured(hidden: kiks.RobotSpec, base: kiks.RobotSpec = BASE, seed: int = 0,
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [2, 3])
-@pytest.mark.parametrize("base", [BASE, KHEPERA_II], ids=["khepera", "khepera_ii"])
+@pytest.mark.parametrize(("base", "seed"), [(BASE, 2), (KHEPERA_II, 3)], ids=["khepera", "khepera_ii"])
 def test_any_hidden_parameters_are_found(base: kiks.RobotSpec, seed: int) -> None:
     hidden = hidden_robot(seed, base)
     found = measured(hidden, base, seed=seed, skew_rad=math.radians(6 * (-1) ** seed))
