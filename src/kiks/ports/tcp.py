@@ -11,8 +11,8 @@ from kiks.errors import LinkError, ParameterError, shown
 from kiks.ports.descriptors import RESERVE, opening
 from kiks.ports.endpoint import READ_SIZE, Channel, Endpoint
 
-WAITING_MAX = 8
-"""Most clients that wait at a port until the commands of the one before them are done; others are refused."""
+WAITING_MAX = 128
+"""Most clients that wait at a port until the commands of the one before them are done; others must try again."""
 
 AHEAD_MAX = 16 << 20
 """Most characters that are read ahead of a robot [bytes]: more than the operating system holds for a client that is
