@@ -94,7 +94,7 @@ def test_a_bad_line_of_a_replay_file_is_named_but_not_repeated(line: str, tmp_pa
     with pytest.raises(kiks.ParameterError, match=r"line 2, must be a whole number of ns") as caught:
         parse_thinking(f"replay:{path}")
     assert str(caught.value).replace(str(path), "") == (
-        "replay file '', line 2, must be a whole number of ns of at most 18 digits, but it is something else. "
+        "replay file '', line 2, must be a whole number of ns of at most 13 digits, but it is something else. "
         "Record a run again with thinking 'live'."
     )
 

@@ -20,8 +20,8 @@ from kiks.model.policy import split_thinking
 FILE_BYTES_MAX = 64 << 20
 """Most bytes of a replay file."""
 
-DIGITS_MAX = 18
-"""Most digits of a time [ns]: thirty years."""
+DIGITS_MAX = 13
+"""Most digits of a time [ns]: nobody thinks for three hours, and a simulation of years would seem to hang."""
 
 
 class Thinking(Protocol):
