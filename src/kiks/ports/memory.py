@@ -8,7 +8,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from kiks.clock.line import BACKLOG_LIMIT
-from kiks.errors import LinkError
+from kiks.errors import SHOWN_MAX, LinkError, shown
+from kiks.model.ranges import check_kind
 from kiks.ports.port import VirtualPort
 from kiks.ports.reading import NEVER_NS, end_of_read, never_ends
 
@@ -128,6 +129,7 @@ def claim(wire: Wire, robot: int, holder: str) -> None:
     """Let somebody have a robot's line alone.
 
     Raises:
+        ParameterError: If the holder is no text.
         LinkError: If somebody holds it already.
     """
     if wire.holder is not None:
@@ -135,4 +137,5 @@ def claim(wire: Wire, robot: int, holder: str) -> None:
             f"a port must be free to be opened, but robot {robot} is in use by {wire.holder}. "
             f"Close it there first, or open another robot."
         )
-    wire.holder = holder
+    check_kind("holder", holder, str, "It says who has the port.")
+    wire.holder = holder if holder.isprintable() and len(holder) <= 2 * SHOWN_MAX else shown(holder)
