@@ -53,6 +53,12 @@ def told_or_done(calls: dict[str, Callable[[], Any]]) -> None:
         assert len(said) < 10 * SHOWN_MAX, name
 
 
+def grab_and_keep(hands: Hands, index: Any) -> None:
+    hands.grab("b", "robot", index)
+    hands.move("b", 140, 130)
+    hands.keep()
+
+
 def of_simulation(sim: Simulation, h: Any) -> dict[str, Callable[[], Any]]:
     hands = Hands(sim)
     hands.grab("a", "robot", 1)
@@ -95,7 +101,7 @@ def of_simulation(sim: Simulation, h: Any) -> dict[str, Callable[[], Any]]:
         "move": lambda: hands.move("a", h, 100),
         "turn": lambda: hands.turn("a", h),
         "grab": lambda: Hands(sim).grab("b", h, 0),
-        "grab index": lambda: Hands(sim).grab("b", "robot", h),
+        "grab index": lambda: grab_and_keep(Hands(sim), h),
         "run": lambda: sim.run(0.1 if is_long(h) else h),
         "arena": lambda: Simulation(h),
         "seed": lambda: Simulation(ARENA, seed=h),

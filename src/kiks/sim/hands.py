@@ -83,7 +83,7 @@ class Hands:
         self.drop(owner)
         counts = self._counts()
         is_kind = isinstance(what, str) and what in KINDS
-        if not is_kind or not isinstance(index, int) or not 0 <= index < counts[what]:
+        if not is_kind or isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < counts[what]:
             raise ParameterError(
                 f"a hand must take one of {counts} by its kind and index, but it was to take {shown(what)} "
                 f"{shown(index)}."
