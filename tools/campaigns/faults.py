@@ -433,6 +433,33 @@ def _swap(rng: random.Random, path: Path, files: list[Path]) -> None:
     path.write_bytes(rng.choice([each for each in files if each.suffix == path.suffix]).read_bytes())
 
 
+# ---- a person ----
+
+_ENDLESS = """
+import serial
+port = serial.Serial("COM1", timeout=1)
+while True:
+    port.write(b"N\\n")
+    port.readline()
+"""
+
+_COMMANDS = (
+    ("serve", "--tcp", "0", "--no-pty"), ("run", "endless.py"), ("demo", "follow", "--seconds", "100000"),
+    ("desk", "--port", "0", "--no-browser"), ("warmup",),
+)  # fmt: skip
+
+
+def _interrupt(rng: random.Random) -> None:
+    """Press Ctrl-C while a command loads, or somewhat later; it ends at once, and says nothing of Python."""
+    with tempfile.TemporaryDirectory(prefix="kiks-torture-") as folder:
+        (Path(folder) / "endless.py").write_text(_ENDLESS, encoding="ascii")
+        with started(*rng.choice(_COMMANDS), folder=Path(folder)) as command:
+            # Before that Python itself has no handler yet.
+            time.sleep(rng.uniform(0.1, 4.0))
+            command.process.send_signal(signal.SIGINT)
+            command.end()
+
+
 # ---- all of them ----
 
 SCENES: dict[str, tuple[Callable[[random.Random], None], int, float]] = {
@@ -446,6 +473,7 @@ SCENES: dict[str, tuple[Callable[[random.Random], None], int, float]] = {
     "kill_server": (_kill_server, 4, 100.0),
     "kill_session": (_kill_session, 4, 100.0),
     "kill_desk": (_kill_desk, 3, 100.0),
+    "interrupt": (_interrupt, 120, 100.0),
     "damage_cache": (_damage_cache, 8, 200.0),
     "no_home": (_no_home, 2, 200.0),
 }
