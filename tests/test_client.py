@@ -45,6 +45,15 @@ def test_every_method(sim: kiks.Simulation) -> None:
         assert robot.time_s == pytest.approx(sim.time_s)
 
 
+def test_wheels_that_do_not_arrive_are_not_waited_for_for_ever() -> None:
+    sim = kiks.Simulation(kiks.Arena.box(300, 300), seed=1)
+    with kiks.Khepera(sim.port(1)) as robot:
+        robot.set_profile(1, 1)
+        with pytest.raises(kiks.LinkError, match="both wheels must arrive within 600 s, but one has not"):
+            robot.move_to(1_000_000, -1_000_000, wait=True, poll_s=1.0)
+        assert 600 < sim.time_s < 602
+
+
 def test_a_surprising_reply_is_named(sim: kiks.Simulation) -> None:
     robot = kiks.Khepera(sim.port(1))
     sim.port(1).write(b"H\n")

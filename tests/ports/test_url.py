@@ -60,7 +60,7 @@ def test_options_make_a_simulation() -> None:
         ("kiks://", "must be named like 'kiks://1'"),
         ("kiks://one", "must be named like 'kiks://1'"),
         ("kiks://9", "names robot 9 and the simulation has robot 1 only"),
-        ("kiks://nowhere/1", "a simulation's name must be one of"),
+        ("kiks://nowhere/1", "a simulation's name must be one that is alive"),
         ("kiks://1?sead=3", "Did you mean 'seed'"),
         ("kiks://1?seed=x", "must be a whole number, but it was 'x'"),
         ("kiks://1?arena=/no/where.toml", "/no/where.toml"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from itertools import accumulate, pairwise
 
 import numpy as np
@@ -31,7 +31,7 @@ class Watching:
     """
 
     def __init__(self, measures: Sequence[Measure], senses: Sequence[str], who: str) -> None:
-        if not isinstance(measures, Iterable):
+        if not isinstance(measures, Sequence):
             raise ParameterError(f"measures must be a list of measures, but they were {shown(measures)}.")
         self.measures = tuple(measures)
         for each in self.measures:

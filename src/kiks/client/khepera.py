@@ -8,7 +8,7 @@ import time
 from types import TracebackType
 from typing import Any, NamedTuple, Protocol
 
-from kiks.errors import SHOWN_MAX, LinkError, ParameterError, shown
+from kiks.errors import LinkError, ParameterError, shown
 from kiks.firmware.receiver import LINE_LIMIT
 from kiks.model.ranges import SECONDS_MAX, check_count, check_kind, check_number
 from kiks.ports.port import VirtualPort
@@ -19,6 +19,9 @@ TIMEOUT_S = 2.0
 
 AWAKE_S = 0.0002
 """How long a program stays awake for a reply [s]: a simulator's is there sooner than a sleeper is woken."""
+
+ARRIVAL_MAX_S = 600.0
+"""Longest time that wheels are waited for [s]: at the usual speed a robot drives a hundred metres in it."""
 
 
 class Port(Protocol):
@@ -146,9 +149,20 @@ class Khepera:
             right: Target of the right wheel.
             wait: True to return when both wheels report their arrival.
             poll_s: Pause between two questions while waiting [s].
+
+        Raises:
+            ParameterError: If an argument is no number, or out of range.
+            LinkError: If another reply comes, or the wheels do not arrive within `ARRIVAL_MAX_S`.
         """
+        if not isinstance(wait, int):
+            raise ParameterError(f"wait must be True or False, but it was {shown(wait)}.")
         self._order(request_of(b"C,%d,%d\n", left, right))
+        end_s = self.time_s + ARRIVAL_MAX_S
         while wait and not all(motor.on_target for motor in self.status()):
+            if self.time_s > end_s:
+                raise LinkError(
+                    f"both wheels must arrive within {ARRIVAL_MAX_S:g} s, but one has not. Does a wall hold the robot?"
+                )
             self.pause(poll_s)
 
     def set_profile(self, speed: int = 20, acceleration: int = 64) -> None:
@@ -355,7 +369,7 @@ def open_port(name: str, baud: int = 9600, timeout_s: float | None = TIMEOUT_S) 
     try:
         port: Any = serial.serial_for_url(name, baudrate=baud, timeout=timeout_s, stopbits=2)
     except (serial.SerialException, ValueError, OSError) as error:
-        why = str(error).replace(name, name[:SHOWN_MAX])
+        why = str(error).replace(name, shown(name)[1:-1])
         raise LinkError(
             f"port {shown(name)} must be one that can be opened, but: {why}. A simulated robot is 'kiks://1'."
         ) from None

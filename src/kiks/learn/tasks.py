@@ -57,7 +57,7 @@ def avoid(controller: Controller | None = None, **changes: Any) -> Task:
     task = Task(
         "avoid",
         (rooms.pillars(), rooms.corridors(), rooms.wedges()),
-        controller or controllers.linear(speed_limit=SPEED_LIMIT),
+        controllers.linear(speed_limit=SPEED_LIMIT) if controller is None else controller,
         (measures.avoidance, measures.roaming, measures.contacts, measures.path_mm, measures.straightness),
         fitness=avoid_fitness,
         seconds=20.0,
@@ -87,7 +87,7 @@ def follow(controller: Controller | None = None, **changes: Any) -> Task:
     task = Task(
         "follow",
         (rooms.follow_box(), rooms.corridors(), rooms.wedges()),
-        controller or controllers.mlp(hidden=(4,), speed_limit=SPEED_LIMIT),
+        controllers.mlp(hidden=(4,), speed_limit=SPEED_LIMIT) if controller is None else controller,
         (measures.wall_following("left"), measures.contacts, measures.path_mm, measures.straightness),
         fitness=follow_fitness,
         seconds=40.0,
@@ -114,10 +114,11 @@ def light(controller: Controller | None = None, **changes: Any) -> Task:
         controller: What is evolved; a network of both senses with four hidden units if left out.
         changes: Other arguments of `Task`.
     """
+    usual = controllers.mlp(hidden=(4,), senses=("proximity", "ambient"), speed_limit=SPEED_LIMIT)
     task = Task(
         "light",
         (_lit(rooms.pillars(), 200, 300), _lit(rooms.wedges(), 300, 300), _lit(rooms.corridors(), 400, 400)),
-        controller or controllers.mlp(hidden=(4,), senses=("proximity", "ambient"), speed_limit=SPEED_LIMIT),
+        usual if controller is None else controller,
         (measures.near_light_share(100.0), measures.light_mm, measures.contacts, measures.path_mm),
         fitness=light_fitness,
         seconds=40.0,
@@ -152,7 +153,7 @@ def gather(controller: Controller | None = None, **changes: Any) -> Task:
     task = Task(
         "gather",
         tuple(_with_cylinders(number) for number in range(3)),
-        controller or controllers.gru(units=4, speed_limit=SPEED_LIMIT),
+        controllers.gru(units=4, speed_limit=SPEED_LIMIT) if controller is None else controller,
         (measures.gathered(300, 300, radius_mm=150), measures.spread_mm, measures.contacts, measures.path_mm),
         fitness=gather_fitness,
         seconds=90.0,
@@ -194,7 +195,7 @@ def maze(controller: Controller | None = None, **changes: Any) -> Task:
     task = Task(
         "maze",
         (mazes.kheperax(),),
-        controller or controllers.mlp(hidden=(8,), speed_limit=SPEED_LIMIT),
+        controllers.mlp(hidden=(8,), speed_limit=SPEED_LIMIT) if controller is None else controller,
         (measures.goal_mm(*mazes.goal_mm()), measures.final_x_mm, measures.final_y_mm, measures.turned_pulses),
         fitness=maze_fitness,
         seconds=100.0,
