@@ -3,6 +3,9 @@
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV   := .venv
 BIN    := $(VENV)/bin
+# Many tests wait for processes of their own: one worker more than there are processors keeps these busy.
+WORKERS = $(shell $(BIN)/python -c 'import os; print(len(os.sched_getaffinity(0)) + 1)')
+PYTEST = $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
 .PHONY: demo test quick checked setup system lint types docs benchmarks clean
 
@@ -12,15 +15,15 @@ demo: setup
 # Tests have a time limit each, and compiling is none of theirs.
 test: setup system
 	$(BIN)/kiks warmup
-	$(BIN)/python -m pytest -n auto
+	$(PYTEST)
 
 quick: setup system
 	$(BIN)/kiks warmup
-	$(BIN)/python -m pytest -n auto -m "not slow"
+	$(PYTEST) -m "not slow"
 
 # The tests of kernels once more, in code that checks every index: some minutes, as all is compiled anew.
 checked: setup
-	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest -n auto -m "not slow" tests/engine tests/batch
+	NUMBA_BOUNDSCHECK=1 $(PYTEST) -m "not slow" tests/engine tests/batch
 
 setup: $(VENV)/.ready
 

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kiks.client.khepera import Khepera, Port
+from kiks.client.khepera import Khepera
+from kiks.client.port import Port
 from kiks.control.controller import Controller, whole_speeds
 from kiks.errors import ParameterError, shown
 from kiks.model.ranges import SECONDS_MAX, check_number

@@ -10,7 +10,7 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
-from kiks.client.khepera import Port, open_port
+from kiks.client.port import Port, open_port
 from kiks.errors import LinkError, ParameterError, shown
 from kiks.model.ranges import SECONDS_MAX, check_kind, check_number, check_numbers
 from kiks.ports.port import VirtualPort

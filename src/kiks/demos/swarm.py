@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from kiks.client.khepera import Port, open_port
+from kiks.client.port import Port, open_port
 
 CRUISE = 8
 """Speed ahead [pulses/10 ms]."""

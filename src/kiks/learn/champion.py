@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, Field
 import kiks
 from kiks.batch.timing import Baud, Timing
 from kiks.client.drive import Driver, drive
-from kiks.client.khepera import Port
+from kiks.client.port import Port
 from kiks.control.controller import Controller
 from kiks.control.controllers import controller_of, recipe_for
 from kiks.control.recipes import Recipe

@@ -115,7 +115,9 @@ class SocketConnection(Connection):
         try:
             self._there.sendall(request.pack())
         except OSError:
-            _end()
+            # Python ends a program by clearing all it holds in any order: a port may be closed after this socket.
+            if not sys.is_finalizing():
+                _end()
 
     def _wait(self, ticket: int) -> Answer:
         while (answer := take_answer(self._received)) is None or answer.ticket != ticket:

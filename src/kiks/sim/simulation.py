@@ -83,10 +83,7 @@ class Simulation(Things):
             check_arena(arena)
         check_kinds(robot, response)
         robots = None if robots is None else check_count("robots", robots, 1, 1000, "Say how many you need.")
-        if not isinstance(seed, int) or not 0 <= seed < 2**63:
-            raise ParameterError(
-                f"seed must be a whole number from 0 to 2^63 - 1, but it was {shown(seed)}. Any small number will do."
-            )
+        seed = check_count("seed", seed, 0, 2**63 - 1, "Any small number will do.")
         self.thinking = thinking
         self.program = Program(thinking)
         self.gate: Gate | None = None
