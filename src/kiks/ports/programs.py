@@ -278,10 +278,14 @@ class Programs:
             self._tell_end(handle)
 
     def close(self) -> None:
-        """End all processes that still run, and close their connections."""
+        """End all processes that still run, say how those ended that had gone before, and close the connections."""
         self._is_closed = True
         for handle in self.handles:
+            if handle.guest.has_hung_up:
+                handle.has_ended.wait(GRACE_S)  # the operating system is at it, and its exit code will be told
             handle.process.kill()
+        for handle in self._notice_ends():
+            self._tell_end(handle)
         for handle in self.handles:
             handle.process.wait()
             handle.guest.close()
