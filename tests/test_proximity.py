@@ -10,6 +10,7 @@ from tests.symmetry import mirrored, symmetric
 
 import kiks
 from kiks.model.robot import RobotSpec
+from kiks.sim.look import proximity_from
 
 QUIET = RobotSpec.load("khepera").with_changes(
     proximity__noise_small=0.0,
@@ -119,3 +120,35 @@ def test_ambient_is_dark() -> None:
     readings = kiks.Khepera(sim.port(1)).ambient()
     assert all(440 <= reading <= 460 for reading in readings)
     assert len(set(readings)) > 2
+
+
+@pytest.mark.parametrize("response", ["reflection", "fast"])
+def test_readings_from_many_poses_are_those_of_a_robot_that_is_put_there(response: str) -> None:
+    sim = kiks.Simulation(kiks.Arena.box(400, 400), robots=3, seed=3, response=response)
+    sim.place(1, 340.0, 60.0, 0.0)
+    sim.place(2, 200.0, 200.0, 0.0)
+    sim.place(3, 60.0, 340.0, 1.0)
+    sim.port(2).write(b"D,9,9\n")
+    sim.run(0.5)
+    turns = np.linspace(-9.0, 9.0, 13)
+    poses = [[x, y, turn] for x, y in ((28.5, 100.0), (174.0, 203.0), (100.0, 100.0), (60.0, 275.0)) for turn in turns]
+    before = sim.state_hash()
+    readings = proximity_from(sim, 1, np.array(poses))
+    assert sim.state_hash() == before
+    for pose, expected in zip(poses, readings.tolist(), strict=True):
+        sim.place(1, *pose)
+        assert sim.proximity(1) == expected
+    assert [(reading > 100).any() for reading in np.split(readings, 4)] == [True, True, False, True]
+
+
+@pytest.mark.parametrize(
+    ("poses", "words"),
+    [
+        ([[1.0, 2.0]], "poses must be numbers of the shape"),
+        ([[math.nan, 2.0, 0.0]], "poses must be finite numbers"),
+        ([[1e9, 2.0, 0.0]], "poses must be in the arena, 600 x 600 mm"),
+    ],
+)
+def test_poses_that_cannot_be_are_refused(poses: list[list[float]], words: str) -> None:
+    with pytest.raises(kiks.ParameterError, match=words):
+        proximity_from(kiks.Simulation(kiks.Arena.box(600, 600)), 1, np.array(poses))

@@ -40,6 +40,7 @@ def compile_everything() -> None:
     """Call every compiled function once, by way of what users call."""
     from kiks.client.khepera import Khepera
     from kiks.model.arena import Arena
+    from kiks.sim.look import proximity_from
     from kiks.sim.simulation import Simulation
 
     sim = Simulation(Arena.box(200, 200))
@@ -53,6 +54,7 @@ def compile_everything() -> None:
     robot.ambient()
     sim.proximity(1)
     sim.ambient(1)
+    proximity_from(sim, 1, sim.poses())
     sim.look()
     sim.explain(1, 0)
     sim.explain_light(1, 0)

@@ -25,6 +25,7 @@ import numpy as np
 from kiks.client.measuring import Array, CalibrationError, Run
 from kiks.model.arena import Arena
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
+from kiks.sim.look import proximity_from
 from kiks.sim.simulation import Simulation
 
 NOISE_COUNTS, NOISE_SHARE = 8.0, 0.05
@@ -96,13 +97,13 @@ class Stand:
         sim = Simulation(self.arena, robot=spec)
         wall_mm, middle_mm = self.arena.width_mm - self.radius_mm, self.arena.height_mm / 2
         expected = np.empty((len(gaps_mm), SENSOR_COUNT))
-        expected[:] = spec.proximity.baseline_counts
-        for index, (gap_mm, heading_rad) in enumerate(zip(gaps_mm.tolist(), headings_rad.tolist(), strict=True)):
-            if gap_mm < self.sight_mm:
-                sim.place(1, wall_mm - max(gap_mm, GAP_MIN_MM), middle_mm, heading_rad)
-                expected[index] = sim.proximity(1)
-        limited: Array = np.minimum(expected, spec.proximity.maximum_counts)
-        return limited
+        expected[:] = np.minimum(spec.proximity.baseline_counts, spec.proximity.maximum_counts)
+        in_sight = gaps_mm < self.sight_mm
+        poses = np.full((np.count_nonzero(in_sight), 3), middle_mm)
+        poses[:, 0] = wall_mm - np.maximum(gaps_mm[in_sight], GAP_MIN_MM)
+        poses[:, 2] = headings_rad[in_sight]
+        expected[in_sight] = proximity_from(sim, 1, poses)
+        return expected
 
 
 def odometry(run: Run, spec: RobotSpec, heading_rad: float) -> tuple[Array, Array]:

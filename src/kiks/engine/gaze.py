@@ -15,7 +15,16 @@ from kiks.engine.compiling import entry, inlined, kernel
 from kiks.engine.discs import PER_TRACK, SEEN_SIZE, TRACKS_SIZE, disc_of, meet_discs, see
 from kiks.engine.lanes import stack_floats
 from kiks.engine.parameters import RAY_COUNT
-from kiks.engine.proximity import follow_near, pose_at, read_proximity, survey, trace, view_of
+from kiks.engine.proximity import (
+    expected_count,
+    follow_around,
+    follow_near,
+    pose_at,
+    read_proximity,
+    survey,
+    trace,
+    view_of,
+)
 from kiks.engine.rays import scale
 from kiks.engine.responses import REFLECTION
 from kiks.engine.scene import moment_of
@@ -170,3 +179,30 @@ def places_at(scene: Any, tick_count: Any, time_ns: Any, poses: Any, places: Any
             now = body.x_mm if axis == 0 else body.y_mm
             later = now if ticks_ago == 0 else body.trail[ticks_ago - 1, axis]
             places[k, axis] = later + back * (body.trail[ticks_ago, axis] - later)
+
+
+@entry
+def read_from(
+    scene: Any, sight: Any, networks: Any, tick_count: Any, time_ns: Any, robot: Any, poses: Any, out: Any
+) -> Any:
+    """Write the counts that a robot would read on average at this very time if it stood elsewhere.
+
+    Args:
+        scene: What there is.
+        sight: What rays meet of the arena.
+        networks: As `kiks.engine.proximity.read_proximity` takes them.
+        tick_count: Ticks done.
+        time_ns: The present time.
+        robot: Index of the robot.
+        poses: float64 [pose, 3]: x [mm] and y [mm], in the arena, and heading [rad].
+        out: float64 [pose, 8].
+    """
+    robots, _, kinds, _ = scene
+    parameters = kinds[robots[0, robot].kind]
+    tracks, moment = stack_floats(TRACKS_SIZE), moment_of(tick_count, time_ns)
+    for k in range(out.shape[0]):
+        x, y, heading = poses[k, 0], poses[k, 1], poses[k, 2]
+        track_count = follow_around(scene, robot, x, y, tracks)
+        for sensor in range(out.shape[1]):
+            count = expected_count(sight, networks, parameters, tracks, track_count, moment, x, y, heading, sensor)
+            out[k, sensor] = min(count, parameters.maximum_counts)

@@ -222,20 +222,28 @@ def quantize(parameters: Any, count: Any) -> Any:
 
 @inlined
 def follow_near(scene: Any, robot: Any, tracks: Any) -> Any:
-    """Write down the tracks of the discs that a robot's proximity sensors may see; return how many.
+    """Write down the tracks of the discs that a robot's proximity sensors may see; return how many."""
+    state = scene[0][0, robot]
+    return follow_around(scene, robot, state.x_mm, state.y_mm, tracks)
+
+
+@inlined
+def follow_around(scene: Any, robot: Any, x: Any, y: Any, tracks: Any) -> Any:
+    """Write down the tracks of the discs that a robot's proximity sensors might see from a place; return how many.
 
     Args:
         scene: What there is.
         robot: Index of the robot.
+        x: The place [mm].
+        y: The place [mm].
         tracks: float64 [`TRACKS_SIZE`].
     """
     robots, _, kinds, _ = scene
-    state = robots[0, robot]
-    parameters = kinds[state.kind]
+    parameters = kinds[robots[0, robot].kind]
     found = stack_integers(SEEN_LIMIT)
     reach = parameters.radius_mm + parameters.reach_mm + MOVED_MM
-    count = find_near(scene, 0, state.x_mm, state.y_mm, reach + MOVED_MM, robot, found)
-    return follow(scene, 0, found, count, state.x_mm, state.y_mm, reach, tracks) if count > 0 else 0
+    count = find_near(scene, 0, x, y, reach + MOVED_MM, robot, found)
+    return follow(scene, 0, found, count, x, y, reach, tracks) if count > 0 else 0
 
 
 @entry

@@ -33,6 +33,7 @@ def default(samples: Samples, response: str | None = None) -> Floats:
         response: What makes counts of its rays; that of its file if left out.
     """
     from kiks.model.arena import Arena
+    from kiks.sim.look import proximity_from
     from kiks.sim.simulation import Simulation
 
     side_mm = 2 * (BODY_RADIUS_MM + float(samples.gap_mm.max()) + _ROOM_MM)
@@ -45,12 +46,11 @@ def default(samples: Samples, response: str | None = None) -> Floats:
     else:
         inside = np.hypot(x - samples.radius_mm, x[:, None]) <= samples.radius_mm
     sim = Simulation(Arena(inside.astype(np.uint8) * 255, _CELL_MM, samples.name), response=response)
-    counts = np.empty(samples.counts.shape, np.float64)
-    for i, gap_mm in enumerate(samples.gap_mm):
-        for j, angle_deg in enumerate(samples.angle_deg[i]):
-            sim.place(1, centre_mm - BODY_RADIUS_MM - float(gap_mm), centre_mm, math.radians(float(angle_deg)))
-            counts[i, j] = sim.proximity(1)
-    return counts
+    poses = np.empty((*samples.counts.shape[:-1], 3))
+    poses[..., 0] = centre_mm - BODY_RADIUS_MM - samples.gap_mm[:, None]
+    poses[..., 1] = centre_mm
+    poses[..., 2] = np.radians(samples.angle_deg)
+    return proximity_from(sim, 1, poses.reshape(-1, 3)).reshape(samples.counts.shape)
 
 
 def thesis(samples: Samples, response: NetworkResponse | None = None) -> Floats:

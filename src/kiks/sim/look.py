@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from kiks.engine import gaze
 from kiks.engine.parameters import RAY_COUNT
 from kiks.engine.state import BALL
+from kiks.errors import ParameterError
+from kiks.model.ranges import HEADING_KEPT_RAD, check_numbers
 from kiks.model.robot import SENSOR_COUNT
 
 if TYPE_CHECKING:
@@ -69,6 +71,34 @@ def trace_rays(
     gaze.gaze(sim.scene, sim.sight, sim.state.tick_count, sim.now_ns, first, rays, met)
     lengths_mm = np.where(met == gaze.NOTHING, np.inf, rays[:, :, 0])
     return lengths_mm, rays[:, :, 1], rays[:, :, 2], met
+
+
+def proximity_from(sim: Simulation, robot: int, poses: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what `Simulation.proximity` would, float64 [pose, 8], if a robot stood at other poses, one by one.
+
+    Nothing keeps it from standing in a wall there; a simulation of a robot that is put down thousands of times for a
+    fit has no time to ask.
+
+    Args:
+        sim: The simulation.
+        robot: Number of the robot, from 1.
+        poses: float64 [pose, 3]: x_mm, y_mm, heading_rad.
+
+    Raises:
+        ParameterError: If there is no such robot, a number is not finite, or a place is outside the arena.
+    """
+    index = sim.index_of(robot)
+    poses = check_numbers("poses", poses, (None, 3))
+    size_mm = (sim.arena.width_mm, sim.arena.height_mm)
+    if not ((poses[:, :2] >= 0.0) & (poses[:, :2] <= size_mm)).all():
+        raise ParameterError(f"poses must be in the arena, {size_mm[0]:g} x {size_mm[1]:g} mm, but one was not.")
+    poses[:, 2] = np.where(abs(poses[:, 2]) <= HEADING_KEPT_RAD, poses[:, 2], np.remainder(poses[:, 2], 2 * np.pi))
+    counts = np.empty((len(poses), SENSOR_COUNT))
+    with sim.lock:
+        sim.sync()
+        state = sim.state
+        gaze.read_from(sim.scene, sim.sight, sim.networks, state.tick_count, sim.now_ns, index, poses, counts)
+    return counts
 
 
 def name_of(sim: Simulation, met: int) -> str:

@@ -53,6 +53,7 @@ class Simulation(Things):
 
     Attributes:
         gate: Where its time passes while somebody watches; None while nobody does.
+        networks: What the responses of its robots need besides rays.
 
     Raises:
         ParameterError: If a number is out of range or a name unknown.
@@ -90,7 +91,7 @@ class Simulation(Things):
         self._cameras = Cameras(self)
         super().__init__(Arena.default() if arena is None else arena, specs_of(robot, robots, response), seed)
         self.spec = self.specs[0]
-        self._networks = networks_for(*(spec.proximity.response for spec in self.specs))
+        self.networks = networks_for(*(spec.proximity.response for spec in self.specs))
         self._counts = np.zeros(SENSOR_COUNT, np.int64)
         self._expected = np.zeros(SENSOR_COUNT, np.float64)
         self._radios: dict[int, Radio] = {}
@@ -109,7 +110,7 @@ class Simulation(Things):
         )
 
     def _sense_proximity(self, index: int, is_noisy: bool = True) -> list[Any]:
-        return self._sense(proximity.read_proximity, self._networks, index, is_noisy)
+        return self._sense(proximity.read_proximity, self.networks, index, is_noisy)
 
     def _sense_ambient(self, index: int, is_noisy: bool = True) -> list[Any]:
         return self._sense(ambient.read_ambient, self.lamps, index, is_noisy)
@@ -238,7 +239,7 @@ class Simulation(Things):
             for wire in self.wires:
                 wire.firmware.take(self.state)
             self._cameras.take()
-            self._networks = networks_for(*(spec.proximity.response for spec in self.specs))
+            self.networks = networks_for(*(spec.proximity.response for spec in self.specs))
             self.wires.append(Wire(self._firmware(index), self._agenda, index))
             self._enter()
             return index + 1
@@ -385,7 +386,7 @@ class Simulation(Things):
         """
         with self.lock:
             self.sync()
-            return explain_proximity(self, self._networks, robot, sensor)
+            return explain_proximity(self, self.networks, robot, sensor)
 
     def explain_light(self, robot: int, sensor: int) -> LightExplanation:
         """Return why command `O` returns what it returns for a light sensor at this instant.
@@ -405,7 +406,7 @@ class Simulation(Things):
         """Return where everybody is at this instant, and what all sensors see; looking changes nothing."""
         with self.lock:
             self.sync()
-            return look(self, self._networks)
+            return look(self, self.networks)
 
     def image(self, robot: int) -> list[float]:
         """Return what a K213 would see at this instant and pose, 64 greys from the left, without noise or rounding.
