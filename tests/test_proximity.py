@@ -124,7 +124,7 @@ def test_ambient_is_dark() -> None:
 
 @pytest.mark.parametrize("response", ["reflection", "fast"])
 def test_readings_from_many_poses_are_those_of_a_robot_that_is_put_there(response: str) -> None:
-    sim = kiks.Simulation(kiks.Arena.box(400, 400), robots=3, seed=3, response=response)
+    sim = kiks.Simulation(kiks.Arena.box(400, 400, wall_mm=0), robots=3, seed=3, response=response)
     sim.place(1, 340.0, 60.0, 0.0)
     sim.place(2, 200.0, 200.0, 0.0)
     sim.place(3, 60.0, 340.0, 1.0)

@@ -5,16 +5,20 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.engine.compiled import PLAIN_AND_CHECKED
 
 import kiks
 from kiks.batch import batch as batch_module
 from kiks.batch.beginning import random_starts
 from kiks.model.family import family
 from kiks.model.places import Ball, Lamp
+
+ROOT = Path(__file__).parents[2]
 
 
 @kiks.controller(parameters=2)
@@ -94,8 +98,9 @@ def test_running_again_begins_again(expected: list[str]) -> None:
 @pytest.mark.timeout(470)  # it compiles the batch for another processor
 def test_the_processor_does_not_matter() -> None:
     """In a process of its own, compiled for a processor without wide vectors: all that a batch does, to the bit."""
-    environment = os.environ | {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
-    done = subprocess.run([sys.executable, __file__], env=environment, capture_output=True, check=True, text=True)
+    command = [sys.executable, "-m", "tests.batch.test_batch"]
+    environment = os.environ | PLAIN_AND_CHECKED
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, check=True, text=True)
     assert done.stdout.strip() == all_hashes()
 
 

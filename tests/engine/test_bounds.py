@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numba
 import pytest
+from tests.engine.compiled import PLAIN_AND_CHECKED
 
 from kiks.engine import code_cache
 
@@ -16,12 +17,11 @@ ROOT = Path(__file__).parent.parent.parent
 
 
 @pytest.mark.timeout(470)  # it compiles engine and batch, with the checks for the first time
-@pytest.mark.parametrize("checks", ["0", pytest.param("1", marks=pytest.mark.slow)])
-def test_every_index_is_within_its_array(checks: str) -> None:
+@pytest.mark.parametrize("compiled", [{}, pytest.param(PLAIN_AND_CHECKED, marks=pytest.mark.slow)], ids=["", "checked"])
+def test_every_index_is_within_its_array(compiled: dict[str, str]) -> None:
     """Where it is not, Numba raises an IndexError with the checks, and without them the process may end."""
     command = [sys.executable, "-X", "faulthandler", "-m", "tests.engine.checked_worlds"]
-    environment = os.environ | {"NUMBA_BOUNDSCHECK": checks}
-    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
+    done = subprocess.run(command, cwd=ROOT, env=os.environ | compiled, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr[-3000:]
     assert done.stdout == "all within their arrays\n"
 

@@ -6,16 +6,19 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 from llvmlite import binding
+from tests.engine.compiled import MIDDLING, PLAIN_AND_CHECKED
 
 from kiks.model.arena import Arena
 from kiks.model.places import Ball, Cylinder, Pose
 from kiks.model.robot import RESPONSES
 from kiks.sim.simulation import Simulation
 
+ROOT = Path(__file__).parents[2]
 SCRIPT = (b"D,60,57\n", b"P,-255,200\n", b"D,-5,90\n", b"G,0,0\n", b"C,3000,-2000\n", b"D,127,127\n", b"C,-900,-900\n")
 LAMPS = ((60.0, 250.0, 1.0), (330.0, 90.0, 4.0), (200.0, 5.0, 2.0))
 BALLS, CYLINDERS = ((150.0, 90.0), (320.0, 200.0, 25.0)), ((90.0, 150.0), (250.0, 90.0), (300.0, 130.0, 12.0))
@@ -69,8 +72,8 @@ def record() -> str:
 
 
 def record_of_process(**environment: str) -> str:
-    command = [sys.executable, __file__]
-    done = subprocess.run(command, env=os.environ | environment, capture_output=True, check=True)
+    command = [sys.executable, "-m", "tests.engine.test_determinism"]
+    done = subprocess.run(command, cwd=ROOT, env=os.environ | environment, capture_output=True, check=True)
     return done.stdout.decode()
 
 
@@ -84,12 +87,13 @@ def test_in_another_process(record: str) -> None:
 
 @pytest.mark.timeout(470)  # it compiles the engine for another processor
 @pytest.mark.slow
-@pytest.mark.parametrize(("processor", "surpassed_by"), [("generic", "avx"), ("x86-64-v3", "avx512f")])
-def test_for_another_processor(record: str, processor: str, surpassed_by: str) -> None:
-    """Without vectors to speak of, and with AVX2 where this processor has more."""
+@pytest.mark.parametrize(
+    ("compiled", "surpassed_by"), [(PLAIN_AND_CHECKED, "avx"), (MIDDLING, "avx512f")], ids=["plain", "middling"]
+)
+def test_for_another_processor(record: str, compiled: dict[str, str], surpassed_by: str) -> None:
     if not binding.get_host_cpu_features().get(surpassed_by):
-        pytest.skip(f"this computer's processor has no {surpassed_by}: it is itself like {processor}")
-    assert record_of_process(NUMBA_CPU_NAME=processor, NUMBA_CPU_FEATURES="") == record
+        pytest.skip(f"this computer's processor has no {surpassed_by}: it is itself like {compiled['NUMBA_CPU_NAME']}")
+    assert record_of_process(**compiled) == record
 
 
 if __name__ == "__main__":
