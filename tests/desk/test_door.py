@@ -13,6 +13,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
+from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 import kiks
@@ -238,7 +239,8 @@ def test_events_that_are_none_hurt_nobody(
         client.send("40")
         client.recv(GUARD_S)
         client.send(message)
-        client.send("3")
+        with suppress(ConnectionClosed):  # the desk may hang up on it
+            client.send("3")
     assert is_well(shown)
 
 
