@@ -80,14 +80,14 @@ def row(result: Result) -> str:
     """Return the line of a campaign in the table."""
     counts = verdicts([result])
     cells = [counts[verdict] for verdict in ("death", "foreign", "message", "hang", "lost")]
-    words = "".join(f"{cell:>8}" for cell in cells)
+    words = "".join(f"{cell:>9}" for cell in cells)
     return (
         f"{result.name:<24}{result.tried:>12,}{result.refused:>10,}{words}{result.peak_mb:>9.0f}{result.seconds:>8.0f}"
     )
 
 
 HEAD = (
-    f"{'campaign':<24}{'tried':>12}{'refused':>10}{'deaths':>8}{'foreign':>8}{'messages':>8}{'hangs':>8}{'lost':>8}"
+    f"{'campaign':<24}{'tried':>12}{'refused':>10}{'deaths':>9}{'foreign':>9}{'messages':>9}{'hangs':>9}{'lost':>9}"
     f"{'peak MB':>9}{'s':>8}"
 )
 
