@@ -74,6 +74,9 @@ class QuickLines:
             self._descriptor = int(port.fileno()) if os.name == "posix" else None
         except (AttributeError, OSError):
             self._descriptor = None  # not a port of the operating system: RFC 2217
+        if self._descriptor is not None:
+            self._ready = select.poll()  # unlike select(), it takes descriptors of 1024 and more
+            self._ready.register(self._descriptor, select.POLLIN)
 
     def write(self, data: bytes, /) -> int | None:
         """Send characters."""
@@ -102,7 +105,7 @@ class QuickLines:
         try:
             if self._descriptor is None:
                 return bytes(self.port.read(max(1, self.port.in_waiting)))
-            if not self._wait(self._descriptor):
+            if not self._wait():
                 return b""
             some = os.read(self._descriptor, 4096)
         except (OSError, ValueError) as error:
@@ -115,16 +118,14 @@ class QuickLines:
             )
         return some
 
-    def _wait(self, descriptor: int) -> bool:
+    def _wait(self) -> bool:
         """Wait for a character; say whether one came before the time-out."""
-        ready = select.poll()  # unlike select(), it takes descriptors of 1024 and more
-        ready.register(descriptor, select.POLLIN)
         until_s = time.perf_counter() + AWAKE_S
         while time.perf_counter() < until_s:
-            if ready.poll(0):
+            if self._ready.poll(0):
                 return True
         timeout_s = self.port.timeout
-        return bool(ready.poll(None if timeout_s is None else math.ceil(timeout_s * 1e3)))
+        return bool(self._ready.poll(None if timeout_s is None else math.ceil(timeout_s * 1e3)))
 
     def close(self) -> None:
         """Close the port."""
