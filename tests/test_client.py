@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import fcntl
 import math
+import os
+import resource
+import socket
 
 import pytest
 
 import kiks
 from kiks.client.khepera import Status
+from kiks.client.port import _is_readable
 
 
 @pytest.fixture
@@ -145,3 +150,21 @@ def test_placing(sim: kiks.Simulation) -> None:
 def test_an_arena_is_an_arena() -> None:
     with pytest.raises(kiks.ParameterError, match=r"arena must be a kiks.Arena, but it was 'maze.png'. Read a file"):
         kiks.Simulation("maze.png")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("least", [0, 1024], ids=["small", "large"])
+def test_descriptors_of_any_size_are_waited_for(least: int) -> None:
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if 0 <= hard < 1100:
+        pytest.skip("this computer gives no descriptor beyond 1024")
+    resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, 1100), hard))
+    here, there = socket.socketpair()
+    with here, there:
+        descriptor = fcntl.fcntl(here, fcntl.F_DUPFD, least)
+        try:
+            assert not _is_readable(descriptor, 0.0)
+            there.send(b"x")
+            assert _is_readable(descriptor, None)
+        finally:
+            os.close(descriptor)
+            resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))

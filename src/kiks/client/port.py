@@ -16,6 +16,9 @@ TIMEOUT_S = 2.0
 AWAKE_S = 0.0002
 """How long a program stays awake for a reply [s]: a simulator's is there sooner than a sleeper is woken."""
 
+SELECT_END = 1024
+"""Descriptors from here on are too large for select(), which is a little quicker at a pseudo-terminal than poll()."""
+
 
 class Port(Protocol):
     """What is needed of a port; pyserial's and ours have it."""
@@ -74,9 +77,6 @@ class QuickLines:
             self._descriptor = int(port.fileno()) if os.name == "posix" else None
         except (AttributeError, OSError):
             self._descriptor = None  # not a port of the operating system: RFC 2217
-        if self._descriptor is not None:
-            self._ready = select.poll()  # unlike select(), it takes descriptors of 1024 and more
-            self._ready.register(self._descriptor, select.POLLIN)
 
     def write(self, data: bytes, /) -> int | None:
         """Send characters."""
@@ -105,7 +105,7 @@ class QuickLines:
         try:
             if self._descriptor is None:
                 return bytes(self.port.read(max(1, self.port.in_waiting)))
-            if not self._wait():
+            if not self._wait(self._descriptor):
                 return b""
             some = os.read(self._descriptor, 4096)
         except (OSError, ValueError) as error:
@@ -118,15 +118,23 @@ class QuickLines:
             )
         return some
 
-    def _wait(self) -> bool:
+    def _wait(self, descriptor: int) -> bool:
         """Wait for a character; say whether one came before the time-out."""
         until_s = time.perf_counter() + AWAKE_S
         while time.perf_counter() < until_s:
-            if self._ready.poll(0):
+            if _is_readable(descriptor, 0.0):
                 return True
-        timeout_s = self.port.timeout
-        return bool(self._ready.poll(None if timeout_s is None else math.ceil(timeout_s * 1e3)))
+        return _is_readable(descriptor, self.port.timeout)
 
     def close(self) -> None:
         """Close the port."""
         self.port.close()
+
+
+def _is_readable(descriptor: int, timeout_s: float | None) -> bool:
+    """Wait until a descriptor can be read; say whether it can before the time-out."""
+    if descriptor < SELECT_END:
+        return bool(select.select([descriptor], [], [], timeout_s)[0])
+    ready = select.poll()
+    ready.register(descriptor, select.POLLIN)
+    return bool(ready.poll(None if timeout_s is None else math.ceil(timeout_s * 1e3)))
