@@ -14,6 +14,8 @@ import pytest
 from kiks.cli import app
 from kiks.errors import ParameterError
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[1]
 ARENA = str(ROOT / "examples" / "arenas" / "office.toml")
 WANDER = str(ROOT / "tests" / "programs" / "wander.py")

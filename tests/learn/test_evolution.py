@@ -16,6 +16,8 @@ import kiks
 from kiks import ParameterError
 from kiks.learn.task import cautious_mean
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("cma")
 pytest.importorskip("ribs")
 parquet = pytest.importorskip("pyarrow.parquet")
