@@ -130,7 +130,7 @@ def test_readings_from_many_poses_are_those_of_a_robot_that_is_put_there(respons
     sim.place(3, 60.0, 340.0, 1.0)
     sim.port(2).write(b"D,9,9\n")
     sim.run(0.5)
-    turns = np.linspace(-9.0, 9.0, 13)
+    turns = [*np.linspace(-9.0, 9.0, 13).tolist(), 1e20]
     poses = [[x, y, turn] for x, y in ((28.5, 100.0), (174.0, 203.0), (100.0, 100.0), (60.0, 275.0)) for turn in turns]
     before = sim.state_hash()
     readings = proximity_from(sim, 1, np.array(poses))

@@ -457,7 +457,8 @@ def _interrupt(rng: random.Random) -> None:
             # Before that Python itself has no handler yet.
             time.sleep(rng.uniform(0.1, 4.0))
             command.process.send_signal(signal.SIGINT)
-            command.end()
+            # Shortly before Python ends it hands Ctrl-C back to the system, which ends the process by the signal.
+            command.end(by=signal.SIGINT)
 
 
 # ---- all of them ----

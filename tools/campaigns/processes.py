@@ -6,7 +6,6 @@ import contextlib
 import os
 import re
 import select
-import signal
 import socket
 import subprocess
 import sys
@@ -61,8 +60,8 @@ class Command:
         assert found is not None
         return found[1]
 
-    def end(self) -> int:
-        """Wait until it ends, and return its exit code.
+    def end(self, *, by: int = 0) -> int:
+        """Wait until it ends, and return its exit code; a signal that was sent to it may have ended it.
 
         Raises:
             Broken: If it does not end, or dies, or a traceback is seen.
@@ -72,8 +71,7 @@ class Command:
         except subprocess.TimeoutExpired:
             raise Broken("hang", f"did not end: {self.said[-200:]!r}", "waits for the end") from None
         self.check()
-        # Python's last act is to give Ctrl-C back to the system, which ends a process that has done all by a signal.
-        if code < 0 and code != -signal.SIGINT:
+        if code < 0 and code != -by:
             raise Broken("death", f"signal {-code}: {self.said[-200:]!r}", "a command dies")
         return code
 

@@ -84,7 +84,7 @@ class QuickLines:
         return count
 
     def read_until(self, expected: bytes = b"\n") -> bytes:
-        """Return a line, or what there is of it after the time-out.
+        """Return a line, or as much of it as came before the timeout.
 
         Raises:
             LinkError: If the port is gone.

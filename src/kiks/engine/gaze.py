@@ -188,7 +188,7 @@ def read_from(
     """Write the counts that a robot would read on average at this very time if it stood elsewhere.
 
     Args:
-        scene: What there is.
+        scene: The robots, balls and cylinders (`kiks.engine.scene`).
         sight: What rays meet of the arena.
         networks: As `kiks.engine.proximity.read_proximity` takes them.
         tick_count: Ticks done.

@@ -232,7 +232,7 @@ def follow_around(scene: Any, robot: Any, x: Any, y: Any, tracks: Any) -> Any:
     """Write down the tracks of the discs that a robot's proximity sensors might see from a place; return how many.
 
     Args:
-        scene: What there is.
+        scene: The robots, balls and cylinders (`kiks.engine.scene`).
         robot: Index of the robot.
         x: The place [mm].
         y: The place [mm].

@@ -23,7 +23,7 @@ from kiks.ports.handle import Handle
 from kiks.ports.names import Names
 from kiks.ports.permission import Anything, Permission
 from kiks.ports.process import Command, Process
-from kiks.ports.turns import PATIENCE_S, START_PATIENCE_S, Turns
+from kiks.ports.turns import PATIENCE_S, START_PATIENCE_S, VISIT_PATIENCE_S, Turns
 from kiks.sim.simulation import Simulation
 
 IDLE_S = 0.05
@@ -31,9 +31,6 @@ IDLE_S = 0.05
 
 GRACE_S = 1.0
 """How long a program may tidy up after Ctrl-C [s of real time]."""
-
-VISIT_PATIENCE_S = 60.0
-"""How long the beginning is waited for if programs come that a person starts elsewhere [s of real time]."""
 
 _log = logging.getLogger("kiks.run")
 
@@ -95,8 +92,7 @@ class Programs:
         self._thinking = thinking
         self._record = record
         self._is_heard = is_heard
-        self._signals = 0
-        self._was_touched = False
+        self._signals, self._was_touched = 0, False
         self._is_closed, self._count = False, 0
         begin = [(robot, command) for robot, command in enumerate(commands, 1) if command is not None]
         self._are_numbered = len(begin) > 1
@@ -378,8 +374,8 @@ class Programs:
 
     def _notice_ends(self) -> list[Handle]:
         """Return the programs that have ended since the last time."""
-        ended = [handle for handle in self.handles if handle.guest.has_hung_up and not handle.is_running]
-        noticed = [handle for handle in ended if not handle.has_been_noticed]
+        silent = [handle for handle in self.handles if handle.guest.has_hung_up and not handle.has_been_noticed]
+        noticed = [handle for handle in silent if not handle.is_running]
         for handle in noticed:
             handle.has_been_noticed = True
         return noticed

@@ -42,6 +42,9 @@ START_WORD_S = 1.0
 START_PATIENCE_S = 10.0
 """How long the world waits for programs that do not come [s of real time]."""
 
+VISIT_PATIENCE_S = 60.0
+"""How long the beginning is waited for if programs come that a person starts elsewhere [s of real time]."""
+
 PATIENCE_S = 2.0
 """How long the world waits for a silent program [s of real time], if nothing else is said."""
 

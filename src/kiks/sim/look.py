@@ -12,7 +12,7 @@ from kiks.engine import gaze
 from kiks.engine.parameters import RAY_COUNT
 from kiks.engine.state import BALL
 from kiks.errors import ParameterError
-from kiks.model.ranges import HEADING_KEPT_RAD, check_numbers
+from kiks.model.ranges import check_numbers, wrapped
 from kiks.model.robot import SENSOR_COUNT
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ def proximity_from(sim: Simulation, robot: int, poses: NDArray[np.float64]) -> N
     size_mm = (sim.arena.width_mm, sim.arena.height_mm)
     if not ((poses[:, :2] >= 0.0) & (poses[:, :2] <= size_mm)).all():
         raise ParameterError(f"poses must be in the arena, {size_mm[0]:g} x {size_mm[1]:g} mm, but one was not.")
-    poses[:, 2] = np.where(abs(poses[:, 2]) <= HEADING_KEPT_RAD, poses[:, 2], np.remainder(poses[:, 2], 2 * np.pi))
+    poses[:, 2] = [wrapped(heading_rad) for heading_rad in poses[:, 2].tolist()]
     counts = np.empty((len(poses), SENSOR_COUNT))
     with sim.lock:
         sim.sync()
