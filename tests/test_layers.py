@@ -23,6 +23,7 @@ LAYERS = [
     "clock",
     "sim",
     "ports",
+    "script",
     "client",
     "batch",
     "drawing",
@@ -39,7 +40,7 @@ ALLOWED = {("sim", "ports"), ("sim", "desk")}
 
 # What of the standard library only some layers may touch.
 CLOCKS = {"time", "datetime"}
-MAY_SEE_THE_WALL_CLOCK = {"clock", "client", "learn", "desk", "toolbox", "cli"}
+MAY_SEE_THE_WALL_CLOCK = {"clock", "script", "client", "learn", "desk", "toolbox", "cli"}
 RANDOM = {"random", "secrets"}
 MAY_HAVE_SECRETS = {"desk", "toolbox"}
 

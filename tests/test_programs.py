@@ -24,7 +24,7 @@ from kiks.errors import LinkError, ParameterError
 from kiks.ports.names import Names
 from kiks.ports.process import Command
 from kiks.ports.programs import Programs
-from kiks.ports.unchanged import run_here
+from kiks.script.runner import run_here
 
 # Each test starts processes.
 pytestmark = pytest.mark.slow

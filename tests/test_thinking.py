@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import threading
-import time
 from pathlib import Path
 
 import pytest
 
 import kiks
-from kiks.clock.program import EPOCH_S
 from kiks.clock.thinking import ThinkingLive, parse_thinking, save_thinking
-from kiks.clock.virtual import virtual_time
 from kiks.demos.avoid import Avoid
 
 
@@ -97,23 +93,3 @@ def test_a_bad_line_of_a_replay_file_is_named_but_not_repeated(line: str, tmp_pa
         "replay file '', line 2, must be a whole number of ns of at most 13 digits, but it is something else. "
         "Record a run again with thinking 'live'."
     )
-
-
-def test_threads_that_ran_before_keep_real_time() -> None:
-    told: list[float] = []
-    begin, has_told = threading.Event(), threading.Event()
-
-    def other() -> None:
-        begin.wait()
-        told.append(time.time())
-        has_told.set()
-
-    thread = threading.Thread(target=other)
-    thread.start()
-    with virtual_time(lambda: 0, lambda seconds: None):
-        assert time.time() == EPOCH_S
-        begin.set()
-        has_told.wait()
-        assert time.monotonic() == 0
-    thread.join()
-    assert told[0] > EPOCH_S + 1e8

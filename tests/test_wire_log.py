@@ -11,7 +11,7 @@ from tests.served import GUARD_S, PROGRAMS, fresh
 
 from kiks.ports.process import Command
 from kiks.ports.programs import Programs
-from kiks.ports.unchanged import run_here
+from kiks.script.runner import run_here
 from kiks.sim.simulation import Simulation
 from kiks.sim.tail import Tail
 from kiks.sim.wire_log import PIECE_LIMIT, Piece, Span, TimeShares, WireLog, share_time

@@ -10,7 +10,7 @@ import pytest
 
 import kiks.desk.example_programs as programs
 from kiks.model.arena import Arena
-from kiks.ports.unchanged import run_here
+from kiks.script.runner import run_here
 from kiks.sim.simulation import Simulation
 from kiks.units import ns_from_s
 

@@ -156,7 +156,7 @@ def _run_on_desk(sim: Simulation, commands: list[Command], host: Callable[..., P
 
 def _run_one(sim: Simulation, command: Command, told: dict[str, int], record: Path | None) -> int:
     """Run a program in this process; return its exit code."""
-    from kiks.ports.unchanged import run_here
+    from kiks.script.runner import run_here
 
     try:
         return run_here(sim, command.program, command.arguments, told)

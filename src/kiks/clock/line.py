@@ -40,6 +40,11 @@ class SerialLine:
         self.baud = baud
         self.character_ns = character_ns(baud)
 
+    @property
+    def room_ns(self) -> int:
+        """When a sender that is held back may go on [ns]."""
+        return self.sending_until_ns - BACKLOG_LIMIT * self.character_ns
+
     def send(self, count: int, at_ns: int) -> int:
         """Put characters on the way to the robot; return when the first one sets out [ns]."""
         start_ns = max(at_ns, self.sending_until_ns)

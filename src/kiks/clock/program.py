@@ -19,6 +19,7 @@ class Program:
     Attributes:
         thinks: Whether its thinking costs time.
         measures: Whether that is as long as it really takes.
+        waiting: What the questions of the thread cost that runs.
 
     Raises:
         ParameterError: If it knows none of that name.
@@ -29,7 +30,7 @@ class Program:
         self._policy = None if isinstance(policy, ThinkingFixed) and policy.time_ns == 0 else policy
         self.thinks = self._policy is not None
         self.measures = isinstance(policy, ThinkingLive)
-        self._waiting = Waiting()
+        self.waiting = Waiting()
 
     def enter(self, *, is_command: bool) -> int:
         """Return what the program has to pay as it calls [ns]; see `Thinking.enter`."""
@@ -37,12 +38,21 @@ class Program:
 
     def ask(self) -> int:
         """Return the time that a question takes [ns], more and more while nothing else is done."""
-        return self._waiting.ask()
+        return self.waiting.ask()
+
+    def poll(self) -> int:
+        """Return the time that a question takes [ns] which is none about time or bytes; see `Waiting.poll`."""
+        return self.waiting.poll()
+
+    def go_on(self) -> None:
+        """Note that another thread of it thinks now."""
+        if self._policy is not None:
+            self._policy.leave()
 
     def leave(self, *, has_acted: bool) -> None:
         """Note that the program goes on now, after it has done something or has only asked."""
         if has_acted:
-            self._waiting.act()
+            self.waiting.act()
         if self._policy is not None:
             self._policy.leave()
 

@@ -5,6 +5,9 @@ from __future__ import annotations
 FIRST_POLL_NS = 1_000
 LONGEST_POLL_NS = 1_000_000
 
+FREE_POLLS = 100
+"""Questions about locks and the like, in a row, that cost nothing."""
+
 
 class Waiting:
     """The length of a run of questions without an answer (is a byte there? what time is it?).
@@ -22,6 +25,7 @@ class Waiting:
 
     def __init__(self) -> None:
         self._next_ns = 0
+        self._poll_count = 0
 
     def ask(self) -> int:
         """Return the time that this question takes [ns]."""
@@ -29,6 +33,15 @@ class Waiting:
         self._next_ns = min(cost_ns * 2, LONGEST_POLL_NS) if cost_ns else FIRST_POLL_NS
         return cost_ns
 
+    def poll(self) -> int:
+        """Return the time that a question takes [ns] to which other threads know the answer: is the lock free?
+
+        The first hundred in a row are free: a program may look at a few locks without losing its time.
+        """
+        self._poll_count += 1
+        return self.ask() if self._poll_count > FREE_POLLS else 0
+
     def act(self) -> None:
         """Note that the program did something else."""
         self._next_ns = 0
+        self._poll_count = 0

@@ -11,12 +11,14 @@ import socket
 import sys
 import threading
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from typing import Any
 
 from kiks.clock.line import BACKLOG_LIMIT
 from kiks.errors import LinkError
-from kiks.ports.messages import RECEIVE_SIZE, WINDOW, Answer, Kind, Request, take_answer
+from kiks.ports.messages import RECEIVE_SIZE, WINDOW, Answer, Kind, Request, pack_reads, take_answer
+from kiks.ports.reading import NEVER_NS, Read
 from kiks.units import TICK_NS
 
 TELL_NS = TICK_NS
@@ -187,9 +189,18 @@ class FarLine:
         """Return how many characters have arrived and were not read."""
         return self._ask(Kind.COUNT).number
 
-    def finish_sending(self) -> None:
-        """Let time pass until everything has been sent."""
-        self._ask(Kind.SENT)
+    def sent_ns(self) -> int:
+        """Return when everything will have been sent [ns]."""
+        return self._ask(Kind.SENT).number
+
+    def room_ns(self) -> int:
+        """Return when the line takes more characters [ns]."""
+        return self.now_ns if self._ahead_count <= BACKLOG_LIMIT else self._ask(Kind.ROOM).number
+
+    def wait_for(self, reads: Sequence[Read], until_ns: int) -> list[bool]:
+        """Let time pass until one of several reads is complete; see `Line.wait_for`."""
+        second = -1 if until_ns >= NEVER_NS else until_ns
+        return [bool(flag) for flag in self._connection.ask(Kind.WAIT, second=second, data=pack_reads(reads)).data]
 
     def drop_arrived(self) -> None:
         """Forget the characters that have arrived and were not read."""

@@ -10,9 +10,9 @@ from collections import deque
 from kiks.clock.line import BACKLOG_LIMIT
 from kiks.errors import KiksError
 from kiks.ports.memory import claim
-from kiks.ports.messages import ASKING, RECEIVE_SIZE, Answer, Kind, Request, take_request
+from kiks.ports.messages import ASKING, RECEIVE_SIZE, Answer, Kind, Request, take_request, unpack_reads
 from kiks.ports.names import Names
-from kiks.ports.reading import NEVER_NS, end_of_read, never_ends
+from kiks.ports.reading import NEVER_NS, end_of_read, end_of_wait, is_complete, never_ends
 from kiks.ports.turns import Player, Turns
 from kiks.sim.simulation import Simulation
 
@@ -128,9 +128,12 @@ class Guest(Player):
             self._answer(at_ns, is_good=False, data=str(error).encode())
 
     def look(self) -> None:
-        """Answer a read if its end is known."""
+        """Answer a read, or a wait for several, if its end is known."""
         request = self._read
         if request is None:
+            return
+        if request.kind is Kind.WAIT:
+            self._look_at_all(request)
             return
         wire = self._sim.wires[request.robot - 1]
         deadline_ns = NEVER_NS if request.second < 0 else self.acts_from_ns + request.second
@@ -152,14 +155,28 @@ class Guest(Player):
             end_ns = max(end_ns, self.acts_from_ns)
             self._answer(end_ns, robot=request.robot, data=wire.line.take(count))
 
+    def _look_at_all(self, request: Request) -> None:
+        wires, reads = self._sim.wires, unpack_reads(request.data)
+        end_ns, is_known = end_of_wait(wires, reads, NEVER_NS if request.second < 0 else request.second)
+        if not is_known:
+            return
+        self._read = None
+        self.waits = False
+        now_ns = self.acts_from_ns if end_ns == NEVER_NS else max(end_ns, self.acts_from_ns)
+        self._answer(now_ns, data=bytes(is_complete(wires[read.robot - 1], read, now_ns) for read in reads))
+
     def _has_room(self, robot: int) -> bool:
         """Say whether the line can take more; if not, try again when it can."""
-        line = self._sim.wires[robot - 1].line
-        room_ns = line.sending_until_ns - BACKLOG_LIMIT * line.character_ns
+        room_ns = self._sim.wires[robot - 1].line.room_ns
         if room_ns <= self.acts_from_ns or self._has_made_room:
             return True
         self.acts_from_ns = room_ns
         self._has_made_room = True
+        self._warn_of_flood(robot)
+        return False
+
+    def _warn_of_flood(self, robot: int) -> None:
+        """Tell a person that the program sends faster than the line carries."""
         if not self._has_been_warned:
             self._has_been_warned = True
             _log.warning(
@@ -169,7 +186,6 @@ class Guest(Player):
                 BACKLOG_LIMIT,
                 robot,
             )
-        return False
 
     def _note_thinking(self, request: Request) -> None:
         """Let those who watch its robots know how long it has thought."""
@@ -185,6 +201,10 @@ class Guest(Player):
             self._end()
         elif kind is Kind.MEET:
             self._answer(at_ns)
+        elif kind is Kind.WAIT:
+            self._read = request
+            self.waits = True
+            self.look()
         elif kind is Kind.FIND:
             self._answer(at_ns, number=self._names.robot(request.data.decode(), self.robot))
         elif kind is not Kind.REACHED:
@@ -207,7 +227,11 @@ class Guest(Player):
         elif kind is Kind.DROP:
             line.take(line.arrived_count(at_ns))
         elif kind is Kind.SENT:
-            self._answer(max(at_ns, line.sending_until_ns), robot=robot)
+            self._answer(at_ns, robot=robot, number=max(at_ns, line.sending_until_ns))
+        elif kind is Kind.ROOM:
+            if line.room_ns > at_ns:
+                self._warn_of_flood(robot)
+            self._answer(at_ns, robot=robot, number=max(at_ns, line.room_ns))
         elif kind is Kind.SET_BAUD:
             wire.set_baud(request.first)
         elif kind is Kind.BAUD:

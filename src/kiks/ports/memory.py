@@ -5,13 +5,14 @@ A program that reads waits in simulated time: up to the instant at which the cha
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from kiks.clock.line import BACKLOG_LIMIT
 from kiks.errors import SHOWN_MAX, LinkError, shown
 from kiks.model.ranges import check_kind
 from kiks.ports.port import VirtualPort
-from kiks.ports.reading import NEVER_NS, end_of_read, never_ends
+from kiks.ports.reading import NEVER_NS, Read, end_of_read, end_of_wait, is_complete, never_ends
 
 if TYPE_CHECKING:
     from kiks.sim.simulation import Simulation
@@ -64,7 +65,7 @@ class NearLine:
         """Put characters on the line; wait while it is full."""
         sim, wire = self._sim, self._wire
         while data:
-            room_ns = wire.line.sending_until_ns - BACKLOG_LIMIT * wire.line.character_ns
+            room_ns = wire.line.room_ns
             if room_ns > sim.now_ns:
                 sim.advance_to(room_ns)
             wire.send(data[:BACKLOG_LIMIT], sim.now_ns)
@@ -91,9 +92,23 @@ class NearLine:
         """Return how many characters have arrived and were not read."""
         return self._wire.line.arrived_count(self._sim.now_ns)
 
-    def finish_sending(self) -> None:
-        """Let time pass until everything has been sent."""
-        self._sim.advance_to(self._wire.line.sending_until_ns)
+    def sent_ns(self) -> int:
+        """Return when everything will have been sent [ns]."""
+        return max(self._wire.line.sending_until_ns, self._sim.now_ns)
+
+    def room_ns(self) -> int:
+        """Return when the line takes more characters [ns]."""
+        return max(self._wire.line.room_ns, self._sim.now_ns)
+
+    def wait_for(self, reads: Sequence[Read], until_ns: int) -> list[bool]:
+        """Let time pass until one of several reads is complete; see `Line.wait_for`."""
+        sim = self._sim
+        while True:
+            end_ns, is_known = end_of_wait(sim.wires, reads, until_ns)
+            if end_ns < NEVER_NS:
+                sim.advance_to(end_ns)
+            if is_known:
+                return [is_complete(sim.wires[read.robot - 1], read, sim.now_ns) for read in reads]
 
     def drop_arrived(self) -> None:
         """Forget the characters that have arrived and were not read."""

@@ -7,8 +7,11 @@ once; those that ask are answered with the program's new time. Both have a head 
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 from enum import IntEnum
 from typing import NamedTuple
+
+from kiks.ports.reading import Read
 
 RECEIVE_SIZE = 1 << 16
 """Most bytes taken from the connection at once."""
@@ -18,6 +21,7 @@ WINDOW = 64
 
 _REQUEST = struct.Struct("<BHqIqqqqI")
 _ANSWER = struct.Struct("<I?qqqI")
+_READ = struct.Struct("<HqB")
 
 
 class Kind(IntEnum):
@@ -45,12 +49,16 @@ class Kind(IntEnum):
     DROP = 10
     """Tells to forget these."""
     SENT = 11
-    """Asks to be answered when everything has been sent."""
+    """Asks when everything will have been sent [ns]."""
     SET_BAUD = 12
     """Tells the speed, `first`."""
     BAUD = 13
     """Asks for the speed."""
-    END = 14
+    ROOM = 14
+    """Asks when the line takes more [ns]."""
+    WAIT = 15
+    """Asks to be answered when one of the reads that follow is complete, or at `second` [ns]; -1: at no time."""
+    END = 16
     """Never sent: what the end of the connection stands for."""
 
 
@@ -129,3 +137,22 @@ def take_answer(buffer: bytearray) -> Answer | None:
     data = bytes(buffer[_ANSWER.size : end])
     del buffer[:end]
     return Answer(ticket, is_good, now_ns, number, ahead_count, data)
+
+
+def pack_reads(reads: Sequence[Read]) -> bytes:
+    """Return what WAIT carries."""
+    packed = b""
+    for robot, size, terminator in reads:
+        end = terminator or b""
+        packed += _READ.pack(robot, -1 if size is None else size, len(end)) + end
+    return packed
+
+
+def unpack_reads(data: bytes) -> list[Read]:
+    """Return what `pack_reads` has packed."""
+    reads, start = [], 0
+    while start < len(data):
+        robot, size, length = _READ.unpack_from(data, start)
+        start += _READ.size + length
+        reads.append(Read(robot, None if size < 0 else size, data[start - length : start] or None))
+    return reads

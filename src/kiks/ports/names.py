@@ -28,6 +28,11 @@ class Names:
         self._own = set(range(1, programs + 1))
         self._found: dict[tuple[int, str], int] = {}
 
+    def offered(self) -> list[str]:
+        """Return the port names that a program finds which looks for ports: for its robot, and those left over."""
+        count = 1 + sum(robot not in self._own for robot in range(1, self._sim.robot_count + 1))
+        return [*self._told, *(f"/dev/ttyUSB{number}" for number in range(count))][:count]
+
     def own(self, robot: int) -> None:
         """Give a robot to a program that comes, as its own; nothing is left of the one that had it."""
         self._own.add(robot)

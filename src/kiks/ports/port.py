@@ -7,6 +7,7 @@ program's thinking, asking and waiting cost; the line lets that time pass and ca
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from operator import index
 from typing import Any, Protocol
@@ -14,6 +15,7 @@ from typing import Any, Protocol
 from kiks.clock.program import Program
 from kiks.errors import ParameterError, shown
 from kiks.model.ranges import SECONDS_MAX, check_count, check_number
+from kiks.ports.reading import Read
 from kiks.units import ns_from_s, s_from_ns
 
 BAUD_MIN = 75
@@ -63,8 +65,24 @@ class Line(Protocol):
     def arrived_count(self) -> int:
         """Return how many characters have arrived and were not read."""
 
-    def finish_sending(self) -> None:
-        """Let time pass until everything has been sent."""
+    def sent_ns(self) -> int:
+        """Return when everything will have been sent [ns]."""
+
+    def room_ns(self) -> int:
+        """Return when the line takes more characters without a wait [ns]."""
+
+    def wait_for(self, reads: Sequence[Read], until_ns: int) -> list[bool]:
+        """Let time pass until one of several reads is complete, which takes no character, or up to a time [ns].
+
+        With `NEVER_NS`, and no command on any of the lines, nothing happens.
+
+        Args:
+            reads: What is waited for, on lines of the same world.
+            until_ns: When the wait ends at the latest [ns]; `NEVER_NS` if it has no end.
+
+        Returns:
+            Which of them are complete.
+        """
 
     def drop_arrived(self) -> None:
         """Forget the characters that have arrived and were not read."""
@@ -90,11 +108,13 @@ class VirtualPort:
         line: The way to the robot.
         program: The program whose port this is: what its thinking and its waiting cost.
 
+    Attributes:
+        line: The same way.
     """
 
     def __init__(self, line: Line, program: Program) -> None:
         self.timeout = None
-        self._line = line
+        self.line = line
         self._program = program
         self._has_read = True
 
@@ -119,13 +139,13 @@ class VirtualPort:
     @property
     def baudrate(self) -> int:
         """Speed of the line [bit/s]; setting it sets the robot's end too, as its mode selector would."""
-        return self._line.baud
+        return self.line.baud
 
     @baudrate.setter
     def baudrate(self, baud: int) -> None:
         baud = check_count("baudrate", baud, BAUD_MIN, BAUD_MAX, "Usual: 9600 bit/s.")
-        with self._line.lock:
-            self._line.set_baud(baud)
+        with self.line.lock:
+            self.line.set_baud(baud)
 
     def write(self, data: bytes) -> int:
         """Send characters; return how many. They leave one after the other while the program goes on.
@@ -136,7 +156,7 @@ class VirtualPort:
         """
         if data.__class__ is not bytes:
             data = _characters(data)
-        line, program = self._line, self._program
+        line, program = self.line, self._program
         with line.lock:
             if program.thinks:
                 self._think(is_command=self._has_read)
@@ -174,19 +194,19 @@ class VirtualPort:
     @property
     def in_waiting(self) -> int:
         """Characters that have arrived and were not read. Asking again and again lets time pass."""
-        with self._line.lock:
+        with self.line.lock:
             self._ask()
-            return self._line.arrived_count()
+            return self.line.arrived_count()
 
     def flush(self) -> None:
         """Wait until everything has been sent."""
-        with self._line.lock:
-            self._line.finish_sending()
+        with self.line.lock:
+            self.line.pass_to(self.line.sent_ns())
 
     def reset_input_buffer(self) -> None:
         """Drop the characters that have arrived and were not read."""
-        with self._line.lock:
-            self._line.drop_arrived()
+        with self.line.lock:
+            self.line.drop_arrived()
 
     def reset_output_buffer(self) -> None:
         """Do nothing: what was written is on the line already."""
@@ -200,20 +220,20 @@ class VirtualPort:
         Raises:
             LinkError: If somebody holds it already.
         """
-        self._line.claim(holder)
+        self.line.claim(holder)
 
     def close(self) -> None:
         """Hang up: forget what nobody read. The robot drives on, and the port may be opened again."""
-        with self._line.lock:
-            self._line.hang_up()
+        with self.line.lock:
+            self.line.hang_up()
 
     # ---- time, as the program lives it ----
 
     def ask_ns(self) -> int:
         """Return the simulated time [ns]; asking again and again lets time pass, so that a loop may wait for it."""
-        with self._line.lock:
+        with self.line.lock:
             self._ask()
-            return self._line.now_ns
+            return self.line.now_ns
 
     @property
     def time_s(self) -> float:
@@ -227,10 +247,10 @@ class VirtualPort:
             ParameterError: If it is negative, longer than 1e9 s or no number.
         """
         passing_ns = ns_from_s(check_number("seconds", seconds, 0, SECONDS_MAX, "Time never runs backwards."))
-        with self._line.lock:
+        with self.line.lock:
             if self._program.thinks:
                 self._think(is_command=False)
-            self._line.pass_to(self._line.now_ns + passing_ns)
+            self.line.pass_to(self.line.now_ns + passing_ns)
             self._program.leave(has_acted=True)
 
     # ---- inside ----
@@ -239,7 +259,7 @@ class VirtualPort:
         """Let the time pass that the program has thought."""
         time_ns = self._program.enter(is_command=is_command)
         if time_ns:
-            self._line.think(time_ns)
+            self.line.think(time_ns)
 
     def _ask(self) -> None:
         """Let the time pass that a question costs."""
@@ -247,11 +267,11 @@ class VirtualPort:
             self._think(is_command=False)
         cost_ns = self._program.ask()
         if cost_ns:
-            self._line.pass_to(self._line.now_ns + cost_ns)
+            self.line.pass_to(self.line.now_ns + cost_ns)
         self._program.leave(has_acted=False)
 
     def _read(self, size: int | None, terminator: bytes | None) -> bytes:
-        line, program, timeout_ns = self._line, self._program, self._timeout_ns
+        line, program, timeout_ns = self.line, self._program, self._timeout_ns
         with line.lock:
             if program.thinks:
                 self._think(is_command=False)

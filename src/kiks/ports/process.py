@@ -18,6 +18,9 @@ from typing import IO, NamedTuple
 from kiks.errors import KiksError, ParameterError
 from kiks.sim.tail import Tail
 
+LATE, PUNCTUAL = "late", "punctual"
+"""When a program was started: after the world had begun, or before."""
+
 OUTPUT_LIMIT = 1000
 """Lines of a program's output that are kept."""
 
@@ -66,7 +69,7 @@ class Process:
     (`child.py`), so it must be one that lives as long.
 
     Args:
-        words: What `kiks.ports.child` is told before the program.
+        words: What `kiks.script.child` is told before the program.
         command: The program.
         there: Its end of the socket.
         is_heard: Whether its output is kept. Such a program has nobody at its keyboard, and a group of its own: what
@@ -90,7 +93,7 @@ class Process:
         has_started = threading.Event()
         failures: list[OSError] = []
         # -P: the folder in which KiKS was started is none of the program's.
-        line = [sys.executable, "-P", "-m", "kiks.ports.child", str(there.fileno()), *words]
+        line = [sys.executable, "-P", "-m", "kiks.script.child", str(there.fileno()), *words]
         line += [str(command.program), *command.arguments]
 
         def attend() -> None:

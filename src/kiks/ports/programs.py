@@ -16,13 +16,12 @@ from kiks.clock.patience import Patience
 from kiks.clock.thinking import parse_thinking
 from kiks.ending import INTERRUPTED
 from kiks.errors import KiksError, ParameterError
-from kiks.ports.child import LATE, PUNCTUAL
 from kiks.ports.descriptors import opening
 from kiks.ports.guest import NearGuest, SocketGuest
 from kiks.ports.handle import Handle
 from kiks.ports.names import Names
 from kiks.ports.permission import Anything, Permission
-from kiks.ports.process import Command, Process
+from kiks.ports.process import LATE, PUNCTUAL, Command, Process
 from kiks.ports.turns import PATIENCE_S, START_PATIENCE_S, VISIT_PATIENCE_S, Turns
 from kiks.sim.simulation import Simulation
 
@@ -319,7 +318,7 @@ class Programs:
         with there:
             try:
                 handle.process = Process(
-                    [lateness, self._policy(number), record],
+                    [lateness, self._policy(number), record, " ".join(self._names.offered())],
                     command,
                     there,
                     is_heard=self._is_heard,

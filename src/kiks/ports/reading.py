@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 from kiks.errors import LinkError
 
@@ -11,6 +12,20 @@ if TYPE_CHECKING:
 
 NEVER_NS = 1 << 63
 """A time [ns] that no simulation reaches."""
+
+
+class Read(NamedTuple):
+    """What a thread of a program waits for on a line.
+
+    Attributes:
+        robot: Number of the robot, from 1.
+        size: How many characters at most; None: up to the terminator.
+        terminator: What ends the read; None: the size alone.
+    """
+
+    robot: int
+    size: int | None
+    terminator: bytes | None = None
 
 
 def end_of_read(
@@ -43,6 +58,34 @@ def end_of_read(
         return NEVER_NS, 0
     arrived = line.arrived_count(end_ns)
     return end_ns, arrived if size is None else min(arrived, size)
+
+
+def end_of_wait(wires: Sequence[Wire], reads: Sequence[Read], until_ns: int) -> tuple[int, bool]:
+    """Return up to when nothing can change for those who wait for the first of several reads.
+
+    Args:
+        wires: The lines of all robots, with every command carried out that acts up to now.
+        reads: What is waited for.
+        until_ns: When the wait ends at the latest [ns]; `NEVER_NS` if it has no end.
+
+    Returns:
+        A time [ns], and whether the wait ends there; if not, a robot acts then, and the question is to be asked again.
+    """
+    end_ns, next_ns = until_ns, NEVER_NS
+    for robot, size, terminator in reads:
+        wire = wires[robot - 1]
+        end = end_of_read(wire, size, terminator, until_ns, 0)
+        if end is not None:
+            end_ns = min(end_ns, end[0])
+        elif wire.next_ns is not None:
+            next_ns = min(next_ns, wire.next_ns)
+    return (next_ns, False) if next_ns <= end_ns and next_ns < NEVER_NS else (end_ns, True)
+
+
+def is_complete(wire: Wire, read: Read, now_ns: int) -> bool:
+    """Say whether what a read waits for has arrived."""
+    count = _complete(wire.line.waiting, read.size, read.terminator)
+    return read.size == 0 or 0 < count <= wire.line.arrived_count(now_ns)
 
 
 def never_ends(robot: int) -> LinkError:

@@ -11,7 +11,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from kiks.clock.line import BACKLOG_LIMIT
 from kiks.clock.pace import Pace
 from kiks.ports.endpoint import Channel
 from kiks.sim.simulation import Simulation
@@ -151,7 +150,7 @@ class Live:
                 if last_ns is not None:
                     wait_s = min(wait_s, COALESCE_S, pace.wall_wait_s(last_ns))
             if self.is_full(link):
-                wait_s = min(wait_s, pace.wall_wait_s(line.sending_until_ns - BACKLOG_LIMIT * line.character_ns))
+                wait_s = min(wait_s, pace.wall_wait_s(line.room_ns))
         return wait_s if has_caught_up else 0.0
 
     def receive(self, link: Link, data: bytes) -> None:
@@ -161,5 +160,4 @@ class Live:
 
     def is_full(self, link: Link) -> bool:
         """Say whether as many characters are on the line as a serial driver holds."""
-        line = link.wire.line
-        return line.sending_until_ns - self._sim.now_ns > BACKLOG_LIMIT * line.character_ns
+        return link.wire.line.room_ns > self._sim.now_ns

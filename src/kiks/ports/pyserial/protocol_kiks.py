@@ -21,6 +21,14 @@ class Serial(SerialBase):  # type: ignore[misc, unused-ignore]
         """Return the simulated port behind a name; `kiks run` puts its own mapping here."""
         return url.find_port(name)
 
+    def _take(self, port: VirtualPort) -> None:
+        """Take a port for this program alone."""
+        port.claim(f"the program that opened {shown(self.port)}")
+
+    def _give_back(self, port: VirtualPort) -> None:
+        """Let others have it."""
+        port.close()
+
     def open(self) -> None:
         """Open the port.
 
@@ -35,7 +43,7 @@ class Serial(SerialBase):  # type: ignore[misc, unused-ignore]
             raise SerialException(f"port {self.port!r} must be closed before it is opened, but it is open.")
         try:
             self._sim_port = self.find(str(self.port))
-            self._sim_port.claim(f"the program that opened {shown(self.port)}")
+            self._take(self._sim_port)
         except KiksError as error:
             raise SerialException(str(error)) from None
         self.is_open = True
@@ -44,7 +52,7 @@ class Serial(SerialBase):  # type: ignore[misc, unused-ignore]
     def close(self) -> None:
         """Hang up. The robot drives on."""
         if self.is_open and self._sim_port is not None:
-            self._sim_port.close()
+            self._give_back(self._sim_port)
         self.is_open = False
         self._sim_port = None
 

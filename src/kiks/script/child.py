@@ -1,4 +1,4 @@
-"""A program in a process of its own; `programs.py` starts it by `python -m kiks.ports.child`."""
+"""A program in a process of its own; `programs.py` starts it by `python -m kiks.script.child`."""
 
 from __future__ import annotations
 
@@ -14,17 +14,16 @@ from kiks.clock.thinking import save_thinking
 from kiks.errors import KiksError
 from kiks.ports.far import FarLine, SocketConnection
 from kiks.ports.messages import Kind
-from kiks.ports.port import VirtualPort
-from kiks.ports.unchanged import run_program
-
-LATE, PUNCTUAL = "late", "punctual"
-"""When a program was started: after the world had begun, or before."""
+from kiks.ports.process import LATE
+from kiks.script.runner import run_program
 
 DIE_WITH_PARENT = 1
 """PR_SET_PDEATHSIG of Linux (linux/prctl.h)."""
 
 
-def main(descriptor: int, is_late: bool, thinking: str, record: str, program: Path, arguments: list[str]) -> int:
+def main(
+    descriptor: int, is_late: bool, thinking: str, record: str, offered: list[str], program: Path, arguments: list[str]
+) -> int:
     """Run the program to its end; return its exit code.
 
     Args:
@@ -32,6 +31,7 @@ def main(descriptor: int, is_late: bool, thinking: str, record: str, program: Pa
         is_late: Whether the world may have begun already.
         thinking: What the program's computing costs.
         record: File for the thinking times that were measured; none if empty.
+        offered: The port names that the program finds when it looks for ports.
         program: The Python file.
         arguments: What it finds in `sys.argv` after its name.
     """
@@ -46,11 +46,15 @@ def main(descriptor: int, is_late: bool, thinking: str, record: str, program: Pa
     connection = SocketConnection(socket.socket(fileno=descriptor), is_late=is_late)
     policy = Program(thinking)
 
-    def open_port(name: str) -> VirtualPort:
-        return VirtualPort(FarLine(connection, connection.ask(Kind.FIND, data=name.encode()).number), policy)
-
     try:
-        return run_program(program, arguments, open_port, VirtualPort(FarLine(connection, 0), policy))
+        return run_program(
+            program,
+            arguments,
+            lambda robot: FarLine(connection, robot),
+            lambda name: connection.ask(Kind.FIND, data=name.encode()).number,
+            policy,
+            offered,
+        )
     except KeyboardInterrupt:
         return 130
     finally:
@@ -67,5 +71,5 @@ def _save(measured_ns: list[int], record: str) -> None:
 
 
 if __name__ == "__main__":
-    descriptor, lateness, thinking, record, program, *arguments = sys.argv[1:]
-    sys.exit(main(int(descriptor), lateness == LATE, thinking, record, Path(program), arguments))
+    descriptor, lateness, thinking, record, offered, program, *arguments = sys.argv[1:]
+    sys.exit(main(int(descriptor), lateness == LATE, thinking, record, offered.split(), Path(program), arguments))

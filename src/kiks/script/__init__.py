@@ -1,0 +1,1 @@
+"""Whole Python programs, unchanged, in simulated time: their threads, clocks, ports and event loops."""

@@ -1,0 +1,123 @@
+"""The clocks of a program: `time` and `datetime` tell the robot's time, and waiting costs none of ours."""
+
+from __future__ import annotations
+
+import datetime
+import time
+from collections.abc import Callable
+from typing import Any
+
+from kiks.clock.program import EPOCH_S
+from kiks.ports.port import VirtualPort
+from kiks.script.scheduler import Scheduler
+from kiks.units import NS_PER_S
+
+CALENDARS = frozenset(getattr(time, name) for name in ("CLOCK_REALTIME", "CLOCK_TAI") if hasattr(time, name))
+"""Clocks of `time.clock_gettime` that tell the date; the others tell how long the program has been running."""
+
+
+def replacements(scheduler: Scheduler, clock: VirtualPort) -> dict[str, dict[str, Any]]:
+    """Return what stands in for names of `time` and `datetime`, by module.
+
+    Args:
+        scheduler: The program's threads.
+        clock: A port of the program's world.
+    """
+    now_ns = clock.ask_ns
+
+    def calendar_ns() -> int:
+        return EPOCH_S * NS_PER_S + now_ns()
+
+    def sleep(seconds: float, /) -> None:
+        if seconds < 0:
+            raise ValueError("sleep length must be non-negative")
+        if seconds == 0:
+            scheduler.give_way()
+            now_ns()
+        else:
+            clock.sleep(seconds)
+
+    def clock_gettime_ns(clock_id: int, /) -> int:
+        return calendar_ns() if clock_id in CALENDARS else now_ns()
+
+    def of_now(name: str) -> Callable[..., Any]:
+        """Return a function of `time` that takes a time, or the present one."""
+        original = getattr(time, name)
+        is_of_struct = name in ("asctime", "strftime")
+
+        def converted(*given: Any) -> Any:
+            if name == "strftime" and len(given) == 1:
+                given = (given[0], local(calendar_ns() / NS_PER_S))
+            elif name != "strftime" and (not given or given[0] is None):
+                seconds = calendar_ns() / NS_PER_S
+                given = (local(seconds),) if is_of_struct else (seconds,)
+            return original(*given)
+
+        return converted
+
+    local = time.localtime
+    functions: dict[str, Callable[..., Any]] = {
+        "sleep": sleep,
+        "time": lambda: calendar_ns() / NS_PER_S,
+        "time_ns": calendar_ns,
+        "clock_gettime": lambda clock_id, /: clock_gettime_ns(clock_id) / NS_PER_S,
+        "clock_gettime_ns": clock_gettime_ns,
+    }
+    for name in ("monotonic", "perf_counter", "process_time", "thread_time"):
+        functions[name] = lambda: now_ns() / NS_PER_S
+        functions[f"{name}_ns"] = now_ns
+    for name in ("localtime", "gmtime", "ctime", "asctime", "strftime"):
+        functions[name] = of_now(name)
+    dates = _dates(calendar_ns)
+    return {
+        "time": {name: _here(scheduler, function, getattr(time, name)) for name, function in functions.items()},
+        "datetime": dates,
+        "_datetime": dates,
+    }
+
+
+def _here(scheduler: Scheduler, function: Callable[..., Any], original: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function for the program's threads; others of this process, such as a server's, keep the original."""
+
+    def choose(*given: Any) -> Any:
+        return (function if scheduler.is_here else original)(*given)
+
+    choose.__name__ = choose.__qualname__ = original.__name__
+    return choose
+
+
+def _dates(calendar_ns: Callable[[], int]) -> dict[str, type]:
+    """Return `datetime` and `date` whose present is simulated; dates made before are of the same type to them."""
+
+    class Kind(type):
+        """What makes a class with the same members as the one that it stands in for."""
+
+        def __instancecheck__(cls, instance: object) -> bool:
+            return isinstance(instance, cls.__bases__[0])
+
+        def __subclasscheck__(cls, other: type) -> bool:
+            return issubclass(other, cls.__bases__[0])
+
+    class SimulatedDatetime(datetime.datetime, metaclass=Kind):
+        @classmethod
+        def now(cls, tz: datetime.tzinfo | None = None) -> SimulatedDatetime:
+            seconds, rest_ns = divmod(calendar_ns(), NS_PER_S)
+            return cls.fromtimestamp(seconds, tz).replace(microsecond=rest_ns // 1000)
+
+        @classmethod
+        def today(cls) -> SimulatedDatetime:
+            return cls.now()
+
+        @classmethod
+        def utcnow(cls) -> SimulatedDatetime:
+            return cls.now(datetime.UTC).replace(tzinfo=None)
+
+    class SimulatedDate(datetime.date, metaclass=Kind):
+        @classmethod
+        def today(cls) -> SimulatedDate:
+            return cls.fromtimestamp(calendar_ns() / NS_PER_S)
+
+    for simulated in (SimulatedDatetime, SimulatedDate):
+        simulated.__name__ = simulated.__qualname__ = simulated.__bases__[0].__name__
+        simulated.__module__ = "datetime"
+    return {"datetime": SimulatedDatetime, "date": SimulatedDate}

@@ -1,0 +1,63 @@
+"""Names of modules that mean something else while a program runs."""
+
+from __future__ import annotations
+
+import _thread
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+_MISSING = object()
+
+_SWEPT = sys.stdlib_module_names | {"serial"}
+
+
+@contextmanager
+def replaced(
+    replacements: Mapping[str, Mapping[str, Any]], new_lock: Callable[[], object] | None = None
+) -> Iterator[None]:
+    """Let names mean something else, also where modules of Python and of pyserial have taken them from others.
+
+    What KiKS has imported beside these keeps what it has: it lives in real time.
+
+    Args:
+        replacements: What stands in for names, by module, or module and class.
+        new_lock: Makes a lock that stands in for those that modules have made when they were imported; None: they stay.
+    """
+    undo: list[tuple[Any, str, Any]] = []
+
+    def put(owner: Any, name: str, value: Any) -> None:
+        undo.append((owner, name, vars(owner).get(name, _MISSING)))
+        setattr(owner, name, value)
+
+    # The originals are held, so that no other object has the same id.
+    stands_for: dict[int, tuple[Any, Any]] = {}
+    for path, names in replacements.items():
+        owner: Any = sys.modules.get(path)
+        if owner is None and path.rpartition(".")[0] in sys.modules:
+            module, _, name = path.rpartition(".")
+            owner = getattr(sys.modules[module], name, None)
+        if owner is None:
+            continue
+        for name, value in names.items():
+            original = vars(owner).get(name)
+            if callable(original):
+                stands_for[id(original)] = (original, value)
+            put(owner, name, value)
+    for name, module in list(sys.modules.items()):
+        if name.partition(".")[0] not in _SWEPT or not hasattr(module, "__dict__"):
+            continue
+        for attribute, value in list(vars(module).items()):
+            if id(value) in stands_for and value is stands_for[id(value)][0]:
+                put(module, attribute, stands_for[id(value)][1])
+            elif new_lock is not None and type(value) is _thread.LockType and not value.locked():
+                put(module, attribute, new_lock())
+    try:
+        yield
+    finally:
+        for owner, name, value in reversed(undo):
+            if value is _MISSING:
+                delattr(owner, name)
+            else:
+                setattr(owner, name, value)

@@ -1,0 +1,205 @@
+"""A whole Python program, unchanged: simulated robots behind its serial ports, simulated time for all its threads."""
+
+from __future__ import annotations
+
+import runpy
+import sys
+import threading
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from kiks.clock.program import Program
+from kiks.errors import KiksError
+from kiks.ports.port import Line, VirtualPort
+from kiks.script import clocks, event_loops, locks, serial_ports
+from kiks.script.files import OpenPorts, RealFiles
+from kiks.script.lines import SharedLine
+from kiks.script.replacing import replaced
+from kiks.script.scheduler import EndedError, Scheduler
+from kiks.script.signals import Signals
+
+if TYPE_CHECKING:
+    from kiks.sim.simulation import Simulation
+
+
+def run_here(sim: Simulation, program: Path, arguments: list[str], told: dict[str, int]) -> int:
+    """Run a program in this process to its end; return its exit code.
+
+    Args:
+        sim: The simulation behind its ports.
+        program: The Python file.
+        arguments: What it finds in `sys.argv` after its name.
+        told: Robots by port name.
+
+    Raises:
+        ParameterError: If `told` names a robot that is not there.
+    """
+    from kiks.ports.memory import NearLine
+    from kiks.ports.names import Names
+    from kiks.ports.url import find_port
+
+    names = Names(sim, told)
+
+    def find(name: str) -> int | VirtualPort:
+        if not name.startswith("kiks:"):
+            return names.robot(name)
+        port = find_port(name)
+        return port.robot if port.sim is sim else port
+
+    return run_program(program, arguments, lambda robot: NearLine(sim, robot), find, sim.program, names.offered())
+
+
+def run_program(
+    program: Path,
+    arguments: list[str],
+    line_of: Callable[[int], Line],
+    find: Callable[[str], int | VirtualPort],
+    policy: Program,
+    offered: list[str],
+) -> int:
+    """Run a program to its end with simulated ports and simulated time; return its exit code.
+
+    Args:
+        program: The Python file.
+        arguments: What it finds in `sys.argv` after its name.
+        line_of: Returns the line of a robot, from 1; that of robot 1 tells the time.
+        find: Returns the robot behind a port's name, or a port of another world.
+        policy: What the program's thinking and asking cost.
+        offered: The port names that it finds when it looks for ports.
+    """
+    world = line_of(1)
+    scheduler = Scheduler(world, policy, RealFiles())
+    lines: dict[int, SharedLine] = {}
+
+    def open_port(name: str) -> VirtualPort:
+        found = find(name)
+        if isinstance(found, VirtualPort):
+            return found
+        if found not in lines:
+            lines[found] = SharedLine(line_of(found), found, scheduler)
+        return VirtualPort(lines[found], policy)
+
+    clock = VirtualPort(SharedLine(world, 1, scheduler), policy)
+    ports = OpenPorts(scheduler)
+    ends, signals = _AtExit(), Signals(scheduler)
+    replacements = _merged(
+        locks.replacements(scheduler),
+        clocks.replacements(scheduler, clock),
+        ports.replacements(),
+        serial_ports.replacements(open_port, ports, offered),
+        event_loops.replacements(scheduler),
+        signals.replacements(),
+        ends.replacements(),
+    )
+
+    def main() -> int:
+        code = _run_file(program)
+        _wait_for_threads(scheduler)
+        ends.run()
+        return code
+
+    argv_before, path_before = sys.argv, sys.path[:]
+    sys.argv = [str(program), *arguments]
+    sys.path.insert(0, str(program.resolve().parent))
+    try:
+        with signals.taken(), replaced(replacements, replacements["threading"]["Lock"]):
+            return scheduler.run(main)
+    except EndedError as end:
+        if end.message:
+            _complain(f"kiks: {end.message}")
+        return end.code
+    finally:
+        _forget_threads(scheduler)
+        sys.argv = argv_before
+        sys.path[:] = path_before
+
+
+def _merged(*parts: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    whole: dict[str, dict[str, Any]] = {}
+    for part in parts:
+        for module, names in part.items():
+            whole.setdefault(module, {}).update(names)
+    return whole
+
+
+class _AtExit:
+    """What the program has done when it ends, such as stopping the robot: while there still is one."""
+
+    def __init__(self) -> None:
+        self._calls: list[tuple[Callable[..., object], tuple[Any, ...], dict[str, Any]]] = []
+
+    def replacements(self) -> dict[str, dict[str, Any]]:
+        """Return what stands in for names of `atexit`."""
+        return {"atexit": {"register": self._register, "unregister": self._unregister}}
+
+    def run(self) -> None:
+        """Do it, what came last first."""
+        while self._calls:
+            call, args, kwargs = self._calls.pop()
+            try:
+                call(*args, **kwargs)
+            except Exception as error:
+                print(f"Exception ignored in atexit callback: {call!r}", file=sys.stderr)
+                _print_program_trace(error)
+
+    def _register(self, call: Callable[..., object], /, *args: Any, **kwargs: Any) -> Callable[..., object]:
+        self._calls.append((call, args, kwargs))
+        return call
+
+    def _unregister(self, call: Callable[..., object], /) -> None:
+        self._calls = [each for each in self._calls if each[0] != call]
+
+
+def _run_file(program: Path) -> int:
+    """Run the main thread; return the exit code."""
+    try:
+        runpy.run_path(str(program), run_name="__main__")
+    except SystemExit as leaving:
+        if leaving.code is None or isinstance(leaving.code, int):
+            return leaving.code or 0
+        return _complain(str(leaving.code))
+    except KiksError as error:
+        return _complain(f"kiks: {error}")
+    except Exception as error:
+        _print_program_trace(error)
+        return 1
+    return 0
+
+
+def _wait_for_threads(scheduler: Scheduler) -> None:
+    """Wait for the threads that the program has left, as Python does when its main thread ends."""
+    for call in reversed(getattr(threading, "_threading_atexits", [])):
+        call()
+    while left := [each for each in threading.enumerate() if each.ident in scheduler.tasks and not each.daemon]:
+        for thread in left:
+            thread.join()
+
+
+def _forget_threads(scheduler: Scheduler) -> None:
+    """Let Python not wait for threads that have not ended: they never go on."""
+    for ident, task in scheduler.tasks.items():
+        thread = threading._active.pop(ident, None)  # type: ignore[attr-defined]
+        if task.sentinel is not None and task.sentinel.locked():
+            task.sentinel.release()
+        if thread is not None:
+            thread._stop()
+
+
+def _complain(text: str) -> int:
+    print(text, file=sys.stderr)
+    return 1
+
+
+def _print_program_trace(error: Exception) -> None:
+    """Show the program's own error as Python would, without the frames of KiKS and runpy above and below it."""
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [
+        frame
+        for frame in frames
+        if "runpy" not in frame.filename and str(Path(__file__).parent.parent) not in frame.filename
+    ]
+    print("Traceback (most recent call last):", file=sys.stderr)
+    print("".join(traceback.format_list(own)), end="", file=sys.stderr)
+    print("".join(traceback.format_exception_only(error)), end="", file=sys.stderr)

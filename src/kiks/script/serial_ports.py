@@ -1,0 +1,128 @@
+"""What a program finds in `serial`: every port is a simulated robot's, whatever name it is given."""
+
+from __future__ import annotations
+
+import errno
+import fnmatch
+import glob
+import os
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from kiks.ports import url as urls
+from kiks.ports.port import VirtualPort
+from kiks.script.files import OpenPorts
+from kiks.script.lines import SharedLine
+
+USB_ADAPTER = (0x0403, 0x6001)
+"""Vendor and product of the most common adapter from USB to a serial line, FTDI's FT232: programs look for it."""
+
+
+def replacements(
+    open_port: Callable[[str], VirtualPort], ports: OpenPorts, names: Sequence[str]
+) -> dict[str, dict[str, Any]]:
+    """Return what stands in for names of `serial`, `glob` and `os.path`, by module.
+
+    Args:
+        open_port: Returns the port behind a name.
+        ports: Where ports get their file descriptors.
+        names: Port names that a program finds when it looks for ports, one a robot.
+    """
+    import serial
+    import serial.tools.list_ports
+    from serial.tools import list_ports_common
+
+    from kiks.ports.pyserial import protocol_kiks
+
+    # The ports that the program has open, by line.
+    holders: dict[int, list[Serial]] = {}
+
+    class Serial(protocol_kiks.Serial):
+        """What a program gets that asks for a serial port."""
+
+        _descriptor: int | None = None
+
+        def find(self, name: str) -> VirtualPort:
+            return open_port(name)
+
+        def _take(self, port: VirtualPort) -> None:
+            others = holders.setdefault(id(port.line), [])
+            if self._exclusive and any(other._exclusive for other in others):
+                raise serial.SerialException(
+                    errno.EWOULDBLOCK, f"Could not exclusively lock port {self.port}: it is open already"
+                )
+            # As on a real one, a program may open a port twice; characters go to whoever reads first.
+            if not others:
+                super()._take(port)
+            others.append(self)
+
+        def _give_back(self, port: VirtualPort) -> None:
+            others = holders[id(port.line)]
+            others.remove(self)
+            if not others:
+                super()._give_back(port)
+
+        def fileno(self) -> int:
+            if self._descriptor is None:
+                line = self._open_port.line
+                if not isinstance(line, SharedLine):
+                    return super().fileno()
+                self._descriptor = ports.add(line, self)
+            return self._descriptor
+
+        @property
+        def fd(self) -> int | None:
+            return self.fileno() if self.is_open else None
+
+        def close(self) -> None:
+            if self._descriptor is not None:
+                ports.remove(self._descriptor)
+                self._descriptor = None
+            super().close()
+
+        def cancel_read(self) -> None:
+            line = self._open_port.line
+            if isinstance(line, SharedLine):
+                line.cancel_read()
+
+        def cancel_write(self) -> None:
+            """Do nothing: what was written is on the line."""
+
+        def nonblocking(self) -> None:
+            """Do nothing: who waits with `select` reads what is there."""
+
+    def serial_for_url(url: str, *args: Any, do_not_open: bool = False, **settings: Any) -> Serial:
+        port = Serial(None, *args, **settings)
+        port.port = url
+        if not do_not_open:
+            port.open()
+        return port
+
+    def comports(include_links: bool = False, _hide_subsystems: Any = None) -> list[Any]:
+        found = []
+        for number, name in enumerate(names, 1):
+            info = list_ports_common.ListPortInfo(name)
+            info.description = f"USB Serial Port (simulated Khepera {number})"
+            info.vid, info.pid = USB_ADAPTER
+            info.serial_number, info.location = f"KIKS{number:04}", f"1-{number}"
+            info.manufacturer, info.product = "KiKS", f"Simulated Khepera {number}"
+            info.hwid = info.usb_info()
+            found.append(info)
+        return found
+
+    def simulated_glob(pathname: Any, **options: Any) -> list[Any]:
+        more = fnmatch.filter(names, pathname) if isinstance(pathname, str) else []
+        return sorted({*real_glob(pathname, **options), *more})
+
+    def exists(path: Any) -> bool:
+        return (isinstance(path, str) and path in names) or real_exists(path)
+
+    real_glob, real_exists = glob.glob, os.path.exists
+    return {
+        "serial": {"Serial": Serial, "serial_for_url": serial_for_url},
+        "serial.tools.list_ports": {"comports": comports},
+        "glob": {"glob": simulated_glob, "iglob": lambda *args, **options: iter(simulated_glob(*args, **options))},
+        "posixpath": {"exists": exists},
+        # `kiks.Khepera` and `kiks.kopen` find their ports by this one.
+        urls.__name__: {"find_port": open_port},
+    }
