@@ -15,6 +15,9 @@ from kiks.units import NS_PER_S
 CALENDARS = frozenset(getattr(time, name) for name in ("CLOCK_REALTIME", "CLOCK_TAI") if hasattr(time, name))
 """Clocks of `time.clock_gettime` that tell the date; the others tell how long the program has been running."""
 
+SHORTEST_S = 1e-9
+"""Shortest sleep [s]: what floating-point numbers leave of one may be less, and time goes on nevertheless."""
+
 
 def replacements(scheduler: Scheduler, clock: VirtualPort) -> dict[str, dict[str, Any]]:
     """Return what stands in for names of `time` and `datetime`, by module.
@@ -35,7 +38,7 @@ def replacements(scheduler: Scheduler, clock: VirtualPort) -> dict[str, dict[str
             scheduler.give_way()
             now_ns()
         else:
-            clock.sleep(seconds)
+            clock.sleep(max(seconds, SHORTEST_S))
 
     def clock_gettime_ns(clock_id: int, /) -> int:
         return calendar_ns() if clock_id in CALENDARS else now_ns()
@@ -68,9 +71,18 @@ def replacements(scheduler: Scheduler, clock: VirtualPort) -> dict[str, dict[str
         functions[f"{name}_ns"] = now_ns
     for name in ("localtime", "gmtime", "ctime", "asctime", "strftime"):
         functions[name] = of_now(name)
+
+    def deadline_time(*_: object) -> float:
+        """Return the time [s] to a library that waits up to a time-out: a program that waits so asks for nothing."""
+        scheduler.poll()
+        return scheduler.world.now_ns / NS_PER_S
+
     dates = _dates(calendar_ns)
     return {
         "time": {name: _here(scheduler, function, getattr(time, name)) for name, function in functions.items()},
+        "queue": {"time": deadline_time},
+        "threading": {"_time": deadline_time},
+        "asyncio.base_events.BaseEventLoop": {"time": deadline_time},
         "datetime": dates,
         "_datetime": dates,
     }

@@ -17,8 +17,7 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
     Args:
         scheduler: The program's threads; each has a running loop of its own from now on.
     """
-    get_running, set_running = asyncio._get_running_loop, asyncio._set_running_loop
-    scheduler.carried["asyncio"] = get_running, set_running
+    scheduler.carried.append((asyncio._get_running_loop, asyncio._set_running_loop))
 
     class Local(local):
         """Which loop each thread has."""

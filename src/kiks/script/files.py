@@ -13,11 +13,9 @@ import selectors
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from kiks.model.ranges import SECONDS_MAX
 from kiks.ports.reading import NEVER_NS, Read
 from kiks.script.lines import SharedLine
-from kiks.script.scheduler import Scheduler
-from kiks.units import ns_from_s
+from kiks.script.scheduler import Scheduler, timeout_ns
 
 BLOCK_MS = 50
 """How long a wait in real time lasts before signals are looked at [ms]."""
@@ -79,9 +77,7 @@ class OpenPorts:
             timeout_s: How long.
         """
         scheduler = self._scheduler
-        deadline_ns = NEVER_NS
-        if timeout_s is not None and timeout_s <= SECONDS_MAX:
-            deadline_ns = scheduler.world.now_ns + ns_from_s(max(timeout_s, 0.0))
+        deadline_ns = NEVER_NS if timeout_s is None else scheduler.world.now_ns + timeout_ns(timeout_s)
         found = self._look(wanted)
         if not found and timeout_s is not None and timeout_s <= 0:
             scheduler.poll()
@@ -162,18 +158,18 @@ class OpenPorts:
             def __exit__(self, *_: object) -> None:
                 self.close()
 
-        class Selector(selectors._BaseSelectorImpl):  # type: ignore[misc]
+        class Selector(selectors._BaseSelectorImpl):
             """See `selectors.DefaultSelector`."""
 
             def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
                 wanted = {
-                    descriptor: (READ if key.events & selectors.EVENT_READ else 0)
+                    key.fd: (READ if key.events & selectors.EVENT_READ else 0)
                     | (WRITE if key.events & selectors.EVENT_WRITE else 0)
-                    for descriptor, key in self._fd_to_key.items()
+                    for key in self.get_map().values()
                 }
                 ready = []
                 for descriptor, happened in ports.wait(wanted, timeout).items():
-                    key = self._fd_to_key.get(descriptor)
+                    key = self.get_map().get(descriptor)
                     if key is not None:
                         events = (selectors.EVENT_READ if happened & ~WRITE else 0) | (
                             selectors.EVENT_WRITE if happened & ~READ else 0
@@ -225,7 +221,8 @@ def _read_port(port: Any, length: int) -> bytes:
     timeout, port.timeout = port.timeout, None
     try:
         first: bytes = port.read(1)
-        return first + port.read(min(length - 1, port.in_waiting))
+        rest: bytes = port.read(min(length - 1, port.in_waiting))
+        return first + rest
     finally:
         port.timeout = timeout
 

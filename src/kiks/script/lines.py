@@ -6,9 +6,10 @@ from contextlib import AbstractContextManager
 from typing import Any
 
 from kiks.clock.line import BACKLOG_LIMIT
+from kiks.errors import LinkError
 from kiks.ports.port import Line
 from kiks.ports.reading import NEVER_NS, Read
-from kiks.script.scheduler import SIGNALLED, Scheduler
+from kiks.script.scheduler import ALONE, COMPLETE, SIGNALLED, Scheduler, Task
 
 
 class SharedLine:
@@ -25,7 +26,8 @@ class SharedLine:
         self.robot = robot
         self._line = line
         self._scheduler = scheduler
-        self._readers: list[Any] = []
+        self._readers: list[Task] = []
+        self._what = f"robot {robot}"
         # What passes through as it is.
         self.think = line.think
         self.arrived_count = line.arrived_count
@@ -72,17 +74,33 @@ class SharedLine:
             if poll_ns and not data:
                 scheduler.sleep_until(line.now_ns + poll_ns)
             return data
-        deadline_ns = NEVER_NS if timeout_ns is None else line.now_ns + timeout_ns
-        read, cause = Read(self.robot, size, terminator), None
-        # Another thread may take the characters first: then the wait goes on.
-        while cause in (None, SIGNALLED) and line.now_ns < deadline_ns and not line.wait_for([read], line.now_ns)[0]:
-            task = scheduler.current
-            self._readers.append(task)
-            try:
-                cause = scheduler.wait(f"robot {self.robot}", until_ns=deadline_ns, reads=[read])
-            finally:
-                self._readers.remove(task)
-        return line.read(size, terminator, 0, 0)
+        if line.arrived_count() and line.wait_for([Read(self.robot, size, terminator)], line.now_ns)[0]:
+            return line.read(size, terminator, 0, 0)
+        return self._wait(size, terminator, NEVER_NS if timeout_ns is None else line.now_ns + timeout_ns)
+
+    def _wait(self, size: int | None, terminator: bytes | None, deadline_ns: int) -> bytes:
+        """Let other threads go on until a read is complete, or up to a time [ns]; return what it has read."""
+        line, scheduler, task = self._line, self._scheduler, self._scheduler.current
+        self._readers.append(task)
+        try:
+            data = b""
+            while True:
+                read = Read(self.robot, None if size is None else size - len(data), terminator)
+                cause = scheduler.wait(self._what, until_ns=deadline_ns, reads=(read,), may_go_alone=True)
+                if cause is ALONE:
+                    left_ns = None if deadline_ns == NEVER_NS else max(deadline_ns - line.now_ns, 0)
+                    try:
+                        return data + line.read(*read[1:], left_ns, 0)
+                    except LinkError:
+                        scheduler.end_stuck()
+                if cause is SIGNALLED:
+                    continue
+                data += line.read(*read[1:], 0, 0)
+                # Another thread may have taken characters first: then the wait goes on.
+                if cause is not COMPLETE or len(data) == size or (terminator is not None and data.endswith(terminator)):
+                    return data
+        finally:
+            self._readers.remove(task)
 
     def cancel_read(self) -> None:
         """Let the threads go on that wait for characters; they get what has arrived."""

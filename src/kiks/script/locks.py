@@ -12,10 +12,8 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from kiks.model.ranges import SECONDS_MAX
 from kiks.ports.reading import NEVER_NS
-from kiks.script.scheduler import SIGNALLED, Scheduler, Task
-from kiks.units import ns_from_s
+from kiks.script.scheduler import SIGNALLED, Scheduler, Task, timeout_ns
 
 REAL_LOCK = _thread.allocate_lock
 REAL_SLEEP = time.sleep
@@ -54,9 +52,7 @@ class Lock:
         until_ns = NEVER_NS
         if timeout != -1:
             _check_timeout(timeout)
-            # What is longer than any run is for ever.
-            if timeout <= SECONDS_MAX:
-                until_ns = self.scheduler.world.now_ns + ns_from_s(timeout)
+            until_ns = self.scheduler.world.now_ns + timeout_ns(timeout)
         return self._wait(until_ns)
 
     def release(self) -> None:
@@ -75,13 +71,21 @@ class Lock:
             self.scheduler.poll()
         return self._is_locked
 
-    __enter__ = acquire
     acquire_lock = acquire
     release_lock = release
     locked_lock = locked
 
+    def __enter__(self) -> bool:
+        if self._is_locked:
+            return self._wait(NEVER_NS)
+        self._is_locked = True
+        return True
+
     def __exit__(self, *_: object) -> None:
-        self.release()
+        if self._waiters or not self._is_locked:
+            self.release()
+        else:
+            self._is_locked = False
 
     def _at_fork_reinit(self) -> None:
         self.__init__()  # type: ignore[misc]

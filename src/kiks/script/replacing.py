@@ -36,13 +36,14 @@ def replaced(
     for path, names in replacements.items():
         owner: Any = sys.modules.get(path)
         if owner is None and path.rpartition(".")[0] in sys.modules:
-            module, _, name = path.rpartition(".")
-            owner = getattr(sys.modules[module], name, None)
+            parent, _, attribute = path.rpartition(".")
+            owner = getattr(sys.modules[parent], attribute, None)
         if owner is None:
             continue
         for name, value in names.items():
             original = vars(owner).get(name)
-            if callable(original):
+            # What a module has from another one is replaced there alone.
+            if callable(original) and getattr(original, "__module__", None) == path:
                 stands_for[id(original)] = (original, value)
             put(owner, name, value)
     for name, module in list(sys.modules.items()):

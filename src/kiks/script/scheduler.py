@@ -24,15 +24,17 @@ import greenlet
 
 from kiks.clock.program import Program
 from kiks.clock.waiting import Waiting
+from kiks.model.ranges import SECONDS_MAX
 from kiks.ports.port import Line
 from kiks.ports.reading import NEVER_NS, Read
+from kiks.units import ns_from_s
 
 TASK_IDENT = 1 << 20
 """What `threading.get_ident` says in the first thread that a program starts."""
 
 
-SIGNALLED = object()
-"""Why a thread went on that was not done with waiting."""
+SIGNALLED, COMPLETE, ALONE = object(), object(), object()
+"""Why a thread goes on: a signal has come, a read is complete, or nobody else can go on before its read is."""
 
 _KEPT: list[Scheduler] = []
 """All that there have been: a thread that were collected while it waits would run its `finally` without a world."""
@@ -58,7 +60,6 @@ class Task:
         waits_for: What it waits for, in words for a person; empty while it does not wait.
         waiting: What its questions cost.
         sentinel: A lock that is released when it ends; None if nobody has asked for it.
-        saved: What libraries keep for each thread, while another one runs; by the library.
     """
 
     def __init__(self, ident: int, run: Callable[[], object], hub: greenlet.greenlet) -> None:
@@ -66,10 +67,10 @@ class Task:
         self.waits_for = ""
         self.waiting = Waiting()
         self.sentinel: Any = None
-        self.saved: dict[str, object] = {}
         self.greenlet = greenlet.greenlet(lambda *_: run(), hub)
         self.number = 0
         self.cause: object = None
+        self.may_go_alone = False
 
 
 class EndedError(Exception):
@@ -92,15 +93,13 @@ class Scheduler:
     Attributes:
         current: The thread that runs.
         tasks: Those that have been started and have not ended, by ident.
-        switch_count: How often another thread went on.
-        carried: What libraries keep for each thread of the operating system: by name, how it is taken and put back.
+        carried: How to take and to put back what libraries keep for each thread of the operating system.
     """
 
     def __init__(self, world: Line, program: Program, files: Files) -> None:
         self.world = world
         self.program = program
-        self.switch_count = 0
-        self.carried: dict[str, tuple[Callable[[], object], Callable[[Any], object]]] = {}
+        self.carried: list[tuple[Callable[[], object], Callable[[Any], object]]] = []
         self._files = files
         self._os_thread = get_ident()
         self._hub = greenlet.getcurrent()
@@ -223,6 +222,7 @@ class Scheduler:
         until_ns: int = NEVER_NS,
         reads: Sequence[Read] = (),
         files: Mapping[int, int] | None = None,
+        may_go_alone: bool = False,
     ) -> object:
         """Let other threads go on until this one is woken, a read is complete, a file is ready, or it is late enough.
 
@@ -231,14 +231,17 @@ class Scheduler:
             until_ns: When the wait ends at the latest [ns].
             reads: Reads that end the wait.
             files: Events that end it, by descriptor.
+            may_go_alone: Whether it ends, too, when no other thread can go on before a read is complete or it is late
+                enough: the thread then waits for that itself, at less cost.
 
         Returns:
-            What `wake` was called with; None if nobody has; `SIGNALLED` if a signal has come, and was dealt with, while
-            the main thread waited.
+            What `wake` was called with; `COMPLETE` if a read is complete; `ALONE`; None if it is late enough, or a file
+            is ready; `SIGNALLED` if a signal came, and was dealt with, while the main thread waited.
         """
         task = self.current
         task.waits_for = what
         task.cause = None
+        task.may_go_alone = may_go_alone
         task.number = next(self._numbers)
         if until_ns < NEVER_NS:
             heapq.heappush(self._deadlines, (until_ns, task.number, task))
@@ -291,12 +294,10 @@ class Scheduler:
         chosen = self._choose()
         self._is_choosing = False
         if chosen is not task:
-            for name, (take, _) in self.carried.items():
-                task.saved[name] = take()
-            self.switch_count += 1
+            saved = [take() for take, _ in self.carried]
             chosen.greenlet.switch()
-            for name, (_, put) in self.carried.items():
-                put(task.saved.get(name))
+            for (_, put), value in zip(self.carried, saved, strict=True):
+                put(value)
         if thinks:
             self.program.go_on()
         while self._calls and task is self._main:
@@ -324,6 +325,11 @@ class Scheduler:
     def _pass_time(self) -> None:
         """Let time pass until a thread may go on."""
         until_ns = self._next_deadline_ns()
+        if len(self._readers) == 1 and not self._watchers:
+            (reader,) = self._readers
+            if reader.may_go_alone and (until_ns == NEVER_NS or self._deadlines[0][2] is reader):
+                self.wake(reader, ALONE)
+                return
         if self._watchers and self._look_at_files(block=False):
             return
         readers = [(task, read) for task, reads in self._readers.items() for read in reads]
@@ -339,10 +345,10 @@ class Scheduler:
         while self._next_deadline_ns() <= now_ns:
             due.append(heapq.heappop(self._deadlines))
         for _, _, task in sorted(due, key=lambda entry: entry[:2]):
-            self.wake(task, None)
+            self.wake(task, COMPLETE if task in complete else None)
         if not due and now_ns == began_ns and until_ns == NEVER_NS:
             if not self._watchers:
-                self._tell_deadlock()
+                self.end_stuck()
             # Only the world outside can go on, and simulated time stands still meanwhile.
             self._look_at_files(block=True)
 
@@ -357,8 +363,9 @@ class Scheduler:
             self.wake(task, None)
         return bool(woken)
 
-    def _tell_deadlock(self) -> NoReturn:
+    def end_stuck(self) -> NoReturn:
         """End the program: none of its threads can ever go on."""
+        self.current.waits_for = self.current.waits_for or "a robot that was asked nothing"
         waiting = ", ".join(
             f"{_name_of(task)} for {task.waits_for}" for task in (self._main, *self.tasks.values()) if task.waits_for
         )
@@ -367,6 +374,16 @@ class Scheduler:
             f"some thread of a program must be able to go on, but all wait for ever: {waiting}. The robot is silent "
             "until it is asked: give reads a timeout, and let threads know when to stop.",
         )
+
+
+def timeout_ns(seconds: float) -> int:
+    """Return a time-out [s] as a time [ns]: none for what is over, for ever for what is longer than any run.
+
+    What is left of a time-out, by floating-point numbers, may be less than a nanosecond: time goes on nevertheless.
+    """
+    if seconds <= 0:
+        return 0
+    return max(ns_from_s(seconds), 1) if seconds <= SECONDS_MAX else NEVER_NS
 
 
 def _name_of(task: Task) -> str:

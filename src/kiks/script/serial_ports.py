@@ -47,7 +47,7 @@ def replacements(
 
         def _take(self, port: VirtualPort) -> None:
             others = holders.setdefault(id(port.line), [])
-            if self._exclusive and any(other._exclusive for other in others):
+            if self.exclusive and any(other.exclusive for other in others):
                 raise serial.SerialException(
                     errno.EWOULDBLOCK, f"Could not exclusively lock port {self.port}: it is open already"
                 )

@@ -14,8 +14,8 @@ from typing import Any
 
 import kiks
 from kiks.ports.reading import NEVER_NS
-from kiks.script.scheduler import SIGNALLED, Scheduler
-from kiks.units import ns_from_s, s_from_ns
+from kiks.script.scheduler import SIGNALLED, Scheduler, timeout_ns
+from kiks.units import s_from_ns
 
 EXIT_OF_SIGNAL = 128
 """What a shell adds to the number of the signal that ended a program."""
@@ -36,6 +36,8 @@ class Signals:
     def __init__(self, scheduler: Scheduler) -> None:
         self._scheduler = scheduler
         self._handlers: dict[int, Any] = {}
+        # What there was before the program began.
+        self._before: dict[int, Any] = {}
         self._wakeup = -1
         # Which setting of the alarm clock counts, when it rings [ns], and how often after that [ns].
         self._alarm = (0, NEVER_NS, 0)
@@ -51,14 +53,13 @@ class Signals:
             for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
             if (handler := _real_getsignal(number)) is signal.default_int_handler
         }
-        for number, handler in before.items():
-            self._set(number, handler)
-        changed = self._handlers
+        for name, handler in before.items():
+            self._set(name, handler)
         try:
             yield
         finally:
-            for number in changed:
-                _real_signal(number, before.get(number, signal.SIG_DFL))
+            for changed, handler in self._before.items():
+                _real_signal(changed, handler)
 
     def replacements(self) -> dict[str, dict[str, Any]]:
         """Return what stands in for names of `signal`."""
@@ -78,6 +79,7 @@ class Signals:
 
     def _set(self, number: int, handler: Any, /) -> Any:
         before = self._get(number)
+        self._before.setdefault(number, _real_getsignal(number))
         is_called = callable(handler) and not isinstance(handler, signal.Handlers)
         _real_signal(number, self._come if is_called else handler)
         self._handlers[number] = handler
@@ -120,7 +122,7 @@ class Signals:
         number, world = self._alarm[0] + 1, self._scheduler.world
         self._alarm = number, NEVER_NS, 0
         if seconds:
-            self._alarm = number, world.now_ns + ns_from_s(seconds), ns_from_s(interval_s)
+            self._alarm = number, world.now_ns + timeout_ns(seconds), timeout_ns(interval_s)
             self._scheduler.start(self._ring, (number,), {})
         return before
 
