@@ -20,6 +20,7 @@ class Program:
         thinks: Whether its thinking costs time.
         measures: Whether that is as long as it really takes.
         waiting: What the questions of the thread cost that runs.
+        act_count: How often it has called a port or a clock.
 
     Raises:
         ParameterError: If it knows none of that name.
@@ -31,6 +32,7 @@ class Program:
         self.thinks = self._policy is not None
         self.measures = isinstance(policy, ThinkingLive)
         self.waiting = Waiting()
+        self.act_count = 0
 
     def enter(self, *, is_command: bool) -> int:
         """Return what the program has to pay as it calls [ns]; see `Thinking.enter`."""
@@ -42,6 +44,7 @@ class Program:
 
     def poll(self) -> int:
         """Return the time that a question takes [ns] which is none about time or bytes; see `Waiting.poll`."""
+        self.act_count += 1
         return self.waiting.poll()
 
     def go_on(self) -> None:
@@ -51,6 +54,7 @@ class Program:
 
     def leave(self, *, has_acted: bool) -> None:
         """Note that the program goes on now, after it has done something or has only asked."""
+        self.act_count += 1
         if has_acted:
             self.waiting.act()
         if self._policy is not None:

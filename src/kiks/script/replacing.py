@@ -32,6 +32,7 @@ def replaced(
         setattr(owner, name, value)
 
     # The originals are held, so that no other object has the same id.
+    named: list[tuple[Any, str, Any]] = []
     stands_for: dict[int, tuple[Any, Any]] = {}
     for path, names in replacements.items():
         owner: Any = sys.modules.get(path)
@@ -45,7 +46,7 @@ def replaced(
             # What a module has from another one is replaced there alone.
             if callable(original) and getattr(original, "__module__", None) == path:
                 stands_for[id(original)] = (original, value)
-            put(owner, name, value)
+            named.append((owner, name, value))
     for name, module in list(sys.modules.items()):
         if name.partition(".")[0] not in _SWEPT or not hasattr(module, "__dict__"):
             continue
@@ -54,6 +55,8 @@ def replaced(
                 put(module, attribute, stands_for[id(value)][1])
             elif new_lock is not None and type(value) is _thread.LockType and not value.locked():
                 put(module, attribute, new_lock())
+    for owner, name, value in named:
+        put(owner, name, value)
     try:
         yield
     finally:

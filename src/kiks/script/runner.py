@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING, Any
 from kiks.clock.program import Program
 from kiks.errors import KiksError
 from kiks.ports.port import Line, VirtualPort
-from kiks.script import clocks, event_loops, locks, serial_ports
+from kiks.script import clocks, event_loops, locks, outside, serial_ports
 from kiks.script.files import OpenPorts, RealFiles
 from kiks.script.lines import SharedLine
 from kiks.script.replacing import replaced
 from kiks.script.scheduler import EndedError, Scheduler
 from kiks.script.signals import Signals
+from kiks.script.watch import watched
 
 if TYPE_CHECKING:
     from kiks.sim.simulation import Simulation
@@ -91,6 +92,7 @@ def run_program(
         serial_ports.replacements(open_port, ports, offered),
         event_loops.replacements(scheduler),
         signals.replacements(),
+        outside.replacements(scheduler),
         ends.replacements(),
     )
 
@@ -104,7 +106,12 @@ def run_program(
     sys.argv = [str(program), *arguments]
     sys.path.insert(0, str(program.resolve().parent))
     try:
-        with signals.taken(), replaced(replacements, replacements["threading"]["Lock"]):
+        with (
+            watched(scheduler),
+            signals.taken(),
+            replaced(replacements, replacements["threading"]["Lock"]),
+            outside.watched(scheduler),
+        ):
             return scheduler.run(main)
     except EndedError as end:
         if end.message:

@@ -191,6 +191,11 @@ class Scheduler:
         """Say whether no other thread goes on before this one, unless this one does something for it."""
         return not (self._ready or self._readers or self._watchers) and self._next_deadline_ns() == NEVER_NS
 
+    @property
+    def has_others(self) -> bool:
+        """Say whether another thread could go on if this one waited; any thread of the process may ask."""
+        return bool(self._ready or self._readers or self._deadlines)
+
     def poll(self) -> None:
         """Let a question that does not wait, such as for a lock, cost what it costs; others may go on."""
         cost_ns = self.program.poll()
@@ -287,6 +292,7 @@ class Scheduler:
 
     def _go_on(self, task: Task) -> None:
         """Let the next thread go on; come back when it is the turn of this one."""
+        self.program.act_count += 1
         thinks = self.program.thinks
         if thinks and (thought_ns := self.program.enter(is_command=False)):
             self.world.think(thought_ns)

@@ -1,0 +1,149 @@
+"""A look from outside at the thread of the operating system that runs a program: is it stuck, or waits in real time?
+
+Code in C may wait by itself, and a loop may ask for nothing at all. Neither gives way to other threads, and simulated
+time stands still meanwhile. A thread of ours looks a few times a second, and ends the program with one line that names
+where it is. It never changes what a run does that ends well.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import FrameType
+
+from kiks.script.outside import ADVICE, OURS, where
+from kiks.script.scheduler import Scheduler
+
+SAMPLE_S = 0.05
+"""How often the thread is looked at [s of real time]."""
+
+WAITING_SAMPLES = 5
+"""In how many looks it may wait by itself."""
+
+LOCKED_S = 10.0
+"""How long it may wait for a lock of a library [s of real time]: one that computes on all processors does so, too."""
+
+SPINNING_S = 10.0
+"""How long a thread may compute while others could go on [s of processor time]."""
+
+GRACE_S = 5.0
+"""How long code in C may go on before the process is ended from outside [s of real time]."""
+
+_SIGNAL = signal.SIGRTMAX - 1
+
+
+@contextmanager
+def watched(scheduler: Scheduler) -> Iterator[None]:
+    """End the program if it waits by itself or asks for nothing; on Linux, and in the main thread of a process."""
+    if sys.platform != "linux" or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    watch = _Watch(scheduler)
+    before = signal.signal(_SIGNAL, watch.end)
+    watch.start()
+    try:
+        yield
+    finally:
+        watch.stop()
+        signal.signal(_SIGNAL, before)
+
+
+class _Watch:
+    """The thread that looks.
+
+    Args:
+        scheduler: The threads of the program.
+    """
+
+    def __init__(self, scheduler: Scheduler) -> None:
+        self._scheduler = scheduler
+        self._message = ""
+        self._watched = threading.get_ident()
+        self._folder = Path(f"/proc/self/task/{threading.get_native_id()}")
+        self._is_over = threading.Event()
+        self._thread = threading.Thread(target=self._look_on, name="kiks: watch", daemon=True)
+        # Bound here once: the program lives with clocks that are simulated.
+        self._cpu_s, self._now_s = time.process_time, time.monotonic
+
+    def start(self) -> None:
+        """Begin to look."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Look no more."""
+        self._is_over.set()
+        self._thread.join()
+
+    def end(self, _number: int, _frame: FrameType | None) -> None:
+        """End the program, in its own thread."""
+        if not self._is_over.is_set():
+            self._scheduler.end(1, self._message)
+
+    def _look_on(self) -> None:
+        waits, last = 0, -1
+        active_cpu_s = locked_cpu_s = self._cpu_s()
+        locked_s = self._now_s()
+        while not self._is_over.wait(SAMPLE_S):
+            count, cpu_s, now_s = self._scheduler.program.act_count, self._cpu_s(), self._now_s()
+            if count != last:
+                last, active_cpu_s = count, cpu_s
+            what = self._waits_for()
+            if what == "lock" and cpu_s - locked_cpu_s < LOCKED_S / 10:
+                if now_s - locked_s > LOCKED_S:
+                    self._tell(f"it waited by itself{self._where()}")
+                    return
+            else:
+                locked_cpu_s, locked_s = cpu_s, now_s
+            waits += what == "time"
+            if waits >= WAITING_SAMPLES:
+                self._tell(f"it waited by itself{self._where()}")
+                return
+            if cpu_s - active_cpu_s > SPINNING_S and self._scheduler.has_others:
+                self._tell(
+                    f"it asked for neither time nor bytes for {SPINNING_S:g} s while its other threads waited"
+                    f"{self._where()}",
+                    "If it waits for a variable there, put time.sleep(0.001) into the loop, or ",
+                )
+                return
+
+    def _waits_for(self) -> str:
+        """Say whether the thread waits for a 'time' or file, or a 'lock', in code that is none of ours."""
+        try:
+            state = (self._folder / "stat").read_text().rpartition(")")[2].split()[0]
+            if state != "S":
+                return ""
+            reason = (self._folder / "wchan").read_text()
+        except OSError:
+            return ""
+        if "futex" in reason:
+            kind = "lock"
+        elif any(word in reason for word in ("nanosleep", "poll", "select", "sigtimedwait")):
+            kind = "time"
+        else:
+            return ""
+        frame = sys._current_frames().get(self._watched)
+        name = frame.f_code.co_filename if frame is not None else "<"
+        return "" if name.startswith(("<", *OURS)) and "site-packages" not in name else kind
+
+    def _where(self) -> str:
+        return where(sys._current_frames().get(self._watched))
+
+    def _tell(self, what: str, way: str = "") -> None:
+        advice = way + ADVICE
+        self._message = (
+            "a program in simulated time must wait by time.sleep, a lock or a port, but "
+            f"{what}. {advice[0].upper()}{advice[1:]}"
+        )
+        with suppress(OSError):
+            signal.pthread_kill(self._watched, _SIGNAL)
+        if not self._is_over.wait(GRACE_S):
+            # Code in C does not come back to Python.
+            sys.stdout.flush()
+            print(f"kiks: {self._message}", file=sys.stderr, flush=True)
+            os._exit(1)
