@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from kiks.sim.simulation import Simulation
-
-sim: Simulation
-program: list[list[list[Any]]]
+sim: Any = None
+program: list[Any] = []
 robots = 0
 trace: list[tuple[int, int, Any]] = []
 

@@ -9,10 +9,12 @@ import hypothesis.strategies as st
 from hypothesis import HealthCheck, given, settings
 from tests.script import seen
 from tests.script.oracle import Oracle, Trace
-from tests.served import fresh
 
+from kiks.model.arena import Arena
 from kiks.script.runner import run_here
+from kiks.sim.simulation import Simulation
 
+BOX = Arena.box(200, 200)
 STEPS = Path(__file__).with_name("steps.py")
 TIMES_MS = st.sampled_from([1, 2, 5, 8, 30])
 PLAIN = st.one_of(
@@ -30,9 +32,14 @@ ANY = st.recursive(
 PROGRAMS = st.lists(st.lists(ANY, max_size=8), min_size=1, max_size=5)
 
 
+def world() -> Simulation:
+    """Return a small world of two robots that is always the same."""
+    return Simulation(BOX, robots=2, seed=7)
+
+
 def run_threads(program: list[Any]) -> tuple[Trace, str]:
     """Run a program's steps in threads; return what they saw, and the state of the world."""
-    seen.sim, seen.program, seen.robots, seen.trace = fresh(2), program, 2, []
+    seen.sim, seen.program, seen.robots, seen.trace = world(), program, 2, []
     assert run_here(seen.sim, STEPS, [], {}) == 0
     return seen.trace, seen.sim.state_hash()
 
@@ -40,5 +47,5 @@ def run_threads(program: list[Any]) -> tuple[Trace, str]:
 @given(PROGRAMS)
 @settings(max_examples=200, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 def test_threads_do_what_a_plain_simulation_says(program: list[Any]) -> None:
-    oracle = Oracle(fresh(2), program)
+    oracle = Oracle(world(), program)
     assert run_threads(program) == (oracle.trace, oracle.sim.state_hash())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import _thread
+import itertools
 import queue
 import threading
 import time
@@ -24,6 +25,10 @@ ELSEWHERE_S = 0.001
 """How often a thread that is none of the program's looks whether a lock is free [s]."""
 
 
+LOCKS_IN_A_ROW = 1000
+"""How many free locks a thread may take before that costs what a question does."""
+
+
 class Lock:
     """A lock; see `_thread.lock`. Who waits gets it in turn: to release it is to hand it over."""
 
@@ -42,6 +47,9 @@ class Lock:
             if blocking and timeout != -1:
                 _check_timeout(timeout)
             self._is_locked = True
+            self.scheduler.lock_count += 1
+            if self.scheduler.lock_count > LOCKS_IN_A_ROW:
+                self._spin()
             return True
         if not blocking:
             if timeout != -1:
@@ -76,10 +84,7 @@ class Lock:
     locked_lock = locked
 
     def __enter__(self) -> bool:
-        if self._is_locked:
-            return self._wait(NEVER_NS)
-        self._is_locked = True
-        return True
+        return self.acquire()
 
     def __exit__(self, *_: object) -> None:
         if self._waiters or not self._is_locked:
@@ -92,6 +97,12 @@ class Lock:
 
     def __repr__(self) -> str:
         return f"<{'locked' if self._is_locked else 'unlocked'} lock object at {id(self):#x}>"
+
+    def _spin(self) -> None:
+        """Let others go on: a thread that looks at what is behind a lock again and again waits for them."""
+        if self.scheduler.is_here:
+            self.scheduler.lock_count = 0
+            self.scheduler.ask()
 
     def _wait(self, until_ns: int) -> bool:
         scheduler = self.scheduler
@@ -191,6 +202,8 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
             "_set_sentinel": set_sentinel,
             "get_ident": get_ident,
             "local": local,
+            # The first thread of a program is Thread-1, whatever ran in this process before.
+            "_counter": itertools.count(1).__next__,
         },
         "threading.Event": {"is_set": is_set},
         # What executors are at work: those of this process are none of the program's.

@@ -15,6 +15,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -58,7 +59,7 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
         "subprocess.Popen": {"wait": wait, "poll": poll, "communicate": communicate},
         # What `subprocess` waits for is real.
         "subprocess": {"_PopenSelector": selectors.PollSelector, "_time": time.monotonic},
-        "multiprocessing.process.BaseProcess": {"start": start},
+        f"{BaseProcess.__module__}.BaseProcess": {"start": start},
     }
 
 

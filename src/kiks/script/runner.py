@@ -188,10 +188,9 @@ def _forget_threads(scheduler: Scheduler) -> None:
     """Let Python not wait for threads that have not ended: they never go on."""
     for ident, task in scheduler.tasks.items():
         thread = threading._active.pop(ident, None)  # type: ignore[attr-defined]
-        if task.sentinel is not None and task.sentinel.locked():
-            task.sentinel.release()
+        threading._shutdown_locks.discard(task.sentinel)  # type: ignore[attr-defined]
         if thread is not None:
-            thread._stop()
+            thread._is_stopped, thread._tstate_lock = True, None
 
 
 def _complain(text: str) -> int:

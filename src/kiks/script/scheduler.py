@@ -93,6 +93,7 @@ class Scheduler:
     Attributes:
         current: The thread that runs.
         tasks: Those that have been started and have not ended, by ident.
+        lock_count: How many free locks the thread that runs has taken since it went on.
         carried: How to take and to put back what libraries keep for each thread of the operating system.
     """
 
@@ -114,6 +115,7 @@ class Scheduler:
         self._deadlines: list[tuple[int, int, Task]] = []
         self._readers: dict[Task, Sequence[Read]] = {}
         self._watchers: dict[Task, Mapping[int, int]] = {}
+        self.lock_count = 0
         self.tasks: dict[int, Task] = {}
         self._main = Task(get_ident(), lambda: None, self._hub)
         self.current = self._main
@@ -197,8 +199,14 @@ class Scheduler:
         return bool(self._ready or self._readers or self._deadlines)
 
     def poll(self) -> None:
-        """Let a question that does not wait, such as for a lock, cost what it costs; others may go on."""
-        cost_ns = self.program.poll()
+        """Let a question to other threads, such as for a lock, cost what it costs; they may go on."""
+        self._pay(self.program.poll())
+
+    def ask(self) -> None:
+        """Let a question cost what one for the time does; others may go on."""
+        self._pay(self.program.ask())
+
+    def _pay(self, cost_ns: int) -> None:
         if cost_ns:
             self.sleep_until(self.world.now_ns + cost_ns)
 
@@ -293,6 +301,7 @@ class Scheduler:
     def _go_on(self, task: Task) -> None:
         """Let the next thread go on; come back when it is the turn of this one."""
         self.program.act_count += 1
+        self.lock_count = 0
         thinks = self.program.thinks
         if thinks and (thought_ns := self.program.enter(is_command=False)):
             self.world.think(thought_ns)

@@ -62,6 +62,12 @@ def replacements(
             if not others:
                 super()._give_back(port)
 
+        def _ask(self, question: Any) -> bytes:
+            answer = super()._ask(question)
+            if not self.is_open:  # another thread has closed it meanwhile
+                raise serial.PortNotOpenError
+            return answer
+
         def fileno(self) -> int:
             if self._descriptor is None:
                 line = self._open_port.line
@@ -112,12 +118,12 @@ def replacements(
 
     def simulated_glob(pathname: Any, **options: Any) -> list[Any]:
         more = fnmatch.filter(names, pathname) if isinstance(pathname, str) else []
-        return sorted({*real_glob(pathname, **options), *more})
+        return sorted({*real_iglob(pathname, **options), *more})
 
     def exists(path: Any) -> bool:
         return (isinstance(path, str) and path in names) or real_exists(path)
 
-    real_glob, real_exists = glob.glob, os.path.exists
+    real_iglob, real_exists = glob.iglob, os.path.exists
     return {
         "serial": {"Serial": Serial, "serial_for_url": serial_for_url},
         "serial.tools.list_ports": {"comports": comports},

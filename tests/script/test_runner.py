@@ -1,0 +1,448 @@
+"""Whole programs in simulated time: what `kiks run` does with their threads, clocks, signals and files."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import textwrap
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from kiks.model.arena import Arena
+from kiks.script.runner import run_here
+from kiks.sim.simulation import Simulation
+
+BOX = Arena.box(200, 200)
+OPEN = "import serial\nport = serial.Serial('/dev/ttyUSB0', 9600, timeout=1)\n"
+
+
+class Run:
+    """A run of a program, given as its text."""
+
+    def __init__(self, folder: Path, *, robots: int = 1, thinking: str = "none") -> None:
+        self.folder = folder
+        self.robots = robots
+        self.thinking = thinking
+
+    def __call__(self, text: str, *arguments: str) -> tuple[int, float, str]:
+        """Run it; return its exit code, the simulated time [s] and the state of the world."""
+        path = self.folder / "program.py"
+        path.write_text(textwrap.dedent(text))
+        sim = Simulation(BOX, robots=self.robots, seed=7, thinking=self.thinking)
+        code = run_here(sim, path, list(arguments), {})
+        return code, sim.time_s, sim.state_hash()
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Run:
+    return Run(tmp_path)
+
+
+# ---- threads ----
+
+READER = f"""
+import queue, threading, time
+{OPEN}
+lines, is_running = queue.Queue(), True
+def read():
+    while is_running:
+        line = port.readline()
+        if line:
+            lines.put(line)
+reader = threading.Thread(target=read)
+reader.start()
+start, count = time.time(), 0
+while time.time() - start < 20:
+    port.write(b'N\\n')
+    assert lines.get(timeout=2).startswith(b'n,')
+    count += 1
+is_running = False
+reader.join()
+print('done', round(time.time() - start, 1), count)
+"""
+
+
+def test_reader_thread_is_as_repeatable_as_a_plain_loop(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    results = [(run(READER), capsys.readouterr().out) for _ in range(2)]
+    assert results[0] == results[1]
+    (code, time_s, _), said = results[0]
+    assert (code, said.split()[:2]) == (0, ["done", "21.0"])
+    # The reader's last time-out lasts 1 s.
+    assert 21.0 <= time_s < 21.1
+
+
+def test_threads_sleep_at_once_and_end_in_their_order(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    code, time_s, _ = run("""
+        import threading, time
+        def nap(seconds):
+            time.sleep(seconds)
+            print(threading.current_thread().name, round(time.monotonic(), 3))
+        threads = [threading.Thread(target=nap, args=(5 - number,), name=f't{number}') for number in range(5)]
+        for thread in threads: thread.start()
+        for thread in threads: thread.join()
+    """)
+    assert (code, round(time_s, 3)) == (0, 5.0)
+    assert capsys.readouterr().out.split() == ["t4", "1.0", "t3", "2.0", "t2", "3.0", "t1", "4.0", "t0", "5.0"]
+
+
+@pytest.mark.parametrize(
+    "loop",
+    [
+        "while not done: time.time()",
+        "while not done: datetime.datetime.now()",
+        "while not done: time.sleep(0)",
+        "while not done: port.in_waiting",
+        "while not event.is_set(): pass",
+        "while not lock.acquire(False): pass",
+        "while thread.is_alive(): pass",
+        "while lines.empty(): pass",
+    ],
+)
+def test_thread_that_only_asks_gives_way(run: Run, loop: str) -> None:
+    code, time_s, _ = run(f"""
+        import datetime, queue, serial, threading, time
+        port = serial.Serial('COM1')
+        done, event, lock, lines = False, threading.Event(), threading.Lock(), queue.Queue()
+        lock.acquire()
+        def work():
+            global done
+            time.sleep(3)
+            done = True
+            event.set()
+            lock.release()
+            lines.put(1)
+        thread = threading.Thread(target=work)
+        thread.start()
+        {loop}
+    """)
+    assert code == 0
+    assert 3.0 <= time_s < 3.01
+
+
+def test_threads_that_wait_for_ever_end_with_one_line(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("import threading\nlock = threading.Lock()\nlock.acquire()\nlock.acquire()\n")[0] == 1
+    assert capsys.readouterr().err.startswith("kiks: some thread of a program must be able to go on, but all wait for")
+    assert run(f"{OPEN}port.timeout = None\nimport threading\nthreading.Thread(target=port.readline).start()\n")[0] == 1
+    said = capsys.readouterr().err
+    assert "Thread-1 (readline) for a robot that was asked nothing" in said
+    assert said.count("\n") == 1
+
+
+def test_main_thread_waits_for_others_but_for_daemons(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    code, time_s, _ = run("""
+        import atexit, threading, time
+        atexit.register(lambda: print('last', time.monotonic()))
+        def tick():
+            while True:
+                time.sleep(1)
+        threading.Thread(target=tick, daemon=True).start()
+        threading.Timer(2.5, print, ['timer']).start()
+        print('main')
+    """)
+    assert (code, time_s) == (0, 2.5)
+    assert capsys.readouterr().out == "main\ntimer\nlast 2.5\n"
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_error_in_a_thread_is_its_own(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    code, _, _ = run("""
+        import sys, threading, time
+        threading.Thread(target=lambda: 1 / 0).start()
+        threading.Thread(target=sys.exit, args=(3,)).start()
+        time.sleep(1)
+        print('main goes on')
+    """)
+    assert code == 0
+    assert capsys.readouterr().out == "main goes on\n"
+
+
+def test_locals_identities_and_names_are_those_of_each_thread(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("""
+        import threading, time
+        own = threading.local()
+        def work(number):
+            own.number = number
+            time.sleep(1)
+            thread = threading.current_thread()
+            print(own.number, thread.name, threading.get_ident() == thread.ident)
+        for number in range(2):
+            threading.Thread(target=work, args=(number,), name=f't{number}').start()
+        print(threading.current_thread() is threading.main_thread(), hasattr(own, 'number'))
+    """)[:2] == (0, 1.0)
+    assert capsys.readouterr().out == "True False\n0 t0 True\n1 t1 True\n"
+
+
+def test_other_threads_of_this_process_live_in_real_time(run: Run, tmp_path: Path) -> None:
+    told: list[float] = []
+    begin, has_told = threading.Event(), tmp_path / "told"
+
+    def other() -> None:
+        begin.wait()
+        told.append(time.time())
+        with threading.Lock():
+            has_told.touch()
+
+    thread = threading.Thread(target=other)
+    thread.start()
+    begin.set()
+    before_s = time.time()
+    assert run(f"import os, time\nwhile not os.path.exists({str(has_told)!r}): time.sleep(1e-3)\n")[0] == 0
+    thread.join()
+    assert before_s - 60 < told[0] < time.time() + 60
+
+
+def test_thinking_of_threads_is_charged(tmp_path: Path) -> None:
+    counted = """
+        import queue, serial, threading
+        port, lines = serial.Serial('COM1', timeout=1), queue.Queue()
+        def read():
+            for _ in range(10): lines.put(port.readline())
+        threading.Thread(target=read).start()
+        for _ in range(10):
+            port.write(b'N\\n')
+            lines.get()
+    """
+    none, fixed = (Run(tmp_path, thinking=thinking)(counted)[1] for thinking in ("none", "fixed:10"))
+    assert fixed == pytest.approx(none + 10 * 0.010)
+
+
+# ---- clocks, signals, files ----
+
+
+def test_every_clock_tells_the_robots_time(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    assert (
+        run("""
+        import datetime, sched, time, timeit
+        clocks = [time.time, time.monotonic, time.perf_counter, time.process_time, time.thread_time,
+                  timeit.default_timer,
+                  lambda: time.clock_gettime(time.CLOCK_MONOTONIC), lambda: time.time_ns() / 1e9,
+                  lambda: datetime.datetime.now().timestamp(), lambda: datetime.datetime.now(datetime.UTC).timestamp(),
+                  lambda: time.mktime(time.localtime())]
+        before = [clock() for clock in clocks]
+        scheduler = sched.scheduler()
+        scheduler.enter(7, 1, lambda: None)
+        scheduler.run()
+        print({round(clock() - start) for clock, start in zip(clocks, before)})
+        print(isinstance(datetime.datetime.now(), datetime.datetime), datetime.date.today().year in (1999, 2000))
+        print(time.strftime('%Y-%m-%d', time.gmtime()))
+    """)[0]
+        == 0
+    )
+    assert capsys.readouterr().out == "{7}\nTrue True\n2000-01-01\n"
+
+
+def test_alarm_rings_in_simulated_time(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    code, time_s, _ = run("""
+        import signal, time
+        rings = []
+        signal.signal(signal.SIGALRM, lambda number, frame: rings.append(round(time.monotonic(), 3)))
+        signal.setitimer(signal.ITIMER_REAL, 1, 0.5)
+        time.sleep(2.2)
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.alarm(3)
+        signal.pause()
+        print(rings)
+    """)
+    assert (code, round(time_s, 3)) == (0, 5.2)
+    assert capsys.readouterr().out == "[1.0, 1.5, 2.0, 5.2]\n"
+
+
+def test_alarm_without_a_handler_ends_the_program(run: Run) -> None:
+    assert run("import signal, time\nsignal.signal(14, signal.SIG_DFL)\nsignal.alarm(2)\ntime.sleep(10)\n")[:2] == (
+        128 + signal.SIGALRM,
+        2.0,
+    )
+
+
+def test_interruption_reaches_the_main_thread(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        code, time_s, _ = run("""
+            import os, signal, threading, time
+            threading.Timer(2, os.kill, [os.getpid(), signal.SIGINT]).start()
+            try:
+                time.sleep(60)
+            except KeyboardInterrupt:
+                print('stopped', threading.current_thread() is threading.main_thread())
+        """)
+    finally:
+        assert signal.signal(signal.SIGINT, before) is signal.default_int_handler
+    assert (code, time_s) == (0, 2.0)
+    assert capsys.readouterr().out == "stopped True\n"
+
+
+WAITS = {
+    "select": "wait = lambda: select.select([port], [], [], 0.5)[0] == [port]",
+    "poll": "poll = select.poll()\npoll.register(port, select.POLLIN)\nwait = lambda: bool(poll.poll(500))",
+    "epoll": "poll = select.epoll()\npoll.register(port.fileno(), select.EPOLLIN)\nwait = lambda: bool(poll.poll(0.5))",
+    "selectors": "any = selectors.DefaultSelector()\nany.register(port, 1)\nwait = lambda: bool(any.select(0.5))",
+}
+
+
+@pytest.mark.parametrize("wait", WAITS)
+def test_file_waits_end_when_a_character_comes_or_the_time_is_over(
+    run: Run, wait: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = f"{OPEN}import os, select, selectors\n{WAITS[wait]}\n" + textwrap.dedent("""
+        import time
+        print(wait(), time.monotonic())
+        port.write(b'H\\n')
+        line = b''
+        while not line.endswith(b'\\n'):
+            assert wait()
+            line += os.read(port.fileno(), 100)
+        print(line, 0.505 < time.monotonic() < 0.52)
+    """)
+    assert run(text)[0] == 0
+    assert capsys.readouterr().out == "False 0.5\nb'h,0,0\\r\\n' True\n"
+
+
+def test_pipe_between_threads_wakes_who_waits_for_it(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("""
+        import os, select, threading, time
+        here, there = os.pipe()
+        threading.Timer(2, os.write, [there, b'!']).start()
+        print(select.select([here], [], [], 5)[0] == [here], time.monotonic())
+    """)[:2] == (0, 2.0)
+    assert capsys.readouterr().out == "True 2.0\n"
+
+
+# ---- ports ----
+
+
+def test_ports_are_found_by_those_who_look(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert (
+        Run(tmp_path, robots=2)("""
+        import glob, os, serial
+        from serial.tools import list_ports
+        print([info.device for info in list_ports.comports()], [info.vid for info in list_ports.grep('USB')])
+        print(glob.glob('/dev/ttyUSB*'), os.path.exists('/dev/ttyUSB1'), os.path.exists('/dev/ttyUSB2'))
+        found = []
+        for number in range(5):
+            try:
+                serial.Serial(f'COM{number}').close()
+                found.append(number)
+            except serial.SerialException:
+                pass
+        print(found)
+    """)[0]
+        == 0
+    )
+    assert capsys.readouterr().out == (
+        "['/dev/ttyUSB0', '/dev/ttyUSB1'] [1027, 1027]\n['/dev/ttyUSB0', '/dev/ttyUSB1'] True False\n[0, 1]\n"
+    )
+
+
+def test_port_may_be_opened_twice_unless_exclusively(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    assert (
+        run("""
+        import serial
+        first = serial.Serial('COM1', timeout=1)
+        second = serial.Serial('COM1', timeout=1)
+        first.write(b'H\\n')
+        print(second.readline())
+        second.close()
+        first.write(b'G,3,4\\nH\\n')
+        print(first.readline(), first.readline())
+        third = serial.Serial('COM1', exclusive=True)
+        try:
+            serial.Serial('COM1', exclusive=True)
+        except serial.SerialException as error:
+            print('exclusive' in str(error))
+    """)[0]
+        == 0
+    )
+    assert capsys.readouterr().out == "b'h,0,0\\r\\n'\nb'g\\r\\n' b'h,3,4\\r\\n'\nTrue\n"
+
+
+def test_read_is_called_off_by_another_thread(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    assert (
+        run(f"""
+        {OPEN.replace(chr(10), ";")}
+        import threading, time
+        port.timeout = None
+        threading.Timer(3, port.cancel_read).start()
+        print(port.read(5), time.monotonic())
+        threading.Timer(3, port.close).start()
+        try:
+            port.read(5)
+        except serial.SerialException as error:
+            print(error, time.monotonic())
+    """)[0]
+        == 0
+    )
+    assert capsys.readouterr().out == "b'' 3.0\nAttempting to use a port that is not open 6.0\n"
+
+
+# ---- what simulated time does not reach ----
+
+
+@pytest.mark.parametrize(
+    ("text", "must"),
+    [
+        (
+            "import socket\nsocket.create_connection(('127.0.0.1', 9))",
+            "talk to its robots alone, but it used the net",
+        ),
+        ("import socket\nsocket.socket().bind(('127.0.0.1', 0))", "talk to its robots alone"),
+        ("import subprocess, sys\nsubprocess.run([sys.executable, '-c', ''])", "start no process of Python by itself"),
+        ("import os\nos.system('python3 -c 1')", "start no process of Python by itself"),
+        (
+            "import multiprocessing as m\nm.Process(target=print).start()",
+            "start no process of Python by itself",
+        ),
+        ("import os\nos.fork()", "be one process, but it started one more by fork"),
+        ("import os\nos.open('/dev/ttyUSB0', os.O_RDWR)", "open a serial port by pyserial, but it opened /dev/ttyUSB0"),
+        ("import ctypes\nfor _ in range(100): ctypes.CDLL(None).usleep(20000)", "wait by time.sleep, a lock or a port"),
+    ],
+)
+def test_program_that_leaves_simulated_time_ends_with_one_line(
+    run: Run, text: str, must: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    code, _, _ = run(f"try:\n{textwrap.indent(text, '    ')}\nexcept Exception: pass\nprint('wrong')\n")
+    out, said = capfd.readouterr()
+    assert (code, out) == (1, "")
+    assert said.startswith(f"kiks: a program in simulated time must {must}")
+    assert "(program.py, line 3)" in said
+    assert said.endswith("kiks serve, where time is real.\n")
+    assert said.count("\n") == 1
+
+
+def test_other_programs_take_no_simulated_time(run: Run, capfd: pytest.CaptureFixture[str]) -> None:
+    code, time_s, _ = run("""
+        import os, subprocess
+        print(subprocess.run(['echo', 'hello'], capture_output=True, text=True, timeout=5).stdout, end='', flush=True)
+        os.system('echo there')
+        sleeper = subprocess.Popen(['sleep', '0.05'])
+        print(sleeper.poll(), sleeper.wait(timeout=0.001))
+    """)
+    assert (code, time_s) == (0, 0.0)
+    assert capfd.readouterr().out == "hello\nthere\n0 0\n"
+
+
+def test_process_is_as_it_was_when_a_program_has_ended(run: Run) -> None:
+    import asyncio.events
+    import concurrent.futures.thread
+    import queue
+    import select
+
+    def names() -> list[object]:
+        return [
+            time.time, time.sleep, threading.Lock, threading.get_ident, threading.local, queue.SimpleQueue,
+            select.select, signal.signal, os.read, asyncio.events._get_running_loop,
+            concurrent.futures.thread._global_shutdown_lock,
+            sys.argv, sys.path[:], signal.getsignal(signal.SIGINT), sorted(sys.modules["__main__"].__dict__),
+        ]  # fmt: skip
+
+    before, threads = names(), threading.enumerate()
+    assert run(READER.replace("< 20", "< 1"), "argument")[0] == 0
+    assert (
+        run("import threading, time\nthreading.Thread(target=time.sleep, args=(9,), daemon=True).start()\n1 / 0\n")[0]
+        == 1
+    )
+    assert names() == before
+    assert threading.enumerate() == threads
