@@ -1,6 +1,7 @@
-"""How fast several programs in one world run: each sends D and N in a loop at 9600 baud, each in its own process.
+"""How fast programs run: several in one world, each in its own process, and one with threads beside a plain one.
 
-Run: python benchmarks/programs.py [--json]. Each figure is a median, from the first command to the last end.
+Each sends D and N in a loop at 9600 baud. Run: python benchmarks/programs.py [--json]. Each figure is a median, from
+the first command to the last end.
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ from pathlib import Path
 from calibration import report
 
 import kiks
-from kiks.ports.programs import Command, Programs
+from kiks.ports.process import Command
+from kiks.ports.programs import Programs
+from kiks.script.runner import run_here
 
 SOURCE = """
 import sys, serial
@@ -25,13 +28,42 @@ for loop in range(int(sys.argv[1])):
     port.write(b"N\\n"); port.readline()
 """
 
+THREADED = """
+import queue, sys, threading, serial
+port = serial.Serial("/dev/ttyUSB0", 9600, stopbits=2, timeout=2)
+lines, is_running = queue.Queue(), True
+
+def read():
+    while is_running:
+        line = port.readline()
+        if line:
+            lines.put(line)
+
+reader = threading.Thread(target=read)
+reader.start()
+for loop in range(int(sys.argv[1])):
+    port.write(b"D,5,%d\\n" % (loop % 9)); lines.get()
+    port.write(b"N\\n"); lines.get()
+is_running = False
+reader.join()
+"""
+
+
+def run_alone(program: Path, loops: int) -> float:
+    """Return how many times faster than real time a program runs that is alone in this process."""
+    sim = kiks.Simulation(seed=1)
+    start_s = time.perf_counter()
+    if run_here(sim, program, [str(loops)], {}):
+        raise SystemExit("the program has failed")
+    return sim.time_s / (time.perf_counter() - start_s)
+
 
 def run(program: Path, count: int, loops: int) -> tuple[float, float]:
     """Return simulated and real time [s] of some programs, their start left out."""
     sim = kiks.Simulation(robots=count, seed=1)
     programs = Programs(sim, [Command(program, [str(loops)])] * count)
     while sim.now_ns == 0:
-        programs._round()
+        programs.round(0.05)
     start_s = time.perf_counter()
     programs.run()
     return sim.time_s, time.perf_counter() - start_s
@@ -48,6 +80,11 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         program = Path(folder) / "program.py"
         program.write_text(SOURCE)
+        threaded = Path(folder) / "threaded.py"
+        threaded.write_text(THREADED)
+        pairs = [(run_alone(threaded, options.loops), run_alone(program, options.loops)) for _ in range(7)][1:]
+        figures.append(("programs.threaded_speedup", statistics.median(pair[0] for pair in pairs), "x real time"))
+        figures.append(("programs.threaded_over_plain", statistics.median(a / b for a, b in pairs), "times as fast"))
         for count in (2, 4):
             runs = [run(program, count, options.loops) for _ in range(5)]
             speedup = statistics.median(simulated / real for simulated, real in runs)

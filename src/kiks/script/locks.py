@@ -92,6 +92,10 @@ class Lock:
         else:
             self._is_locked = False
 
+    def _is_owned(self) -> bool:
+        """Say whether anybody has it; `threading.Condition` asks so, and would else try to take it."""
+        return self._is_locked
+
     def _at_fork_reinit(self) -> None:
         self.__init__()  # type: ignore[misc]
 
