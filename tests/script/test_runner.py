@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from kiks.model.arena import Arena
+from kiks.script import watch
 from kiks.script.runner import run_here
 from kiks.sim.simulation import Simulation
 
@@ -446,3 +447,39 @@ def test_process_is_as_it_was_when_a_program_has_ended(run: Run) -> None:
     )
     assert names() == before
     assert threading.enumerate() == threads
+
+
+def test_loop_that_asks_for_nothing_ends_with_one_line(
+    run: Run, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(watch, "SPINNING_S", 0.5)
+    code, _, _ = run("""
+        import threading, time
+        is_done = False
+        def work():
+            global is_done
+            time.sleep(1)
+            is_done = True
+        threading.Thread(target=work).start()
+        while not is_done:
+            pass
+    """)
+    said = capsys.readouterr().err
+    assert code == 1
+    assert "asked for neither time nor bytes for" in said
+    assert "put time.sleep(0.001) into the loop, or run it on kiks serve" in said
+    assert [record.message[:35] for record in caplog.records] == ["the program has asked for neither t"]
+
+
+def test_thread_may_compute_while_others_wait_for_it(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(watch, "SPINNING_S", 0.05)
+    assert (
+        run("""
+        import threading
+        numbers = []
+        thread = threading.Thread(target=lambda: numbers.append(sum(k * k for k in range(3_000_000))))
+        thread.start()
+        thread.join()
+    """)[0]
+        == 0
+    )

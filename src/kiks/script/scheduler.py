@@ -37,7 +37,7 @@ SIGNALLED, COMPLETE, ALONE = object(), object(), object()
 """Why a thread goes on: a signal has come, a read is complete, or nobody else can go on before its read is."""
 
 _KEPT: list[Scheduler] = []
-"""All that there have been: a thread that were collected while it waits would run its `finally` without a world."""
+"""Those with threads that never end: one that were collected while it waits would run its `finally` then."""
 
 
 class Files(Protocol):
@@ -140,8 +140,9 @@ class Scheduler:
         self._hub = greenlet.getcurrent()
         self._main.greenlet = greenlet.greenlet(run_main, self._hub)
         self.program.waiting = self._main.waiting
-        _KEPT.append(self)
         self._main.greenlet.switch()
+        if self.tasks or not self._main.greenlet.dead:
+            _KEPT.append(self)
         if self._end is not None:
             raise self._end
         if errors:
@@ -169,7 +170,9 @@ class Scheduler:
                 task.sentinel.release()
             del self.tasks[task.ident]
             # The next one goes on where this greenlet ends.
+            self._is_choosing = True
             task.greenlet.parent = self._choose().greenlet
+            self._is_choosing = False
 
         task = Task(next(self._idents), run, self._hub)
         self.tasks[task.ident] = task
@@ -196,7 +199,8 @@ class Scheduler:
     @property
     def has_others(self) -> bool:
         """Say whether another thread could go on if this one waited; any thread of the process may ask."""
-        return bool(self._ready or self._readers or self._deadlines)
+        deadlines = [task for _, number, task in list(self._deadlines) if task.waits_for and task.number == number]
+        return bool(self._ready or self._readers or deadlines)
 
     def poll(self) -> None:
         """Let a question to other threads, such as for a lock, cost what it costs; they may go on."""

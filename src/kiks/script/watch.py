@@ -7,6 +7,7 @@ where it is. It never changes what a run does that ends well.
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import sys
@@ -29,11 +30,16 @@ WAITING_SAMPLES = 5
 LOCKED_S = 10.0
 """How long it may wait for a lock of a library [s of real time]: one that computes on all processors does so, too."""
 
-SPINNING_S = 10.0
+SPINNING_S = 30.0
 """How long a thread may compute while others could go on [s of processor time]."""
+
+WARNING_SHARE = 0.2
+"""Share of that after which a person is told."""
 
 GRACE_S = 5.0
 """How long code in C may go on before the process is ended from outside [s of real time]."""
+
+_log = logging.getLogger("kiks.run")
 
 _SIGNAL = signal.SIGRTMAX - 1
 
@@ -86,7 +92,7 @@ class _Watch:
             self._scheduler.end(1, self._message)
 
     def _look_on(self) -> None:
-        waits, last = 0, -1
+        waits, last, has_warned = 0, -1, False
         active_cpu_s = locked_cpu_s = self._cpu_s()
         locked_s = self._now_s()
         while not self._is_over.wait(SAMPLE_S):
@@ -104,13 +110,16 @@ class _Watch:
             if waits >= WAITING_SAMPLES:
                 self._tell(f"it waited by itself{self._where()}")
                 return
-            if cpu_s - active_cpu_s > SPINNING_S and self._scheduler.has_others:
-                self._tell(
-                    f"it asked for neither time nor bytes for {SPINNING_S:g} s while its other threads waited"
-                    f"{self._where()}",
-                    "If it waits for a variable there, put time.sleep(0.001) into the loop, or ",
-                )
+            spun_s = cpu_s - active_cpu_s
+            if not (spun_s > WARNING_SHARE * SPINNING_S and self._scheduler.has_others):
+                continue
+            what = f"asked for neither time nor bytes for {spun_s:.0f} s while its other threads waited{self._where()}"
+            if spun_s > SPINNING_S:
+                self._tell(f"it {what}", "If it waits for a variable there, put time.sleep(0.001) into the loop, or ")
                 return
+            if not has_warned:
+                has_warned = True
+                _log.warning("the program has %s; it ends after %g s. If it computes, that is right.", what, SPINNING_S)
 
     def _waits_for(self) -> str:
         """Say whether the thread waits for a 'time' or file, or a 'lock', in code that is none of ours."""
