@@ -197,10 +197,10 @@ class Scheduler:
         return not (self._ready or self._readers or self._watchers) and self._next_deadline_ns() == NEVER_NS
 
     @property
-    def has_others(self) -> bool:
-        """Say whether another thread could go on if this one waited; any thread of the process may ask."""
+    def has_timed(self) -> bool:
+        """Say whether another thread waits for a time or a robot; any thread of the process may ask."""
         deadlines = [task for _, number, task in list(self._deadlines) if task.waits_for and task.number == number]
-        return bool(self._ready or self._readers or deadlines)
+        return bool(self._readers or deadlines)
 
     def poll(self) -> None:
         """Let a question to other threads, such as for a lock, cost what it costs; they may go on."""

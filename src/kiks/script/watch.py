@@ -31,7 +31,7 @@ LOCKED_S = 10.0
 """How long it may wait for a lock of a library [s of real time]: one that computes on all processors does so, too."""
 
 SPINNING_S = 30.0
-"""How long a thread may compute while others could go on [s of processor time]."""
+"""How long a thread may compute while others wait for a time or a robot [s of processor time]."""
 
 WARNING_SHARE = 0.2
 """Share of that after which a person is told."""
@@ -111,15 +111,15 @@ class _Watch:
                 self._tell(f"it waited by itself{self._where()}")
                 return
             spun_s = cpu_s - active_cpu_s
-            if not (spun_s > WARNING_SHARE * SPINNING_S and self._scheduler.has_others):
+            if spun_s < WARNING_SHARE * SPINNING_S or not self._scheduler.tasks:
                 continue
             what = f"asked for neither time nor bytes for {spun_s:.0f} s while its other threads waited{self._where()}"
-            if spun_s > SPINNING_S:
+            if spun_s > SPINNING_S and self._scheduler.has_timed:
                 self._tell(f"it {what}", "If it waits for a variable there, put time.sleep(0.001) into the loop, or ")
                 return
             if not has_warned:
                 has_warned = True
-                _log.warning("the program has %s; it ends after %g s. If it computes, that is right.", what, SPINNING_S)
+                _log.warning("the program has %s. If it computes, that is right; else end it with Ctrl-C.", what)
 
     def _waits_for(self) -> str:
         """Say whether the thread waits for a 'time' or file, or a 'lock', in code that is none of ours."""
