@@ -24,9 +24,6 @@ from kiks.cli.options import (
     load_world,
     with_robots,
 )
-from kiks.cli.options import (
-    say as tell,
-)
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import LinkError
 
@@ -96,8 +93,8 @@ def serve(
     show_log(is_quiet=quiet)
     kinds = robot or []
     project, home = load_world(arena)
-    if any(each.program for each in project.robots) and not quiet:
-        tell(f"the programs of {arena} are left out: kiks serve waits for those that connect. kiks run starts them.")
+    if any(each.program for each in project.robots):
+        say(f"The programs of {arena} are left out: those take part that connect. kiks run {arena} starts them.")
     project = with_robots(project, robots, len(kinds))
     project = replace(project, seed=project.seed if seed is None else seed, baud=project.baud if baud is None else baud)
     sim = simulation_of(project, home, kinds=kinds, thinking="none")
