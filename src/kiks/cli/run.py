@@ -50,7 +50,7 @@ class RunCommand(TyperCommand):
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Put the options behind such a file before it."""
         before, words = self._split(ctx, args)
-        if words and words[0].endswith((".kiks", ".toml")):
+        if words and words[0].lower().endswith((".kiks", ".toml")):
             behind, others = self._split(ctx, words[1:])
             args = [word for word in before + behind if word != "--"] + [words[0], *others]
         return super().parse_args(ctx, args)
