@@ -8,6 +8,7 @@ import pty
 import re
 import subprocess
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -249,6 +250,21 @@ def test_paths_of_a_long_run_are_thinned_out() -> None:
     assert 5 <= len(path) <= 10
     assert steps_s == {0.64}
     assert path[0, 0] == 0
+
+
+def test_paths_stay_whole_if_ctrl_c_comes_while_a_point_is_kept() -> None:
+    class Interrupted:
+        def __getitem__(self, _index: int) -> Any:
+            raise KeyboardInterrupt
+
+    sim = fresh()
+    sim.record_paths(0.01)
+    drive_into_a_wall(sim, 0.1)
+    before = sim.paths().tolist()
+    state: Any = SimpleNamespace(tick_count=sim.state.tick_count, robots=sim.state.robots, bodies=Interrupted())
+    with pytest.raises(KeyboardInterrupt):
+        sim.watchers[0].look(state)
+    assert sim.paths().tolist() == before
 
 
 # ---- whose line it is ----

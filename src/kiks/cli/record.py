@@ -104,9 +104,11 @@ class _Rows:
         driven_mm = (robots["forwards_mm"] + robots["backwards_mm"]).tolist()
         places = zip(robots["x_mm"].tolist(), robots["y_mm"].tolist(), robots["heading_rad"].tolist(), strict=True)
         rows = zip(places, driven_mm, robots["contact_count"].tolist(), strict=True)
+        lines = []
         for number, ((x_mm, y_mm, heading_rad), way_mm, contacts) in enumerate(rows, 1):
             heading_deg = math.degrees(heading_rad) % 360
-            self._file.write(f"{time_s},{number},{x_mm:.3f},{y_mm:.3f},{heading_deg:.3f},{way_mm:.3f},{contacts}\n")
+            lines.append(f"{time_s},{number},{x_mm:.3f},{y_mm:.3f},{heading_deg:.3f},{way_mm:.3f},{contacts}\n")
+        self._file.write("".join(lines))
 
 
 def tell_run(sim: Simulation, doubt: str = "") -> None:

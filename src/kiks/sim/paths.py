@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,14 @@ class Watcher(Protocol):
         """Look at the state, after ticks that are no more than were left; called between two looks, too."""
 
 
+class _Point(NamedTuple):
+    """Where everybody was after so many ticks: columns of x_mm, y_mm, heading_rad, and of number, x_mm, y_mm."""
+
+    tick_count: int
+    poses: NDArray[np.float64]
+    bodies: NDArray[np.float64]
+
+
 class Paths:
     """Poses of all robots and places of all balls and cylinders, after each period of whole ticks.
 
@@ -34,9 +42,7 @@ class Paths:
     def __init__(self, period_ticks: int, state: State, points_max: int | None = None) -> None:
         self._period_ticks = period_ticks
         self._points_max = points_max
-        self._ticks: list[int] = []
-        self._robots: list[NDArray[np.float64]] = []
-        self._bodies: list[NDArray[np.float64]] = []
+        self._points: list[_Point] = []
         self._note(state)
 
     def ticks_left(self, tick_count: int) -> int:
@@ -51,32 +57,32 @@ class Paths:
     def _note(self, state: State) -> None:
         robots: Any = state.robots[0]
         bodies: Any = state.bodies[0]
-        self._ticks.append(state.tick_count)
-        self._robots.append(np.array([robots["x_mm"], robots["y_mm"], robots["heading_rad"]]))
-        self._bodies.append(np.array([bodies["number"], bodies["x_mm"], bodies["y_mm"]]))
-        if self._points_max is not None and len(self._ticks) > self._points_max:
+        poses = np.array([robots["x_mm"], robots["y_mm"], robots["heading_rad"]])
+        places = np.array([bodies["number"], bodies["x_mm"], bodies["y_mm"]])
+        # In one step, as Ctrl-C may come anywhere, and paths are asked for after it.
+        self._points.append(_Point(state.tick_count, poses, places))
+        if self._points_max is not None and len(self._points) > self._points_max:
             self._thin_out()
 
     def _thin_out(self) -> None:
         """Drop every second point; the first stays, at whatever tick it was."""
-        self._period_ticks *= 2
-        kept = [k for k, ticks in enumerate(self._ticks) if k == 0 or ticks % self._period_ticks == 0]
-        self._ticks = [self._ticks[k] for k in kept]
-        self._robots = [self._robots[k] for k in kept]
-        self._bodies = [self._bodies[k] for k in kept]
+        period_ticks = 2 * self._period_ticks
+        first, *others = self._points
+        self._points = [first, *(each for each in others if each.tick_count % period_ticks == 0)]
+        self._period_ticks = period_ticks
 
     def array(self) -> NDArray[np.float64]:
         """Return all points, float64 [robot, point, 4]: time_s, x_mm, y_mm, heading_rad; NaN before a robot came."""
-        poses = np.full((self._robots[-1].shape[1], len(self._robots), 3), np.nan)
-        for point, there in enumerate(self._robots):
-            poses[: there.shape[1], point] = there.T
-        times_s = np.array([ticks * TICK_NS * 1e-9 for ticks in self._ticks])
-        return np.concatenate([np.broadcast_to(times_s[None, :, None], (*poses.shape[:2], 1)), poses], axis=2)
+        ways = np.full((self._points[-1].poses.shape[1], len(self._points), 4), np.nan)
+        for index, point in enumerate(self._points):
+            ways[:, index, 0] = point.tick_count * TICK_NS * 1e-9
+            ways[: point.poses.shape[1], index, 1:] = point.poses.T
+        return ways
 
     def of_bodies(self) -> dict[int, list[tuple[float, float]]]:
         """Return the places of each ball and cylinder that there was, by its number: x_mm, y_mm."""
         places: dict[int, list[tuple[float, float]]] = {}
-        for there in self._bodies:
-            for number, x_mm, y_mm in there.T.tolist():
+        for point in self._points:
+            for number, x_mm, y_mm in point.bodies.T.tolist():
                 places.setdefault(int(number), []).append((x_mm, y_mm))
         return places
