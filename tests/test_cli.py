@@ -158,7 +158,7 @@ def test_live_thinking_is_recorded_and_replayed(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("run", "nowhere.py"), "PROGRAM must be a Python file, but 'nowhere.py' is none"),
+        (("run", "nowhere.py"), "PROGRAM must be a Python file, but there is no file 'nowhere.py'"),
         (("run", "--map", "ttyS0", WANDER), "--map must be a port's name, = and a robot's number"),
         (("run", "--map", "ttyS0=4", WANDER), "This simulation has robot 1"),
         (("run", "--thinking", "slow", WANDER), "thinking must be 'none'"),
@@ -196,6 +196,8 @@ NO_RESULTS = {
 RESULTS = {
     ("demo", "picture"): ("demo", "--picture", "PLACE"),
     ("run", "save_thinking"): ("run", "--save-thinking", "PLACE", WANDER),
+    ("run", "picture"): ("run", "--picture", "PLACE", WANDER),
+    ("run", "csv"): ("run", "--csv", "PLACE", WANDER),
     ("accuracy", "page"): ("accuracy", "--page", "PLACE"),
     ("accuracy", "plots"): ("accuracy", "--plots", "PLACE"),
     ("fit", "robot"): ("fit", "--robot", "PLACE"),

@@ -54,7 +54,6 @@ def test_a_trace_shows_where_everything_was() -> None:
     sim.place(1, 200, 100, 0.0)
     sim.move_body(2, 200, 160)
     sim.run(0.2)
-    trace.note()
     image = draw_simulation(sim, trace)
     assert before == FLOOR
     assert pixel(image, 200, 190) != FLOOR  # the cylinder's path
@@ -70,7 +69,7 @@ def test_what_came_later_or_went_is_no_trouble() -> None:
     sim.add_ball(200, 50)
     sim.lamps[:, 3] = 0
     assert draw_simulation(sim, trace).size == (800, 600)
-    trace.note()
+    sim.run(0.2)
     assert draw_simulation(sim, trace).size == (800, 600)
 
 

@@ -108,6 +108,11 @@ def test_the_picture_shows_each_reading_at_its_place(robot: kiks.Khepera) -> Non
         return next(index for index, line in enumerate(lines) if f" {number}" in line)
 
     assert line_of(233) == line_of(344) < line_of(122) == line_of(455) < line_of(566) < line_of(677) == line_of(788)
+    narrow = Console(file=io.StringIO(), width=60)
+    narrow.print(command.picture(sample, 6.5, "a port", 60))
+    assert isinstance(narrow.file, io.StringIO)
+    assert all(f" {number} " in narrow.file.getvalue() for number in sample.proximity + sample.ambient)
+    assert "…" not in narrow.file.getvalue()
     assert command.bar(0).strip() == "0"
     assert command.bar(2000) == "██████████ 2000"
 

@@ -246,12 +246,12 @@ def test_ctrl_c_ends_all_programs(tmp_path: Path) -> None:
         "    while port.readline() != b'd\\r\\n': pass\n    print('tidied')\n",
     )
     with started(hangs, tidy) as (process, _, errors):
-        while errors.readline() != b"l\r\n":
+        while errors.readline() != b"1 hangs.py | l\r\n":
             pass
         os.killpg(process.pid, signal.SIGINT)
         out, told = process.communicate(timeout=GUARD_S)
     assert process.returncode == 130
-    assert out == b"tidied\n"
+    assert out == b"2 tidy.py  | tidied\n"
     assert b"not repeatable: it was interrupted" in told
     assert b"Traceback" not in told
 
@@ -259,7 +259,7 @@ def test_ctrl_c_ends_all_programs(tmp_path: Path) -> None:
 def test_no_program_outlives_a_killed_kiks(tmp_path: Path) -> None:
     hangs = write(tmp_path, "hangs.py", "import os\nos.write(1, f'{os.getpid()}\\n'.encode())\n" + HANGS)
     with started(hangs, hangs) as (process, output, _):
-        watched = [os.pidfd_open(int(output.readline())) for _ in range(2)]
+        watched = [os.pidfd_open(int(output.readline().partition(b"|")[2])) for _ in range(2)]
         process.kill()
         process.wait(GUARD_S)
         # Nobody but its end has told them.
@@ -306,8 +306,10 @@ def test_words_are_programs_and_arguments(tmp_path: Path) -> None:
     assert parse_words([one, "1", two, "c.py"]) == [Command(Path(one), ["1"]), Command(Path(two), ["c.py"])]
     assert parse_words([f"{one} {two} 'a b'", two]) == [Command(Path(one), [two, "a b"]), Command(Path(two))]
     assert parse_words([odd, "it's", "two words"]) == [Command(Path(odd), ["it's", "two words"])]
-    with pytest.raises(ParameterError, match=r"PROGRAM must be a Python file, but 'c\.py' is none"):
+    with pytest.raises(ParameterError, match=r"PROGRAM must be a Python file, but there is no file 'c\.py'\. Give"):
         parse_words(["c.py", one])
+    with pytest.raises(ParameterError, match=r"PROGRAM must be a Python file, but '.*' is a folder\. Give"):
+        parse_words([str(tmp_path), one])
 
 
 def test_command_runs_two_programs() -> None:

@@ -1,6 +1,6 @@
 """Learn to avoid obstacles by PPO, in 64 worlds at once, and drive what was learnt on a serial line.
 
-pip install 'kiks[learn]' stable-baselines3
+pip install '.[learn]' stable-baselines3
 python examples/learning/ppo_avoid.py
 
 The policy's network has the shape of `kiks.controllers.mlp`, so that its weights become a controller: no PyTorch is

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import colorsys
 import math
+from base64 import b64encode
 from collections.abc import Iterable, Sequence
 from io import BytesIO
+from itertools import groupby, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,6 +36,7 @@ _LIGHT = (255, 205, 40)
 _LAMP_OFF = (165, 160, 150)
 _LONGEST_SIDE = 1200
 _FINER = 2  # drawn that much larger and shrunk, which smooths the lines
+_PAGE_INCHES = 7.0
 _GOLDEN = 0.618034  # hues that differ by this share of the circle stay apart, however many there are
 
 
@@ -43,26 +46,24 @@ class Trace:
     Args:
         sim: The simulation; from now on it records the paths of its robots.
         every_s: Time between two points of a path [s], whole hundredths.
-
-    Attributes:
-        bodies: The places of each ball and cylinder at each note, by its number.
+        points_max: Most points of a path; on a longer way fewer are kept. None for all.
     """
 
-    def __init__(self, sim: Simulation, every_s: float = 0.1) -> None:
+    def __init__(self, sim: Simulation, every_s: float = 0.1, *, points_max: int | None = None) -> None:
         self.sim = sim
-        self.sim.record_paths(every_s)
-        self.bodies: dict[int, list[Place]] = {}
-        self.note()
+        self.sim.record_paths(every_s, points_max=points_max)
 
-    def note(self) -> None:
-        """Write down where balls and cylinders are now; robots need no notes."""
+    def paths(self) -> list[list[Sequence[float]]]:
+        """Return the poses of each robot on its way to where it is: x_mm, y_mm, heading_rad."""
+        ways = zip(self.sim.paths()[:, :, 1:], self.sim.poses().tolist(), strict=True)
+        return [[*way[np.isfinite(way[:, 0])].tolist(), pose] for way, pose in ways]
+
+    def bodies(self) -> dict[int, list[Place]]:
+        """Return the places of each ball and cylinder on its way to where it is, by its number: x_mm, y_mm."""
+        ways = self.sim.body_paths()
         for body in self.sim.bodies():
-            self.bodies.setdefault(int(body["number"]), []).append((float(body["x_mm"]), float(body["y_mm"])))
-
-    def paths(self) -> list[list[list[float]]]:
-        """Return the poses of each robot on its way: x_mm, y_mm, heading_rad."""
-        poses: list[list[list[float]]] = self.sim.paths()[:, :, 1:].tolist()
-        return poses
+            ways.setdefault(int(body["number"]), []).append((float(body["x_mm"]), float(body["y_mm"])))
+        return ways
 
 
 def draw_simulation(sim: Simulation, trace: Trace | None = None) -> Image:
@@ -105,24 +106,55 @@ def draw_world(
     from PIL import Image
 
     sheet = _Sheet(arena, longest_side)
+    _draw(sheet, lamps, bodies, poses, radii_mm, trace)
+    width, height = sheet.image.size
+    return sheet.image.resize((width // _FINER, height // _FINER), Image.Resampling.LANCZOS)
+
+
+def save_simulation(sim: Simulation, path: str | Path, trace: Trace | None = None) -> None:
+    """Draw a simulation as it stands into a file: with lines that stay sharp if it ends in .svg, else in pixels.
+
+    Args:
+        sim: The simulation.
+        path: The file; its type follows from the ending.
+        trace: The way there, as for `draw_simulation`.
+
+    Raises:
+        ParameterError: If the place cannot be written or the ending names no type of picture.
+    """
+    if not _is_svg(path):
+        save_picture(draw_simulation(sim, trace), path)
+        return
+    sheet = _Sheet(sim.arena, _LONGEST_SIDE, of_lines := _SvgPen())
+    _draw(sheet, sim.lamps, sim.bodies(), sim.poses(), [spec.body.radius_mm for spec in sim.specs], trace)
+    replace_file(path, _svg(sheet.image, of_lines.elements, finer=_FINER), "a picture")
+
+
+def _draw(
+    sheet: _Sheet,
+    lamps: NDArray[np.float64],
+    bodies: NDArray[np.void],
+    poses: NDArray[np.float64],
+    radii_mm: Sequence[float],
+    trace: Trace | None,
+) -> None:
+    """Draw what stands in an arena on a sheet."""
     for x_mm, y_mm, power_w, is_on in lamps.tolist():
         sheet.lamp((x_mm, y_mm), power_w, is_on=bool(is_on))
     if trace is not None:
+        places_of = trace.bodies()
         for index, (radius_mm, path) in enumerate(zip(radii_mm, trace.paths(), strict=True)):
             sheet.path(path, _colours(index, len(poses), len(path)), 1.2 if len(poses) == 1 else 1.6)
             sheet.ring(path[0][:2], radius_mm, (*_robot_colour(index, len(poses)), 90))
         for body in bodies:
-            places = trace.bodies.get(int(body["number"]), [])
+            places = places_of[int(body["number"])]
             sheet.line(places, (*_tint(body), 200), 2.4)
-            if places:
-                sheet.ring(places[0], float(body["radius_mm"]), (*_tint(body), 190))
+            sheet.ring(places[0], float(body["radius_mm"]), (*_tint(body), 190))
     for body in bodies:
         place, radius_mm = (float(body["x_mm"]), float(body["y_mm"])), float(body["radius_mm"])
         sheet.body(place, radius_mm, _tint(body), is_ball=bool(body["what"] == BALL))
     for index, pose in enumerate(poses.tolist()):
         sheet.robot(pose, radii_mm[index], _robot_colour(index, len(poses)), str(index + 1))
-    width, height = sheet.image.size
-    return sheet.image.resize((width // _FINER, height // _FINER), Image.Resampling.LANCZOS)
 
 
 def save_picture(image: Image, path: str | Path) -> None:
@@ -131,8 +163,12 @@ def save_picture(image: Image, path: str | Path) -> None:
     Raises:
         ParameterError: If the place cannot be written or the ending names no type of picture.
     """
+    if _is_svg(path):
+        replace_file(path, _svg(image, []), "a picture")
+        return
     pixels, kind = BytesIO(), _picture_type(path)
-    image.save(pixels, kind)
+    # PDF: so many pixels an inch that it fits a page across, and pixels as they are.
+    image.save(pixels, kind, **({"resolution": image.width / _PAGE_INCHES, "quality": 95} if kind == "PDF" else {}))
     replace_file(path, pixels.getvalue(), "a picture")
 
 
@@ -142,8 +178,13 @@ def check_picture(path: str | Path) -> None:
     Raises:
         ParameterError: If the place cannot be written or the ending names no type of picture.
     """
-    _picture_type(path)
+    if not _is_svg(path):
+        _picture_type(path)
     check_writable(path, "a picture")
+
+
+def _is_svg(path: str | Path) -> bool:
+    return Path(path).suffix.lower() == ".svg"
 
 
 def _picture_type(path: str | Path) -> str:
@@ -157,7 +198,7 @@ def _picture_type(path: str | Path) -> str:
     except (KeyError, OSError, ValueError):
         raise ParameterError(
             f"a picture must go to a file like 'run.png', but {str(path)!r} ends like no picture that can be written. "
-            "Let it end in .png."
+            "Let it end in .png, .svg or .pdf."
         ) from None
     return kind
 
@@ -194,9 +235,13 @@ class _Sheet:
     Args:
         arena: What is drawn on it first.
         longest_side: Most pixels of a side of the picture.
+        pen: What strokes are drawn with, instead of pixels of `image`.
+
+    Attributes:
+        image: The arena, and what was drawn on it in pixels.
     """
 
-    def __init__(self, arena: Arena, longest_side: int) -> None:
+    def __init__(self, arena: Arena, longest_side: int, pen: _SvgPen | None = None) -> None:
         from PIL import Image, ImageDraw
 
         self.height_mm = arena.height_mm
@@ -207,7 +252,7 @@ class _Sheet:
         shade = (40 + cells.astype(np.uint16) * 150 // 255).astype(np.uint8)
         colours = np.where((cells == 0)[..., None], np.array(_FLOOR, np.uint8), shade[..., None])
         self.image = Image.fromarray(colours.astype(np.uint8), "RGB").resize(size, Image.Resampling.LANCZOS)
-        self.pen = ImageDraw.Draw(self.image, "RGBA")
+        self.pen: Any = ImageDraw.Draw(self.image, "RGBA") if pen is None else pen
 
     def point(self, place: Sequence[float]) -> Place:
         """Return the pixel of a place [mm]."""
@@ -231,9 +276,11 @@ class _Sheet:
             self.pen.line(points, fill=colour, width=self.pixels(width_mm), joint="curve")
 
     def path(self, poses: Sequence[Sequence[float]], colours: Iterable[Colour], width_mm: float) -> None:
-        points = [self.point(pose) for pose in poses]
-        for begin, end, colour in zip(points, points[1:], colours, strict=False):
-            self.pen.line([begin, end], fill=colour, width=self.pixels(width_mm))
+        points, first = [self.point(pose) for pose in poses], 0
+        for colour, same in groupby(islice(colours, len(points) - 1)):
+            last = first + sum(1 for _ in same)
+            self.pen.line(points[first : last + 1], fill=colour, width=self.pixels(width_mm))
+            first = last
 
     def lamp(self, place: Place, power_w: float, *, is_on: bool) -> None:
         """Draw a lamp, and its light as far as a sensor that looks at it would read less than half of darkness."""
@@ -279,4 +326,70 @@ class _Sheet:
         self.pen.text(at(-0.16, 0.0), name, fill=_WHITE, font=font, anchor="mm", stroke_width=1, stroke_fill=_WHITE)
 
 
-__all__ = ["Trace", "check_picture", "draw_simulation", "draw_world", "save_picture"]
+class _SvgPen:
+    """Draws what Pillow's `ImageDraw` would draw, as elements of SVG; of its methods those that a sheet uses.
+
+    Attributes:
+        elements: What was drawn.
+    """
+
+    def __init__(self) -> None:
+        self.elements: list[str] = []
+
+    def ellipse(
+        self, box: tuple[float, ...], fill: Colour | None = None, outline: Colour | None = None, width: float = 1
+    ) -> None:
+        left, top, right, bottom = box
+        edge = 0.0 if outline is None else width / 2  # Pillow's outline lies within the box
+        place = (
+            f'cx="{(left + right) / 2:.1f}" cy="{(top + bottom) / 2:.1f}" r="{max((right - left) / 2 - edge, 0):.1f}"'
+        )
+        self._add("circle", place, fill, outline, width)
+
+    def polygon(self, points: Sequence[Place], fill: Colour | None = None) -> None:
+        self._add("polygon", _svg_points(points), fill, None, 0)
+
+    def line(self, points: Sequence[Place], fill: Colour | None = None, width: float = 1, joint: str = "") -> None:
+        self._add("polyline", _svg_points(points) + ' stroke-linejoin="round"', None, fill, width)
+
+    def text(self, at: Place, text: str, fill: Colour | None = None, font: Any = None, **_others: Any) -> None:
+        place = f'x="{at[0]:.1f}" y="{at[1]:.1f}" font-size="{font.size:.1f}" font-family="sans-serif"'
+        place += ' font-weight="bold" text-anchor="middle" dominant-baseline="central"'
+        self._add("text", place, fill, None, 0, text)
+
+    def _add(
+        self, kind: str, shape: str, fill: Colour | None, stroke: Colour | None, width: float, text: str = ""
+    ) -> None:
+        words = [kind, shape, *_svg_colour("fill", fill)]
+        if stroke is not None:
+            words += [*_svg_colour("stroke", stroke), f'stroke-width="{width:.1f}"']
+        self.elements.append(f"<{' '.join(words)}>{text}</{kind}>")
+
+
+def _svg_points(points: Sequence[Place]) -> str:
+    return f'points="{" ".join(f"{x:.1f},{y:.1f}" for x, y in points)}"'
+
+
+def _svg_colour(name: str, colour: Colour | None) -> Iterable[str]:
+    yield f'{name}="none"' if colour is None else f'{name}="#{bytes(colour[:3]).hex()}"'
+    if colour is not None and len(colour) > 3:
+        yield f'{name}-opacity="{colour[3] / 255:.2f}"'
+
+
+def _svg(image: Image, elements: Sequence[str], *, finer: int = 1) -> str:
+    """Return a file with a picture in pixels, and elements above it; it is shown smaller than they are."""
+    pixels = BytesIO()
+    image.save(pixels, "PNG")
+    size = f'width="{image.width}" height="{image.height}"'
+    data = b64encode(pixels.getvalue()).decode()
+    shown = f'width="{image.width // finer}" height="{image.height // finer}"'
+    lines = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {image.width} {image.height}" {shown}>',
+        f'<image {size} href="data:image/png;base64,{data}"/>',
+        *elements,
+        "</svg>",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+__all__ = ["Trace", "check_picture", "draw_simulation", "draw_world", "save_picture", "save_simulation"]

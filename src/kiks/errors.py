@@ -38,6 +38,16 @@ def nearest(given: str, known: Iterable[str]) -> str:
     return f" Did you mean {matches[0]!r}?" if matches else ""
 
 
+def installing(extra: str) -> str:
+    """Return how the libraries of an extra are installed, 'learn', 'plot' or 'ray': KiKS itself is in no index yet.
+
+    Example:
+        >>> installing("learn")
+        "Run `pip install '.[learn]'` in a checkout of KiKS"
+    """
+    return f"Run `pip install '.[{extra}]'` in a checkout of KiKS"
+
+
 SHOWN_MAX = 80
 """Most characters of a value that a message repeats."""
 

@@ -72,7 +72,7 @@ def new_page(browser: Browser) -> Iterator[NewPage]:
 @pytest.fixture
 def shown(tmp_path: Path) -> Iterator[Shown]:
     """A desk of its own for each test, in this process; its folder is the test's."""
-    pytest.importorskip("nicegui", reason="the desk needs NiceGUI: install kiks[desk]")
+    pytest.importorskip("nicegui", reason="the desk needs NiceGUI")
     from tests.desk.visitor import open_desk
 
     shown = open_desk(tmp_path)

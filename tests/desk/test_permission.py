@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from kiks.desk.desk import Desk, commands_of
+from kiks.desk.desk import Desk
 from kiks.desk.scripts import EXAMPLES
 from kiks.errors import ParameterError
 from kiks.model.arena import Arena
 from kiks.model.project import Project, ProjectRobot
 from kiks.ports.permission import Permission
-from kiks.ports.process import Command
+from kiks.ports.process import Command, commands_of
 from kiks.sim.building import simulation_of
 
 TRACE = "import sys, pathlib; pathlib.Path(sys.argv[1]).touch()"

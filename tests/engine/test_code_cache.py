@@ -53,6 +53,14 @@ def test_the_second_call_comes_from_the_disk(tmp_path: Path, caplog: pytest.LogC
     assert not caplog.records
 
 
+def test_a_start_that_was_interrupted_has_not_compiled_all() -> None:
+    folder = next(code_cache.cache_folders())
+    folder.mkdir(parents=True)
+    (folder / "kiks.engine.step.advance-26-0123456789abcdef.code").touch()
+    assert is_compiled("advance")
+    assert not is_compiled()
+
+
 def flipped(seed: int) -> Damage:
     def flip(data: bytes) -> bytes:
         place = random.Random(seed).randrange(len(data))

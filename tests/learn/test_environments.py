@@ -68,7 +68,7 @@ def test_kiks_alone_imports_no_gymnasium() -> None:
 def test_what_is_not_installed_is_named(missing: str, module: str) -> None:
     code = f"import sys; sys.modules['{missing}'] = None; import {module}"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert "pip install 'kiks[learn]'" in found.stderr
+    assert "pip install '.[learn]'" in found.stderr
 
 
 @pytest.mark.parametrize("name", ["kiks/Avoid-v0", "kiks/Maze-v0"])

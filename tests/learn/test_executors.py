@@ -271,7 +271,7 @@ def test_work_that_cannot_be_pickled_is_turned_away():
 
 def test_without_ray_it_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
-    with pytest.raises(ParameterError, match=r"pip install 'kiks\[ray\]'"):
+    with pytest.raises(ParameterError, match=r"pip install '\.\[ray\]'"):
         executor_for("ray", works.Sums()).__enter__()
 
 

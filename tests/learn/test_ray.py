@@ -29,7 +29,7 @@ def ray():
         patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
         # What lets Ray stay on the loopback address.
         patch.setenv("RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER", "0")
-        yield pytest.importorskip("ray", reason="Ray is not installed: pip install 'kiks[ray]'")
+        yield pytest.importorskip("ray", reason="Ray is not installed: pip install '.[ray]'")
 
 
 @pytest.fixture(scope="module")

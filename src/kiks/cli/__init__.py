@@ -17,7 +17,7 @@ from kiks.cli.evolve import evolve
 from kiks.cli.fit import fit
 from kiks.cli.matlab import matlab
 from kiks.cli.monitor import monitor
-from kiks.cli.run import run
+from kiks.cli.run import RunCommand, run
 from kiks.cli.schema import schema
 from kiks.cli.serve import serve
 from kiks.cli.session import session
@@ -48,8 +48,7 @@ for _command in (
     schema,
     warmup,
 ):
-    # A program's own options, and whatever stands after its name, belong to the program.
-    app.command(context_settings={"allow_interspersed_args": _command is not run})(_command)
+    app.command(cls=RunCommand if _command is run else None)(_command)
 app.add_typer(arena, name="arena")
 
 

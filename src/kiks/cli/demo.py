@@ -112,7 +112,7 @@ def _run(scene: Scene, behaviour: str, total_s: float, picture: Path) -> None:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
 
-    from kiks.drawing import Trace, draw_simulation, save_picture
+    from kiks.drawing import Trace, save_simulation
 
     end_as_with_ctrl_c()
     sim = scene.sim
@@ -129,11 +129,10 @@ def _run(scene: Scene, behaviour: str, total_s: float, picture: Path) -> None:
         start_s = perf_counter()
         for _ in scene.slices(total_s):
             working_s += perf_counter() - start_s
-            trace.note()
             if sim.time_s - told_s >= REPORT_S:
                 told_s = sim.time_s
                 progress.update(task, completed=min(sim.time_s, total_s), description=report())
             start_s = perf_counter()
-    save_picture(draw_simulation(sim, trace), picture)
+    save_simulation(sim, picture, trace)
     typer.echo(f"{behaviour}: {report().strip()}")
     typer.echo(f"Picture: {picture}   Seed {sim.seed}, state {sim.state_hash()}: the same on every computer.")

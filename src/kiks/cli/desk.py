@@ -12,6 +12,7 @@ import typer
 
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.log import show_log
+from kiks.cli.options import is_project, parse_turret, with_robots
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError
 
@@ -72,13 +73,14 @@ def desk(
     ready_engine()
     show_log(is_quiet=True)
     from kiks.cli.run import parse_words
-    from kiks.desk.desk import Desk, commands_of
+    from kiks.desk.desk import Desk
     from kiks.desk.guard import LOOPBACK
     from kiks.model.project import Project
+    from kiks.ports.process import commands_of
     from kiks.sim.building import simulation_of
 
     project = Project() if arena is None else Project.load(arena)
-    home = folder or (Path(arena).parent if arena is not None and arena.lower().endswith(".kiks") else Path())
+    home = folder or (Path(arena).parent if arena is not None and is_project(arena) else Path())
     if not home.is_dir():
         raise ParameterError(f"--folder must be a folder, but {str(home)!r} is none. Make it first.")
     begin = parse_words(program) if program else []
@@ -111,12 +113,8 @@ def _robots(
     project: Project, count: int | None, kinds: list[str], turrets: list[str], least: int
 ) -> tuple[ProjectRobot, ...]:
     """Return a project's robots with what the command line says of them."""
-    from kiks.cli.options import parse_turret
-    from kiks.model.project import ProjectRobot
-
-    robots = list(project.robots)
-    count = max(len(robots) if count is None else count, len(kinds), least)
-    robots = robots[:count] + [ProjectRobot(kind=robots[-1].kind)] * (count - len(robots))
+    robots = list(with_robots(project, count, max(len(kinds), least)).robots)
+    count = len(robots)
     if kinds and len(kinds) not in (1, count):
         raise ParameterError(
             f"--robot must name one kind for all or one for each of {count} robots, but it named {len(kinds)}."
@@ -127,7 +125,8 @@ def _robots(
     for entry in turrets:
         name, number = parse_turret(entry, count)
         for index in range(count) if number is None else [number - 1]:
-            robots[index] = replace(robots[index], turrets=(*robots[index].turrets, name))
+            if name not in robots[index].turrets:
+                robots[index] = replace(robots[index], turrets=(*robots[index].turrets, name))
     return tuple(robots)
 
 

@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from kiks.cli.desk import open_desk
-from kiks.cli.options import fit_turrets, load_arena
+from kiks.cli.options import fit_turrets, load_arena, say
+from kiks.cli.record import recorded, tell_run
 from kiks.ending import end_as_with_ctrl_c
 
 
@@ -32,34 +33,39 @@ def drive(
 
 def run_champion(
     file: Path,
-    *,
     arena: str | None,
     robots: int,
     turret: list[str] | None,
     seed: int,
     seconds: float,
-    desk: bool,
+    picture: Path | None,
+    csv: Path | None,
+    *,
+    on_desk: bool,
 ) -> None:
     """Let a champion drive all robots of a simulation, and say how it went.
 
     Raises:
-        ParameterError: If the file is none of a champion.
+        ParameterError: If the file is none of a champion, or a result cannot be written.
     """
     from kiks.learn.champion import Champion
 
     champion = Champion.load(file)
     sim, ports = champion.simulation(load_arena(arena), robots=robots, seed=seed)
     fit_turrets(sim, turret)
+    end_as_with_ctrl_c()
 
     def work() -> None:
-        loop_count = champion.drive(ports, seconds=seconds)
-        contacts = sum(sim.contacts(number) for number in range(1, robots + 1))
-        typer.echo(
-            f"kiks: {loop_count} loops, {sim.travelled_mm(1) / 1000:.2f} m, {contacts} contacts, {sim.time_s:.3f} s "
-            f"simulated, seed {seed}, state {sim.state_hash()}"
-        )
+        doubt = "it was interrupted"
+        try:
+            with recorded(sim, picture, csv):
+                loop_count = champion.drive(ports, seconds=seconds)
+            say(f"{loop_count} loops")
+            doubt = ""
+        finally:
+            tell_run(sim, doubt)
 
-    if desk:
+    if on_desk:
         from kiks.desk.desk import Desk
 
         open_desk(Desk(sim), work=work)

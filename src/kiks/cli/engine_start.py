@@ -68,4 +68,4 @@ def compile_everything() -> None:
     robot.turret(99, "S")
     sim.add_cylinder(40, 40)
     sim.run(0.1)
-    Simulation(Arena.box(200, 200), response="fast")
+    Simulation(Arena.box(200, 200), response="fast")  # last, for it calls `kiks.engine.compiling.LAST`

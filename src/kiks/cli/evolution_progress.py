@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -36,24 +36,37 @@ def progress_of(
         done = min(max(shares, default=0.0), 1.0)
         return done, passed_s / done - passed_s if done else 0.0
 
-    def text() -> str:
+    def text(width: int | None = None) -> str:
+        """Return how far it is, in no more than so many characters if that can be."""
         latest, number = evolution.generations[-1], len(evolution.generations)
         now_s = perf_counter()
         rate = len(latest.values) * evolution.task.driven_s / max(now_s - last_s[0], 1e-9)
         last_s[0] = now_s
-        return (
-            f"generation {number}   best {latest.fitness.max():.4f}   mean {latest.fitness.mean():.4f}   "
-            f"champion {evolution.champion.fitness:.4f}   {_metric(rate)} x real time   "
-            f"{done_and_left()[1]:.0f} s left"
+        return _fitting(
+            {
+                f"generation {number}": 0,
+                f"best {latest.fitness.max():.4f}": 1,
+                f"mean {latest.fitness.mean():.4f}": 4,
+                f"champion {evolution.champion.fitness:.4f}": 3,
+                f"{_metric(rate)} x real time": 5,
+                f"{done_and_left()[1]:.0f} s left": 2,
+            },
+            width,
         )
 
     if console.is_terminal:
         from rich.progress import BarColumn, Progress, TextColumn
 
-        columns = (TextColumn(evolution.task.name), BarColumn(bar_width=20), TextColumn("{task.description}"))
+        name, bar_width = evolution.task.name, min(20, console.width // 6)
+        columns = (TextColumn(name), BarColumn(bar_width), TextColumn("{task.description}"))
         with Progress(*columns, console=console, transient=True) as progress:
             bar = progress.add_task("preparing", total=1.0)
-            yield lambda _: progress.update(bar, completed=done_and_left()[0], description=text())
+
+            def show(_: Evolution) -> None:
+                said = text(console.width - len(name) - bar_width - 2)
+                progress.update(bar, completed=done_and_left()[0], description=said)
+
+            yield show
         return
     told_s = [-EVERY_S]
 
@@ -64,6 +77,24 @@ def progress_of(
             typer.echo(said)
 
     yield tell
+
+
+def _fitting(parts: Mapping[str, int], width: int | None) -> str:
+    """Return parts in a line, without the least important if it would become too wide.
+
+    Args:
+        parts: How important each is, the most important 0.
+        width: Most characters; None for any number.
+
+    Example:
+        >>> _fitting({"generation 7": 0, "mean 0.5": 2, "best 0.9": 1}, 24)
+        'generation 7   best 0.9'
+    """
+    line = "   ".join(parts)
+    if width is None or len(line) <= width or len(parts) == 1:
+        return line
+    least = max(parts, key=lambda part: parts[part])
+    return _fitting({part: rank for part, rank in parts.items() if part != least}, width)
 
 
 def _metric(number: float) -> str:

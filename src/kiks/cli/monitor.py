@@ -96,7 +96,7 @@ def _display(console: Console, title: str) -> Iterator[Callable[[Sample, float],
     from rich.live import Live
 
     with Live(console=console, auto_refresh=False, screen=False) as live:
-        yield lambda sample, rate_hz: live.update(picture(sample, rate_hz, title), refresh=True)
+        yield lambda sample, rate_hz: live.update(picture(sample, rate_hz, title, console.width), refresh=True)
 
 
 def line(sample: Sample, rate_hz: float) -> str:
@@ -108,20 +108,27 @@ def line(sample: Sample, rate_hz: float) -> str:
     return "   ".join((*words, f"{rate_hz:.1f} Hz"))
 
 
-def bar(count: float) -> str:
-    """Return a reading as a bar and a number, always of the same width.
+def bar(count: float, width: int = BAR_WIDTH) -> str:
+    """Return a reading as a bar of so many characters and a number, always of the same width.
 
     Example:
         >>> bar(512)
         '█████       512'
     """
-    eighths = round(min(max(count / FULL_COUNTS, 0.0), 1.0) * BAR_WIDTH * 8)
+    eighths = round(min(max(count / FULL_COUNTS, 0.0), 1.0) * width * 8)
     full, rest = divmod(eighths, 8)
-    return f"{('█' * full + _PARTS[rest].strip()).ljust(BAR_WIDTH)} {count:4.0f}"
+    return f"{('█' * full + _PARTS[rest].strip()).ljust(width)} {count:4.0f}"
 
 
-def picture(sample: Sample, rate_hz: float, title: str) -> Table:
-    """Return a sample as the robot seen from above, its front at the top, with a table of the rest below."""
+def picture(sample: Sample, rate_hz: float, title: str, width: int = 80) -> Table:
+    """Return a sample as the robot seen from above, its front at the top, with a table of the rest below.
+
+    Args:
+        sample: The readings.
+        rate_hz: Samples a second of late.
+        title: What stands above.
+        width: Characters of a line, at least 60.
+    """
     from rich import box
     from rich.table import Table
     from rich.text import Text
@@ -131,15 +138,17 @@ def picture(sample: Sample, rate_hz: float, title: str) -> Table:
             return Text("")
         count = sample.proximity[sensor]
         colour = "green" if count < FULL_COUNTS / 3 else "yellow" if count < FULL_COUNTS * 2 / 3 else "red"
-        return Text(f"{sensor} ", "dim").append(bar(count), colour)
+        return Text(f"{sensor} ", "dim").append(bar(count, bar_width), colour)
 
+    # Four stand side by side, each with its number before and its reading behind, and two blanks between them.
+    bar_width = min(BAR_WIDTH, (width - 3 * 2) // 4 - len("0 ") - len(" 1023"))
     around = Table.grid(padding=(0, 2))
     for row in ((None, 2, 3, None), (1, None, None, 4), (0, None, None, 5), (None, 7, 6, None)):
         around.add_row(*(cell(sensor) for sensor in row))
     light = Table(box=box.SIMPLE, padding=(0, 1))
     light.add_column("sensor")
     for sensor in range(len(sample.ambient)):
-        light.add_column(str(sensor), justify="right", min_width=4)
+        light.add_column(str(sensor), justify="right", min_width=3)
     light.add_row("ambient", *map(str, sample.ambient))
     wheels = Table(box=box.SIMPLE, padding=(0, 1))
     for name in ("wheel", "counter [pulses]", "speed [pulses/10 ms]", "mode", "on target", "error"):

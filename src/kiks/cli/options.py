@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,10 +13,16 @@ from kiks.model.files import check_writable, make_folder
 
 if TYPE_CHECKING:
     from kiks.model.arena import Arena
+    from kiks.model.project import Project
     from kiks.sim.simulation import Simulation
 
-ArenaFile = Annotated[str | None, typer.Option(help="Arena (.toml, .kiks, .kad) or picture; the classic box if none.")]
-Robots = Annotated[int, typer.Option(help="Robots in the arena.", min=1, max=1000)]
+ArenaFile = Annotated[
+    str | None, typer.Option(help="Arena (.toml, .kad), picture, or project's world (.kiks); the classic box if none.")
+]
+Robots = Annotated[
+    int | None,
+    typer.Option(help="Robots in the arena; as many as a project has, else 1, if left out.", min=1, max=1000),
+]
 RobotKinds = Annotated[
     list[str] | None,
     typer.Option("--robot", help="Kind of robot: khepera, khepera_ii, or a file; once for all, or once for each."),
@@ -32,6 +39,9 @@ WhenSilent = Annotated[
 ]
 PatienceS = Annotated[float, typer.Option("--patience", help="How long it may be silent, in real seconds.")]
 Seed = Annotated[int, typer.Option(help="Seed: the same seed, the same run.", min=0)]
+SeedOrOwn = Annotated[
+    int | None, typer.Option(help="Seed: the same seed, the same run; a project's own, else 0, if left out.", min=0)
+]
 
 
 def written_file(param: typer.CallbackParam, value: Path | None) -> Path | None:
@@ -72,26 +82,73 @@ def _name(param: typer.CallbackParam) -> str:
 
 
 def load_arena(file: str | None) -> Arena:
-    """Return the arena of a file, the classic box if there is none.
+    """Return the arena of a file, the classic box if there is none; of a project say that nothing else is taken.
 
     Raises:
         ArenaError: If the file is no arena.
     """
     from kiks.model.arena import Arena
 
-    return Arena.default() if file is None else Arena.load(file)
+    if file is None:
+        return Arena.default()
+    arena = Arena.load(file)
+    if is_project(file):
+        say(f"the arena alone is taken from {file}; its robots, programs and settings are left out here.")
+    return arena
+
+
+def is_project(file: str | Path) -> bool:
+    """Say whether a file's name is that of a project."""
+    return str(file).lower().endswith(".kiks")
+
+
+def load_world(file: str | None) -> tuple[Project, Path]:
+    """Return the project of a file and the folder in which it lies; one Khepera if the file is another arena, or none.
+
+    Raises:
+        ArenaError: If the file is neither.
+    """
+    from kiks.model.project import Project
+
+    if file is not None and is_project(file):
+        return Project.load(file), Path(file).parent
+    return Project(load_arena(file)), Path()
+
+
+def with_robots(project: Project, count: int | None, least: int) -> Project:
+    """Return a project with as many robots as the command line says; those that come are of the kind of the last.
+
+    Args:
+        project: The project.
+        count: How many there are to be; as many as it has if None.
+        least: At least so many, whatever is said.
+    """
+    from kiks.model.project import ProjectRobot
+
+    robots = project.robots
+    count = max(len(robots) if count is None else count, least)
+    more = (ProjectRobot(kind=robots[-1].kind),) * (count - len(robots))
+    return replace(project, robots=robots[:count] + more)
+
+
+def say(text: str) -> None:
+    """Tell the person at the terminal something, on a line of its own that is not among the results."""
+    typer.echo(f"kiks: {text}", err=True)
 
 
 def fit_turrets(sim: Simulation, entries: list[str] | None) -> None:
-    """Put turrets on robots.
+    """Put turrets on robots that have not got them.
 
     Raises:
         ParameterError: If an entry is no turret, or names no robot.
     """
+    from kiks.sim.sites import name_of
+
     for entry in entries or []:
         name, number = parse_turret(entry, sim.robot_count)
         for robot in range(1, sim.robot_count + 1) if number is None else [number]:
-            sim.fit(robot, name)
+            if name not in map(name_of, sim.turrets(robot)):
+                sim.fit(robot, name)
 
 
 def parse_turret(entry: str, robot_count: int) -> tuple[str, int | None]:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
 from kiks.cli.desk import WithDesk, open_desk
 from kiks.cli.engine_start import ready_engine
@@ -17,13 +19,19 @@ from kiks.cli.options import (
     ArenaFile,
     PatienceS,
     RobotKinds,
-    Seed,
+    Robots,
+    SeedOrOwn,
     Turrets,
     WhenSilent,
     fit_turrets,
+    is_project,
     load_arena,
+    load_world,
+    say,
+    with_robots,
     written_file,
 )
+from kiks.cli.record import Picture, Table, recorded, tell_run
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, shown
 
@@ -34,23 +42,49 @@ if TYPE_CHECKING:
     from kiks.sim.simulation import Simulation
 
 
+class RunCommand(TyperCommand):
+    """Takes options behind a project or a champion, too: such a file has no arguments of its own, as programs have."""
+
+    allow_interspersed_args = False  # a program's own options, and whatever stands behind its name, belong to it
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Put the options behind such a file before it."""
+        before, words = self._split(ctx, args)
+        if words and words[0].lower().endswith((".kiks", ".toml")):
+            behind, others = self._split(ctx, words[1:])
+            args = [word for word in before + behind if word != "--"] + [words[0], *others]
+        return super().parse_args(ctx, args)
+
+    def _split(self, ctx: Any, args: list[str]) -> tuple[list[str], list[str]]:
+        """Return the options at the beginning, and the words behind them."""
+        found, _, _ = self.make_parser(ctx).parse_args(list(args))
+        count = int(found.get("program") is not None) + len(found.get("arguments") or ())
+        return args[: len(args) - count], args[len(args) - count :]
+
+
 def run(
-    context: typer.Context,
     program: Annotated[
-        Path, typer.Argument(help="A Python program that talks to a Khepera through pyserial, or a champion's file.")
+        Path,
+        typer.Argument(
+            help="A Python program that talks to a Khepera through pyserial, a project (.kiks) or a champion's file."
+        ),
     ],
     arguments: Annotated[
         list[str] | None,
         typer.Argument(help="What the program finds in sys.argv; each .py file among it begins one more program."),
     ] = None,
     arena: ArenaFile = None,
-    robots: Annotated[int, typer.Option(help="Robots in the arena; at least one a program.", min=1, max=1000)] = 1,
+    robots: Robots = None,
     robot: RobotKinds = None,
     turret: Turrets = None,
-    seed: Seed = 0,
+    seed: SeedOrOwn = None,
     thinking: Annotated[
-        str, typer.Option(help="What the program's computing costs: none, fixed:MS, live, live:FACTOR, replay:FILE.")
-    ] = "none",
+        str | None,
+        typer.Option(
+            help="What the program's computing costs: none, fixed:MS, live, live:FACTOR, replay:FILE; a project's own, "
+            "else none, if left out."
+        ),
+    ] = None,
     map_: Annotated[
         list[str] | None,
         typer.Option("--map", help="Port name and robot, like /dev/ttyS0=1; else in the order of opening."),
@@ -62,6 +96,8 @@ def run(
     when_silent: WhenSilent = "ignore",
     patience: PatienceS = 2.0,
     seconds: Annotated[float, typer.Option(help="How long a champion drives [s]; programs end by themselves.")] = 60.0,
+    picture: Picture = None,
+    csv: Table = None,
     desk: WithDesk = False,
 ) -> None:
     """Run a program for a real robot on a simulated one, unchanged; its waits and sleeps cost no time.
@@ -69,35 +105,54 @@ def run(
     Its serial ports become simulated robots, and its time.sleep, time.time and time.monotonic simulated time. Several
     programs share a world, each in a process of its own: the first drives robot 1, the second robot 2, and so on.
 
-    A file that `kiks evolve` has left lets its champion drive all robots.
+    A project (.kiks) brings its world, robots and programs; programs behind it take the place of its own, from robot 1
+    on. A file that `kiks evolve` has left lets its champion drive all robots.
 
     Example: kiks run --arena examples/arenas/maze.toml --map /dev/ttyUSB0=1 wander.py
     """
     ready_engine()
     show_log()
-    # A program may go to another folder.
-    record = None if save_thinking is None else save_thinking.absolute()
     if program.suffix == ".toml":
         from kiks.cli.drive import run_champion
 
-        run_champion(program, **_options_of_champion(context, program, arguments or []))
+        if arguments:
+            raise ParameterError(
+                f"a champion must drive all robots alone, but {shown(arguments[0])} stands behind it. Leave it out."
+            )
+        run_champion(program, arena, robots or 1, turret, seed or 0, seconds, picture, csv, on_desk=desk)
         return
-    kinds = robot or ["khepera"]
+    kinds = robot or []
+    from kiks.ports.process import Labels, commands_of
     from kiks.ports.programs import Programs
     from kiks.ports.turns import check_policy
-    from kiks.sim.simulation import Simulation
+    from kiks.sim.building import simulation_of, thinking_of
 
-    commands = parse_words([str(program), *(arguments or [])])
+    named = parse_words(arguments or [] if is_project(program) else [str(program), *(arguments or [])])
+    project, home = load_world(str(program) if is_project(program) else arena)
+    if is_project(program) and arena is not None:
+        project = replace(project, arena=load_arena(arena))
+    project = with_robots(project, robots, max(len(kinds), len(named)))
+    project = project if seed is None else replace(project, seed=seed)
+    own = commands_of(project, home)
+    commands: list[Command | None] = [*named, *own[len(named) :]] if is_project(program) else [*named]
+    while commands and commands[-1] is None:
+        commands.pop()
+    if not commands:
+        raise ParameterError(
+            f"a project must name a program for a robot to be run, but {str(program)!r} names none. Name one behind "
+            f"it: kiks run {program} my_program.py."
+        )
+    if any(own) and not is_project(program):
+        say(f"the programs of {arena} are left out. kiks run {arena} starts them, too.")
     mapping = dict(parse_map(entry) for entry in map_ or [])
     check_policy(when_silent, patience)
-    sim = Simulation(
-        load_arena(arena),
-        robots=max(robots, len(kinds), len(commands)),
-        seed=seed,
-        thinking=thinking if len(commands) == 1 else "none",
-        robot=kinds,
-    )
+    thinking = thinking_of(project, home) if thinking is None else thinking
+    # A program may go to another folder.
+    record = None if save_thinking is None else save_thinking.absolute()
+    sim = simulation_of(project, home, kinds=kinds, thinking=thinking if len(commands) == 1 else "none")
     fit_turrets(sim, turret)
+    names = [each.program.name for each in commands if each is not None]
+    labels = Labels(names) if len(names) > 1 else None
     host = partial(
         Programs,
         told=mapping,
@@ -105,52 +160,48 @@ def run(
         record=record,
         when_silent=when_silent,
         patience_s=patience,
-        say=lambda text: typer.echo(f"kiks: {text}", err=True),
+        say=say if labels is None else labels.say,
+        labels=labels,
     )
     if desk:
-        _run_on_desk(sim, commands, host, thinking)
+        with recorded(sim, picture, csv):
+            # What the command line changed of its robots the desk finds out.
+            told = None if kinds or turret else project
+            _run_on_desk(sim, commands, host, thinking, project=told, speed=project.speed, folder=home)
         return
     end_as_with_ctrl_c()
     code, doubt = 1, ""
     try:
-        if len(commands) == 1:
-            code = _run_one(sim, commands[0], mapping, record)
-        else:
-            programs = host(sim, commands)
-            code = programs.run()
-            doubt = programs.doubt
+        with recorded(sim, picture, csv):
+            if len(commands) == 1 and commands[0] is not None:
+                code = _run_one(sim, commands[0], mapping, record)
+            else:
+                programs = host(sim, commands)
+                code = programs.run()
+                doubt = programs.doubt
+    except KeyboardInterrupt:
+        doubt = "it was interrupted"
+        raise
     finally:
         _tell(sim, thinking, doubt)
     raise typer.Exit(code)
 
 
-def _options_of_champion(context: typer.Context, file: Path, after: list[str]) -> dict[str, Any]:
-    """Return the options for a champion, which has no arguments of its own: what stands after it is for us, too."""
-    given = dict(context.params)
-    with context.command.make_context("kiks run", [*after, str(file)], parent=context.parent) as later:
-        for name, value in later.params.items():
-            source = later.get_parameter_source(name)
-            if source is not None and source.name == "COMMANDLINE":
-                given[name] = value
-    return {name: given[name] for name in ("arena", "robots", "turret", "seed", "seconds", "desk")}
-
-
 def _tell(sim: Simulation, thinking: str, doubt: str) -> None:
     """Say how the run has ended, and whether it is repeatable."""
-    if thinking.startswith("live"):
-        doubt = "thinking was live"
-    repeatable = f"not repeatable: {doubt}" if doubt else f"state {sim.state_hash()}"
-    typer.echo(f"kiks: {sim.time_s:.3f} s simulated, seed {sim.seed}, {repeatable}", err=True)
+    tell_run(sim, "thinking was live" if thinking.startswith("live") else doubt)
 
 
-def _run_on_desk(sim: Simulation, commands: list[Command], host: Callable[..., Programs], thinking: str) -> None:
-    """Run programs in processes of their own in a world that browsers see, until Ctrl-C."""
+def _run_on_desk(
+    sim: Simulation, commands: Sequence[Command | None], host: Callable[..., Programs], thinking: str, **options: Any
+) -> None:
+    """Run programs in processes of their own in a world that browsers see, until Ctrl-C; `Desk` has the options."""
     from kiks.desk.desk import Desk
 
     def host_at(sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
         return host(sim, commands, new_patience=gate.patience)
 
-    desk = Desk(sim, commands=commands, new_programs=host_at)
+    desk = Desk(sim, commands=commands, new_programs=host_at, **options)
     open_desk(desk, programs_ended=lambda sim: _tell(sim, thinking, desk.programs.doubt))
 
 
@@ -188,9 +239,8 @@ def parse_words(words: list[str]) -> list[Command]:
         elif commands:
             commands[-1].arguments.append(word)
         else:
-            raise ParameterError(
-                f"PROGRAM must be a Python file, but {shown(word)} is none. Give its path before its own arguments."
-            )
+            found = f"{shown(word)} is a folder" if Path(word).is_dir() else f"there is no file {shown(word)}"
+            raise ParameterError(f"PROGRAM must be a Python file, but {found}. Give its path before its own arguments.")
     return commands
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,11 +17,12 @@ from kiks.cli.options import (
     PatienceS,
     RobotKinds,
     Robots,
-    Seed,
+    SeedOrOwn,
     Turrets,
     WhenSilent,
     fit_turrets,
-    load_arena,
+    load_world,
+    with_robots,
 )
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import LinkError
@@ -36,10 +38,10 @@ TCP_PORT = 10020
 
 def serve(
     arena: ArenaFile = None,
-    robots: Robots = 1,
+    robots: Robots = None,
     robot: RobotKinds = None,
     turret: Turrets = None,
-    seed: Seed = 0,
+    seed: SeedOrOwn = None,
     speed: Annotated[float, typer.Option(help="Simulated seconds in a real one, for thinking live.")] = 1.0,
     thinking: Annotated[
         str, typer.Option(help="live: the world runs all the time; none or fixed:MS: it waits for each command.")
@@ -50,7 +52,14 @@ def serve(
     ] = None,
     when_silent: WhenSilent = "ignore",
     patience: PatienceS = 2.0,
-    baud: Annotated[int, typer.Option(help="Line speed until a program sets one.", min=75, max=4_000_000)] = 9600,
+    baud: Annotated[
+        int | None,
+        typer.Option(
+            help="Line speed until a program sets one; a project's or the robot's own, 9600, if left out.",
+            min=75,
+            max=4_000_000,
+        ),
+    ] = None,
     pty: Annotated[bool, typer.Option(help="Make a serial port for each robot.")] = True,
     link: Annotated[
         Path | None, typer.Option(help="Name of the serial port; with several robots a number is appended.")
@@ -75,20 +84,22 @@ def serve(
     """
     from kiks.clock.patience import Patience
     from kiks.ports.server import Server
-    from kiks.sim.simulation import Simulation
+    from kiks.sim.building import simulation_of
 
     def say(text: str) -> None:
         if not quiet:
             typer.echo(text)
 
     show_log(is_quiet=quiet)
-    kinds = robot or ["khepera"]
-    robots = max(robots, len(kinds))
-    ground = load_arena(arena)
-    sim = Simulation(ground, robots=robots, seed=seed, robot=kinds)
+    kinds = robot or []
+    project, home = load_world(arena)
+    if any(each.program for each in project.robots):
+        say(f"The programs of {arena} are left out: those take part that connect. kiks run {arena} starts them.")
+    project = with_robots(project, robots, len(kinds))
+    project = replace(project, seed=project.seed if seed is None else seed, baud=project.baud if baud is None else baud)
+    sim = simulation_of(project, home, kinds=kinds, thinking="none")
+    robots = sim.robot_count
     fit_turrets(sim, turret)
-    for wire in sim.wires:
-        wire.set_baud(baud)
     if not quiet:
         ready_engine()
     compile_everything()  # or load it: before the first program waits for it
@@ -101,7 +112,7 @@ def serve(
         for number, endpoints in ways.items():
             say(f"Robot {number}")
             if pty:
-                endpoints.append(_open_pty(number, robots, link, baud))
+                endpoints.append(_open_pty(number, robots, link, sim.wires[number - 1].line.baud))
                 say(f"  serial port  {endpoints[-1].name}")
             endpoints.append(_open_tcp(number, tcp, host, say))
             say(f"  TCP          socket://{endpoints[-1].name}")

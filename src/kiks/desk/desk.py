@@ -14,17 +14,15 @@ from kiks.desk.editing import Editing
 from kiks.desk.scripts import EXAMPLES
 from kiks.desk.speedometer import Speedometer
 from kiks.errors import KiksError, LinkError, ParameterError
-from kiks.firmware.k213 import K213
-from kiks.model.files import program_in
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, robot_names
 from kiks.ports.permission import Permission
-from kiks.ports.process import Command
+from kiks.ports.process import Command, commands_of
 from kiks.ports.programs import Programs
 from kiks.sim.building import project_of, simulation_of
 from kiks.sim.hands import Hands
 from kiks.sim.simulation import Simulation
-from kiks.sim.sites import KINDS
+from kiks.sim.sites import name_of
 from kiks.sim.tail import Tail
 
 LOOK_S = 0.003
@@ -312,24 +310,11 @@ def foreign_project(sim: Simulation) -> Project:
     Robots of another kind than KiKS has become Kheperas, and turrets of a user's own are left out.
     """
     known = {RobotSpec.load(kind): kind for kind in robot_names()}
-    turrets = {**{kind: name for name, kind in KINDS.items()}, K213: "k213"}
     robots = tuple(
         ProjectRobot(
             kind=known.get(spec, "khepera"),
-            turrets=tuple(turrets[type(each)] for each in sim.turrets(number) if type(each) in turrets),
+            turrets=tuple(name for each in sim.turrets(number) if (name := name_of(each)) is not None),
         )
         for number, spec in enumerate(sim.specs, 1)
     )
     return project_of(sim, Project(sim.arena, robots=robots, seed=sim.seed, thinking=sim.thinking))
-
-
-def commands_of(project: Project, folder: Path) -> list[Command | None]:
-    """Return the program of each robot of a project in a folder; None for a robot that has none.
-
-    Raises:
-        ParameterError: If one lies elsewhere, or is no program.
-    """
-    return [
-        None if robot.program is None else Command(program_in(folder, robot.program), list(robot.arguments))
-        for robot in project.robots
-    ]

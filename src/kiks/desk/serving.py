@@ -6,6 +6,7 @@ import asyncio
 import logging
 import socket
 import threading
+from contextlib import suppress
 from dataclasses import dataclass
 
 import uvicorn
@@ -35,6 +36,9 @@ MESSAGE_LIMIT = 1 << 20
 
 BACKLOG = 128
 """Most connections that wait to be accepted."""
+
+EVERY_ADDRESS = ("0.0.0.0", "::")
+"""What stands for all addresses of this computer; no browser finds it by that."""
 
 CLOSED = "KiKS: this desk is closed. Open it again where it was opened."
 
@@ -133,6 +137,7 @@ class DeskServer:
     def _address(self, number: int | None) -> str:
         assert self._socket is not None
         host, port = self._socket.getsockname()[:2]
+        host = _own_address(self._socket.family) if host in EVERY_ADDRESS else host
         host = f"[{host}]" if ":" in host else host
         return f"http://{host}:{port}/" + ("" if number is None else f"desk/{number}")
 
@@ -207,6 +212,16 @@ class DeskServer:
                 ui.label(CLOSED)
             else:
                 Page(served.desk, number)
+
+
+def _own_address(family: socket.AddressFamily) -> str:
+    """Return the address by which other computers find this one; its name if it has none."""
+    # Of documentation: nothing is sent, but the system says from where it would be.
+    far = "2001:db8::1" if family == socket.AF_INET6 else "192.0.2.1"
+    with suppress(OSError), socket.socket(family, socket.SOCK_DGRAM) as asking:
+        asking.connect((far, 9))
+        return str(asking.getsockname()[0])
+    return socket.gethostname()
 
 
 def _listen(host: str, port: int, *, or_free: bool = False) -> socket.socket:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, installing
 from kiks.fit.samples import MAXIMUM_COUNTS, Floats, is_active
 from kiks.model.files import make_folder, replace_file
 from kiks.model.robot import SENSOR_COUNT
@@ -29,8 +29,7 @@ def _figure(columns: int, rows: int) -> tuple[Any, Any]:
         from matplotlib.figure import Figure
     except ImportError as error:
         raise ParameterError(
-            "Plots must be drawn by Matplotlib, but it is not installed. Run `pip install matplotlib`, or leave "
-            "--plots out."
+            f"Plots must be drawn by Matplotlib, but it is not installed. {installing('plot')}, or leave --plots out."
         ) from error
     figure = Figure(figsize=(4.8 * columns, 3.4 * rows), layout="constrained")
     return figure, figure.subplots(rows, columns, squeeze=False)

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.errors import ParameterError, nearest, shown
+from kiks.errors import ParameterError, installing, nearest, shown
 from kiks.learn.task import Axis
 
 Floats = NDArray[np.float64]
@@ -207,5 +207,5 @@ def library(name: str) -> Any:
     except ImportError as error:
         package = name.partition(".")[0]
         raise ParameterError(
-            f"This must be done with {package}, but it cannot be imported ({error}). Run `pip install 'kiks[learn]'`."
+            f"This must be done with {package}, but it cannot be imported ({error}). {installing('learn')}."
         ) from None

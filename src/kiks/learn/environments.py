@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.batch.beginning import WORLDS_LIMIT
-from kiks.errors import ParameterError, shown
+from kiks.errors import ParameterError, installing, shown
 from kiks.learn.episodes import SEED_LIMIT, Episodes
 from kiks.learn.lesson import Lesson
 from kiks.learn.lessons import LESSONS, lesson_of
@@ -33,7 +33,7 @@ try:
     from gymnasium.vector.utils import batch_space
 except ModuleNotFoundError as error:
     raise ModuleNotFoundError(
-        "environments must have Gymnasium, but it is not installed. Run `pip install 'kiks[learn]'`.", name="gymnasium"
+        f"environments must have Gymnasium, but it is not installed. {installing('learn')}.", name="gymnasium"
     ) from error
 
 Floats32 = NDArray[np.float32]

@@ -19,7 +19,7 @@ from contextlib import suppress
 from typing import Any
 
 import kiks
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, installing
 from kiks.learn.work import Answer, Floats, Integers, Lost, Raised, Ready, Values, Work, Worker
 
 _log = logging.getLogger("kiks.learn")
@@ -252,6 +252,6 @@ def _import_ray(*, loopback_only: bool) -> Any:
         import ray
     except ImportError as error:
         raise ParameterError(
-            "Evaluations on 'ray' need Ray, but it is not installed. Run `pip install 'kiks[ray]'`, or use 'processes'."
+            f"Evaluations on 'ray' need Ray, but it is not installed. {installing('ray')}, or use 'processes'."
         ) from error
     return ray

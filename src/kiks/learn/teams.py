@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.errors import ParameterError, shown
+from kiks.errors import ParameterError, installing, shown
 from kiks.learn.environments import STEP_LIMIT, checked_mode, checked_seed, episodes_of, spaces_of
 from kiks.learn.episodes import SEED_LIMIT
 from kiks.learn.lesson import Lesson
@@ -18,7 +18,7 @@ try:
     from pettingzoo import ParallelEnv
 except ModuleNotFoundError as error:
     raise ModuleNotFoundError(
-        "teams must have PettingZoo, but it is not installed. Run `pip install 'kiks[learn]'`.", name="pettingzoo"
+        f"teams must have PettingZoo, but it is not installed. {installing('learn')}.", name="pettingzoo"
     ) from error
 
 Floats32 = NDArray[np.float32]

@@ -48,8 +48,8 @@ def replace_files(files: Mapping[Path, bytes | str], what: str = "The file", *, 
                 continue
             fresh[target] = _name_beside(target)
             _write(fresh[target], content, 0o666 if rights is None else rights)
-            if target.exists() and rights is None:
-                fresh[target].chmod(stat.S_IMODE(target.stat().st_mode))
+            if rights is None:
+                _take_rights(fresh[target], target)
         for path, beside in fresh.items():
             os.replace(beside, path)
             _settle(path.parent)
@@ -59,6 +59,68 @@ def replace_files(files: Mapping[Path, bytes | str], what: str = "The file", *, 
         for beside in fresh.values():
             with suppress(OSError):
                 beside.unlink()
+
+
+class GrowingFile:
+    """A text file that is written bit by bit, and is the whole new one when it is closed; until then the old one.
+
+    A disk that is full disturbs nobody who writes: `close` says so.
+
+    Args:
+        path: Where it goes, as `replace_file` has it.
+        what: What messages call it.
+
+    Raises:
+        ParameterError: If it cannot be written.
+    """
+
+    def __init__(self, path: str | Path, what: str = "The file") -> None:
+        self._path, self._what = path, what
+        self._error: Exception | None = None
+        try:
+            self._target = self._beside = _target(path_of(path, what))
+            flags = os.O_WRONLY
+            if not self._target.exists() or self._target.is_file():
+                self._beside = _name_beside(self._target)
+                flags |= os.O_CREAT | os.O_EXCL
+            self._file = open(os.open(self._beside, flags, 0o666), "w", encoding="utf-8", newline="\n")  # noqa: SIM115
+        except OSError as error:
+            raise _unwritable(what, "file", path, error) from error
+
+    def write(self, text: str) -> None:
+        """Write some more."""
+        if self._error is None:
+            try:
+                self._file.write(text)
+            except OSError as error:
+                self._error = error
+
+    def close(self) -> None:
+        """Let it be the new file.
+
+        Raises:
+            ParameterError: If it could not be written; an earlier file is then as it was.
+        """
+        is_other = self._beside != self._target
+        try:
+            try:
+                self._file.flush()
+                if is_other:
+                    os.fsync(self._file.fileno())
+            finally:
+                self._file.close()
+            if self._error is not None:
+                raise self._error
+            if is_other:
+                _take_rights(self._beside, self._target)
+                os.replace(self._beside, self._target)
+                _settle(self._target.parent)
+        except OSError as error:
+            raise _unwritable(self._what, "file", self._path, error) from error
+        finally:
+            if is_other:
+                with suppress(OSError):
+                    self._beside.unlink()
 
 
 def check_writable(path: str | Path, what: str, *, is_new: bool = False) -> None:
@@ -126,6 +188,12 @@ def _write(path: Path, data: bytes, mode: int) -> None:
         file.write(data)
         file.flush()
         os.fsync(file.fileno())
+
+
+def _take_rights(beside: Path, target: Path) -> None:
+    """Give a new file the rights of the one that it replaces, if there is one."""
+    if target.exists():
+        beside.chmod(stat.S_IMODE(target.stat().st_mode))
 
 
 def _settle(folder: Path) -> None:

@@ -21,7 +21,7 @@ from kiks.ports.guest import NearGuest, SocketGuest
 from kiks.ports.handle import Handle
 from kiks.ports.names import Names
 from kiks.ports.permission import Anything, Permission
-from kiks.ports.process import LATE, PUNCTUAL, Command, Process
+from kiks.ports.process import LATE, PUNCTUAL, Command, Labels, Process
 from kiks.ports.turns import PATIENCE_S, START_PATIENCE_S, VISIT_PATIENCE_S, Turns
 from kiks.sim.simulation import Simulation
 
@@ -56,6 +56,7 @@ class Programs:
             a heard program starts ends with it.
         new_patience: Makes patiences with another wall clock: one that stands still while the world does.
         visitors: How many programs that were started elsewhere begin together with these; see `admit`.
+        labels: What writes where this process prints what they print, if it is not kept; they do so themselves if None.
 
     Attributes:
         handles: The programs; of those that have ended the last one of each robot.
@@ -80,6 +81,7 @@ class Programs:
         is_heard: bool = False,
         new_patience: Callable[[float], Patience] = Patience,
         visitors: int = 0,
+        labels: Labels | None = None,
     ) -> None:
         self.sim = sim
         self.permission: Permission = Anything()
@@ -87,12 +89,9 @@ class Programs:
         self._visitors: list[NearGuest] = []
         self._is_moving = False
         self._moved = threading.Condition(sim.lock)
-        self._say = say
-        self._thinking = thinking
-        self._record = record
-        self._is_heard = is_heard
-        self._signals, self._was_touched = 0, False
-        self._is_closed, self._count = False, 0
+        self._say, self._thinking, self._record = say, thinking, record
+        self._is_heard, self._labels = is_heard, labels
+        self._signals, self._count, self._was_touched, self._is_closed = 0, 0, False, False
         begin = [(robot, command) for robot, command in enumerate(commands, 1) if command is not None]
         self._are_numbered = len(begin) > 1
         for number in range(1, len(begin) + 1):
@@ -322,6 +321,7 @@ class Programs:
                     command,
                     there,
                     is_heard=self._is_heard,
+                    voice=None if self._labels is None else self._labels.voice(number, command.program.name),
                     ended=lambda: self._end(handle),
                 )
             except KiksError:
@@ -373,8 +373,8 @@ class Programs:
 
     def _notice_ends(self) -> list[Handle]:
         """Return the programs that have ended since the last time."""
-        silent = [handle for handle in self.handles if handle.guest.has_hung_up and not handle.has_been_noticed]
-        noticed = [handle for handle in silent if not handle.is_running]
+        there = [handle for handle in self.handles if handle.guest.has_hung_up and not handle.is_running]
+        noticed = [handle for handle in there if not handle.has_been_noticed]
         for handle in noticed:
             handle.has_been_noticed = True
         return noticed

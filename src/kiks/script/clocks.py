@@ -81,6 +81,8 @@ def replacements(scheduler: Scheduler, clock: VirtualPort) -> dict[str, dict[str
     return {
         "time": {name: _here(scheduler, function, getattr(time, name)) for name, function in functions.items()},
         "queue": {"time": deadline_time},
+        # `relativeCreated` of a log counts from here.
+        "logging": {"_startTime": EPOCH_S + scheduler.world.now_ns / NS_PER_S},
         "threading": {"_time": deadline_time},
         "asyncio.base_events.BaseEventLoop": {"time": deadline_time},
         "datetime": dates,

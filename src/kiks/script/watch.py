@@ -130,7 +130,8 @@ class _Watch:
             reason = (self._folder / "wchan").read_text()
         except OSError:
             return ""
-        if "futex" in reason:
+        if "futex" in reason or ("pipe" in reason and self._scheduler.tasks):
+            # A pipe may be one that another thread of the program writes to.
             kind = "lock"
         elif any(word in reason for word in ("nanosleep", "poll", "select", "sigtimedwait")):
             kind = "time"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,20 +13,25 @@ from kiks.model.arena import Ball, Cylinder, Lamp, Pose
 from kiks.model.files import inside
 from kiks.model.policy import split_thinking
 from kiks.model.project import Project, ProjectRobot
-from kiks.model.robot import RobotSpec
+from kiks.model.robot import RobotSpec, specs_of
 from kiks.model.room import free_place
 from kiks.sim.simulation import Simulation
 
 
-def simulation_of(project: Project, folder: str | Path = ".") -> Simulation:
+def simulation_of(
+    project: Project, folder: str | Path = ".", *, kinds: Sequence[str] = (), thinking: str | None = None
+) -> Simulation:
     """Return the world of a project at its start, with turrets fitted and lines set; programs are not begun.
 
     Args:
         project: The project.
         folder: Where it lies: robot files and replays are looked up from there.
+        kinds: Kinds of robots in place of the project's: one for all or one for each. Files among them lie anywhere.
+        thinking: What programs' computing costs, in place of what the project says; a replay lies anywhere.
 
     Raises:
-        ParameterError: If a robot's file is none, or a path leads out of the folder.
+        ParameterError: If a robot's file is none, a path leads out of the folder, or there are too few or too many
+            kinds.
         ArenaError: If something has no free place.
 
     Example:
@@ -35,14 +41,13 @@ def simulation_of(project: Project, folder: str | Path = ".") -> Simulation:
         (38400, 64)
     """
     home = Path(folder)
-    kind, file = split_thinking(project.thinking)
-    thinking = f"{kind}:{inside(home, file, 'replay')}" if isinstance(file, str) else project.thinking
-    sim = Simulation(
-        project.arena,
-        seed=project.seed,
-        thinking=thinking,
-        robot=[spec_of(robot, project, home) for robot in project.robots],
-    )
+    if kinds:
+        others = specs_of(kinds, len(project.robots), project.response)
+        specs = [_as_set(spec, robot, project) for spec, robot in zip(others, project.robots, strict=True)]
+    else:
+        specs = [spec_of(robot, project, home) for robot in project.robots]
+    thinking = thinking_of(project, home) if thinking is None else thinking
+    sim = Simulation(project.arena, seed=project.seed, thinking=thinking, robot=specs)
     for number, (robot, wire) in enumerate(zip(project.robots, sim.wires, strict=True), start=1):
         for turret in robot.turrets:
             sim.fit(number, turret)
@@ -63,10 +68,24 @@ def spec_of(robot: ProjectRobot, project: Project, folder: Path) -> RobotSpec:
         ParameterError: If the robot's file is none, or leads out of the folder.
     """
     path = inside(folder, robot.kind, "kind") if robot.kind.lower().endswith(".toml") else robot.kind
-    spec = RobotSpec.load(path, response=project.response)
+    return _as_set(RobotSpec.load(path, response=project.response), robot, project)
+
+
+def _as_set(spec: RobotSpec, robot: ProjectRobot, project: Project) -> RobotSpec:
+    """Return a kind of robot with what a project sets of its own."""
     if robot.brightness is not None:
         spec = spec.with_changes(body__brightness=robot.brightness)
     return spec if project.noise else spec.without_noise()
+
+
+def thinking_of(project: Project, folder: Path) -> str:
+    """Return what the computing of a project's programs costs; a replay with its whole path.
+
+    Raises:
+        ParameterError: If the replay's path leads out of the folder.
+    """
+    kind, file = split_thinking(project.thinking)
+    return f"{kind}:{inside(folder, file, 'replay')}" if isinstance(file, str) else project.thinking
 
 
 def project_of(sim: Simulation, project: Project) -> Project:

@@ -1,8 +1,8 @@
-"""The paths of robots, kept as they drive."""
+"""The paths of robots, balls and cylinders, kept as they move; and who looks on while ticks are done."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,18 +11,38 @@ from kiks.engine.state import State
 from kiks.units import TICK_NS
 
 
+class Watcher(Protocol):
+    """Who looks at a world after ticks of its own choice. It changes nothing, and asks the world for nothing."""
+
+    def ticks_left(self, tick_count: int) -> int:
+        """Return how many ticks may be done before the next look, at least one."""
+
+    def look(self, state: State) -> None:
+        """Look at the state, after ticks that are no more than were left; called between two looks, too."""
+
+
+class _Point(NamedTuple):
+    """Where everybody was after so many ticks: columns of x_mm, y_mm, heading_rad, and of number, x_mm, y_mm."""
+
+    tick_count: int
+    poses: NDArray[np.float64]
+    bodies: NDArray[np.float64]
+
+
 class Paths:
-    """Poses of all robots, one after each period of whole ticks.
+    """Poses of all robots and places of all balls and cylinders, after each period of whole ticks.
 
     Args:
         period_ticks: Ticks between two points.
         state: What is looked at; its present poses are the first point.
+        points_max: Most points that are kept. When there are more, every second one is dropped, and from then on half
+            as many come; None for all.
     """
 
-    def __init__(self, period_ticks: int, state: State) -> None:
+    def __init__(self, period_ticks: int, state: State, points_max: int | None = None) -> None:
         self._period_ticks = period_ticks
-        self._points: list[NDArray[np.float64]] = []
-        self._times_s: list[float] = []
+        self._points_max = points_max
+        self._points: list[_Point] = []
         self._note(state)
 
     def ticks_left(self, tick_count: int) -> int:
@@ -35,14 +55,34 @@ class Paths:
             self._note(state)
 
     def _note(self, state: State) -> None:
-        self._times_s.append(state.tick_count * TICK_NS * 1e-9)
         robots: Any = state.robots[0]
-        self._points.append(np.array([robots["x_mm"], robots["y_mm"], robots["heading_rad"]]))
+        bodies: Any = state.bodies[0]
+        poses = np.array([robots["x_mm"], robots["y_mm"], robots["heading_rad"]])
+        places = np.array([bodies["number"], bodies["x_mm"], bodies["y_mm"]])
+        # In one step, as Ctrl-C may come anywhere, and paths are asked for after it.
+        self._points.append(_Point(state.tick_count, poses, places))
+        if self._points_max is not None and len(self._points) > self._points_max:
+            self._thin_out()
+
+    def _thin_out(self) -> None:
+        """Drop every second point; the first stays, at whatever tick it was."""
+        period_ticks = 2 * self._period_ticks
+        first, *others = self._points
+        self._points = [first, *(each for each in others if each.tick_count % period_ticks == 0)]
+        self._period_ticks = period_ticks
 
     def array(self) -> NDArray[np.float64]:
         """Return all points, float64 [robot, point, 4]: time_s, x_mm, y_mm, heading_rad; NaN before a robot came."""
-        poses = np.full((self._points[-1].shape[1], len(self._points), 3), np.nan)
-        for point, there in enumerate(self._points):
-            poses[: there.shape[1], point] = there.T
-        times_s = np.broadcast_to(np.array(self._times_s)[None, :, None], (*poses.shape[:2], 1))
-        return np.concatenate([times_s, poses], axis=2)
+        ways = np.full((self._points[-1].poses.shape[1], len(self._points), 4), np.nan)
+        for index, point in enumerate(self._points):
+            ways[:, index, 0] = point.tick_count * TICK_NS * 1e-9
+            ways[: point.poses.shape[1], index, 1:] = point.poses.T
+        return ways
+
+    def of_bodies(self) -> dict[int, list[tuple[float, float]]]:
+        """Return the places of each ball and cylinder that there was, by its number: x_mm, y_mm."""
+        places: dict[int, list[tuple[float, float]]] = {}
+        for point in self._points:
+            for number, x_mm, y_mm in point.bodies.T.tolist():
+                places.setdefault(int(number), []).append((x_mm, y_mm))
+        return places

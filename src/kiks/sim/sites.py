@@ -13,6 +13,7 @@ from kiks.errors import ParameterError, nearest, shown
 from kiks.firmware.battle import Battle
 from kiks.firmware.general_io import GeneralIO
 from kiks.firmware.gripper import Gripper
+from kiks.firmware.k213 import K213
 from kiks.firmware.radio import Radio
 from kiks.firmware.turret import AnyTurret, Met, Turret
 from kiks.model.ranges import check_heading
@@ -151,6 +152,13 @@ def named(turret: object, camera: Callable[[], Turret]) -> Turret:
     if not isinstance(turret, GeneralIO):
         _check(turret)
     return turret
+
+
+def name_of(turret: Turret) -> str | None:
+    """Return the name that `Simulation.fit` takes for a turret; None for one of a user's own."""
+    if type(turret) is K213:
+        return "k213"
+    return next((name for name, kind in KINDS.items() if type(turret) is kind), None)
 
 
 def _check(turret: Turret) -> None:

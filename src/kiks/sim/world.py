@@ -17,11 +17,11 @@ from kiks.engine.scene import enter_everybody, make_scene
 from kiks.engine.state import State
 from kiks.errors import ParameterError, shown
 from kiks.model.arena import PAD, Arena
-from kiks.model.ranges import check_heading, check_kind, check_number, wrapped
+from kiks.model.ranges import check_count, check_heading, check_kind, check_number, wrapped
 from kiks.model.robot import RobotSpec
 from kiks.model.room import OVERLAP_MM
 from kiks.sim.floor import Floor
-from kiks.sim.paths import Paths
+from kiks.sim.paths import Paths, Watcher
 from kiks.units import TICK_NS, s_from_ns
 
 TICKS_AT_ONCE = 10_000
@@ -39,6 +39,7 @@ class World(Floor):
     Attributes:
         lock: Held by whoever looks at the world or changes it.
         now_ns: The simulated time [ns].
+        watchers: Who looks on as ticks are done.
 
     Raises:
         ArenaError: If the arena has no free place for a robot.
@@ -52,6 +53,7 @@ class World(Floor):
         self.now_ns = 0
         self.state = State.empty(world_count=1, robot_count=len(self.specs))
         self._tell_kinds()
+        self.watchers: list[Watcher] = []
         self._paths: Paths | None = None
         for index, pose in enumerate(self.start_poses(seed).tolist()):
             self._put(index, *pose)
@@ -125,13 +127,13 @@ class World(Floor):
         ticks = -(-time_ns // TICK_NS) - self.state.tick_count
         while ticks > 0:
             count = ticks if ticks < TICKS_AT_ONCE else TICKS_AT_ONCE
-            if self._paths is not None:
-                count = min(count, self._paths.ticks_left(self.state.tick_count))
+            for watcher in self.watchers:
+                count = min(count, watcher.ticks_left(self.state.tick_count))
             step.advance(self.scene, self.ground, self.seed, self.state.tick_count, count)
             self.state.tick_count += count
             ticks -= count
-            if self._paths is not None:
-                self._paths.look(self.state)
+            for watcher in self.watchers:
+                watcher.look(self.state)
 
     # ---- robots ----
 
@@ -232,21 +234,27 @@ class World(Floor):
             straight = np.hypot(robots["x_mm"] - robots["start_x_mm"], robots["y_mm"] - robots["start_y_mm"])
             return np.column_stack([robots["forwards_mm"], robots["backwards_mm"], straight])
 
-    def record_paths(self, every_s: float = 0.1) -> None:
-        """Keep the poses of all robots from now on, for `paths`; what was kept before is dropped.
+    def record_paths(self, every_s: float = 0.1, *, points_max: int | None = None) -> None:
+        """Keep where all robots, balls and cylinders are from now on; what was kept before is dropped.
 
         Args:
             every_s: Time between two points [s]: whole hundredths, at least one.
+            points_max: Most points that are kept, from 2. When there are more, every second one is dropped, and from
+                then on half as many come; None for all.
 
         Raises:
-            ParameterError: If it is none of these.
+            ParameterError: If one is none of these.
         """
         ticks = 100 * check_number("every_s", every_s, 0, 1e7, "Take 0.1.")
         if ticks < 1 - 1e-9 or abs(ticks - round(ticks)) > 1e-6:
             raise ParameterError(f"every_s must be a multiple of 0.01 s, but it was {shown(every_s)}. Take 0.1.")
+        if points_max is not None:
+            check_count("points_max", points_max, 2, 10**9, "Take 10000.")
         with self.lock:
             self.sync()
-            self._paths = Paths(round(ticks), self.state)
+            self.watchers = [each for each in self.watchers if each is not self._paths]
+            self._paths = Paths(round(ticks), self.state, points_max)
+            self.watchers.append(self._paths)
 
     def paths(self) -> NDArray[np.float64]:
         """Return the paths since `record_paths`, float64 [robot, point, 4]: time_s, x_mm, y_mm, heading_rad.
@@ -255,10 +263,22 @@ class World(Floor):
             ParameterError: If none were recorded.
         """
         with self.lock:
-            self.sync()
-            if self._paths is None:
-                raise ParameterError("paths must be recorded before they are asked for. Call record_paths() first.")
-            return self._paths.array()
+            return self._recorded().array()
+
+    def body_paths(self) -> dict[int, list[tuple[float, float]]]:
+        """Return where balls and cylinders were since `record_paths`, by their numbers: x_mm, y_mm.
+
+        Raises:
+            ParameterError: If nothing was recorded.
+        """
+        with self.lock:
+            return self._recorded().of_bodies()
+
+    def _recorded(self) -> Paths:
+        self.sync()
+        if self._paths is None:
+            raise ParameterError("paths must be recorded before they are asked for. Call record_paths() first.")
+        return self._paths
 
     def contacts(self, robot: int) -> int:
         """Return how often a robot has met something so far: a wall, a robot, a ball or a cylinder.

@@ -1,0 +1,128 @@
+"""What is left of a run: a picture of it, a table of it, and a line for each robot."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from kiks.cli.options import say, written_file
+from kiks.model.files import GrowingFile
+
+if TYPE_CHECKING:
+    from kiks.engine.state import State
+    from kiks.sim.simulation import Simulation
+
+TABLE_TICKS = 5
+"""Ticks of 10 ms between two rows of a robot in a table."""
+
+COLUMNS = ("time_s", "robot", "x_mm", "y_mm", "heading_deg", "driven_mm", "contacts")
+
+POINTS_MAX, LEAST_POINTS_MAX = 200_000, 1000
+"""Most points of all paths of a picture together, but of each path at least so many."""
+
+
+def _drawable(param: typer.CallbackParam, value: Path | None) -> Path | None:
+    """Check the file of a picture before the run.
+
+    Raises:
+        ParameterError: If it could not be written, or its ending names no type of picture.
+    """
+    if value is not None:
+        from kiks.drawing import check_picture
+
+        check_picture(value)
+    return value
+
+
+Picture = Annotated[
+    Path | None,
+    typer.Option(help="Draw the arena with the paths of all robots here: .png, .svg or .pdf.", callback=_drawable),
+]
+Table = Annotated[
+    Path | None,
+    typer.Option("--csv", help="Write here where each robot is, every 50 ms of simulated time.", callback=written_file),
+]
+
+
+@contextmanager
+def recorded(sim: Simulation, picture: Path | None, csv: Path | None) -> Iterator[None]:
+    """Keep what happens in a world meanwhile, also if it is interrupted; the run is the same, to the bit.
+
+    Args:
+        sim: The world.
+        picture: File of the picture that is drawn at the end; none if None.
+        csv: File of the table; none if None.
+
+    Raises:
+        ParameterError: If a file cannot be written.
+    """
+    # A program may go to another folder.
+    picture, csv = picture and picture.absolute(), csv and csv.absolute()
+    with ExitStack() as at_the_end:
+        if picture is not None:
+            from kiks.drawing import Trace, save_simulation
+
+            trace = Trace(sim, points_max=max(POINTS_MAX // sim.robot_count, LEAST_POINTS_MAX))
+            at_the_end.callback(save_simulation, sim, picture, trace)
+        if csv is not None:
+            file = GrowingFile(csv, "--csv")
+            at_the_end.callback(file.close)
+            rows = _Rows(file, sim.state)
+            sim.watchers.append(rows)
+            at_the_end.callback(sim.watchers.remove, rows)
+            # The last ticks may not have been asked for yet.
+            at_the_end.callback(sim.sync)
+        yield
+
+
+class _Rows:
+    """Writes a row for each robot after each period, as a `kiks.sim.paths.Watcher`.
+
+    Args:
+        file: Where they go.
+        state: The world, as it is at the first row.
+    """
+
+    def __init__(self, file: GrowingFile, state: State) -> None:
+        self._file = file
+        file.write(",".join(COLUMNS) + "\n")
+        self.look(state)
+
+    def ticks_left(self, tick_count: int) -> int:
+        return TABLE_TICKS - tick_count % TABLE_TICKS
+
+    def look(self, state: State) -> None:
+        if state.tick_count % TABLE_TICKS:
+            return
+        time_s = f"{state.tick_count / 100:.2f}"
+        robots: Any = state.robots[0]
+        driven_mm = (robots["forwards_mm"] + robots["backwards_mm"]).tolist()
+        places = zip(robots["x_mm"].tolist(), robots["y_mm"].tolist(), robots["heading_rad"].tolist(), strict=True)
+        rows = zip(places, driven_mm, robots["contact_count"].tolist(), strict=True)
+        lines = []
+        for number, ((x_mm, y_mm, heading_rad), way_mm, contacts) in enumerate(rows, 1):
+            heading_deg = math.degrees(heading_rad) % 360
+            lines.append(f"{time_s},{number},{x_mm:.3f},{y_mm:.3f},{heading_deg:.3f},{way_mm:.3f},{contacts}\n")
+        self._file.write("".join(lines))
+
+
+def tell_run(sim: Simulation, doubt: str = "") -> None:
+    """Say what each robot has done, then how the run has ended: its time, seed and state.
+
+    Args:
+        sim: The world.
+        doubt: Why it might not be repeatable; nothing if it is.
+    """
+    for number in range(1, sim.robot_count + 1):
+        contacts = sim.contacts(number)
+        say(
+            f"robot {number}: {sim.travelled_mm(number) / 1000:.2f} m driven, {contacts} "
+            f"contact{'' if contacts == 1 else 's'}, {sim.time_s:.3f} s"
+        )
+    repeatable = f"not repeatable: {doubt}" if doubt else f"state {sim.state_hash()}"
+    say(f"{sim.time_s:.3f} s simulated, seed {sim.seed}, {repeatable}")
