@@ -11,13 +11,6 @@ import time
 import serial
 from tests.script import seen
 
-programs = seen.program
-ports = [serial.Serial(f"/dev/ttyUSB{number}", timeout=60) for number in range(seen.robots)]
-lines = [threading.Lock() for _ in ports]
-locks = [threading.Lock() for _ in range(3)]
-queues = [queue.Queue() for _ in range(2)]
-events = [threading.Event() for _ in range(2)]
-
 
 def do(number, kind, *rest):
     if kind == "sleep":
@@ -56,10 +49,18 @@ def run(number, steps):
         seen.note(number, [step[0], result])
 
 
-threads = [threading.Thread(target=run, args=(number, steps)) for number, steps in enumerate(programs) if number]
-for thread in threads:
-    thread.start()
-run(0, programs[0])
-for thread in threads:
-    thread.join()
-seen.note(0, "end")
+if __name__ == "__main__":
+    programs = seen.program
+    ports = [serial.Serial(f"/dev/ttyUSB{number}", timeout=60) for number in range(seen.robots)]
+    lines = [threading.Lock() for _ in ports]
+    locks = [threading.Lock() for _ in range(3)]
+    queues = [queue.Queue() for _ in range(2)]
+    events = [threading.Event() for _ in range(2)]
+
+    threads = [threading.Thread(target=run, args=(number, steps)) for number, steps in enumerate(programs) if number]
+    for thread in threads:
+        thread.start()
+    run(0, programs[0])
+    for thread in threads:
+        thread.join()
+    seen.note(0, "end")

@@ -199,7 +199,12 @@ class OpenPorts:
 
         def read(descriptor: int, length: int, /) -> bytes:
             port = ports._ports.get(descriptor)
-            return _real_read(descriptor, length) if port is None else _read_port(port[1], length)
+            if port is not None:
+                return _read_port(port[1], length)
+            if ports._scheduler.is_here and ports._scheduler.tasks and os.get_blocking(descriptor):
+                # Another thread of the program may be the one that writes there.
+                ports.wait({descriptor: READ}, None)
+            return _real_read(descriptor, length)
 
         def write(descriptor: int, data: bytes, /) -> int:
             port = ports._ports.get(descriptor)

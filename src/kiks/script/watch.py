@@ -10,6 +10,7 @@ from __future__ import annotations
 import logging
 import os
 import signal
+import subprocess
 import sys
 import threading
 import time
@@ -18,7 +19,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 
-from kiks.script.outside import ADVICE, OURS, where
+from kiks.script.outside import ADVICE, where
 from kiks.script.scheduler import Scheduler
 
 SAMPLE_S = 0.05
@@ -38,6 +39,9 @@ WARNING_SHARE = 0.2
 
 GRACE_S = 5.0
 """How long code in C may go on before the process is ended from outside [s of real time]."""
+
+_MAY_WAIT = ("<", str(Path(__file__).parent.parent), subprocess.__file__)
+"""Whose code may wait in real time: imports, KiKS, and what waits for other programs."""
 
 _log = logging.getLogger("kiks.run")
 
@@ -139,7 +143,7 @@ class _Watch:
             return ""
         frame = sys._current_frames().get(self._watched)
         name = frame.f_code.co_filename if frame is not None else "<"
-        return "" if name.startswith(("<", *OURS)) and "site-packages" not in name else kind
+        return "" if name.startswith(_MAY_WAIT) else kind
 
     def _where(self) -> str:
         return where(sys._current_frames().get(self._watched))
