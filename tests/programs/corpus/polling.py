@@ -41,6 +41,13 @@ while monotonic() < end:
 ser.write(b"D,0,0\n")
 sleep(0.3)
 last = list(link.poll())[-1]
-print("asked", asked, "times:", asked - answered <= 1, "meanwhile busy:", busy > 2 * asked)
+print(
+    "asked ten times a second:",
+    14 <= asked <= 16,
+    "answered:",
+    asked - answered <= 1,
+    "meanwhile busy:",
+    busy > 2 * asked,
+)
 print("last:", last)
 ser.close()
