@@ -1,4 +1,4 @@
-"""Runs a command on a terminal of its own, with nobody at the keys; what it prints beside its screens goes to stdout."""
+"""Runs a command on a terminal of its own, with nobody at the keys; what it prints beside its screens is printed."""
 
 import os
 import pty

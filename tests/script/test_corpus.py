@@ -220,8 +220,7 @@ def run_real(name: str, ports: Mapping[str, str], environment: Mapping[str, str]
         check=False,
         text=True,
         stdin=subprocess.DEVNULL,
-        stdout=PIPE,
-        stderr=PIPE,
+        capture_output=True,
     )
     return done.stdout + (f"exit code {done.returncode}: {done.stderr}" if done.returncode else "")
 

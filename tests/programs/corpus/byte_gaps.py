@@ -1,4 +1,4 @@
-"""`inter_byte_timeout`: on Windows a silent line ends a read; on Linux pyserial waits for the time limit all the same."""
+"""`inter_byte_timeout`: on Windows a silent line ends a read; on Linux the time limit does."""
 
 import sys
 import time
