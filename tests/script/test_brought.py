@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -80,16 +81,28 @@ lose()
 """
 
 
-def test_errors_are_told_with_their_causes_and_without_kiks(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+def test_errors_are_told_with_their_causes_and_without_kiks(
+    run: Run, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # As the library of the command line does, which shows frames of its own.
+    monkeypatch.setattr(sys, "excepthook", lambda *_: print("wrong"))
     assert run(CHAIN) == 1
     told = capsys.readouterr().err
     assert told.startswith("Exception in thread careless:\nTraceback (most recent call last):\n")
     assert told.count("PortNotOpenError: ") == told.count("direct cause") == told.count("RuntimeError: lost\n") == 2
     assert "protocol_kiks" not in told
     assert "runner.py" not in told
+    assert told.count("File") == 7
 
 
 def test_hook_of_the_program_hears_its_error(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
     hook = "def hook(kind, error, trace): print('stopped:', error)\n"
     assert run(f"import sys\n{hook}sys.excepthook = hook\nraise ValueError('too near')\n") == 1
     assert capsys.readouterr() == ("stopped: too near\n", "")
+
+
+def test_event_loop_that_lives_in_real_time_is_refused(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("try: import uvloop\nexcept ImportError: pass\n") == 1
+    assert capsys.readouterr().err.startswith(
+        "kiks: a program in simulated time must wait by Python's own event loops, but it imported uvloop (brought.py, "
+    )

@@ -114,6 +114,7 @@ def run_program(
     argv_before, path_before, hook_before = sys.argv, sys.path[:], sys.excepthook
     sys.argv = [str(program), *arguments]
     sys.path.insert(0, str(program.resolve().parent))
+    sys.excepthook = lambda _kind, error, _trace: _print_program_trace(error)
     try:
         with (
             watched(scheduler),
@@ -179,10 +180,7 @@ def _run_file(program: Path) -> int:
     except KiksError as error:
         return _complain(f"kiks: {error}")
     except Exception as error:
-        if sys.excepthook is sys.__excepthook__:
-            _print_program_trace(error)
-        else:
-            sys.excepthook(type(error), error, error.__traceback__)
+        sys.excepthook(type(error), error, error.__traceback__)
         return 1
     return 0
 
