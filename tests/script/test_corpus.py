@@ -53,7 +53,7 @@ WIDE = "size_mm = [1500, 1500]\n" + "".join(
 GUARD_S = 60.0
 
 Runs = dict[str, tuple[str, str]]
-"""What each program has printed, and the last line of its errors, which is that of KiKS."""
+"""What each program has printed, and its errors with the lines of KiKS."""
 
 
 @contextmanager
@@ -98,8 +98,11 @@ def run_alone(folder: Path, environment: Mapping[str, str]) -> tuple[Runs, Runs]
         for name in WITH_TERMINAL & set(SIMULATED):
             words = [sys.executable, ON_TERMINAL, *KIKS, "run", "--seed", SEED, CORPUS[name]]
             done = subprocess.run(words, env=dict(environment), timeout=GUARD_S, check=True, stdout=PIPE, text=True)
-            *lines, last = done.stdout.splitlines(keepends=True)
-            runs[name] = "".join(lines), last
+            # On a terminal both go to the same place.
+            lines = done.stdout.splitlines(keepends=True)
+            runs[name] = tuple(
+                "".join(each for each in lines if each.startswith("kiks: ") is ours) for ours in (False, True)
+            )
     return first, second
 
 
