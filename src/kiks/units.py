@@ -25,6 +25,18 @@ def ns_from_s(time_s: float) -> int:
     return round(time_s * NS_PER_S)
 
 
+def wait_ns(time_s: float) -> int:
+    """Return how long a wait for some time [s] lasts [ns]: at least one, if it lasts at all.
+
+    Who waits again and again for what is left up to an instant would else never get there.
+
+    Example:
+        >>> wait_ns(2.2e-16), wait_ns(0.0), wait_ns(0.07)
+        (1, 0, 70000000)
+    """
+    return max(ns_from_s(time_s), 1 if time_s > 0 else 0)
+
+
 def s_from_ns(time_ns: int) -> float:
     """Return a time [ns] in seconds."""
     return time_ns / NS_PER_S

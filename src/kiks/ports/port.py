@@ -16,7 +16,7 @@ from kiks.clock.program import Program
 from kiks.errors import ParameterError, shown
 from kiks.model.ranges import SECONDS_MAX, check_count, check_number
 from kiks.ports.reading import Read
-from kiks.units import ns_from_s, s_from_ns
+from kiks.units import ns_from_s, s_from_ns, wait_ns
 
 BAUD_MIN = 75
 BAUD_MAX = 4_000_000
@@ -151,8 +151,8 @@ class VirtualPort:
         """Send characters; return how many. They leave one after the other while the program goes on.
 
         Raises:
-            TypeError: If they are a text; as pyserial has it.
-            ParameterError: If they are no characters.
+            TypeError: If they are a text, or nothing that consists of numbers; as pyserial has it.
+            ParameterError: If a number is out of range.
         """
         if data.__class__ is not bytes:
             data = _characters(data)
@@ -246,7 +246,7 @@ class VirtualPort:
         Raises:
             ParameterError: If it is negative, longer than 1e9 s or no number.
         """
-        passing_ns = ns_from_s(check_number("seconds", seconds, 0, SECONDS_MAX, "Time never runs backwards."))
+        passing_ns = wait_ns(check_number("seconds", seconds, 0, SECONDS_MAX, "Time never runs backwards."))
         with self.line.lock:
             if self._program.thinks:
                 self._think(is_command=False)
@@ -287,8 +287,8 @@ def _characters(data: Any) -> bytes:
     """Return what a program hands over as pyserial takes it: bytes, or numbers from 0 to 255.
 
     Raises:
-        TypeError: If it is a text.
-        ParameterError: If it is neither.
+        TypeError: If it is a text, or nothing that consists of numbers.
+        ParameterError: If a number is out of range.
     """
     if isinstance(data, str):
         raise TypeError(f"unicode strings are not supported, please encode to bytes: {shown(data)}")
@@ -296,8 +296,9 @@ def _characters(data: Any) -> bytes:
         check_count("a count of zeros", data, most=ZEROS_MAX)  # As pyserial has it: a number is so many zeros.
     try:
         return bytes(data)
-    except (TypeError, ValueError, OverflowError):
-        raise ParameterError(f"data must be bytes, or numbers from 0 to 255, but it was {shown(data)}.") from None
+    except (TypeError, ValueError, OverflowError) as error:
+        text = f"data must be bytes, or numbers from 0 to 255, but it was {shown(data)}."
+        raise (TypeError if isinstance(error, TypeError) else ParameterError)(text) from None
 
 
 def _count(size: Any) -> int:

@@ -31,6 +31,7 @@ OURS = (str(Path(__file__).parent.parent), os.path.dirname(os.__file__))
 _SOCKETS = frozenset(f"socket.{name}" for name in ("connect", "bind", "sendto", "sendmsg", "getaddrinfo"))
 _FORKS = frozenset({"os.fork", "os.forkpty"})
 _STARTS = frozenset({"subprocess.Popen", "os.system", "os.posix_spawn", "os.exec", "os.spawn"})
+_OTHER_LOOPS = frozenset({"uvloop", "gevent", "eventlet"})
 _DEVICE = re.compile(r"/dev/(tty(?!$)|cu\.|serial/|rfcomm)")
 _PYTHON = re.compile(r"(^|[\s/])(python|pypy)[\d.]*(\s|$)|\.py(\s|$)")
 
@@ -85,7 +86,7 @@ class _Hook:
             sys.addaudithook(self._hear)
 
     def _hear(self, event: str, arguments: tuple[Any, ...]) -> None:
-        if _watching and (event == "open" or event in _SOCKETS or event in _FORKS or event in _STARTS):
+        if _watching and (event in ("open", "import") or event in _SOCKETS or event in _FORKS or event in _STARTS):
             scheduler = _watching[-1]
             if scheduler.is_here:
                 _judge(scheduler, event, arguments)
@@ -98,6 +99,9 @@ def _judge(scheduler: Scheduler, event: str, arguments: tuple[Any, ...]) -> None
     if event == "open":
         if isinstance(arguments[0], str) and _DEVICE.match(arguments[0]):
             _refuse(scheduler, "open a serial port by pyserial", f"it opened {arguments[0]} by itself")
+    elif event == "import":
+        if arguments[0] in _OTHER_LOOPS:
+            _refuse(scheduler, "wait by Python's own event loops", f"it imported {arguments[0]}", "Use asyncio, or ")
     elif event in _SOCKETS:
         _refuse(scheduler, "talk to its robots alone", "it used the network")
     elif event in _FORKS:

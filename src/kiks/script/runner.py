@@ -24,6 +24,8 @@ from kiks.script.watch import watched
 if TYPE_CHECKING:
     from kiks.sim.simulation import Simulation
 
+_NOT_OF_THE_PROGRAM = (str(Path(__file__).parent.parent), "<frozen runpy>", runpy.__file__)
+
 
 def run_here(sim: Simulation, program: Path, arguments: list[str], told: dict[str, int]) -> int:
     """Run a program in this process to its end; return its exit code.
@@ -100,6 +102,7 @@ def run_program(
         outside.replacements(scheduler),
         ends.replacements(),
         {"os": {"_exit": end_at_once}},
+        {"threading": {"excepthook": _print_thread_trace, "__excepthook__": _print_thread_trace}},
     )
 
     def main() -> int:
@@ -108,9 +111,10 @@ def run_program(
         ends.run()
         return code
 
-    argv_before, path_before = sys.argv, sys.path[:]
+    argv_before, path_before, hook_before = sys.argv, sys.path[:], sys.excepthook
     sys.argv = [str(program), *arguments]
     sys.path.insert(0, str(program.resolve().parent))
+    sys.excepthook = lambda _kind, error, _trace: _print_program_trace(error)
     try:
         with (
             watched(scheduler),
@@ -125,7 +129,7 @@ def run_program(
         return end.code
     finally:
         _forget_threads(scheduler)
-        sys.argv = argv_before
+        sys.argv, sys.excepthook = argv_before, hook_before
         sys.path[:] = path_before
 
 
@@ -176,7 +180,7 @@ def _run_file(program: Path) -> int:
     except KiksError as error:
         return _complain(f"kiks: {error}")
     except Exception as error:
-        _print_program_trace(error)
+        sys.excepthook(type(error), error, error.__traceback__)
         return 1
     return 0
 
@@ -204,14 +208,21 @@ def _complain(text: str) -> int:
     return 1
 
 
-def _print_program_trace(error: Exception) -> None:
+def _print_program_trace(error: BaseException) -> None:
     """Show the program's own error as Python would, without the frames of KiKS and runpy above and below it."""
-    frames = traceback.extract_tb(error.__traceback__)
-    own = [
-        frame
-        for frame in frames
-        if "runpy" not in frame.filename and str(Path(__file__).parent.parent) not in frame.filename
-    ]
-    print("Traceback (most recent call last):", file=sys.stderr)
-    print("".join(traceback.format_list(own)), end="", file=sys.stderr)
-    print("".join(traceback.format_exception_only(error)), end="", file=sys.stderr)
+    report = traceback.TracebackException.from_exception(error)
+    chain: list[traceback.TracebackException | None] = [report]
+    while chain:
+        each = chain.pop()
+        if each is not None:
+            own = [frame for frame in each.stack if not frame.filename.startswith(_NOT_OF_THE_PROGRAM)]
+            each.stack = traceback.StackSummary.from_list(own)
+            chain += [each.__cause__, each.__context__, *(each.exceptions or [])]
+    print("".join(report.format()), end="", file=sys.stderr)
+
+
+def _print_thread_trace(what: Any, /) -> None:
+    """Show what has ended a thread; see `threading.excepthook`."""
+    if what.exc_type is not SystemExit:
+        print(f"Exception in thread {what.thread.name}:", file=sys.stderr)
+        _print_program_trace(what.exc_value)

@@ -27,7 +27,7 @@ from kiks.clock.waiting import Waiting
 from kiks.model.ranges import SECONDS_MAX
 from kiks.ports.port import Line
 from kiks.ports.reading import NEVER_NS, Read
-from kiks.units import ns_from_s
+from kiks.units import wait_ns
 
 TASK_IDENT = 1 << 20
 """What `threading.get_ident` says in the first thread that a program starts."""
@@ -396,13 +396,10 @@ class Scheduler:
 
 
 def timeout_ns(seconds: float) -> int:
-    """Return a time-out [s] as a time [ns]: none for what is over, for ever for what is longer than any run.
-
-    What is left of a time-out, by floating-point numbers, may be less than a nanosecond: time goes on nevertheless.
-    """
+    """Return a time-out [s] as a time [ns]: none for what is over, for ever for what is longer than any run."""
     if seconds <= 0:
         return 0
-    return max(ns_from_s(seconds), 1) if seconds <= SECONDS_MAX else NEVER_NS
+    return wait_ns(seconds) if seconds <= SECONDS_MAX else NEVER_NS
 
 
 def _name_of(task: Task) -> str:

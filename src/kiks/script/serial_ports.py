@@ -21,7 +21,7 @@ USB_ADAPTER = (0x0403, 0x6001)
 def replacements(
     open_port: Callable[[str], VirtualPort], ports: OpenPorts, names: Sequence[str]
 ) -> dict[str, dict[str, Any]]:
-    """Return what stands in for names of `serial`, `glob` and `os.path`, by module.
+    """Return what stands in for names of `serial`, `glob` and `os`, by module.
 
     Args:
         open_port: Returns the port behind a name.
@@ -120,15 +120,22 @@ def replacements(
         more = fnmatch.filter(names, pathname) if isinstance(pathname, str) else []
         return sorted({*real_iglob(pathname, **options), *more})
 
-    def exists(path: Any) -> bool:
-        return (isinstance(path, str) and path in names) or real_exists(path)
+    def stat(path: Any, *args: Any, **options: Any) -> os.stat_result:
+        # A port is there for whoever asks, by `os.path` or `pathlib`, and is a device as any terminal is.
+        return real_stat(os.devnull if is_offered(path) else path, *args, **options)
 
-    real_iglob, real_exists = glob.iglob, os.path.exists
+    def access(path: Any, *args: Any, **options: Any) -> bool:
+        return is_offered(path) or real_access(path, *args, **options)
+
+    def is_offered(path: Any) -> bool:
+        return isinstance(path, str | os.PathLike) and os.fspath(path) in names
+
+    real_iglob, real_stat, real_access = glob.iglob, os.stat, os.access
     return {
         "serial": {"Serial": Serial, "serial_for_url": serial_for_url},
         "serial.tools.list_ports": {"comports": comports},
         "glob": {"glob": simulated_glob, "iglob": lambda *args, **options: iter(simulated_glob(*args, **options))},
-        "posixpath": {"exists": exists},
+        "os": {"stat": stat, "access": access},
         # `kiks.Khepera` and `kiks.kopen` find their ports by this one.
         urls.__name__: {"find_port": open_port},
     }

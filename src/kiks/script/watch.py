@@ -14,6 +14,9 @@ import subprocess
 import sys
 import threading
 import time
+
+# Bound here once: a program lives with a `_thread` that is simulated.
+from _thread import start_new_thread
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -77,18 +80,19 @@ class _Watch:
         self._watched = threading.get_ident()
         self._folder = Path(f"/proc/self/task/{threading.get_native_id()}")
         self._is_over = threading.Event()
-        self._thread = threading.Thread(target=self._look_on, name="kiks: watch", daemon=True)
+        self._has_ended = threading.Event()
         # Bound here once: the program lives with clocks that are simulated.
         self._cpu_s, self._now_s = time.process_time, time.monotonic
 
     def start(self) -> None:
         """Begin to look."""
-        self._thread.start()
+        # Unknown to `threading`: a program may count its threads, and wait until there is but one.
+        start_new_thread(self._look_on, ())
 
     def stop(self) -> None:
         """Look no more."""
         self._is_over.set()
-        self._thread.join()
+        self._has_ended.wait()
 
     def end(self, _number: int, _frame: FrameType | None) -> None:
         """End the program, in its own thread."""
@@ -96,6 +100,12 @@ class _Watch:
             self._scheduler.end(1, self._message)
 
     def _look_on(self) -> None:
+        try:
+            self._look_again_and_again()
+        finally:
+            self._has_ended.set()
+
+    def _look_again_and_again(self) -> None:
         waits, last, has_warned = 0, -1, False
         active_cpu_s = locked_cpu_s = self._cpu_s()
         locked_s = self._now_s()

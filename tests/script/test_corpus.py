@@ -1,0 +1,240 @@
+"""Programs as people write them for a real robot do the same in each way of running them: alone, on the desk, in real
+time.
+
+Each is in `tests/programs/corpus` and prints what does not depend on milliseconds.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from subprocess import PIPE
+
+import pytest
+from tests.served import PROGRAMS
+from tests.test_cli import KIKS
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
+
+CORPUS = {path.stem: str(path) for path in sorted((PROGRAMS / "corpus").glob("*.py"))}
+ON_TERMINAL, EACH_ALONE, INTO_FILE = (
+    str(PROGRAMS / f"{name}.py") for name in ("on_terminal", "each_alone", "into_file")
+)
+
+WINDOWS_WAIT_IN_SIMULATED_TIME = False
+"""Whether `kiks run` lets these wait in simulated time; until then they are run in real time alone."""
+WITH_WINDOWS = {"tk_window", "pygame_drive", "curses_panel"}
+WITH_TERMINAL = {"curses_panel"}
+"""The desk gives programs no terminal, so there such a program has nowhere to draw."""
+
+SIMULATED = [name for name in CORPUS if WINDOWS_WAIT_IN_SIMULATED_TIME or name not in WITH_WINDOWS]
+
+AT_ONCE = 2
+"""Simulated runs at the same time: one a core."""
+IN_REAL_TIME = 6
+"""Programs at the same time that live in real time: they mostly wait."""
+GROUP = 13
+"""Programs that share a world: so many begin together within the time in which the world waits for them."""
+SEED = "3"
+WIDE = "size_mm = [1500, 1500]\n" + "".join(
+    f"[[start]]\nat_mm = [{150 + 200 * (number % 7)}, {100 + 180 * (number // 7)}]\nheading_deg = 0\n"
+    for number in range(49)
+)
+"""An arena in which no robot meets another one, or a wall."""
+GUARD_S = 60.0
+
+Runs = dict[str, tuple[str, str]]
+"""What each program has printed, and its errors with the lines of KiKS."""
+
+
+@contextmanager
+def display() -> Iterator[dict[str, str]]:
+    """Yield an environment with a screen that nobody sees."""
+    if shutil.which("Xvfb") is None:
+        pytest.skip("there is no Xvfb for the program with a window")
+    ours, theirs = os.pipe()
+    command = ["Xvfb", "-displayfd", str(theirs), "-nolisten", "tcp"]
+    with subprocess.Popen(command, pass_fds=[theirs], stderr=subprocess.DEVNULL) as process:
+        os.close(theirs)
+        try:
+            with open(ours) as told:
+                number = told.readline().strip()
+            yield {**os.environ, "DISPLAY": f":{number}"}
+        finally:
+            process.terminate()
+
+
+@pytest.fixture(scope="module")
+def environment() -> Iterator[dict[str, str]]:
+    """What programs find in their environment: a screen for windows and none for sound."""
+    with display() as found:
+        yield {**found, "SDL_AUDIODRIVER": "dummy", "PYTHONUNBUFFERED": "1"}
+
+
+def run_alone(folder: Path, environment: Mapping[str, str]) -> tuple[Runs, Runs]:
+    """Run each program twice by `kiks run`; return what it said each time, with the state at its end."""
+    runs = {f"{name}.{time}": name for name in SIMULATED for time in (1, 2)}
+    plain = [shlex.join([run, CORPUS[name]]) for run, name in runs.items() if name not in WITH_TERMINAL]
+    command = [sys.executable, EACH_ALONE, str(folder), str(AT_ONCE), "--seed", SEED, "--", *plain]
+    subprocess.run(command, env=dict(environment), timeout=280, check=True, stdin=subprocess.DEVNULL)
+    first, second = (
+        {
+            name: tuple((folder / f"{name}.{time}.{kind}").read_text() for kind in ("out", "err"))
+            for name in SIMULATED
+            if name not in WITH_TERMINAL
+        }
+        for time in (1, 2)
+    )
+    for runs in (first, second):
+        for name in WITH_TERMINAL & set(SIMULATED):
+            words = [sys.executable, ON_TERMINAL, *KIKS, "run", "--seed", SEED, CORPUS[name]]
+            done = subprocess.run(words, env=dict(environment), timeout=GUARD_S, check=True, stdout=PIPE, text=True)
+            # On a terminal both go to the same place.
+            lines = done.stdout.splitlines(keepends=True)
+            runs[name] = tuple(
+                "".join(each for each in lines if each.startswith("kiks: ") is ours) for ours in (False, True)
+            )
+    return first, second
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory: pytest.TempPathFactory, environment: dict[str, str]) -> tuple[Runs, Runs]:
+    return run_alone(tmp_path_factory.mktemp("alone"), environment)
+
+
+def printed(run: Runs) -> dict[str, str]:
+    """Return what the programs have printed."""
+    return {name: out for name, (out, _) in run.items()}
+
+
+def test_each_program_does_the_same_again(alone: tuple[Runs, Runs]) -> None:
+    first, second = alone
+    assert first == second
+    for name, (out, errors) in first.items():
+        assert re.search(rf"^kiks: \d+\.\d{{3}} s simulated, seed {SEED}, state [0-9a-f]{{16}}\n\Z", errors, re.M), name
+        assert "Traceback" not in out + errors, name
+
+
+# ---- together, and on the desk ----
+
+
+def run_together(
+    names: Sequence[str], folder: Path, environment: Mapping[str, str], *, on_desk: bool
+) -> tuple[dict[str, str], str]:
+    """Run programs in one world; return what each of them printed, and the line with the state at the end."""
+    folder.mkdir()
+    (folder / "wide.toml").write_text(WIDE)
+    words = [shlex.join([INTO_FILE, str(folder / name), CORPUS[name]]) for name in names]
+    options = ["--arena", str(folder / "wide.toml"), "--seed", SEED, "--when-silent", "wait"]
+    command = [*KIKS, "run", *(["--desk"] if on_desk else []), *options, *words]
+    pipes = {"stdout": PIPE, "stderr": subprocess.STDOUT, "stdin": subprocess.DEVNULL}
+    env = {**environment, "BROWSER": "true"}
+    told = []
+    with subprocess.Popen(command, cwd=folder, env=env, text=True, start_new_session=True, **pipes) as process:
+        assert process.stdout is not None
+        try:
+            for line in process.stdout:
+                told.append(line)
+                if "s simulated" in line and on_desk:
+                    process.send_signal(signal.SIGINT)
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+    text = "".join(told)
+    assert process.returncode == 0, text
+    (end,) = [line for line in told if "s simulated" in line]
+    return {name: (folder / name).read_text() for name in names}, end
+
+
+def test_programs_do_the_same_on_the_desk(
+    alone: tuple[Runs, Runs], tmp_path: Path, environment: dict[str, str]
+) -> None:
+    names = [name for name in SIMULATED if name not in WITH_TERMINAL]
+    groups = [names[start : start + GROUP] for start in range(0, len(names), GROUP)]
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        on_desk = [
+            pool.submit(run_together, group, tmp_path / str(number), environment, on_desk=True)
+            for number, group in enumerate(groups)
+        ]
+        without = pool.submit(run_together, groups[0], tmp_path / "without", environment, on_desk=False)
+    said: dict[str, str] = {}
+    for job in on_desk:
+        said |= job.result()[0]
+    assert said == {name: alone[0][name][0] for name in names}
+    assert on_desk[0].result()[1] == without.result()[1]
+    assert "state" in without.result()[1]
+
+
+# ---- in real time ----
+
+
+@contextmanager
+def served(folder: Path, robots: int) -> Iterator[list[dict[str, str]]]:
+    """Serve robots in real time; yield the names of each one's ports: by kind, `serial port` or `RFC 2217`."""
+    (folder / "wide.toml").write_text(WIDE)
+    options = ["--arena", str(folder / "wide.toml"), "--seed", SEED, "--tcp", "0", "--rfc2217", "0"]
+    command = [*KIKS, "serve", "--robots", str(robots), "--link", str(folder / "ttyUSB"), *options]
+    with subprocess.Popen(
+        command, stdout=PIPE, stderr=subprocess.DEVNULL, env={**os.environ, "PYTHONUNBUFFERED": "1"}, text=True
+    ) as process:
+        assert process.stdout is not None
+        ports: list[dict[str, str]] = []
+        for line in process.stdout:
+            if line.startswith("Robot "):
+                ports.append({})
+            elif line.startswith("  "):
+                kind, name = re.split(r"\s{2,}", line.strip())
+                ports[-1][kind] = name
+            else:
+                break
+        try:
+            yield ports
+        finally:
+            process.send_signal(signal.SIGINT)
+            process.communicate(timeout=GUARD_S)
+
+
+def run_real(name: str, ports: Mapping[str, str], environment: Mapping[str, str]) -> str:
+    """Run a program by Python alone, with pyserial itself; return what it said, errors, too."""
+    device = ports["serial port"]
+    arguments = {
+        # A pseudo terminal has no lines for DTR and RTS.
+        "control_lines": [ports["RFC 2217"]],
+        "try_ports": ["/dev/there-is-none", device],
+        # `comports` lists what the kernel has, and KiKS adds no device to that: this one is told its port.
+        "find_port": [device],
+    }.get(name, [device])
+    command = [sys.executable, CORPUS[name], *arguments]
+    if name in WITH_TERMINAL:
+        command = [sys.executable, ON_TERMINAL, *command]
+    done = subprocess.run(
+        command,
+        env=dict(environment),
+        timeout=GUARD_S,
+        check=False,
+        text=True,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+    )
+    return done.stdout + (f"exit code {done.returncode}: {done.stderr}" if done.returncode else "")
+
+
+def test_programs_do_the_same_in_real_time(
+    alone: tuple[Runs, Runs], tmp_path: Path, environment: dict[str, str]
+) -> None:
+    with served(tmp_path, len(CORPUS)) as ports, ThreadPoolExecutor(IN_REAL_TIME) as pool:
+        jobs = {name: pool.submit(run_real, name, port, environment) for name, port in zip(CORPUS, ports, strict=True)}
+    said = {name: job.result() for name, job in jobs.items()}
+    assert {name: text for name, text in said.items() if name in SIMULATED} == printed(alone[0])
+    for name in WITH_WINDOWS - set(SIMULATED):
+        assert "exit code" not in said[name]
+        assert "True" in said[name] or "12 rounds" in said[name]
