@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import sched
 import time
 from collections.abc import Callable
 from typing import Any
@@ -78,8 +79,17 @@ def replacements(scheduler: Scheduler, clock: VirtualPort) -> dict[str, dict[str
         return scheduler.world.now_ns / NS_PER_S
 
     dates = _dates(calendar_ns)
+    simulated = {name: _here(scheduler, function, getattr(time, name)) for name, function in functions.items()}
+
+    def begin(
+        plan: sched.scheduler, timefunc: Any = simulated["monotonic"], delayfunc: Any = simulated["sleep"]
+    ) -> None:
+        real_begin(plan, timefunc, delayfunc)
+
+    real_begin = sched.scheduler.__init__
     return {
-        "time": {name: _here(scheduler, function, getattr(time, name)) for name, function in functions.items()},
+        "time": simulated,
+        "sched.scheduler": {"__init__": begin},
         "queue": {"time": deadline_time},
         # `relativeCreated` of a log counts from here.
         "logging": {"_startTime": EPOCH_S + scheduler.world.now_ns / NS_PER_S},

@@ -57,9 +57,16 @@ def replaced(
                 put(module, attribute, new_lock())
     for owner, name, value in named:
         put(owner, name, value)
+    before = set(sys.modules)
     try:
         yield
     finally:
+        # What was imported meanwhile has taken what stood in.
+        originals = {id(value): original for original, value in stands_for.values()}
+        for name in sys.modules.keys() - before:
+            for attribute, value in list(vars(sys.modules[name]).items()):
+                if id(value) in originals:
+                    setattr(sys.modules[name], attribute, originals[id(value)])
         for owner, name, value in reversed(undo):
             if value is _MISSING:
                 delattr(owner, name)

@@ -7,7 +7,6 @@ where it is. It never changes what a run does that ends well.
 
 from __future__ import annotations
 
-import logging
 import os
 import signal
 import subprocess
@@ -45,8 +44,6 @@ GRACE_S = 5.0
 
 _MAY_WAIT = ("<", str(Path(__file__).parent.parent), subprocess.__file__)
 """Whose code may wait in real time: imports, KiKS, and what waits for other programs."""
-
-_log = logging.getLogger("kiks.run")
 
 _SIGNAL = signal.SIGRTMAX - 1
 
@@ -133,7 +130,10 @@ class _Watch:
                 return
             if not has_warned:
                 has_warned = True
-                _log.warning("the program has %s. If it computes, that is right; else end it with Ctrl-C.", what)
+                # Not by `logging`, which would make this thread one of those that a program may count.
+                print(
+                    f"kiks: the program has {what}. If it computes, that is right; else press Ctrl-C.", file=sys.stderr
+                )
 
     def _waits_for(self) -> str:
         """Say whether the thread waits for a 'time' or file, or a 'lock', in code that is none of ours."""
