@@ -30,7 +30,7 @@ ON_TERMINAL, EACH_ALONE, INTO_FILE = (
     str(PROGRAMS / f"{name}.py") for name in ("on_terminal", "each_alone", "into_file")
 )
 
-WINDOWS_WAIT_IN_SIMULATED_TIME = False
+WINDOWS_WAIT_IN_SIMULATED_TIME = True
 """Whether `kiks run` lets these wait in simulated time; until then they are run in real time alone."""
 WITH_WINDOWS = {"tk_window", "pygame_drive", "curses_panel"}
 WITH_TERMINAL = {"curses_panel"}

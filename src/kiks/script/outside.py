@@ -43,7 +43,7 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
     real_poll = subprocess.Popen.poll
 
     def start(process: Any) -> None:
-        _refuse(scheduler, "start no process of Python by itself", "it did, by multiprocessing", "Use threads, or ")
+        refuse(scheduler, "start no process of Python by itself", "it did, by multiprocessing", "Use threads, or ")
 
     def wait(popen: subprocess.Popen[Any], timeout: float | None = None) -> int:
         return real_wait(popen, None)
@@ -98,16 +98,16 @@ _hook = _Hook()
 def _judge(scheduler: Scheduler, event: str, arguments: tuple[Any, ...]) -> None:
     if event == "open":
         if isinstance(arguments[0], str) and _DEVICE.match(arguments[0]):
-            _refuse(scheduler, "open a serial port by pyserial", f"it opened {arguments[0]} by itself")
+            refuse(scheduler, "open a serial port by pyserial", f"it opened {arguments[0]} by itself")
     elif event == "import":
         if arguments[0] in _OTHER_LOOPS:
-            _refuse(scheduler, "wait by Python's own event loops", f"it imported {arguments[0]}", "Use asyncio, or ")
+            refuse(scheduler, "wait by Python's own event loops", f"it imported {arguments[0]}", "Use asyncio, or ")
     elif event in _SOCKETS:
-        _refuse(scheduler, "talk to its robots alone", "it used the network")
+        refuse(scheduler, "talk to its robots alone", "it used the network")
     elif event in _FORKS:
-        _refuse(scheduler, "be one process", "it started one more by fork", "Use threads, or ")
+        refuse(scheduler, "be one process", "it started one more by fork", "Use threads, or ")
     elif any(_PYTHON.search(word) for word in _words(arguments)):
-        _refuse(
+        refuse(
             scheduler,
             "start no process of Python by itself",
             "it did",
@@ -127,7 +127,8 @@ def _words(arguments: tuple[Any, ...]) -> list[str]:
     return words
 
 
-def _refuse(scheduler: Scheduler, must: str, given: str, way: str = "") -> None:
+def refuse(scheduler: Scheduler, must: str, given: str, way: str = "") -> None:
+    """End the program with one line: what it must do, what it did, and what to do instead."""
     advice = way + ADVICE
     scheduler.end(
         1,

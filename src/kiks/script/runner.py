@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from kiks.clock.program import Program
 from kiks.errors import KiksError
 from kiks.ports.port import Line, VirtualPort
-from kiks.script import clocks, event_loops, locks, outside, serial_ports
+from kiks.script import clocks, event_loops, libraries, locks, outside, serial_ports
 from kiks.script.files import OpenPorts, RealFiles
 from kiks.script.lines import SharedLine
 from kiks.script.replacing import replaced
@@ -85,7 +85,7 @@ def run_program(
         return VirtualPort(lines[found], policy)
 
     clock = VirtualPort(SharedLine(world, 1, scheduler), policy)
-    ports = OpenPorts(scheduler)
+    host, ports = libraries.Host(scheduler, clock), OpenPorts(scheduler)
     ends, signals = _AtExit(), Signals(scheduler)
 
     def end_at_once(code: int) -> None:
@@ -101,6 +101,7 @@ def run_program(
         signals.replacements(),
         outside.replacements(scheduler),
         ends.replacements(),
+        libraries.keyboard(host),
         {"os": {"_exit": end_at_once}},
         {"threading": {"excepthook": _print_thread_trace, "__excepthook__": _print_thread_trace}},
     )
@@ -120,6 +121,7 @@ def run_program(
             watched(scheduler),
             signals.taken(),
             replaced(replacements, replacements["threading"]["Lock"]),
+            libraries.adapted(host),
             outside.watched(scheduler),
         ):
             return scheduler.run(main)

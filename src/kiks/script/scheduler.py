@@ -33,8 +33,8 @@ TASK_IDENT = 1 << 20
 """What `threading.get_ident` says in the first thread that a program starts."""
 
 
-SIGNALLED, COMPLETE, ALONE = object(), object(), object()
-"""Why a thread goes on: a signal has come, a read is complete, or nobody else can go on before its read is."""
+SIGNALLED, COMPLETE, ALONE, STUCK = object(), object(), object(), object()
+"""Why a thread goes on: a signal has come; a read is complete; nobody else can go on before its read is; nobody can."""
 
 _KEPT: list[Scheduler] = []
 """Those with threads that never end: one that were collected while it waits would run its `finally` then."""
@@ -115,6 +115,7 @@ class Scheduler:
         self._deadlines: list[tuple[int, int, Task]] = []
         self._readers: dict[Task, Sequence[Read]] = {}
         self._watchers: dict[Task, Mapping[int, int]] = {}
+        self._patient: list[Task] = []
         self.lock_count = 0
         self.tasks: dict[int, Task] = {}
         self._main = Task(get_ident(), lambda: None, self._hub)
@@ -240,6 +241,7 @@ class Scheduler:
         reads: Sequence[Read] = (),
         files: Mapping[int, int] | None = None,
         may_go_alone: bool = False,
+        when_stuck: bool = False,
     ) -> object:
         """Let other threads go on until this one is woken, a read is complete, a file is ready, or it is late enough.
 
@@ -250,10 +252,11 @@ class Scheduler:
             files: Events that end it, by descriptor.
             may_go_alone: Whether it ends, too, when no other thread can go on before a read is complete or it is late
                 enough: the thread then waits for that itself, at less cost.
+            when_stuck: Whether it ends when all threads would wait for ever: a person may still do something.
 
         Returns:
-            What `wake` was called with; `COMPLETE` if a read is complete; `ALONE`; None if it is late enough, or a file
-            is ready; `SIGNALLED` if a signal came, and was dealt with, while the main thread waited.
+            What `wake` was called with; `COMPLETE` if a read is complete; `ALONE`; `STUCK`; None if it is late enough,
+            or a file is ready; `SIGNALLED` if a signal came, and was dealt with, while the main thread waited.
         """
         task = self.current
         task.waits_for = what
@@ -266,12 +269,16 @@ class Scheduler:
             self._readers[task] = reads
         if files:
             self._watchers[task] = files
+        if when_stuck:
+            self._patient.append(task)
         try:
             self._go_on(task)
         finally:
             task.waits_for = ""
             self._readers.pop(task, None)
             self._watchers.pop(task, None)
+            if when_stuck:
+                self._patient.remove(task)
         return task.cause
 
     def wake(self, task: Task, cause: object) -> bool:
@@ -366,6 +373,9 @@ class Scheduler:
         for _, _, task in sorted(due, key=lambda entry: entry[:2]):
             self.wake(task, COMPLETE if task in complete else None)
         if not due and now_ns == began_ns and until_ns == NEVER_NS:
+            if self._patient:
+                self.wake(self._patient[0], STUCK)
+                return
             if not self._watchers:
                 self.end_stuck()
             # Only the world outside can go on, and simulated time stands still meanwhile.

@@ -1,0 +1,112 @@
+"""Libraries whose code in C waits by itself: each has an adapter here, put in place when a program imports it."""
+
+from __future__ import annotations
+
+import builtins
+import importlib.util
+import select
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from importlib.abc import MetaPathFinder
+from importlib.machinery import ModuleSpec
+from types import ModuleType
+from typing import Any, NamedTuple
+
+from kiks.ports.port import VirtualPort
+from kiks.script.files import poll_files
+from kiks.script.outside import refuse
+from kiks.script.scheduler import Scheduler
+
+BLINK_S = 0.02
+"""How often a window or a keyboard is looked at while only a person can go on [s of real time]."""
+
+
+class Host(NamedTuple):
+    """What an adapter works with: the program's threads, and a port of its world for the time."""
+
+    scheduler: Scheduler
+    clock: VirtualPort
+
+
+Adapter = Callable[[ModuleType, Host], dict[Any, dict[str, Any]]]
+"""Returns what stands in for names, by the module or class that has them."""
+
+
+def _adapters() -> dict[str, Adapter]:
+    from kiks.script.libraries import curses_keys, pygame_time, tk_loop
+
+    return {
+        "tkinter": tk_loop.adapt,
+        "pygame.time": pygame_time.adapt,
+        "pygame.event": pygame_time.adapt_events,
+        "curses": curses_keys.adapt,
+    }
+
+
+@contextmanager
+def adapted(host: Host) -> Iterator[None]:
+    """Let libraries wait in simulated time, those that are imported meanwhile, too."""
+    adapters = _adapters()
+    undo: list[tuple[Any, str, Any]] = []
+
+    def adapt(name: str, module: ModuleType) -> None:
+        for owner, names in adapters[name](module, host).items():
+            for attribute, value in names.items():
+                undo.append((owner, attribute, vars(owner)[attribute]))
+                setattr(owner, attribute, value)
+
+    for name in adapters:
+        if name in sys.modules:
+            adapt(name, sys.modules[name])
+    finder = _Finder(set(adapters), adapt)
+    sys.meta_path.insert(0, finder)
+    try:
+        yield
+    finally:
+        sys.meta_path.remove(finder)
+        for owner, attribute, value in reversed(undo):
+            setattr(owner, attribute, value)
+
+
+class _Finder(MetaPathFinder):
+    """Finds a library as Python does, and adapts it when it has been imported."""
+
+    def __init__(self, names: set[str], adapt: Callable[[str, ModuleType], None]) -> None:
+        self._names = names
+        self._adapt = adapt
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        if fullname not in self._names:
+            return None
+        self._names.discard(fullname)
+        spec = importlib.util.find_spec(fullname)
+        if spec is not None and spec.loader is not None:
+            execute = spec.loader.exec_module
+
+            def execute_and_adapt(module: ModuleType) -> None:
+                execute(module)
+                self._adapt(fullname, module)
+
+            spec.loader.exec_module = execute_and_adapt  # type: ignore[method-assign]
+        return spec
+
+
+def keyboard(host: Host) -> dict[str, dict[str, Any]]:
+    """Return what stands in for `input`."""
+    real_input = builtins.input
+
+    def read_line(prompt: object = "", /) -> str:
+        if sys.stdin is not None and sys.stdin.isatty() and not poll_files({sys.stdin.fileno(): select.POLLIN}, 0):
+            refuse_keyboard(host.scheduler)
+        return real_input(prompt)
+
+    return {"builtins": {"input": read_line}}
+
+
+def refuse_keyboard(scheduler: Scheduler) -> None:
+    """End the program if it waits for a key while other threads could go on: no simulated time waits for a person."""
+    if not scheduler.is_alone:
+        refuse(scheduler, "not wait for the keyboard while other threads drive a robot", "it did")
