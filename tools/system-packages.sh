@@ -1,6 +1,7 @@
 #!/bin/sh
 # What KiKS needs of the system: Python's venv module, and for the tests a C compiler (a robot is driven from C),
-# Chromium (the desk is used in a real browser) and Octave (the toolbox): system-packages.sh [tests].
+# Chromium (the desk is used in a real browser), Octave (the toolbox) and a screen that nobody sees (programs with
+# windows): system-packages.sh [tests].
 # As root on Debian this installs what is missing; otherwise it names it.
 set -eu
 
@@ -9,6 +10,8 @@ missing=""
 if [ "${1:-}" = tests ]; then
     command -v gcc >/dev/null 2>&1 || missing="$missing gcc libc6-dev"
     command -v chromium >/dev/null 2>&1 || missing="$missing chromium fonts-dejavu-core"
+    command -v Xvfb >/dev/null 2>&1 || missing="$missing xvfb"
+    "$python" -c 'import tkinter' >/dev/null 2>&1 || missing="$missing python3-tk"
     command -v octave-cli >/dev/null 2>&1 || missing="$missing octave"
     # The package lies in a folder that names Octave's programming interface: ask Debian.
     dpkg-query -W octave-instrument-control >/dev/null 2>&1 || missing="$missing octave-instrument-control"

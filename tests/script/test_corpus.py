@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import re
 import shlex
-import shutil
 import signal
 import subprocess
 import sys
@@ -20,6 +19,7 @@ from pathlib import Path
 from subprocess import PIPE
 
 import pytest
+from tests.script.screen import display
 from tests.served import PROGRAMS
 from tests.test_cli import KIKS
 
@@ -30,13 +30,8 @@ ON_TERMINAL, EACH_ALONE, INTO_FILE = (
     str(PROGRAMS / f"{name}.py") for name in ("on_terminal", "each_alone", "into_file")
 )
 
-WINDOWS_WAIT_IN_SIMULATED_TIME = True
-"""Whether `kiks run` lets these wait in simulated time; until then they are run in real time alone."""
-WITH_WINDOWS = {"tk_window", "pygame_drive", "curses_panel"}
 WITH_TERMINAL = {"curses_panel"}
 """The desk gives programs no terminal, so there such a program has nowhere to draw."""
-
-SIMULATED = [name for name in CORPUS if WINDOWS_WAIT_IN_SIMULATED_TIME or name not in WITH_WINDOWS]
 
 AT_ONCE = 2
 """Simulated runs at the same time: one a core."""
@@ -56,23 +51,6 @@ Runs = dict[str, tuple[str, str]]
 """What each program has printed, and its errors with the lines of KiKS."""
 
 
-@contextmanager
-def display() -> Iterator[dict[str, str]]:
-    """Yield an environment with a screen that nobody sees."""
-    if shutil.which("Xvfb") is None:
-        pytest.skip("there is no Xvfb for the program with a window")
-    ours, theirs = os.pipe()
-    command = ["Xvfb", "-displayfd", str(theirs), "-nolisten", "tcp"]
-    with subprocess.Popen(command, pass_fds=[theirs], stderr=subprocess.DEVNULL) as process:
-        os.close(theirs)
-        try:
-            with open(ours) as told:
-                number = told.readline().strip()
-            yield {**os.environ, "DISPLAY": f":{number}"}
-        finally:
-            process.terminate()
-
-
 @pytest.fixture(scope="module")
 def environment() -> Iterator[dict[str, str]]:
     """What programs find in their environment: a screen for windows and none for sound."""
@@ -82,20 +60,20 @@ def environment() -> Iterator[dict[str, str]]:
 
 def run_alone(folder: Path, environment: Mapping[str, str]) -> tuple[Runs, Runs]:
     """Run each program twice by `kiks run`; return what it said each time, with the state at its end."""
-    runs = {f"{name}.{time}": name for name in SIMULATED for time in (1, 2)}
+    runs = {f"{name}.{time}": name for name in CORPUS for time in (1, 2)}
     plain = [shlex.join([run, CORPUS[name]]) for run, name in runs.items() if name not in WITH_TERMINAL]
     command = [sys.executable, EACH_ALONE, str(folder), str(AT_ONCE), "--seed", SEED, "--", *plain]
     subprocess.run(command, env=dict(environment), timeout=280, check=True, stdin=subprocess.DEVNULL)
     first, second = (
         {
             name: tuple((folder / f"{name}.{time}.{kind}").read_text() for kind in ("out", "err"))
-            for name in SIMULATED
+            for name in CORPUS
             if name not in WITH_TERMINAL
         }
         for time in (1, 2)
     )
     for runs in (first, second):
-        for name in WITH_TERMINAL & set(SIMULATED):
+        for name in WITH_TERMINAL:
             words = [sys.executable, ON_TERMINAL, *KIKS, "run", "--seed", SEED, CORPUS[name]]
             done = subprocess.run(words, env=dict(environment), timeout=GUARD_S, check=True, stdout=PIPE, text=True)
             # On a terminal both go to the same place.
@@ -158,7 +136,7 @@ def run_together(
 def test_programs_do_the_same_on_the_desk(
     alone: tuple[Runs, Runs], tmp_path: Path, environment: dict[str, str]
 ) -> None:
-    names = [name for name in SIMULATED if name not in WITH_TERMINAL]
+    names = [name for name in CORPUS if name not in WITH_TERMINAL]
     groups = [names[start : start + GROUP] for start in range(0, len(names), GROUP)]
     with ThreadPoolExecutor(AT_ONCE) as pool:
         on_desk = [
@@ -234,7 +212,7 @@ def test_programs_do_the_same_in_real_time(
     with served(tmp_path, len(CORPUS)) as ports, ThreadPoolExecutor(IN_REAL_TIME) as pool:
         jobs = {name: pool.submit(run_real, name, port, environment) for name, port in zip(CORPUS, ports, strict=True)}
     said = {name: job.result() for name, job in jobs.items()}
-    assert {name: text for name, text in said.items() if name in SIMULATED} == printed(alone[0])
-    for name in WITH_WINDOWS - set(SIMULATED):
+    assert {name: text for name, text in said.items() if name in CORPUS} == printed(alone[0])
+    for name in WITH_WINDOWS - set(CORPUS):
         assert "exit code" not in said[name]
         assert "True" in said[name] or "12 rounds" in said[name]
