@@ -212,7 +212,4 @@ def test_programs_do_the_same_in_real_time(
     with served(tmp_path, len(CORPUS)) as ports, ThreadPoolExecutor(IN_REAL_TIME) as pool:
         jobs = {name: pool.submit(run_real, name, port, environment) for name, port in zip(CORPUS, ports, strict=True)}
     said = {name: job.result() for name, job in jobs.items()}
-    assert {name: text for name, text in said.items() if name in CORPUS} == printed(alone[0])
-    for name in WITH_WINDOWS - set(CORPUS):
-        assert "exit code" not in said[name]
-        assert "True" in said[name] or "12 rounds" in said[name]
+    assert said == printed(alone[0])
