@@ -91,10 +91,54 @@ def test_without_the_token_there_is_no_desk(host: str, tmp_path: Path) -> None:
 
 def test_run_on_a_desk_is_the_run_without(tmp_path: Path) -> None:
     words = ("--seed", "3", DRIVE, "COM1", "5", "3", "5")
-    with started("run", "--desk", *words, folder=tmp_path) as (_, output):
+    with started("run", "--desk", "--no-wait", *words, folder=tmp_path) as (_, output):
         url_of(output)
         shown = state_of(line_with(output, "s simulated"))
     assert shown == state_of(kiks("run", *words).stderr)
+
+
+def show_page(url: str) -> None:
+    """Do what a page does that shows the world: take a frame and say so."""
+    from urllib.parse import urlsplit
+
+    from websockets.sync.client import connect
+
+    cookies = HTTPCookieProcessor()
+    build_opener(cookies).open(url, timeout=GUARD_S).close()
+    parts = urlsplit(url)
+    feed = f"ws://{parts.netloc}{parts.path.rstrip('/')}/feed"
+    cookie = "; ".join(f"{each.name}={each.value}" for each in cookies.cookiejar)
+    with connect(feed, compression=None, additional_headers={"Cookie": cookie}, open_timeout=GUARD_S) as socket:
+        while not isinstance(socket.recv(GUARD_S), bytes):
+            pass
+        socket.send('{"kind": "ack"}')
+
+
+@pytest.mark.parametrize("words", [("run", "--desk"), ("desk", "--port", "0", "--no-browser")])
+def test_programs_begin_when_a_page_shows_the_world(words: tuple[str, ...], tmp_path: Path) -> None:
+    (tmp_path / "tells.py").write_text("open('begun', 'w').close()\nimport time\ntime.sleep(1)\n")
+    with started(*words, "tells.py", folder=tmp_path) as (process, output):
+        url = url_of(output)
+        assert line_with(output, "It begins when a page shows it")
+        assert not (tmp_path / "begun").exists()
+        show_page(url)
+        if words[0] == "run":
+            assert line_with(output, "1.000 s simulated")
+            assert (tmp_path / "begun").exists()
+        process.send_signal(signal.SIGINT)
+        # The last state stays until a person lets the world go on.
+        assert line_with(output, "Stopped after 1.0 s" if words[0] == "run" else "Stopped after")
+        assert process.wait(GUARD_S) == 0
+
+
+@pytest.mark.parametrize("words", [("run", "--desk"), ("demo", "avoid", "--desk")])
+def test_who_waits_for_a_page_ends_with_ctrl_c(words: tuple[str, ...], tmp_path: Path) -> None:
+    words = (*words, DRIVE, "COM1", "5", "3", "5") if words[0] == "run" else words
+    with started(*words, folder=tmp_path) as (process, output):
+        assert line_with(output, "It begins when a page shows it")
+        process.send_signal(signal.SIGINT)
+        assert line_with(output, "Stopped after 0.0 s")
+        assert process.wait(GUARD_S) == 0
 
 
 @pytest.mark.parametrize(
@@ -102,7 +146,7 @@ def test_run_on_a_desk_is_the_run_without(tmp_path: Path) -> None:
     [(("demo", "avoid", "--seconds", "1"), "avoid: "), (("demo", "soccer", "--seconds", "1"), "soccer: left 0")],
 )
 def test_demonstration_on_a_desk(words: tuple[str, ...], said: str, tmp_path: Path) -> None:
-    with started(*words, "--desk", folder=tmp_path) as (process, output):
+    with started(*words, "--desk", "--no-wait", folder=tmp_path) as (process, output):
         url = url_of(output)
         assert line_with(output, said)
         assert line_with(output, "Picture: ")

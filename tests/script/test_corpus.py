@@ -113,7 +113,7 @@ def run_together(
     (folder / "wide.toml").write_text(WIDE)
     words = [shlex.join([INTO_FILE, str(folder / name), CORPUS[name]]) for name in names]
     options = ["--arena", str(folder / "wide.toml"), "--seed", SEED, "--when-silent", "wait"]
-    command = [*KIKS, "run", *(["--desk"] if on_desk else []), *options, *words]
+    command = [*KIKS, "run", *(["--desk", "--no-wait"] if on_desk else []), *options, *words]
     pipes = {"stdout": PIPE, "stderr": subprocess.STDOUT, "stdin": subprocess.DEVNULL}
     env = {**environment, "BROWSER": "true"}
     told = []

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from kiks.cli.desk import WithDesk, open_desk
+from kiks.cli.desk import NoWait, WithDesk, open_desk
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.match import show_match
 from kiks.cli.options import Seed, load_arena
@@ -57,6 +57,7 @@ def demo(
     ] = None,
     right: Annotated[str | None, typer.Option(help="soccer: that of the right side.")] = None,
     desk: WithDesk = False,
+    no_wait: NoWait = False,
 ) -> None:
     """Show robots at work, as fast as this computer can, and leave a picture of it.
 
@@ -84,7 +85,7 @@ def demo(
     check_picture(picture)
     ready_engine()
     if is_soccer:
-        show_match(seconds, seed, picture, left, right, on_desk=desk)
+        show_match(seconds, seed, picture, left, right, on_desk=desk, waits=not no_wait)
         return
     given = None if arena is None else load_arena(arena)
     if behaviour in list(Behaviour):
@@ -100,7 +101,7 @@ def demo(
     if desk:
         from kiks.desk.desk import Desk
 
-        open_desk(Desk(scene.sim), work=work)
+        open_desk(Desk(scene.sim), work=work, waits=not no_wait)
     else:
         work()
 

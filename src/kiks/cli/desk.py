@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from kiks.sim.simulation import Simulation
 
 WithDesk = Annotated[bool, typer.Option("--desk", help="Show it in a browser, at real speed to begin with.")]
+NoWait = Annotated[bool, typer.Option("--no-wait", help="Begin at once, and not when the first page shows the world.")]
 
 
 def desk(
@@ -62,6 +63,7 @@ def desk(
         bool, typer.Option("--run-programs", help="Let browsers on other computers start programs, too.")
     ] = False,
     browser: Annotated[bool, typer.Option(help="Open a browser.")] = True,
+    no_wait: NoWait = False,
 ) -> None:
     """Open the desk: a world in the browser, to watch, to touch and to understand.
 
@@ -102,10 +104,12 @@ def desk(
             owns_world=True,
             may_run_programs=run_programs or host in LOOPBACK,
             commands=commands,
+            is_held=not no_wait,
         ),
         host=host,
         port=port,
         browser=browser,
+        waits=not no_wait,
     )
 
 
@@ -136,7 +140,8 @@ def open_desk(
     host: str = "127.0.0.1",
     port: int | None = None,
     browser: bool = True,
-    work: Callable[[], None] = lambda: None,
+    waits: bool = True,
+    work: Callable[[], None] | None = None,
     goes_on: bool = True,
     programs_ended: Callable[[Simulation], None] = lambda sim: None,
 ) -> None:
@@ -147,6 +152,7 @@ def open_desk(
         host: Address to serve the page at.
         port: TCP port of the page.
         browser: Whether a browser is opened.
+        waits: Whether programs and work begin when the first page shows the world; else at once.
         work: What moves the world at first.
         goes_on: Whether the world goes on by itself after that; else it stands still.
         programs_ended: Called with the world, locked, when its programs have ended.
@@ -160,7 +166,12 @@ def open_desk(
     try:
         if browser:
             shown.browse()
-        work()
+        if waits and (desk.has_beginners or work is not None):
+            typer.echo("It begins when a page shows it; with --no-wait it begins at once.")
+            desk.is_seen.wait()
+        desk.begin()
+        if work is not None:
+            work()
         if goes_on:
             Driver(desk, programs_ended).run()
         threading.Event().wait()

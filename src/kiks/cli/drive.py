@@ -42,6 +42,7 @@ def run_champion(
     csv: Path | None,
     *,
     on_desk: bool,
+    waits: bool,
 ) -> None:
     """Let a champion drive all robots of a simulation, and say how it went.
 
@@ -68,6 +69,6 @@ def run_champion(
     if on_desk:
         from kiks.desk.desk import Desk
 
-        open_desk(Desk(sim), work=work)
+        open_desk(Desk(sim), work=work, waits=waits)
     else:
         work()

@@ -28,7 +28,8 @@ def show_match(
     left: str | None,
     right: str | None,
     *,
-    on_desk: bool = False,
+    on_desk: bool,
+    waits: bool,
 ) -> None:
     """Let two programs play, say when goals fall, and leave a picture.
 
@@ -39,6 +40,7 @@ def show_match(
         left: The program of the left side with its arguments; KiKS's own player if left out.
         right: That of the right side.
         on_desk: Whether it is shown in a browser.
+        waits: Whether it begins when the first page shows it.
 
     Raises:
         ParameterError: If one of them is no program, or a value is out of range.
@@ -55,7 +57,7 @@ def show_match(
     if on_desk:
         from kiks.desk.desk import Desk
 
-        open_desk(Desk(match), work=partial(_play, match, players, picture), goes_on=False)
+        open_desk(Desk(match), work=partial(_play, match, players, picture), waits=waits, goes_on=False)
     else:
         _play(match, players, picture)
 

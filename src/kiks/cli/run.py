@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-from kiks.cli.desk import WithDesk, open_desk
+from kiks.cli.desk import NoWait, WithDesk, open_desk
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.log import show_log
 from kiks.cli.options import (
@@ -99,6 +99,7 @@ def run(
     picture: Picture = None,
     csv: Table = None,
     desk: WithDesk = False,
+    no_wait: NoWait = False,
 ) -> None:
     """Run a program for a real robot on a simulated one, unchanged; its waits and sleeps cost no time.
 
@@ -119,7 +120,9 @@ def run(
             raise ParameterError(
                 f"a champion must drive all robots alone, but {shown(arguments[0])} stands behind it. Leave it out."
             )
-        run_champion(program, arena, robots or 1, turret, seed or 0, seconds, picture, csv, on_desk=desk)
+        run_champion(
+            program, arena, robots or 1, turret, seed or 0, seconds, picture, csv, on_desk=desk, waits=not no_wait
+        )
         return
     kinds = robot or []
     from kiks.ports.process import Labels, commands_of
@@ -167,7 +170,9 @@ def run(
         with recorded(sim, picture, csv):
             # What the command line changed of its robots the desk finds out.
             told = None if kinds or turret else project
-            _run_on_desk(sim, commands, host, thinking, project=told, speed=project.speed, folder=home)
+            _run_on_desk(
+                sim, commands, host, thinking, waits=not no_wait, project=told, speed=project.speed, folder=home
+            )
         return
     end_as_with_ctrl_c()
     code, doubt = 1, ""
@@ -193,7 +198,13 @@ def _tell(sim: Simulation, thinking: str, doubt: str) -> None:
 
 
 def _run_on_desk(
-    sim: Simulation, commands: Sequence[Command | None], host: Callable[..., Programs], thinking: str, **options: Any
+    sim: Simulation,
+    commands: Sequence[Command | None],
+    host: Callable[..., Programs],
+    thinking: str,
+    *,
+    waits: bool,
+    **options: Any,
 ) -> None:
     """Run programs in processes of their own in a world that browsers see, until Ctrl-C; `Desk` has the options."""
     from kiks.desk.desk import Desk
@@ -201,8 +212,14 @@ def _run_on_desk(
     def host_at(sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
         return host(sim, commands, new_patience=gate.patience)
 
-    desk = Desk(sim, commands=commands, new_programs=host_at, **options)
-    open_desk(desk, programs_ended=lambda sim: _tell(sim, thinking, desk.programs.doubt))
+    desk = Desk(sim, commands=commands, new_programs=host_at, is_held=waits, **options)
+
+    def end(sim: Simulation) -> None:
+        # The page keeps the last state, until a person lets the world go on.
+        desk.gate.pause(sim.now_ns)
+        _tell(sim, thinking, desk.programs.doubt)
+
+    open_desk(desk, waits=waits, programs_ended=end)
 
 
 def _run_one(sim: Simulation, command: Command, told: dict[str, int], record: Path | None) -> int:

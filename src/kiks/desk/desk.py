@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import threading
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -51,6 +52,7 @@ class Desk:
         may_run_programs: Whether others than `commands` may be started, from a browser or by a project.
         commands: Programs that begin with the world, the first for robot 1 and so on; they may always be started.
         new_programs: Makes the host of a world's programs, for who wants other settings than the project's.
+        is_held: Whether programs begin with `begin` only; else at once.
 
     Attributes:
         sim: The world.
@@ -59,6 +61,7 @@ class Desk:
         hands: What is held in it.
         editing: What people draw in it.
         programs: The programs in it.
+        is_seen: Set when a page has shown it for the first time.
         meter: How fast its time passes.
         scene: Number of what there is to be seen; another one whenever something has come, gone or changed its looks.
         news: What people are told, the newest last.
@@ -75,12 +78,15 @@ class Desk:
         may_run_programs: bool = False,
         commands: Sequence[Command | None] = (),
         new_programs: NewPrograms | None = None,
+        is_held: bool = False,
     ) -> None:
         self.folder = (Path.cwd() if folder is None else folder).resolve()
         self.owns_world = owns_world
         self.may_run_programs = may_run_programs
         self.scene = 0
         self.news: Tail[str] = Tail(NEWS_LIMIT)
+        self.is_seen = threading.Event()
+        self._has_begun = not is_held
         self._commands = self._granted = list(commands)
         self._new_programs = new_programs or self._usual_programs
         self._retired: list[Programs] = []
@@ -91,7 +97,7 @@ class Desk:
     def _take(self, sim: Simulation, speed: float | None) -> None:
         gate = Gate(sim.lock, speed=speed)
         # First, because it may fail: then the world that was there stays.
-        programs = self._new_programs(sim, self._commands, gate)
+        programs = self._new_programs(sim, self._commands if self._has_begun else (), gate)
         programs.permission = self._permission()
         self.sim, self.gate, self.programs = sim, gate, programs
         self.hands = Hands(sim)
@@ -99,6 +105,26 @@ class Desk:
         self._mark = sim.checkpoint()
         sim.gate = gate
         self.tell()
+
+    @property
+    def has_beginners(self) -> bool:
+        """Say whether there are programs that begin with the world."""
+        return any(command is not None for command in self._commands)
+
+    def begin(self) -> None:
+        """Let the programs begin that begin with the world, and with each one that replaces it.
+
+        Raises:
+            KiksError: If one of them cannot start.
+        """
+        if self._has_begun:
+            return
+        self._has_begun = True
+        if self.has_beginners:
+            programs = self._new_programs(self.sim, self._commands, self.gate)
+            programs.permission = self._permission()
+            self._retired.append(self.programs)
+            self.programs = programs
 
     def _usual_programs(self, sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
         return Programs(

@@ -216,6 +216,7 @@ class Gateway:
             count = message.get("count")
             shown_count = count if isinstance(count, int) and 1 <= count <= IN_FLIGHT else 1
             viewer.in_flight = max(viewer.in_flight - shown_count, 0)
+            self._desk.is_seen.set()
             return
         desk, name = self._desk, viewer.name
         if kind == "grab":
