@@ -35,8 +35,9 @@ LAYERS = [
     "cli",
 ]
 
-# `sim.port(1)` hands out the port in memory, `sim.show()` the desk: calls upwards, made when they are asked for.
-ALLOWED = {("sim", "ports"), ("sim", "desk")}
+# `sim.port(1)` hands out the port in memory, `sim.show()` the desk, and a notebook shows arenas and simulations as
+# pictures: calls upwards, made when they are asked for.
+ALLOWED = {("sim", "ports"), ("sim", "desk"), ("sim", "drawing"), ("model", "drawing")}
 
 # What of the standard library only some layers may touch.
 CLOCKS = {"time", "datetime"}

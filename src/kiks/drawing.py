@@ -19,6 +19,7 @@ from kiks.errors import ParameterError
 from kiks.model.arena import PAD, Arena
 from kiks.model.files import check_writable, replace_file
 from kiks.sim.simulation import Simulation
+from kiks.sim.things import Things
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -78,8 +79,12 @@ def draw_simulation(sim: Simulation, trace: Trace | None = None) -> Image:
         >>> draw_simulation(sim).size
         (600, 400)
     """
-    radii_mm = [spec.body.radius_mm for spec in sim.specs]
-    return draw_world(sim.arena, sim.lamps, sim.bodies(), sim.poses(), radii_mm, trace)
+    return _draw_things(sim, trace)
+
+
+def _draw_things(world: Things, trace: Trace | None = None) -> Image:
+    radii_mm = [spec.body.radius_mm for spec in world.specs]
+    return draw_world(world.arena, world.lamps, world.bodies(), world.poses(), radii_mm, trace)
 
 
 def draw_world(
@@ -109,6 +114,23 @@ def draw_world(
     _draw(sheet, lamps, bodies, poses, radii_mm, trace)
     width, height = sheet.image.size
     return sheet.image.resize((width // _FINER, height // _FINER), Image.Resampling.LANCZOS)
+
+
+def png_of_world(world: Things) -> bytes:
+    """Return a picture of a world as it stands, as a notebook shows it."""
+    return _png(_draw_things(world))
+
+
+def png_of_arena(arena: Arena) -> bytes:
+    """Return a picture of an arena with what it holds, as a notebook shows it."""
+    sim = Simulation(arena)  # it knows where lamps, balls and cylinders are; its robot is left out
+    return _png(draw_world(arena, sim.lamps, sim.bodies(), sim.poses()[:0], []))
+
+
+def _png(image: Image) -> bytes:
+    data = BytesIO()
+    image.save(data, "PNG")
+    return data.getvalue()
 
 
 def save_simulation(sim: Simulation, path: str | Path, trace: Trace | None = None) -> None:

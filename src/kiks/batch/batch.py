@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import functools
+import html
 import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import islice, product
 from typing import Any
 
 import numpy as np
@@ -38,6 +40,9 @@ BLOCKS_PER_THREAD = 4
 EVER = 2**62
 """More half loops, and later [ns], than anything."""
 
+ROWS_SHOWN = 10
+"""Rows of a table in a notebook."""
+
 STEP_BLOCK = 64
 """Fewest worlds that a thread is woken for when all of them do a single step, which takes some microseconds each."""
 
@@ -49,10 +54,32 @@ class Rollouts:
     Attributes:
         values: What the measures say, float64 [world, robot, measure].
         step_counts: Control steps done, int64 [world].
+        measures: What the measures are called.
     """
 
     values: NDArray[np.float64]
     step_counts: NDArray[np.int64]
+    measures: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        worlds, robots, _ = self.values.shape
+        return f"<KiKS rollouts: {worlds} worlds, {robots} robots each, measures: {', '.join(self.measures) or 'none'}>"
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: a row for each robot, the first ones and how many there are."""
+        worlds, robots, count = self.values.shape
+        heads = ["world", "robot", "steps", *(self.measures or [f"measure {k}" for k in range(count)])]
+        rows = [
+            [str(world), str(robot + 1), str(self.step_counts[world]), *(f"{x:.6g}" for x in self.values[world, robot])]
+            for world, robot in islice(product(range(worlds), range(robots)), ROWS_SHOWN)
+        ]
+        table = "".join(
+            f"<tr>{''.join(f'<{tag}>{html.escape(cell)}</{tag}>' for cell in cells)}</tr>"
+            for tag, cells in [("th", heads), *(("td", row) for row in rows)]
+        )
+        left = worlds * robots - len(rows)
+        more = f"<p>and {left} more of {worlds} worlds with {robots} robots each</p>" if left else ""
+        return f"<table>{table}</table>{more}"
 
 
 class Batch:
@@ -188,7 +215,8 @@ class Batch:
         decider = decider_of(controller)
         address = address_of(decider, DECIDER)
         self._on_all_cores(worlds, controller.senses, (0, EVER), until_ns, address, watching.watchers)
-        return Rollouts(watching.values(worlds.notes), worlds.steps.copy())
+        names = tuple(each.name for each in watching.measures)
+        return Rollouts(watching.values(worlds.notes), worlds.steps.copy(), names)
 
     # ---- step by step ----
 

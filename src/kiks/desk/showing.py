@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import html
 import logging
+import sys
 import threading
 import webbrowser
+from typing import Any
 
 from kiks.desk.desk import Desk, NewsHandler
 from kiks.desk.driver import Driver
@@ -52,6 +54,7 @@ class Shown:
         self.url = SERVER.url(self._served.number)
         self._driver: Driver | None = None
         self._thread: threading.Thread | None = None
+        self._cell: int | None = None
         self._news = NewsHandler(desk)
         logging.getLogger("kiks").addHandler(self._news)
 
@@ -78,11 +81,48 @@ class Shown:
             self._thread.join(STOP_S)
         SERVER.close(self._served)
 
+    def present(self, *, browser: bool) -> None:
+        """Show it below the cell of a notebook; elsewhere say where it is, and open it in a browser.
+
+        Args:
+            browser: Whether a browser is opened.
+        """
+        shell = _shell()
+        self._cell = None if shell is None else shell.execution_count
+        if _is_notebook(shell):
+            self._display(shell)
+            return
+        print(f"The desk: {self.url}")
+        if browser:
+            self.browse()
+
     def __repr__(self) -> str:
         return f"<KiKS desk at {self.url}>"
 
-    def _repr_html_(self) -> str:
-        return f'<iframe src="{html.escape(self.url)}" style="width: 100%; height: 640px; border: 0"></iframe>'
+    def _ipython_display_(self) -> None:
+        """Show it once more, but not in the cell that has shown it."""
+        shell = _shell()
+        if shell is not None and shell.execution_count == self._cell:
+            return
+        if _is_notebook(shell):
+            self._display(shell)
+        else:
+            print(repr(self))
+
+    def _display(self, shell: Any) -> None:
+        frame = f'<iframe src="{html.escape(self.url)}" style="width: 100%; height: 640px; border: 0"></iframe>'
+        shell.display_pub.publish({"text/html": frame, "text/plain": repr(self)})
+
+
+def _shell() -> Any:
+    """Return the IPython in which this runs; None elsewhere."""
+    ipython = sys.modules.get("IPython")
+    return None if ipython is None else ipython.get_ipython()
+
+
+def _is_notebook(shell: Any) -> bool:
+    """Say whether cells can show a page: in a kernel, not in a terminal."""
+    return getattr(shell, "kernel", None) is not None
 
 
 def show(
@@ -102,6 +142,5 @@ def show(
     shown = Shown(Desk(sim, speed=speed, may_run_programs=is_alive), port=port)
     if is_alive:
         shown.drive()
-    if browser:
-        shown.browse()
+    shown.present(browser=browser)
     return shown

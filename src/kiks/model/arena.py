@@ -308,6 +308,12 @@ class Arena:
         assert self._faces is not None
         return self._faces
 
+    def _repr_png_(self) -> bytes:
+        """Return what a notebook shows: the arena from above, with what it holds."""
+        from kiks.drawing import png_of_arena
+
+        return png_of_arena(self)
+
     def clearance_at_mm(self, x_mm: float, y_mm: float) -> float:
         """Return how far a point is from the surface of the nearest wall [mm].
 

@@ -57,6 +57,15 @@ class Things(World):
             except ParameterError as error:
                 raise ArenaError(f"Arena {shown(arena.name)}: {error}") from None
 
+    def __repr__(self) -> str:
+        return f"<KiKS simulation: {len(self.specs)} robots, {self.time_s:.3f} s, seed {self.seed}>"
+
+    def _repr_png_(self) -> bytes:
+        """Return what a notebook shows: the world from above."""
+        from kiks.drawing import png_of_world
+
+        return png_of_world(self)
+
     @property
     def lamps(self) -> NDArray[np.float64]:
         """The lamps: x_mm, y_mm, power_w, and 1 for on or 0 for off: float64 [lamp, 4].
