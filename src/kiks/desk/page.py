@@ -25,6 +25,16 @@ words of these colours are lighter: see `STYLE`."""
 
 HINT = "Drag a robot to move it, its rim to turn it. Click it to look inside."
 
+MEMORY = """<script>
+try {
+  sessionStorage.length;
+} catch {
+  Object.defineProperty(window, "sessionStorage", { value: {} });
+}
+</script>"""
+"""Stands in for what NiceGUI remembers a tab by: within a notebook's page of another name, such as localhost for
+127.0.0.1, Chromium refuses even to look at it, and all buttons would be dead."""
+
 NEWS_S = 0.5
 """How often people are told what is new [s]."""
 
@@ -42,6 +52,7 @@ class Page:
         self._told = desk.news.count
         feed = f"/desk/{number}/feed"
         ui.colors(primary=PRIMARY, accent=ACCENT, positive=POSITIVE)
+        ui.add_head_html(MEMORY)
         ui.add_css(STYLE)
         with ui.header(elevated=True).classes("items-center q-py-none q-px-md no-wrap gap-2").style("height: 58px"):
             ui.label("KiKS").classes("text-h6 gt-sm")
