@@ -182,7 +182,7 @@ def test_stopped_program_leaves_a_robot_that_stands_and_is_free(
 
 def test_what_a_program_has_started_ends_with_it(tmp_path: Path) -> None:
     text = (
-        "import subprocess, sys, time\nchild = subprocess.Popen([sys.executable, '-c', 'input()'], stdin=-1)\n"
+        "import subprocess, time\nchild = subprocess.Popen(['cat'], stdin=-1)\n"
         "print(child.pid)\ntime.sleep(1)\nopen('/dev/stdin').read()\n"
         "while True: pass\n"
     )

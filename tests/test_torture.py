@@ -103,7 +103,7 @@ def test_files_are_whole(scene: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.timeout(470)  # a campaign of many cases, in processes of its own
-@pytest.mark.parametrize("scene", ["evolution", "server", "desk"])
+@pytest.mark.parametrize("scene", ["server", "desk"])
 def test_who_is_killed_takes_nothing_along(scene: str) -> None:
     check("--only", f"faults.kill_{scene}", "--cases", "1", "--seed", "14")
 

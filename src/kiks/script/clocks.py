@@ -92,7 +92,7 @@ def replacements(scheduler: Scheduler, clock: VirtualPort) -> dict[str, dict[str
         "sched.scheduler": {"__init__": begin},
         "queue": {"time": deadline_time},
         # `relativeCreated` of a log counts from here.
-        "logging": {"_startTime": EPOCH_S + scheduler.world.now_ns / NS_PER_S},
+        "logging": {"_startTime": float(EPOCH_S)},
         "threading": {"_time": deadline_time},
         "asyncio.base_events.BaseEventLoop": {"time": deadline_time},
         "datetime": dates,
