@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import _thread
+import concurrent.futures.thread
 import itertools
 import queue
 import threading
@@ -211,7 +212,7 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
         },
         "threading.Event": {"is_set": is_set},
         # What executors are at work: those of this process are none of the program's.
-        "concurrent.futures.thread": {"_shutdown": False, "_threads_queues": weakref.WeakKeyDictionary()},
+        concurrent.futures.thread.__name__: {"_shutdown": False, "_threads_queues": weakref.WeakKeyDictionary()},
         "queue": {"SimpleQueue": queue._PySimpleQueue},  # type: ignore[attr-defined]
         "_queue": {"SimpleQueue": queue._PySimpleQueue},  # type: ignore[attr-defined]
     }

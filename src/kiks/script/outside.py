@@ -33,7 +33,8 @@ _FORKS = frozenset({"os.fork", "os.forkpty"})
 _STARTS = frozenset({"subprocess.Popen", "os.system", "os.posix_spawn", "os.exec", "os.spawn"})
 _OTHER_LOOPS = frozenset({"uvloop", "gevent", "eventlet"})
 _DEVICE = re.compile(r"/dev/(tty(?!$)|cu\.|serial/|rfcomm)")
-_PYTHON = re.compile(r"(^|[\s/])(python|pypy)[\d.]*(\s|$)|\.py(\s|$)")
+# A command of Python, at the beginning of a line of a shell or of one of its parts.
+_PYTHON = re.compile(r"(^|[;&|(]|/sh -c )\s*((env|nohup|sudo|exec)\s+)*(\S*/)?((python|pypy)[\d.]*|\S+\.py)(\s|$)")
 
 _watching: list[Scheduler] = []
 
@@ -106,7 +107,7 @@ def _judge(scheduler: Scheduler, event: str, arguments: tuple[Any, ...]) -> None
         refuse(scheduler, "talk to its robots alone", "it used the network")
     elif event in _FORKS:
         refuse(scheduler, "be one process", "it started one more by fork", "Use threads, or ")
-    elif any(_PYTHON.search(word) for word in _words(arguments)):
+    elif _PYTHON.search(_command(arguments)):
         refuse(
             scheduler,
             "start no process of Python by itself",
@@ -115,16 +116,11 @@ def _judge(scheduler: Scheduler, event: str, arguments: tuple[Any, ...]) -> None
         )
 
 
-def _words(arguments: tuple[Any, ...]) -> list[str]:
-    """Return the words of a command, as far as they are texts."""
-    words: list[str] = []
-    for argument in arguments:
-        for word in argument if isinstance(argument, list | tuple) else [argument]:
-            if isinstance(word, bytes | os.PathLike):
-                word = os.fsdecode(word)
-            if isinstance(word, str):
-                words.append(word)
-    return words
+def _command(arguments: tuple[Any, ...]) -> str:
+    """Return the command that a process is started with: `os.system` has it alone, all others behind the file."""
+    command = arguments[min(1, len(arguments) - 1)]
+    words = command if isinstance(command, list | tuple) else [command]
+    return " ".join(os.fsdecode(word) for word in words if isinstance(word, str | bytes | os.PathLike))
 
 
 def refuse(scheduler: Scheduler, must: str, given: str, way: str = "") -> None:
