@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.engine.state import BALL
+from kiks.engine.state import BALL, BODY, CYLINDER
 from kiks.errors import ParameterError
-from kiks.model.arena import PAD, Arena
+from kiks.model.arena import PAD, Arena, Ball
 from kiks.model.files import check_writable, replace_file
+from kiks.model.robot import RobotSpec
 from kiks.sim.simulation import Simulation
-from kiks.sim.things import Things
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -79,12 +79,8 @@ def draw_simulation(sim: Simulation, trace: Trace | None = None) -> Image:
         >>> draw_simulation(sim).size
         (600, 400)
     """
-    return _draw_things(sim, trace)
-
-
-def _draw_things(world: Things, trace: Trace | None = None) -> Image:
-    radii_mm = [spec.body.radius_mm for spec in world.specs]
-    return draw_world(world.arena, world.lamps, world.bodies(), world.poses(), radii_mm, trace)
+    radii_mm = [spec.body.radius_mm for spec in sim.specs]
+    return draw_world(sim.arena, sim.lamps, sim.bodies(), sim.poses(), radii_mm, trace)
 
 
 def draw_world(
@@ -116,21 +112,21 @@ def draw_world(
     return sheet.image.resize((width // _FINER, height // _FINER), Image.Resampling.LANCZOS)
 
 
-def png_of_world(world: Things) -> bytes:
-    """Return a picture of a world as it stands, as a notebook shows it."""
-    return _png(_draw_things(world))
+def draw_arena(arena: Arena) -> Image:
+    """Return a picture of an arena and what it says of lamps, balls and cylinders, with a Khepera at each start."""
+    bodies = np.zeros(len(arena.bodies), BODY)
+    for record, body in zip(bodies, arena.bodies, strict=True):
+        record["x_mm"], record["y_mm"], record["radius_mm"] = body.x_mm, body.y_mm, body.radius_mm
+        record["brightness"], record["what"] = body.brightness, BALL if isinstance(body, Ball) else CYLINDER
+    lamps, starts = np.array(arena.lamps, np.float64).reshape(-1, 4), np.array(arena.starts, np.float64).reshape(-1, 3)
+    return draw_world(arena, lamps, bodies, starts, [RobotSpec.load("khepera").body.radius_mm] * len(starts))
 
 
-def png_of_arena(arena: Arena) -> bytes:
-    """Return a picture of an arena with what it holds, as a notebook shows it."""
-    sim = Simulation(arena)  # it knows where lamps, balls and cylinders are; its robot is left out
-    return _png(draw_world(arena, sim.lamps, sim.bodies(), sim.poses()[:0], []))
-
-
-def _png(image: Image) -> bytes:
-    data = BytesIO()
-    image.save(data, "PNG")
-    return data.getvalue()
+def png_for_notebook(image: Image) -> tuple[bytes, dict[str, int]]:
+    """Return a picture as a PNG, and at which size a notebook shows it: half, so it is sharp on any screen."""
+    pixels = BytesIO()
+    image.save(pixels, "PNG")
+    return pixels.getvalue(), {"width": image.width // 2, "height": image.height // 2}
 
 
 def save_simulation(sim: Simulation, path: str | Path, trace: Trace | None = None) -> None:
@@ -414,4 +410,4 @@ def _svg(image: Image, elements: Sequence[str], *, finer: int = 1) -> str:
     return "\n".join(lines) + "\n"
 
 
-__all__ = ["Trace", "check_picture", "draw_simulation", "draw_world", "save_picture", "save_simulation"]
+__all__ = ["Trace", "check_picture", "draw_arena", "draw_simulation", "draw_world", "save_picture", "save_simulation"]

@@ -72,3 +72,13 @@ def shown(value: object) -> str:
         text = f"a {type(value).__name__} that cannot be shown"
     text = " ".join(text.split())
     return text if len(text) <= SHOWN_MAX else f"{text[: SHOWN_MAX - 4]}...{text[-1]}"
+
+
+def counted(count: int, noun: str) -> str:
+    """Return how many there are of something.
+
+    Example:
+        >>> counted(1, "robot"), counted(3, "robot")
+        ('1 robot', '3 robots')
+    """
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"

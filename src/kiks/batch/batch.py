@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import functools
-import html
 import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from itertools import islice, product
 from typing import Any
 
 import numpy as np
@@ -18,6 +15,7 @@ from kiks.batch.beginning import Beginning
 from kiks.batch.bunches import bunch_size
 from kiks.batch.callbacks import DECIDER, decider_of
 from kiks.batch.loop import roll_out
+from kiks.batch.rollouts import Rollouts
 from kiks.batch.timing import Timing
 from kiks.batch.watching import Watching
 from kiks.batch.worlds import Alone, Together, Worlds
@@ -28,7 +26,7 @@ from kiks.engine.rays import sight_of
 from kiks.engine.scene import enter_worlds, make_scene
 from kiks.engine.state import State
 from kiks.engine.vectors import LANES
-from kiks.errors import ParameterError, shown
+from kiks.errors import ParameterError, counted, shown
 from kiks.model.arena import PAD, Arena
 from kiks.model.ranges import SECONDS_MAX, array_of, check_count, check_number, check_numbers
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
@@ -40,46 +38,8 @@ BLOCKS_PER_THREAD = 4
 EVER = 2**62
 """More half loops, and later [ns], than anything."""
 
-ROWS_SHOWN = 10
-"""Rows of a table in a notebook."""
-
 STEP_BLOCK = 64
 """Fewest worlds that a thread is woken for when all of them do a single step, which takes some microseconds each."""
-
-
-@dataclass(frozen=True)
-class Rollouts:
-    """What came of letting controllers drive.
-
-    Attributes:
-        values: What the measures say, float64 [world, robot, measure].
-        step_counts: Control steps done, int64 [world].
-        measures: What the measures are called.
-    """
-
-    values: NDArray[np.float64]
-    step_counts: NDArray[np.int64]
-    measures: tuple[str, ...] = ()
-
-    def __repr__(self) -> str:
-        worlds, robots, _ = self.values.shape
-        return f"<KiKS rollouts: {worlds} worlds, {robots} robots each, measures: {', '.join(self.measures) or 'none'}>"
-
-    def _repr_html_(self) -> str:
-        """Return what a notebook shows: a row for each robot, the first ones and how many there are."""
-        worlds, robots, count = self.values.shape
-        heads = ["world", "robot", "steps", *(self.measures or [f"measure {k}" for k in range(count)])]
-        rows = [
-            [str(world), str(robot + 1), str(self.step_counts[world]), *(f"{x:.6g}" for x in self.values[world, robot])]
-            for world, robot in islice(product(range(worlds), range(robots)), ROWS_SHOWN)
-        ]
-        table = "".join(
-            f"<tr>{''.join(f'<{tag}>{html.escape(cell)}</{tag}>' for cell in cells)}</tr>"
-            for tag, cells in [("th", heads), *(("td", row) for row in rows)]
-        )
-        left = worlds * robots - len(rows)
-        more = f"<p>and {left} more of {worlds} worlds with {robots} robots each</p>" if left else ""
-        return f"<table>{table}</table>{more}"
 
 
 class Batch:
@@ -163,6 +123,10 @@ class Batch:
         self.notes = np.zeros((self.world_count, self.robot_count, self._watching.note_count))
         self._is_sensed = False
         self._begin_again(np.arange(self.world_count))
+
+    def __repr__(self) -> str:
+        robots = counted(self.robot_count, "robot")
+        return f"<Batch: {counted(self.world_count, 'world')} of {robots} in {counted(len(self.arenas), 'arena')}>"
 
     # ---- all at once ----
 
@@ -338,8 +302,8 @@ class Batch:
     def _begin_again(self, chosen: NDArray[np.int64]) -> None:
         """Put worlds back to their beginning."""
         self._beginning.put_back(self.state, chosen, self._starts[chosen])
-        for counted in (self._ticks, self._begins_ns, self._watched_ns, self._sensed_ns, self._steps):
-            counted[chosen] = 0
+        for count in (self._ticks, self._begins_ns, self._watched_ns, self._sensed_ns, self._steps):
+            count[chosen] = 0
         self.notes[chosen] = 0.0
         enter_worlds(self._scene, chosen)
 

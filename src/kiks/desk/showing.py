@@ -26,7 +26,7 @@ STOP_S = 10.0
 class Shown:
     """A desk that browsers can see.
 
-    In a notebook it is shown below the cell.
+    In a notebook, who names it in a cell sees it below.
 
     Args:
         desk: The desk.
@@ -71,6 +71,22 @@ class Shown:
             # Other users see with which address a browser is started: not with the token.
             webbrowser.open(SERVER.url_for_once(self._served.number))
 
+    def present(self, *, browser: bool) -> None:
+        """Show it to who calls: below the cell of a notebook; elsewhere its address is printed, and a browser opened.
+
+        Args:
+            browser: False for its address alone.
+        """
+        ipython = _ipython()
+        if browser and hasattr(ipython, "kernel"):
+            self._ipython_display_()
+            return
+        if ipython is not None:
+            self._cell = ipython.execution_count
+        print(f"The desk: {self.url}")
+        if browser:
+            self.browse()
+
     def close(self) -> None:
         """Show it no longer; the world goes its way."""
         logging.getLogger("kiks").removeHandler(self._news)
@@ -81,48 +97,18 @@ class Shown:
             self._thread.join(STOP_S)
         SERVER.close(self._served)
 
-    def present(self, *, browser: bool) -> None:
-        """Show it below the cell of a notebook; elsewhere say where it is, and open it in a browser.
-
-        Args:
-            browser: Whether a browser is opened.
-        """
-        shell = _shell()
-        self._cell = None if shell is None else shell.execution_count
-        if _is_notebook(shell):
-            self._display(shell)
-            return
-        print(f"The desk: {self.url}")
-        if browser:
-            self.browse()
-
     def __repr__(self) -> str:
         return f"<KiKS desk at {self.url}>"
 
     def _ipython_display_(self) -> None:
-        """Show it once more, but not in the cell that has shown it."""
-        shell = _shell()
-        if shell is not None and shell.execution_count == self._cell:
-            return
-        if _is_notebook(shell):
-            self._display(shell)
-        else:
-            print(repr(self))
+        """Show it below the cell of a notebook, its address in a terminal; once a cell, which may name it again."""
+        ipython = _ipython()
+        if ipython.execution_count != self._cell:
+            self._cell = ipython.execution_count
+            ipython.display_pub.publish({"text/plain": repr(self), "text/html": self._repr_html_()})
 
-    def _display(self, shell: Any) -> None:
-        frame = f'<iframe src="{html.escape(self.url)}" style="width: 100%; height: 640px; border: 0"></iframe>'
-        shell.display_pub.publish({"text/html": frame, "text/plain": repr(self)})
-
-
-def _shell() -> Any:
-    """Return the IPython in which this runs; None elsewhere."""
-    ipython = sys.modules.get("IPython")
-    return None if ipython is None else ipython.get_ipython()
-
-
-def _is_notebook(shell: Any) -> bool:
-    """Say whether cells can show a page: in a kernel, not in a terminal."""
-    return getattr(shell, "kernel", None) is not None
+    def _repr_html_(self) -> str:
+        return f'<iframe src="{html.escape(self.url)}" style="width: 100%; height: 640px; border: 0"></iframe>'
 
 
 def show(
@@ -144,3 +130,9 @@ def show(
         shown.drive()
     shown.present(browser=browser)
     return shown
+
+
+def _ipython() -> Any:
+    """Return the IPython that this program runs in, which has a `kernel` in a notebook; None in plain Python."""
+    there = sys.modules.get("IPython")
+    return None if there is None else there.get_ipython()

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import InstanceOf
 
-from kiks.errors import ArenaError, ParameterError, shown
+from kiks.errors import ArenaError, ParameterError, counted, shown
 from kiks.model.box import Box
 from kiks.model.data_file import Rule
 from kiks.model.files import path_of
@@ -43,7 +43,7 @@ _KINDS = (
 )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Arena:
     """A checked arena that never changes; `dataclasses.replace` makes a changed copy.
 
@@ -70,17 +70,17 @@ class Arena:
         False
     """
 
-    brightness: npt.NDArray[np.uint8] = field(repr=False)
+    brightness: npt.NDArray[np.uint8]
     mm_per_cell: float
     name: str
     starts: tuple[Pose, ...] = ()
     lamps: tuple[Lamp, ...] = ()
     balls: tuple[Ball, ...] = ()
     cylinders: tuple[Cylinder, ...] = ()
-    _surface: npt.NDArray[np.uint8] | None = field(default=None, init=False, repr=False)
-    _clearance: npt.NDArray[np.float32] | None = field(default=None, init=False, repr=False)
-    _leaps: npt.NDArray[np.int16] | None = field(default=None, init=False, repr=False)
-    _faces: npt.NDArray[np.int32] | None = field(default=None, init=False, repr=False)
+    _surface: npt.NDArray[np.uint8] | None = field(default=None, init=False)
+    _clearance: npt.NDArray[np.float32] | None = field(default=None, init=False)
+    _leaps: npt.NDArray[np.int16] | None = field(default=None, init=False)
+    _faces: npt.NDArray[np.int32] | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
         given = self.brightness
@@ -108,6 +108,17 @@ class Arena:
         for name, label, kind in _KINDS:
             entries = checked_places(label, kind, getattr(self, name), given, self.mm_per_cell)
             object.__setattr__(self, name, entries)
+
+    def __repr__(self) -> str:
+        counts = [(len(getattr(self, name)), label) for name, label, _ in _KINDS]
+        held = "".join(f", {counted(count, label)}" for count, label in counts if count)
+        return f"<Arena {shown(self.name)}: {self.width_mm:g} x {self.height_mm:g} mm{held}>"
+
+    def _repr_png_(self) -> tuple[bytes, dict[str, int]]:
+        """Return a picture, which notebooks show."""
+        from kiks.drawing import draw_arena, png_for_notebook
+
+        return png_for_notebook(draw_arena(self))
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Through the constructor: a plain pickle would bring the raster back writable and carry the caches along.
@@ -307,12 +318,6 @@ class Arena:
             object.__setattr__(self, "_faces", faces)
         assert self._faces is not None
         return self._faces
-
-    def _repr_png_(self) -> bytes:
-        """Return what a notebook shows: the arena from above, with what it holds."""
-        from kiks.drawing import png_of_arena
-
-        return png_of_arena(self)
 
     def clearance_at_mm(self, x_mm: float, y_mm: float) -> float:
         """Return how far a point is from the surface of the nearest wall [mm].

@@ -190,7 +190,7 @@ class Simulation(Things):
     def show(
         self, *, speed: float | None = 1.0, is_alive: bool = False, port: int | None = None, browser: bool = True
     ) -> Shown:
-        """Show this world in a browser, where it may be watched, paused and touched; in a notebook, below the cell.
+        """Show this world in a browser, to be watched, paused and touched, and say where; in a notebook below the cell.
 
         Looking changes nothing: the run is the same, to the bit, unless somebody reaches in.
 
@@ -198,7 +198,7 @@ class Simulation(Things):
             speed: Simulated seconds in a real one from now on; None for as fast as possible.
             is_alive: Whether time passes by itself, in a thread; else it does when the program lets it.
             port: TCP port of the page, on this computer only; 8123, or a free one, if left out.
-            browser: Whether a browser is opened.
+            browser: False for its address alone.
 
         Returns:
             What is shown, with its `url`; `close()` ends it.

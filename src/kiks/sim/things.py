@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from kiks.engine.numbers import sin_cos
 from kiks.engine.state import BALL, BODY, CYLINDER
-from kiks.errors import ArenaError, KiksError, ParameterError, shown
+from kiks.errors import ArenaError, KiksError, ParameterError, counted, shown
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp
 from kiks.model.ranges import check_heading, check_number, check_numbers
 from kiks.model.robot import RobotSpec
@@ -58,13 +58,17 @@ class Things(World):
                 raise ArenaError(f"Arena {shown(arena.name)}: {error}") from None
 
     def __repr__(self) -> str:
-        return f"<KiKS simulation: {len(self.specs)} robots, {self.time_s:.3f} s, seed {self.seed}>"
+        robots = counted(self.robot_count, "robot")
+        return f"<{type(self).__name__}: {robots} in {shown(self.arena.name)} at {self.time_s:.3f} s, seed {self.seed}>"
 
-    def _repr_png_(self) -> bytes:
-        """Return what a notebook shows: the world from above."""
-        from kiks.drawing import png_of_world
+    def _repr_png_(self) -> tuple[bytes, dict[str, int]]:
+        """Return a picture of it as it stands, which notebooks show."""
+        from kiks.drawing import draw_world, png_for_notebook
 
-        return png_of_world(self)
+        radii_mm = [spec.body.radius_mm for spec in self.specs]
+        with self.lock:
+            image = draw_world(self.arena, self.lamps, self.bodies(), self.poses(), radii_mm)
+        return png_for_notebook(image)
 
     @property
     def lamps(self) -> NDArray[np.float64]:

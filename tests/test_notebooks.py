@@ -1,0 +1,186 @@
+"""What notebooks, terminals and plain Python show: of the desk, and of simulations, arenas and results of a batch."""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+from base64 import b64decode
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import kiks
+from kiks.batch.rollouts import FIRST, Rollouts
+
+GUARD_S = 60.0
+OF_DESK = "sim = kiks.Simulation(robots=2)\n"
+
+Run = Callable[[str], list[dict[str, Any]]]
+
+
+@pytest.fixture(scope="module")
+def run() -> Iterator[Run]:
+    """Run cells in the kernel of a notebook; return what each shows, by types."""
+    client = pytest.importorskip("jupyter_client.manager", reason="notebooks need ipykernel")
+    kernel, cells = client.start_new_kernel(startup_timeout=GUARD_S)
+
+    def run(cell: str) -> list[dict[str, Any]]:
+        shown: list[dict[str, Any]] = []
+
+        def note(message: dict[str, Any]) -> None:
+            content = message["content"]
+            assert message["msg_type"] != "error", "\n".join(content["traceback"])
+            if message["msg_type"] in ("display_data", "execute_result"):
+                shown.append(content["data"])
+            elif message["msg_type"] == "stream":
+                shown.append({content["name"]: content["text"]})
+
+        cells.execute_interactive(cell, timeout=GUARD_S, output_hook=note)
+        return shown
+
+    run("import kiks")
+    yield run
+    cells.stop_channels()
+    kernel.shutdown_kernel(now=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "cell", ["shown = sim.show()", "sim.show()", "shown = sim.show()\nshown", "for _ in range(1):\n    sim.show()"]
+)
+def test_a_notebook_shows_the_desk_once_below_the_cell(run: Run, cell: str) -> None:
+    (seen,) = run(OF_DESK + cell)
+    assert seen["text/html"].startswith('<iframe src="http://127.0.0.1:')
+    assert seen["text/plain"].startswith("<KiKS desk at http://127.0.0.1:")
+
+
+@pytest.mark.slow
+def test_a_later_cell_shows_the_same_desk_again(run: Run) -> None:
+    (first,) = run(OF_DESK + "shown = sim.show()")
+    assert run("shown") == [first]
+    assert run("display(shown)") == [first]
+    assert run("shown.close()") == []
+
+
+@pytest.mark.slow
+def test_a_notebook_that_wants_no_page_has_the_address(run: Run) -> None:
+    (seen,) = run(OF_DESK + "sim.show(browser=False)")
+    assert seen["stdout"].startswith("The desk: http://127.0.0.1:")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("cell", "kind", "text"),
+    [
+        ("kiks.Simulation(robots=2)", "image/png", "<Simulation: 2 robots in 'default' at 0.000 s, seed 0>"),
+        ("kiks.Arena.box(400, 300)", "image/png", "<Arena 'box': 400 x 300 mm>"),
+        ("rollouts", "text/html", "<Rollouts: 2 worlds of 1 robot, path_mm>"),
+    ],
+)
+def test_a_notebook_shows_a_picture_or_a_table(run: Run, cell: str, kind: str, text: str) -> None:
+    run(
+        "import numpy; from kiks.batch.rollouts import Rollouts\n"
+        "rollouts = Rollouts(numpy.ones((2, 1, 1)), numpy.ones(2, numpy.int64), ('path_mm',))"
+    )
+    (seen,) = run(cell)
+    assert seen["text/plain"] == text
+    assert seen[kind].startswith("<table>") or b64decode(seen[kind]).startswith(b"\x89PNG")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("words", [["-c"], ["-m", "IPython", "--colors=NoColor", "-c"]], ids=["Python", "IPython"])
+def test_a_terminal_has_the_address_once(words: list[str]) -> None:
+    if "IPython" in words:
+        pytest.importorskip("IPython", reason="the terminal of IPython needs ipykernel")
+    script = "import kiks; sim = kiks.Simulation(); sim.show(browser=False)"
+    said = subprocess.run([sys.executable, *words, script], capture_output=True, text=True, timeout=GUARD_S, check=True)
+    (line,) = [line for line in said.stdout.splitlines() if "http" in line]
+    assert line.startswith("The desk: http://127.0.0.1:")
+
+
+def size_of(thing: Any) -> tuple[tuple[int, int], dict[str, int]]:
+    """Return of a picture for notebooks how many pixels it has, and at which size it is shown."""
+    png, shown = thing._repr_png_()
+    return Image.open(io.BytesIO(png)).size, shown
+
+
+def test_pictures_are_sharp() -> None:
+    assert size_of(kiks.Simulation(kiks.Arena.box(300, 200))) == ((600, 400), {"width": 300, "height": 200})
+    assert size_of(kiks.Arena.box(300, 200)) == ((600, 400), {"width": 300, "height": 200})
+
+
+def test_the_picture_of_an_arena_is_that_of_a_simulation_that_begins_there() -> None:
+    arena = kiks.Arena.load("examples/arenas/pillars.toml")
+    assert len(arena.bodies) == 2
+    assert arena._repr_png_() == kiks.Simulation(arena)._repr_png_()
+
+
+def test_looking_at_a_picture_changes_nothing() -> None:
+    looked_at, alone = (kiks.Simulation(kiks.Arena.box(300, 200), seed=3) for _ in range(2))
+    for sim in (looked_at, alone):
+        sim.port(1).write(b"D,5,5\n")
+        sim.run(0.123)
+    looked_at._repr_png_()
+    for sim in (looked_at, alone):
+        sim.run(0.5)
+    assert looked_at.state_hash() == alone.state_hash()
+
+
+def test_what_is_short_says_what_it_is() -> None:
+    arena = kiks.Arena.load("examples/arenas/pillars.toml")
+    assert repr(arena) == "<Arena 'Pillars': 600 x 600 mm, 1 start, 1 ball, 1 cylinder>"
+    assert repr(kiks.Batch(arena, 3)) == "<Batch: 3 worlds of 1 robot in 1 arena>"
+
+
+def test_results_know_what_was_measured() -> None:
+    @kiks.controller()
+    def stay(sensors, memory, parameters, wheels):  # type: ignore[no-untyped-def]
+        wheels[:] = 0
+
+    batch = kiks.Batch(kiks.Arena.box(300, 200), worlds=2, seed=1)
+    came = batch.run(stay, seconds=1, measures=[kiks.measures.path_mm, kiks.measures.contacts])
+    assert repr(came) == "<Rollouts: 2 worlds of 1 robot, path_mm, contacts>"
+
+
+def rollouts(worlds: int, robots: int = 1) -> Rollouts:
+    values = np.arange(worlds * robots * 2, dtype=np.float64).reshape(worlds, robots, 2) / (1.0, 7.0)
+    return Rollouts(values, np.arange(worlds), ("contacts", "<path>"))
+
+
+def test_a_long_table_shows_the_first_and_sums_up_all() -> None:
+    shown = rollouts(1000)
+    lines = str(shown).splitlines()
+    assert lines[0].split() == ["world", "steps", "contacts", "<path>"]
+    assert len(lines) == 1 + FIRST + 1 + 4
+    assert lines[FIRST].split()[:3] == [str(FIRST - 1), "9", "18"]
+    assert lines[FIRST + 1] == "... 990 more"
+    assert lines[-4].split() == ["mean", "499.50", "999.00", "142.86"]
+    assert lines[-1].split() == ["max", "999", "1998", "285.57"]
+    html = shown._repr_html_()
+    assert html.count("<tr>") == len(lines)
+    assert "&lt;path&gt;" in html
+    assert "<path>" not in html
+
+
+def test_a_short_table_shows_all_robots() -> None:
+    lines = str(rollouts(2, robots=3)).splitlines()
+    assert lines[0].split()[:2] == ["world", "robot"]
+    assert [line.split()[:2] for line in lines[1:7]] == [[str(k // 3), str(k % 3)] for k in range(6)]
+    assert lines[7].split()[0] == "mean"
+
+
+def test_numbers_that_are_none_are_shown_so() -> None:
+    values = np.array([[[np.nan, 1e12]], [[np.inf, -1e-9]]])
+    lines = str(Rollouts(values, np.ones(2, np.int64), ("a", "b"))).splitlines()
+    assert [line.split()[2] for line in lines[1:]] == ["nan", "inf", "nan", "nan", "nan", "nan"]
+    assert lines[1].split()[3] == "1.000e+12"
+
+
+def test_without_measures_there_are_still_steps() -> None:
+    nothing = Rollouts(np.zeros((2, 1, 0)), np.array([3, 4]), ())
+    assert repr(nothing) == "<Rollouts: 2 worlds of 1 robot, no measures>"
+    assert [line.split() for line in str(nothing).splitlines()[:3]] == [["world", "steps"], ["0", "3"], ["1", "4"]]
