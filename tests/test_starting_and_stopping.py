@@ -73,6 +73,7 @@ class Driven:
 
     def __init__(self, programs: Programs) -> None:
         self.programs = programs
+        programs.begin()
         self._is_over = False
         self._round = threading.Condition()
         self._thread = threading.Thread(target=self._drive, daemon=True)

@@ -12,7 +12,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any
 
@@ -30,6 +30,19 @@ def end_at_once() -> None:
 def end_as_with_ctrl_c() -> None:
     """Let Ctrl-C, SIGTERM and SIGHUP raise KeyboardInterrupt; `nohup` keeps a process alive as ever."""
     _handle(signal.default_int_handler)
+
+
+@contextmanager
+def noting_endings(note: Callable[[], None]) -> Iterator[None]:
+    """Call something at Ctrl-C, SIGTERM and SIGHUP meanwhile, and go on; only in the main thread."""
+    before = {name: signal.getsignal(name) for name in _endings()}
+    _handle(lambda _number, _frame: note())
+    try:
+        yield
+    finally:
+        with suppress(ValueError):
+            for name, handler in before.items():
+                signal.signal(name, handler)
 
 
 def send_again_what_is_dropped() -> None:

@@ -131,6 +131,13 @@ def test_programs_begin_when_a_page_shows_the_world(words: tuple[str, ...], tmp_
         assert process.wait(GUARD_S) == 0
 
 
+def test_mistakes_are_told_before_anybody_waits_for_a_page(tmp_path: Path) -> None:
+    result = kiks("run", "--desk", "--thinking", "replay:nowhere", DRIVE, DRIVE, cwd=tmp_path)
+    assert result.returncode == 2
+    assert "replay file 'nowhere.1' must exist" in result.stderr
+    assert "http://" not in result.stdout
+
+
 @pytest.mark.parametrize("words", [("run", "--desk"), ("demo", "avoid", "--desk")])
 def test_who_waits_for_a_page_ends_with_ctrl_c(words: tuple[str, ...], tmp_path: Path) -> None:
     words = (*words, DRIVE, "COM1", "5", "3", "5") if words[0] == "run" else words

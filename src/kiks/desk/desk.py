@@ -97,8 +97,10 @@ class Desk:
     def _take(self, sim: Simulation, speed: float | None) -> None:
         gate = Gate(sim.lock, speed=speed)
         # First, because it may fail: then the world that was there stays.
-        programs = self._new_programs(sim, self._commands if self._has_begun else (), gate)
+        programs = self._new_programs(sim, self._commands, gate)
         programs.permission = self._permission()
+        if self._has_begun:
+            programs.begin()
         self.sim, self.gate, self.programs = sim, gate, programs
         self.hands = Hands(sim)
         self.meter = Speedometer()
@@ -117,14 +119,8 @@ class Desk:
         Raises:
             KiksError: If one of them cannot start.
         """
-        if self._has_begun:
-            return
         self._has_begun = True
-        if self.has_beginners:
-            programs = self._new_programs(self.sim, self._commands, self.gate)
-            programs.permission = self._permission()
-            self._retired.append(self.programs)
-            self.programs = programs
+        self.programs.begin()
 
     def _usual_programs(self, sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
         return Programs(

@@ -5,16 +5,14 @@ from __future__ import annotations
 import contextlib
 import logging
 import selectors
-import signal
 import socket
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from types import FrameType
 
 from kiks.clock.patience import Patience
 from kiks.clock.thinking import parse_thinking
-from kiks.ending import INTERRUPTED
+from kiks.ending import INTERRUPTED, noting_endings
 from kiks.errors import KiksError, ParameterError
 from kiks.ports.descriptors import opening
 from kiks.ports.guest import NearGuest, SocketGuest
@@ -42,8 +40,8 @@ class Programs:
 
     Args:
         sim: The world.
-        commands: Programs that begin together; the first one drives robot 1, whatever port it opens, and so on. None
-            where a robot has none.
+        commands: Programs that begin together, with `begin` or `run`; the first one drives robot 1, whatever port it
+            opens, and so on. None where a robot has none.
         told: Robots by port name, for whichever program opens it.
         thinking: What the computing of each costs: 'none', 'fixed:MS', 'live', 'live:FACTOR', or 'replay:FILE'; where
             several begin together, with the number of the program appended: FILE.1.
@@ -64,7 +62,7 @@ class Programs:
 
     Raises:
         ParameterError: If a value is out of range or unknown.
-        KiksError: If the computer does not let a program start.
+        KiksError: If the computer has no file descriptors left for it.
     """
 
     def __init__(
@@ -92,13 +90,13 @@ class Programs:
         self._say, self._thinking, self._record = say, thinking, record
         self._is_heard, self._labels = is_heard, labels
         self._signals, self._count, self._was_touched, self._is_closed = 0, 0, False, False
-        begin = [(robot, command) for robot, command in enumerate(commands, 1) if command is not None]
-        self._are_numbered = len(begin) > 1
-        for number in range(1, len(begin) + 1):
+        self._beginners = [(robot, command) for robot, command in enumerate(commands, 1) if command is not None]
+        self._are_numbered = len(self._beginners) > 1
+        for number in range(1, len(self._beginners) + 1):
             parse_thinking(self._policy(number))
         self._turns = Turns(
             sim,
-            expected=len(begin) + visitors,
+            expected=len(self._beginners) + visitors,
             missing=self._missing,
             log=_log,
             is_once=True,
@@ -108,7 +106,7 @@ class Programs:
             start_patience_s=VISIT_PATIENCE_S if visitors else START_PATIENCE_S,
         )
         self._names = Names(sim, told or {}, 0)
-        for robot, _ in begin:
+        for robot, _ in self._beginners:
             self._names.own(robot)
         with opening("the programs of a world"):
             self._bell, self._bell_rope = socket.socketpair()
@@ -116,12 +114,21 @@ class Programs:
         self._bell.setblocking(False)
         self._bell_rope.setblocking(False)
         self._selector.register(self._bell, selectors.EVENT_READ)
-        try:
-            for robot, command in begin:
-                self._add(command, robot)
-        except KiksError:
-            self.close()
-            raise
+
+    def begin(self) -> None:
+        """Start the programs that begin together, unless they have been.
+
+        Raises:
+            KiksError: If the computer does not let one start.
+        """
+        with self.sim.lock:
+            beginners, self._beginners = self._beginners, []
+            try:
+                for robot, command in beginners:
+                    self._add(command, robot)
+            except KiksError:
+                self.close()
+                raise
 
     @property
     def drive(self) -> bool:
@@ -231,9 +238,16 @@ class Programs:
         grace.start()
 
     def run(self) -> int:
-        """Let them run until the last has ended; return 0 if all went well, else the first exit code that tells."""
+        """Let them run until the last has ended; return 0 if all went well, else the first exit code that tells.
+
+        Raises:
+            KiksError: If the computer does not let one start.
+        """
+        self.begin()
         try:
-            with self._signals_noted():
+            self._grace = Patience(GRACE_S)
+            # The programs have got it, too, and may still stop their robots.
+            with noting_endings(self._note_signal):
                 while any(not handle.has_been_noticed for handle in self.handles) or self._turns.players:
                     if self._signals and (self._signals > 1 or self._grace.left_s() == 0):
                         return INTERRUPTED
@@ -399,21 +413,5 @@ class Programs:
         with contextlib.suppress(OSError):
             self._bell.recv(1 << 10)
 
-    @contextlib.contextmanager
-    def _signals_noted(self) -> Iterator[None]:
-        """Note Ctrl-C and its kind, and go on: the programs have got it, too, and may still stop their robots."""
-        if threading.current_thread() is not threading.main_thread():
-            yield
-            return
-
-        def note(_number: int, _frame: FrameType | None) -> None:
-            self._signals += 1
-
-        self._grace = Patience(GRACE_S)
-        names = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-        before = {name: signal.signal(name, note) for name in names if signal.getsignal(name) is not signal.SIG_IGN}
-        try:
-            yield
-        finally:
-            for name, handler in before.items():
-                signal.signal(name, handler)
+    def _note_signal(self) -> None:
+        self._signals += 1
