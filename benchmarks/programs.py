@@ -62,6 +62,7 @@ def run(program: Path, count: int, loops: int) -> tuple[float, float]:
     """Return simulated and real time [s] of some programs, their start left out."""
     sim = kiks.Simulation(robots=count, seed=1)
     programs = Programs(sim, [Command(program, [str(loops)])] * count)
+    programs.begin()
     while sim.now_ns == 0:
         programs.round(0.05)
     start_s = time.perf_counter()
