@@ -32,9 +32,9 @@ def address() -> Iterator[str]:
     command = [sys.executable, str(Path(__file__).with_name("monitor_page.py"))]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
         assert process.stdout is not None
-        line = process.stdout.readline().strip()
-        assert line.startswith("http"), "the desk did not start"
-        yield line
+        *_, url = process.stdout.readline().split() or [""]
+        assert url.startswith("http"), "the desk did not start"
+        yield url
         process.kill()
 
 
