@@ -240,6 +240,29 @@ def test_missing_program_is_named_and_then_done_without(caplog: pytest.LogCaptur
         one.close()
 
 
+def test_missing_program_is_waited_for_as_long_as_a_person_wants(caplog: pytest.LogCaptureFixture) -> None:
+    wall = Wall()
+    ways = {robot: [TcpEndpoint(0)] for robot in (1, 2)}
+    with served(ways, new_patience=partial(Patience, wall_ns=wall), when_silent="wait") as run:
+        one = Client(ways[1][0])
+        one.send(b"H\n")
+        run.wait_held(1)
+        wall.pass_s(1.5)
+        run.wait_rounds(3)
+        assert said(caplog) == [
+            "the world begins when 2 programs are there, but that of robot 2 is missing. It waits until all are there."
+        ]
+        wall.pass_s(1000)
+        run.wait_rounds(3)
+        assert one.has_heard_nothing()
+        late = Client(ways[2][0])
+        assert late.ask(b"B\n").startswith(b"b,")
+        assert one.lines.readline() == b"h,0,0\r\n"
+        assert len(said(caplog)) == 1
+        late.close()
+        one.close()
+
+
 def test_program_that_looks_in_and_goes_does_not_count() -> None:
     with served({robot: [TcpEndpoint(0)] for robot in (1, 2)}) as run:
         ways = run.server._endpoints

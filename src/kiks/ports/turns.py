@@ -122,7 +122,8 @@ class Turns:
         when_silent: What happens to a program that is silent while others wait: 'wait', 'drop' or 'ignore'.
         patience_s: How long it may be [s of real time].
         new_patience: For tests: makes patiences with their own wall clock.
-        start_patience_s: How long the world waits for those with whom it begins [s of real time].
+        start_patience_s: How long the world waits for those with whom it begins [s of real time], unless it is told to
+            wait for all that are silent.
 
     Raises:
         ParameterError: If there is no such policy, or the patience is out of range.
@@ -273,19 +274,20 @@ class Turns:
             self.has_begun = True
             return 0.0
         left_s = self._start.left_s()
-        if left_s > 0:
-            word_s = left_s - (self._start_patience_s - START_WORD_S)
-            if word_s > 0:
-                return word_s
+        word_s = left_s - (self._start_patience_s - START_WORD_S)
+        if word_s > 0:
+            return word_s
+        waits_on = self._when_silent == "wait"
+        if left_s > 0 or waits_on:
             if not self._has_named_missing:
                 self._has_named_missing = True
                 self._log.warning(
-                    "the world begins when %d programs are there, but %s is missing. It waits %.0f s more.",
+                    "the world begins when %d programs are there, but %s is missing. %s",
                     self._expected,
                     self._missing(),
-                    left_s,
+                    "It waits until all are there." if waits_on else f"It waits {left_s:.0f} s more.",
                 )
-            return left_s
+            return None if waits_on else left_s
         self._log.warning(
             "the world has begun without %s, which did not come within %g s. Who comes now acts from now on, and the "
             "run is not repeatable.",
