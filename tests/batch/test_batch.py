@@ -1,24 +1,17 @@
-"""A batch: the same whatever the number of threads, the blocks and the processor; and clear words for what is wrong."""
+"""A batch: the same whatever the number of threads and the blocks; and clear words for what is wrong."""
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from tests.engine.compiled import PLAIN_AND_CHECKED
 
 import kiks
 from kiks.batch import batch as batch_module
 from kiks.batch.beginning import random_starts
 from kiks.model.family import family
 from kiks.model.places import Ball, Lamp
-
-ROOT = Path(__file__).parents[2]
 
 
 @kiks.controller(parameters=2)
@@ -92,16 +85,6 @@ def test_running_again_begins_again(expected: list[str]) -> None:
     batch = make(threads=1)
     hashes(batch, seconds=1.0)
     assert hashes(batch) == expected
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(470)  # it compiles the batch for another processor
-def test_the_processor_does_not_matter() -> None:
-    """In a process of its own, compiled for a processor without wide vectors: all that a batch does, to the bit."""
-    command = [sys.executable, "-m", "tests.batch.test_batch"]
-    environment = os.environ | PLAIN_AND_CHECKED
-    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, check=True, text=True)
-    assert done.stdout.strip() == all_hashes()
 
 
 def test_worlds_can_be_put_back_one_by_one() -> None:
@@ -233,7 +216,3 @@ def test_speeds_that_are_no_numbers_are_nought() -> None:
     batch = make(1)
     batch.run(wild, seconds=0.5)
     assert batch.state.robots["speed_setpoint"].tolist() == [[[0, 127]]]
-
-
-if __name__ == "__main__":
-    print(all_hashes())

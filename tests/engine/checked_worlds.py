@@ -1,7 +1,7 @@
-"""Worlds of all kinds, to be run as a process whose kernels check every index: `NUMBA_BOUNDSCHECK=1`.
+"""Worlds of all kinds, to be run as a process whose kernels are compiled for another processor and check every index.
 
-What is no number, and what is out of all range, is written into the state and the lamps themselves, behind the checks
-that stand at the doors.
+It prints all that comes of plain runs, which no build may change. Then NaN and numbers far out of range are written
+into the state and the lamps themselves, behind the checks that guard every entrance.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import math
 from typing import Any
 
 import numpy as np
+from tests.batch.test_batch import all_hashes
 from tests.engine.test_determinism import run_record
 
 import kiks
@@ -122,7 +123,8 @@ def programs() -> None:
 
 if __name__ == "__main__":
     logging.disable()  # a turret that reckons with what is no number says so
-    run_record()
+    print(run_record())
+    print(all_hashes())
     programs()
     batches()
     wild_states()
