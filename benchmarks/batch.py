@@ -38,8 +38,8 @@ from calibration import calibration_loops_per_s, report
 from PIL import Image, ImageDraw
 
 import kiks
-from kiks.batch.beginning import random_starts
-from kiks.model.places import Ball
+from kiks.batch.initial_state import random_starts
+from kiks.model.arena_objects import Ball
 
 PINS = (
     *("kheperax==0.2.0", "jax==0.4.30", "jaxlib==0.4.30", "qdax==0.4.0", "flax==0.8.5", "brax==0.10.5"),

@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import kiks
-from kiks.client.calibration import calibrate
-from kiks.client.placements import Instruction, SimPlacements
-from kiks.client.wall_fit import Stand
+from kiks.calibration.calibrate import calibrate
+from kiks.calibration.placements import Instruction, SimPlacements
+from kiks.calibration.wall_fit import Stand
 
 SEEDS = range(8)
 

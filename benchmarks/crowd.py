@@ -29,7 +29,8 @@ from calibration import calibration_loops_per_s, report
 from numba import njit
 
 import kiks
-from kiks.engine import proximity, step
+from kiks.engine import step
+from kiks.engine.sensing import proximity
 from kiks.units import TICK_NS
 
 COUNTS = (1, 10, 100, 1000)

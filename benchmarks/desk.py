@@ -32,8 +32,8 @@ from calibration import report
 
 import kiks
 from kiks.demos.follow import Follow
-from kiks.desk.key import COOKIE
-from kiks.desk.showing import show
+from kiks.desk.server.show import show
+from kiks.desk.server.token import COOKIE
 
 ROBOTS = 20
 SECONDS = 10.0
@@ -51,7 +51,7 @@ FLAGS = [
 SERVER = """
 import sys, time
 import kiks
-from kiks.desk.showing import show
+from kiks.desk.server.show import show
 sim = kiks.Simulation(kiks.Arena.box(1000, 1000), robots=20, seed=1)
 for number in range(1, 21):
     kiks.Khepera(sim.port(number)).set_speed(3 + number % 5, 3 + number % 3)

@@ -20,7 +20,7 @@ import gymnasium
 import numpy as np
 from calibration import report
 
-import kiks.learn.environments  # noqa: F401  (registers them)
+import kiks.learn.gymnasium_envs  # noqa: F401  (registers them)
 
 COUNTS, THREADS = (1, 100, 1000, 10_000), (1, 2)
 STEPS = 20_000

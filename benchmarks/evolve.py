@@ -19,7 +19,7 @@ from pathlib import Path
 from calibration import report
 
 import kiks
-from kiks.batch.beginning import random_starts
+from kiks.batch.initial_state import random_starts
 from kiks.model.arena import Pose
 
 ARENAS = Path(__file__).parent.parent / "examples" / "arenas"

@@ -16,7 +16,7 @@ from pathlib import Path
 from calibration import report
 
 import kiks
-from kiks.ports.process import Command
+from kiks.ports.program_process import Command
 from kiks.ports.programs import Programs
 from kiks.script.runner import run_here
 

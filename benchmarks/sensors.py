@@ -27,10 +27,10 @@ from numba import njit
 import kiks
 from kiks.demos.avoid import Avoid
 from kiks.demos.follow import Follow
-from kiks.engine import ambient, camera, proximity
-from kiks.engine.networks import networks_for
 from kiks.engine.parameters import pack
 from kiks.engine.scene import Scene, make_scene
+from kiks.engine.sensing import ambient, camera, proximity
+from kiks.engine.sensing.thesis_networks import networks_for
 from kiks.engine.state import PIXEL_COUNT
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
 from kiks.units import TICK_NS

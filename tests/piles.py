@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from kiks.engine import motor
+from kiks.engine.physics import motor
 from kiks.model.arena import Arena
 from kiks.sim.simulation import Simulation
 

@@ -13,7 +13,7 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 import kiks
-from kiks.client.monitoring import COLUMNS, CsvLog, RateMeter, Sample, logged, samples
+from kiks.client.monitor import COLUMNS, CsvLog, RateMeter, Sample, logged, samples
 
 app = typer.Typer()
 command = importlib.import_module("kiks.cli.monitor")  # `kiks.cli.monitor` itself is the function

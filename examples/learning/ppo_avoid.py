@@ -19,8 +19,8 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecEnv
 
 import kiks
-import kiks.learn.environments
-from kiks.batch.beginning import random_starts
+import kiks.learn.gymnasium_envs
+from kiks.batch.initial_state import random_starts
 
 HIDDEN = (16, 16)
 WORLDS = 64

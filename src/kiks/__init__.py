@@ -17,10 +17,10 @@ import serial  # noqa: TID253  (pyserial has to be told where our plug-in is)
 
 if TYPE_CHECKING:
     from kiks.batch.batch import Batch
-    from kiks.batch.timing import Timing
+    from kiks.batch.loop_timing import Timing
     from kiks.client.drive import drive
-    from kiks.client.functions import kclose, kopen, ksend, ktime, pause
     from kiks.client.khepera import Khepera, Status
+    from kiks.client.matlab_functions import kclose, kopen, ksend, ktime, pause
     from kiks.control import controllers, measures
     from kiks.control.controller import Controller, controller
     from kiks.control.measure import Measure, measure
@@ -85,18 +85,18 @@ _HOMES = {
     "Simulation": "kiks.sim.simulation",
     "Status": "kiks.client.khepera",
     "Task": "kiks.learn.task",
-    "Timing": "kiks.batch.timing",
+    "Timing": "kiks.batch.loop_timing",
     "controller": "kiks.control.controller",
     "controllers": "kiks.control.controllers",
     "drive": "kiks.client.drive",
     "executor_for": "kiks.learn.executors",
-    "kclose": "kiks.client.functions",
-    "kopen": "kiks.client.functions",
-    "ksend": "kiks.client.functions",
-    "ktime": "kiks.client.functions",
+    "kclose": "kiks.client.matlab_functions",
+    "kopen": "kiks.client.matlab_functions",
+    "ksend": "kiks.client.matlab_functions",
+    "ktime": "kiks.client.matlab_functions",
     "measure": "kiks.control.measure",
     "measures": "kiks.control.measures",
-    "pause": "kiks.client.functions",
+    "pause": "kiks.client.matlab_functions",
     "tasks": "kiks.learn.tasks",
 }
 

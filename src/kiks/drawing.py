@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from kiks.engine.state import BALL, BODY, CYLINDER
 from kiks.errors import ParameterError
 from kiks.model.arena import PAD, Arena, Ball
-from kiks.model.files import check_writable, replace_file
+from kiks.model.atomic_files import check_writable, replace_file
 from kiks.model.robot import RobotSpec
 from kiks.sim.simulation import Simulation
 

@@ -9,9 +9,9 @@ import pytest
 
 import kiks
 from kiks.batch import batch as batch_module
-from kiks.batch.beginning import random_starts
+from kiks.batch.initial_state import random_starts
+from kiks.model.arena_objects import Ball, Lamp
 from kiks.model.family import family
-from kiks.model.places import Ball, Lamp
 
 
 @kiks.controller(parameters=2)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import kiks
 from kiks.control.controller import whole_speeds
-from kiks.control.networks import exponential_between
+from kiks.control.neural_nets import exponential_between
 
 BOTH = ("proximity", "ambient")
 

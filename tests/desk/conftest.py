@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from tests.desk.visitor import Visitor
     from tests.desk.visits import NewPage
 
-    from kiks.desk.showing import Shown
+    from kiks.desk.server.show import Shown
 
 CHROMIUM = Path("/usr/bin/chromium")
 ARGUMENTS = [

@@ -21,7 +21,7 @@ from fastapi import FastAPI, Response, WebSocket, WebSocketDisconnect
 from nicegui import ui
 from PIL import Image
 
-from kiks.desk.arena_view import ArenaView, Pick, Stroke, Tool
+from kiks.desk.panels.arena_view import ArenaView, Pick, Stroke, Tool
 
 WIDTH_MM, HEIGHT_MM = 900, 600
 REACH_MM = 60.0

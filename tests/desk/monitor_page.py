@@ -12,9 +12,9 @@ from typing import Any
 from nicegui import app, ui
 
 import kiks
-from kiks.desk.monitor_panel import MonitorPanel
-from kiks.desk.showing import show
-from kiks.model.places import Ball, Cylinder, Lamp, Pose
+from kiks.desk.panels.monitor import MonitorPanel
+from kiks.desk.server.show import show
+from kiks.model.arena_objects import Ball, Cylinder, Lamp, Pose
 
 
 def make_world() -> kiks.Simulation:

@@ -14,10 +14,10 @@ import uvicorn
 from fastapi import FastAPI
 from nicegui import ui
 
-from kiks.desk.desk import Desk
-from kiks.desk.driver import Driver
-from kiks.desk.programs_panel import ProgramsPanel
-from kiks.desk.wire_panel import WirePanel
+from kiks.desk.panels.programs import ProgramsPanel
+from kiks.desk.panels.wire import WirePanel
+from kiks.desk.server.desk import Desk
+from kiks.desk.server.show import Driver
 from kiks.model.arena import Arena
 from kiks.sim.simulation import Simulation
 

@@ -13,7 +13,7 @@ from playwright.sync_api import Browser, expect
 from tests.desk.visitor import Visitor
 from tests.desk.visits import NewPage
 
-from kiks.desk.showing import Shown
+from kiks.desk.server.show import Shown
 
 pytestmark = pytest.mark.slow
 

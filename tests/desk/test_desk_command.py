@@ -15,8 +15,8 @@ from urllib.error import HTTPError
 from urllib.request import HTTPCookieProcessor, OpenerDirector, Request, build_opener, urlopen
 
 import pytest
+from tests.cli.test_cli import kiks, state_of
 from tests.served import PROGRAMS
-from tests.test_cli import kiks, state_of
 
 pytestmark = pytest.mark.slow
 DRIVE = str(PROGRAMS / "drive.py")

@@ -17,11 +17,11 @@ from playwright.sync_api import expect
 from tests.desk.visitor import Visitor
 from tests.desk.visits import NewPage
 
-from kiks.desk.desk import Desk
-from kiks.desk.gateway import Viewer
-from kiks.desk.page import Page
-from kiks.desk.serving import SERVER
-from kiks.desk.showing import Shown
+from kiks.desk.panels.page import Page
+from kiks.desk.server.desk import Desk
+from kiks.desk.server.gateway import Viewer
+from kiks.desk.server.server import SERVER
+from kiks.desk.server.show import Shown
 
 pytestmark = pytest.mark.slow
 

@@ -18,11 +18,11 @@ from playwright.sync_api import Page
 from tests.desk.visitor import FIRST_PICTURE, SCREENSHOTS
 from tests.desk.visits import NewPage
 
-from kiks.desk.desk import Desk
-from kiks.desk.showing import Shown
+from kiks.desk.server.desk import Desk
+from kiks.desk.server.show import Shown
 from kiks.model.arena import Arena, Pose
 from kiks.model.project import Project
-from kiks.sim.building import simulation_of
+from kiks.sim.from_project import simulation_of
 
 pytestmark = pytest.mark.slow
 

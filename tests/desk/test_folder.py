@@ -13,12 +13,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from kiks.desk.example_worlds import EXAMPLES
-from kiks.desk.folder import LISTED_MAX, OPENED, UPLOAD_BYTES_MAX, Folder, decode, encode
+from kiks.desk.server.example_worlds import EXAMPLES
+from kiks.desk.server.folder import LISTED_MAX, OPENED, UPLOAD_BYTES_MAX, Folder, decode, encode
 from kiks.errors import ArenaError, KiksError, ParameterError
 from kiks.model.arena import Arena, Lamp
 from kiks.model.project import Project
-from kiks.sim.building import simulation_of
+from kiks.sim.from_project import simulation_of
 
 BAD_NAMES = [
     "", " ", ".", "..", "../x", "a/../../x", "/etc/x", "//x", "\0", "x\0.kiks", "a\\b", "C:\\x", "c:x", "~/x", "~x",

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from kiks.desk.frames import NO_HIT, arena_picture, describe_scene, describe_shapes, pack_frame
+from kiks.desk.server.frames import NO_HIT, arena_picture, describe_scene, describe_shapes, pack_frame
 from kiks.model.arena import Arena
-from kiks.model.places import Ball, Cylinder, Lamp, Pose
+from kiks.model.arena_objects import Ball, Cylinder, Lamp, Pose
 from kiks.sim.simulation import Simulation
 
 WALL_MM = 10.0

@@ -16,9 +16,9 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 import kiks
-from kiks.desk.gateway import IN_FLIGHT, Viewer
-from kiks.desk.key import COOKIE
-from kiks.desk.showing import Shown, show
+from kiks.desk.server.gateway import IN_FLIGHT, Viewer
+from kiks.desk.server.show import Shown, show
+from kiks.desk.server.token import COOKIE
 from kiks.errors import ParameterError
 
 GUARD_S = 20.0

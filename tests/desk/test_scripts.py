@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kiks.desk.scripts import (
+from kiks.desk.server.scripts import (
     SIZE_LIMIT,
     Script,
     find_mistake,

@@ -16,8 +16,8 @@ from playwright.sync_api import Browser, expect
 from tests.desk.visitor import FIRST_PICTURE, SCREENSHOTS, Visitor
 from tests.desk.visits import NewPage
 
-from kiks.desk.serving import SERVER
-from kiks.desk.showing import Shown
+from kiks.desk.server.server import SERVER
+from kiks.desk.server.show import Shown
 
 pytestmark = pytest.mark.slow
 

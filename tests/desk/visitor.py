@@ -12,12 +12,12 @@ from typing import Any, TypeVar
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
-from kiks.desk.desk import Desk
-from kiks.desk.showing import Shown
+from kiks.desk.server.desk import Desk
+from kiks.desk.server.show import Shown
 from kiks.model.arena import Arena
-from kiks.model.places import Ball, Cylinder, Lamp, Pose
+from kiks.model.arena_objects import Ball, Cylinder, Lamp, Pose
 from kiks.model.project import Project, ProjectRobot
-from kiks.sim.building import simulation_of
+from kiks.sim.from_project import simulation_of
 from kiks.sim.simulation import Simulation
 
 SCREENSHOTS = Path(__file__).parents[2] / "screenshots"

@@ -1,13 +1,13 @@
-"""What `kiks.batch.alone` does with eight worlds of lone robots, called from Python for any number of them."""
+"""What `kiks.batch.lane_stepper` does with eight worlds of lone robots, called from Python for any number of them."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from kiks.batch.alone import give_back, pass_to, read, take
-from kiks.batch.worlds import Alone, Worlds
+from kiks.batch.kernel_args import Alone, Worlds
+from kiks.batch.lane_stepper import give_back, pass_to, read, take
 from kiks.engine.compiling import entry
-from kiks.engine.vectors import LANES
+from kiks.engine.simd.f64x8 import LANES
 
 
 @entry

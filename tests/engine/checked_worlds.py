@@ -17,7 +17,7 @@ from tests.engine.test_determinism import run_record
 import kiks
 from kiks.engine.state import BODY, ROBOT
 from kiks.model.arena import Arena
-from kiks.model.places import Ball, Cylinder, Lamp
+from kiks.model.arena_objects import Ball, Cylinder, Lamp
 from kiks.model.robot import RESPONSES
 from kiks.sim.simulation import Simulation
 

@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from kiks.engine import motor, step
+from kiks.engine import step
 from kiks.engine.parameters import pack
+from kiks.engine.physics import motor
 from kiks.engine.scene import make_scene
 from kiks.engine.state import State
 from kiks.model.arena import PAD, Arena

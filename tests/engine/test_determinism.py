@@ -13,7 +13,7 @@ import pytest
 from llvmlite import binding
 
 from kiks.model.arena import Arena
-from kiks.model.places import Ball, Cylinder, Pose
+from kiks.model.arena_objects import Ball, Cylinder, Pose
 from kiks.model.robot import RESPONSES
 from kiks.sim.simulation import Simulation
 

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from kiks.errors import ParameterError
-from kiks.fit.reflection import find_rigs, fit_reflection, predict
-from kiks.fit.rig import Rig
+from kiks.fit.reflection import Rig, find_rigs, fit_reflection, predict
 from kiks.fit.samples import Samples
 from kiks.model.robot import RobotSpec
 

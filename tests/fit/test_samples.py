@@ -8,9 +8,8 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from kiks.engine.rays import cast_ray, sight_of
+from kiks.engine.sensing.rays import cast_ray, sight_of
 from kiks.errors import ParameterError
-from kiks.fit.networks import PLACES
 from kiks.fit.samples import (
     BODY_RADIUS_MM,
     MAXIMUM_COUNTS,
@@ -22,6 +21,7 @@ from kiks.fit.samples import (
     meet,
     nearnesses,
 )
+from kiks.fit.train_networks import PLACES
 from kiks.model.arena import Arena
 
 ROW = "0 1 2 3 4 5 6 1023"

@@ -162,7 +162,7 @@ def test_a_broken_generation_is_named(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("algorithm", ["ga", "map-elites"])
 def test_the_picture_is_drawn(algorithm: str, tmp_path: Path) -> None:
-    from kiks.learn.plots import save_plot
+    from kiks.learn.evolution_plot import save_plot
 
     save_plot(run(algorithm), tmp_path / "fitness.png")
     assert (tmp_path / "fitness.png").read_bytes().startswith(b"\x89PNG")

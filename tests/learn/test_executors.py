@@ -16,9 +16,9 @@ from tests.learn import works
 
 from kiks.errors import ParameterError, WorkError
 from kiks.learn.chunks import LOSSES_ALLOWED, Chunks
-from kiks.learn.crew import CrewExecutor
+from kiks.learn.evaluation import Lost, Ready, Values, Worker
 from kiks.learn.executors import executor_for
-from kiks.learn.work import Lost, Ready, Values, Worker
+from kiks.learn.worker_pool import CrewExecutor
 
 ROOT = Path(__file__).parents[2]
 

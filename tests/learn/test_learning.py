@@ -12,7 +12,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-import kiks.learn.environments  # noqa: F401  (registers them)
+import kiks.learn.gymnasium_envs  # noqa: F401  (registers them)
 
 ROOT = Path(__file__).parents[2]
 

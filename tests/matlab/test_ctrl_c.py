@@ -12,7 +12,7 @@ import pytest
 from tests.matlab.octave import GUARD_S, needs_octave
 from tests.matlab.terminal import Terminal, processor_ticks, state
 
-from kiks.toolbox.exchange import HANDSHAKE_S
+from kiks.toolbox.framing import HANDSHAKE_S
 
 pytestmark = [needs_octave, pytest.mark.slow]
 

@@ -16,9 +16,9 @@ from typing import Any
 import pytest
 from tests.served import GUARD_S, PROGRAMS, Served, fresh, served
 
-from kiks.clock.line import BACKLOG_LIMIT
 from kiks.clock.pace import Pace
 from kiks.clock.patience import Patience
+from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import ParameterError
 from kiks.ports.endpoint import READ_SIZE, Endpoint
 from kiks.ports.pty import PtyEndpoint

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kiks
-from kiks.clock.line import OUTPUT_LIMIT
+from kiks.clock.serial_timing import OUTPUT_LIMIT
 from kiks.units import character_ns
 
 

@@ -18,16 +18,16 @@ from hypothesis import strategies as st
 from tests.ports.test_server import Wall
 from tests.served import GUARD_S, open_plain, read_line, served
 
-from kiks.clock.line import BACKLOG_LIMIT
 from kiks.clock.pace import Pace
+from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import LinkError
 from kiks.firmware.commands import COMMANDS
-from kiks.ports.descriptors import RESERVE
 from kiks.ports.endpoint import Endpoint
+from kiks.ports.file_descriptors import RESERVE
+from kiks.ports.live import LEFT_BEHIND_NS
 from kiks.ports.pty import PtyEndpoint
 from kiks.ports.rfc2217 import Rfc2217Endpoint
 from kiks.ports.tcp import FirstLine, TcpEndpoint
-from kiks.ports.timing import LEFT_BEHIND_NS
 from kiks.units import NS_PER_S
 
 

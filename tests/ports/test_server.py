@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 from tests.served import GUARD_S, PROGRAMS, Served, ask, fresh, open_plain, read_line, run_python, served
 
-from kiks.clock.line import BACKLOG_LIMIT
 from kiks.clock.pace import Pace
+from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import ParameterError
 from kiks.ports.endpoint import READ_SIZE
 from kiks.ports.pty import PtyEndpoint

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 import serial
+from tests.cli.test_cli import kiks
 from tests.served import GUARD_S, PROGRAMS, fresh, run_python, served
 from tests.session_player import Pieces, Session, play, sessions, simulation
-from tests.test_cli import kiks
 
 from kiks.ports.pty import PtyEndpoint
 from kiks.ports.rfc2217 import Rfc2217Endpoint

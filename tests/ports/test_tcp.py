@@ -8,7 +8,7 @@ import serial
 from tests.ports.test_pty import course_in_memory
 from tests.served import GUARD_S, PROGRAMS, run_python, served
 
-from kiks.clock.line import OUTPUT_LIMIT
+from kiks.clock.serial_timing import OUTPUT_LIMIT
 from kiks.errors import LinkError, ParameterError
 from kiks.ports.tcp import TcpChannel, TcpEndpoint
 

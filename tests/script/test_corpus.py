@@ -19,9 +19,9 @@ from pathlib import Path
 from subprocess import PIPE
 
 import pytest
+from tests.cli.test_cli import KIKS
 from tests.script.screen import display
 from tests.served import PROGRAMS
-from tests.test_cli import KIKS
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 

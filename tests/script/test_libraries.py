@@ -8,9 +8,9 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
+from tests.cli.test_cli import KIKS
 from tests.script.screen import display
 from tests.served import PROGRAMS
-from tests.test_cli import KIKS
 
 pytestmark = pytest.mark.slow
 

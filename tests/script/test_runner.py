@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from kiks.model.arena import Arena
-from kiks.script import watch
+from kiks.script import watchdog
 from kiks.script.runner import run_here
 from kiks.sim.simulation import Simulation
 
@@ -454,7 +454,7 @@ def test_process_is_as_it_was_when_a_program_has_ended(run: Run) -> None:
 def test_loop_that_asks_for_nothing_ends_with_one_line(
     run: Run, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(watch, "SPINNING_S", 0.5)
+    monkeypatch.setattr(watchdog, "SPINNING_S", 0.5)
     code, _, _ = run("""
         import threading, time
         is_done = False
@@ -474,7 +474,7 @@ def test_loop_that_asks_for_nothing_ends_with_one_line(
 
 
 def test_thread_may_compute_while_others_wait_for_it(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(watch, "SPINNING_S", 0.05)
+    monkeypatch.setattr(watchdog, "SPINNING_S", 0.05)
     assert (
         run("""
         import threading

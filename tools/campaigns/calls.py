@@ -21,10 +21,10 @@ from tools.campaigns.runner import Campaign, Play, judge
 
 import kiks
 from kiks.clock.thinking import parse_thinking
-from kiks.learn.environments import KheperaEnv, KheperaVectorEnv
+from kiks.learn.gymnasium_envs import KheperaEnv, KheperaVectorEnv
 from kiks.model.arena import Ball, Cylinder, Lamp, Pose
 from kiks.model.project import Project, ProjectRobot
-from kiks.sim.building import simulation_of
+from kiks.sim.from_project import simulation_of
 from kiks.sim.simulation import Simulation
 
 CALLS = 100_000

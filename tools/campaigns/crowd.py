@@ -43,7 +43,7 @@ _HTTP = (
     b"GET / HTTP/1.1\r\nHost: evil.example\r\nOrigin: http://[\r\n\r\n",
     b"GET /%0d%0aSet-Cookie:a=b HTTP/1.1\r\nHost: localhost\r\nOrigin: null\r\n\r\n",
     b"GET /desk/0/feed HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-    b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nOrigin: http://127.0.0.1:99999999\r\n\r\n",
+    b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Token: AAAAAAAAAAAAAAAAAAAAAA==\r\nOrigin: http://127.0.0.1:99999999\r\n\r\n",
     b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 99999999999999\r\n\r\n" + b"x" * 10_000,
     b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nTransfer-Encoding: chunked\r\n\r\nffffffff\r\n",
     b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: -1\r\n\r\n",

@@ -34,20 +34,20 @@ from tools.campaigns.runner import Broken, Campaign, Play, judge
 
 import kiks
 from kiks.clock.thinking import save_thinking
-from kiks.desk.showing import show
+from kiks.desk.server.show import show
 from kiks.engine.code_cache import cache_folders
 from kiks.model.arena import Arena
 from kiks.model.arena_file import save_arena
 from kiks.model.kad import save_kad
-from kiks.model.network import NetworkResponse
 from kiks.model.project import Project
-from kiks.model.robot_file import save_robot
+from kiks.model.robot import save_robot
+from kiks.model.thesis_networks import NetworkResponse
 from kiks.ports.pty import PtyEndpoint
 from kiks.ports.tcp import TcpEndpoint
 from kiks.sim.simulation import Simulation
-from kiks.toolbox.exchange import Pulse
-from kiks.toolbox.host import Host
+from kiks.toolbox.framing import Pulse
 from kiks.toolbox.session import Session
+from kiks.toolbox.session_process import Host
 
 # ---- files that are being written ----
 

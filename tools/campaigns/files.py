@@ -21,18 +21,18 @@ from tools.campaigns.strange import bomb, strange_kad, strange_mat, strange_netp
 
 import kiks
 from kiks.clock.thinking import parse_thinking
-from kiks.desk.folder import decode
+from kiks.desk.server.folder import decode
 from kiks.fit.models import thesis
 from kiks.fit.samples import load_samples, nearnesses
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
 from kiks.model.arena_file import save_arena
 from kiks.model.kad import encode_kad
-from kiks.model.network import THESIS, NetworkResponse
 from kiks.model.project import Project, ProjectRobot
+from kiks.model.thesis_networks import THESIS, NetworkResponse
 from kiks.ports.pty import default_folder
-from kiks.sim.building import simulation_of
+from kiks.sim.from_project import simulation_of
 from kiks.sim.simulation import Simulation
-from kiks.toolbox.doors import Door, find_door
+from kiks.toolbox.session_files import Door, find_door
 
 CASES = 10_000
 """Mutations of each kind of file."""
@@ -366,8 +366,8 @@ def _warm() -> None:
     global _FAN
     if _FAN is not None:
         return
-    from kiks.fit.networks import PLACES
     from kiks.fit.samples import Fan
+    from kiks.fit.train_networks import PLACES
 
     drive(Simulation(_arena(), robots=2, seed=1))
     drive(simulation_of(Project(_arena(), robots=(ProjectRobot(turrets=("k213", "gripper")),), response="thesis")))

@@ -19,14 +19,14 @@ from tools.campaigns.hostile import NUMBERS, OTHERS, mutated
 from tools.campaigns.runner import SECRET, Broken, Campaign, Play, check_message, judge, place_of
 
 import kiks
-from kiks.desk.desk import Desk
-from kiks.desk.gateway import Gateway, Viewer
+from kiks.desk.server.desk import Desk
+from kiks.desk.server.gateway import Gateway, Viewer
 from kiks.errors import ParameterError
+from kiks.toolbox.preferences import Settings
 from kiks.toolbox.requests import REQUESTS, answer
 from kiks.toolbox.session import Session
-from kiks.toolbox.settings import Settings
-from kiks.toolbox.visitor import Visitor
-from kiks.toolbox.words import unescape
+from kiks.toolbox.session_client import SessionClient
+from kiks.toolbox.wire_format import unescape
 
 MESSAGES, REQUESTS_SENT = 50_000, 50_000
 """How many of both are sent."""
@@ -215,7 +215,7 @@ def _prepare_session() -> Play:
 
     def play(rng: random.Random) -> int:
         with _running() as session:
-            visitor = Visitor(session, 1)
+            visitor = SessionClient(session, 1)
             lines = ["set thinking none", "world default", "open 1 9600", *(_request(rng) for _ in range(PER_CASE))]
             for line in lines:
                 failures.last = None

@@ -11,24 +11,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kiks.batch.beginning import Beginning
-from kiks.batch.bunches import bunch_size
 from kiks.batch.callbacks import DECIDER, decider_of
+from kiks.batch.initial_state import Beginning
+from kiks.batch.kernel_args import Alone, Together, Worlds
 from kiks.batch.loop import roll_out
+from kiks.batch.loop_timing import Timing
+from kiks.batch.measure_slots import MeasureSlots
 from kiks.batch.rollouts import Rollouts
-from kiks.batch.timing import Timing
-from kiks.batch.watching import Watching
-from kiks.batch.worlds import Alone, Together, Worlds
+from kiks.batch.stepper_dispatch import bunch_size
+from kiks.control.compiled_function import address_of
 from kiks.control.controller import SENSES, Controller, check_senses
-from kiks.control.functions import address_of
 from kiks.control.measure import Measure
-from kiks.engine.rays import sight_of
 from kiks.engine.scene import enter_worlds, make_scene
+from kiks.engine.sensing.rays import sight_of
+from kiks.engine.simd.f64x8 import LANES
 from kiks.engine.state import State
-from kiks.engine.vectors import LANES
 from kiks.errors import ParameterError, counted, shown
 from kiks.model.arena import PAD, Arena
-from kiks.model.ranges import SECONDS_MAX, array_of, check_count, check_number, check_numbers
+from kiks.model.checks import SECONDS_MAX, array_of, check_count, check_number, check_numbers
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
 from kiks.units import NS_PER_S, ns_from_s
 
@@ -119,7 +119,7 @@ class Batch:
         )
         self._sensors = np.zeros((self.world_count, self.robot_count, SENSOR_COUNT * len(self.senses)))
         self._wheels = np.zeros((self.world_count, self.robot_count, 2))
-        self._watching = Watching(measures, self.senses, "the batch")
+        self._watching = MeasureSlots(measures, self.senses, "the batch")
         self.notes = np.zeros((self.world_count, self.robot_count, self._watching.note_count))
         self._is_sensed = False
         self._begin_again(np.arange(self.world_count))
@@ -156,7 +156,7 @@ class Batch:
                 "Write @kiks.controller over the function."
             )
         until_ns = ns_from_s(check_number("seconds", seconds, 0, SECONDS_MAX))
-        watching = Watching(measures, controller.senses, repr(controller.name))
+        watching = MeasureSlots(measures, controller.senses, repr(controller.name))
         given = controller.check_parameters(parameters)
         if given.ndim == 2:
             given = given[:, None, :]

@@ -17,8 +17,8 @@ from numba.core.errors import NumbaError
 from numba.np.numpy_support import from_dtype
 from numpy.typing import NDArray
 
+from kiks.control.compiled_function import address_of, caller_of
 from kiks.control.controller import Controller
-from kiks.control.functions import address_of, caller_of
 from kiks.control.measure import Measure, Moment
 from kiks.engine.compiling import kernel
 from kiks.engine.state import BODY

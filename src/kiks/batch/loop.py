@@ -1,7 +1,7 @@
 """The loop of a batch: sense, decide, act, watch, wait; for a bunch of worlds at once, again and again.
 
-A loop's instants are those of a program on serial lines (`kiks.batch.timing`), and all that happens at them is what
-happens in a `kiks.Simulation`: ticks that have begun are done, then the robot reads or obeys.
+The instants of a loop are those of a program on serial lines (`kiks.batch.loop_timing`). At each of them the same
+happens as in a `kiks.Simulation`: the ticks that have begun are done, then the robot reads or obeys.
 """
 
 from __future__ import annotations
@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from kiks.batch.bunches import command, give_back, pass_to, read, show, take
 from kiks.batch.callbacks import call_decider, call_measure
-from kiks.batch.timing import ASK_LENGTH, acts_at, answer_length, order_length
+from kiks.batch.loop_timing import ASK_LENGTH, acts_at, answer_length, order_length
+from kiks.batch.stepper_dispatch import command, give_back, pass_to, read, show, take
 from kiks.control.controller import whole_speed
 from kiks.control.measure import Moment
 from kiks.engine.compiling import entry, kernel, spliced
-from kiks.engine.lanes import borrowed, stack_booleans, stack_floats, stack_integers
-from kiks.engine.vectors import LANES
+from kiks.engine.simd.f64x8 import LANES
+from kiks.engine.simd.stack_arrays import borrowed, stack_booleans, stack_floats, stack_integers
 from kiks.model.robot import SENSOR_COUNT
 from kiks.units import NS_PER_S
 

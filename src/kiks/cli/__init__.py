@@ -23,7 +23,7 @@ from kiks.cli.serve import serve
 from kiks.cli.session import session
 from kiks.cli.warmup import warmup
 from kiks.errors import KiksError
-from kiks.ports.descriptors import raise_limit
+from kiks.ports.file_descriptors import raise_limit
 
 app = typer.Typer(
     help="KiKS Is a Khepera Simulator: programs for a real Khepera robot run on a simulated one, unchanged.",

@@ -10,7 +10,7 @@ import typer
 
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.options import written_file, written_folder
-from kiks.model.files import replace_file
+from kiks.model.atomic_files import replace_file
 
 if TYPE_CHECKING:
     from kiks.fit.accuracy import Card

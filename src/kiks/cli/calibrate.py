@@ -13,8 +13,8 @@ from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
+    from kiks.calibration.placements import Instruction, Placements
     from kiks.client.khepera import Khepera
-    from kiks.client.placements import Instruction, Placements
 
 REPEAT_MAX_MM = 2000.0
 
@@ -40,10 +40,9 @@ def calibrate(
     Example: kiks calibrate --port /dev/ttyUSB0 --out mine.toml
     """
     ready_engine()
-    from kiks.client.calibration import calibrate as measure
+    from kiks.calibration.calibrate import calibrate as measure
     from kiks.client.khepera import Khepera
-    from kiks.model.robot import RobotSpec
-    from kiks.model.robot_file import save_robot
+    from kiks.model.robot import RobotSpec, save_robot
 
     kind = RobotSpec.load(base)
     marks = None if gaps is None else parse_gaps(gaps)
@@ -79,7 +78,7 @@ class TerminalPlacements:
         """Say what is to be done and wait; return the gap that the person gives, the marked one by default [mm]."""
         from dataclasses import replace
 
-        from kiks.client.placements import Place
+        from kiks.calibration.placements import Place
 
         self.count += 1
         typer.echo(f"\n{self.count}. {instruction.text}")
@@ -111,7 +110,7 @@ def _ask_gap(question: str, default_mm: float) -> float:
 
 def hand_of(robot: Khepera) -> Placements | None:
     """Return what can move the robot: nothing but a person, unless it is simulated in this very process."""
-    from kiks.client.placements import SimPlacements
+    from kiks.calibration.placements import SimPlacements
     from kiks.ports.memory import SimPort
 
     port = robot.port

@@ -99,7 +99,7 @@ def demo(
         scene = ChampionScene(Champion.load(behaviour), given, seed=seed, baud=baud)
     work = partial(_run, scene, name, scene.seconds if seconds is None else seconds, picture)
     if desk:
-        from kiks.desk.desk import Desk
+        from kiks.desk.server.desk import Desk
 
         open_desk(Desk(scene.sim), work=work, waits=not no_wait)
     else:

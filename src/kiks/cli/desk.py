@@ -11,13 +11,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.log import show_log
-from kiks.cli.options import is_project, parse_turret, with_robots
+from kiks.cli.options import is_project, parse_turret, show_log, with_robots
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
-    from kiks.desk.desk import Desk
+    from kiks.desk.server.desk import Desk
     from kiks.model.project import Project, ProjectRobot
     from kiks.sim.simulation import Simulation
 
@@ -75,11 +74,11 @@ def desk(
     ready_engine()
     show_log(is_quiet=True)
     from kiks.cli.run import parse_words
-    from kiks.desk.desk import Desk
-    from kiks.desk.guard import LOOPBACK
+    from kiks.desk.server.access import LOOPBACK
+    from kiks.desk.server.desk import Desk
     from kiks.model.project import Project
-    from kiks.ports.process import commands_of
-    from kiks.sim.building import simulation_of
+    from kiks.ports.program_process import commands_of
+    from kiks.sim.from_project import simulation_of
 
     project = Project() if arena is None else Project.load(arena)
     home = folder or (Path(arena).parent if arena is not None and is_project(arena) else Path())
@@ -157,8 +156,7 @@ def open_desk(
         goes_on: Whether the world goes on by itself after that; else it stands still.
         programs_ended: Called with the world, locked, when its programs have ended.
     """
-    from kiks.desk.driver import Driver
-    from kiks.desk.showing import Shown
+    from kiks.desk.server.show import Driver, Shown
 
     shown = Shown(desk, host=host, port=port)
     end_as_with_ctrl_c()

@@ -67,7 +67,7 @@ def run_champion(
             tell_run(sim, doubt)
 
     if on_desk:
-        from kiks.desk.desk import Desk
+        from kiks.desk.server.desk import Desk
 
         open_desk(Desk(sim), work=work, waits=waits)
     else:

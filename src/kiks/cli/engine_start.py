@@ -40,8 +40,8 @@ def compile_everything() -> None:
     """Call every compiled function once, by way of what users call."""
     from kiks.client.khepera import Khepera
     from kiks.model.arena import Arena
-    from kiks.sim.look import proximity_from
     from kiks.sim.simulation import Simulation
+    from kiks.sim.snapshot import proximity_from
 
     sim = Simulation(Arena.box(200, 200))
     robot = Khepera(sim.port(1))

@@ -120,7 +120,7 @@ def _run(evolution: Evolution, generations: int | None, seconds: float | None, w
 
 def _finish(evolution: Evolution, folder: Path, *, stopped: bool) -> None:
     """Save the picture, and say what came of it."""
-    from kiks.learn.plots import save_plot
+    from kiks.learn.evolution_plot import save_plot
 
     champion = evolution.champion
     save_plot(evolution, folder / "fitness.png")

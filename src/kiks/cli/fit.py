@@ -54,10 +54,9 @@ def fit(
     from rich.table import Table
 
     from kiks.cli.engine_start import ready_engine
-    from kiks.fit import networks
+    from kiks.fit import train_networks
     from kiks.fit.reflection import active_pairs, fit_reflection
-    from kiks.model.robot import RobotSpec
-    from kiks.model.robot_file import save_robot
+    from kiks.model.robot import RobotSpec, save_robot
 
     ready_engine()
     tables = _tables(files, data)
@@ -69,7 +68,7 @@ def fit(
         result.add_column(column, justify="left" if column == "model" else "right")
 
     def enter(name: str, counts: Floats, expected: Floats) -> None:
-        result.add_row(name, *(f"{error:.1f}" for error in networks.errors(counts, expected)))
+        result.add_row(name, *(f"{error:.1f}" for error in train_networks.errors(counts, expected)))
         if plots is not None:
             from kiks.fit.plots import plot_errors
 
@@ -83,8 +82,8 @@ def fit(
         learn = [rig.moved(table) for rig, table in zip(found.rigs, learn, strict=True)]
         test = [rig.moved(table) for rig, table in zip(found.rigs, test, strict=True)]
         enter("default", *active_pairs(found.spec, test))
-        for size, layers in networks.SIZES.items():
-            trained = networks.train_sensors(
+        for size, layers in train_networks.SIZES.items():
+            trained = train_networks.train_sensors(
                 learn,
                 layers,
                 places=places.value,
@@ -92,13 +91,13 @@ def fit(
                 starts=starts,
                 progress=lambda sensor, size=size: status.update(f"{size}, {sensor}"),  # type: ignore[misc]
             )
-            enter(size, *networks.predictions(test, trained, places=places.value))
+            enter(size, *train_networks.predictions(test, trained, places=places.value))
     console.print(result)
     if robot is not None:
         save_robot(found.spec, robot, comment="Proximity sensors fitted to samples by `kiks fit`.")
         typer.echo(f"Robot: {robot}")
     if out is not None:
-        networks.response_of(trained, places=places.value).save(out)
+        train_networks.response_of(trained, places=places.value).save(out)
         typer.echo(f"Networks: {out}")
 
 

@@ -15,7 +15,7 @@ from kiks.errors import ParameterError, shown
 
 if TYPE_CHECKING:
     from kiks.demos.match import Match, Report
-    from kiks.ports.process import Command
+    from kiks.ports.program_process import Command
 
 SECONDS = 300.0
 """How long a match takes if nobody says otherwise [s]."""
@@ -55,7 +55,7 @@ def show_match(
 
     match = Match(SECONDS if seconds is None else seconds, seed, on_goal=tell)
     if on_desk:
-        from kiks.desk.desk import Desk
+        from kiks.desk.server.desk import Desk
 
         open_desk(Desk(match), work=partial(_play, match, players, picture), waits=waits, goes_on=False)
     else:
@@ -94,7 +94,7 @@ def player(words: str | None, robot: int, side: str) -> Command:
     """
     from kiks.cli.run import parse_words
     from kiks.demos import soccer
-    from kiks.ports.process import Command
+    from kiks.ports.program_process import Command
 
     given = [f"kiks://{robot}", side]
     if words is None:

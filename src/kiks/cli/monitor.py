@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from kiks.client.monitoring import Sample
+    from kiks.client.monitor import Sample
 
 FULL_COUNTS = 1023
 BAR_WIDTH = 10
@@ -41,7 +41,7 @@ def monitor(
     from rich.console import Console
 
     from kiks.client.khepera import Khepera
-    from kiks.client.monitoring import CsvLog, RateMeter, logged, samples
+    from kiks.client.monitor import CsvLog, RateMeter, logged, samples
 
     if port.startswith("kiks:"):
         ready_engine()

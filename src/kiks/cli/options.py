@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from kiks.errors import ParameterError, shown
-from kiks.model.files import check_writable, make_folder
+from kiks.model.atomic_files import check_writable, make_folder
 
 if TYPE_CHECKING:
     from kiks.model.arena import Arena
     from kiks.model.project import Project
     from kiks.sim.simulation import Simulation
+import logging
 
 ArenaFile = Annotated[
     str | None, typer.Option(help="Arena (.toml, .kad), picture, or project's world (.kiks); the classic box if none.")
@@ -142,7 +143,7 @@ def fit_turrets(sim: Simulation, entries: list[str] | None) -> None:
     Raises:
         ParameterError: If an entry is no turret, or names no robot.
     """
-    from kiks.sim.sites import name_of
+    from kiks.sim.turret_host import name_of
 
     for entry in entries or []:
         name, number = parse_turret(entry, sim.robot_count)
@@ -170,3 +171,17 @@ def parse_turret(entry: str, robot_count: int) -> tuple[str, int | None]:
             f"{shown(entry)}. Example: gripper=2."
         )
     return name, int(number)
+
+
+class _Lines(logging.Handler):
+    """A line on the error output for each entry."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        typer.echo(f"kiks: {self.format(record)}", err=True)
+
+
+def show_log(*, is_quiet: bool = False) -> None:
+    """Show who comes and goes, and what goes wrong; if quiet, what goes wrong alone."""
+    log = logging.getLogger("kiks")
+    log.handlers = [_Lines()]
+    log.setLevel(logging.WARNING if is_quiet else logging.INFO)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from kiks.cli.options import say, written_file
-from kiks.model.files import GrowingFile
+from kiks.model.atomic_files import GrowingFile
 
 if TYPE_CHECKING:
     from kiks.engine.state import State

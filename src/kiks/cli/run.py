@@ -14,7 +14,6 @@ from typer.core import TyperCommand
 
 from kiks.cli.desk import NoWait, WithDesk, open_desk
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.log import show_log
 from kiks.cli.options import (
     ArenaFile,
     PatienceS,
@@ -28,6 +27,7 @@ from kiks.cli.options import (
     load_arena,
     load_world,
     say,
+    show_log,
     with_robots,
     written_file,
 )
@@ -37,7 +37,7 @@ from kiks.errors import ParameterError, shown
 
 if TYPE_CHECKING:
     from kiks.clock.gate import Gate
-    from kiks.ports.process import Command
+    from kiks.ports.program_process import Command
     from kiks.ports.programs import Programs
     from kiks.sim.simulation import Simulation
 
@@ -125,10 +125,10 @@ def run(
         )
         return
     kinds = robot or []
-    from kiks.ports.process import Labels, commands_of
+    from kiks.ports.program_process import Labels, commands_of
+    from kiks.ports.program_scheduler import check_policy
     from kiks.ports.programs import Programs
-    from kiks.ports.turns import check_policy
-    from kiks.sim.building import simulation_of, thinking_of
+    from kiks.sim.from_project import simulation_of, thinking_of
 
     named = parse_words(arguments or [] if is_project(program) else [str(program), *(arguments or [])])
     project, home = load_world(str(program) if is_project(program) else arena)
@@ -207,7 +207,7 @@ def _run_on_desk(
     **options: Any,
 ) -> None:
     """Run programs in processes of their own in a world that browsers see, until Ctrl-C; `Desk` has the options."""
-    from kiks.desk.desk import Desk
+    from kiks.desk.server.desk import Desk
 
     def host_at(sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
         return host(sim, commands, new_patience=gate.patience)
@@ -244,7 +244,7 @@ def parse_words(words: list[str]) -> list[Command]:
     Raises:
         ParameterError: If the first word is no file.
     """
-    from kiks.ports.process import Command
+    from kiks.ports.program_process import Command
 
     commands: list[Command] = []
     for word in words:

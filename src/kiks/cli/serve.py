@@ -11,7 +11,6 @@ import typer
 
 from kiks.cli.desk import WithDesk
 from kiks.cli.engine_start import compile_everything, ready_engine
-from kiks.cli.log import show_log
 from kiks.cli.options import (
     ArenaFile,
     PatienceS,
@@ -22,13 +21,14 @@ from kiks.cli.options import (
     WhenSilent,
     fit_turrets,
     load_world,
+    show_log,
     with_robots,
 )
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import LinkError
 
 if TYPE_CHECKING:
-    from kiks.desk.showing import Shown
+    from kiks.desk.server.show import Shown
     from kiks.ports.endpoint import Endpoint
     from kiks.sim.simulation import Simulation
 
@@ -84,7 +84,7 @@ def serve(
     """
     from kiks.clock.patience import Patience
     from kiks.ports.server import Server
-    from kiks.sim.building import simulation_of
+    from kiks.sim.from_project import simulation_of
 
     def say(text: str) -> None:
         if not quiet:
@@ -148,8 +148,8 @@ def serve(
 
 def _show(sim: Simulation, speed: float) -> Shown:
     """Show the world in a browser; time passes there as people want it."""
-    from kiks.desk.desk import Desk
-    from kiks.desk.showing import Shown
+    from kiks.desk.server.desk import Desk
+    from kiks.desk.server.show import Shown
 
     shown = Shown(Desk(sim, speed=speed))
     typer.echo(f"The desk: {shown.url}")

@@ -11,10 +11,10 @@ from typing import Annotated
 import typer
 
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.log import show_log
+from kiks.cli.options import show_log
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import KiksError
-from kiks.toolbox.exchange import Exchange, Pulse
+from kiks.toolbox.framing import Exchange, Pulse
 
 
 def session(
@@ -46,7 +46,7 @@ def session(
     exchange = Exchange(0, sink, close=lambda: _close(0, sink), parent=os.getppid())
     try:
         if where is not None:
-            from kiks.toolbox.doors import find_door
+            from kiks.toolbox.session_files import find_door
 
             os.write(sink, find_door(where).line().encode())
         elif listen is not None:
@@ -57,8 +57,8 @@ def session(
             if join is None:
                 _serve(pulse, window, exchange=exchange)
             else:
-                from kiks.toolbox.doors import find_door
-                from kiks.toolbox.host import join as take_part
+                from kiks.toolbox.session_files import find_door
+                from kiks.toolbox.session_process import join as take_part
 
                 take_part(find_door(join), exchange, 0, sink)
     except KiksError as error:
@@ -71,13 +71,13 @@ def session(
 
 
 def _serve(pulse: Pulse, window: bool | None, *, exchange: Exchange | None = None, listen: Path | None = None) -> None:
-    from kiks.desk.screen import has_screen
-    from kiks.toolbox.doors import write_door
-    from kiks.toolbox.host import Host
+    from kiks.desk.server.show import has_screen
     from kiks.toolbox.session import Session
+    from kiks.toolbox.session_files import write_door
+    from kiks.toolbox.session_process import SessionProcess
 
     end_as_with_ctrl_c()
-    host = Host(Session(ready=ready_engine, has_window=has_screen() if window is None else window), pulse)
+    host = SessionProcess(Session(ready=ready_engine, has_window=has_screen() if window is None else window), pulse)
     try:
         if exchange is not None:
             host.speak_with(exchange)

@@ -11,7 +11,7 @@ from kiks.client.khepera import Khepera
 from kiks.client.port import Port
 from kiks.control.controller import Controller, whole_speeds
 from kiks.errors import ParameterError, shown
-from kiks.model.ranges import SECONDS_MAX, check_number
+from kiks.model.checks import SECONDS_MAX, check_number
 from kiks.model.robot import SENSOR_COUNT
 from kiks.units import ns_from_s, s_from_ns
 

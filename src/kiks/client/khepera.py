@@ -9,7 +9,7 @@ from typing import NamedTuple
 from kiks.client.port import TIMEOUT_S, Port, open_port
 from kiks.errors import LinkError, ParameterError, shown
 from kiks.firmware.receiver import LINE_LIMIT
-from kiks.model.ranges import SECONDS_MAX, check_count, check_kind, check_number
+from kiks.model.checks import SECONDS_MAX, check_count, check_kind, check_number
 from kiks.ports.port import VirtualPort
 
 ARRIVAL_MAX_S = 600.0

@@ -3,7 +3,7 @@
 Need: a person pauses a world, slows it down, or takes a robot in the hand, whoever moves that world: a program in this
 process, programs in others, a server, or nobody. None of it may change what happens otherwise.
 Method: all time passes in one place, `Simulation.advance_to`, with the simulation's lock held. While the gate is up it
-asks `admit` how far it may go. Waiting there releases the lock, so that others may look; what they want done with the
+asks `admit` how far it may go. PollCost there releases the lock, so that others may look; what they want done with the
 world is done in between, by whoever holds the lock.
 """
 

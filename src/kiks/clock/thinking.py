@@ -13,9 +13,9 @@ from time import perf_counter_ns
 from typing import Protocol
 
 from kiks.errors import ParameterError
+from kiks.model.atomic_files import replace_file
 from kiks.model.data_file import read_file
-from kiks.model.files import replace_file
-from kiks.model.policy import split_thinking
+from kiks.model.thinking_policy import split_thinking
 
 FILE_BYTES_MAX = 64 << 20
 """Most bytes of a replay file."""

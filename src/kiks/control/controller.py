@@ -12,12 +12,12 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kiks.control.functions import Compiled
-from kiks.control.recipes import recipe_of
+from kiks.control.compiled_function import Compiled
+from kiks.control.controller_spec import recipe_of
 from kiks.engine.compiling import entry, kernel
-from kiks.engine.motor import SPEED_MAX
+from kiks.engine.physics.motor import SPEED_MAX
 from kiks.errors import ParameterError, nearest, shown
-from kiks.model.ranges import check_count, check_numbers
+from kiks.model.checks import check_count, check_numbers
 from kiks.model.robot import SENSOR_COUNT
 
 SENSES = ("proximity", "ambient")

@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.control import networks
+from kiks.control import neural_nets
 from kiks.control.controller import Controller
-from kiks.control.recipes import (
+from kiks.control.controller_spec import (
     PERIOD_S,
     SPEED_LIMIT,
     TIME_CONSTANT_S,
@@ -35,8 +35,8 @@ from kiks.control.recipes import (
     relative_to,
 )
 from kiks.errors import ParameterError, shown
+from kiks.model.checks import check_count, check_kind
 from kiks.model.data_file import adapter, check
-from kiks.model.ranges import check_count, check_kind
 from kiks.model.robot import SENSOR_COUNT
 
 
@@ -246,7 +246,7 @@ def _shaped(recipe: Shape) -> Controller:
     if isinstance(recipe, Ctrnn):
         memory = recipe.neurons
         size = memory * (2 + sense_count + memory)
-        decide = networks.continuous(
+        decide = neural_nets.continuous(
             sense_count,
             memory,
             period_s=recipe.period_s,
@@ -255,15 +255,15 @@ def _shaped(recipe: Shape) -> Controller:
         )
     elif isinstance(recipe, Gru):
         memory = recipe.units
-        size = 3 * networks.layer_size(sense_count + memory, memory) + networks.layer_size(memory, 2)
-        decide = networks.gated(sense_count, memory, speed_limit=limit)
+        size = 3 * neural_nets.layer_size(sense_count + memory, memory) + neural_nets.layer_size(memory, 2)
+        decide = neural_nets.gated(sense_count, memory, speed_limit=limit)
     else:
         memory = 2 * recipe.feedback
         hidden = recipe.hidden if isinstance(recipe, Mlp) else ()
         counts = (sense_count + memory, *hidden, 2)
-        size = sum(networks.layer_size(*pair) for pair in itertools.pairwise(counts))
+        size = sum(neural_nets.layer_size(*pair) for pair in itertools.pairwise(counts))
         is_cut = isinstance(recipe, Linear)
-        decide = networks.feed_forward(counts, has_feedback=recipe.feedback, is_cut=is_cut, speed_limit=limit)
+        decide = neural_nets.feed_forward(counts, has_feedback=recipe.feedback, is_cut=is_cut, speed_limit=limit)
     decide.__name__ = decide.__qualname__ = recipe.kind
     model: Any = type(recipe)
     said = adapter(model).dump_python(recipe, mode="json")

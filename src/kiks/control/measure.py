@@ -9,10 +9,10 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from kiks.control.compiled_function import Compiled
 from kiks.control.controller import check_senses
-from kiks.control.functions import Compiled
 from kiks.errors import ParameterError, shown
-from kiks.model.ranges import check_count
+from kiks.model.checks import check_count
 
 Moment: Any = namedtuple(
     "Moment",

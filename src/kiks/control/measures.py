@@ -16,7 +16,7 @@ from kiks.control.measure import Measure, measure
 from kiks.engine.compiling import kernel
 from kiks.errors import ParameterError, shown
 from kiks.model.arena import Arena
-from kiks.model.ranges import check_number
+from kiks.model.checks import check_number
 
 FULL_SPEED = 10.0
 """Speed that counts as 1 [pulses/10 ms]: 80 mm/s, at which Floreano and Mondada's robot drove at most."""

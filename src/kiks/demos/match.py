@@ -18,7 +18,7 @@ from kiks.demos import pitch
 from kiks.engine.numbers import uniform
 from kiks.errors import ParameterError, shown
 from kiks.model.robot import RobotSpec
-from kiks.ports.process import Command
+from kiks.ports.program_process import Command
 from kiks.ports.programs import Programs
 from kiks.sim.simulation import Simulation
 from kiks.units import ns_from_s

@@ -30,7 +30,7 @@ from numba.core import serialize
 from numba.core.compiler import CompileResult
 
 from kiks.errors import ParameterError
-from kiks.model.files import replace_file
+from kiks.model.atomic_files import replace_file
 
 KERNEL_FOLDERS = ("engine", "control", "batch")
 """Folders beside one another whose files hold kernels."""
@@ -139,7 +139,7 @@ def _version() -> str:
     """Return a digest of all that machine code depends on: sources, compilers, Python, this computer's processor."""
     digest = hashlib.sha256()
     for folder in KERNEL_FOLDERS:
-        for source in sorted((Path(__file__).parent.parent / folder).glob("*.py")):
+        for source in sorted((Path(__file__).parent.parent / folder).rglob("*.py")):
             digest.update(source.read_bytes())
     processor = binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
     config: Any = numba.config

@@ -2,7 +2,7 @@
 
 Need: the mathematical library differs between systems in the last bit, and a run must not.
 Method: additions, multiplications, divisions, square roots and roundings alone, which IEEE 754 fixes to the bit.
-Sine, cosine and random numbers are for `Lanes`, too (`kiks.engine.vectors`).
+Sine, cosine and random numbers are for `Lanes`, too (`kiks.engine.simd.f64x8`).
 Random numbers are counter-based: a pure function of who asks and when, so that neither order nor threads matter.
 """
 
@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from kiks.engine.compiling import kernel
-from kiks.engine.masks import choose, everywhere, has_bit
-from kiks.engine.vectors import floor
-from kiks.engine.words import number, word
+from kiks.engine.simd.f64x8 import floor
+from kiks.engine.simd.masks import choose, everywhere, has_bit
+from kiks.engine.simd.u64x8 import number, word
 
 # Pi/2 and ln 2 in two parts: the first has 33 bits, so that its product with a count below 2^20 is exact.
 _HALF_PI_HIGH = 1.5707963267341256

@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.engine.networks import NETWORK_RESPONSES, TABLE_LEVELS
 from kiks.engine.numbers import exponential, logarithm, power, sin_cos
-from kiks.engine.vectors import LANES
-from kiks.model.network import BODY_RADIUS_MM, NetworkResponse
+from kiks.engine.sensing.thesis_networks import NETWORK_RESPONSES, TABLE_LEVELS
+from kiks.engine.simd.f64x8 import LANES
 from kiks.model.robot import (
     AMBIENT_MODELS,
     JITTER_POINT_LIMIT,
@@ -26,6 +25,7 @@ from kiks.model.robot import (
     Reflection,
     RobotSpec,
 )
+from kiks.model.thesis_networks import BODY_RADIUS_MM, NetworkResponse
 from kiks.units import TICK_NS
 
 RAY_COUNT = 7

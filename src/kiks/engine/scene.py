@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.engine.compiling import entry, kernel
+from kiks.engine.simd.f64x8 import floor
 from kiks.engine.state import TRAIL_LENGTH, State
-from kiks.engine.vectors import floor
 from kiks.units import TICK_NS
 
 SQUARE_MM = 64.0

@@ -75,7 +75,7 @@ ROBOT = np.dtype(
         ("camera_light", "i4"),
         ("camera_taken_ns", "i8"),
         ("camera_pixels", "u1", (PIXEL_COUNT,)),
-        # The gripper, where one is fitted (`kiks.engine.gripper`).
+        # The gripper, where one is fitted (`kiks.engine.physics.gripper`).
         ("arm_target", "f8"),
         ("arm", "f8"),  # 255 down in front, 127 upright, 0 folded back
         ("jaws", "f8"),  # 200 open, 0 closed

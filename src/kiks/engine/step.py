@@ -4,23 +4,23 @@ from __future__ import annotations
 
 from typing import Any
 
-from kiks.engine.bodies import remember_place
-from kiks.engine.company import make_room, move_together
 from kiks.engine.compiling import entry, inlined, kernel
-from kiks.engine.eights import (
+from kiks.engine.physics.balls import remember_place
+from kiks.engine.physics.collisions import make_room, move_together
+from kiks.engine.physics.grasp import carry_lifted
+from kiks.engine.physics.gripper import move_gripper, tend_grippers
+from kiks.engine.physics.motion import draw_slip, move, note_contact, remember_pose
+from kiks.engine.physics.motor import control_motors, latch_encoders, turn_motors
+from kiks.engine.scene import count_discs, enter_all
+from kiks.engine.simd.masks import anywhere, everywhere, opposite
+from kiks.engine.simd.records import (
     EIGHT,
-    copy_eight,
+    copy_record8,
     only,
-    open_eight,
+    open_record8,
     put_back,
     stack_record,
 )
-from kiks.engine.gripper import move_gripper, tend_grippers
-from kiks.engine.hold import carry_lifted
-from kiks.engine.masks import anywhere, everywhere, opposite
-from kiks.engine.motion import draw_slip, move, note_contact, remember_pose
-from kiks.engine.motor import control_motors, latch_encoders, turn_motors
-from kiks.engine.scene import count_discs, enter_all
 
 
 @entry
@@ -68,13 +68,13 @@ def advance_eight(eight: Any, parameters: Any, ground: Any, seeds: Any, until: A
     """Let time pass in eight worlds of one robot each.
 
     Args:
-        eight: The robots, an `Eight` of `EIGHT`.
-        parameters: Their constants, an `Eight` of `EIGHT_KINDS`.
+        eight: The robots, an `Record8` of `EIGHT`.
+        parameters: Their constants, an `Record8` of `EIGHT_KINDS`.
         ground: The arena, as in `advance`.
         seeds: Seeds of the eight worlds, `Words`; each is the first world of its seed.
         until: Number of ticks after which each is to stand, `Lanes`; who has done as many does none.
     """
-    before = open_eight(stack_record(EIGHT))
+    before = open_record8(stack_record(EIGHT))
     while True:
         now = eight.tick_count
         is_due = now < until
@@ -82,7 +82,7 @@ def advance_eight(eight: Any, parameters: Any, ground: Any, seeds: Any, until: A
             break
         # Some are done before the others for a tick or two: putting them back costs less than asking at each number.
         if not everywhere(is_due):
-            copy_eight(eight, before)
+            copy_record8(eight, before)
         advance_alone(eight, parameters, ground, (seeds, 0, 0, now))
         eight.tick_count = now + 1.0
         if not everywhere(is_due):

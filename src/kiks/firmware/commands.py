@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kiks.engine import motor
+from kiks.engine.physics import motor
 
 if TYPE_CHECKING:
     from kiks.firmware.khepera import Firmware

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from kiks.firmware.turret import Shape, Turret
-from kiks.model.ranges import check_count, check_number
+from kiks.model.checks import check_count, check_number
 
 ADDRESS = 32
 """Its place on the extension bus (khepera-protocol.md 10.1)."""

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-from kiks.engine.gripper import ARM_MAX, ARM_START, GAP_MM, GAP_PER_STEP, JAW_LENGTH_MM, JAWS_MAX
-from kiks.engine.probe import turn_to
+from kiks.engine.physics.gripper import ARM_MAX, ARM_START, GAP_MM, GAP_PER_STEP, JAW_LENGTH_MM, JAWS_MAX
+from kiks.engine.sensing.range_finder import turn_to
 from kiks.firmware.turret import Orders, Shape, Site, Turret, Values
 
 BARRIER_BROKEN = 255

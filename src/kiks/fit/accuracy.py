@@ -3,7 +3,7 @@
 Only active cells count, those with a measured reading between 20 and 1000: below is noise, above saturation. Models and
 poses were fitted to angles with an even index at most; those with an odd one, the held-out half, were never seen.
 
-Every figure is there for two sets of poses, the same for all models: those that were found for the rig (`kiks.fit.rig`)
+Every figure is given for two sets of poses, the same for all models: those found for the rig (`kiks.fit.reflection`)
 and, with `told` in its name, those of the tables.
 """
 
@@ -21,8 +21,7 @@ from numpy.typing import NDArray
 
 from kiks.errors import ParameterError
 from kiks.fit.models import MODELS
-from kiks.fit.reflection import active_pairs, find_rigs, fit_reflection
-from kiks.fit.rig import Rig
+from kiks.fit.reflection import Rig, active_pairs, find_rigs, fit_reflection
 from kiks.fit.samples import ACTIVE_COUNTS, MAXIMUM_COUNTS, Floats, Samples, is_active, load_samples
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
 

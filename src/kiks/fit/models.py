@@ -11,11 +11,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from kiks.engine import networks
-from kiks.fit.networks import PLACES, fan_of
+from kiks.engine.sensing import thesis_networks
 from kiks.fit.samples import BODY_RADIUS_MM, MAXIMUM_COUNTS, Fan, Floats, Samples, nearnesses, ray_lengths_mm
-from kiks.model.network import NetworkResponse
+from kiks.fit.train_networks import PLACES, fan_of
 from kiks.model.robot import SENSOR_COUNT
+from kiks.model.thesis_networks import NetworkResponse
 
 Model = Callable[[Samples], Floats]
 
@@ -33,8 +33,8 @@ def default(samples: Samples, response: str | None = None) -> Floats:
         response: What makes counts of its rays; that of its file if left out.
     """
     from kiks.model.arena import Arena
-    from kiks.sim.look import proximity_from
     from kiks.sim.simulation import Simulation
+    from kiks.sim.snapshot import proximity_from
 
     side_mm = 2 * (BODY_RADIUS_MM + float(samples.gap_mm.max()) + _ROOM_MM)
     cells = math.ceil(side_mm / _CELL_MM)
@@ -58,8 +58,8 @@ def thesis(samples: Samples, response: NetworkResponse | None = None) -> Floats:
     response = response or NetworkResponse.load()
     seen = nearnesses(samples, fan_of(response))
     counts = np.empty(samples.counts.shape, np.float64)
-    packed = networks.pack_networks(response)
-    networks.respond_networks(packed, seen.reshape(-1, *seen.shape[2:]), counts.reshape(-1, SENSOR_COUNT))
+    packed = thesis_networks.pack_networks(response)
+    thesis_networks.respond_networks(packed, seen.reshape(-1, *seen.shape[2:]), counts.reshape(-1, SENSOR_COUNT))
     return counts
 
 
@@ -68,8 +68,8 @@ def fast(samples: Samples) -> Floats:
     response = NetworkResponse.load()
     seen = nearnesses(samples, fan_of(response))
     counts = np.empty(samples.counts.shape, np.float64)
-    table = networks.networks_for("fast")["table"][0]
-    networks.respond_table(table, seen.reshape(-1, *seen.shape[2:]), counts.reshape(-1, SENSOR_COUNT))
+    table = thesis_networks.networks_for("fast")["table"][0]
+    thesis_networks.respond_table(table, seen.reshape(-1, *seen.shape[2:]), counts.reshape(-1, SENSOR_COUNT))
     return counts
 
 

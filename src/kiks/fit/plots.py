@@ -10,7 +10,7 @@ import numpy as np
 
 from kiks.errors import ParameterError, installing
 from kiks.fit.samples import MAXIMUM_COUNTS, Floats, is_active
-from kiks.model.files import make_folder, replace_file
+from kiks.model.atomic_files import make_folder, replace_file
 from kiks.model.robot import SENSOR_COUNT
 
 if TYPE_CHECKING:

@@ -3,7 +3,7 @@
 Need: places, directions, light, thresholds and lobes of eight sensors, and four constants that they share
 (`kiks.model.robot.Reflection`), from sweeps at several gaps from walls and round posts.
 
-Assumption: the tables' poses are nearly right. How each sweep differed (`kiks.fit.rig`) is found together with the
+Assumption: the poses of the tables are nearly right. How each sweep differed (`Rig`) is found together with the
 robot; else its errors, which are larger than the sensors' noise, would be taken for properties of the sensors.
 
 Method: robust least squares (soft L1), all tables at once. No reading depends on another sensor's or another sweep's
@@ -20,11 +20,38 @@ from typing import Any
 import numpy as np
 
 from kiks.engine.parameters import RAY_COUNT, pack, ray_offsets_deg
-from kiks.engine.responses import respond_all
+from kiks.engine.sensing.responses import respond_all
 from kiks.errors import ParameterError
-from kiks.fit.rig import Rig
 from kiks.fit.samples import Fan, Floats, Samples, is_active, meet
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
+
+
+@dataclass(frozen=True, eq=False)
+class Rig:
+    """How each sweep differed from what its table says.
+
+    Args:
+        gap_mm: How much wider the gap was [mm], shape [gaps].
+        angle_deg: How much larger the angle was half way round [deg], shape [gaps].
+        turn_deg: How much farther than once around the robot went [deg], shape [gaps].
+    """
+
+    gap_mm: Floats
+    angle_deg: Floats
+    turn_deg: Floats
+
+    @classmethod
+    def exact(cls, gap_count: int) -> Rig:
+        """Return the rig whose tables are right."""
+        return cls(*np.zeros((3, gap_count)))
+
+    def moved(self, samples: Samples) -> Samples:
+        """Return the samples with the poses at which they were really taken."""
+        # The angle grows by about one turn from the first column of a sweep to the last.
+        share = samples.angle_deg / 360.0 - 0.5
+        angle_deg = samples.angle_deg + self.angle_deg[:, None] + self.turn_deg[:, None] * share
+        return replace(samples, gap_mm=samples.gap_mm + self.gap_mm, angle_deg=angle_deg)
+
 
 ERROR_COUNTS = 30.0
 """About what a reading is off from a smooth curve along the angle (README of the samples) [counts]."""

@@ -25,9 +25,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.errors import ParameterError, shown
-from kiks.model.arrays import Numbers, read_arrays
+from kiks.model.array_checks import Numbers, read_arrays
+from kiks.model.atomic_files import path_of
 from kiks.model.data_file import COORDINATE_MAX, read_file
-from kiks.model.files import path_of
 from kiks.model.raster import is_number
 from kiks.model.robot import SENSOR_COUNT
 

@@ -10,16 +10,16 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field
 
 import kiks
-from kiks.batch.timing import Baud, Timing
+from kiks.batch.loop_timing import Baud, Timing
 from kiks.client.drive import Driver, drive
 from kiks.client.port import Port
 from kiks.control.controller import Controller
+from kiks.control.controller_spec import Recipe
 from kiks.control.controllers import controller_of, recipe_for
-from kiks.control.recipes import Recipe
 from kiks.model.arena import Arena
 from kiks.model.arena_file import quoted
+from kiks.model.atomic_files import path_of, replace_files
 from kiks.model.data_file import Number, Text, Whole, as_list, check, parse_toml, read_file, record
-from kiks.model.files import path_of, replace_files
 from kiks.sim.simulation import Simulation
 
 FORMAT = 1

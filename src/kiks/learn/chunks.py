@@ -1,6 +1,6 @@
 """How a generation is cut into chunks: large enough to be worth the way, small enough that all workers end together.
 
-Chunks never show in results: values follow from parameters and seed alone (`Work`).
+Chunks never show in results: values follow from parameters and seed alone (`Evaluation`).
 """
 
 from __future__ import annotations

@@ -19,10 +19,10 @@ import kiks
 from kiks.errors import ParameterError, shown
 from kiks.learn.algorithms import make_algorithm
 from kiks.learn.champion import Champion
+from kiks.learn.evolution_log import Folder, Generation, Identity
 from kiks.learn.executors import Executor, executor_for
-from kiks.learn.records import Folder, Generation, Identity
 from kiks.learn.task import Task
-from kiks.model.ranges import check_count, check_kind, check_number, check_numbers
+from kiks.model.checks import check_count, check_kind, check_number, check_numbers
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -9,13 +9,13 @@ from typing import Self
 import numpy as np
 
 from kiks.errors import ParameterError, WorkError, nearest, shown
-from kiks.learn.work import Floats, Integers, Raised, Ready, Work, Worker, check_candidates
-from kiks.model.ranges import check_kind
+from kiks.learn.evaluation import Evaluation, Floats, Integers, Raised, Ready, Worker, check_candidates
+from kiks.model.checks import check_kind
 
 KINDS = ("threads", "processes", "ray")
 
 
-def executor_for(where: str, work: Work) -> Executor:
+def executor_for(where: str, work: Evaluation) -> Executor:
     """Return an executor for one work, to be used in a `with` statement.
 
     Args:
@@ -41,7 +41,7 @@ def executor_for(where: str, work: Work) -> Executor:
     """
     check_kind("the place of evaluations", where, str, "Usual: 'threads'.")
     if not callable(getattr(work, "evaluate", None)):
-        raise ParameterError(f"work must be a kiks.Task, or another Work, but it was {shown(work)}.")
+        raise ParameterError(f"work must be a kiks.Task, or another Evaluation, but it was {shown(work)}.")
     kind, colon, detail = where.partition(":")
     if kind not in KINDS or (colon and not detail):
         raise ParameterError(
@@ -50,7 +50,7 @@ def executor_for(where: str, work: Work) -> Executor:
         )
     if kind == "threads":
         return ThreadsExecutor(work, thread_count=_count(where, detail))
-    from kiks.learn.crew import CrewExecutor
+    from kiks.learn.worker_pool import CrewExecutor
 
     if kind == "processes":
         from kiks.learn.processes import ProcessCrew
@@ -133,7 +133,7 @@ class ThreadsExecutor(Executor):
         thread_count: How many threads it may use.
     """
 
-    def __init__(self, work: Work, *, thread_count: int) -> None:
+    def __init__(self, work: Evaluation, *, thread_count: int) -> None:
         super().__init__()
         self._worker = Worker(lambda: work, threads=thread_count)
 
@@ -154,6 +154,6 @@ class ThreadsExecutor(Executor):
 
 def work_error(where: str, raised: Raised) -> WorkError:
     """Return the error for work that raised in `where`, with the worker's traceback as a note."""
-    error = WorkError(f"Work must not raise, but its {where} raised {raised.what}")
+    error = WorkError(f"Evaluation must not raise, but its {where} raised {raised.what}")
     error.add_note(f"In the worker:\n{raised.story}")
     return error

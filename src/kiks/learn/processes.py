@@ -18,21 +18,21 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 
 from kiks.errors import ParameterError
-from kiks.learn.work import Answer, Floats, Integers, Lost, Ready, Work, Worker
+from kiks.learn.evaluation import Answer, Evaluation, Floats, Integers, Lost, Ready, Worker
 
 PATIENCE_S = 5.0
 """How long a worker may take to end by itself [s]."""
 
 
 class ProcessCrew:
-    """A crew of processes (`Crew`).
+    """A crew of processes (`WorkerPool`).
 
     Args:
         work: What evaluates candidates.
         worker_count: How many processes.
     """
 
-    def __init__(self, work: Work, *, worker_count: int) -> None:
+    def __init__(self, work: Evaluation, *, worker_count: int) -> None:
         self._work = work
         self._worker_count = worker_count
         self._workers: dict[int, _Process] = {}
@@ -49,8 +49,8 @@ class ProcessCrew:
             self._pickled = pickle.dumps(self._work, protocol=pickle.HIGHEST_PROTOCOL)
         except Exception as error:
             raise ParameterError(
-                f"Work must be picklable to run in processes, but {type(self._work).__name__} is not: {error}. Build"
-                " what cannot be pickled in prepare(), and define classes and functions at the top of a module."
+                f"Evaluations must be picklable to run in processes, but {type(self._work).__name__} is not: {error}."
+                " Build what cannot be pickled in prepare(), and define classes and functions at the top of a module."
             ) from error
         self.muster()
 

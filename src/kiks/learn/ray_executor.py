@@ -20,7 +20,7 @@ from typing import Any
 
 import kiks
 from kiks.errors import ParameterError, installing
-from kiks.learn.work import Answer, Floats, Integers, Lost, Raised, Ready, Values, Work, Worker
+from kiks.learn.evaluation import Answer, Evaluation, Floats, Integers, Lost, Raised, Ready, Values, Worker
 
 _log = logging.getLogger("kiks.learn")
 
@@ -34,7 +34,7 @@ CONNECT_S = 60.0
 
 
 class RayCrew:
-    """A crew of actors (`Crew`).
+    """A crew of actors (`WorkerPool`).
 
     Args:
         work: What evaluates candidates.
@@ -42,7 +42,7 @@ class RayCrew:
             program is connected to, else for one of its own on this computer, for as long as the crew is open.
     """
 
-    def __init__(self, work: Work, *, address: str | None) -> None:
+    def __init__(self, work: Evaluation, *, address: str | None) -> None:
         self._work = work
         self._address = address
         self._ray: Any = None
@@ -64,8 +64,8 @@ class RayCrew:
             pickled = ray.cloudpickle.dumps(self._work)
         except Exception as error:
             raise ParameterError(
-                f"Work must be picklable to run on a cluster, but {type(self._work).__name__} is not: {error}. Build"
-                " what cannot be pickled in prepare()."
+                f"Evaluations must be picklable to run on a cluster, but {type(self._work).__name__} is not: {error}."
+                " Build what cannot be pickled in prepare()."
             ) from error
         self._connect()
         try:

@@ -13,15 +13,15 @@ import numpy as np
 from pydantic import Field
 
 from kiks.batch.batch import Batch
-from kiks.batch.beginning import Arenas, Starts, random_starts
-from kiks.batch.timing import Timing
+from kiks.batch.initial_state import Arenas, Starts, random_starts
+from kiks.batch.loop_timing import Timing
 from kiks.control.controller import Controller
 from kiks.control.measure import Measure
 from kiks.errors import ParameterError, shown
-from kiks.learn.work import Floats, Integers, check_candidates
+from kiks.learn.evaluation import Floats, Integers, check_candidates
 from kiks.model.arena import AnArena
+from kiks.model.checks import check_number
 from kiks.model.data_file import Number, Text, Whole, read_file, record
-from kiks.model.ranges import check_number
 from kiks.model.robot import RobotSpec
 
 Fitness = Callable[[Mapping[str, Floats]], Floats]
@@ -66,7 +66,7 @@ class Axis:
 
 @record
 class Task:
-    """A task that controllers are evolved for: a `kiks.learn.work.Work`.
+    """A task that controllers are evolved for: a `kiks.learn.evaluation.Work`.
 
     A candidate, that is a controller's parameters, drives in `worlds` worlds, which the arenas share evenly. What is
     measured there, on average over a world's robots, becomes one number, its fitness.

@@ -8,17 +8,17 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from kiks.batch.beginning import Starts
-from kiks.batch.timing import Milliseconds
+from kiks.batch.initial_state import Starts
+from kiks.batch.loop_timing import Milliseconds
 from kiks.control.controller import Controller
+from kiks.control.controller_spec import Recipe
 from kiks.control.controllers import controller_of
-from kiks.control.recipes import Recipe
 from kiks.errors import KiksError, ParameterError
 from kiks.learn.task import ROBOTS_MAX, WORLDS_MAX, Seconds, Task
 from kiks.learn.tasks import TASKS
 from kiks.model.arena import Arena
+from kiks.model.atomic_files import inside
 from kiks.model.data_file import OneOf, Rule, Text, Whole, check, parse_toml, read_file, record
-from kiks.model.files import inside
 from kiks.model.robot import robot_names
 
 Name = Annotated[

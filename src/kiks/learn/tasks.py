@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from kiks.control import controllers, measures
 from kiks.control.controller import Controller
-from kiks.control.recipes import module_in
+from kiks.control.controller_spec import module_in
 from kiks.errors import ParameterError, nearest, shown
-from kiks.learn import mazes, rooms
+from kiks.learn import mazes, training_arenas
 from kiks.learn.task import Axis, Task, cautious_mean
 from kiks.model.arena import Arena, Cylinder, Lamp
-from kiks.model.files import path_of
+from kiks.model.atomic_files import path_of
 
 Floats = NDArray[np.float64]
 Values = Mapping[str, Floats]
@@ -56,14 +56,14 @@ def avoid(controller: Controller | None = None, **changes: Any) -> Task:
     """
     task = Task(
         "avoid",
-        (rooms.pillars(), rooms.corridors(), rooms.wedges()),
+        (training_arenas.pillars(), training_arenas.corridors(), training_arenas.wedges()),
         controllers.linear(speed_limit=SPEED_LIMIT) if controller is None else controller,
         (measures.avoidance, measures.roaming, measures.contacts, measures.path_mm, measures.straightness),
         fitness=avoid_fitness,
         seconds=20.0,
         worlds=12,
         axes=(Axis("path_mm", 0, 1500), Axis("straightness", 0, 1)),
-        exam=rooms.unseen(),
+        exam=training_arenas.unseen(),
         about="drive fast, straight and about, touch nothing",
     )
     return replace(task, **changes)
@@ -86,14 +86,14 @@ def follow(controller: Controller | None = None, **changes: Any) -> Task:
     """
     task = Task(
         "follow",
-        (rooms.follow_box(), rooms.corridors(), rooms.wedges()),
+        (training_arenas.follow_box(), training_arenas.corridors(), training_arenas.wedges()),
         controllers.mlp(hidden=(4,), speed_limit=SPEED_LIMIT) if controller is None else controller,
         (measures.wall_following("left"), measures.contacts, measures.path_mm, measures.straightness),
         fitness=follow_fitness,
         seconds=40.0,
         worlds=12,
         axes=(Axis("path_mm", 0, 3000), Axis("wall_following", 0, 1)),
-        exam=rooms.unseen(),
+        exam=training_arenas.unseen(),
         about="drive along walls, on the robot's left",
     )
     return replace(task, **changes)
@@ -117,14 +117,18 @@ def light(controller: Controller | None = None, **changes: Any) -> Task:
     usual = controllers.mlp(hidden=(4,), senses=("proximity", "ambient"), speed_limit=SPEED_LIMIT)
     task = Task(
         "light",
-        (_lit(rooms.pillars(), 200, 300), _lit(rooms.wedges(), 300, 300), _lit(rooms.corridors(), 400, 400)),
+        (
+            _lit(training_arenas.pillars(), 200, 300),
+            _lit(training_arenas.wedges(), 300, 300),
+            _lit(training_arenas.corridors(), 400, 400),
+        ),
         usual if controller is None else controller,
         (measures.near_light_share(100.0), measures.light_mm, measures.contacts, measures.path_mm),
         fitness=light_fitness,
         seconds=40.0,
         worlds=12,
         axes=(Axis("light_mm", 0, 600), Axis("path_mm", 0, 3000)),
-        exam=_lit(rooms.unseen(), 550, 320),
+        exam=_lit(training_arenas.unseen(), 550, 320),
         about="go to the lamp and stay with it",
     )
     return replace(task, **changes)

@@ -16,12 +16,12 @@ import numpy.typing as npt
 from pydantic import InstanceOf
 
 from kiks.errors import ArenaError, ParameterError, counted, shown
+from kiks.model.arena_objects import Ball, Cylinder, Lamp, Pose, checked_places
+from kiks.model.atomic_files import path_of
 from kiks.model.box import Box
+from kiks.model.checks import check_number
 from kiks.model.data_file import Rule
-from kiks.model.files import path_of
 from kiks.model.maze import draw_maze
-from kiks.model.places import Ball, Cylinder, Lamp, Pose, checked_places
-from kiks.model.ranges import check_number
 from kiks.model.raster import (
     MAX_CELLS,
     PAD,

@@ -9,8 +9,8 @@ import numpy.typing as npt
 from pydantic import BeforeValidator, Field
 
 from kiks.errors import ParameterError
+from kiks.model.arena_objects import Brightness
 from kiks.model.data_file import Whole, record
-from kiks.model.places import Brightness
 from kiks.model.raster import cells_per_pixel
 
 

@@ -3,7 +3,7 @@
 Source: kiks-behaviour.md, section 5. `walls` is width and height [mm], then for each piece: a count n of corners, their
 n columns and n rows, counted from 1 with row 1 on top and both ends included, and a grey. What else an arena has is in
 variables that the Matlab KiKS does not ask for: `starts`, `lamps`, `balls` and `cylinders`, a row for each, in the
-order of the fields of `kiks.model.places` and with y upwards.
+order of the fields of `kiks.model.arena_objects` and with y upwards.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ import numpy.typing as npt
 
 from kiks.errors import ArenaError, KiksError, shown
 from kiks.model.arena import Arena
-from kiks.model.arrays import Numbers, check_array
+from kiks.model.arena_objects import Ball, Cylinder, Lamp, Pose
+from kiks.model.array_checks import Numbers, check_array
+from kiks.model.atomic_files import path_of, replace_file
 from kiks.model.data_file import COORDINATE_MAX, read_file
-from kiks.model.files import path_of, replace_file
-from kiks.model.mat import FILE_BYTES_MAX, read_numbers
-from kiks.model.places import Ball, Cylinder, Lamp, Pose
+from kiks.model.mat5 import FILE_BYTES_MAX, read_numbers
 from kiks.model.raster import cells_per_pixel
 
 PIECES_MAX = 200_000

@@ -16,8 +16,8 @@ from itertools import count, product
 import numpy as np
 import numpy.typing as npt
 
-from kiks.model.places import Lamp, Pose
-from kiks.model.ranges import check_count
+from kiks.model.arena_objects import Lamp, Pose
+from kiks.model.checks import check_count
 from kiks.model.raster import cells_per_pixel
 
 SIDE_MAX = 100

@@ -25,6 +25,7 @@ from kiks.model.arena_file import (
     places_of,
     quoted,
 )
+from kiks.model.atomic_files import check_relative, path_of, replace_file
 from kiks.model.data_file import (
     Number,
     OneOf,
@@ -38,10 +39,9 @@ from kiks.model.data_file import (
     read_file,
     record,
 )
-from kiks.model.files import check_relative, path_of, replace_file
-from kiks.model.policy import split_thinking
 from kiks.model.raster_text import box_keys_of, raster_of_text, raster_text
 from kiks.model.robot import Baud, Brightness, Response, robot_names
+from kiks.model.thinking_policy import split_thinking
 
 FILE_BYTES_MAX = 96 << 20
 """Most bytes of a project file."""

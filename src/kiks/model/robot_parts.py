@@ -14,7 +14,7 @@ SENSOR_COUNT = 8
 """Infra-red sensors of a Khepera, clockwise from the left side (khepera-protocol.md 4.14)."""
 
 RESPONSES = ("reflection", "thesis", "fast", "standin", "curve")
-"""What makes counts of a sensor's rays (`kiks.engine.responses`)."""
+"""What makes counts of a sensor's rays (`kiks.engine.sensing.responses`)."""
 
 JITTER_POINT_LIMIT = 51
 """Most points of the distribution of the jitter."""

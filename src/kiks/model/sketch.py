@@ -14,12 +14,12 @@ import numpy.typing as npt
 
 from kiks.errors import ArenaError, KiksError, ParameterError, shown
 from kiks.model.arena import Arena
+from kiks.model.arena_objects import Ball, Cylinder, Lamp, Pose, checked_places
 from kiks.model.brush import Area, Point, rectangle_cells, stroke_cells
+from kiks.model.free_disc import OVERLAP_MM, free_place, room_mm
 from kiks.model.materials import brightness_of
 from kiks.model.picture import decode_picture
-from kiks.model.places import Ball, Cylinder, Lamp, Pose, checked_places
 from kiks.model.raster import is_number
-from kiks.model.room import OVERLAP_MM, free_place, room_mm
 from kiks.model.sketch_history import BoxPatch, Canvas, History, Patch, ThingPatch, WholePatch
 from kiks.model.sketch_things import (
     AnyThing,

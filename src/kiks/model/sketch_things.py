@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import NamedTuple, TypeVar
 
-from kiks.model.places import Ball, Cylinder, Lamp
+from kiks.model.arena_objects import Ball, Cylinder, Lamp
+from kiks.model.free_disc import OVERLAP_MM
 from kiks.model.robot import RobotSpec
-from kiks.model.room import OVERLAP_MM
 
 
 class SketchRobot(NamedTuple):

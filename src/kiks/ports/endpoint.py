@@ -8,7 +8,7 @@ from __future__ import annotations
 import logging
 from abc import ABC, abstractmethod
 
-from kiks.clock.line import OUTPUT_LIMIT
+from kiks.clock.serial_timing import OUTPUT_LIMIT
 
 READ_SIZE = 4096
 """Most characters taken from a client at once [bytes]."""

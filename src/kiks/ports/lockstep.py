@@ -2,7 +2,7 @@
 
 A command acts the thinking time after the reply before it, and the program waits until its own reply is there. How the
 operating system cuts the bytes, and how long a program really took, has no influence; how several programs share the
-world stands in `turns.py`.
+world stands in `program_scheduler.py`.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ import logging
 import re
 from collections.abc import Callable, Iterable
 
-from kiks.clock.line import BACKLOG_LIMIT
 from kiks.clock.patience import Patience
-from kiks.ports.timing import IDLE_S, Link
-from kiks.ports.turns import PATIENCE_S, Player, Turns
+from kiks.clock.serial_timing import BACKLOG_LIMIT
+from kiks.ports.live import IDLE_S, Link
+from kiks.ports.program_scheduler import PATIENCE_S, Participant, ProgramScheduler
 from kiks.sim.simulation import Simulation
 from kiks.units import NS_PER_S
 
@@ -63,7 +63,7 @@ class Lockstep:
         self._sim = sim
         self._thinking_ns = thinking_ns
         self._clients: dict[int, Client] = {}
-        self._turns = Turns(
+        self._scheduler = ProgramScheduler(
             sim,
             expected=programs,
             missing=missing,
@@ -78,8 +78,8 @@ class Lockstep:
 
     def enter(self, link: Link) -> None:
         """Let a client take part from now on."""
-        client = self._clients[link.robot] = Client(link, self._sim, self._turns, self._thinking_ns)
-        self._turns.join(client)
+        client = self._clients[link.robot] = Client(link, self._sim, self._scheduler, self._thinking_ns)
+        self._scheduler.join(client)
 
     def leave(self, link: Link) -> None:
         """Let the commands that a client has left behind act; `has_left` when they have."""
@@ -91,7 +91,7 @@ class Lockstep:
 
     def advance(self, links: Iterable[Link]) -> float:
         """Carry out the commands whose turn it is, and hand over their replies."""
-        wait_s = self._turns.advance()
+        wait_s = self._scheduler.advance()
         return IDLE_S if wait_s is None else min(wait_s, IDLE_S)
 
     def receive(self, link: Link, data: bytes) -> None:
@@ -103,14 +103,14 @@ class Lockstep:
         return self._clients[link.robot].is_full
 
 
-class Client(Player):
+class Client(Participant):
     """The client of a link, as one that takes its turn."""
 
-    def __init__(self, link: Link, sim: Simulation, turns: Turns, thinking_ns: int) -> None:
+    def __init__(self, link: Link, sim: Simulation, scheduler: ProgramScheduler, thinking_ns: int) -> None:
         super().__init__(f"the client of robot {link.robot}", link.robot)
         self._link = link
         self._sim = sim
-        self._turns = turns
+        self._scheduler = scheduler
         self._thinking_ns = thinking_ns
         self._kept = bytearray()
         self._next = b""
@@ -188,7 +188,7 @@ class Client(Player):
             if self._link.channel is not None:
                 self._link.channel.write(reply)
         self.waits = False
-        self._turns.see(end_ns)
+        self._scheduler.see(end_ns)
         self._go_on(end_ns)
 
     # ---- inside ----

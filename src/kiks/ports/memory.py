@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from kiks.clock.line import BACKLOG_LIMIT
+from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import SHOWN_MAX, LinkError, shown
-from kiks.model.ranges import check_kind
+from kiks.model.checks import check_kind
 from kiks.ports.port import VirtualPort
-from kiks.ports.reading import NEVER_NS, Read, end_of_read, end_of_wait, is_complete, never_ends
+from kiks.ports.read_completion import NEVER_NS, Read, end_of_read, end_of_wait, is_complete, never_ends
 
 if TYPE_CHECKING:
     from kiks.sim.simulation import Simulation

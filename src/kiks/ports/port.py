@@ -1,8 +1,8 @@
 """A serial port in simulated time: what a program sees of it, wherever the simulation runs.
 
-It has the methods of a pyserial port, so that a program cannot tell the difference. What lies between it and the robot
-is its line: in this process (`memory.py`) or in the one that runs several programs (`far.py`). The port knows what a
-program's thinking, asking and waiting cost; the line lets that time pass and carries the characters.
+It has the methods of a pyserial port, so a program cannot tell the difference. Between it and the robot lies its line:
+in this process (`memory.py`) or in the one that runs several programs (`remote_link.py`). The port knows what thinking,
+polling and waiting cost a program; the line lets that time pass and carries the characters.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from contextlib import AbstractContextManager
 from operator import index
 from typing import Any, Protocol
 
-from kiks.clock.program import Program
+from kiks.clock.program_clock import ProgramClock
 from kiks.errors import ParameterError, shown
-from kiks.model.ranges import SECONDS_MAX, check_count, check_number
-from kiks.ports.reading import Read
+from kiks.model.checks import SECONDS_MAX, check_count, check_number
+from kiks.ports.read_completion import Read
 from kiks.units import ns_from_s, s_from_ns, wait_ns
 
 BAUD_MIN = 75
@@ -112,7 +112,7 @@ class VirtualPort:
         line: The same way.
     """
 
-    def __init__(self, line: Line, program: Program) -> None:
+    def __init__(self, line: Line, program: ProgramClock) -> None:
         self.timeout = None
         self.line = line
         self._program = program

@@ -14,14 +14,68 @@ from kiks.clock.patience import Patience
 from kiks.clock.thinking import parse_thinking
 from kiks.ending import INTERRUPTED, noting_endings
 from kiks.errors import KiksError, ParameterError
-from kiks.ports.descriptors import opening
-from kiks.ports.guest import NearGuest, SocketGuest
-from kiks.ports.handle import Handle
-from kiks.ports.names import Names
-from kiks.ports.permission import Anything, Permission
-from kiks.ports.process import LATE, PUNCTUAL, Command, Labels, Process
-from kiks.ports.turns import PATIENCE_S, START_PATIENCE_S, VISIT_PATIENCE_S, Turns
+from kiks.ports.file_descriptors import opening
+from kiks.ports.participant import LocalParticipant, RemoteParticipant
+from kiks.ports.port_names import PortNames
+from kiks.ports.program_process import LATE, PUNCTUAL, Anything, Command, Labels, OutputLine, Permission, Process
+from kiks.ports.program_scheduler import PATIENCE_S, START_PATIENCE_S, VISIT_PATIENCE_S, ProgramScheduler
+from kiks.sim.ring_buffer import RingBuffer
 from kiks.sim.simulation import Simulation
+
+
+class Handle:
+    """A program that was started.
+
+    Attributes:
+        command: What was started.
+        number: Its number, from 1 in the order in which they were started.
+        robot: Number of the robot that is its own.
+        name: Who it is, for a person.
+    """
+
+    def __init__(self, command: Command, participant: RemoteParticipant) -> None:
+        self.command = command
+        self.number = participant.rank
+        self.robot = participant.robot
+        self.name = participant.name
+        self.has_been_noticed = False
+        self.has_ended = threading.Event()
+        self.participant = participant
+        self.process: Process
+
+    @property
+    def is_running(self) -> bool:
+        """Whether it still runs; when not, its output is complete, and its robots are free if it was stopped."""
+        return not self.has_ended.is_set()
+
+    @property
+    def code(self) -> int | None:
+        """The exit code with which it has ended, 128 and its number after a signal; None while it runs."""
+        code = None if self.is_running else self.process.code
+        return code if code is None or code >= 0 else 128 - code
+
+    @property
+    def output(self) -> RingBuffer[OutputLine] | None:
+        """What it has printed; None if the terminal has it."""
+        return self.process.output
+
+    @property
+    def state(self) -> str:
+        """What it does, in a word or two: 'running', 'stopping', 'stopped', 'silenced', or how it has ended."""
+        if self.is_running:
+            return "stopping" if self.participant.is_stopped else "running"
+        if self.participant.is_stopped:
+            return "stopped"
+        return "silenced" if self.participant.is_silenced else f"ended {self.how}"
+
+    @property
+    def how(self) -> str:
+        """How it has ended, in words; nothing while it runs."""
+        code = self.process.code
+        if code is None:
+            return ""
+        return f"with exit code {code}" if code >= 0 else f"by signal {-code}"
+
 
 IDLE_S = 0.05
 """Longest sleep [s]: a second Ctrl-C is noticed within it."""
@@ -84,7 +138,7 @@ class Programs:
         self.sim = sim
         self.permission: Permission = Anything()
         self.handles: list[Handle] = []
-        self._visitors: list[NearGuest] = []
+        self._visitors: list[LocalParticipant] = []
         self._is_moving = False
         self._moved = threading.Condition(sim.lock)
         self._say, self._thinking, self._record = say, thinking, record
@@ -94,7 +148,7 @@ class Programs:
         self._are_numbered = len(self._beginners) > 1
         for number in range(1, len(self._beginners) + 1):
             parse_thinking(self._policy(number))
-        self._turns = Turns(
+        self._scheduler = ProgramScheduler(
             sim,
             expected=len(self._beginners) + visitors,
             missing=self._missing,
@@ -105,7 +159,7 @@ class Programs:
             new_patience=new_patience,
             start_patience_s=VISIT_PATIENCE_S if visitors else START_PATIENCE_S,
         )
-        self._names = Names(sim, told or {}, 0)
+        self._names = PortNames(sim, told or {}, 0)
         for robot, _ in self._beginners:
             self._names.own(robot)
         with opening("the programs of a world"):
@@ -133,7 +187,7 @@ class Programs:
     @property
     def drive(self) -> bool:
         """Say whether programs move the world's time: then nobody else may."""
-        return self._turns.drive
+        return self._scheduler.drive
 
     @property
     def doubt(self) -> str:
@@ -142,7 +196,7 @@ class Programs:
             return "it was interrupted"
         if self._was_touched:
             return "a program was started or stopped while the world was there"
-        return "" if self._turns.is_repeatable else "the world did not wait for every program"
+        return "" if self._scheduler.is_repeatable else "the world did not wait for every program"
 
     # ---- they come and go ----
 
@@ -168,7 +222,7 @@ class Programs:
                         f"robot {robot} must be free for another program, but {handle.name} has it. Stop that one "
                         "first, or take another robot."
                     )
-                handle.guest.part()
+                handle.participant.part()
             parse_thinking(self._policy(self._count + 1))
             for each in self.handles:
                 if not each.is_running:
@@ -180,7 +234,7 @@ class Programs:
         self._ring()
         return handle
 
-    def admit(self, name: str, rank: int) -> NearGuest:
+    def admit(self, name: str, rank: int) -> LocalParticipant:
         """Let a program take part, from its first word on, that was started elsewhere: a thread here speaks for it.
 
         Args:
@@ -192,26 +246,26 @@ class Programs:
         """
         with self.sim.lock:
             self._check_open(name)
-            guest = NearGuest(name, rank, 0, self.sim, self._turns, self._names)
-            guest.is_waited_for = False
-            self._turns.join(guest)
-            self._visitors = [each for each in self._visitors if not each.has_left] + [guest]
+            participant = LocalParticipant(name, rank, 0, self.sim, self._scheduler, self._names)
+            participant.is_waited_for = False
+            self._scheduler.join(participant)
+            self._visitors = [each for each in self._visitors if not each.has_left] + [participant]
             self._was_touched = True
-        return guest
+        return participant
 
     @property
     def is_shared(self) -> bool:
         """Say whether more than one program takes part, or is waited for to begin."""
-        return len(self._turns.players) > 1 or not self._turns.has_begun
+        return len(self._scheduler.participants) > 1 or not self._scheduler.has_begun
 
     def move(self) -> float | None:
-        """Do what may be done now, unless another thread is at it; the caller holds the lock. See `Turns.advance`."""
+        """Do what may be done now, unless another thread is at it; see `ProgramScheduler.advance`. Needs the lock."""
         # The gate may make a thread wait in the middle, and then lets others look at the world.
         if self._is_moving:
             return None
         self._is_moving = True
         try:
-            return self._turns.advance()
+            return self._scheduler.advance()
         finally:
             self._is_moving = False
             self._moved.notify_all()
@@ -227,9 +281,9 @@ class Programs:
         """
         if not handle.is_running:
             return
-        is_tidying, handle.guest.is_stopped = handle.guest.is_stopped, True
+        is_tidying, handle.participant.is_stopped = handle.participant.is_stopped, True
         self._was_touched = True
-        if is_tidying or not handle.guest.is_here:
+        if is_tidying or not handle.participant.is_here:
             handle.process.kill()
             return
         handle.process.interrupt()
@@ -248,7 +302,7 @@ class Programs:
             self._grace = Patience(GRACE_S)
             # The programs have got it, too, and may still stop their robots.
             with noting_endings(self._note_signal):
-                while any(not handle.has_been_noticed for handle in self.handles) or self._turns.players:
+                while any(not handle.has_been_noticed for handle in self.handles) or self._scheduler.participants:
                     if self._signals and (self._signals > 1 or self._grace.left_s() == 0):
                         return INTERRUPTED
                     self.round(IDLE_S)
@@ -276,11 +330,11 @@ class Programs:
                 if key.data is not None and events & selectors.EVENT_READ and not key.data.receive():
                     self._hang_up(key.data)
             heard = [key.data for key, _ in ready]
-            for guest in over:
+            for participant in over:
                 # A process that it has started may still hold the connection.
-                if guest not in heard and not guest.has_hung_up:
-                    guest.leave()
-                    self._hang_up(guest)
+                if participant not in heard and not participant.has_hung_up:
+                    participant.leave()
+                    self._hang_up(participant)
             noticed = self._notice_ends()
         for handle in noticed:
             self._tell_end(handle)
@@ -289,17 +343,17 @@ class Programs:
         """End all processes that still run, say how those ended that had gone before, and close the connections."""
         self._is_closed = True
         for handle in self.handles:
-            if handle.guest.has_hung_up:
+            if handle.participant.has_hung_up:
                 handle.has_ended.wait(GRACE_S)  # the operating system is at it, and its exit code will be told
             handle.process.kill()
         for handle in self._notice_ends():
             self._tell_end(handle)
         for handle in self.handles:
             handle.process.wait()
-            handle.guest.close()
+            handle.participant.close()
         with self.sim.lock:
-            for guest in self._visitors:
-                guest.close()
+            for participant in self._visitors:
+                participant.close()
             self._moved.notify_all()
         self._selector.close()
         self._bell.close()
@@ -324,9 +378,9 @@ class Programs:
         number = self._count + 1
         name = f"program {number} ({command.program.name})"
         here, there = socket.socketpair()
-        guest = SocketGuest(here, name, number, robot, self.sim, self._turns, self._names)
-        handle = Handle(command, guest)
-        lateness = LATE if self._turns.has_begun else PUNCTUAL
+        participant = RemoteParticipant(here, name, number, robot, self.sim, self._scheduler, self._names)
+        handle = Handle(command, participant)
+        lateness = LATE if self._scheduler.has_begun else PUNCTUAL
         record = f"{self._record}{self._suffix(number)}" if self._record is not None else ""
         with there:
             try:
@@ -339,55 +393,55 @@ class Programs:
                     ended=lambda: self._end(handle),
                 )
             except KiksError:
-                guest.close()
+                participant.close()
                 raise
         # A world that runs already does not stand still until somebody's imports are done.
-        guest.is_waited_for = not self._turns.has_begun
+        participant.is_waited_for = not self._scheduler.has_begun
         self._count = number
-        self._turns.join(guest)
+        self._scheduler.join(participant)
         self.handles.append(handle)
         return handle
 
     def _end(self, handle: Handle) -> None:
         """Free the robots of a program that a person has stopped: here, as `round` may be waiting for time to go on."""
-        if handle.guest.is_stopped and not self._is_closed:
+        if handle.participant.is_stopped and not self._is_closed:
             with self.sim.lock:
-                handle.guest.part()
+                handle.participant.part()
         handle.has_ended.set()
         self._ring()
 
-    def _look_around(self) -> list[SocketGuest]:
+    def _look_around(self) -> list[RemoteParticipant]:
         """See to it that every connection is listened to for what matters; return those whose process has ended."""
         over = []
         for handle in self.handles:
-            guest = handle.guest
-            if guest.is_silenced and handle.is_running:
+            participant = handle.participant
+            if participant.is_silenced and handle.is_running:
                 handle.process.kill()
-            if guest.is_stopped and handle.process.code is not None:
-                guest.part()
+            if participant.is_stopped and handle.process.code is not None:
+                participant.part()
                 handle.has_ended.set()
-            if not guest.has_hung_up:
-                self._listen_to(guest)
+            if not participant.has_hung_up:
+                self._listen_to(participant)
                 if not handle.is_running:
-                    over.append(guest)
+                    over.append(participant)
         return over
 
-    def _listen_to(self, guest: SocketGuest) -> None:
-        events = selectors.EVENT_READ | (selectors.EVENT_WRITE if guest.has_unsent else 0)
-        if guest not in self._selector.get_map():
-            self._selector.register(guest, events, guest)
-        elif self._selector.get_key(guest).events != events:
-            self._selector.modify(guest, events, guest)
+    def _listen_to(self, participant: RemoteParticipant) -> None:
+        events = selectors.EVENT_READ | (selectors.EVENT_WRITE if participant.has_unsent else 0)
+        if participant not in self._selector.get_map():
+            self._selector.register(participant, events, participant)
+        elif self._selector.get_key(participant).events != events:
+            self._selector.modify(participant, events, participant)
 
-    def _hang_up(self, guest: SocketGuest) -> None:
-        self._selector.unregister(guest)
-        guest.has_hung_up = True
-        if guest.has_left:
-            guest.close()
+    def _hang_up(self, participant: RemoteParticipant) -> None:
+        self._selector.unregister(participant)
+        participant.has_hung_up = True
+        if participant.has_left:
+            participant.close()
 
     def _notice_ends(self) -> list[Handle]:
         """Return the programs that have ended since the last time."""
-        there = [handle for handle in self.handles if handle.guest.has_hung_up and not handle.is_running]
+        there = [handle for handle in self.handles if handle.participant.has_hung_up and not handle.is_running]
         noticed = [handle for handle in there if not handle.has_been_noticed]
         for handle in noticed:
             handle.has_been_noticed = True
@@ -395,14 +449,14 @@ class Programs:
 
     def _tell_end(self, handle: Handle) -> None:
         """Say how a program has ended."""
-        self._say(f"{handle.name} {'was stopped' if handle.guest.is_stopped else f'has ended {handle.how}'}.")
-        left = [other.guest for other in self.handles if other.is_running and other.guest.is_here]
-        if left and not any(guest.is_waited_for for guest in left):
-            names = ", ".join(guest.name for guest in left)
+        self._say(f"{handle.name} {'was stopped' if handle.participant.is_stopped else f'has ended {handle.how}'}.")
+        left = [other.participant for other in self.handles if other.is_running and other.participant.is_here]
+        if left and not any(participant.is_waited_for for participant in left):
+            names = ", ".join(participant.name for participant in left)
             _log.warning("%s, which the world does not wait for, still runs. Ctrl-C ends it.", names)
 
     def _missing(self) -> str:
-        return ", ".join(each.name for each in self.handles if not each.guest.is_here) or "a program elsewhere"
+        return ", ".join(each.name for each in self.handles if not each.participant.is_here) or "a program elsewhere"
 
     def _ring(self) -> None:
         """Let `round` look up."""

@@ -24,8 +24,8 @@ import termios
 from pathlib import Path
 
 from kiks.errors import LinkError
-from kiks.ports.descriptors import opening
 from kiks.ports.endpoint import READ_SIZE, Channel, Endpoint
+from kiks.ports.file_descriptors import opening
 
 TCGETS2 = 0x802C542A
 """Linux request for terminal settings with the speed as a number, whatever it is (asm-generic/ioctls.h)."""

@@ -8,16 +8,16 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
-from kiks.clock.line import BACKLOG_LIMIT
 from kiks.clock.pace import Pace
 from kiks.clock.patience import Patience
+from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.clock.thinking import ThinkingFixed, parse_thinking
 from kiks.errors import ParameterError, shown
 from kiks.ports.endpoint import Endpoint
+from kiks.ports.live import Link, Live, TimePolicy
 from kiks.ports.lockstep import Lockstep
 from kiks.ports.port import BAUD_MAX, BAUD_MIN
-from kiks.ports.timing import Link, Live, Timing
-from kiks.ports.turns import PATIENCE_S
+from kiks.ports.program_scheduler import PATIENCE_S
 from kiks.sim.simulation import Simulation
 
 _log = logging.getLogger("kiks.serve")
@@ -63,7 +63,7 @@ class Server:
         new_patience: Callable[[float], Patience] = Patience,
     ) -> None:
         self.sim = sim
-        self._timing: Timing
+        self._timing: TimePolicy
         if thinking == "live":
             self._timing = Live(sim, Pace(speed) if pace is None else pace)
         else:

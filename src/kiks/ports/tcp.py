@@ -8,8 +8,8 @@ import re
 import socket
 
 from kiks.errors import LinkError, ParameterError, shown
-from kiks.ports.descriptors import RESERVE, opening
 from kiks.ports.endpoint import READ_SIZE, Channel, Endpoint
+from kiks.ports.file_descriptors import RESERVE, opening
 
 WAITING_MAX = 128
 """Most clients that wait at a port until the commands of the one before them are done; others must try again."""

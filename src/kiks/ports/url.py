@@ -1,4 +1,4 @@
-"""Names of simulated ports: `kiks://1`, `kiks://sim2/1`, `kiks://1?arena=maze.toml&seed=3&thinking=fixed:2`."""
+"""PortNames of simulated ports: `kiks://1`, `kiks://sim2/1`, `kiks://1?arena=maze.toml&seed=3&thinking=fixed:2`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl, urlsplit
 
 from kiks.errors import LinkError, ParameterError, nearest, shown
-from kiks.sim.table import TABLE
+from kiks.sim.registry import REGISTRY
 
 if TYPE_CHECKING:
     from kiks.ports.memory import SimPort
@@ -44,9 +44,9 @@ def find_port(url: str) -> SimPort:
     if options:
         sim = _fresh(options, url)
     elif name:
-        sim = TABLE.find(name)
+        sim = REGISTRY.find(name)
     else:
-        sim = TABLE.newest() or Simulation()
+        sim = REGISTRY.newest() or Simulation()
     robot = int(number)
     if not 1 <= robot <= sim.robot_count:
         known = "robot 1 only" if sim.robot_count == 1 else f"robots 1 to {sim.robot_count}"

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from itertools import count
 from typing import Any
 
-from kiks.script.scheduler import Scheduler
+from kiks.script.thread_scheduler import Scheduler
 
 
 def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:

@@ -10,16 +10,16 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from kiks.clock.program import Program
+from kiks.clock.program_clock import ProgramClock
 from kiks.errors import KiksError
 from kiks.ports.port import Line, VirtualPort
-from kiks.script import clocks, event_loops, libraries, locks, outside, serial_ports
-from kiks.script.files import OpenPorts, RealFiles
-from kiks.script.lines import SharedLine
-from kiks.script.replacing import replaced
-from kiks.script.scheduler import EndedError, Scheduler
+from kiks.script import clocks, event_loops, libraries, locks, serial_ports, unsupported
+from kiks.script.file_waits import OpenPorts, RealFiles
+from kiks.script.patching import replaced
+from kiks.script.shared_line import SharedLine
 from kiks.script.signals import Signals
-from kiks.script.watch import watched
+from kiks.script.thread_scheduler import EndedError, Scheduler
+from kiks.script.watchdog import watched
 
 if TYPE_CHECKING:
     from kiks.sim.simulation import Simulation
@@ -40,10 +40,10 @@ def run_here(sim: Simulation, program: Path, arguments: list[str], told: dict[st
         ParameterError: If `told` names a robot that is not there.
     """
     from kiks.ports.memory import NearLine
-    from kiks.ports.names import Names
+    from kiks.ports.port_names import PortNames
     from kiks.ports.url import find_port
 
-    names = Names(sim, told)
+    names = PortNames(sim, told)
 
     def find(name: str) -> int | VirtualPort:
         if not name.startswith("kiks:"):
@@ -59,7 +59,7 @@ def run_program(
     arguments: list[str],
     line_of: Callable[[int], Line],
     find: Callable[[str], int | VirtualPort],
-    policy: Program,
+    policy: ProgramClock,
     offered: list[str],
 ) -> int:
     """Run a program to its end with simulated ports and simulated time; return its exit code.
@@ -99,7 +99,7 @@ def run_program(
         serial_ports.replacements(open_port, ports, offered),
         event_loops.replacements(scheduler),
         signals.replacements(),
-        outside.replacements(scheduler),
+        unsupported.replacements(scheduler),
         ends.replacements(),
         libraries.keyboard(host),
         {"os": {"_exit": end_at_once}},
@@ -122,7 +122,7 @@ def run_program(
             signals.taken(),
             replaced(replacements, replacements["threading"]["Lock"]),
             libraries.adapted(host),
-            outside.watched(scheduler),
+            unsupported.watched(scheduler),
         ):
             return scheduler.run(main)
     except EndedError as end:

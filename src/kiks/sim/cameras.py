@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kiks.engine import camera
+from kiks.engine.sensing import camera
 from kiks.engine.state import PIXEL_COUNT
 from kiks.firmware.k213 import K213, Picture
 from kiks.units import TICK_NS

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kiks.clock.line import BACKLOG_LIMIT
+from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import LinkError, ParameterError, shown
 from kiks.firmware.receiver import LINE_LIMIT
 from kiks.sim.simulation import Simulation

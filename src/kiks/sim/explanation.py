@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.engine import reasons
-from kiks.engine.gaze import NOTHING
 from kiks.engine.parameters import RAY_COUNT
-from kiks.model.ranges import check_count
+from kiks.engine.sensing import explain
+from kiks.engine.sensing.observe import NOTHING
+from kiks.model.checks import check_count
 from kiks.model.robot import SENSOR_COUNT
-from kiks.sim.look import name_of
+from kiks.sim.snapshot import name_of
 
 if TYPE_CHECKING:
     from kiks.sim.simulation import Simulation
@@ -223,7 +223,7 @@ def explain_proximity(sim: Simulation, networks: NDArray[np.void], robot: int, s
     index = sim.index_of(robot)
     _check_sensor(sensor)
     rays, met, without = np.empty((3, RAY_COUNT)), np.empty(RAY_COUNT, np.int64), np.empty(RAY_COUNT)
-    sampled_ns, expected, scattered, jitter, count = reasons.explain_proximity(
+    sampled_ns, expected, scattered, jitter, count = explain.explain_proximity(
         *(sim.scene, sim.sight, networks, sim.state.tick_count, sim.now_ns, sim.seed, index, sensor),
         *(rays, met, without),
     )
@@ -269,7 +269,7 @@ def explain_ambient(sim: Simulation, robot: int, sensor: int) -> LightExplanatio
     index = sim.index_of(robot)
     _check_sensor(sensor)
     facts, why = np.empty((len(sim.lamps), 3)), np.empty((len(sim.lamps), 2), np.int64)
-    sampled_ns, expected, noise, count, unlit = reasons.explain_ambient(
+    sampled_ns, expected, noise, count, unlit = explain.explain_ambient(
         *(sim.scene, sim.sight, sim.lamps, sim.state.tick_count, sim.now_ns, sim.seed, index, sensor),
         *(facts, why),
     )
@@ -309,13 +309,13 @@ def _check_sensor(sensor: int) -> None:
 
 
 def _state_of(sim: Simulation, how: int, hider: int) -> str:
-    if how == reasons.HIDDEN:
+    if how == explain.HIDDEN:
         return f"hidden by {name_of(sim, hider)}"
     return {
-        reasons.SHINING: "seen",
-        reasons.OFF: "off",
-        reasons.BEHIND: "behind the sensor",
-        reasons.BEHIND_BODY: "behind the robot itself",
+        explain.SHINING: "seen",
+        explain.OFF: "off",
+        explain.BEHIND: "behind the sensor",
+        explain.BEHIND_BODY: "behind the robot itself",
     }[how]
 
 

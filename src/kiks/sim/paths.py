@@ -18,7 +18,7 @@ class Watcher(Protocol):
         """Return how many ticks may be done before the next look, at least one."""
 
     def look(self, state: State) -> None:
-        """Look at the state, after ticks that are no more than were left; called between two looks, too."""
+        """Snapshot at the state, after ticks that are no more than were left; called between two looks, too."""
 
 
 class _Point(NamedTuple):

@@ -10,29 +10,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.clock.gate import Gate
-from kiks.clock.program import Program
-from kiks.engine import ambient, proximity
-from kiks.engine.networks import networks_for
+from kiks.clock.program_clock import ProgramClock
+from kiks.engine.sensing import ambient, proximity
+from kiks.engine.sensing.thesis_networks import networks_for
 from kiks.errors import ParameterError, shown
 from kiks.firmware.k213 import K213
 from kiks.firmware.khepera import Firmware
 from kiks.firmware.radio import Radio, deliver
 from kiks.firmware.turret import Turret
 from kiks.model.arena import Arena
-from kiks.model.ranges import CLOCK_END_NS, SECONDS_MAX, check_count, check_number
+from kiks.model.checks import CLOCK_END_NS, SECONDS_MAX, check_count, check_number
 from kiks.model.robot import SENSOR_COUNT, RobotSpec, specs_of
 from kiks.sim.cameras import Cameras
 from kiks.sim.explanation import Explanation, LightExplanation, explain_ambient, explain_proximity
-from kiks.sim.look import Look, look, trace_rays
-from kiks.sim.sites import Place, first_memory, named
-from kiks.sim.table import TABLE
+from kiks.sim.registry import REGISTRY
+from kiks.sim.snapshot import Snapshot, look, trace_rays
 from kiks.sim.things import Things
+from kiks.sim.turret_host import RobotSite, first_memory, named
 from kiks.sim.wire import Agenda, Wire
 from kiks.sim.world import check_arena, check_kinds
 from kiks.units import ns_from_s
 
 if TYPE_CHECKING:
-    from kiks.desk.showing import Shown
+    from kiks.desk.server.show import Shown
     from kiks.ports.memory import SimPort
 
 
@@ -86,7 +86,7 @@ class Simulation(Things):
         robots = None if robots is None else check_count("robots", robots, 1, 1000, "Say how many you need.")
         seed = check_count("seed", seed, 0, 2**63 - 1, "Any small number will do.")
         self.thinking = thinking
-        self.program = Program(thinking)
+        self.program = ProgramClock(thinking)
         self.gate: Gate | None = None
         self._cameras = Cameras(self)
         super().__init__(Arena.default() if arena is None else arena, specs_of(robot, robots, response), seed)
@@ -98,7 +98,7 @@ class Simulation(Things):
         self._agenda = Agenda()
         self.wires = [Wire(self._firmware(index), self._agenda, index) for index in range(self.robot_count)]
         self._ports: dict[int, SimPort] = {}
-        self.name = TABLE.enter(self)
+        self.name = REGISTRY.enter(self)
 
     def _firmware(self, index: int) -> Firmware:
         return Firmware(
@@ -207,7 +207,7 @@ class Simulation(Things):
             LinkError: If the page cannot be served there.
             ParameterError: If the speed is out of range, or the desk is open on another port.
         """
-        from kiks.desk.showing import show
+        from kiks.desk.server.show import show
 
         return show(self, speed=speed, is_alive=is_alive, port=port, browser=browser)
 
@@ -300,7 +300,7 @@ class Simulation(Things):
                     f"turret must be one that robot {robot} has not got, but {shown(there[0].name)} has its number, "
                     f"{fitted.number}. Give a turret of your own another, 24 to 31."
                 )
-            fitted.fit(Place(self, index, fitted, first_memory(fitted, firmware.fitted)))
+            fitted.fit(RobotSite(self, index, fitted, first_memory(fitted, firmware.fitted)))
             firmware.fit(fitted)
             if isinstance(fitted, Radio):
                 self._radios = fitted.site.turrets(Radio)
@@ -402,7 +402,7 @@ class Simulation(Things):
             self.sync()
             return explain_ambient(self, robot, sensor)
 
-    def look(self) -> Look:
+    def look(self) -> Snapshot:
         """Return where everybody is at this instant, and what all sensors see; looking changes nothing."""
         with self.lock:
             self.sync()

@@ -13,10 +13,10 @@ from kiks.engine.numbers import sin_cos
 from kiks.engine.state import BALL, BODY, CYLINDER
 from kiks.errors import ArenaError, KiksError, ParameterError, counted, shown
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp
-from kiks.model.ranges import check_heading, check_number, check_numbers
+from kiks.model.checks import check_heading, check_number, check_numbers
+from kiks.model.free_disc import OVERLAP_MM
 from kiks.model.robot import RobotSpec
-from kiks.model.room import OVERLAP_MM
-from kiks.sim.floor import PRESSED_MM
+from kiks.sim.free_space import PRESSED_MM
 from kiks.sim.world import World
 
 

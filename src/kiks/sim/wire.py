@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable
 from heapq import heappop, heappush
 
-from kiks.clock.line import SerialLine
+from kiks.clock.serial_timing import SerialTiming
 from kiks.firmware.khepera import Firmware
 from kiks.sim.wire_log import TimeShares, WireLog
 from kiks.units import ns_from_s
@@ -57,7 +57,7 @@ class Wire:
         self.firmware = firmware
         self._agenda = agenda
         self._index = index
-        self.line = SerialLine(firmware.baud)
+        self.line = SerialTiming(firmware.baud)
         self.holder: str | None = None
         self.next_ns: int | None = None
         self._processing_ns = ns_from_s(firmware.spec.firmware.processing_ms * 1e-3)

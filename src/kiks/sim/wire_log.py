@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from kiks.sim.tail import Tail
+from kiks.sim.ring_buffer import RingBuffer
 
 PIECE_LIMIT = 4096
 """Pieces that are remembered: a second of a robot at 115200 bit/s to whom one talks without a break has about 300."""
@@ -69,8 +69,8 @@ class WireLog:
     """
 
     def __init__(self, now_ns: int) -> None:
-        self.pieces: Tail[Piece] = Tail(PIECE_LIMIT)
-        self._thoughts: Tail[Span] = Tail(THOUGHT_LIMIT)
+        self.pieces: RingBuffer[Piece] = RingBuffer(PIECE_LIMIT)
+        self._thoughts: RingBuffer[Span] = RingBuffer(THOUGHT_LIMIT)
         self._begin_ns = now_ns
 
     def send(self, data: bytes, start_ns: int, character_ns: int, acts: list[tuple[int, int]]) -> None:

@@ -10,17 +10,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.engine import contact, proximity, step
+from kiks.engine import step
 from kiks.engine.parameters import PARAMETERS, pack
-from kiks.engine.rays import sight_of
+from kiks.engine.physics import contact
 from kiks.engine.scene import enter_everybody, make_scene
+from kiks.engine.sensing import proximity
+from kiks.engine.sensing.rays import sight_of
 from kiks.engine.state import State
 from kiks.errors import ParameterError, shown
 from kiks.model.arena import PAD, Arena
-from kiks.model.ranges import check_count, check_heading, check_kind, check_number, wrapped
+from kiks.model.checks import check_count, check_heading, check_kind, check_number, wrapped
+from kiks.model.free_disc import OVERLAP_MM
 from kiks.model.robot import RobotSpec
-from kiks.model.room import OVERLAP_MM
-from kiks.sim.floor import Floor
+from kiks.sim.free_space import Floor
 from kiks.sim.paths import Paths, Watcher
 from kiks.units import TICK_NS, s_from_ns
 

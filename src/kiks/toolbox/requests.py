@@ -11,8 +11,10 @@ from kiks.errors import KiksError, ParameterError, shown
 from kiks.model.arena import Arena
 from kiks.model.arena_file import save_arena
 from kiks.model.kad import save_kad
-from kiks.toolbox.matrices import arena_of
-from kiks.toolbox.things import (
+from kiks.toolbox.matlab_arenas import arena_of
+from kiks.toolbox.session_client import SessionClient
+from kiks.toolbox.wire_format import escape, matrices_of, matrix_text, number_text, numbers_of, numbers_text, unescape
+from kiks.toolbox.world_requests import (
     ask_distances,
     ask_objects,
     ask_path,
@@ -22,8 +24,6 @@ from kiks.toolbox.things import (
     ask_spawn,
     port_of,
 )
-from kiks.toolbox.visitor import Visitor
-from kiks.toolbox.words import escape, matrices_of, matrix_text, number_text, numbers_of, numbers_text, unescape
 
 WORDS_MAX = 100_000
 """Longest request other than for a world."""
@@ -44,10 +44,10 @@ PAUSE_MAX_S = 1e6
 
 _log = logging.getLogger("kiks.toolbox")
 
-Act = Callable[[Visitor, str], str]
+Act = Callable[[SessionClient, str], str]
 
 
-def answer(visitor: Visitor, line: str) -> str:
+def answer(visitor: SessionClient, line: str) -> str:
     """Return the answer to a line, never an exception."""
     name, _, words = line.partition(" ")
     visitor.asked = 0
@@ -86,7 +86,7 @@ def answer(visitor: Visitor, line: str) -> str:
 # ---- worlds ----
 
 
-def _version(visitor: Visitor, words: str) -> str:
+def _version(visitor: SessionClient, words: str) -> str:
     return __version__
 
 
@@ -100,13 +100,13 @@ def _path(text: str) -> str:
     return path
 
 
-def _set(visitor: Visitor, words: str) -> str:
+def _set(visitor: SessionClient, words: str) -> str:
     name, _, value = words.partition(" ")
     visitor.session.settings = visitor.session.settings.changed(name, unescape(value))
     return ""
 
 
-def _world(visitor: Visitor, words: str) -> str:
+def _world(visitor: SessionClient, words: str) -> str:
     session = visitor.session
     kind, _, rest = words.partition(" ")
     if kind == "default":
@@ -122,21 +122,21 @@ def _world(visitor: Visitor, words: str) -> str:
     return ""
 
 
-def _arena(visitor: Visitor, text: str) -> Arena:
+def _arena(visitor: SessionClient, text: str) -> Arena:
     codes, *greys = matrices_of(text)
     settings = visitor.session.settings
     return arena_of(codes, *greys, wall=settings.wall, ball=settings.ball, cylinder=settings.cylinder)
 
 
-def _active(visitor: Visitor, words: str) -> str:
+def _active(visitor: SessionClient, words: str) -> str:
     return str(int(visitor.session.desk is not None))
 
 
-def _desk(visitor: Visitor, words: str) -> str:
+def _desk(visitor: SessionClient, words: str) -> str:
     return visitor.session.url
 
 
-def _save(visitor: Visitor, words: str) -> str:
+def _save(visitor: SessionClient, words: str) -> str:
     path = _path(words)
     project = visitor.session.present_project()
     suffix = Path(path).suffix.lower()
@@ -151,36 +151,36 @@ def _save(visitor: Visitor, words: str) -> str:
     return ""
 
 
-def _read(visitor: Visitor, words: str) -> str:
+def _read(visitor: SessionClient, words: str) -> str:
     return matrix_text(Arena.load(_path(words)).brightness[::-1])
 
 
-def _print(visitor: Visitor, words: str) -> str:
+def _print(visitor: SessionClient, words: str) -> str:
     if visitor.session.desk is not None:
         visitor.session.desk.say(unescape(words))
     return ""
 
 
-def _checkpoint(visitor: Visitor, words: str) -> str:
+def _checkpoint(visitor: SessionClient, words: str) -> str:
     visitor.do(lambda sim: None)
     visitor.session.mark()
     return ""
 
 
-def _reset(visitor: Visitor, words: str) -> str:
+def _reset(visitor: SessionClient, words: str) -> str:
     visitor.do(lambda sim: None)
     visitor.session.reset()
     return ""
 
 
-def _state(visitor: Visitor, words: str) -> str:
+def _state(visitor: SessionClient, words: str) -> str:
     return visitor.do(lambda sim: sim.state_hash())
 
 
 # ---- ports ----
 
 
-def _open(visitor: Visitor, words: str) -> str:
+def _open(visitor: SessionClient, words: str) -> str:
     number, _, rest = words.partition(" ")
     (baud,) = numbers_of(rest.split(), 1, "baud")
     if not port_of(number) or not 0 < baud <= BAUD_MAX:
@@ -191,36 +191,36 @@ def _open(visitor: Visitor, words: str) -> str:
     return ""
 
 
-def _close(visitor: Visitor, words: str) -> str:
+def _close(visitor: SessionClient, words: str) -> str:
     visitor.close(port_of(words))
     return ""
 
 
-def _send(visitor: Visitor, words: str) -> str:
+def _send(visitor: SessionClient, words: str) -> str:
     number, _, text = words.partition(" ")
     return escape(visitor.send(port_of(number), unescape(text)))
 
 
-def _ask(visitor: Visitor, words: str) -> str:
+def _ask(visitor: SessionClient, words: str) -> str:
     number, _, text = words.partition(" ")
     return escape(visitor.send(port_of(number), text + "\n"))
 
 
-def _listen(visitor: Visitor, words: str) -> str:
+def _listen(visitor: SessionClient, words: str) -> str:
     return escape(visitor.listen(port_of(words)))
 
 
-def _time(visitor: Visitor, words: str) -> str:
+def _time(visitor: SessionClient, words: str) -> str:
     time_s = visitor.time_s(port_of(words))
     return "" if time_s is None else number_text(time_s)
 
 
-def _pass(visitor: Visitor, words: str) -> str:
+def _pass(visitor: SessionClient, words: str) -> str:
     visitor.opened(port_of(words)).port.ask_ns()
     return ""
 
 
-def _pause(visitor: Visitor, words: str) -> str:
+def _pause(visitor: SessionClient, words: str) -> str:
     (seconds,) = numbers_of(words.split(), 1, "a pause")
     if not 0 <= seconds <= PAUSE_MAX_S:
         raise ParameterError(f"a pause must be a time from 0 to {PAUSE_MAX_S:g} s, but it was {seconds:g}.")
@@ -228,7 +228,7 @@ def _pause(visitor: Visitor, words: str) -> str:
     return ""
 
 
-def _pace(visitor: Visitor, words: str) -> str:
+def _pace(visitor: SessionClient, words: str) -> str:
     return numbers_text(100.0 * speed for speed in visitor.pace())
 
 

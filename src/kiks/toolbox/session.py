@@ -13,17 +13,17 @@ from kiks.clock.gate import Gate
 from kiks.errors import LinkError
 from kiks.model.arena import Arena
 from kiks.model.project import Project, ProjectRobot
-from kiks.ports.process import Command
+from kiks.ports.program_process import Command
 from kiks.ports.programs import Programs
-from kiks.sim.building import simulation_of, spec_of
+from kiks.sim.from_project import simulation_of, spec_of
 from kiks.sim.simulation import Simulation
-from kiks.toolbox.settings import Settings
+from kiks.toolbox.preferences import Settings
 from kiks.units import NS_PER_S
 
 if TYPE_CHECKING:
-    from kiks.desk.desk import Desk
-    from kiks.desk.showing import Shown
-    from kiks.toolbox.visitor import Visitor
+    from kiks.desk.server.desk import Desk
+    from kiks.desk.server.show import Shown
+    from kiks.toolbox.session_client import SessionClient
 
 WAIT_S = 0.05
 """Longest time for which the world does not look around [s of real time]."""
@@ -53,7 +53,7 @@ class Session:
     def __init__(self, *, ready: Callable[[], None] = lambda: None, has_window: bool = False) -> None:
         self.settings = Settings()
         self.desk: Desk | None = None
-        self.visitors: list[Visitor] = []
+        self.visitors: list[SessionClient] = []
         self.owners: dict[int, object] = {}
         self.lock = threading.RLock()
         self._ready = ready
@@ -88,7 +88,7 @@ class Session:
         Raises:
             KiksError: If it is none.
         """
-        from kiks.desk.desk import Desk
+        from kiks.desk.server.desk import Desk
 
         with self.lock:
             if self.desk is None:
@@ -251,7 +251,7 @@ class Session:
             self.desk.say(text)
 
     def _show(self) -> None:
-        from kiks.desk.showing import Shown
+        from kiks.desk.server.show import Shown
 
         assert self.desk is not None
         self._shown = Shown(self.desk)

@@ -14,9 +14,9 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 from kiks.ports.port import VirtualPort
-from kiks.script.files import poll_files
-from kiks.script.outside import refuse
-from kiks.script.scheduler import Scheduler
+from kiks.script.file_waits import poll_files
+from kiks.script.thread_scheduler import Scheduler
+from kiks.script.unsupported import refuse
 
 BLINK_S = 0.02
 """How often a window or a keyboard is looked at while only a person can go on [s of real time]."""

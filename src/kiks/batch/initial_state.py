@@ -1,0 +1,267 @@
+"""How the worlds of a batch begin: as simulations of their seeds would."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BeforeValidator, Field
+
+from kiks.engine.parameters import PARAMETERS, pack
+from kiks.engine.sensing.thesis_networks import networks_for
+from kiks.engine.state import State
+from kiks.errors import ParameterError, shown
+from kiks.model.arena import AnArena, Arena
+from kiks.model.checks import HEADING_KEPT_RAD, check_count, check_numbers, wrapped
+from kiks.model.data_file import OneOf
+from kiks.model.robot import RobotSpec
+from kiks.sim.simulation import Simulation
+from kiks.sim.world import check_kinds
+
+ARENAS_LIMIT = 10_000
+"""Most arenas that worlds share."""
+
+WORLDS_LIMIT = 10_000_000
+"""Most worlds in a batch: their robots alone would fill the memory of any computer."""
+
+
+def _listed(arenas: object) -> object:
+    return (arenas,) if isinstance(arenas, Arena) else arenas
+
+
+Arenas = Annotated[tuple[AnArena, ...], BeforeValidator(_listed), Field(min_length=1, max_length=ARENAS_LIMIT)]
+"""Arenas that worlds take in turn; one alone may be given as it is."""
+
+Starts = Annotated[str, OneOf(("random", "arena"))]
+"""Where robots start: at random places, or where the arena puts them."""
+
+
+class Beginning:
+    """The state in which the worlds of a batch begin, and how to return to it.
+
+    A simulation of each arena is made once; each world of that arena begins as a copy of it.
+
+    Args:
+        arena: One arena, or several that the worlds take in turn.
+        worlds: How many worlds.
+        robot: What the robots are; see `kiks.Batch`.
+        robots: How many are in each world.
+        response: Response of the proximity sensors, if not that of the robots' files.
+
+    Attributes:
+        arenas: The arenas.
+        arena_indices: Which of them each world has, int64 [world].
+        specs: The kinds of robots.
+        kinds: Their constants, records of `PARAMETERS`, shape [kind].
+        networks: What their responses need (`kiks.engine.sensing.thesis_networks`).
+        state: A state of so many worlds.
+        lamps: float64 [world, lamp, 4]; worlds of arenas with fewer lamps have some that are off.
+
+    Raises:
+        ParameterError: If an argument is out of range.
+        ArenaError: If something has no free place where an arena puts it.
+    """
+
+    def __init__(
+        self,
+        arena: Arena | Sequence[Arena],
+        worlds: int,
+        robot: str | RobotSpec | Sequence[Any],
+        robots: int,
+        response: str | None,
+    ) -> None:
+        self.arenas = list(arena) if isinstance(arena, Iterable) else [arena]
+        if not self.arenas or not all(isinstance(each, Arena) for each in self.arenas):
+            raise ParameterError(f"arena must be a kiks.Arena or several, but it was {shown(arena)}.")
+        worlds, robots = check_count("worlds", worlds, 1, WORLDS_LIMIT), check_count("robots", robots, 1, 1000)
+        named = _kinds_of(robot, worlds, robots, response)
+        self.specs = list(dict.fromkeys(spec for row in named for spec in row))
+        numbers = {spec: number for number, spec in enumerate(self.specs)}
+        self._check_firmware()
+        self.kinds = np.zeros(len(self.specs), PARAMETERS)
+        for number, spec in enumerate(self.specs):
+            self.kinds[number : number + 1] = pack(spec)
+        self.networks = networks_for(*dict.fromkeys(spec.proximity.response for spec in self.specs))
+        self.arena_indices = np.arange(worlds) % len(self.arenas)
+        self._models = [Simulation(each, robot=list(named[0])) for each in self.arenas]
+        body_counts = {model.state.bodies.shape[1] for model in self._models}
+        if len(body_counts) > 1:
+            raise ParameterError(
+                f"the arenas of one batch must hold the same number of balls and cylinders, but they hold "
+                f"{sorted(body_counts)}. Make a batch for each number."
+            )
+        self.state = State.empty(world_count=worlds, robot_count=robots, body_count=body_counts.pop())
+        self._kind_numbers = np.array([[numbers[spec] for spec in row] for row in named], np.int64)
+        lamp_count = max(len(model.lamps) for model in self._models)
+        self.lamps = np.zeros((worlds, lamp_count, 4))
+        for index, model in enumerate(self._models):
+            self.lamps[self.arena_indices == index, : len(model.lamps)] = model.lamps
+
+    def _check_firmware(self) -> None:
+        """Raise a ParameterError unless all kinds take the same time on the line."""
+        answers = {(spec.firmware.processing_ms, spec.quirks.d_reply_trailing_comma) for spec in self.specs}
+        if len(answers) > 1:
+            raise ParameterError(
+                "the robots of one batch must have the same firmware.processing_ms and quirks, but they differ. "
+                "Make a batch for each."
+            )
+
+    def check_seeds(self, seeds: ArrayLike, count: int) -> NDArray[np.int64]:
+        """Return seeds as int64 [count].
+
+        Raises:
+            ParameterError: If they are no whole numbers from 0 to 2^63 - 1, or not so many.
+        """
+        try:
+            given = np.asarray(seeds)
+        except (TypeError, ValueError, OverflowError):
+            given = np.zeros(0)
+        if given.dtype.kind not in "iu" or given.shape != (count,) or (given < 0).any() or (given >= 2**63).any():
+            raise ParameterError(
+                f"seeds must be {count} whole numbers from 0 to 2^63 - 1, one for each world, but they were "
+                f"{shown(seeds)}."
+            )
+        return given.astype(np.int64)
+
+    def seeds_of(self, seed: int | ArrayLike) -> NDArray[np.int64]:
+        """Return a seed for each world: those given, or counted up from one.
+
+        Raises:
+            ParameterError: If they are no seeds, or not as many as there are worlds.
+        """
+        world_count = len(self.arena_indices)
+        if isinstance(seed, int | np.integer) and 0 <= seed < 2**63 - world_count:
+            return seed + np.arange(world_count, dtype=np.int64)
+        return self.check_seeds(seed, world_count)
+
+    def starts_of(
+        self,
+        seeds: NDArray[np.int64],
+        starts: ArrayLike | None,
+        worlds: NDArray[np.int64] | None = None,
+    ) -> NDArray[np.float64]:
+        """Return start poses, float64 [those worlds, robot, 3].
+
+        Args:
+            seeds: Seeds of the worlds.
+            starts: Given poses, or anything that broadcasts to them; None for those that simulations would have.
+            worlds: Numbers of the worlds; all if left out.
+
+        Raises:
+            ParameterError: If the shape is another, or a start is not free.
+            ArenaError: If there is no free place for a robot.
+        """
+        chosen = np.arange(len(self.arena_indices)) if worlds is None else worlds
+        robot_count = self.state.robots.shape[1]
+        shape = (len(chosen), robot_count, 3)
+        if starts is None:
+            poses = np.zeros(shape)
+            for k, world in enumerate(chosen):
+                poses[k] = self._models[self.arena_indices[world]].start_poses(int(seeds[k]))
+            return poses
+        given = check_numbers("starts", starts)
+        try:
+            poses = np.array(np.broadcast_to(given, shape))
+        except ValueError:
+            raise ParameterError(
+                f"starts must be poses x_mm, y_mm, heading_rad [world, robot, 3], here {shape}, but their shape was "
+                f"{given.shape}."
+            ) from None
+        for k, world in enumerate(chosen):
+            self._models[self.arena_indices[world]].check_start_poses(poses[k], f"of world {world}")
+        return poses
+
+    def put_back(self, state: State, worlds: NDArray[np.int64], starts: NDArray[np.float64]) -> None:
+        """Put worlds of a state back to their beginning.
+
+        Args:
+            state: The state; changed in place.
+            worlds: Numbers of the worlds.
+            starts: Where their robots start, float64 [those worlds, robot, 3].
+        """
+        for index, model in enumerate(self._models):
+            here = worlds[self.arena_indices[worlds] == index]
+            state.robots[here] = model.state.robots[0]
+            state.bodies[here] = model.state.bodies[0]
+        robots: Any = state.robots[worlds]
+        robots["kind"] = self._kind_numbers[np.minimum(worlds, len(self._kind_numbers) - 1)]
+        if (np.abs(starts[:, :, 2]) > HEADING_KEPT_RAD).any():
+            starts = starts.copy()
+            starts[:, :, 2] = np.vectorize(wrapped, [float])(starts[:, :, 2])
+        for axis, name in enumerate(("x_mm", "y_mm", "heading_rad")):
+            robots[name] = starts[:, :, axis]
+        robots["start_x_mm"], robots["start_y_mm"] = starts[:, :, 0], starts[:, :, 1]
+        robots["trail"] = starts[:, :, None, :]
+        state.robots[worlds] = robots
+
+
+def _kinds_of(
+    robot: str | RobotSpec | Sequence[Any], worlds: int, robots: int, response: str | None
+) -> list[tuple[RobotSpec, ...]]:
+    """Return the robots of each world, or of all of them in one row.
+
+    Raises:
+        ParameterError: If they are no kinds, or not as many as there are worlds or robots.
+    """
+
+    def spec_of(kind: Any) -> RobotSpec:
+        check_kinds(kind, response)
+        spec = kind if isinstance(kind, RobotSpec) else RobotSpec.load(kind)
+        return spec if response is None else spec.with_changes(proximity__response=response)
+
+    def row_of(row: Any) -> tuple[RobotSpec, ...]:
+        if isinstance(row, str | RobotSpec):
+            return (spec_of(row),) * robots
+        if not isinstance(row, Sequence):
+            raise ParameterError(f"robot must name the robots of each world, but for one it was {shown(row)}.")
+        if len(row) != robots:
+            raise ParameterError(f"robot must name {robots} robots for a world, but it named {len(row)}.")
+        return tuple(spec_of(each) for each in row)
+
+    if isinstance(robot, str | RobotSpec):
+        return [row_of(robot)]
+    if not isinstance(robot, Sequence):
+        raise ParameterError(f"robot must name one kind for all, or one for each world, but it was {shown(robot)}.")
+    if len(robot) != worlds:
+        raise ParameterError(
+            f"robot must name one kind for all, or one for each of {worlds} worlds, but it named {len(robot)}."
+        )
+    return [row_of(row) for row in robot]
+
+
+def random_starts(
+    arena: Arena, count: int, *, seed: int, radius_mm: float = 27.5, clear_mm: float = 5.0
+) -> NDArray[np.float64]:
+    """Return free poses in an arena, evenly spread over it at random, float64 [count, 3]: x_mm, y_mm, heading_rad.
+
+    Args:
+        arena: The arena.
+        count: How many.
+        seed: Seed of the choice.
+        radius_mm: Radius of the robot [mm].
+        clear_mm: How far its edge must be from walls, balls and cylinders [mm].
+
+    Raises:
+        ParameterError: If there is hardly a free place.
+    """
+    rng = np.random.default_rng(seed)
+    poses: list[NDArray[np.float64]] = []
+    found = 0
+    for _ in range(1000):
+        if found >= count:
+            break
+        tried = rng.uniform((0, 0, -math.pi), (arena.width_mm, arena.height_mm, math.pi), (2 * count + 100, 3))
+        free = np.array([arena.free_for(x_mm, y_mm, radius_mm + clear_mm) for x_mm, y_mm, _ in tried.tolist()])
+        for body in arena.bodies:
+            free &= np.hypot(tried[:, 0] - body.x_mm, tried[:, 1] - body.y_mm) > radius_mm + clear_mm + body.radius_mm
+        poses.append(tried[free])
+        found += int(free.sum())
+    if found < count:
+        raise ParameterError(
+            f"the arena {shown(arena.name)} must have free places for a robot of {radius_mm:g} mm, but only {found} of "
+            f"{count} were found. Take a larger one, or a smaller clear_mm."
+        )
+    return np.concatenate(poses)[:count]

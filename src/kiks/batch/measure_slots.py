@@ -1,0 +1,66 @@
+"""Measures side by side: where each keeps its notes, and what they say in the end."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from itertools import accumulate, pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.batch.callbacks import watchers_of
+from kiks.control.measure import Measure
+from kiks.errors import ParameterError, shown
+
+
+class MeasureSlots:
+    """Measures that watch the same robots.
+
+    Args:
+        measures: The measures.
+        senses: What those robots sense.
+        who: Who senses that, for the message.
+
+    Attributes:
+        measures: The measures.
+        note_count: Numbers that all of them keep for each robot.
+
+    Raises:
+        ParameterError: If one is no measure, or wants to find other senses.
+    """
+
+    def __init__(self, measures: Sequence[Measure], senses: Sequence[str], who: str) -> None:
+        if not isinstance(measures, Sequence):
+            raise ParameterError(f"measures must be a list of measures, but they were {shown(measures)}.")
+        self.measures = tuple(measures)
+        for each in self.measures:
+            if not isinstance(each, Measure):
+                raise ParameterError(
+                    "measures must be made by @kiks.measure or be some of kiks.measures, but "
+                    f"{shown(each)} was among them."
+                )
+            if tuple(senses[: len(each.senses)]) != each.senses:
+                raise ParameterError(
+                    f"the measure {shown(each.name)} must find {' and '.join(each.senses)} first among what is "
+                    "sensed, but "
+                    f"{who} senses {', '.join(senses)}. Let it sense that, too."
+                )
+        self._ends = list(accumulate((each.note_count for each in self.measures), initial=0))
+        self.note_count = self._ends[-1]
+
+    @functools.cached_property
+    def watchers(self) -> NDArray[np.int64]:
+        """How the loop of a batch calls them (`kiks.batch.callbacks.watchers_of`).
+
+        Raises:
+            ParameterError: If one cannot be compiled.
+        """
+        return watchers_of(self.measures)
+
+    def values(self, notes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what the measures say of notes [world, robot, note], float64 [world, robot, measure]."""
+        values = np.zeros((*notes.shape[:2], len(self.measures)))
+        for k, (begin, end) in enumerate(pairwise(self._ends)):
+            values[:, :, k] = self.measures[k].result(notes[:, :, begin:end])
+        return values

@@ -1,0 +1,77 @@
+"""Worlds one by one, each with all that meets in it: the steps of the engine for robots in company.
+
+What these functions do is said in `kiks.batch.stepper_dispatch`. Here a bunch is one world: its scene and its number.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from kiks.batch.kernel_args import PROXIMITY
+from kiks.engine.compiling import kernel
+from kiks.engine.physics.motor import command_speed
+from kiks.engine.sensing.ambient import read_ambient
+from kiks.engine.sensing.proximity import read_proximity
+from kiks.engine.step import advance
+from kiks.units import TICK_NS
+
+
+@kernel
+def scene_of(worlds: Any, world: Any) -> Any:
+    """Return the scene of a world alone: world 0 of its own, as in a `kiks.Simulation`."""
+    robots, bodies, kinds, (begins, entries, spots, widest) = worlds.scene
+    end = world + 1
+    return (
+        robots[world:end],
+        bodies[world:end],
+        kinds,
+        (begins[world:end], entries[world:end], spots[world:end], widest),
+    )
+
+
+@kernel
+def take(place: Any, worlds: Any, numbers: Any) -> Any:
+    """Return the scene of a world, and its number."""
+    return scene_of(worlds, numbers[0]), numbers[0]
+
+
+@kernel
+def give_back(place: Any, worlds: Any, bunch: Any) -> Any:
+    """Do nothing: the scene is the state itself."""
+
+
+@kernel
+def pass_to(place: Any, worlds: Any, bunch: Any, times_ns: Any) -> Any:
+    """Do the ticks that have begun up to a time."""
+    scene, world = bunch
+    ticks = -(-times_ns[0] // TICK_NS) - worlds.ticks[world]
+    if ticks > 0:
+        advance(scene, place.ground, worlds.seeds[world], worlds.ticks[world], ticks)
+        worlds.ticks[world] += ticks
+
+
+@kernel
+def read(place: Any, worlds: Any, bunch: Any, code: Any, times_ns: Any, robot: Any, counts: Any) -> Any:
+    """Let a robot read its sensors."""
+    scene, world = bunch
+    tick, seed = worlds.ticks[world], worlds.seeds[world]
+    if code == PROXIMITY:
+        read_proximity(scene, place.sight, place.networks, tick, times_ns[0], seed, robot, True, counts[0])
+    else:
+        read_ambient(scene, place.sight, worlds.lamps[world], tick, times_ns[0], seed, robot, True, counts[0])
+
+
+@kernel
+def command(place: Any, bunch: Any, k: Any, robot: Any, left: Any, right: Any) -> Any:
+    """Set a robot's speeds."""
+    command_speed(bunch[0][0][0, robot], left, right)
+
+
+@kernel
+def show(place: Any, worlds: Any, bunch: Any, k: Any, robot: Any, state: Any) -> Any:
+    """Write where a robot is and has been."""
+    record = bunch[0][0][0, robot]
+    state[0], state[1], state[2] = record.x_mm, record.y_mm, record.heading_rad
+    state[3], state[4] = record.start_x_mm, record.start_y_mm
+    state[5] = record.forwards_mm + record.backwards_mm
+    state[6], state[7] = record.contact_count, record.is_touching

@@ -1,0 +1,189 @@
+"""The functions of the Matlab days: `kopen`, `ksend`, `kclose`, `ktime` and `pause`.
+
+A negative port is a simulated robot (-1 is robot 1, -2 robot 2 of the newest simulation), any other number a real
+serial port (0 is the first one). Source: thesis 3.3 ("The interface") and appendix A, kiks-behaviour.md 1.2.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+from kiks.client.port import Port, open_port
+from kiks.errors import LinkError, ParameterError, shown
+from kiks.model.checks import SECONDS_MAX, check_kind, check_number, check_numbers
+from kiks.ports.port import VirtualPort
+
+
+class Reference(tuple[float, ...]):
+    """What `kopen` returns: four numbers, as ever, with the open port behind them."""
+
+    port: Port | None
+    opened_s: float
+
+    @property
+    def number(self) -> int:
+        """The port's number."""
+        return int(self[0])
+
+
+class Openings:
+    """The references that are open, by port number: `ktime(-1)` names nothing but the number."""
+
+    def __init__(self) -> None:
+        self.by_number: dict[int, Reference] = {}
+
+    def latest(self) -> Reference | None:
+        """Return the reference opened last that is still open."""
+        return next(reversed(self.by_number.values()), None)
+
+
+_OPENINGS = Openings()
+
+
+def kopen(settings: Sequence[float]) -> Reference:
+    r"""Open a robot's port and return a reference for `ksend` and `kclose`.
+
+    Args:
+        settings: [port, baud, timeout]: port number (negative: simulated), line speed [bit/s] (9600 if left out) and
+            time-out [s] (1 if left out).
+
+    Raises:
+        ParameterError: If a number is missing or out of range.
+        LinkError: If the port does not exist or is open already.
+
+    Example:
+        >>> import kiks
+        >>> sim = kiks.Simulation()
+        >>> ref = kopen([-1, 9600, 1])
+        >>> ksend("D,0,0\n", ref)
+        'd'
+        >>> kclose(ref)
+    """
+    values = check_numbers("settings", settings).tolist()
+    is_list = isinstance(values, list) and 1 <= len(values) <= 3
+    if not is_list or isinstance(values[0], list) or abs(values[0]) > 9999 or values[0] != int(values[0]):
+        raise ParameterError(
+            f"settings must be [port, baud, timeout], but it was {shown(settings)}. Simulated: [-1, 9600, 1]."
+        )
+    number = int(values[0])
+    baud = int(values[1]) if len(values) > 1 else 9600
+    timeout_s = values[2] if len(values) > 2 else 1.0
+    if number in _OPENINGS.by_number:
+        raise LinkError(
+            f"port {number} must be closed before it is opened, but it is open. Call kclose(ref) or kclose([]) first."
+        )
+    port = open_port(f"kiks://{-number}" if number < 0 else _device(number), baud, timeout_s)
+    reference = Reference((float(number),) * 4)
+    reference.port = port
+    reference.opened_s = _now_s(port)
+    _OPENINGS.by_number[number] = reference
+    # As the old one did: the first exchange shows that somebody answers. A real robot may be switched on later.
+    ksend("B\r", reference)
+    return reference
+
+
+def ksend(text: str, ref: Sequence[float], timeout: float | None = None) -> str:
+    r"""Send a command and return the reply without its line end.
+
+    Args:
+        text: The command with its terminator, LF or CR; empty to let time pass only.
+        ref: What `kopen` returned.
+        timeout: Longest time to wait for the reply [s], if it is not that of `kopen`.
+
+    Returns:
+        The reply; what came of it if the time-out was over first.
+
+    Raises:
+        ParameterError: If the text is none.
+        LinkError: If the port is not open.
+    """
+    check_kind("text", text, str, r'Write ksend("N\n", ref).')
+    port = _opened(ref).port
+    assert port is not None
+    if not text:
+        _now_s(port)
+        return ""
+    port.write(text.encode("latin-1", errors="replace"))
+    if not text.endswith(("\n", "\r")):
+        return ""
+    holder: Any = port if isinstance(port, VirtualPort) else getattr(port, "port", port)
+    before = holder.timeout
+    if timeout is not None:
+        holder.timeout = timeout
+    try:
+        return port.read_until(b"\n").rstrip(b"\r\n").decode("ascii", errors="replace")
+    finally:
+        holder.timeout = before
+
+
+def kclose(ref: Sequence[float]) -> None:
+    """Close a port; `[]` closes every simulated one. It is no error if it is not open. The robot drives on."""
+    if isinstance(ref, list | tuple) and not ref:
+        numbers = [number for number in _OPENINGS.by_number if number < 0]
+    else:
+        numbers = [_number_of(ref)]
+    for number in numbers:
+        reference = _OPENINGS.by_number.pop(number, None)
+        if reference is not None and reference.port is not None:
+            reference.port.close()
+            reference.port = None
+
+
+def ktime(port: int | Sequence[float]) -> float | None:
+    """Return the time since a port was opened [s], simulated or real; None if it is not open.
+
+    Args:
+        port: The port's number, or what `kopen` returned.
+    """
+    reference = _OPENINGS.by_number.get(_number_of(port))
+    if reference is None or reference.port is None:
+        return None
+    return _now_s(reference.port) - reference.opened_s
+
+
+def pause(seconds: float) -> None:
+    """Let time pass [s]: simulated time if a simulated port was opened last, else real time.
+
+    Raises:
+        ParameterError: If the time is negative or not finite.
+    """
+    reference = _OPENINGS.latest()
+    if reference is not None and isinstance(reference.port, VirtualPort):
+        reference.port.sleep(seconds)
+    else:
+        time.sleep(check_number("seconds", seconds, 0, SECONDS_MAX, "Time never runs backwards."))
+
+
+def _opened(ref: Sequence[float]) -> Reference:
+    reference = _OPENINGS.by_number.get(_number_of(ref)) if isinstance(ref, list | tuple) and len(ref) >= 4 else None
+    if reference is None or reference.port is None:
+        raise LinkError(
+            f"ref must be what kopen returned and still be open, but it was {shown(ref)}. "
+            f"Open it with kopen([-1, 9600, 1])."
+        )
+    return reference
+
+
+def _number_of(ref: Any) -> int:
+    """Return the number of the port that a reference, or the number itself, names.
+
+    Raises:
+        ParameterError: If it names none.
+    """
+    numbers = check_numbers("ref", ref).ravel()
+    if not len(numbers):
+        raise ParameterError("ref must be what kopen returned, or a port's number, but it was empty.")
+    return int(numbers[0])
+
+
+def _device(number: int) -> str:
+    """Return the name of a real serial port: 0 is COM1 or /dev/ttyS0, as it was."""
+    import os
+
+    return f"COM{number + 1}" if os.name == "nt" else f"/dev/ttyS{number}"
+
+
+def _now_s(port: Port) -> float:
+    return port.time_s if isinstance(port, VirtualPort) else time.monotonic()

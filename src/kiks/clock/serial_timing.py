@@ -1,0 +1,118 @@
+"""A serial line in simulated time: when each character of a command has arrived, and each of a reply.
+
+A character takes 11 bit times and the next one waits for it; both directions work at once (khepera-protocol.md 2.1).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+from kiks.units import character_ns
+
+BACKLOG_LIMIT = 4096
+"""Characters on the way to the robot beyond which a sender has to wait [bytes]: a serial driver's buffer."""
+
+OUTPUT_LIMIT = 1 << 20
+"""Characters that wait for a reader [bytes]; what the robot says beyond them is lost, as in any serial driver."""
+
+
+class SerialTiming:
+    """Both directions of one robot's line.
+
+    Attributes:
+        waiting: Characters for the host that nobody has read, arrived or not.
+        sending_until_ns: When the last character for the robot will have arrived [ns].
+        lost_count: Characters that were dropped because nobody read for too long.
+    """
+
+    def __init__(self, baud: int) -> None:
+        self.baud = baud
+        self.character_ns = character_ns(baud)
+        self.sending_until_ns = 0
+        self.lost_count = 0
+        self._answering_until_ns = 0
+        self.waiting = bytearray()
+        # Pieces of `waiting`, oldest first: when the first character set out [ns], time of one [ns], their count.
+        self._pieces: deque[list[int]] = deque()
+
+    def set_baud(self, baud: int) -> None:
+        """Change the speed for everything that sets out from now on."""
+        self.baud = baud
+        self.character_ns = character_ns(baud)
+
+    @property
+    def room_ns(self) -> int:
+        """When a sender that is held back may go on [ns]."""
+        return self.sending_until_ns - BACKLOG_LIMIT * self.character_ns
+
+    def send(self, count: int, at_ns: int) -> int:
+        """Put characters on the way to the robot; return when the first one sets out [ns]."""
+        start_ns = max(at_ns, self.sending_until_ns)
+        self.sending_until_ns = start_ns + count * self.character_ns
+        return start_ns
+
+    def carry(self, count: int, at_ns: int) -> int:
+        """Put characters that somebody else keeps on the way to the host; return when the first sets out [ns]."""
+        start_ns = max(at_ns, self._answering_until_ns)
+        self._answering_until_ns = start_ns + count * self.character_ns
+        return start_ns
+
+    def answer(self, data: bytes, at_ns: int) -> int | None:
+        """Put a reply on the way to the host; return when it sets out [ns], None if it is empty or lost."""
+        if not data:
+            return None
+        if len(self.waiting) + len(data) > OUTPUT_LIMIT:
+            self.lost_count += len(data)
+            return None
+        start_ns = self.carry(len(data), at_ns)
+        self.waiting += data
+        self._pieces.append([start_ns, self.character_ns, len(data)])
+        return start_ns
+
+    def arrived_count(self, now_ns: int) -> int:
+        """Return how many of the waiting characters have arrived."""
+        count = 0
+        for start_ns, character, length in self._pieces:
+            if start_ns + length * character <= now_ns:
+                count += length
+                continue
+            return count + max((now_ns - start_ns) // character, 0)
+        return count
+
+    def arrival_ns(self, count: int) -> int | None:
+        """Return when the first `count` waiting characters have all arrived [ns], None if they were never sent."""
+        for start_ns, character, length in self._pieces:
+            if count <= length:
+                return start_ns + count * character
+            count -= length
+        return None
+
+    def take(self, count: int) -> bytes:
+        """Remove and return the first `count` waiting characters."""
+        if count == len(self.waiting):
+            taken = bytes(self.waiting)
+            self.forget()
+            return taken
+        taken = bytes(self.waiting[:count])
+        del self.waiting[:count]
+        left = len(taken)
+        while left:
+            piece = self._pieces[0]
+            if piece[2] <= left:
+                left -= piece[2]
+                self._pieces.popleft()
+            else:
+                piece[0] += left * piece[1]
+                piece[2] -= left
+                break
+        return taken
+
+    def cut_short(self, until_ns: int, now_ns: int) -> None:
+        """Take off the line what would reach the robot later than `until_ns`, and what would reach the host [ns]."""
+        self.sending_until_ns = min(self.sending_until_ns, until_ns)
+        self._answering_until_ns = min(self._answering_until_ns, now_ns)
+
+    def forget(self) -> None:
+        """Drop every character that nobody has read."""
+        self.waiting.clear()
+        self._pieces.clear()

@@ -1,0 +1,182 @@
+"""Small neural networks as kernels: what the controllers that come with KiKS are made of.
+
+Need: a call takes a hundred nanoseconds or so, and has the same bits on every processor.
+Method: sums run over inputs outside and over units inside. So each unit adds up its inputs in their order, and the sums
+of several units go on side by side; those of one input after the other would wait for each other. Counts are constants
+of the kernels. Scratch lies on the stack, where nothing else can overlap it, so that it stays in registers.
+
+Parameters of a layer are a matrix [1 + input, unit] row by row: first the biases, then the weights of each input.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from kiks.engine.compiling import inlined, kernel
+from kiks.engine.numbers import tanh
+from kiks.engine.simd.stack_arrays import stack_floats
+
+COUNT_MAX = 1023
+"""The largest count that a sensor gives (khepera-protocol.md 8.4)."""
+
+TIME_SCALE_LIMIT = 4.0
+"""Time constants lie within e to this power of the one that is given, to either side."""
+
+GAIN = 4.0
+"""What a CTRNN's weights and biases are multiplied by: from 1 on, a parameter makes a unit hold what it has."""
+
+_SHARE = 1.0 / COUNT_MAX
+
+
+@kernel
+def logistic(x: Any) -> Any:
+    """Return 1 / (1 + e^-x), within 4e-6."""
+    return 0.5 + 0.5 * tanh(0.5 * x)
+
+
+@kernel
+def exponential_between(x: Any) -> Any:
+    """Return e to the power of x, which is cut to +-`TIME_SCALE_LIMIT`, within 0.1 %, which does for time."""
+    t = tanh(0.5 * min(max(x, -TIME_SCALE_LIMIT), TIME_SCALE_LIMIT))
+    return (1.0 + t) / (1.0 - t)
+
+
+@inlined
+def add_products(inputs: Any, input_count: Any, parameters: Any, first: Any, units: Any, unit_count: Any) -> Any:
+    """Add weighted inputs to units; the weights are the parameters from `first` on, [input, unit]."""
+    for k in range(input_count):
+        given, row = inputs[k], first + k * unit_count
+        for unit in range(unit_count):
+            units[unit] += given * parameters[row + unit]
+
+
+@inlined
+def do_layer(inputs: Any, input_count: Any, parameters: Any, first: Any, units: Any, unit_count: Any) -> Any:
+    """Do a linear layer; its parameters are those from `first` on."""
+    for unit in range(unit_count):
+        units[unit] = parameters[first + unit]
+    add_products(inputs, input_count, parameters, first + unit_count, units, unit_count)
+
+
+def layer_size(input_count: int, unit_count: int) -> int:
+    """Return how many parameters a layer has."""
+    return (1 + input_count) * unit_count
+
+
+def layers(counts: tuple[int, ...], first: int = 0) -> Any:
+    """Return a kernel `(inputs, parameters, units)` of layers of so many numbers, with tanh between, not at the end."""
+    input_count, unit_count = counts[:2]
+
+    if len(counts) == 2:
+
+        @inlined
+        def do_last(inputs: Any, parameters: Any, units: Any) -> Any:
+            do_layer(inputs, input_count, parameters, first, units, unit_count)
+
+        return do_last
+
+    do_rest = layers(counts[1:], first + layer_size(input_count, unit_count))
+
+    @inlined
+    def do_all(inputs: Any, parameters: Any, units: Any) -> Any:
+        between = stack_floats(unit_count)
+        do_layer(inputs, input_count, parameters, first, between, unit_count)
+        for unit in range(unit_count):
+            between[unit] = tanh(between[unit])
+        do_rest(between, parameters, units)
+
+    return do_all
+
+
+def feed_forward(counts: tuple[int, ...], *, has_feedback: bool, is_cut: bool, speed_limit: float) -> Any:
+    """Return the function of a controller: layers from the senses, and its last speeds if so wanted, to the wheels.
+
+    Args:
+        counts: Inputs, units of each hidden layer, 2.
+        has_feedback: Whether the last two inputs are the last outputs, from the memory.
+        is_cut: Whether outputs are cut to +-1; else they are their tanh.
+        speed_limit: The speed of an output of 1 [pulses/10 ms].
+    """
+    input_count, memory_count, net = counts[0], 2 * has_feedback, layers(counts)
+    sense_count = input_count - memory_count
+
+    def decide(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+        inputs, outputs = stack_floats(input_count), stack_floats(2)
+        for k in range(sense_count):
+            inputs[k] = sensors[k] * _SHARE
+        for k in range(memory_count):
+            inputs[sense_count + k] = memory[k]
+        net(inputs, parameters, outputs)
+        for wheel in range(2):
+            output = min(max(outputs[wheel], -1.0), 1.0) if is_cut else tanh(outputs[wheel])
+            wheels[wheel] = speed_limit * output
+            if has_feedback:
+                memory[wheel] = output
+
+    return decide
+
+
+def continuous(
+    sense_count: int, neuron_count: int, *, period_s: float, time_constant_s: float, speed_limit: float
+) -> Any:
+    """Return the function of a controller: a continuous-time recurrent network; see `kiks.controllers.ctrnn`."""
+    bias_first, senses_first = neuron_count, 2 * neuron_count
+    neurons_first = senses_first + sense_count * neuron_count
+    periods = period_s / time_constant_s
+
+    def decide(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+        inputs, rates = stack_floats(sense_count), stack_floats(neuron_count)
+        driven, active, towards = stack_floats(neuron_count), stack_floats(neuron_count), stack_floats(neuron_count)
+        fastest = 0.0
+        for k in range(neuron_count):
+            rates[k] = periods * exponential_between(-parameters[k])
+            driven[k] = 0.0
+        for k in range(neuron_count):
+            fastest = max(fastest, rates[k])
+        for k in range(sense_count):
+            inputs[k] = sensors[k] * _SHARE
+        add_products(inputs, sense_count, parameters, senses_first, driven, neuron_count)
+        # Steps of at most half of the shortest time constant neither swing nor run away.
+        step_count = max(int(np.ceil(2.0 * fastest)), 1)
+        share = 1.0 / step_count
+        for _ in range(step_count):
+            for k in range(neuron_count):
+                active[k] = logistic(memory[k] + GAIN * parameters[bias_first + k])
+                towards[k] = driven[k]
+            add_products(active, neuron_count, parameters, neurons_first, towards, neuron_count)
+            for k in range(neuron_count):
+                memory[k] += share * rates[k] * (GAIN * towards[k] - memory[k])
+        for wheel in range(2):
+            wheels[wheel] = speed_limit * tanh(0.5 * (memory[wheel] + GAIN * parameters[bias_first + wheel]))
+
+    return decide
+
+
+def gated(sense_count: int, unit_count: int, *, speed_limit: float) -> Any:
+    """Return the function of a controller: gated recurrent units; see `kiks.controllers.gru`."""
+    input_count, gate_count = sense_count + unit_count, 2 * unit_count
+    units_first = layer_size(input_count, gate_count)
+    wheels_first = units_first + layer_size(input_count, unit_count)
+
+    def decide(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+        inputs, outputs = stack_floats(input_count), stack_floats(2)
+        gates, fresh = stack_floats(gate_count), stack_floats(unit_count)
+        for k in range(sense_count):
+            inputs[k] = sensors[k] * _SHARE
+        for k in range(unit_count):
+            inputs[sense_count + k] = memory[k]
+        do_layer(inputs, input_count, parameters, 0, gates, gate_count)
+        for k in range(gate_count):
+            gates[k] = logistic(gates[k])
+        for k in range(unit_count):
+            inputs[sense_count + k] *= gates[unit_count + k]
+        do_layer(inputs, input_count, parameters, units_first, fresh, unit_count)
+        for k in range(unit_count):
+            memory[k] = gates[k] * memory[k] + (1.0 - gates[k]) * tanh(fresh[k])
+        do_layer(memory, unit_count, parameters, wheels_first, outputs, 2)
+        for wheel in range(2):
+            wheels[wheel] = speed_limit * tanh(outputs[wheel])
+
+    return decide

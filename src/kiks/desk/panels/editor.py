@@ -1,0 +1,230 @@
+"""The panel with which people draw: tools, brush and brightness, the way back, new arenas, and files."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Awaitable
+from dataclasses import dataclass
+
+from nicegui import ui
+from nicegui.events import KeyEventArguments
+
+from kiks.desk.panels.arena_view import ArenaView, Stroke, Tool
+from kiks.desk.panels.feedback import told
+from kiks.desk.panels.files import FilesPanel
+from kiks.desk.panels.new_arena import ask_for_box, ask_for_maze
+from kiks.desk.server.desk import Desk
+from kiks.errors import ParameterError
+from kiks.model.arena_objects import Ball, Cylinder, Lamp
+from kiks.model.materials import REFLECTANCES, brightness_of
+from kiks.model.robot import robot_names
+from kiks.model.sketch_things import SketchRobot
+
+BRUSH_MAX_MM = 100
+SNAPS: dict[float, str] = {0.0: "off", 1.0: "1 mm", 5.0: "5 mm", 10.0: "10 mm", 50.0: "50 mm"}
+REFRESH_S = 0.5
+"""How often it is shown whether there is a way back [s]: somebody else may have drawn."""
+
+
+@dataclass(frozen=True)
+class _ToolButton:
+    """A tool as people see it, and what the pointer does with it."""
+
+    word: str
+    icon: str
+    hint: str
+    pointer: str
+
+
+TOOLS = {
+    "hand": _ToolButton(
+        "Hand", "pan_tool", "Drag robots, balls, cylinders and lamps; turn robots by their rim", "hand"
+    ),
+    "rectangle": _ToolButton("Rectangle", "rectangle", "Draw a block of wall from corner to corner", "rectangle"),
+    "line": _ToolButton("Line", "horizontal_rule", "Draw a straight wall as wide as the brush", "line"),
+    "freehand": _ToolButton("Freehand", "gesture", "Draw a wall along your way, as wide as the brush", "freehand"),
+    "erase": _ToolButton("Erase", "cleaning_services", "Wipe walls away with the brush", "freehand"),
+    "erase-box": _ToolButton("Erase a box", "crop_free", "Wipe away all walls in a rectangle", "rectangle"),
+    "robot": _ToolButton("Robot", "smart_toy", "Put another robot down; the world begins anew", "point"),
+    "ball": _ToolButton("Ball", "sports_soccer", "Put a ball down", "point"),
+    "cylinder": _ToolButton("Cylinder", "album", "Put a cylinder down", "point"),
+    "lamp": _ToolButton("Lamp", "lightbulb", "Hang up a lamp of 1 W", "point"),
+    "remove": _ToolButton("Take away", "delete", "Take away the robot, ball, cylinder or lamp clicked at", "point"),
+}
+"""What can be done with the pointer."""
+
+
+class EditorPanel:
+    """The controls with which a world is drawn, opened and saved.
+
+    Args:
+        desk: The desk.
+        view: Where people draw.
+    """
+
+    def __init__(self, desk: Desk, view: ArenaView) -> None:
+        self._desk, self._view = desk, view
+        self._tool = "hand"
+        self._buttons: dict[str, ui.button] = {}
+        with ui.column().classes("w-full q-pa-md gap-3"):
+            self._build_tools()
+            self._build_brush()
+            self._build_steps()
+            self._build_arenas()
+            FilesPanel(desk)
+        ui.keyboard(on_key=self._press, ignore=["input", "select", "textarea"])
+        ui.timer(REFRESH_S, self._refresh)
+        self._choose("hand")
+        self._refresh()
+
+    def _build_tools(self) -> None:
+        with ui.row().classes("w-full gap-1"):
+            for name, tool in TOOLS.items():
+                button = ui.button(icon=tool.icon, on_click=lambda name=name: self._choose(name))
+                button.props(f'dense padding="6px" aria-label="{tool.word}" data-testid=tool-{name}').mark(
+                    f"tool-{name}"
+                )
+                with button:
+                    ui.tooltip(f"{tool.word}: {tool.hint}")
+                self._buttons[name] = button
+        self._hint = ui.label().classes("text-caption").props("data-testid=tool-hint aria-live=polite")
+
+    def _build_brush(self) -> None:
+        with ui.row().classes("w-full items-center no-wrap"):
+            ui.label("Brush").classes("w-24")
+            self._brush = ui.slider(min=1, max=BRUSH_MAX_MM, value=10, on_change=self._apply_tool)
+            self._brush.props('label aria-label="Width of the brush in millimetres" data-testid=brush').classes("col")
+            ui.label().bind_text_from(self._brush, "value", lambda width: f"{width:g} mm").classes("w-16")
+        with ui.row().classes("w-full items-center no-wrap"):
+            ui.label("Brightness").classes("w-24")
+            self._brightness = ui.slider(min=1, max=255, value=255, on_change=self._show_brightness)
+            self._brightness.props('label aria-label="Brightness of walls, 1 to 255" data-testid=brightness')
+            self._brightness.classes("col")
+            self._swatch = ui.element("div").props("aria-hidden=true data-testid=swatch")
+            self._swatch.style("width: 4rem; height: 1.5rem; border: 1px solid currentColor; border-radius: 4px")
+        with ui.row().classes("w-full items-center no-wrap"):
+            choices = {"": "a grey of its own"} | {name: name for name in REFLECTANCES}
+            self._material = ui.select(choices, label="Material", value="white", on_change=self._take_material)
+            self._material.props("dense options-dense data-testid=material").classes("col")
+            self._material.tooltip("How much of a sensor's light the wall sends back, as real materials do")
+            self._snap = ui.select(SNAPS, label="Snap to a grid", value=0.0, on_change=self._apply_tool)
+            self._snap.props("dense options-dense data-testid=snap").classes("col")
+            self._snap.tooltip("Corners and ends of walls go to whole steps of this size")
+            self._kind = ui.select(robot_names(), label="Kind of robot", value="khepera")
+            self._kind.props("dense options-dense data-testid=robot-kind").classes("col")
+            self._kind.tooltip("What the robot tool puts down")
+        self._show_brightness()
+
+    def _build_steps(self) -> None:
+        with ui.row().classes("w-full gap-1"):
+            self._undo = _button("Undo", "undo", "undo", "Take the last step back (Ctrl-Z)", self._step_back)
+            self._redo = _button("Redo", "redo", "redo", "Do it again (Ctrl-Y)", self._step_forth)
+            _button("Clear", "layers_clear", "clear", "Take all walls away; what stands there stays", self._clear)
+
+    def _build_arenas(self) -> None:
+        with ui.row().classes("w-full gap-1"):
+            _button("New arena", "add_box", "new-arena", "An empty box of any size", self._new_box)
+            _button("Maze", "grid_4x4", "new-maze", "A random maze with a lamp in its exit", self._new_maze)
+
+    # ---- tools ----
+
+    def put_down(self) -> None:
+        """Take the hand in place of a tool, for people who turn to something else."""
+        self._choose("hand")
+
+    def _choose(self, name: str) -> None:
+        self._tool = name
+        for each, button in self._buttons.items():
+            is_chosen = each == name
+            button.props(f"{'color=accent' if is_chosen else 'color=primary'} aria-pressed={str(is_chosen).lower()}")
+        self._hint.text = TOOLS[name].hint + "."
+        self._apply_tool()
+
+    def _apply_tool(self) -> None:
+        tool = TOOLS[self._tool]
+        size_mm = 55.0 if self._tool == "robot" else 64.0 if self._tool == "ball" else 32.0
+        brush_mm = size_mm if tool.pointer == "point" else float(self._brush.value or 1)
+        label = "" if self._tool == "hand" else tool.word.lower()
+        self._view.set_tool(Tool(tool.pointer, brush_mm, float(self._snap.value), label))  # type: ignore[arg-type]
+
+    def _show_brightness(self) -> None:
+        grey = int(self._brightness.value)
+        self._swatch.style(f"background: rgb({grey}, {grey}, {grey})")
+        names = [name for name in REFLECTANCES if brightness_of(name) == grey]
+        self._material.value = names[0] if names else ""
+
+    def _take_material(self) -> None:
+        if self._material.value:
+            self._brightness.value = brightness_of(self._material.value)
+
+    # ---- steps ----
+
+    @told
+    async def draw(self, stroke: Stroke) -> None:
+        """Do what a stroke of the chosen tool means, unless it cannot be done: then the person is told why."""
+        await self._drawn(stroke)
+        self._refresh()
+
+    def _drawn(self, stroke: Stroke) -> Awaitable[None]:
+        editing, tool, points = self._desk.editing, self._tool, stroke.points
+        if not points:
+            raise ParameterError("A stroke must have a point, but it had none. Draw again.")
+        grey = 0 if tool.startswith("erase") else int(self._brightness.value)
+        width_mm = float(self._brush.value)
+        if stroke.kind == "rectangle":
+            return editing.draw(lambda sketch: sketch.rectangle(*points[0], *points[-1], grey))
+        if stroke.kind in ("line", "freehand"):
+            return editing.draw(lambda sketch: sketch.line(points, width_mm=width_mm, brightness=grey))
+        (x_mm, y_mm) = points[0]
+        if tool == "remove":
+            return editing.remove(x_mm, y_mm)
+        if tool == "robot":
+            return editing.place(SketchRobot(x_mm, y_mm, math.pi / 2, self._kind.value))
+        kinds: dict[str, type[Ball | Cylinder | Lamp]] = {"ball": Ball, "cylinder": Cylinder, "lamp": Lamp}
+        return editing.place(kinds[tool](x_mm, y_mm))
+
+    @told
+    async def _step_back(self) -> None:
+        await self._desk.editing.undo()
+        self._refresh()
+
+    @told
+    async def _step_forth(self) -> None:
+        await self._desk.editing.redo()
+        self._refresh()
+
+    @told
+    async def _clear(self) -> None:
+        await self._desk.editing.draw(lambda sketch: sketch.clear())
+        self._refresh()
+
+    @told
+    async def _new_box(self) -> None:
+        if (arena := await ask_for_box()) is not None:
+            await self._desk.editing.begin(arena)
+
+    @told
+    async def _new_maze(self) -> None:
+        if (arena := await ask_for_maze()) is not None:
+            await self._desk.editing.begin(arena)
+
+    async def _press(self, event: KeyEventArguments) -> None:
+        if not event.action.keydown or not (event.modifiers.ctrl or event.modifiers.meta):
+            return
+        key = event.key.name.lower()
+        if key == "z" and not event.modifiers.shift:
+            await self._step_back()
+        elif key in ("y", "z"):
+            await self._step_forth()
+
+    def _refresh(self) -> None:
+        self._undo.set_enabled(self._desk.editing.can_undo)
+        self._redo.set_enabled(self._desk.editing.can_redo)
+
+
+def _button(word: str, icon: str, name: str, hint: str, act: object) -> ui.button:
+    button = ui.button(word, icon=icon, on_click=act)  # type: ignore[arg-type]
+    button.props(f"dense no-caps outline padding='4px 10px' data-testid={name}").mark(name)
+    with button:
+        ui.tooltip(hint)
+    return button

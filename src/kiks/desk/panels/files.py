@@ -1,0 +1,150 @@
+"""Opening and saving: files of the desk's folder, examples, and files that go from and to the browser."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import PurePosixPath
+
+from nicegui import ui
+from nicegui.events import UploadEventArguments
+
+from kiks.desk.panels.feedback import told
+from kiks.desk.server.desk import Desk
+from kiks.desk.server.example_worlds import EXAMPLES
+from kiks.desk.server.folder import OPENED, PICTURES, UPLOAD_BYTES_MAX, Folder, decode, encode
+from kiks.errors import ArenaError, ParameterError
+from kiks.model.arena import Arena
+from kiks.model.picture import decode_picture
+from kiks.model.project import Project
+
+
+class FilesPanel:
+    """The controls for files.
+
+    Args:
+        desk: The desk.
+    """
+
+    def __init__(self, desk: Desk) -> None:
+        # Files are taken at once: there is never a list of those that wait.
+        ui.add_css(".kiks-upload .q-uploader__list { display: none }")
+        self._desk = desk
+        self._folder = Folder(desk.folder)
+        ui.separator()
+        self._build_open()
+        self._build_save()
+        self._build_upload()
+
+    def _build_open(self) -> None:
+        with ui.row().classes("w-full items-end no-wrap gap-1"):
+            self._choice = ui.select([], label="Open a file of the folder", with_input=True)
+            self._choice.props("dense options-dense data-testid=open-name").classes("col").mark("open-name")
+            self._choice.tooltip(f"Projects, arenas and pictures in {self._desk.folder}")
+            self._choice.on("focus", self._list)
+            _small("Open", "folder_open", "open", "Begin with the world of this file", self._open)
+        with ui.row().classes("w-full items-end no-wrap gap-1"):
+            self._example = ui.select([*EXAMPLES], label="Or an example", value=next(iter(EXAMPLES)))
+            self._example.props("dense options-dense data-testid=example-name").classes("col").mark("example-name")
+            _small("Open", "folder_open", "open-example", "Begin with the world of this example", self._open_example)
+        self._list()
+
+    def _build_save(self) -> None:
+        with ui.row().classes("w-full items-end no-wrap gap-1"):
+            self._name = ui.input("Save as").props("dense data-testid=save-name").classes("col").mark("save-name")
+            self._name.tooltip("Name in the folder; ends in .kiks, or in .kad for the walls alone, as the old KiKS had")
+            _small("Save", "save", "save", "Save the world with everything where it is now", self._save)
+            _small("", "download", "download", "Download it instead, under this name", self._download)
+
+    def _build_upload(self) -> None:
+        with ui.row().classes("w-full items-center no-wrap gap-1"):
+            self._upload = ui.upload(
+                label="Bring a file: project, .kad, picture",
+                auto_upload=True,
+                max_file_size=UPLOAD_BYTES_MAX,
+                on_upload=self._take,
+                on_rejected=lambda: ui.notify(
+                    f"A file must have at most {UPLOAD_BYTES_MAX >> 20} MiB and be one of {', '.join(OPENED)}.",
+                    type="negative",
+                ),
+            )
+            self._upload.props(f'flat bordered accept="{",".join(OPENED)}" data-testid=upload').classes(
+                "col kiks-upload"
+            )
+            self._upload.mark("upload")
+            self._mm_per_pixel = ui.number("mm per pixel", value=1.0, min=0.1, max=100, step=0.1)
+            self._mm_per_pixel.props("dense data-testid=mm-per-pixel").classes("w-28")
+            self._mm_per_pixel.tooltip("How large a pixel of a picture is")
+
+    def _list(self) -> None:
+        names = self._folder.names()
+        if names != self._choice.options:
+            self._choice.set_options(names, value=self._choice.value if self._choice.value in names else None)
+
+    @told
+    async def _open(self) -> None:
+        name = self._choice.value
+        if not name:
+            raise ParameterError("A file must be chosen first. Save one, or open an example.")
+        await self._begin(await asyncio.to_thread(self._folder.open, name))
+        self._name.value = str(PurePosixPath(name).with_suffix(".kiks"))
+
+    @told
+    async def _open_example(self) -> None:
+        await self._begin(EXAMPLES[str(self._example.value)]())
+
+    async def _begin(self, project: Project) -> None:
+        await self._desk.replace(project)
+        ui.notify(f"This is {project.arena.name}.")
+
+    @told
+    async def _save(self) -> None:
+        name = str(self._name.value or "")
+        may_replace = self._folder.has(name)
+        if may_replace and not await _agrees(f"{self._folder.full_name(name)} is there. Replace it?"):
+            return
+        project = await self._desk.present_project()
+        saved = await asyncio.to_thread(self._folder.save, project, name, may_replace=may_replace)
+        self._list()
+        ui.notify(f"Saved as {saved}.", type="positive")
+
+    @told
+    async def _download(self) -> None:
+        name = PurePosixPath(self._folder.full_name(str(self._name.value or "world"))).name
+        project = await self._desk.present_project()
+        ui.download.content(await asyncio.to_thread(encode, project, name), name)
+
+    async def _take(self, event: UploadEventArguments) -> None:
+        await self._taken(event)
+        self._upload.reset()
+
+    @told
+    async def _taken(self, event: UploadEventArguments) -> None:
+        name = event.file.name
+        if event.file.size() > UPLOAD_BYTES_MAX:
+            raise ArenaError(f"A file must have at most {UPLOAD_BYTES_MAX >> 20} MiB, but {name[:100]!r} has more.")
+        data = await event.file.read()
+        if PurePosixPath(name).suffix.lower() in PICTURES:
+            mm_per_pixel = self._mm_per_pixel.value
+            raster = await asyncio.to_thread(decode_picture, data, mm_per_pixel)
+            arena = Arena.from_array(raster, mm_per_pixel=mm_per_pixel, name=PurePosixPath(name).stem[:100])
+            await self._desk.editing.begin(arena)
+        else:
+            await self._begin(await asyncio.to_thread(decode, name, data))
+
+
+async def _agrees(question: str) -> bool:
+    with ui.dialog() as dialog, ui.card():
+        ui.label(question)
+        with ui.row().classes("w-full justify-end"):
+            ui.button("No", on_click=lambda: dialog.submit(False)).props("flat no-caps data-testid=dialog-no")
+            ui.button("Yes", on_click=lambda: dialog.submit(True)).props("no-caps data-testid=dialog-yes")
+    answer = await dialog
+    dialog.delete()
+    return bool(answer)
+
+
+def _small(word: str, icon: str, name: str, hint: str, act: object) -> None:
+    button = ui.button(word, icon=icon, on_click=act)  # type: ignore[arg-type]
+    button.props(f'dense no-caps outline padding="4px 10px" aria-label="{word or hint}" data-testid={name}').mark(name)
+    with button:
+        ui.tooltip(hint)

@@ -1,0 +1,235 @@
+"""The monitor's panel: which robot is watched, its monitor, and why a reading is what it is."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from nicegui import ui
+
+from kiks.desk.panels.explanation_drawing import draw_rays
+from kiks.desk.panels.monitor_view import Asked, MonitorView
+from kiks.desk.server.desk import Desk
+from kiks.errors import KiksError
+from kiks.firmware.battle import Battle
+from kiks.firmware.general_io import GeneralIO
+from kiks.firmware.gripper import Gripper
+from kiks.firmware.k213 import K213
+from kiks.firmware.radio import ATTEMPTS, Radio
+from kiks.firmware.turret import Turret
+from kiks.sim.explanation import Explanation, LightExplanation
+from kiks.sim.simulation import Simulation
+from kiks.units import s_from_ns
+
+
+def describe_turret(turret: Turret) -> str:
+    """Return a line about a turret; the simulation's lock is held."""
+    return (
+        f"{turret.name} (turret {turret.number}): {_state_of(turret)}"
+        if turret.number >= 0
+        else (f"{turret.name}: {_state_of(turret)}")
+    )
+
+
+def _state_of(turret: Turret) -> str:
+    if isinstance(turret, Radio):
+        return _radio(turret)
+    if isinstance(turret, Battle):
+        hits = int(turret.site.record["battle_hits"])
+        return f"energy {turret.energy:.1f} of {turret.most:g} points, hit {hits} times since it was asked last"
+    if isinstance(turret, Gripper):
+        body = turret.site.held_body()
+        return "holds nothing" if body is None else f"holds body {body['number']}, or has it between its jaws"
+    if isinstance(turret, GeneralIO):
+        return f"inputs {turret.inputs:08b}, outputs {turret.outputs:08b}"
+    if isinstance(turret, K213):
+        return (
+            f"a picture every {1000 * s_from_ns(turret.period_ns):g} ms, the last one at "
+            f"{s_from_ns(turret.taken_ns):.3f} s, light level {turret.light}"
+        )
+    return "its own kind"
+
+
+def _radio(radio: Radio) -> str:
+    record = radio.site.record
+    parts = []
+    if attempt := int(record["radio_attempt"]):
+        parts.append(f"sends to robot {record['radio_to']}, attempt {attempt} of {ATTEMPTS}")
+    elif record["radio_has_failed"]:
+        parts.append(f"its last message, to robot {record['radio_to']}, was lost")
+    else:
+        parts.append("silent")
+    if sender := int(record["radio_from"]):
+        data = " ".join(str(byte) for byte in record["radio_from_data"][: int(record["radio_from_length"])].tolist())
+        parts.append(f"a message from robot {sender} waits to be read: {data or 'empty'}")
+    return "; ".join(parts)
+
+
+AGAIN_S = 0.5
+"""How often the explanation and the words about turrets are renewed [s]."""
+
+_RAY_COLUMNS = ("Ray", "Length [mm]", "Met", "Bright", "Angle [°]", "Counts")
+_LAMP_COLUMNS = ("Lamp", "Distance [mm]", "Angle [°]", "Power [W]", "What it is", "Counts")
+_WORDS = ("Met", "What it is")
+
+
+class MonitorPanel:
+    """One robot's monitor, with the answer to "why does it read 437?".
+
+    Args:
+        desk: The desk.
+        feed: Path of the WebSocket that frames come from.
+    """
+
+    def __init__(self, desk: Desk, feed: str = "/desk/feed") -> None:
+        self._desk = desk
+        self._index = 0
+        self._asked: Asked | None = None
+        self._is_seen = False
+        with ui.column().classes("w-full gap-2 q-pa-sm"):
+            self._choice = (
+                ui.select(self._names(), value=0, label="Robot", on_change=lambda event: self._choose(event.value))
+                .classes("w-full")
+                .props('dense outlined data-testid="monitor-robot"')
+                .mark("monitor-robot")
+                .tooltip("Which robot is watched here")
+            )
+            with MonitorView(feed, on_explain=self._explain, on_seen=self._see).classes("w-full") as self._view:
+                self._build_answer()
+            self._turrets = ui.label().style("white-space: pre-line").props('data-testid="turret-words"')
+        ui.timer(AGAIN_S, self._renew)
+
+    def _build_answer(self) -> None:
+        """Build what says why a reading is what it is; it is there once somebody has asked."""
+        with ui.column().classes("kiks-answer w-full gap-2").props('data-testid="explanation"') as self._answer:
+            with ui.row().classes("w-full items-center justify-between no-wrap"):
+                self._title = ui.label().classes("text-h6").props('role="heading" aria-level="2" aria-live="polite"')
+                ui.button(icon="close", on_click=self._forget).props(
+                    'flat round dense aria-label="Close the explanation" data-testid="close-explanation"'
+                ).tooltip("Close the explanation")
+            self._drawing = ui.html(sanitize=False).classes("w-full").props('data-testid="explanation-drawing"')
+            self._words = ui.label().style("white-space: pre-line").props('data-testid="explanation-text"')
+            self._keeps = (
+                ui.switch("Keep looking")
+                .props('dense data-testid="keep-looking"')
+                .mark("keep-looking")
+                .tooltip("Take the reading apart anew twice a second")
+            )
+            self._table = (
+                ui.table(rows=[], columns=[], row_key="0")
+                .classes("w-full")
+                .props('dense flat bordered hide-pagination :rows-per-page-options="[0]"')
+                .props('data-testid="explanation-table"')
+            )
+            self._note = ui.label().classes("text-caption")
+        self._answer.set_visibility(False)
+
+    # ---- what is watched ----
+
+    def show_robot(self, index: int) -> None:
+        """Watch another robot, by its index from 0; one that is not there changes nothing."""
+        if 0 <= index < self._desk.sim.robot_count:
+            self._choice.set_options(self._names(), value=index)
+
+    async def show_sensor(self, index: int, sensor: int) -> None:
+        """Watch a robot, and say why one of its proximity sensors reads what it reads; both count from 0."""
+        self.show_robot(index)
+        await self._explain(Asked(sensor, "proximity"))
+
+    def _names(self) -> dict[int, str]:
+        return {index: f"Robot {name}" for index, name in enumerate(self._desk.names())}
+
+    def _choose(self, index: int) -> None:
+        self._index = index
+        self._view.set_robot(index)
+        self._forget()
+
+    def _forget(self) -> None:
+        self._asked = None
+        self._view.set_chosen(None)
+        self._answer.set_visibility(False)
+
+    def _see(self, is_seen: bool) -> None:
+        self._is_seen = is_seen
+
+    # ---- what is said of it ----
+
+    async def _renew(self) -> None:
+        if not self._is_seen:
+            return
+        if self._choice.options != (names := self._names()):
+            self._choice.set_options(names, value=min(self._index, len(names) - 1))
+        number = self._index + 1
+        self._turrets.set_text(await self._desk.do(lambda sim: _turret_words(sim, number)))
+        if self._keeps.value and self._asked is not None:
+            await self._explain(self._asked)
+
+    async def _explain(self, asked: Asked) -> None:
+        number = self._index + 1
+
+        def ask(sim: Simulation) -> Explanation | LightExplanation:
+            explain = sim.explain if asked.which == "proximity" else sim.explain_light
+            return explain(number, asked.sensor)
+
+        try:
+            why = await self._desk.do(ask)
+        except KiksError as error:
+            ui.notify(str(error), type="negative")
+            return
+        if asked != self._asked:
+            self._asked = asked
+            self._view.set_chosen(asked)
+        self._answer.set_visibility(True)
+        self._title.set_text(f"Why does it read {why.count}?")
+        self._words.set_text(why.text())
+        if isinstance(why, Explanation):
+            self._show_rays(why)
+        else:
+            self._show_lamps(why)
+
+    def _show_rays(self, why: Explanation) -> None:
+        self._drawing.set_visibility(True)
+        self._drawing.set_content(draw_rays(why))
+        rows = [
+            (number, _figure(ray.length_mm), ray.met, ray.brightness or "–", _figure(ray.incidence_deg, 0),
+             _signed(ray.contribution_counts))
+            for number, ray in enumerate(why.rays, 1)
+        ]  # fmt: skip
+        self._fill(_RAY_COLUMNS, rows)
+        self._note.set_text(
+            "Ray 1 is the leftmost. Bright: 1 is black, 255 white. Angle: 0 where a ray meets a surface squarely. "
+            "Counts: what the reading would lose without this ray."
+        )
+
+    def _show_lamps(self, why: LightExplanation) -> None:
+        self._drawing.set_visibility(False)
+        rows = [
+            (lamp.lamp, _figure(lamp.distance_mm, 0), _figure(lamp.angle_deg, 0), f"{lamp.power_w:g}", lamp.state,
+             _signed(-lamp.contribution_counts))
+            for lamp in why.lamps
+        ]  # fmt: skip
+        self._fill(_LAMP_COLUMNS, rows)
+        self._note.set_text(
+            "Angle: off the sensor's axis. Counts: what the lamp changes; light makes readings smaller."
+        )
+
+    def _fill(self, names: tuple[str, ...], rows: list[tuple[Any, ...]]) -> None:
+        columns = [
+            {"name": str(k), "field": str(k), "label": name, "align": "left" if name in _WORDS else "right"}
+            for k, name in enumerate(names)
+        ]
+        if self._table.columns != columns:
+            self._table.columns = columns
+        self._table.rows = [{str(k): value for k, value in enumerate(row)} for row in rows]
+
+
+def _figure(value: float, digits: int = 1) -> str:
+    return f"{value:.{digits}f}" if math.isfinite(value) else "–"
+
+
+def _signed(value: float) -> str:
+    return f"{value:+.1f}" if abs(value) >= 0.05 else "0"
+
+
+def _turret_words(sim: Simulation, number: int) -> str:
+    return "\n".join(describe_turret(turret) for turret in sim.turrets(number)) if number <= sim.robot_count else ""

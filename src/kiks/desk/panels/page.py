@@ -1,0 +1,138 @@
+"""The page: the arena on the left, time above it, and beside it what there is to be looked at and done."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from nicegui import ui
+
+from kiks.desk.panels.arena_view import ArenaView, Pick, Stroke
+from kiks.desk.panels.editor import EditorPanel
+from kiks.desk.panels.monitor import MonitorPanel
+from kiks.desk.panels.programs import ProgramsPanel
+from kiks.desk.panels.settings import SettingsPanel
+from kiks.desk.panels.time_controls import TimePanel
+from kiks.desk.panels.view import ViewPanel
+from kiks.desk.panels.wire import WirePanel
+from kiks.desk.server.desk import Desk
+
+STYLE = Path(__file__).parents[1] / "web" / "page.css"
+
+PRIMARY, ACCENT, POSITIVE = "#174a63", "#b85c00", "#1b7a34"
+"""Colours that can be read with white on them, by all and on a wall: contrasts of 9.4, 4.7 and 5.4 to 1. On dark pages,
+words of these colours are lighter: see `STYLE`."""
+
+HINT = "Drag a robot to move it, its rim to turn it. Click it to look inside."
+
+MEMORY = """<script>
+try {
+  sessionStorage.length;
+} catch {
+  Object.defineProperty(window, "sessionStorage", { value: {} });
+}
+</script>"""
+"""Stands in for what NiceGUI remembers a tab by: within a notebook's page of another name, such as localhost for
+127.0.0.1, Chromium refuses even to look at it, and all buttons would be dead."""
+
+NEWS_S = 0.5
+"""How often people are told what is new [s]."""
+
+
+class Page:
+    """The page of a desk, for one browser.
+
+    Args:
+        desk: The desk.
+        number: Its number in this process.
+    """
+
+    def __init__(self, desk: Desk, number: int) -> None:
+        self._desk = desk
+        self._told = desk.news.count
+        feed = f"/desk/{number}/feed"
+        ui.colors(primary=PRIMARY, accent=ACCENT, positive=POSITIVE)
+        ui.add_head_html(MEMORY)
+        ui.add_css(STYLE)
+        with ui.header(elevated=True).classes("items-center q-py-none q-px-md no-wrap gap-2").style("height: 58px"):
+            ui.label("KiKS").classes("text-h6 gt-sm")
+            TimePanel(desk, feed)
+            ui.space()
+            tools = ui.row().classes("items-center no-wrap gap-1")
+        with ui.splitter(value=64, limits=(30, 100)).classes("desk-body") as halves:
+            with halves.before:
+                self._view = ArenaView(feed, on_pick=self._pick, on_draw=self._draw)
+                ui.label(HINT).classes("desk-hint")
+            with halves.after, ui.column().classes("w-full gap-0 no-wrap"):
+                self._build_tabs(feed)
+        with tools:
+            ViewPanel(desk, self._view)
+        ui.timer(NEWS_S, self._tell_news)
+
+    def _build_tabs(self, feed: str) -> None:
+        """Build the tabs beside the arena; what is in one when it is first looked at."""
+        desk = self._desk
+        self._unbuilt: dict[str, Callable[[], object]] = {}
+        self._monitor: MonitorPanel | None = None
+        self._editor: EditorPanel | None = None
+        self._sleepers: dict[str, WirePanel | ProgramsPanel] = {}
+        tabs = (
+            ("robot", "Robot", lambda: self._build_monitor(feed)),
+            ("wire", "Wire", lambda: self._build_sleeper("wire", WirePanel)),
+            ("arena", "Arena", self._build_editor),
+            ("programs", "Programs", lambda: self._build_sleeper("programs", ProgramsPanel)),
+            ("settings", "Settings", lambda: SettingsPanel(desk)),
+        )
+        with (
+            ui.tabs().props("dense no-caps align=justify active-color=accent").classes("w-full desk-tabs") as self._tabs
+        ):
+            for name, word, _ in tabs:
+                ui.tab(name, word).props(f"data-testid=tab-{name}")
+        self._panels = ui.tab_panels(self._tabs, animated=False).classes("desk-panels w-full")
+        self._places: dict[str, ui.tab_panel] = {}
+        with self._panels:
+            for name, _, build in tabs:
+                self._places[name] = ui.tab_panel(name)
+                self._unbuilt[name] = build
+        self._panels.on_value_change(lambda event: self._build(event.value))
+        self._panels.value = "robot"
+
+    def _build(self, name: str) -> None:
+        if self._editor is not None and name != "arena":
+            self._editor.put_down()
+        build = self._unbuilt.pop(name, None)
+        if build is not None:
+            with self._places[name]:
+                build()
+        for own, sleeper in self._sleepers.items():
+            sleeper.set_visible(own == name)
+
+    def _build_sleeper(self, name: str, kind: type[WirePanel | ProgramsPanel]) -> None:
+        """Build a panel that does nothing while it is not seen."""
+        self._sleepers[name] = kind(self._desk)
+
+    def _build_monitor(self, feed: str) -> None:
+        self._monitor = MonitorPanel(self._desk, feed)
+
+    def _build_editor(self) -> None:
+        self._editor = EditorPanel(self._desk, self._view)
+
+    async def _pick(self, pick: Pick) -> None:
+        """Show the robot or the sensor that was clicked at."""
+        if pick.what in ("robot", "sensor"):
+            self._panels.value = "robot"
+            if self._monitor is not None and pick.what == "robot":
+                self._monitor.show_robot(pick.index)
+            elif self._monitor is not None:
+                await self._monitor.show_sensor(pick.index, pick.sensor)
+
+    async def _draw(self, stroke: Stroke) -> None:
+        """Give a stroke to whoever has handed out the tool."""
+        if self._editor is not None:
+            await self._editor.draw(stroke)
+
+    def _tell_news(self) -> None:
+        first, news = self._desk.news.since(self._told)
+        self._told = first + len(news)
+        for text in news:
+            ui.notify(text, multi_line=True, close_button="OK", timeout=8000)

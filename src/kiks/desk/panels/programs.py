@@ -1,0 +1,341 @@
+"""Programs: which run, on which robots, what they print; and an editor to write one and run it."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING
+
+from nicegui import ui
+
+from kiks.desk.panels.feedback import told
+from kiks.desk.server.scripts import (
+    NEW,
+    Script,
+    find_mistake,
+    offered,
+    path_of,
+    read_script,
+    save_script,
+    split_arguments,
+)
+from kiks.ports.program_process import Command
+from kiks.ports.programs import Handle
+
+if TYPE_CHECKING:
+    from kiks.desk.server.desk import Desk
+
+REFRESH_S = 0.3
+"""How often the list and the output are shown anew [s]."""
+
+SHOWN_LINES = 500
+"""Lines of output in the page."""
+
+NEWEST_LINES = 100
+"""Most lines of output that come into the page in one go."""
+
+LOOK_S = 0.02
+"""How often it is looked whether a program has ended [s]."""
+
+MAY_NOT = (
+    "Programs cannot be started from this page, because this desk is open to other computers: whoever sees it could "
+    "run anything here. Start them where the desk was started, or open it for this computer alone."
+)
+"""Why there is no editor: its programs would not start (`kiks.ports.program_process`)."""
+
+CSS = ".program-error { color: #b00020 } .body--dark .program-error { color: #ff9a90 }"
+
+ICONS = {"running": "play_circle", "stopping": "hourglass_top", "stopped": "stop_circle", "silenced": "volume_off"}
+"""What stands before a program, by its state; the rest has ended."""
+
+
+class ProgramsPanel:
+    """The programs of a desk.
+
+    Args:
+        desk: The desk.
+    """
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+        self._drawn: object = None
+        self._shown: Handle | None = None
+        self._next_line = 0
+        self._script: Script | None = None
+        self._drafts: dict[Script | None, str] = {}
+        ui.add_css(CSS)
+        with ui.column().classes("w-full q-pa-sm gap-2"):
+            if desk.may_run_programs:
+                self._build_editor()
+            else:
+                ui.label(MAY_NOT).classes("text-body2").mark("may-not").props('data-testid="may-not"')
+            self._list = ui.column().classes("w-full gap-1").mark("programs").props('data-testid="programs"')
+            with ui.expansion("Output", value=True).classes("w-full").props("dense") as self._output_box:
+                self._log = (
+                    ui.log(max_lines=SHOWN_LINES)
+                    .classes("w-full text-caption")
+                    .style("height: 12rem")
+                    .mark("output")
+                    .props('data-testid="output" aria-label="What the program has printed"')
+                )
+        self._timer = ui.timer(REFRESH_S, self.refresh)
+        self.refresh()
+
+    def set_visible(self, is_visible: bool) -> None:
+        """Show what is new only while somebody sees it."""
+        self._timer.active = is_visible
+
+    # ---- the list, and what they print ----
+
+    def refresh(self) -> None:
+        """Show how things stand."""
+        desk = self._desk
+        handles = list(desk.programs.handles)
+        if self._shown not in handles:
+            self._show(handles[-1] if handles else None)
+        drawn = [(handle, handle.state, handle is self._shown) for handle in handles]
+        if drawn != self._drawn:
+            self._drawn = drawn
+            self._list.clear()
+            with self._list:
+                self._draw_list(handles)
+        if desk.may_run_programs:
+            robots = {robot: f"robot {robot}" for robot in range(1, desk.sim.robot_count + 1)}
+            if self._robot.options != robots:
+                self._robot.set_options(robots, value=min(self._robot.value or 1, len(robots)))
+        self._add_output()
+
+    def _draw_list(self, handles: list[Handle]) -> None:
+        if not handles:
+            ui.label("No program runs.").classes("text-body2")
+        for handle in handles:
+            is_shown = handle is self._shown
+            with ui.row().classes("w-full items-center no-wrap gap-1"):
+                icon = ICONS.get(handle.state, "error_outline" if handle.code else "check_circle")
+                with (
+                    ui.button(on_click=lambda handle=handle: self._choose(handle))
+                    .props(f'flat no-caps align=left dense aria-pressed="{str(is_shown).lower()}"')
+                    .classes("col text-weight-bold" if is_shown else "col")
+                    .mark(f"program-{handle.number}")
+                ):
+                    ui.icon(icon).classes("q-mr-sm").props("aria-hidden=true")
+                    ui.label(f"{handle.command.program.name} on robot {handle.robot}: {handle.state}")
+                    ui.tooltip("Show what this program prints")
+                self._draw_act(handle)
+
+    def _draw_act(self, handle: Handle) -> None:
+        """Put the button behind a program that ends it, or starts it once more."""
+        name = handle.command.program.name
+        if handle.is_running:
+            icon, word, act = "stop", "Stop", self._stop
+            tip = "End this program, as Ctrl-C would; its robot stops. A second press ends it at once"
+        elif self._desk.may_run_programs:
+            icon, word, act = "replay", "Start again", self._again
+            tip = "Start this program again, with the same arguments"
+        else:
+            return
+        with (
+            ui.button(icon=icon, on_click=lambda: act(handle))
+            .props(f'flat round dense aria-label="{word}: {name}" data-testid="{word.lower().replace(" ", "-")}"')
+            .mark(f"{word.lower().replace(' ', '-')}-{handle.number}")
+        ):
+            ui.tooltip(tip)
+
+    def _choose(self, handle: Handle) -> None:
+        self._show(handle)
+        self.refresh()
+
+    def _show(self, handle: Handle | None) -> None:
+        """Show the output of another program."""
+        self._shown = handle
+        self._next_line = 0
+        self._log.clear()
+
+    def _add_output(self) -> None:
+        """Show what has been printed since the last time."""
+        if self._shown is None or self._shown.output is None:
+            return
+        first, lines = self._shown.output.since(self._next_line)
+        left_out = first - self._next_line + max(len(lines) - NEWEST_LINES, 0)
+        if left_out:
+            self._log.push(f"... {left_out} lines are left out ...", classes="text-italic")
+        for line in lines[-NEWEST_LINES:]:
+            self._log.push(line.text, classes="program-error" if line.is_error else "")
+        self._next_line = first + len(lines)
+
+    @told
+    async def _stop(self, handle: Handle) -> None:
+        self._desk.programs.stop(handle)
+        self.refresh()
+
+    @told
+    async def _again(self, handle: Handle) -> None:
+        await self._start(handle.command, handle.robot)
+
+    # ---- the editor ----
+
+    def _build_editor(self) -> None:
+        with ui.row().classes("w-full items-end no-wrap gap-2"):
+            self._choice = (
+                ui.select({}, label="Program", on_change=self._open)
+                .classes("col")
+                .props('dense options-dense data-testid="script"')
+                .mark("script")
+            )
+            with self._choice:
+                ui.tooltip("Your programs in the desk's folder, and examples that come with KiKS")
+            with (
+                ui.button(icon="note_add", on_click=self._new)
+                .props('flat round dense aria-label="New program" data-testid="new-program"')
+                .mark("new-program")
+            ):
+                ui.tooltip("Begin a new program")
+        with ui.row().classes("w-full items-end no-wrap gap-2"):
+            self._robot = (
+                ui.select({1: "robot 1"}, value=1, label="Runs on").props('dense data-testid="robot"').mark("robot")
+            )
+            with self._robot:
+                ui.tooltip("The robot that answers on whatever port the program opens")
+            self._arguments = (
+                ui.input("Arguments").classes("col").props('dense data-testid="arguments"').mark("arguments")
+            )
+            with self._arguments:
+                ui.tooltip("Words that the program finds in sys.argv; usually none")
+            with (
+                ui.button("Run", icon="play_arrow", on_click=self._run)
+                .props('unelevated no-caps color=primary data-testid="run-program"')
+                .mark("run-program")
+            ):
+                ui.tooltip("Save and run this program (Ctrl-Enter); one that runs on this robot is ended first")
+        # The page's own keys (space, .) are letters here.
+        with ui.element("div").classes("w-full").on("keydown", js_handler="(event) => event.stopPropagation()"):
+            self._editor = (
+                ui.codemirror(
+                    NEW,
+                    language="Python",
+                    theme="basicLight",
+                    on_change=self._note_draft,
+                    keymap={"Ctrl-Enter": self._run, "Cmd-Enter": self._run},
+                )
+                .classes("w-full")
+                .style("height: 38vh; border: 1px solid currentcolor")
+                .props('data-testid="editor"')
+                .mark("editor")
+            )
+        self._mistake = (
+            ui.label().classes("program-error text-body2").props('role="alert" data-testid="mistake"').mark("mistake")
+        )
+        with ui.row().classes("w-full items-end no-wrap gap-2"):
+            self._name = (
+                ui.input("Saved as", value="mine.py").classes("col").props('dense data-testid="name"').mark("name")
+            )
+            with self._name:
+                ui.tooltip("The file in the desk's folder that the program is saved in before it runs")
+            with (
+                ui.button("Save", on_click=self._save)
+                .props('flat no-caps data-testid="save-program"')
+                .mark("save-program")
+            ):
+                ui.tooltip("Save the program in the desk's folder")
+        self._offer()
+        example = next(script for script in offered(self._desk.folder) if script.is_example)
+        self._choice.value = next((s for s in self._choice.options if s.name == "first_steps.py"), example)
+        ui.timer(0, self._dress_editor, once=True)
+        ui.on("desk-dark", lambda event: self._set_theme(bool(event.args)))
+
+    def _dress_editor(self) -> None:
+        """Give the editor a name, and the page's own colours, now and when they change."""
+        ui.run_javascript("""
+            const tell = () => emitEvent("desk-dark", document.body.classList.contains("body--dark"));
+            new MutationObserver(tell).observe(document.body, { attributeFilter: ["class"] });
+            tell();
+            const name = () => {
+                const text = document.querySelector("[data-testid=editor] .cm-content");
+                if (text) text.setAttribute("aria-label", "Program. Escape, then Tab leaves it.");
+                else requestAnimationFrame(name);
+            };
+            name();
+        """)
+
+    def _set_theme(self, is_dark: bool) -> None:
+        self._editor.theme = "vscodeDark" if is_dark else "basicLight"
+
+    def _offer(self) -> None:
+        """List the programs there are."""
+        self._choice.set_options({script: script.label for script in offered(self._desk.folder)})
+
+    @told
+    async def _open(self) -> None:
+        """Show the chosen program, with what was changed and not saved."""
+        script = self._choice.value
+        if script is None or script == self._script:
+            return
+        text = self._drafts.get(script)
+        text = read_script(self._desk.folder, script) if text is None else text
+        self._script = script
+        self._name.value = script.name
+        self._editor.value = text
+        self._mistake.text = ""
+
+    def _new(self) -> None:
+        self._script = None
+        self._choice.value = None
+        self._name.value = "mine.py"
+        self._editor.value = NEW
+        self._mistake.text = ""
+
+    def _note_draft(self) -> None:
+        self._drafts[self._script] = self._editor.value or ""
+        self._mistake.text = ""
+
+    def _store(self) -> Script:
+        """Save the program under its name, and return what it is now.
+
+        Raises:
+            ParameterError: If the name leads out of the folder, or names a file that was not opened here.
+        """
+        text = self._editor.value or ""
+        script, folder = self._script, self._desk.folder
+        if script is not None and script.is_example and text == read_script(folder, script):
+            return script
+        saved = save_script(folder, self._name.value or "", text, may_replace=self._script)
+        self._drafts.pop(self._script, None)
+        self._script = saved
+        self._name.value = saved.name
+        self._offer()
+        self._choice.value = saved
+        return saved
+
+    @told
+    async def _save(self) -> None:
+        script = self._store()
+        where = "unchanged, it needs no saving" if script.is_example else f"saved in {self._desk.folder}"
+        ui.notify(f"{script.name} is {where}.")
+
+    @told
+    async def _run(self) -> None:
+        """Check the program, save it and run it."""
+        mistake = find_mistake(self._editor.value or "")
+        if mistake is not None:
+            self._mistake.text = str(mistake)
+            return
+        arguments = split_arguments(self._arguments.value or "")
+        command = Command(path_of(self._desk.folder, self._store()), arguments)
+        await self._start(command, self._robot.value or 1)
+
+    async def _start(self, command: Command, robot: int) -> None:
+        """Start a program on a robot; one that runs there is ended first.
+
+        Raises:
+            KiksError: If it cannot start.
+        """
+        desk, programs = self._desk, self._desk.programs
+        for handle in list(programs.handles):
+            if handle.robot == robot and handle.is_running:
+                programs.stop(handle)
+                while handle.is_running:
+                    await asyncio.sleep(LOOK_S)
+        handle = await desk.do(lambda _: programs.start(command, robot))
+        self._show(handle)
+        self.refresh()
+        if desk.gate.is_paused:
+            ui.notify("Time stands still: let it run (space), and the program goes on.")

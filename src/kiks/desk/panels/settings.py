@@ -1,0 +1,204 @@
+"""The settings of a world: seed, thinking, line, sensors and robots, each with a sentence of its own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from nicegui import ui
+
+from kiks.desk.panels.feedback import told
+from kiks.desk.server.desk import Desk
+from kiks.errors import ParameterError
+from kiks.model.project import TURRETS, ProjectRobot
+from kiks.model.robot import robot_names
+from kiks.model.thinking_policy import split_thinking
+
+POLICIES = {
+    "none": "none: computing costs no time",
+    "fixed": "fixed: so many milliseconds before each command",
+    "live": "live: as long as it really takes, times a factor",
+    "replay": "replay: as recorded in a file",
+}
+
+MODELS = {
+    "": "the robot's own",
+    "reflection": "reflection: physics, fitted to a real robot",
+    "thesis": "thesis: the networks of the thesis of 2001",
+    "fast": "fast: a table of those networks",
+    "curve": "curve: a measured curve of one colour",
+    "standin": "stand-in: a plain formula",
+}
+
+BAUDS = [9600, 19200, 38400, 57600, 115200]
+
+OF_OLD = """
+**Where the settings of the Matlab KiKS have gone.**
+*Time mode* and *CPU*: thinking `live` with a factor, here above. *Time acceleration*: the speed above the arena.
+*Movement limit* and *interpolation limit*: no more needed, motion is exact at any speed. *Fast sensors*: sensor
+model `fast`. *Grid*, *redraw* and *visualization*: the layers button above the arena. *KiKSnet*: several robots in one
+world, each with its own program, and `kiks serve` for programs elsewhere.
+"""
+
+
+class SettingsPanel:
+    """The controls of a world's settings. Applied, they begin the world anew, with everything where it stands.
+
+    Args:
+        desk: The desk.
+    """
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+        self._rows: list[_RobotRow] = []
+        with ui.column().classes("w-full q-pa-md gap-3"):
+            self._build_settings()
+            ui.label("Robots").classes("text-subtitle1")
+            self._table = ui.column().classes("w-full gap-1")
+            ui.button("Another robot", icon="add", on_click=self._add_row).props(
+                "flat dense no-caps data-testid=add-robot"
+            )
+            with ui.row().classes("w-full"):
+                apply = ui.button("Apply", icon="check", on_click=self._apply).props("no-caps data-testid=apply")
+                over = ui.button("Start over", icon="replay", on_click=self._start_over)
+                over.props("no-caps outline data-testid=start-over")
+                with apply:
+                    ui.tooltip("Begin anew at time 0 with these settings, everything where it stands now")
+                with over:
+                    ui.tooltip("Begin anew at time 0 from the very start: the same seed, programs and places")
+            if not desk.owns_world:
+                ui.label("A program outside holds this world: change its settings there.").classes("text-caption")
+                for element in (apply, over):
+                    element.disable()
+            ui.markdown(OF_OLD).classes("text-body2")
+        self._show()
+
+    def _build_settings(self) -> None:
+        self._seed = _number("Seed", "Whole number. The same seed gives the same run, to the bit.", "seed", minimum=0)
+        self._policy = _choice(
+            "Thinking", POLICIES, "What the program's own computing costs in simulated time.", "thinking"
+        )
+        self._amount = _number("", "", "thinking-amount", minimum=0).bind_visibility_from(
+            self._policy, "value", lambda policy: policy in ("fixed", "live")
+        )
+        self._policy.on_value_change(self._name_amount)
+        self._file = (
+            ui.input("Recorded times")
+            .props('dense outlined data-testid=thinking-file hint="A file of this folder, made with kiks run."')
+            .classes("w-full")
+            .bind_visibility_from(self._policy, "value", lambda policy: policy == "replay")
+        )
+        self._baud = _choice(
+            "Baud rate", BAUDS, "How fast characters go over the line; programs may set another.", "baud"
+        )
+        self._model = _choice("Sensor model", MODELS, "What makes a count of what a sensor's rays meet.", "model")
+        self._noise = ui.switch("Noise").props("data-testid=noise")
+        with self._noise:
+            ui.tooltip("Real sensors never read the same twice; without noise they do, which helps to find mistakes.")
+
+    def _name_amount(self) -> None:
+        label, hint = (
+            ("Milliseconds", "Before each command.")
+            if self._policy.value == "fixed"
+            else ("CPU factor", "1: this computer; 2: one that is half as fast.")
+        )
+        self._amount.props(f'label="{label}" hint="{hint}"')
+
+    def _show(self) -> None:
+        """Show the settings of the present world."""
+        project = self._desk.project
+        policy, amount = split_thinking(project.thinking)
+        self._seed.value = project.seed
+        self._policy.value = policy
+        self._amount.value = amount if not isinstance(amount, str) else 1.0
+        self._file.value = amount if isinstance(amount, str) else ""
+        self._name_amount()
+        baud = project.baud or self._desk.sim.specs[0].firmware.baud
+        self._baud.set_options(sorted({*BAUDS, baud}), value=baud)
+        self._model.value = project.response or ""
+        self._noise.value = project.noise
+        self._table.clear()
+        self._rows.clear()
+        for robot in project.robots:
+            self._add(robot)
+
+    def _add_row(self) -> None:
+        self._add(ProjectRobot(kind=self._rows[-1].robot().kind if self._rows else "khepera"))
+
+    def _add(self, robot: ProjectRobot) -> None:
+        with self._table:
+            self._rows.append(_RobotRow(robot, len(self._rows) + 1, self._remove))
+
+    def _remove(self, row: _RobotRow) -> None:
+        """Take a robot away; one stays."""
+        if len(self._rows) > 1:
+            self._rows.remove(row)
+            row.element.delete()
+
+    def _thinking(self) -> str:
+        policy = self._policy.value
+        if policy == "replay":
+            return f"replay:{self._file.value}"
+        return policy if policy == "none" else f"{policy}:{self._amount.value}"
+
+    @told
+    async def _apply(self) -> None:
+        seed = self._seed.value
+        if seed is None or seed != int(seed):
+            raise ParameterError(f"seed must be a whole number, but it was {seed}.")
+        present = await self._desk.present_project()
+        await self._desk.replace(
+            replace(
+                present,
+                seed=int(seed),
+                thinking=self._thinking(),
+                baud=int(self._baud.value),
+                response=self._model.value or None,
+                noise=bool(self._noise.value),
+                robots=tuple(row.robot() for row in self._rows),
+            )
+        )
+        ui.notify("A new world, with these settings.")
+
+    @told
+    async def _start_over(self) -> None:
+        await self._desk.start_over()
+        self._show()
+        ui.notify("From the start again.")
+
+
+class _RobotRow:
+    """The line of one robot."""
+
+    def __init__(self, robot: ProjectRobot, number: int, remove: Any) -> None:
+        self._given = robot
+        kinds = robot_names()
+        with ui.row().classes("w-full items-center no-wrap gap-2") as self.element:
+            self._name = ui.input(value=robot.name, placeholder=str(number)).props('dense aria-label="Name"')
+            self._name.style("width: 4.5rem")
+            kind = [*kinds, robot.kind] if robot.kind not in kinds else kinds
+            self._kind = ui.select(kind, value=robot.kind).props('dense options-dense aria-label="Kind"')
+            self._turrets = (
+                ui.select(list(TURRETS), value=list(robot.turrets), multiple=True, label="Turrets")
+                .props("dense options-dense use-chips")
+                .classes("col")
+            )
+            ui.button(icon="close", on_click=lambda: remove(self)).props('flat round dense size=sm aria-label="Remove"')
+
+    def robot(self) -> ProjectRobot:
+        """Return what the line says."""
+        return replace(
+            self._given, name=self._name.value or "", kind=self._kind.value, turrets=tuple(self._turrets.value)
+        )
+
+
+def _number(label: str, hint: str, name: str, *, minimum: float) -> ui.number:
+    return ui.number(label, min=minimum).props(f'dense outlined hint="{hint}" data-testid={name}').classes("w-full")
+
+
+def _choice(label: str, choices: Any, hint: str, name: str) -> ui.select:
+    return (
+        ui.select(choices, label=label)
+        .props(f'dense outlined options-dense hint="{hint}" data-testid={name}')
+        .classes("w-full")
+    )

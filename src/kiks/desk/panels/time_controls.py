@@ -1,0 +1,148 @@
+"""Time: run, pause, step, how fast, what the clock says, and back to where it was."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from nicegui import ui
+from nicegui.element import Element
+from nicegui.events import KeyEventArguments
+
+from kiks.desk.panels.feedback import told
+from kiks.desk.server.desk import Desk
+
+_WEB = Path(__file__).parents[1] / "web"
+
+
+class ClockView(Element, component=_WEB / "clock_view.js", esm={"kiks-desk": str(_WEB)}):
+    """The simulated clock, and how fast it goes.
+
+    Args:
+        feed: Path of the WebSocket that frames come from; all components of a page share one.
+    """
+
+    def __init__(self, feed: str = "/desk/feed") -> None:
+        super().__init__()
+        ui.add_css(_WEB / "clock_view.css")
+        self._props["feed"] = feed
+
+
+SPEEDS: dict[float, str] = {
+    0.1: "0.1 x",
+    0.25: "0.25 x",
+    0.5: "0.5 x",
+    1.0: "real time",
+    2.0: "2 x",
+    5.0: "5 x",
+    10.0: "10 x",
+    50.0: "50 x",
+    0.0: "as fast as it can",
+}
+"""How fast time may pass, with 0 for no limit."""
+
+STEPS: dict[float, str] = {0.01: "10 ms", 0.1: "100 ms", 1.0: "1 s", 10.0: "10 s"}
+"""How much a step is [s]."""
+
+LEAVE = """(event) => {
+    if (![" ", "."].includes(event.key) || event.target.ariaExpanded === "true") return;
+    event.qKeyEvent = true;
+    event.preventDefault();
+    event.target.blur();
+}"""
+"""Lets a closed list leave the keys of time to the page: who has just chosen a speed and presses space wants to pause,
+not to open the list again. Quasar skips events so marked, and the page's keys are heard when no list has the focus."""
+
+REFRESH_S = 0.5
+"""How often it is shown what others have changed [s]."""
+
+
+class TimePanel:
+    """The row of controls above the arena.
+
+    Args:
+        desk: The desk.
+        feed: Path of the WebSocket that frames come from.
+    """
+
+    def __init__(self, desk: Desk, feed: str) -> None:
+        self._desk = desk
+        self._run = ui.button(on_click=self._toggle).props("round unelevated color=accent data-testid=run")
+        with self._run:
+            self._run_tip = ui.tooltip("")
+        with _flat("skip_next", "Step", "step", self._step):
+            self._step_tip = ui.tooltip("Let some time pass, then stand still (key: .)")
+        self._step_s = _select(STEPS, 0.01, "How much a step is", "step-size", "5rem")
+        self._speed = _select(SPEEDS, self._shown_speed(), "How fast time passes", "speed", "8.5rem")
+        self._speed.on_value_change(self._set_speed)
+        with self._speed:
+            ui.tooltip("How much simulated time passes in real time; it never changes what robots do")
+        ClockView(feed)
+        with _flat("bookmark_add", "Checkpoint", "mark", self._mark):
+            ui.tooltip("Checkpoint: remember where everything stands")
+        with _flat("settings_backup_restore", "Reset", "reset", self._reset):
+            ui.tooltip("Reset: put everything back where it stood at the checkpoint, or at the start; time goes on")
+        ui.timer(REFRESH_S, self._refresh)
+        ui.keyboard(on_key=self._press)
+        self._refresh()
+
+    def _shown_speed(self) -> float:
+        speed = self._desk.gate.speed
+        return 0.0 if speed is None else min((each for each in SPEEDS if each), key=lambda each: abs(each - speed))
+
+    def _refresh(self) -> None:
+        """Show how time stands; somebody else may have changed it."""
+        desk = self._desk
+        word, icon = ("Run", "play_arrow") if desk.gate.is_paused else ("Pause", "pause")
+        if self._run.props.get("aria-label") != word:
+            self._run.props(f'icon={icon} aria-label="{word}"')
+            self._run_tip.text = f"{word} (space)"
+        if self._speed.value != self._shown_speed():
+            self._speed.value = self._shown_speed()
+
+    @told
+    async def _toggle(self) -> None:
+        await (self._desk.go_on() if self._desk.gate.is_paused else self._desk.pause())
+        self._refresh()
+
+    @told
+    async def _step(self) -> None:
+        await self._desk.step(self._step_s.value)
+        self._refresh()
+
+    @told
+    async def _set_speed(self) -> None:
+        if self._speed.value != self._shown_speed():
+            await self._desk.set_speed(self._speed.value or None)
+
+    @told
+    async def _mark(self) -> None:
+        await self._desk.mark()
+        ui.notify("Remembered where everything stands.")
+
+    @told
+    async def _reset(self) -> None:
+        await self._desk.reset()
+        ui.notify("Everything is back where it stood.")
+
+    async def _press(self, event: KeyEventArguments) -> None:
+        if not event.action.keydown or event.modifiers.ctrl or event.modifiers.alt or event.modifiers.meta:
+            return
+        if event.key == " " and not event.action.repeat:
+            await self._toggle()
+        elif event.key == ".":
+            await self._step()
+
+
+def _flat(icon: str, word: str, name: str, act: object) -> ui.button:
+    return ui.button(icon=icon, on_click=act).props(  # type: ignore[arg-type]
+        f'round dense flat color=white aria-label="{word}" data-testid={name}'
+    )
+
+
+def _select(choices: dict[float, str], value: float, word: str, name: str, width: str) -> ui.select:
+    return (
+        ui.select(choices, value=value)
+        .props(f'dense dark borderless options-dense aria-label="{word}" data-testid={name}')
+        .style(f"min-width: {width}")
+        .on("keydown", js_handler=LEAVE)
+    )

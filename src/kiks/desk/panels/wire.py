@@ -1,0 +1,241 @@
+"""The wire: what goes over a robot's line, where the time goes, and a console to type commands."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from nicegui import ui
+
+from kiks.desk.panels.console import ConsolePanel
+from kiks.sim.wire import Wire
+from kiks.sim.wire_log import Piece, TimeShares
+from kiks.units import NS_PER_S, s_from_ns
+
+if TYPE_CHECKING:
+    from kiks.desk.server.desk import Desk
+
+REFRESH_S = 0.2
+"""How often what is new is shown [s]."""
+
+ROWS = 200
+"""Pieces in the page."""
+
+WINDOWS: dict[int, str] = {1: "the last second", 10: "the last 10 s", 60: "the last minute"}
+"""Simulated times over which the shares are taken [s]."""
+
+PARTS = {
+    "link": ("Link", "Characters were on the line, in either direction: a faster line makes this smaller"),
+    "robot": ("Robot", "The robot had a command and had not answered yet"),
+    "thinking": ("Thinking", "The program thought between a reply and its next command"),
+    "waiting": ("Waiting", "The program waited on purpose (sleep, pause, a time-out), or nobody wanted anything"),
+}
+"""The parts of the bar, in their order: their names, and what they are."""
+
+CSS = """
+    .wire-row { white-space: pre-wrap; font-family: monospace }
+    .wire-sent { color: #0b57a4 }
+    .wire-received { color: #8a4200 }
+    .body--dark .wire-sent { color: #8fc4ff }
+    .body--dark .wire-received { color: #ffb870 }
+    .wire-bar { height: 1.75rem; border: 1px solid currentcolor; overflow: hidden }
+    .wire-bar > div { height: 100%; overflow: hidden; text-align: center; line-height: 1.6rem; white-space: nowrap }
+    .wire-link { background: #1565c0; color: #fff }
+    .wire-robot { background: #ffb300; color: #000 }
+    .wire-thinking { background: #7b1fa2; color: #fff }
+    .wire-waiting { background: #cfd8dc; color: #000 }
+    .wire-part { display: inline-block; width: 0.8em; height: 0.8em; border: 1px solid currentcolor }
+"""
+
+
+class WirePanel:
+    """The line of a robot.
+
+    Args:
+        desk: The desk.
+    """
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+        self._sim: object = None
+        self._watched: Wire | None = None
+        self._next_piece = 0
+        self._is_held = False
+        ui.add_css(CSS)
+        with ui.column().classes("w-full q-pa-sm gap-2"):
+            with ui.row().classes("w-full items-end no-wrap gap-2"):
+                self._robot = (
+                    ui.select({1: "robot 1"}, value=1, label="Line of", on_change=self.refresh)
+                    .classes("col")
+                    .props('dense options-dense data-testid="wire-robot"')
+                    .mark("wire-robot")
+                )
+                with self._robot:
+                    ui.tooltip("Whose line is shown, and to whom you type")
+                self._filter = (
+                    ui.input("Only with", on_change=self._show_again)
+                    .classes("col")
+                    .props('dense clearable debounce=300 data-testid="wire-filter"')
+                    .mark("wire-filter")
+                )
+                with self._filter:
+                    ui.tooltip("Show only what contains this text, such as N or z,")
+                self._hold = self._flat("pause", "Hold the list", "wire-hold", self._toggle_hold)
+                with self._hold:
+                    self._hold_tip = ui.tooltip("Hold the list, to read it; nothing is lost")
+                with self._flat("delete_sweep", "Clear the list", "wire-clear", self._clear):
+                    ui.tooltip("Clear the list; robot and program do not notice")
+            self._rows = (
+                ui.log(max_lines=ROWS)
+                .classes("w-full text-caption")
+                .style("height: 16rem")
+                .props('data-testid="wire" aria-label="What goes over the line"')
+                .mark("wire")
+            )
+            self._build_bar()
+            self._console = ConsolePanel(desk, lambda: self._robot.value or 1)
+        self._timer = ui.timer(REFRESH_S, self.refresh)
+        ui.context.client.on_delete(self._let_go)
+
+    @staticmethod
+    def _flat(icon: str, word: str, name: str, act: object) -> ui.button:
+        return (
+            ui.button(icon=icon, on_click=act)  # type: ignore[arg-type]
+            .props(f'flat round dense aria-label="{word}" data-testid="{name}"')
+            .mark(name)
+        )
+
+    def _build_bar(self) -> None:
+        with ui.row().classes("w-full items-center no-wrap"):
+            ui.label("Where the milliseconds went in").classes("text-subtitle2")
+            self._window = ui.select(WINDOWS, value=1).props(
+                'dense options-dense borderless aria-label="Which time" data-testid="wire-window"'
+            )
+            with self._window:
+                ui.tooltip("How far back the bar looks, in simulated time")
+        self._parts: dict[str, tuple[ui.element, ui.label, ui.label]] = {}
+        bars: dict[str, tuple[ui.element, ui.label]] = {}
+        labels: dict[str, ui.label] = {}
+        with (
+            ui.row()
+            .classes("w-full no-wrap gap-0 wire-bar text-caption")
+            .props('role="img" data-testid="wire-bar"')
+            .mark("wire-bar") as self._bar
+        ):
+            for name in PARTS:
+                with ui.element("div").classes(f"wire-{name}").style("width: 0") as bar:
+                    bars[name] = bar, ui.label()
+        with ui.row().classes("w-full gap-x-4 gap-y-0 text-caption"):
+            for name, (word, meaning) in PARTS.items():
+                with ui.row().classes("items-center gap-1 no-wrap"):
+                    ui.element("span").classes(f"wire-part wire-{name}").props("aria-hidden=true")
+                    labels[name] = ui.label(word).mark(f"share-{name}").props(f'data-testid="share-{name}"')
+                    ui.tooltip(meaning)
+        for name in PARTS:
+            self._parts[name] = *bars[name], labels[name]
+
+    def set_visible(self, is_visible: bool) -> None:
+        """Show what is new only while somebody sees it."""
+        self._timer.active = is_visible
+        if not is_visible:
+            self._let_go()
+
+    def _let_go(self) -> None:
+        """Watch the line no longer: that would cost the world time."""
+        if self._watched is not None:
+            self._watched.unwatch()
+        self._watched = None
+
+    # ---- what is shown ----
+
+    def refresh(self) -> None:
+        """Show what is new."""
+        sim = self._desk.sim
+        if sim is not self._sim:
+            self._sim = sim
+            self._robot.set_options(
+                {robot: f"robot {robot}" for robot in range(1, sim.robot_count + 1)},
+                value=min(self._robot.value or 1, sim.robot_count),
+            )
+        wire = sim.wires[(self._robot.value or 1) - 1]
+        if wire is not self._watched:
+            self._let_go()
+            self._watched = wire
+            wire.watch(sim.now_ns)
+            self._show_again()
+        if wire.log is None:
+            return
+        if not self._is_held:
+            self._add_rows(*wire.log.pieces.since(self._next_piece))
+        shares = wire.shares(max(sim.now_ns - self._window.value * NS_PER_S, 0), sim.now_ns)
+        if shares is not None:
+            self._show_shares(shares)
+        self._console.refresh()
+
+    def _add_rows(self, first: int, pieces: list[Piece]) -> None:
+        left_out = first - self._next_piece + max(len(pieces) - ROWS, 0)
+        self._next_piece = first + len(pieces)
+        text = self._filter.value or ""
+        if left_out and not text:
+            self._rows.push(f"... {left_out} are left out ...", classes="wire-row text-italic")
+        for piece in pieces[-ROWS:]:
+            row = row_text(piece)
+            if text in row:
+                self._rows.push(row, classes=f"wire-row wire-{'sent' if piece.is_sent else 'received'}")
+
+    def _show_shares(self, shares: TimeShares) -> None:
+        whole_ns = shares.window_ns
+        told = []
+        for (name, (bar, name_in_bar, label)), part_ns in zip(self._parts.items(), shares, strict=True):
+            percent = 100 * part_ns / whole_ns if whole_ns else 0.0
+            word = PARTS[name][0]
+            text = f"{word} {percent:.1f} % ({part_ns / 1e6:.0f} ms)"
+            told.append(text)
+            if label.text != text:
+                label.text = text
+                bar.style(f"width: {percent:.2f}%")
+                name_in_bar.text = word if percent > 20 else ""
+        if self._bar.props.get("aria-label") != ", ".join(told):
+            self._bar.props["aria-label"] = ", ".join(told)
+
+    # ---- what a person does ----
+
+    def _show_again(self) -> None:
+        """Show the newest of what is remembered anew."""
+        self._rows.clear()
+        log = None if self._watched is None else self._watched.log
+        if log is not None:
+            self._next_piece = max(log.pieces.count - ROWS, 0)
+            self._add_rows(*log.pieces.since(self._next_piece))
+
+    def _toggle_hold(self) -> None:
+        self._is_held = not self._is_held
+        icon, word = ("play_arrow", "Let the list go on") if self._is_held else ("pause", "Hold the list")
+        self._hold.props(f'icon={icon} aria-label="{word}"')
+        self._hold_tip.text = word
+        if not self._is_held:
+            self._show_again()
+
+    def _clear(self) -> None:
+        self._rows.clear()
+        log = None if self._watched is None else self._watched.log
+        self._next_piece = 0 if log is None else log.pieces.count
+
+
+def visible(data: bytes) -> str:
+    r"""Return characters for a person, those that cannot be seen as Python writes them.
+
+    Example:
+        >>> visible(b"D,5,5\r\n\xff")
+        'D,5,5\\r\\n\\xff'
+    """
+    return repr(data.decode("latin-1"))[1:-1] if data.isascii() else repr(data)[2:-1]
+
+
+def row_text(piece: Piece) -> str:
+    """Return a piece for a person: when its first character set out [s], which way it went, and what it is.
+
+    Example:
+        >>> row_text(Piece(True, b"N", 1_234_567_890, 1_235_000_000, None))
+        '   1.235 → N'
+    """
+    return f"{s_from_ns(piece.first_ns):8.3f} {'→' if piece.is_sent else '←'} {visible(piece.data)}"

@@ -1,0 +1,174 @@
+"""Python files that the desk offers, opens, saves and checks before it runs them."""
+
+from __future__ import annotations
+
+import shlex
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+from kiks.desk.server.folder import check_name
+from kiks.errors import ParameterError, shown
+from kiks.model.atomic_files import inside, program_in, replace_file
+
+SIZE_LIMIT = 200_000
+"""Longest program that is edited in the page [bytes]."""
+
+COUNT_LIMIT = 200
+"""Most files of the folder that are offered."""
+
+EXAMPLES = Path(__file__).parents[1] / "example_programs"
+"""Programs that come with KiKS."""
+
+NEW = '''"""My program."""
+
+import serial
+
+with serial.Serial("/dev/ttyUSB0", 9600, timeout=1) as port:
+    port.write(b"D,5,5\\n")
+    print(port.readline())
+'''
+"""What a new program begins with."""
+
+
+@dataclass(frozen=True)
+class Script:
+    """A program that is offered.
+
+    Attributes:
+        name: Its path in the folder, or that of an example alone.
+        is_example: Whether it comes with KiKS.
+    """
+
+    name: str
+    is_example: bool
+
+    @property
+    def label(self) -> str:
+        """What a person chooses it by."""
+        return f"example: {self.name.removesuffix('.py').replace('_', ' ')}" if self.is_example else self.name
+
+
+def offered(folder: Path) -> list[Script]:
+    """Return the programs of a folder, and the examples."""
+    try:
+        files = [path for path in sorted(folder.glob("*.py")) if path.is_file() and not path.name.startswith(".")]
+    except OSError:
+        files = []
+    own = [Script(path.name, is_example=False) for path in files[:COUNT_LIMIT]]
+    return own + [Script(path.name, is_example=True) for path in sorted(EXAMPLES.glob("[!_]*.py"))]
+
+
+def path_of(folder: Path, script: Script) -> Path:
+    """Return where a program is.
+
+    Raises:
+        ParameterError: If its name leads out of the folder, or is none of a program.
+    """
+    return program_in(EXAMPLES if script.is_example else folder, script.name)
+
+
+def read_script(folder: Path, script: Script) -> str:
+    """Return the text of a program.
+
+    Raises:
+        ParameterError: If its name leads out of the folder, or it is no text of usual length.
+    """
+    path = path_of(folder, script)
+    try:
+        if path.stat().st_size > SIZE_LIMIT:
+            raise ParameterError(
+                f"a program must have at most {SIZE_LIMIT} bytes to be edited here, but {shown(script.name)} has "
+                f"{path.stat().st_size}. Edit it elsewhere."
+            )
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ParameterError(f"a program must be a readable text, but {shown(script.name)} is none: {error}.") from None
+
+
+def save_script(folder: Path, name: str, text: str, *, may_replace: Script | None = None) -> Script:
+    """Write a program into a folder.
+
+    Args:
+        folder: The folder.
+        name: Its name there; .py is put behind it if it is not.
+        text: The program.
+        may_replace: The file that it was read from; another one of that name is not written over.
+
+    Raises:
+        ParameterError: If the name leads out of the folder or is taken, the text is too long, or it cannot be written.
+    """
+    name = name.strip()
+    name = name if name.endswith(".py") else f"{name}.py"
+    check_name(name, (".py",))
+    if "/" in name:
+        raise ParameterError(
+            f"a program's name must be one without folders, but it was {shown(name)}. Take letters and digits: "
+            "square.py."
+        )
+    data = text.encode("utf-8", errors="replace")
+    if len(data) > SIZE_LIMIT:
+        raise ParameterError(f"a program must have at most {SIZE_LIMIT} bytes, but this one has {len(data)}.")
+    script, path = Script(name, is_example=False), inside(folder, name, "the program")
+    if path.exists() and script != may_replace:
+        raise ParameterError(
+            f"a program must have a name that is free, but there is a {shown(name)} already. Take another name, or "
+            "open "
+            "that one and change it."
+        )
+    replace_file(path, data, "a program")
+    return script
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """What Python does not understand.
+
+    Attributes:
+        line: Where it is, from 1.
+        message: What Python says.
+        text: The line.
+    """
+
+    line: int
+    message: str
+    text: str
+
+    def __str__(self) -> str:
+        shown = f": {self.text.strip()}" if self.text.strip() else ""
+        return f"Line {self.line}: {self.message}{shown}"
+
+
+def find_mistake(text: str) -> Mistake | None:
+    r"""Return the first mistake that keeps a program from running at all.
+
+    Example:
+        >>> print(find_mistake("x = 1\nif x = 2:\n    pass\n"))
+        Line 2: invalid syntax. Maybe you meant '==' or ':=' instead of '='?: if x = 2:
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            compile(text, "program", "exec", dont_inherit=True)
+    except SyntaxError as error:
+        line = error.lineno or 1
+        lines = text.splitlines()
+        return Mistake(line, error.msg, lines[line - 1] if line <= len(lines) else "")
+    except (ValueError, RecursionError, MemoryError) as error:
+        return Mistake(1, str(error) or "too deeply nested", "")
+    return None
+
+
+def split_arguments(text: str) -> list[str]:
+    """Return the words of a line, as a shell would.
+
+    Raises:
+        ParameterError: If a quote is not closed.
+    """
+    try:
+        return shlex.split(text)
+    except ValueError as error:
+        raise ParameterError(
+            f"arguments must be words with blanks between them, but they were {shown(text)}: {str(error).lower()}. "
+            "Close the quotes."
+        ) from None

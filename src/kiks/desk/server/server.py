@@ -1,0 +1,246 @@
+"""The server of this process's desks: a web server in a thread of its own, which the first desk starts."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import socket
+import threading
+from contextlib import suppress
+from dataclasses import dataclass
+
+import uvicorn
+from fastapi import FastAPI, Response, WebSocket
+from nicegui import app as nicegui_app
+from nicegui import ui
+from starlette.responses import RedirectResponse
+
+from kiks.desk.panels.page import Page
+from kiks.desk.server.access import LOOPBACK, AccessControl
+from kiks.desk.server.connection_limit import Door
+from kiks.desk.server.desk import Desk
+from kiks.desk.server.gateway import Gateway
+from kiks.desk.server.server_log import note_fault, speak_plainly
+from kiks.desk.server.token import Token
+from kiks.errors import LinkError, ParameterError
+from kiks.ports.file_descriptors import SHORTAGES, opening, shortage
+
+PORT = 8123
+"""Where the desk is found, if nobody else is there."""
+
+START_S = 30.0
+"""How long the server may take to begin [s]; a computer that is very busy needs seconds."""
+
+MESSAGE_LIMIT = 1 << 20
+"""Largest message on a socket [bytes]: a program that is edited in the page comes in one."""
+
+BACKLOG = 128
+"""Most connections that wait to be accepted."""
+
+EVERY_ADDRESS = ("0.0.0.0", "::")
+"""What stands for all addresses of this computer; no browser finds it by that."""
+
+CLOSED = "KiKS: this desk is closed. Open it again where it was opened."
+
+
+@dataclass(frozen=True)
+class Served:
+    """A desk that browsers can see.
+
+    Attributes:
+        desk: The desk.
+        gateway: Who sends its frames.
+        number: Its number in this process.
+    """
+
+    desk: Desk
+    gateway: Gateway
+    number: int
+
+
+class DeskServer:
+    """Serves desks to browsers.
+
+    NiceGUI is one application a process, so there is one of these a process, `SERVER`.
+
+    Attributes:
+        desks: What is served, by number.
+        key: What browsers must know.
+    """
+
+    def __init__(self) -> None:
+        self.desks: dict[int, Served] = {}
+        self.key = Token()
+        self._is_local = True
+        self._count = 0
+        self._socket: socket.socket | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._lock = threading.Lock()
+
+    def start(self, *, host: str = "127.0.0.1", port: int | None = None) -> None:
+        """Begin to serve, unless that is so already.
+
+        Args:
+            host: Address to listen at.
+            port: TCP port, 0 for a free one; `PORT`, or a free one if that is taken, if left out.
+
+        Raises:
+            LinkError: If it cannot listen there.
+            ParameterError: If it serves already, somewhere else.
+        """
+        with self._lock:
+            if self._socket is not None:
+                if port not in (None, 0, self._socket.getsockname()[1]):
+                    raise ParameterError(
+                        f"port must be that of the desk that is open, {self.url()}, but it was {port}."
+                    )
+                return
+            self._is_local = host in LOOPBACK
+            self._socket = _listen(host, PORT, or_free=True) if port is None else _listen(host, port)
+            begun = threading.Event()
+            server = threading.Thread(target=self._serve, args=(begun,), name="kiks desk", daemon=True)
+            server.start()
+            if not begun.wait(START_S) or self._loop is None:
+                self._socket.close()
+                self._socket = None
+                raise LinkError(
+                    f"the desk must begin to serve within {START_S:g} s, but it did not. Look above for the reason."
+                )
+
+    def open(self, desk: Desk) -> Served:
+        """Show a desk to browsers; `start` must have been called."""
+        with self._lock:
+            self._count += 1
+            served = Served(desk, Gateway(desk, self._count), self._count)
+            self.desks[self._count] = served
+            assert self._loop is not None
+            asyncio.run_coroutine_threadsafe(served.gateway.run(), self._loop)
+        return served
+
+    def close(self, served: Served) -> None:
+        """Show it no longer, and let its world go its way."""
+        self.desks.pop(served.number, None)
+        assert self._loop is not None
+        self._loop.call_soon_threadsafe(served.gateway.close)
+        served.desk.close()
+
+    def url(self, number: int | None = None) -> str:
+        """Return where a browser finds a desk, or the newest one, with the token."""
+        return f"{self._address(number)}?token={self.key.token}"
+
+    def url_for_once(self, number: int) -> str:
+        """Return where a browser of this user finds a desk, once: others may see this address."""
+        return f"{self._address(number)}?ticket={self.key.new_ticket()}"
+
+    # ---- inside ----
+
+    def _address(self, number: int | None) -> str:
+        assert self._socket is not None
+        host, port = self._socket.getsockname()[:2]
+        host = _own_address(self._socket.family) if host in EVERY_ADDRESS else host
+        host = f"[{host}]" if ":" in host else host
+        return f"http://{host}:{port}/" + ("" if number is None else f"desk/{number}")
+
+    def _serve(self, begun: threading.Event) -> None:
+        """Run the web server, in a thread of its own."""
+        app = FastAPI(openapi_url=None)
+        self._add_routes(app)
+        ui.run_with(app, title="KiKS", dark=None, show_welcome_message=False, reconnect_timeout=10.0)
+
+        def begin() -> None:
+            self._loop = asyncio.get_running_loop()
+            self._loop.set_exception_handler(note_fault)
+            begun.set()
+
+        nicegui_app.on_startup(begin)
+        config = uvicorn.Config(
+            AccessControl(app, self.key, is_local=self._is_local),
+            http=Door,
+            # uvloop ends the process when there is no file descriptor for its loop.
+            loop="asyncio",
+            backlog=BACKLOG,
+            # Who came is asked of the connection, never of what a client says of itself.
+            proxy_headers=False,
+            log_config=None,
+            access_log=False,
+            lifespan="on",
+            ws="websockets-sansio",
+            ws_max_size=MESSAGE_LIMIT,
+            ws_per_message_deflate=False,
+            timeout_graceful_shutdown=1,
+        )
+        speak_plainly()
+        assert self._socket is not None
+        try:
+            uvicorn.Server(config).run(sockets=[self._socket])
+        except OSError as error:
+            if error.errno not in SHORTAGES:
+                raise
+            logging.getLogger("kiks.desk").error("the desk cannot serve: %s", shortage())
+        finally:
+            begun.set()
+
+    def _add_routes(self, app: FastAPI) -> None:
+        """Say what is found where."""
+
+        @app.get("/")
+        def newest() -> Response:
+            number = max(self.desks, default=None)
+            if number is None:
+                return Response(CLOSED, media_type="text/plain")
+            return RedirectResponse(f"/desk/{number}")
+
+        @app.get("/desk/{number}/arena/{scene}.png")
+        def picture(number: int, scene: int) -> Response:
+            served = self.desks.get(number)
+            if served is None:
+                return Response(status_code=404)
+            return Response(served.gateway.picture(), media_type="image/png", headers={"cache-control": "no-store"})
+
+        @app.websocket("/desk/{number}/feed")
+        async def feed(socket: WebSocket, number: int) -> None:
+            served = self.desks.get(number)
+            if served is None:
+                await socket.close()
+            else:
+                await served.gateway.serve(socket)
+
+        @ui.page("/desk/{number}")
+        def page(number: int) -> None:
+            served = self.desks.get(number)
+            if served is None:
+                ui.label(CLOSED)
+            else:
+                Page(served.desk, number)
+
+
+def _own_address(family: socket.AddressFamily) -> str:
+    """Return the address by which other computers find this one; its name if it has none."""
+    # Of documentation: nothing is sent, but the system says from where it would be.
+    far = "2001:db8::1" if family == socket.AF_INET6 else "192.0.2.1"
+    with suppress(OSError), socket.socket(family, socket.SOCK_DGRAM) as asking:
+        asking.connect((far, 9))
+        return str(asking.getsockname()[0])
+    return socket.gethostname()
+
+
+def _listen(host: str, port: int, *, or_free: bool = False) -> socket.socket:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with opening("the desk's port"):
+        listening = socket.socket(family)
+    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listening.bind((host, port))
+        listening.listen(BACKLOG)
+    except (OSError, OverflowError) as error:
+        listening.close()
+        if or_free:
+            return _listen(host, 0)
+        raise LinkError(
+            f"the desk must be able to listen at {host}:{port}, but it cannot ({error}). Give another --port."
+        ) from None
+    return listening
+
+
+SERVER = DeskServer()
+"""The process's server."""

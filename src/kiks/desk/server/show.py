@@ -1,0 +1,184 @@
+"""A desk that browsers can see, and a world that lives in a program on it: `sim.show()`."""
+
+from __future__ import annotations
+
+import html
+import logging
+import os
+import sys
+import threading
+import webbrowser
+from collections.abc import Callable
+from typing import Any
+
+from kiks.desk.server.desk import Desk, NewsHandler
+from kiks.desk.server.frames import pack_frame
+from kiks.desk.server.server import SERVER
+from kiks.engine.compiling import is_compiled
+from kiks.sim.simulation import Simulation
+from kiks.units import NS_PER_S
+
+SLICE_NS = NS_PER_S // 50
+"""Simulated time that passes in one go while no program moves it [ns]; the gate says when."""
+
+ROUND_S = 0.05
+"""Longest time that a word of a program is waited for [s of real time]: a desk that is closed is noticed within it."""
+
+
+class Driver:
+    """Moves the world of a desk: whatever was set going goes on.
+
+    Args:
+        desk: The desk.
+        programs_ended: Called with the world, locked, when the programs that moved it have all ended.
+    """
+
+    def __init__(self, desk: Desk, programs_ended: Callable[[Simulation], None] = lambda sim: None) -> None:
+        self._desk = desk
+        self._programs_ended = programs_ended
+        self._is_over = threading.Event()
+
+    def run(self) -> None:
+        """Let time pass as programs and the gate allow, until `stop`."""
+        while not self._is_over.is_set():
+            programs = self._desk.programs
+            had_programs = programs.drive
+            programs.round(ROUND_S if had_programs else 0)
+            if not programs.drive:
+                with programs.sim.lock:
+                    if had_programs:
+                        self._programs_ended(programs.sim)
+                    programs.sim.advance_to(programs.sim.now_ns + SLICE_NS)
+                    programs.sim.sync()
+            self._desk.clear_away()
+
+    def stop(self) -> None:
+        """End it; from any thread."""
+        self._is_over.set()
+        self._desk.gate.close()
+
+
+def has_screen() -> bool:
+    """Say whether there is one."""
+    return sys.platform in ("win32", "darwin") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+_log = logging.getLogger("kiks.desk")
+
+STOP_S = 10.0
+"""How long the world's thread may take to stop [s]."""
+
+
+class Shown:
+    """A desk that browsers can see.
+
+    In a notebook, who names it in a cell sees it below.
+
+    Args:
+        desk: The desk.
+        host: Address to listen at.
+        port: TCP port, 0 for a free one; 8123, or a free one if that is taken, if left out.
+
+    Attributes:
+        desk: The desk.
+        url: Where a browser finds it, with the token that it needs.
+
+    Raises:
+        LinkError: If it cannot listen there.
+        ParameterError: If another port is served already.
+    """
+
+    def __init__(self, desk: Desk, *, host: str = "127.0.0.1", port: int | None = None) -> None:
+        self.desk = desk
+        if not is_compiled():
+            _log.warning("Compiling the engine for this computer: once, a minute or so ...")
+        with desk.sim.lock:
+            # What browsers need of the engine is compiled before the first of them waits for it.
+            pack_frame(desk.sim, scene=0)
+        SERVER.start(host=host, port=port)
+        self._served = SERVER.open(desk)
+        self.url = SERVER.url(self._served.number)
+        self._driver: Driver | None = None
+        self._thread: threading.Thread | None = None
+        self._cell: int | None = None
+        self._news = NewsHandler(desk)
+        logging.getLogger("kiks").addHandler(self._news)
+
+    def drive(self) -> None:
+        """Let the world go on by itself from now on, in a thread."""
+        if self._driver is None:
+            self._driver = Driver(self.desk)
+            self._thread = threading.Thread(target=self._driver.run, name="kiks driver", daemon=True)
+            self._thread.start()
+
+    def browse(self) -> None:
+        """Open it in a browser, where there is a screen."""
+        if has_screen():
+            # Other users see with which address a browser is started: not with the token.
+            webbrowser.open(SERVER.url_for_once(self._served.number))
+
+    def present(self, *, browser: bool) -> None:
+        """Show it to who calls: below the cell of a notebook; elsewhere its address is printed, and a browser opened.
+
+        Args:
+            browser: False for its address alone.
+        """
+        ipython = _ipython()
+        if browser and hasattr(ipython, "kernel"):
+            self._ipython_display_()
+            return
+        if ipython is not None:
+            self._cell = ipython.execution_count
+        print(f"The desk: {self.url}")
+        if browser:
+            self.browse()
+
+    def close(self) -> None:
+        """Show it no longer; the world goes its way."""
+        logging.getLogger("kiks").removeHandler(self._news)
+        if self._driver is not None:
+            self._driver.stop()
+        if self._thread is not None:
+            # It may be in a long step; as a daemon it holds up no end.
+            self._thread.join(STOP_S)
+        SERVER.close(self._served)
+
+    def __repr__(self) -> str:
+        return f"<KiKS desk at {self.url}>"
+
+    def _ipython_display_(self) -> None:
+        """Show it below the cell of a notebook, its address in a terminal; once a cell, which may name it again."""
+        ipython = _ipython()
+        if ipython.execution_count != self._cell:
+            self._cell = ipython.execution_count
+            ipython.display_pub.publish({"text/plain": repr(self), "text/html": self._repr_html_()})
+
+    def _repr_html_(self) -> str:
+        return f'<iframe src="{html.escape(self.url)}" style="width: 100%; height: 640px; border: 0"></iframe>'
+
+
+def show(
+    sim: Simulation,
+    *,
+    speed: float | None = 1.0,
+    is_alive: bool = False,
+    port: int | None = None,
+    browser: bool = True,
+) -> Shown:
+    """Show a world in a browser; see `Simulation.show`.
+
+    Raises:
+        LinkError: If the desk cannot listen there.
+        ParameterError: If the speed is out of range, or another port is served already.
+    """
+    shown = Shown(Desk(sim, speed=speed, may_run_programs=is_alive), port=port)
+    if is_alive:
+        shown.drive()
+    shown.present(browser=browser)
+    return shown
+
+
+def _ipython() -> Any:
+    """Return the IPython that this program runs in, which has a `kernel` in a notebook; None in plain Python."""
+    there = sys.modules.get("IPython")
+    return None if there is None else there.get_ipython()

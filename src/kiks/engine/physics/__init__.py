@@ -1,0 +1,1 @@
+"""How things move: motors, motion, contact with walls, collisions, the gripper."""

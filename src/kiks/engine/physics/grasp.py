@@ -1,0 +1,194 @@
+"""A robot and what its gripper holds on the floor, among all that pushes (`kiks.engine.physics.collisions`).
+
+The two are one rigid thing: equal masses, and the robot turns as in `kiks.engine.physics.contact`.
+Derivation: let r be the way from the robot to the place where the body ought to be, e the body's deviation from it, and
+k the radius of gyration. An impulse p moves the body by -p and the robot by p, which also turns by (r x p)/k^2. That
+takes e away if p = e/2 along r, and p = e/(2 + r^2/k^2) across.
+
+So a hold is one more thing that `part` has to bring in order in each sweep, after the overlaps: what pushes the one
+moves the other, and where both are stopped the sweeps find that out.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from kiks.engine.compiling import kernel
+from kiks.engine.numbers import sin_cos
+from kiks.engine.physics.contact import clearance_mm, outward
+from kiks.engine.physics.motion import between_nought_and
+
+REACH = 3.0
+"""Most that a held body goes, in ways of the faster wheel: it is 72 mm from the middle of wheels 53 mm apart."""
+
+SETTLED_MM = 1e-9
+
+
+@kernel
+def held_place(robot: Any, body: Any) -> Any:
+    """Return where a body ought to be that a robot holds [mm]."""
+    sine, cosine = sin_cos(robot.heading_rad)
+    ahead, aside = body.hold_ahead_mm, body.hold_aside_mm
+    return robot.x_mm + ahead * cosine - aside * sine, robot.y_mm + ahead * sine + aside * cosine
+
+
+@kernel
+def is_dragged(body: Any) -> Any:
+    """Say whether a body is held on the floor."""
+    return body.holder != 0 and body.is_lifted == 0
+
+
+@kernel
+def way_of_held(scene: Any, world: Any, room: Any) -> Any:
+    """Return the longest way in this tick of what is held on the floor [mm], if nothing is in its way."""
+    robots, bodies, kinds, _ = scene
+    longest_mm = 0.0
+    for row in range(bodies.shape[1]):
+        body = bodies[world, row]
+        if is_dragged(body):
+            number = body.holder - 1
+            wheel = max(abs(room.ways[number, 0]), abs(room.ways[number, 1]))
+            longest_mm = max(longest_mm, REACH * wheel * kinds[robots[world, number].kind].pulse_mm)
+    return longest_mm
+
+
+@kernel
+def begin_holds(scene: Any, world: Any, room: Any) -> Any:
+    """Let those who hold something on the floor, and what they hold, take part in all pieces of this tick."""
+    robots, bodies, _, _ = scene
+    for row in range(bodies.shape[1]):
+        body = bodies[world, row]
+        if is_dragged(body):
+            robot = robots[world, body.holder - 1]
+            room.is_near[body.holder - 1] = room.is_near[robots.shape[1] + row] = True
+            robot.piece_headings[0] = robot.heading_rad
+
+
+@kernel
+def carry_along(scene: Any, world: Any, room: Any, duration_s: Any) -> Any:
+    """Let what is held follow its robot through a piece of a motion, whatever is there, with the speed of that."""
+    robots, bodies, _, _ = scene
+    for row in range(bodies.shape[1]):
+        body = bodies[world, row]
+        if is_dragged(body):
+            robot = robots[world, body.holder - 1]
+            robot.piece_headings[1] = robot.heading_rad
+            disc = robots.shape[1] + row
+            body.x_mm, body.y_mm = held_place(robot, body)
+            body.velocity_x = (body.x_mm - room.starts[disc, 0]) / duration_s
+            body.velocity_y = (body.y_mm - room.starts[disc, 1]) / duration_s
+
+
+@kernel
+def keep_holds(scene: Any, ground: Any, world: Any, room: Any) -> Any:
+    """Bring robots and what they hold together again where something pushed one of them; return by how much [mm]."""
+    field, cell, pad = ground
+    robots, bodies, kinds, _ = scene
+    worst = 0.0
+    for row in range(bodies.shape[1]):
+        body = bodies[world, row]
+        if not is_dragged(body):
+            continue
+        body.velocity_x = body.velocity_y = 0.0
+        robot = robots[world, body.holder - 1]
+        depth = body.radius_mm - clearance_mm(field, cell, pad, body.x_mm, body.y_mm)
+        if depth > 0.0:
+            nx, ny = outward(field, cell, pad, body.x_mm, body.y_mm)
+            body.x_mm += depth * nx
+            body.y_mm += depth * ny
+        error = pull_together(robot, kinds[robot.kind], body)
+        if error > SETTLED_MM:
+            room.is_touching[body.holder - 1] = True
+            room.is_pushed[body.holder - 1] = room.is_pushed[robots.shape[1] + row] = True
+            worst = max(worst, error)
+    return worst
+
+
+@kernel
+def pull_together(robot: Any, parameters: Any, body: Any) -> Any:
+    """Share a held body's deviation from its place between it and the robot; return how much it was [mm]."""
+    x, y = held_place(robot, body)
+    dx, dy = body.x_mm - x, body.y_mm - y
+    error = math.sqrt(dx * dx + dy * dy)
+    if error <= SETTLED_MM:
+        return error
+    rx, ry = x - robot.x_mm, y - robot.y_mm
+    length = math.sqrt(rx * rx + ry * ry)
+    ux, uy = rx / length, ry / length
+    gyration = 0.5 * parameters.wheel_base_mm
+    leverage = length / gyration
+    along = 0.5 * (dx * ux + dy * uy)
+    across = (dy * ux - dx * uy) / (2.0 + leverage * leverage)
+    px, py = along * ux - across * uy, along * uy + across * ux
+    robot.x_mm += px
+    robot.y_mm += py
+    robot.heading_rad += across * leverage / gyration
+    body.x_mm -= px
+    body.y_mm -= py
+    return error
+
+
+@kernel
+def go_back_together(scene: Any, world: Any, room: Any, stuck_mm: Any) -> Any:
+    """Put a robot and what it holds where the piece began if one of them is there, or they got apart.
+
+    Returns:
+        Whether somebody went back.
+    """
+    robots, bodies, _, _ = scene
+    has_gone = False
+    for row in range(bodies.shape[1]):
+        body = bodies[world, row]
+        if not is_dragged(body):
+            continue
+        number, disc = body.holder - 1, robots.shape[1] + row
+        robot = robots[world, number]
+        x, y = held_place(robot, body)
+        dx, dy = body.x_mm - x, body.y_mm - y
+        is_back = room.is_back[number] and room.is_back[disc]
+        if room.is_back[number] or room.is_back[disc] or dx * dx + dy * dy > stuck_mm * stuck_mm:
+            robot.heading_rad = robot.piece_headings[0]
+            robot.x_mm, robot.y_mm = room.starts[number, 0], room.starts[number, 1]
+            body.x_mm, body.y_mm = room.starts[disc, 0], room.starts[disc, 1]
+            room.is_back[number] = room.is_back[disc] = True
+            has_gone = has_gone or not is_back
+    return has_gone
+
+
+@kernel
+def turn_back(scene: Any, world: Any, room: Any, pieces: Any) -> Any:
+    """Let robots whose load kept them from turning count what their wheels did; a new piece begins.
+
+    As in `kiks.engine.physics.motion.give_way`: a wheel loses at most what it turned, and turns on by its slip ratio.
+    """
+    robots, bodies, kinds, _ = scene
+    for row in range(bodies.shape[1]):
+        body = bodies[world, row]
+        if not is_dragged(body):
+            continue
+        number = body.holder - 1
+        robot = robots[world, number]
+        parameters = kinds[robot.kind]
+        turn = robot.heading_rad - robot.piece_headings[1]
+        rim = 0.5 * turn * parameters.wheel_base_mm / parameters.pulse_mm
+        sine, cosine = sin_cos(robot.heading_rad)
+        dx, dy = robot.x_mm - room.moved[number, 0], robot.y_mm - room.moved[number, 1]
+        pushed = (dx * cosine + dy * sine) / parameters.pulse_mm
+        for wheel in range(2):
+            path = room.ways[number, wheel] / pieces
+            gone = between_nought_and(path, -pushed)  # what `give_way` has taken off
+            lost = between_nought_and(path, gone + (rim if wheel == 0 else -rim)) - gone
+            robot.wheel_pulses[wheel] -= (1.0 - room.ways[number, 2]) * lost
+            robot.slip_pulses[wheel] += (1.0 - room.ways[number, 2]) * lost
+        robot.piece_headings[0] = robot.heading_rad
+
+
+@kernel
+def carry_lifted(scene: Any, world: Any) -> Any:
+    """Phase: let what is lifted move with its robot."""
+    robots, bodies, _, _ = scene
+    for row in range(bodies.shape[1]):
+        body = bodies[world, row]
+        if body.holder != 0 and body.is_lifted != 0:
+            body.x_mm, body.y_mm = held_place(robots[world, body.holder - 1], body)

@@ -1,0 +1,256 @@
+"""The gripper: an arm that goes up and down, jaws that close, and the ball or cylinder that they hold.
+
+Source: kiks-behaviour.md 3.5 (jaws 37 mm long, half gap 0.5 + 27 mm * opening/200) and khepera-protocol.md 10.2 (arm
+255 down in front, 127 upright, 0 folded back, a full swing in about 1 s). The notes leave open, and we chose:
+
+* the jaws begin at the robot's rim; arm and jaws themselves meet nothing, only what they hold does;
+* the arm is down from 215 on: a robot's programs lift to 190 or less and put down at 240 (10.2);
+* the jaws close in half a second.
+
+A body is gripped when closing jaws, the arm down, touch it: its centre is between them, all of it fits between them,
+and nobody else holds it. The jaws then move it into their middle and stop at its width.
+
+Held on the floor it and the robot are one rigid thing (`kiks.engine.physics.grasp`).
+
+Lifted, it is a disc in front of the robot that nothing meets and nothing sees. It comes down only where it is free;
+where it is not, the arm stays above the floor and open jaws wait. So nothing ends inside anything else, and nothing is
+lost.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from kiks.engine.compiling import entry, kernel
+from kiks.engine.numbers import sin_cos
+from kiks.engine.physics.contact import clearance_mm
+from kiks.engine.physics.grasp import held_place
+from kiks.engine.scene import count_discs, disc_at, is_on_floor
+from kiks.engine.simd.masks import choose
+
+ARM_MAX = 255.0
+"""The arm down in front (khepera-protocol.md 10.2)."""
+
+ARM_START = 127.0
+"""Where the arm is at the power-on: upright (kiks-behaviour.md 3.5)."""
+
+ARM_DOWN = 215.0
+"""From here on what is between the jaws stands on the floor."""
+
+ARM_STEP = 2.55
+"""Way of the arm in a tick: a full swing takes 1 s (khepera-protocol.md 10.2)."""
+
+JAWS_MAX = 200.0
+"""The jaws fully open (kiks-behaviour.md 3.5)."""
+
+JAWS_STEP = 4.0
+"""Way of the jaws in a tick: from open to closed in 0.5 s."""
+
+JAW_LENGTH_MM = 37.0
+"""Length of the jaws [mm] (kiks-behaviour.md 3.5)."""
+
+GAP_MM, GAP_PER_STEP = 0.5, 27.0 / 200.0
+"""Half the gap between the closed jaws [mm], and what each step of their opening adds (kiks-behaviour.md 3.5)."""
+
+LOOSE_MM = 0.5
+"""A body that is farther from where it is held has been taken out, or slipped out [mm]."""
+
+FREE_MM = 0.01
+"""Overlap with which a body may come down [mm], as `kiks.sim.world` allows it."""
+
+GAP_TO_ROBOT_MM = 0.02
+"""Least gap between a robot and what it holds [mm]."""
+
+
+@kernel
+def half_gap_mm(jaws: Any) -> Any:
+    """Return how far each jaw is from the middle [mm]."""
+    return GAP_MM + GAP_PER_STEP * jaws
+
+
+@kernel
+def move_arm(robot: Any) -> Any:
+    """Let the arm go a tick's way."""
+    robot.arm += min(max(robot.arm_target - robot.arm, -ARM_STEP), ARM_STEP)
+
+
+@kernel
+def move_gripper(robot: Any, least_jaws: Any) -> Any:
+    """Phase: let the arm and the jaws go a tick's way; the jaws stop at a width."""
+    move_arm(robot)
+    target = choose(robot.is_closing != 0, least_jaws, JAWS_MAX)
+    robot.jaws += min(max(target - robot.jaws, -JAWS_STEP), JAWS_STEP)
+
+
+@kernel
+def tend_grippers(scene: Any, ground: Any, world: Any) -> Any:
+    """Phase: move all grippers; grip, lift, put down and let go. Return whether any body changed hands or level."""
+    robots, bodies, _, _ = scene
+    has_any = False
+    for number in range(robots.shape[1]):
+        robots[world, number].held_row = 0
+        has_any = has_any or robots[world, number].has_gripper != 0
+    if not has_any:
+        return False
+    has_changed = False
+    for row in range(bodies.shape[1]):
+        holder = bodies[world, row].holder
+        if holder > 0:
+            if not is_in_its_place(scene, world, row) and put_down(scene, ground, world, row):
+                has_changed = True
+            else:
+                robots[world, holder - 1].held_row = row + 1
+    for number in range(robots.shape[1]):
+        robot = robots[world, number]
+        if robot.has_gripper == 0:
+            continue
+        if robot.held_row > 0:
+            has_changed = tend_held(scene, ground, world, number) or has_changed
+        else:
+            before = half_gap_mm(robot.jaws)
+            move_gripper(robot, 0.0)
+            if robot.arm >= ARM_DOWN and half_gap_mm(robot.jaws) < before:
+                has_changed = grip(scene, world, number, before) or has_changed
+    return has_changed
+
+
+@kernel
+def tend_held(scene: Any, ground: Any, world: Any, number: Any) -> Any:
+    """Move a gripper that holds something; return whether it was let go, lifted or put on the floor."""
+    robot = scene[0][world, number]
+    body = scene[1][world, robot.held_row - 1]
+    row = robot.held_row - 1
+    if robot.is_closing == 0 and put_down(scene, ground, world, row):
+        robot.held_row = 0
+        move_gripper(robot, 0.0)
+        return True
+    width = (body.radius_mm - GAP_MM) / GAP_PER_STEP
+    is_waiting = robot.is_closing == 0
+    robot.jaws = max(robot.jaws, width)
+    arm = robot.arm
+    if is_waiting:  # there is no room below: the jaws stay as they are
+        move_arm(robot)
+    else:
+        move_gripper(robot, width)
+        centre(scene, world, number, body)
+    if robot.arm < ARM_DOWN:
+        has_changed = body.is_lifted == 0
+        body.is_lifted = 1
+        return has_changed
+    if body.is_lifted == 0:
+        return False
+    if is_free(scene, ground, world, row):
+        body.is_lifted = 0
+        return True
+    robot.arm = min(arm, ARM_DOWN - ARM_STEP)
+    return False
+
+
+@kernel
+def centre(scene: Any, world: Any, number: Any, body: Any) -> Any:
+    """Let closing jaws move what they hold into their middle, around the robot where it would be in its way."""
+    robot = scene[0][world, number]
+    most = max(half_gap_mm(robot.jaws) - body.radius_mm, 0.0)
+    body.hold_aside_mm = min(max(body.hold_aside_mm, -most), most)
+    apart = scene[2][robot.kind].radius_mm + body.radius_mm + GAP_TO_ROBOT_MM
+    square = apart * apart - body.hold_aside_mm * body.hold_aside_mm
+    body.hold_ahead_mm = max(body.hold_ahead_mm, math.sqrt(square))
+
+
+@kernel
+def from_robot(robot: Any, body: Any) -> Any:
+    """Return where a body is as a robot sees it: ahead and to the left of its centre [mm]."""
+    sine, cosine = sin_cos(robot.heading_rad)
+    dx, dy = body.x_mm - robot.x_mm, body.y_mm - robot.y_mm
+    return dx * cosine + dy * sine, dy * cosine - dx * sine
+
+
+@kernel
+def is_between_jaws(robot: Any, parameters: Any, body: Any) -> Any:
+    """Say whether the centre of a body is between a robot's jaws, were the arm down."""
+    ahead, aside = from_robot(robot, body)
+    begin = parameters.radius_mm
+    return begin <= ahead <= begin + JAW_LENGTH_MM and abs(aside) <= half_gap_mm(robot.jaws)
+
+
+@kernel
+def grip(scene: Any, world: Any, number: Any, half_gap_before: Any) -> Any:
+    """Grip the first body that the jaws have touched in this tick; say whether there was one."""
+    robots, bodies, kinds, _ = scene
+    robot = robots[world, number]
+    for row in range(bodies.shape[1]):
+        body = bodies[world, row]
+        if body.holder != 0 or not is_between_jaws(robot, kinds[robot.kind], body):
+            continue
+        ahead, aside = from_robot(robot, body)
+        # It may have come nearer to a jaw in the last tick, too.
+        if half_gap_mm(robot.jaws) <= abs(aside) + body.radius_mm <= half_gap_before + LOOSE_MM:
+            body.holder = number + 1
+            body.hold_ahead_mm, body.hold_aside_mm = ahead, aside
+            body.velocity_x = body.velocity_y = 0.0
+            robot.held_row = row + 1
+            return True
+    return False
+
+
+@kernel
+def is_in_its_place(scene: Any, world: Any, row: Any) -> Any:
+    """Say whether a held body is where a gripper holds it."""
+    robots, bodies, _, _ = scene
+    body = bodies[world, row]
+    robot = robots[world, body.holder - 1]
+    if robot.has_gripper == 0:
+        return False
+    x, y = held_place(robot, body)
+    if body.is_lifted != 0:
+        body.x_mm, body.y_mm = x, y
+    dx, dy = body.x_mm - x, body.y_mm - y
+    return dx * dx + dy * dy < LOOSE_MM * LOOSE_MM
+
+
+@kernel
+def put_down(scene: Any, ground: Any, world: Any, row: Any) -> Any:
+    """Let a held body go, at rest; say whether there was room for it."""
+    body = scene[1][world, row]
+    if body.is_lifted != 0 and not is_free(scene, ground, world, row):
+        return False
+    body.holder = body.is_lifted = 0
+    body.velocity_x = body.velocity_y = 0.0
+    return True
+
+
+@kernel
+def is_free(scene: Any, ground: Any, world: Any, row: Any) -> Any:
+    """Say whether nothing is on the floor where a lifted body is."""
+    field, cell, pad = ground
+    robot_count, disc_count = count_discs(scene)
+    x, y, radius = disc_at(scene, world, robot_count + row)
+    if clearance_mm(field, cell, pad, x, y) < radius - FREE_MM:
+        return False
+    for disc in range(disc_count):
+        if disc != robot_count + row and is_on_floor(scene, world, disc):
+            other_x, other_y, other_radius = disc_at(scene, world, disc)
+            dx, dy, apart = other_x - x, other_y - y, radius + other_radius - FREE_MM
+            if dx * dx + dy * dy < apart * apart:
+                return False
+    return True
+
+
+# ---- for Python ----
+
+
+@entry
+def find_object(scene: Any, number: Any) -> Any:
+    """Return the row of the body that a robot's gripper holds or has between its jaws, from 0; -1 for none."""
+    robots, bodies, kinds, _ = scene
+    robot = robots[0, number]
+    found = -1
+    for row in range(bodies.shape[1]):
+        body = bodies[0, row]
+        if body.holder == number + 1:
+            return row
+        is_there = robot.arm >= ARM_DOWN and body.holder == 0 and is_between_jaws(robot, kinds[robot.kind], body)
+        if is_there and found < 0:
+            found = row
+    return found

@@ -1,0 +1,279 @@
+"""From the paths of two wheels to a pose: the exact arc, cut into short pieces where a wall is near.
+
+Derivation: with wheel paths l and r [mm] the centre moves s = (l + r)/2 along an arc that turns by q = (r - l)/b. Its
+chord has the length s sinc(q/2) and the direction heading + q/2 (khepera-protocol.md 7.3).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import extending, types
+
+from kiks.engine.compiling import inlined, kernel
+from kiks.engine.numbers import SMALL_RAD, sin_cos, sin_cos_of_small, sinc, uniform
+from kiks.engine.physics.contact import PIECE_MM, PIECES_MAX, clearance_mm, is_free, slide
+from kiks.engine.simd.f64x8 import floor, greatest, lane_of, with_lane
+from kiks.engine.simd.masks import anywhere, choose, everywhere, holds, lane_count, opposite
+from kiks.engine.simd.records import one_of, only
+from kiks.engine.state import TRAIL_LENGTH
+
+STREAM_SLIP = 1
+"""Random stream of the slip ratios (`kiks.engine.sensing.proximity` has the next)."""
+
+CONTACT_TICKS = 20
+"""Ticks without a touch after which a contact is over: what touches again within 0.2 s is the same one."""
+
+
+@inlined
+def remember_pose(robot: Any) -> Any:
+    """Phase: keep the pose at this tick boundary, for sensors that were sampled a little while ago."""
+    for k in range(TRAIL_LENGTH - 1, 0, -1):
+        for axis in range(3):
+            robot.trail[k, axis] = robot.trail[k - 1, axis]
+    robot.trail[0, 0] = robot.x_mm
+    robot.trail[0, 1] = robot.y_mm
+    robot.trail[0, 2] = robot.heading_rad
+
+
+@inlined
+def move(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, left: Any, right: Any, chance: Any) -> Any:
+    """Phase: drive along the arc that the wheels ask for, as far as the walls let it; count what the rims did.
+
+    Args:
+        field: Distance of cells to the nearest wall [mm], shape [rows, columns].
+        cell: Edge of a cell [mm].
+        pad: Cells of the border around the arena.
+        robot: Record of the robot, or of eight.
+        parameters: Record of its constants.
+        left: Path that the left wheel would make without a wall [pulses].
+        right: The same of the right wheel.
+        chance: Share of its command at which a blocked wheel turns, or what it is drawn from (`slip_ratio_of`).
+
+    Returns:
+        Whether it touched a wall.
+    """
+    pulse = parameters.pulse_mm
+    travel = max(abs(left), abs(right)) * pulse
+    arc = 0.5 * (left + right) * pulse
+    turn = (right - left) * pulse / parameters.wheel_base_mm
+    # Between cell centres the clearance errs by less than one and a half cells: farther away no wall is touched.
+    room = clearance_mm(field, cell, pad, robot.x_mm, robot.y_mm)
+    is_near = room < parameters.radius_mm + travel + 2.0 * cell
+    if anywhere(is_near):
+        pieces = choose(is_near, min(max(1.0, -floor(-travel / PIECE_MM)), PIECES_MAX), 1.0)
+        return move_near(field, cell, pad, robot, parameters, (left, right), (arc, turn), pieces, chance)
+    x, y, _, _ = end_of_arc(robot, arc * sinc(0.5 * turn), turn)
+    drive(robot, x, y, turn, arc)
+    robot.wheel_pulses[0] += left
+    robot.wheel_pulses[1] += right
+    return is_near
+
+
+@kernel
+def move_near(
+    field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, paths: Any, whole: Any, pieces: Any, chance: Any
+) -> Any:
+    """Drive along an arc in pieces, and touch what is in the way.
+
+    Args:
+        field: Distance of cells to the nearest wall [mm], shape [rows, columns].
+        cell: Edge of a cell [mm].
+        pad: Cells of the border around the arena.
+        robot: Record of the robot, or of eight.
+        parameters: Record of its constants.
+        paths: Paths that the wheels would make without a wall [pulses].
+        whole: The arc [mm] and its turn [rad].
+        pieces: How many pieces to make of it.
+        chance: As in `move`.
+
+    Returns:
+        Whether it touched a wall.
+    """
+    left, right = paths
+    arc, turn = whole
+    way_left, way_right = left * parameters.pulse_mm, right * parameters.pulse_mm
+    rim_left, rim_right = left, right
+    if anywhere(pieces > 1.0):
+        arc, turn = arc / pieces, turn / pieces
+        way_left, way_right = way_left / pieces, way_right / pieces
+        rim_left, rim_right = left / pieces, right / pieces
+    chord = arc * sinc(0.5 * turn)
+    made_left, made_right = 0.0, 0.0
+    is_touching = pieces < 1.0  # nowhere yet
+    for piece in range(np.int64(greatest(pieces))):
+        is_moving = piece < pieces
+        x, y, sine, cosine = end_of_arc(robot, chord, turn)
+        is_going = is_moving & is_free(field, cell, pad, parameters, x, y)
+        if anywhere(is_going):
+            drive(only(robot, is_going), x, y, turn, arc)
+            made_left += choose(is_going, rim_left, 0.0)
+            made_right += choose(is_going, rim_right, 0.0)
+        is_blocked = is_moving & opposite(is_going)
+        if anywhere(is_blocked):
+            is_touching = is_touching | is_blocked
+            for lane in range(lane_count(is_blocked)):
+                if holds(is_blocked, lane):
+                    one, its = one_of(robot, lane), one_of(parameters, lane)
+                    arc_of_it = lane_of(chord, lane), lane_of(sine, lane), lane_of(cosine, lane), lane_of(turn, lane)
+                    ways = lane_of(way_left, lane), lane_of(way_right, lane)
+                    slip_ratio = slip_ratio_of(chance, its, lane)
+                    rims = scrape(field, cell, pad, one, its, arc_of_it, ways, slip_ratio)
+                    made_left = with_lane(made_left, lane, lane_of(made_left, lane) + rims[0])
+                    made_right = with_lane(made_right, lane, lane_of(made_right, lane) + rims[1])
+    robot.slip_pulses[0] += left - made_left
+    robot.slip_pulses[1] += right - made_right
+    robot.wheel_pulses[0] += made_left
+    robot.wheel_pulses[1] += made_right
+    return is_touching
+
+
+@inlined
+def end_of_arc(robot: Any, chord: Any, turn: Any) -> Any:
+    """Return where a free robot is after an arc, x and y [mm], and sine and cosine of the direction of its chord."""
+    sine, cosine = sin_cos(robot.heading_rad + 0.5 * turn)
+    return robot.x_mm + chord * cosine, robot.y_mm + chord * sine, sine, cosine
+
+
+@inlined
+def drive(robot: Any, x: Any, y: Any, turn: Any, arc: Any) -> Any:
+    """Be at (x, y) [mm], turned [rad], after an arc [mm]."""
+    robot.x_mm = x
+    robot.y_mm = y
+    robot.heading_rad += turn
+    count_path(robot, arc)
+
+
+@kernel
+def scrape(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, piece: Any, ways: Any, slip_ratio: Any) -> Any:
+    """Make a piece of an arc that leads into a wall; return what the rims of the wheels did [pulses].
+
+    Args:
+        field: Distance of cells to the nearest wall [mm], shape [rows, columns].
+        cell: Edge of a cell [mm].
+        pad: Cells of the border around the arena.
+        robot: Record of the robot.
+        parameters: Record of its constants.
+        piece: The chord [mm], sine and cosine of its direction, and the turn [rad].
+        ways: What the wheels ask for [mm].
+        slip_ratio: Share of its command at which a blocked wheel turns.
+    """
+    chord, sine, cosine, turn = piece
+    base = parameters.wheel_base_mm
+    u, v, q = slide(field, cell, pad, robot, parameters, chord * cosine, chord * sine, turn)
+    robot.heading_rad += q
+    along = u * cosine + v * sine
+    count_path(robot, math.sqrt(u * u + v * v) if along > 0.0 else -math.sqrt(u * u + v * v))
+    # The rim goes with the floor, but for the slip ratio of what it wanted more.
+    rim_left = slip(along - 0.5 * q * base, ways[0], slip_ratio) / parameters.pulse_mm
+    rim_right = slip(along + 0.5 * q * base, ways[1], slip_ratio) / parameters.pulse_mm
+    return rim_left, rim_right
+
+
+@kernel
+def draw_slip(parameters: Any, seed: Any, world: Any, number: Any, tick: Any) -> Any:
+    """Return at which share of its command a wheel of a robot turns in a tick, if it is blocked."""
+    drawn = uniform(seed, world, number, STREAM_SLIP, tick, 0)
+    return parameters.slip_ratio_min + drawn * (parameters.slip_ratio_max - parameters.slip_ratio_min)
+
+
+def slip_ratio_of(chance: Any, parameters: Any, lane: Any) -> Any:
+    """Return a slip ratio that is given, or draw it from a seed, a world, a robot's number and a tick."""
+    raise NotImplementedError("it is for kernels")
+
+
+@extending.overload(slip_ratio_of)  # type: ignore[untyped-decorator, unused-ignore]
+def _overload_slip_ratio_of(chance: Any, parameters: Any, lane: Any) -> Any:
+    def given(chance: Any, parameters: Any, lane: Any) -> Any:
+        return chance
+
+    def drawn(chance: Any, parameters: Any, lane: Any) -> Any:
+        seed, world, number, tick = chance
+        return draw_slip(parameters, lane_of(seed, lane), world, number, lane_of(tick, lane))
+
+    return given if isinstance(chance, types.Float) else drawn
+
+
+@inlined
+def count_path(robot: Any, way_mm: Any) -> Any:
+    """Add a piece of path to what the robot has driven ahead, or back if it is negative."""
+    robot.forwards_mm += max(way_mm, 0.0)
+    robot.backwards_mm -= min(way_mm, 0.0)
+
+
+@inlined
+def note_contact(robot: Any, is_touching: Any) -> Any:
+    """Phase: count the contacts; one that lasts counts once, with gaps in it, too.
+
+    A ball that is pushed along runs ahead by hundredths of a millimetre whenever the motors falter.
+    """
+    robot.contact_count += choose(is_touching & (robot.is_touching == 0), 1, 0)
+    robot.is_touching = choose(is_touching, CONTACT_TICKS, max(robot.is_touching - 1, 0))
+
+
+@kernel
+def between_nought_and(limit: Any, value: Any) -> Any:
+    """Return a value, or 0 or the limit if it is beyond one of them."""
+    return min(max(value, 0.0), limit) if limit > 0.0 else max(min(value, 0.0), limit)
+
+
+@kernel
+def give_way(robot: Any, parameters: Any, dx: Any, dy: Any, wheels: Any, slip_ratio: Any) -> Any:
+    """Let a robot that something has pushed by (dx, dy) [mm] count what its rims did.
+
+    A push brakes the wheels, at most to a stop, and turns none faster: gears of 25:1 cannot be driven from the wheel.
+
+    Args:
+        robot: Record of the robot.
+        parameters: Record of its constants.
+        dx: How far it was pushed [mm].
+        dy: How far it was pushed [mm].
+        wheels: The paths that its wheels have made [pulses].
+        slip_ratio: Share of its command at which a blocked wheel turns.
+    """
+    sine, cosine = sin_cos(robot.heading_rad)
+    pushed = (dx * cosine + dy * sine) / parameters.pulse_mm
+    for wheel in range(2):
+        path = wheels[wheel]
+        lost = between_nought_and(path, -pushed)
+        robot.wheel_pulses[wheel] -= (1.0 - slip_ratio) * lost
+        robot.slip_pulses[wheel] += (1.0 - slip_ratio) * lost
+        # What was counted as driven and was not is taken off again.
+        if lost > 0.0:
+            robot.forwards_mm -= 0.5 * lost * parameters.pulse_mm
+        else:
+            robot.backwards_mm += 0.5 * lost * parameters.pulse_mm
+
+
+@kernel
+def slip(floor_path: Any, wanted_path: Any, slip_ratio: Any) -> Any:
+    """Return the path of a rim that wants more than the floor under it gives."""
+    return floor_path + slip_ratio * (wanted_path - floor_path)
+
+
+@kernel
+def pose_between(robot: Any, ticks_ago: Any, share: Any) -> Any:
+    """Return x, y and heading within the tick that ended `ticks_ago` ticks ago, after a share of it, on its arc."""
+    x0, y0, heading = boundary(robot, ticks_ago, 0), boundary(robot, ticks_ago, 1), boundary(robot, ticks_ago, 2)
+    dx = boundary(robot, ticks_ago - 1, 0) - x0
+    dy = boundary(robot, ticks_ago - 1, 1) - y0
+    turn = boundary(robot, ticks_ago - 1, 2) - heading
+    # The chord to a point on the arc is shorter by the ratio of sines, and turned back by the rest of the half angle.
+    length = share * sinc(0.5 * share * turn) / sinc(0.5 * turn)
+    back = 0.5 * (share - 1.0) * turn
+    sine, cosine = sin_cos_of_small(back) if everywhere(abs(back) < SMALL_RAD) else sin_cos(back)
+    x = x0 + length * (dx * cosine - dy * sine)
+    y = y0 + length * (dx * sine + dy * cosine)
+    return x, y, heading + share * turn
+
+
+@inlined
+def boundary(robot: Any, ticks_ago: Any, axis: Any) -> Any:
+    """Return x, y or heading at the beginning of the tick that ended so many ticks ago; -1 is the one to come."""
+    now = robot.x_mm if axis == 0 else (robot.y_mm if axis == 1 else robot.heading_rad)
+    value = choose(ticks_ago == 0, robot.trail[0, axis], now)
+    for k in range(1, TRAIL_LENGTH):
+        value = choose(ticks_ago == k, robot.trail[k, axis], value)
+    return value

@@ -1,0 +1,255 @@
+"""The two motors: set-points, trajectory generator, the firmware's PID, and the motor that obeys it.
+
+Need: the transients of the real robot, so that `E`, `K` and `H` answer like its own while it accelerates, arrives and
+stalls. Source: khepera-protocol.md 6.1 to 6.4 (K-Team's algorithm and gains; the plant is inferred there).
+Assumption: a wheel that slips at a wall turns at 10-15 % of its command and stays there (thesis 3.3). A loop closed
+over the slip would wind up to full power instead, so the controllers regulate the path the motor would have made
+without the slip (`slip_pulses`), while the encoders, and with them E, H and K, count what the wheel really did.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from kiks.engine.compiling import entry, inlined, kernel
+from kiks.engine.simd.f64x8 import floor
+from kiks.engine.simd.masks import choose, everywhere, lane_count
+from kiks.engine.simd.records import one_of
+from kiks.engine.state import MODE_POSITION, MODE_PWM, MODE_SPEED
+
+PWM_MAX = 255
+"""Full power (khepera-protocol.md 4.16)."""
+
+SPEED_MAX = 127
+"""Largest speed command [pulses/10 ms] (khepera-protocol.md 4.5)."""
+
+TARGET_MAX = 2**23 - 2
+"""Largest magnitude of a target position [pulses] (khepera-protocol.md 4.4)."""
+
+
+@kernel
+def clamp(value: Any, limit: Any) -> Any:
+    """Return a value cut to +-limit."""
+    return min(max(value, -limit), limit)
+
+
+@kernel
+def wrap_int32(value: Any) -> Any:
+    """Return the low 32 bits of a whole number as a signed one: a counter that overflows."""
+    return value - 4294967296.0 * floor((value + 2147483648.0) * (1.0 / 4294967296.0))
+
+
+@kernel
+def counter(robot: Any, wheel: Any) -> Any:
+    """Return a position counter as command H reports it [pulses]."""
+    return wrap_int32(robot.pulse_count[wheel] + robot.counter_offset[wheel])
+
+
+# ---- set-points: what the commands A, C, D, F, G, J, P and a reset write ----
+
+
+@kernel
+def change_mode(robot: Any, wheel: Any, mode: Any) -> Any:
+    """Hand a motor to another controller, which begins with an empty memory (khepera-protocol.md 6.3)."""
+    is_other = robot.motor_mode[wheel] != mode
+    robot.motor_mode[wheel] = mode
+    robot.error_sum[wheel] = choose(is_other, 0, robot.error_sum[wheel])
+    robot.last_error[wheel] = choose(is_other, 0, robot.last_error[wheel])
+    robot.on_target[wheel] = 0
+
+
+@kernel
+def command_speed(robot: Any, left_pulses: Any, right_pulses: Any) -> Any:
+    """Command D: turn the wheels at these speeds [pulses/10 ms]."""
+    for wheel in range(2):
+        change_mode(robot, wheel, MODE_SPEED)
+        robot.speed_setpoint[wheel] = clamp(left_pulses if wheel == 0 else right_pulses, SPEED_MAX)
+
+
+@kernel
+def command_pwm(robot: Any, left_pwm: Any, right_pwm: Any) -> Any:
+    """Command P: feed the motors without control, -255 to 255."""
+    for wheel in range(2):
+        change_mode(robot, wheel, MODE_PWM)
+        robot.pwm_setpoint[wheel] = clamp(left_pwm if wheel == 0 else right_pwm, PWM_MAX)
+
+
+@kernel
+def command_position(robot: Any, left_pulses: Any, right_pulses: Any) -> Any:
+    """Command C: move the wheels to these counter readings [pulses], along a trapezoid of speed."""
+    for wheel in range(2):
+        if robot.motor_mode[wheel] == MODE_POSITION:
+            # What slip has swallowed is not made up for: the move starts where the wheel is, and where its counter is,
+            # should that have gone over 32 bits.
+            overflow = robot.pulse_count[wheel] + robot.counter_offset[wheel] - counter(robot, wheel)
+            robot.trajectory_pulses[wheel] -= robot.slip_count[wheel] + overflow
+        else:
+            robot.trajectory_pulses[wheel] = counter(robot, wheel)
+            robot.trajectory_speed[wheel] = robot.controlled_speed[wheel]
+        robot.slip_pulses[wheel] -= robot.slip_count[wheel]
+        robot.slip_count[wheel] = 0
+        change_mode(robot, wheel, MODE_POSITION)
+        robot.target_pulses[wheel] = clamp(left_pulses if wheel == 0 else right_pulses, TARGET_MAX)
+
+
+@kernel
+def command_counters(robot: Any, left_pulses: Any, right_pulses: Any) -> Any:
+    """Command G: set the counters [pulses]. A move in progress is shifted with them, so that nothing stirs."""
+    for wheel in range(2):
+        offset = wrap_int32(left_pulses if wheel == 0 else right_pulses) - robot.pulse_count[wheel]
+        shift = offset - robot.counter_offset[wheel]
+        robot.counter_offset[wheel] = offset
+        robot.target_pulses[wheel] += shift
+        robot.trajectory_pulses[wheel] += shift
+
+
+@kernel
+def position_error(robot: Any, wheel: Any) -> Any:
+    """Return by how many pulses a wheel lags behind its trajectory, counted over the overflow of 32 bits."""
+    return wrap_int32(floor(robot.trajectory_pulses[wheel] + 0.5) - counter(robot, wheel))
+
+
+@entry
+def set_speed(robots: Any, world: Any, robot: Any, left_pulses: Any, right_pulses: Any) -> Any:
+    """Call `command_speed` for one robot of an array."""
+    command_speed(robots[world, robot], left_pulses, right_pulses)
+
+
+@entry
+def set_pwm(robots: Any, world: Any, robot: Any, left_pwm: Any, right_pwm: Any) -> Any:
+    """Call `command_pwm` for one robot of an array."""
+    command_pwm(robots[world, robot], left_pwm, right_pwm)
+
+
+@entry
+def set_position(robots: Any, world: Any, robot: Any, left_pulses: Any, right_pulses: Any) -> Any:
+    """Call `command_position` for one robot of an array."""
+    command_position(robots[world, robot], left_pulses, right_pulses)
+
+
+@entry
+def set_counters(robots: Any, world: Any, robot: Any, left_pulses: Any, right_pulses: Any) -> Any:
+    """Call `command_counters` for one robot of an array."""
+    command_counters(robots[world, robot], left_pulses, right_pulses)
+
+
+@entry
+def controller_error(robots: Any, world: Any, robot: Any, wheel: Any) -> Any:
+    """Return the error that command K reports: command minus measurement [pulses or pulses/10 ms]."""
+    state = robots[world, robot]
+    if state.motor_mode[wheel] == MODE_SPEED:
+        return np.int64(state.speed_setpoint[wheel]) - state.measured_speed[wheel]
+    if state.motor_mode[wheel] == MODE_POSITION:
+        return np.int64(position_error(state, wheel))
+    return np.int64(0)
+
+
+# ---- phases of a tick ----
+
+
+@inlined
+def latch_encoders(robot: Any) -> Any:
+    """Phase: count the whole pulses that the wheels have made, and how many of them since the last tick."""
+    for wheel in range(2):
+        pulses = floor(robot.wheel_pulses[wheel])
+        slipped = floor(robot.wheel_pulses[wheel] + robot.slip_pulses[wheel]) - pulses
+        robot.measured_speed[wheel] = pulses - robot.pulse_count[wheel]
+        robot.controlled_speed[wheel] = robot.measured_speed[wheel] + slipped - robot.slip_count[wheel]
+        robot.pulse_count[wheel] = pulses
+        robot.slip_count[wheel] = slipped
+
+
+@kernel
+def advance_trajectory(robot: Any, wheel: Any) -> Any:
+    """Move the commanded position one tick along its trapezoid (khepera-protocol.md 6.2)."""
+    acceleration = robot.profile_acceleration[wheel] / 256.0
+    fastest = np.float64(robot.profile_speed[wheel])
+    distance = robot.target_pulses[wheel] - robot.trajectory_pulses[wheel]
+    side = 1.0 if distance >= 0.0 else -1.0
+    distance = abs(distance)
+    speed = robot.trajectory_speed[wheel] * side
+    if distance < 1.0 and abs(speed) <= acceleration:
+        robot.trajectory_pulses[wheel] = robot.target_pulses[wheel]
+        robot.trajectory_speed[wheel] = 0.0
+        robot.on_target[wheel] = 1
+        # What the integrator gathered against friction on the way would hold the wheel some pulses beyond the target.
+        robot.error_sum[wheel] = 0
+        return
+    if speed < 0.0:  # it still runs away from the target
+        speed = min(speed + acceleration, 0.0)
+    elif distance < speed * speed / (2.0 * acceleration):
+        # Brake as hard as the distance asks for, even beyond the set acceleration: this guarantees the arrival.
+        speed = max(speed - speed * speed / (2.0 * max(distance, 1e-9)), 0.0)
+    elif speed < fastest:
+        speed = min(speed + acceleration, fastest)
+    elif speed > fastest:
+        speed = max(speed - acceleration, fastest)
+    if 0.0 <= speed < acceleration:
+        speed = min(acceleration, distance)  # the last crumbs of the way: never a standstill short of the target
+    speed = min(speed, max(distance, 0.0)) if speed > 0.0 else speed
+    robot.trajectory_speed[wheel] = speed * side
+    robot.trajectory_pulses[wheel] += speed * side
+
+
+@inlined
+def pid(robot: Any, wheel: Any, gains: Any, error: Any, scale: Any) -> Any:
+    """Return the power that the firmware's controller asks for (khepera-protocol.md 6.3), in whole numbers as there.
+
+    Each is below 2^53, but for a demand that is far beyond full power anyway.
+    """
+    error_sum = robot.error_sum[wheel] + error
+    demand = gains[0] * error + gains[1] * error_sum + gains[2] * (error - robot.last_error[wheel])
+    power = floor(abs(demand) / scale)
+    # The integrator rests while the power is clipped, unless it works its way back.
+    is_working = (power <= PWM_MAX) | ((error < 0) != (demand <= 0))
+    robot.error_sum[wheel] = choose(is_working, error_sum, robot.error_sum[wheel])
+    robot.last_error[wheel] = error
+    return clamp(choose(demand >= 0, power, -power), PWM_MAX)
+
+
+@inlined
+def control_motors(robot: Any, parameters: Any) -> Any:
+    """Phase: each motor's controller compares its set-point with the encoders and sets the power."""
+    for wheel in range(2):
+        is_simple = robot.motor_mode[wheel] == MODE_SPEED
+        if everywhere(is_simple):
+            robot.pwm[wheel] = control_speed(robot, parameters, wheel)
+        else:
+            for lane in range(lane_count(is_simple)):
+                control_motor(one_of(robot, lane), one_of(parameters, lane), wheel)
+
+
+@inlined
+def control_speed(robot: Any, parameters: Any, wheel: Any) -> Any:
+    """Return the power of a motor that is to turn at a speed."""
+    error = robot.speed_setpoint[wheel] - robot.controlled_speed[wheel]
+    return pid(robot, wheel, robot.speed_gains, error, parameters.gain_scale)
+
+
+@kernel
+def control_motor(robot: Any, parameters: Any, wheel: Any) -> Any:
+    """Set the power of one motor, whatever controls it."""
+    mode = robot.motor_mode[wheel]
+    if mode == MODE_SPEED:
+        robot.pwm[wheel] = control_speed(robot, parameters, wheel)
+    elif mode == MODE_POSITION:
+        if robot.on_target[wheel] == 0:
+            advance_trajectory(robot, wheel)
+        error = position_error(robot, wheel) - robot.slip_count[wheel]
+        robot.pwm[wheel] = pid(robot, wheel, robot.position_gains, error, parameters.gain_scale)
+    else:
+        robot.pwm[wheel] = robot.pwm_setpoint[wheel]
+
+
+@inlined
+def turn_motors(robot: Any, parameters: Any, wheel: Any) -> Any:
+    """Phase: the motor follows its power with a lag; return the path its wheel would make in this tick [pulses]."""
+    power = robot.pwm[wheel]
+    driving = max(abs(power) - parameters.dead_band_pwm, 0.0) / (PWM_MAX - parameters.dead_band_pwm)
+    final = driving * parameters.free_speed_pulses * parameters.motor_gain[wheel]
+    final = choose(power >= 0.0, final, -final)
+    difference = robot.motor_speed[wheel] - final
+    robot.motor_speed[wheel] = final + difference * parameters.lag_decay
+    return final + difference * parameters.lag_ticks

@@ -1,0 +1,216 @@
+"""The linear camera K213: a row of 64 pixels over 36 degrees, as its own lens and exposure make it.
+
+Source: khepera-protocol.md 10.3, kiks-behaviour.md 3.3 (whose constants were tuned by eye to the images in the K213's
+manual) and thesis 3.4 ("Linear vision extension module").
+
+Method: 64 rays from +18 to -18 degrees, the leftmost pixel first, from the robot's centre; the view begins 50 mm from
+it. A ray ends at the first thing, whose brightness 1..255 becomes a grey of 50..245. Then, in this order: the lens
+blurs what is far, the exposure adapts to the scene, the converter adds noise, the picture darkens towards its edges,
+motion smears it, the line adds noise once more.
+
+Blur: every pixel becomes the mean over a stretch of the row, with a width of its own [pixels].
+
+* Lens. Sharp to D = 250 mm. Beyond, the circle of confusion of a lens grows like 1/D - 1/d, so the stretch reaches
+  7 (1 - D/d) pixels to each side: 3.5 at 500 mm, where KiKS 2.2.0 takes the mean of 7 pixels, and 7 at any distance.
+* Motion. While the picture is exposed for the time T, a wall at the distance d and the angle a moves across the row
+  by (turn - way sin(a)/d) / pixel angle, and driving shakes the turret. T and the shaking are chosen so that a robot
+  at usual speeds gets about the widths of KiKS 2.2.0: 6 pixels straight on, 8 when it turns.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from kiks.engine.compiling import entry, kernel
+from kiks.engine.numbers import at_instant, draw, sin_cos, stream_of
+from kiks.engine.scene import moment_of
+from kiks.engine.sensing.disc_rays import ALL_AROUND, everybody_else, meet_disc, see
+from kiks.engine.sensing.proximity import pose_at
+from kiks.engine.sensing.rays import cast, cast_many, free_cells, scale
+from kiks.engine.simd.stack_arrays import stack_floats
+from kiks.engine.state import PIXEL_COUNT
+from kiks.units import TICK_NS
+
+STREAM_CAMERA = 5
+"""Random stream of the noise on images."""
+
+_EDGE_DEG = 18.0
+_PIXEL_DEG = 2.0 * _EDGE_DEG / (PIXEL_COUNT - 1)
+_SUM_COUNT = PIXEL_COUNT + 1
+_PIXEL_RAD = 0.009973310011396168  # 36/63 degrees
+_PIXEL_COS, _PIXEL_SIN = 0.999950266955943, 0.009973144676492593
+_EDGE_COS, _EDGE_SIN = 0.9510565162951535, 0.3090169943749474
+
+_BEGIN_MM = 50.0
+_NEAREST_MM = 1e-3  # a camera within a wall
+_ANYWHERE = 1e9  # cells: the border of the world is always nearer
+_SHARP_MM = 250.0
+_DEFOCUS_PIXELS = 7.0  # to each side, for what is infinitely far
+
+_BLACK, _WHITE = 50.0, 245.0  # greys of the blackest and the whitest wall
+_DARKEN = 10.0  # what the exposure takes off a scene without black
+_NOISE = 10.0  # of the converter, to each side
+_LINE_NOISE = 0.1  # share of the final grey that is mere chance
+
+_EXPOSURE_TICKS = 5.0  # 50 ms, the shortest reading period
+_SHAKE_PIXELS_PER_MM, _SHAKE_PIXELS = 1.5, 6.0  # by the way during the exposure, and at most
+
+
+@kernel
+def integral(sums: Any, grey: Any, place: Any) -> Any:
+    """Return the integral of a row of pixels from its left edge to a place; beyond the edges it goes on unchanged."""
+    last = grey.shape[0]
+    if not place > 0.0:
+        return place * grey[0]
+    if place >= last:
+        return sums[last] + (place - last) * grey[last - 1]
+    i = np.int64(place)
+    return sums[i] + (place - i) * grey[i]
+
+
+@kernel
+def smear(grey: Any, half_width: Any) -> Any:
+    """Replace each pixel by the mean over its own stretch of the row: `half_width` pixels to each side of its middle.
+
+    Half a pixel is no blur. All means come from one running sum, so wide ones cost as much as narrow ones.
+    """
+    sums, mean = stack_floats(_SUM_COUNT), stack_floats(PIXEL_COUNT)
+    sums[0] = 0.0
+    for p in range(PIXEL_COUNT):
+        sums[p + 1] = sums[p] + grey[p]
+    for p in range(PIXEL_COUNT):
+        low, high = p + 0.5 - half_width[p], p + 0.5 + half_width[p]
+        mean[p] = (integral(sums, grey, high) - integral(sums, grey, low)) / (2.0 * half_width[p])
+    grey[:] = mean
+
+
+@kernel
+def look(sight: Any, seen: Any, seen_count: Any, x: Any, y: Any, heading: Any, grey: Any, distance_mm: Any) -> Any:
+    """Write the grey of what each pixel looks at, and how far it is [mm] from the robot's centre."""
+    cell, pad = scale(sight)
+    per_cell = 1.0 / cell
+    column, row = x * per_cell + pad, y * per_cell + pad
+    begin = max(_BEGIN_MM * per_cell, free_cells(sight, column, row))
+    begin_columns, begin_rows = stack_floats(PIXEL_COUNT), stack_floats(PIXEL_COUNT)
+    rays_x, rays_y = stack_floats(PIXEL_COUNT), stack_floats(PIXEL_COUNT)
+    lengths, brightnesses = stack_floats(PIXEL_COUNT), stack_floats(PIXEL_COUNT)
+    sine, cosine = sin_cos(heading)
+    ray_x = cosine * _EDGE_COS - sine * _EDGE_SIN
+    ray_y = sine * _EDGE_COS + cosine * _EDGE_SIN
+    for p in range(PIXEL_COUNT):
+        rays_x[p], rays_y[p] = ray_x, ray_y
+        begin_columns[p], begin_rows[p] = column + begin * ray_x, row + begin * ray_y
+        # Clockwise to the next pixel.
+        ray_x, ray_y = ray_x * _PIXEL_COS + ray_y * _PIXEL_SIN, ray_y * _PIXEL_COS - ray_x * _PIXEL_SIN
+    cast_many(sight, begin_columns, begin_rows, rays_x, rays_y, lengths, brightnesses)
+    for p in range(PIXEL_COUNT):
+        start, length, brightness = begin, lengths[p], brightnesses[p]
+        if length == 0.0:  # the view begins inside a wall: what is seen is its surface
+            start = 0.0
+            length, brightness = cast(sight, column, row, rays_x[p], rays_y[p], _ANYWHERE)
+        if seen_count > 0:
+            to_disc, _, shade = meet_disc(seen, seen_count, column, row, rays_x[p], rays_y[p], start + length)
+            if shade > 0.0:
+                start, length, brightness = 0.0, to_disc, shade
+        grey[p] = _BLACK + brightness * ((_WHITE - _BLACK) / 255.0)
+        distance_mm[p] = max(_NEAREST_MM, (start + length) * cell)
+
+
+@kernel
+def expose(grey: Any) -> Any:
+    """Adapt the exposure: the brightest pixel becomes white, and a scene without black gets a little darker."""
+    brightest, darkest = grey.max(), grey.min()
+    grey += max(_WHITE - brightest, 0.0) - min(max(darkest - _BLACK, 0.0), _DARKEN)
+
+
+@kernel
+def darken_edges(grey: Any, noise: Any) -> Any:
+    """Cut the greys by a ceiling that falls towards the edges: 240 in the middle, 132 at 18 degrees."""
+    for p in range(PIXEL_COUNT):
+        angle = abs(_EDGE_DEG - p * _PIXEL_DEG)
+        share = angle / _EDGE_DEG
+        ceiling = 240.0 - 6.0 * angle * share * math.sqrt(share)
+        if angle > 5.0 and grey[p] > ceiling:
+            grey[p] = ceiling + noise[p]
+
+
+@entry
+def take_image(
+    scene: Any,
+    sight: Any,
+    tick_count: Any,
+    time_ns: Any,
+    seed: Any,
+    robot: Any,
+    is_noisy: Any,
+    out: Any,
+) -> Any:
+    """Write the image that a robot's camera takes at a time into `out` and return its light level.
+
+    Args:
+        scene: What there is (`kiks.engine.scene`).
+        sight: What rays meet of the arena (`kiks.engine.sensing.rays`).
+        tick_count: Ticks done.
+        time_ns: When, at most 10 ms before the end of the last tick.
+        seed: Seed of the run.
+        robot: Index of the robot.
+        is_noisy: False for the expected image, without rounding; motion smears it all the same.
+        out: float64, shape [64]: greys 0..255, the leftmost pixel first.
+
+    Returns:
+        What the light detector says of the scene, more for a darker one.
+    """
+    state = scene[0][0, robot]
+    x, y, heading = pose_at(state, tick_count, time_ns)
+    x_before, y_before, heading_before = pose_at(state, tick_count, time_ns - TICK_NS)
+    sine, cosine = sin_cos(heading)
+    way_mm = ((x - x_before) * cosine + (y - y_before) * sine) * _EXPOSURE_TICKS
+    turn = (heading - heading_before) * _EXPOSURE_TICKS
+
+    # Three random numbers a pixel; their middles where nothing is to be random.
+    chance = np.full((3, PIXEL_COUNT), 0.5)
+    flicker = 0.5
+    if is_noisy:
+        origin = at_instant(stream_of(seed, 0, robot, STREAM_CAMERA), time_ns)
+        flicker = draw(origin, 3 * PIXEL_COUNT)
+        for kind in range(3):
+            for p in range(PIXEL_COUNT):
+                chance[kind, p] = draw(origin, kind * PIXEL_COUNT + p)
+
+    distance_mm, half_width = stack_floats(PIXEL_COUNT), stack_floats(PIXEL_COUNT)
+    tracks, count, seen = everybody_else(scene, 0, robot)
+    seen_count = see(tracks, count, moment_of(tick_count, time_ns), scale(sight), ALL_AROUND, seen)
+    look(sight, seen, seen_count, x, y, heading, out, distance_mm)
+    for p in range(PIXEL_COUNT):
+        half_width[p] = 0.5 + _DEFOCUS_PIXELS * max(1.0 - _SHARP_MM / distance_mm[p], 0.0)
+    if distance_mm.max() > _SHARP_MM:
+        smear(out, half_width)
+    brightest = out.max()
+    light = (255.0 - brightest) * 7.0 + 175.0 + 50.0 * flicker + (brightest - out.mean())
+
+    expose(out)
+    out += _NOISE * (2.0 * chance[0] - 1.0)
+    darken_edges(out, _NOISE * (2.0 * chance[1] - 1.0))
+
+    if way_mm != 0.0 or turn != 0.0:
+        shake = min(_SHAKE_PIXELS_PER_MM * abs(way_mm), _SHAKE_PIXELS)
+        for p in range(PIXEL_COUNT):
+            sine = _EDGE_SIN * (1.0 - p * (2.0 / (PIXEL_COUNT - 1)))  # of the pixel's angle, within 1 %
+            # Driving moves what is ahead on the left to the left of the picture; a left turn moves all to the right.
+            shift = abs(turn - way_mm * sine / distance_mm[p]) / _PIXEL_RAD
+            half_width[p] = 0.5 + 0.5 * (shake + shift)
+        smear(out, half_width)
+    # At rest, too, each pixel takes a quarter from either neighbour.
+    before = out[0]
+    for p in range(PIXEL_COUNT):
+        here = out[p]
+        out[p] = 0.25 * before + 0.5 * here + 0.25 * out[min(p + 1, PIXEL_COUNT - 1)]
+        before = here
+    out[:] = (1.0 - _LINE_NOISE) * out + _LINE_NOISE * 255.0 * chance[2]
+    if is_noisy:
+        for p in range(PIXEL_COUNT):
+            out[p] = min(max(0.0, np.floor(out[p] + 0.5)), 255.0)
+    return np.int64(np.floor(light + 0.5))

@@ -1,0 +1,202 @@
+"""Fans: the rays of proximity sensors, eight numbers each, of one sensor or of several at once.
+
+Need: a reading of eight sensors is mostly rays, and a ray is mostly waiting for what it looks up. While one fan waits,
+others can go on.
+Method: `enter` writes fans down one by one, `follow` lets them step in turn until all have ended, `met` says where that
+was. A fan's steps are its own, so the bits do not depend on how many there are. They are in float32, from the cell that
+a fan begins in (`kiks.engine.simd.f32x8`).
+
+From anywhere in a cell, its edge too, one may go in any direction as far as its square is from that of the nearest wall
+(`kiks.model.arena.Arena.leaps`). So a step is the way to the edge of the cell, and then that far: no corner is missed,
+and none ends deeper in a wall than by the nudge that takes it over the edge.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from kiks.engine.compiling import entry, inlined, kernel
+from kiks.engine.simd.f32x8 import (
+    count_any,
+    faces_at,
+    if_less,
+    load_narrow,
+    look_up,
+    narrow,
+    store_narrow,
+    whole,
+    widen,
+)
+from kiks.engine.simd.f64x8 import load, store
+from kiks.engine.simd.stack_arrays import stack_integers, stack_narrow
+from kiks.model.raster import LEAPS_PER_CELL
+
+WAY_SIZE = 72
+"""Numbers of a fan, float32: eight times eight, and the two of where it begins and its reach."""
+
+LONGEST = 16000.0
+"""Longest ray [cells]: up to here a nudge still moves a float32, and none stands still for ever."""
+
+# Places of what a fan has.
+_DX, _DY, _PER_DX, _PER_DY, _RIGHT, _UP, _LENGTH, _MET, _REST = (8 * k for k in range(9))
+
+_NUDGE = 1e-3  # over the edge of a cell [cells]
+_GRAZING = 0.1  # cosine of an incidence below which a surface is not worth finding
+_FAR = 1e30
+_FLAT = 1e-10  # square of a direction's part along an axis below which it counts as none
+
+
+@inlined
+def enter(
+    sight: Any, ways: Any, origins: Any, k: Any, column: Any, row: Any, rays_x: Any, rays_y: Any, reach: Any
+) -> Any:
+    """Write a fan down.
+
+    Args:
+        sight: What rays meet (`kiks.engine.sensing.rays`).
+        ways: float32 [`WAY_SIZE` each].
+        origins: int64, one each.
+        k: Number of the fan.
+        column: Where its rays begin [cells].
+        row: Where its rays begin [cells].
+        rays_x: Directions, `Lanes`.
+        rays_y: Directions, `Lanes`.
+        reach: Longest length of a ray [cells].
+    """
+    field = sight[0]
+    # Who is out of the arena is in the wall around it, a cell from its edge, so that no look-up leaves the raster.
+    i = np.int64(min(max(1.0, column), field.shape[1] - 2.0))
+    j = np.int64(min(max(1.0, row), field.shape[0] - 2.0))
+    x, y = min(max(0.0, column - i), 1.0), min(max(0.0, row - j), 1.0)
+    origins[k] = j * field.shape[1] + i
+    dx, dy = narrow(rays_x), narrow(rays_y)
+    dx, dy = if_less(_FLAT, dx * dx, dx, 0.0), if_less(_FLAT, dy * dy, dy, 0.0)
+    way = k * WAY_SIZE
+    store_narrow(ways, way + _DX, dx)
+    store_narrow(ways, way + _DY, dy)
+    store_narrow(ways, way + _PER_DX, if_less(_FLAT, dx * dx, 1.0 / dx, _FAR))
+    store_narrow(ways, way + _PER_DY, if_less(_FLAT, dy * dy, 1.0 / dy, _FAR))
+    store_narrow(ways, way + _RIGHT, if_less(dx, 0.0, 0.0, narrow(1.0)) - x)
+    store_narrow(ways, way + _UP, if_less(dy, 0.0, 0.0, narrow(1.0)) - y)
+    store_narrow(ways, way + _LENGTH, narrow(0.0))
+    ways[way + _REST], ways[way + _REST + 1], ways[way + _REST + 2] = x, y, min(LONGEST, reach)
+
+
+@inlined
+def step(leaps: Any, origin: Any, ways: Any, way: Any, lengths: Any) -> Any:
+    """Return how long the rays of a fan are after one more step.
+
+    Returns:
+        The lengths; numbers above 0 for rays that took it, 0 for those that are beyond their reach, and 1/2 less the
+        brightness of what they met for the others.
+    """
+    columns = whole(ways[way + _REST] + lengths * load_narrow(ways, way + _DX))
+    rows = whole(ways[way + _REST + 1] + lengths * load_narrow(ways, way + _DY))
+    found = look_up(leaps, origin, columns, rows)
+    to_column = (columns + load_narrow(ways, way + _RIGHT)) * load_narrow(ways, way + _PER_DX)
+    to_row = (rows + load_narrow(ways, way + _UP)) * load_narrow(ways, way + _PER_DY)
+    edge = if_less(to_column, to_row, to_column, to_row)
+    onward = if_less(edge, lengths, lengths, edge) + (found * (1.0 / LEAPS_PER_CELL) + _NUDGE)
+    goes_on = if_less(lengths, ways[way + _REST + 2], found + 0.5, 0.0)
+    return if_less(0.0, goes_on, onward, lengths), goes_on
+
+
+@kernel
+def follow(sight: Any, ways: Any, origins: Any, under_way: Any, count: Any) -> Any:
+    """Let the rays of fans go until each has met a wall or gone its reach; `under_way` is room for as many int64."""
+    leaps = sight[2]
+    for k in range(count):
+        under_way[k] = k
+    while count > 0:
+        kept = 0
+        for place_in_line in range(count):
+            k = under_way[place_in_line]
+            way, origin = k * WAY_SIZE, origins[k]
+            lengths = load_narrow(ways, way + _LENGTH)
+            lengths, goes_on = step(leaps, origin, ways, way, lengths)
+            store_narrow(ways, way + _LENGTH, lengths)
+            store_narrow(ways, way + _MET, goes_on)
+            under_way[kept] = k
+            kept += count_any(goes_on)
+        count = kept
+
+
+@inlined
+def meet_faces(sight: Any, ways: Any, origin: Any, way: Any, lengths: Any, shades: Any) -> Any:
+    """Return where rays that met a wall meet its surface, taken to be smooth, and how squarely.
+
+    Returns:
+        Lengths of the rays [cells], at most a cell from those given, and cosines of the angles of incidence.
+    """
+    dx, dy = load_narrow(ways, way + _DX), load_narrow(ways, way + _DY)
+    before = lengths - 2.0 * _NUDGE
+    x, y = ways[way + _REST] + before * dx, ways[way + _REST + 1] + before * dy
+    columns, rows = whole(x), whole(y)
+    # What met nothing looks at where it began: a cell elsewhere would have to come from farther memory.
+    place_x, place_y = if_less(0.0, shades, columns, 0.0), if_less(0.0, shades, rows, 0.0)
+    face_x, face_y, left = faces_at(sight[3], origin, place_x, place_y)
+    squarely = face_x * dx + face_y * dy
+    left = left - (x - columns - 0.5) * face_x - (y - rows - 0.5) * face_y
+    further = left / if_less(_GRAZING, squarely, squarely, 1.0)
+    further = if_less(-1.0, further, if_less(further, 1.0, further, 1.0), -1.0)
+    smooth = before + further
+    smooth = if_less(0.0, smooth, smooth, 0.0)
+    cosines = if_less(0.0, squarely, squarely, 0.0)
+    # A ray that begins in a wall or meets the tip of a corner between cells finds no surface.
+    cosines = if_less(0.0, face_x * face_x + face_y * face_y, cosines, 1.0)
+    found = if_less(0.0, shades, squarely, 0.0)
+    return if_less(_GRAZING, found, smooth, lengths), if_less(0.0, shades, cosines, 1.0)
+
+
+@inlined
+def met(sight: Any, has_faces: Any, ways: Any, origins: Any, k: Any) -> Any:
+    """Return what `cast_fan` does, of a fan that was followed."""
+    way = k * WAY_SIZE
+    ended = load_narrow(ways, way + _MET)
+    shades = if_less(ended, 0.0, 0.5 - ended, 0.0)
+    lengths = if_less(ended, 0.0, load_narrow(ways, way + _LENGTH), ways[way + _REST + 2])
+    cosines = narrow(1.0)
+    if has_faces and count_any(shades):
+        lengths, cosines = meet_faces(sight, ways, origins[k], way, lengths, shades)
+    return widen(lengths), widen(cosines), widen(shades)
+
+
+@kernel
+def cast_fan(sight: Any, has_faces: Any, column: Any, row: Any, rays_x: Any, rays_y: Any, reach: Any) -> Any:
+    """Follow the rays of one fan.
+
+    Args:
+        sight: What rays meet.
+        has_faces: Whether walls are to be smooth.
+        column: Where they begin [cells].
+        row: Where they begin [cells].
+        rays_x: Directions, `Lanes`.
+        rays_y: Directions, `Lanes`.
+        reach: Longest length followed [cells].
+
+    Returns:
+        Lengths [cells], cosines of the angles of incidence, 1 without faces, and brightnesses, 0 for nothing, `Lanes`.
+    """
+    ways, origins, under_way = stack_narrow(WAY_SIZE), stack_integers(1), stack_integers(1)
+    enter(sight, ways, origins, 0, column, row, rays_x, rays_y, reach)
+    follow(sight, ways, origins, under_way, 1)
+    return met(sight, has_faces, ways, origins, 0)
+
+
+@entry
+def cast_eight(sight: Any, column: Any, row: Any, directions: Any, reach: Any, out: Any) -> Any:
+    """Follow eight rays from Python as a proximity sensor does; all in cells.
+
+    Args:
+        sight: What rays meet.
+        column: Where they begin.
+        row: Where they begin.
+        directions: Cosines and sines, shape [2, 8].
+        reach: Longest length followed.
+        out: Where lengths and brightnesses go, shape [2, 8].
+    """
+    lengths, _, brightnesses = cast_fan(sight, False, column, row, load(directions[0]), load(directions[1]), reach)
+    store(out[0], lengths)
+    store(out[1], brightnesses)

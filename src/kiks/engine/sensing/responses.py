@@ -1,0 +1,152 @@
+"""What a proximity sensor makes of its seven rays: the responses that a robot's file can name.
+
+A response takes the length of each ray [mm], how squarely it met a surface (the cosine of the angle of incidence) and
+that one's brightness 1..255, 0 for nothing, and says how many counts above its baseline the sensor expects. Where the
+rays begin and go is the response's own, too (`kiks.engine.parameters`); baseline, noise and rounding are common to all
+and no part of it. The sensor's gain is a factor on the light where there is one, else on the counts.
+
+* REFLECTION: the light that comes back along the rays, and the share of it above a threshold
+  (`kiks.model.robot.Reflection`).
+* STANDIN: a formula in place of the lost table of KiKS 2.2.0 (kiks-behaviour.md 3.1.1).
+* THESIS, FAST: the thesis's networks, and its table made of them (`kiks.engine.sensing.thesis_networks`).
+* CURVE: counts against distance as measured, times reflectance, over rays that count less off the axis
+  (khepera-protocol.md 8.6).
+
+A further one is a number here, a name in `kiks.model.robot.RESPONSES`, its kernel and a branch of `respond`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from kiks.engine.compiling import entry, inlined, kernel
+from kiks.engine.numbers import exponential, power
+from kiks.engine.parameters import CURVE_POINT_COUNT, RAY_COUNT, STANDIN_REACH
+from kiks.engine.sensing.thesis_networks import network_count, table_count
+from kiks.engine.simd.f32x8 import narrow, store_narrow, total
+from kiks.engine.simd.f64x8 import LANES, load, splat, store, where_less
+from kiks.engine.simd.stack_arrays import stack_floats, stack_narrow
+from kiks.model.materials import BLACK_REFLECTANCE
+
+REFLECTION, THESIS, FAST, STANDIN, CURVE = 0, 1, 2, 3, 4
+"""Responses in the order of `kiks.model.robot.RESPONSES`."""
+
+_WEIGHTS = (0.35, 0.33, 0.69, 0.43, 0.69, 0.33, 0.35)  # kiks-behaviour.md 3.1.1
+
+
+@kernel
+def darkness(brightness: Any) -> Any:
+    """Return by how much a dark surface looks farther: black counts half of white (thesis 3.4)."""
+    return 0.5 + brightness * (0.5 / 255.0)
+
+
+@kernel
+def reflectance(brightness: Any) -> Any:
+    """Return the share of light that a surface sends back (`kiks.model.materials`), 0 for nothing."""
+    return BLACK_REFLECTANCE + brightness * ((1.0 - BLACK_REFLECTANCE) / 255.0) if brightness > 0.0 else 0.0
+
+
+@kernel
+def ramp(share: Any, rounding: Any) -> Any:
+    """Return a share, 0 instead of a negative one, with a parabola between -rounding and +rounding."""
+    if share <= -rounding:
+        return 0.0
+    return share if share >= rounding else (share + rounding) * (share + rounding) / (4.0 * rounding)
+
+
+@kernel
+def reflection_count(parameters: Any, sensor: Any, lengths_mm: Any, cosines: Any, brightnesses: Any) -> Any:
+    """Return the count for the light that comes back to a sensor; its rays are `Lanes`."""
+    near = cosines / (lengths_mm + parameters.behind_mm)
+    shares = BLACK_REFLECTANCE + brightnesses * ((1.0 - BLACK_REFLECTANCE) / 255.0)
+    shares = where_less(0.0, brightnesses, shares, 0.0)
+    returned = load(parameters.ray_weight[sensor]) * shares * near * near * near
+    light = total(returned)
+    threshold = parameters.threshold[sensor]
+    share = (1.0 + threshold) * parameters.gain[sensor] * light - threshold
+    rounded = ramp(share, parameters.faint) - ramp(share - 1.0, parameters.bright)
+    return parameters.maximum_counts * max(rounded, 0.0)
+
+
+@kernel
+def standin_count(range_mm: Any, lengths_mm: Any, brightnesses: Any) -> Any:
+    """Return the count of the stand-in; lengths are shares of the robot's own range."""
+    total, per_range = 0.0, 1.0 / range_mm
+    for ray in range(RAY_COUNT):
+        if brightnesses[ray] > 0.0:
+            inverted = min(max(STANDIN_REACH - lengths_mm[ray] * per_range, 0.0), 0.98)
+            near = inverted * darkness(brightnesses[ray])
+            root = math.sqrt(near)
+            total += _WEIGHTS[ray] * near * root * math.sqrt(root)  # to the power of 1.75
+    if total == 0.0:
+        return 0.0
+    return 1023.0 * (1.0 - exponential(-power(total, 1.61)))
+
+
+@inlined
+def nearnesses(range_mm: Any, lengths_mm: Any, brightnesses: Any) -> Any:
+    """Return the inputs of the thesis's networks: 1 at the sensor, 0 out of range, less for a dark surface; `Lanes`."""
+    inverted = max(1.0 - lengths_mm * (1.0 / range_mm), 0.0)
+    return where_less(0.0, brightnesses, inverted * darkness(brightnesses), 0.0)
+
+
+@kernel
+def curve_count(parameters: Any, sensor: Any, lengths_mm: Any, brightnesses: Any) -> Any:
+    """Return the count of a measured curve, whose values up to its range stand in the robot's record."""
+    total, points_per_mm = 0.0, (CURVE_POINT_COUNT - 1) / parameters.range_mm
+    for ray in range(RAY_COUNT):
+        place = min(max(0.0, lengths_mm[ray] * points_per_mm), CURVE_POINT_COUNT - 1.001)
+        i = np.int64(place)
+        low, high = parameters.curve_counts[i], parameters.curve_counts[i + 1]
+        weight = parameters.ray_weight[sensor, ray] * reflectance(brightnesses[ray])
+        total += weight * (low + (place - i) * (high - low))
+    return total
+
+
+@kernel
+def respond(networks: Any, parameters: Any, sensor: Any, lengths_mm: Any, cosines: Any, brightnesses: Any) -> Any:
+    """Return the counts above its baseline that a sensor expects, by its robot's response; the rays are `Lanes`."""
+    if parameters.response == REFLECTION:
+        return reflection_count(parameters, sensor, lengths_mm, cosines, brightnesses)
+    gain = parameters.gain[sensor]
+    if parameters.response == THESIS or parameters.response == FAST:
+        seen = stack_narrow(LANES)
+        store_narrow(seen, 0, narrow(nearnesses(parameters.range_mm, lengths_mm, brightnesses)))
+        if parameters.response == THESIS:
+            return gain * network_count(networks[0], sensor, seen)
+        return gain * table_count(networks[0].table, seen)
+    return gain * respond_one_by_one(parameters, sensor, lengths_mm, brightnesses)
+
+
+@kernel
+def respond_one_by_one(parameters: Any, sensor: Any, lengths: Any, shades: Any) -> Any:
+    """Return the same, but for the gain, for the responses that take ray by ray."""
+    lengths_mm, brightnesses = stack_floats(LANES), stack_floats(LANES)
+    store(lengths_mm, lengths)
+    store(brightnesses, shades)
+    if parameters.response == STANDIN:
+        return standin_count(parameters.range_mm, lengths_mm, brightnesses)
+    return curve_count(parameters, sensor, lengths_mm, brightnesses)
+
+
+@entry
+def respond_all(kinds: Any, lengths_mm: Any, cosines: Any, out: Any) -> Any:
+    """Write the counts above its baseline that a robot without networks expects of white surfaces.
+
+    Args:
+        kinds: Records of `PARAMETERS`, shape [1].
+        lengths_mm: Of rays [mm], shape [samples, 8, 7].
+        cosines: Of the angles of incidence, 0 for a ray that meets nothing, shape [samples, 8, 7].
+        out: Shape [samples, 8].
+    """
+    padded_mm, padded = stack_floats(LANES), stack_floats(LANES)
+    padded_mm[RAY_COUNT], padded[RAY_COUNT] = 1.0, 0.0
+    for sample in range(out.shape[0]):
+        for sensor in range(out.shape[1]):
+            for ray in range(RAY_COUNT):
+                padded_mm[ray], padded[ray] = lengths_mm[sample, sensor, ray], cosines[sample, sensor, ray]
+            shades = where_less(0.0, load(padded), 255.0, splat(0.0))
+            out[sample, sensor] = reflection_count(kinds[0], sensor, load(padded_mm), load(padded), shades)

@@ -1,0 +1,163 @@
+"""The thesis's networks and its fast table: from the nearnesses of seven rays to a count.
+
+Source: thesis section 3.3, "7 input neurons, 13+7 neurons in 2 hidden layers, 1 linear output neuron" and "The 'Fast
+sensors' setting". A nearness is 1 for a ray of no length and 0 for one that meets nothing in range. Of each row of
+weights in a file the last is the bias; their shapes stand in `kiks.model.thesis_networks`.
+
+Method: the neurons of a sensor are computed eight at a time in float32 (`kiks.engine.simd.f32x8`). The second layer and
+the output are linear, so they are merged into one when the networks are packed. Sums run in a fixed order.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.engine.compiling import entry, inlined, kernel
+from kiks.engine.simd.f32x8 import if_less, load_narrow, narrow, store_narrow, total, whole
+from kiks.engine.simd.f64x8 import LANES
+from kiks.engine.simd.stack_arrays import stack_narrow
+from kiks.model.robot import SENSOR_COUNT
+from kiks.model.thesis_networks import INPUT_COUNT, TANH_COUNT, NetworkResponse
+
+TABLE_LEVELS = 6
+"""Values of each ray that the table knows: 0, 10, ..., 50 mm (thesis 3.3)."""
+
+TABLE_SIZE = TABLE_LEVELS**INPUT_COUNT
+"""Entries of the table."""
+
+NETWORK_RESPONSES = ("thesis", "fast")
+"""Responses of robots' files that need a record of `NETWORKS`."""
+
+NEURON_COUNT = 2 * LANES
+"""Neurons of the first layer that are calculated: the thesis's, and some without weights to fill the lanes."""
+
+NETWORKS = np.dtype(
+    [
+        # Of each sensor: a row for each ray, then the biases; what each neuron counts, and the bias of that.
+        ("hidden", "f4", (SENSOR_COUNT, INPUT_COUNT + 1, NEURON_COUNT)),
+        ("output", "f4", (SENSOR_COUNT, NEURON_COUNT)),
+        ("bias", "f4", (SENSOR_COUNT,)),
+        ("table", "f4", (TABLE_SIZE,)),  # zeros unless it is wanted
+    ],
+    align=True,
+)
+"""Weights and table for the sensors' kernels: one record for all robots, as it has a megabyte."""
+
+MAXIMUM = 1023.0
+
+_PLACE_VALUES = np.array([TABLE_LEVELS**k for k in range(INPUT_COUNT - 1, -1, -1)] + [0], np.float32)
+
+
+@inlined
+def tanh(x: Any) -> Any:
+    """Return hyperbolic tangents within 7e-6: the continued fraction to the ninth level, up to 1."""
+    x = if_less(x, 6.297, x, 6.297)
+    x = if_less(-6.297, x, x, -6.297)
+    q = x * x
+    above = (((q + 990.0) * q + 135135.0) * q + 4729725.0) * q + 34459425.0
+    below = (((q * 45.0 + 13860.0) * q + 945945.0) * q + 16216200.0) * q + 34459425.0
+    value = x * above / below
+    value = if_less(value, 1.0, value, 1.0)
+    return if_less(-1.0, value, value, -1.0)
+
+
+@kernel
+def network_count(networks: Any, sensor: Any, seen: Any) -> Any:
+    """Return the count for nearnesses, float32 [8]: 0 if nothing is near, else what the network of the sensor says."""
+    nearest = np.float32(0.0)
+    for ray in range(INPUT_COUNT):
+        nearest = max(nearest, seen[ray])
+    if nearest <= 0.0:
+        return 0.0
+    weights = networks.hidden[sensor]
+    first, second = load_narrow(weights[INPUT_COUNT], 0), load_narrow(weights[INPUT_COUNT], LANES)
+    for ray in range(INPUT_COUNT):
+        first = first + load_narrow(weights[ray], 0) * seen[ray]
+        second = second + load_narrow(weights[ray], LANES) * seen[ray]
+    output = networks.output[sensor]
+    sums = tanh(first) * load_narrow(output, 0) + tanh(second) * load_narrow(output, LANES)
+    return min(max(np.float64(networks.bias[sensor] + total(sums)), 0.0), MAXIMUM)
+
+
+@kernel
+def table_count(table: Any, seen: Any) -> Any:
+    """Return the table's count for nearnesses, float32 [8], each rounded to a fifth; the first ray counts most."""
+    levels = whole(load_narrow(seen, 0) * (TABLE_LEVELS - 1.0) + 0.5)
+    levels = if_less(levels, TABLE_LEVELS - 1.0, levels, TABLE_LEVELS - 1.0)
+    index = total(if_less(0.0, levels, levels, 0.0) * load_narrow(_PLACE_VALUES, 0))
+    return np.float64(table[np.int64(index)])
+
+
+@entry
+def fill_table(networks: Any, table: Any) -> Any:
+    """Write the mean of all sensors' networks for each pattern into `table`, float32 of the shape [6^7].
+
+    Args:
+        networks: Records of `NETWORKS`, shape [1].
+        table: Where the means go.
+    """
+    seen = stack_narrow(LANES)
+    for index in range(table.shape[0]):
+        digits = index
+        for ray in range(INPUT_COUNT - 1, -1, -1):
+            seen[ray] = (digits % TABLE_LEVELS) / (TABLE_LEVELS - 1)
+            digits //= TABLE_LEVELS
+        mean = 0.0
+        for sensor in range(SENSOR_COUNT):
+            mean += network_count(networks[0], sensor, seen)
+        table[index] = mean / SENSOR_COUNT
+
+
+@entry
+def respond_networks(networks: Any, seen: Any, out: Any) -> Any:
+    """Write the counts of `NETWORKS`, shape [1], for nearnesses [samples, 8, 7] into `out`, shape [samples, 8]."""
+    rays = stack_narrow(LANES)
+    for sample in range(seen.shape[0]):
+        for sensor in range(seen.shape[1]):
+            copy_rays(seen[sample, sensor], rays)
+            out[sample, sensor] = network_count(networks[0], sensor, rays)
+
+
+@entry
+def respond_table(table: Any, seen: Any, out: Any) -> Any:
+    """Write the table's counts for many nearnesses, shape [samples, 8, 7], into `out`, shape [samples, 8]."""
+    rays = stack_narrow(LANES)
+    for sample in range(seen.shape[0]):
+        for sensor in range(seen.shape[1]):
+            copy_rays(seen[sample, sensor], rays)
+            out[sample, sensor] = table_count(table, rays)
+
+
+@kernel
+def copy_rays(seen: Any, rays: Any) -> Any:
+    """Copy seven nearnesses into eight lanes."""
+    store_narrow(rays, 0, narrow(0.0))
+    for ray in range(INPUT_COUNT):
+        rays[ray] = seen[ray]
+
+
+def pack_networks(response: NetworkResponse) -> NDArray[np.void]:
+    """Return the weights of networks for the kernels, without a table, shape [1]."""
+    packed = np.zeros(1, NETWORKS)
+    hidden, middle, last = response.weights
+    packed["hidden"][0, :, :, :TANH_COUNT] = hidden.transpose(0, 2, 1)
+    last, bias = last[:, :-1], last[:, -1]
+    packed["output"][0, :, :TANH_COUNT] = np.einsum("sl,slt->st", last, middle[:, :, :-1])
+    packed["bias"][0] = bias + (last * middle[:, :, -1]).sum(axis=1)
+    return packed
+
+
+@functools.cache
+def networks_for(*responses: str) -> NDArray[np.void]:
+    """Return what responses of robots' files need of the networks that come with KiKS, shape [1] or [0]."""
+    if set(responses).isdisjoint(NETWORK_RESPONSES):
+        return np.zeros(0, NETWORKS)
+    packed = pack_networks(NetworkResponse.load())
+    if "fast" in responses:
+        fill_table(packed, packed["table"][0])
+    packed.setflags(write=False)
+    return packed

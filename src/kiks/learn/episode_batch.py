@@ -1,0 +1,185 @@
+"""Many episodes of a lesson at once, one a world: what environments for one robot, for many and for teams share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kiks.batch.batch import Batch
+from kiks.batch.initial_state import random_starts
+from kiks.control.measures import contacts, path_mm
+from kiks.control.neural_nets import COUNT_MAX
+from kiks.drawing import draw_world
+from kiks.errors import ParameterError
+from kiks.learn.env_specs import EnvSpec
+from kiks.model.robot import SENSOR_COUNT, RobotSpec
+
+PLACES = 1000
+"""Free places in an arena from which those of episodes are drawn."""
+
+APART_MM = 5.0
+"""How far robots that start at random are from each other and from all else at least [mm]."""
+
+SEED_LIMIT = 2**63 - 1
+
+PICTURE_SIDE = 480
+"""Pixels of the longer side of a rendered picture."""
+
+
+class Episodes:
+    """Worlds in which robots act step by step, and are told what they sense and what it was worth.
+
+    An episode is determined by the random generator with which it begins, whatever its world's number: two worlds
+    with equal generators and equal arenas go the same way to the bit, as long as they do the same.
+
+    Args:
+        lesson: What is to be learnt.
+        worlds: How many worlds.
+        robots: How many robots are in each.
+        robot: Kind of robot: a name, a robot file or a `kiks.RobotSpec`.
+        response: Response of the proximity sensors, if not that of the robot's file.
+        threads: How many threads; as many as the computer has cores if left out.
+
+    Raises:
+        ParameterError: If an argument is out of range, or there is no room to start.
+    """
+
+    def __init__(
+        self,
+        lesson: EnvSpec,
+        worlds: int = 1,
+        *,
+        robots: int = 1,
+        robot: str | RobotSpec = "khepera",
+        response: str | None = None,
+        threads: int | None = None,
+    ) -> None:
+        self.lesson = lesson
+        goals = () if lesson.goal is None else (lesson.goal,)
+        self.batch = Batch(
+            lesson.arenas,
+            worlds,
+            robot=robot,
+            robots=robots,
+            senses=lesson.senses,
+            timing=lesson.timing,
+            response=response,
+            threads=threads,
+            measures=(lesson.reward, path_mm, contacts, *goals),
+        )
+        self._goal_note = lesson.reward.note_count + 2 if goals else None
+        self._radius_mm = self.batch.specs[0].body.radius_mm
+        self._places = [self._free_places(arena) for arena in self.batch.arenas] if lesson.starts == "random" else []
+        self._sensors = np.zeros((worlds, robots, SENSOR_COUNT * len(lesson.senses)))
+        self._scores = np.zeros((worlds, robots))
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """How many worlds, and robots in each."""
+        return self.batch.world_count, self.batch.robot_count
+
+    def begin(self, worlds: ArrayLike, chances: Sequence[np.random.Generator]) -> None:
+        """Let new episodes begin in some worlds; the first time in all of them.
+
+        Args:
+            worlds: Their numbers, int64 [world].
+            chances: A generator for each, from which its seed and its start are drawn.
+        """
+        chosen = np.asarray(worlds, np.int64)
+        seeds = np.array([chance.integers(SEED_LIMIT) for chance in chances], np.int64)
+        starts = None
+        if self._places:
+            pairs = zip(chosen.tolist(), chances, strict=True)
+            starts = np.array([self._draw_starts(world, chance) for world, chance in pairs])
+        everything = None if len(chosen) == self.batch.world_count else chosen
+        self._sensors = self.batch.reset(everything, seeds=seeds, starts=starts)
+        self._scores[chosen] = 0.0
+
+    def step(self, actions: ArrayLike) -> NDArray[np.float64]:
+        """Let all robots of all worlds act, and sense again.
+
+        Args:
+            actions: Speeds of the left and right wheels, shares of the speed limit, [world, robot, 2]; or
+                [world, 2] of robots that are alone.
+
+        Returns:
+            Their rewards, float64 [world, robot].
+
+        Raises:
+            ParameterError: If the shape is another, or a number is not from -1 to 1.
+        """
+        try:
+            given = np.asarray(actions)
+        except (TypeError, ValueError, OverflowError):
+            given = np.zeros(0)
+        if given.ndim == 2:
+            given = given[:, None]
+        if given.shape != (*self.shape, 2) or given.dtype.kind not in "fiu":
+            raise ParameterError(
+                f"actions must be numbers of the shape {(*self.shape, 2)}, two for each robot, but they were "
+                f"{given.dtype} of the shape {given.shape}."
+            )
+        if not (np.abs(given) <= 1).all():
+            raise ParameterError(
+                f"actions must be from -1 to 1, but among them was {given[~(np.abs(given) <= 1)][0]}. Cut them off "
+                "before, as gymnasium.wrappers.ClipAction does."
+            )
+        self._sensors = self.batch.step(given * self.lesson.speed_limit)
+        before, self._scores = self._scores, self.batch.notes[:, :, 0].copy()
+        return self._scores - before
+
+    def observations(self) -> NDArray[np.float32]:
+        """Return what robots sensed last, as shares of the greatest count, float32 [world, robot, sensor]."""
+        return (self._sensors / COUNT_MAX).astype(np.float32)
+
+    def are_over(self) -> NDArray[np.bool_]:
+        """Say in which worlds a robot has reached the goal, bool [world]."""
+        if self._goal_note is None:
+            return np.zeros(self.batch.world_count, np.bool_)
+        reached: NDArray[np.bool_] = np.any(self.batch.notes[:, :, self._goal_note] > 0, axis=1)
+        return reached
+
+    def facts(self) -> dict[str, NDArray[np.float64]]:
+        """Return what else there is to say of robots, float64 [world, robot]: time_s, path_mm and contacts."""
+        first = self.lesson.reward.note_count
+        paths_mm, contact_counts = (self.batch.notes[:, :, first + k].copy() for k in range(2))
+        times_s = np.repeat(self.batch.times_s[:, None], self.batch.robot_count, axis=1)
+        return {"time_s": times_s, "path_mm": paths_mm, "contacts": contact_counts}
+
+    def picture(self, world: int) -> NDArray[np.uint8]:
+        """Return a world from above, uint8 [row, column, 3]."""
+        batch = self.batch
+        radii_mm = [self._radius_mm] * batch.robot_count
+        bodies: Any = batch.state.bodies[world]
+        arena = batch.arenas[batch.arena_indices[world]]
+        drawn = draw_world(arena, batch.lamps[world], bodies, batch.poses[world], radii_mm, longest_side=PICTURE_SIDE)
+        return np.asarray(drawn)
+
+    # ---- inside ----
+
+    def _free_places(self, arena: Any) -> NDArray[np.float64]:
+        return random_starts(arena, PLACES, seed=0, radius_mm=self._radius_mm, clear_mm=APART_MM)
+
+    def _draw_starts(self, world: int, chance: np.random.Generator) -> list[list[float]]:
+        """Return start poses of a world's robots that are apart from each other.
+
+        Raises:
+            ParameterError: If there is hardly room for so many.
+        """
+        places = self._places[self.batch.arena_indices[world]]
+        least_mm = 2 * self._radius_mm + APART_MM
+        taken: list[list[float]] = []
+        for _ in range(100 * self.batch.robot_count):
+            pose = places[chance.integers(len(places))].tolist()
+            if all(math.hypot(pose[0] - other[0], pose[1] - other[1]) >= least_mm for other in taken):
+                taken.append(pose)
+                if len(taken) == self.batch.robot_count:
+                    return taken
+        raise ParameterError(
+            f"the arena must have room for {self.batch.robot_count} robots, but places for only {len(taken)} were "
+            "found. Take a larger one, or fewer robots."
+        )

@@ -1,0 +1,163 @@
+"""What is evaluated, and what a worker does with it: the same in a thread, in a process and on another computer."""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.errors import ParameterError
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+class Evaluation(Protocol):
+    """What an evolution wants of its candidates: an object that can be pickled, with two methods.
+
+    The values of a candidate must follow from its parameters and its seed alone, not from its neighbours in the call
+    nor from the count of threads: then an evolution has the same bits wherever it runs.
+    """
+
+    def prepare(self) -> None:
+        """Do what is costly and needed once a worker: compile kernels, build arenas."""
+
+    def evaluate(self, candidates: Floats, seeds: Integers, threads: int) -> Floats:
+        """Return what the candidates are worth.
+
+        Args:
+            candidates: Parameters [candidate, parameter]; a copy, of at least one candidate.
+            seeds: A seed for each [candidate].
+            threads: How many threads it may use.
+
+        Returns:
+            Values [candidate, value].
+        """
+        ...
+
+
+def check_candidates(candidates: object, seeds: object) -> tuple[Floats, Integers]:
+    """Return what is evaluated, as arrays.
+
+    Args:
+        candidates: Parameters, float64 [candidate, parameter].
+        seeds: A seed for each, int64 [candidate].
+
+    Raises:
+        ParameterError: If they have not these shapes and types.
+    """
+    candidates, seeds = _array(candidates), _array(seeds)
+    if candidates.ndim != 2 or candidates.dtype != np.float64:
+        raise ParameterError(
+            f"candidates must be a float64 array [candidate, parameter], but it was {candidates.dtype} of shape"
+            f" {candidates.shape}. A single candidate is parameters[np.newaxis]."
+        )
+    if seeds.shape != candidates.shape[:1] or seeds.dtype != np.int64:
+        raise ParameterError(
+            f"seeds must be an int64 array with one seed for each of {len(candidates)} candidates, but it was"
+            f" {seeds.dtype} of shape {seeds.shape}. np.full(count, seed) gives the same seed to all."
+        )
+    return candidates, seeds
+
+
+def _array(values: object) -> NDArray[Any]:
+    try:
+        return np.asarray(values)
+    except ValueError:  # lists of different lengths
+        return np.empty(0, object)
+
+
+@dataclass(frozen=True)
+class Ready:
+    """A worker's answer: give me candidates."""
+
+
+@dataclass(frozen=True)
+class Values:
+    """A worker's answer: what its candidates are worth.
+
+    Attributes:
+        values: [candidate, value].
+        duration_s: How long the evaluation took [s of the wall clock].
+    """
+
+    values: Floats
+    duration_s: float
+
+
+@dataclass(frozen=True)
+class Raised:
+    """A worker's answer: the work raised.
+
+    Attributes:
+        what: Type and message of the exception.
+        story: Its traceback, as text.
+    """
+
+    what: str
+    story: str
+
+    @classmethod
+    def of(cls, error: BaseException) -> Raised:
+        """Return what is told of an exception."""
+        return cls(f"{type(error).__name__}: {error}", "".join(traceback.format_exception(error)))
+
+
+@dataclass(frozen=True)
+class Lost:
+    """In place of an answer: the worker is no more.
+
+    Attributes:
+        how: How it ended, as a sentence goes on after "the worker".
+    """
+
+    how: str
+
+
+Answer = Ready | Values | Raised | Lost
+
+
+class Worker:
+    """A prepared work, and what is asked of it.
+
+    Args:
+        load: Returns the work; it is called once.
+        threads: How many threads an evaluation may use.
+    """
+
+    def __init__(self, load: Callable[[], Evaluation], *, threads: int) -> None:
+        self._load = load
+        self._threads = threads
+
+    def prepare(self) -> Ready | Raised:
+        """Load and prepare the work."""
+        try:
+            self._work = self._load()
+            self._work.prepare()
+        except Exception as error:
+            return Raised.of(error)
+        return Ready()
+
+    def evaluate(self, candidates: Floats, seeds: Integers) -> Values | Raised:
+        """Evaluate a chunk: candidates [candidate, parameter] with their seeds [candidate].
+
+        What came by shared memory must not be written to; work gets a copy, and may do with it what it likes.
+        """
+        try:
+            start_s = perf_counter()
+            values = self._work.evaluate(candidates.copy(), seeds.copy(), self._threads)
+            duration_s = perf_counter() - start_s
+            if not isinstance(values, np.ndarray) or values.ndim != 2 or len(values) != len(candidates):
+                given = f"shape {values.shape}" if isinstance(values, np.ndarray) else repr(values)
+                raise ValueError(
+                    f"evaluate() must return an array [candidate, value] for {len(candidates)} candidates, but it was"
+                    f" {given}."
+                )
+            return Values(values.astype(np.float64, casting="safe"), duration_s)
+        except Exception as error:
+            return Raised.of(error)

@@ -1,0 +1,166 @@
+"""What an evolution leaves on the disk: its generations, from which it can go on, and a log for people and programs.
+
+Need: whatever happens to the process, all generations but the current one are safe, and the log can be read.
+Method: each generation is a small file of its own; files appear whole, in one step, after their bytes are on the disk.
+The log is made of all generations, anew each time.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.errors import ParameterError, shown
+from kiks.learn.algorithms import library
+from kiks.model.array_checks import Numbers, read_arrays
+from kiks.model.atomic_files import make_folder, path_of, replace_file
+from kiks.model.data_file import Text, Whole, check, parse_json, read_file, record
+
+Floats = NDArray[np.float64]
+
+IDENTITY, GENERATIONS, LOG = "evolution.json", "generations", "log.parquet"
+"""Names in the folder."""
+
+
+_ADVICE = "Remove the file, and those after it."
+
+
+@record
+class Identity:
+    """By what an evolution is told from others."""
+
+    task: Text
+    algorithm: Text
+    seed: Whole
+    population: Whole
+    controller: Text
+    task_digest: Text
+    kiks: Text
+
+
+@dataclass(frozen=True)
+class Generation:
+    """What a generation was worth.
+
+    Attributes:
+        candidates: All that were evaluated, float64 [candidate, parameter]: the population, then a rival on trial.
+        values: What they were worth, float64 [candidate, value]: fitness, then measures.
+        population: How many of them are the population.
+        champion_fitness: That of the best rival so far; not a number before there was one.
+        seconds: When it was over [s of the wall clock, since the evolution began].
+    """
+
+    candidates: Floats
+    values: Floats
+    population: int
+    champion_fitness: float
+    seconds: float
+
+    @property
+    def fitness(self) -> Floats:
+        """Fitness of the population, float64 [candidate]."""
+        return self.values[: self.population, 0]
+
+
+class Folder:
+    """The folder of an evolution.
+
+    Args:
+        path: Where it is; it is made if it is not there.
+
+    Raises:
+        ParameterError: If it cannot be made.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = path_of(path, "folder")
+        make_folder(self.path / GENERATIONS, "an evolution")
+
+    def check_identity(self, identity: Identity) -> None:
+        """Make the folder that of an evolution.
+
+        Raises:
+            ParameterError: If it is that of another one.
+        """
+        file = self.path / IDENTITY
+        if not file.exists():
+            replace_file(file, json.dumps(asdict(identity), indent=1) + "\n", "an evolution")
+            return
+        what = f"The record of an evolution {str(file)!r}"
+        found = check(Identity, parse_json(read_file(file, what), what), what, advice="Take a new folder.")
+        for name, value in asdict(identity).items():
+            if (known := getattr(found, name)) != value:
+                raise ParameterError(
+                    f"the folder {str(self.path)!r} must hold the same evolution, but its {name} is "
+                    f"{shown(known)}, not {shown(value)}. Take a new folder, or ask for what it holds."
+                )
+
+    def generation(self, number: int, shape: tuple[int, int], value_count: int) -> dict[str, NDArray[Any]] | None:
+        """Return candidates, values and seconds of a generation as they were saved; None if it was not.
+
+        Args:
+            number: Which, from 0.
+            shape: How many candidates it must have, and parameters of each.
+            value_count: How many values a candidate has at most.
+
+        Raises:
+            ParameterError: If its file is broken, or that of another evolution.
+        """
+        file = self._file(number)
+        if not file.exists():
+            return None
+        rules = {
+            "candidates": Numbers(shape, advice=_ADVICE),
+            "values": Numbers((shape[0], "value"), advice=_ADVICE),
+            "seconds": Numbers((), low=0.0, advice=_ADVICE),
+        }
+        most = shape[0] * (shape[1] + value_count) + 1
+        return read_arrays(file, rules, f"Generation {str(file)!r}", numbers_max=most)
+
+    def save(self, number: int, generation: Generation) -> None:
+        """Save a generation.
+
+        Raises:
+            ParameterError: If it cannot be written.
+        """
+        buffer = io.BytesIO()
+        seconds = np.float64(generation.seconds)
+        np.savez(buffer, candidates=generation.candidates, values=generation.values, seconds=seconds)
+        replace_file(self._file(number), buffer.getvalue(), "a generation")
+
+    def save_log(self, generations: Sequence[Generation], value_names: Sequence[str]) -> None:
+        """Write the log of all generations, a row for each candidate of each population.
+
+        Raises:
+            ParameterError: If it cannot be written, or pyarrow is not installed.
+        """
+        pyarrow, parquet = library("pyarrow"), library("pyarrow.parquet")
+        counts = [len(each.fitness) for each in generations]
+
+        def of_each(values: Sequence[float]) -> NDArray[Any]:
+            return np.repeat(np.array(values), counts) if counts else np.zeros(0)
+
+        columns: dict[str, Any] = {
+            "generation": of_each(range(1, len(counts) + 1)).astype(np.int64),
+            "candidate": np.concatenate([np.zeros(0, np.int64), *map(np.arange, counts)]).astype(np.int64),
+        }
+        values = [each.values[: each.population] for each in generations]
+        table = np.concatenate(values) if values else np.zeros((0, len(value_names)))
+        columns |= {name: table[:, number] for number, name in enumerate(value_names[: table.shape[1]])}
+        columns["champion_fitness"] = of_each([each.champion_fitness for each in generations])
+        columns["seconds"] = of_each([each.seconds for each in generations])
+        evaluated = np.cumsum([len(each.values) for each in generations]).tolist()
+        columns["evaluations"] = of_each(evaluated).astype(np.int64)
+        buffer = io.BytesIO()
+        parquet.write_table(pyarrow.table(columns), buffer)
+        replace_file(self.path / LOG, buffer.getvalue(), "the log")
+
+    def _file(self, number: int) -> Path:
+        return self.path / GENERATIONS / f"{number + 1:06}.npz"

@@ -1,0 +1,297 @@
+"""Gymnasium environments: one robot, or thousands of worlds with a robot each; importing this registers them.
+
+    import gymnasium
+    import kiks.learn.gymnasium_envs
+
+    env = gymnasium.make("kiks/Avoid-v0")
+    envs = gymnasium.make_vec("kiks/Avoid-v0", num_envs=1000)
+
+`kiks.learn.env_specs` defines them. All kinds of environment are made of `kiks.learn.episode_batch`: with the same
+seed, a robot alone and one of a thousand have the same episodes, to the bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.batch.initial_state import WORLDS_LIMIT
+from kiks.errors import ParameterError, installing, shown
+from kiks.learn.env_specs import LESSONS, EnvSpec, lesson_of
+from kiks.learn.episode_batch import SEED_LIMIT, Episodes
+from kiks.model.checks import check_count
+
+try:
+    import gymnasium
+    from gymnasium.spaces import Box
+    from gymnasium.utils.seeding import np_random
+    from gymnasium.vector import AutoresetMode
+    from gymnasium.vector.utils import batch_space
+except ModuleNotFoundError as error:
+    raise ModuleNotFoundError(
+        f"environments must have Gymnasium, but it is not installed. {installing('learn')}.", name="gymnasium"
+    ) from error
+
+Floats32 = NDArray[np.float32]
+Bools = NDArray[np.bool_]
+
+STEP_LIMIT = 600
+"""Steps after which a registered environment is truncated: a minute, as each takes 0.1 s."""
+
+
+def spaces_of(lesson: EnvSpec) -> tuple[Any, Any]:
+    """Return what one robot observes and how it may act, two `gymnasium.spaces.Box`."""
+    return Box(0.0, 1.0, (lesson.sensor_count,), np.float32), Box(-1.0, 1.0, (2,), np.float32)
+
+
+class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
+    """One robot.
+
+    Args:
+        lesson: What is to be learnt: a `EnvSpec` or the name of one.
+        render_mode: 'rgb_array' for pictures from above, None for none.
+        **changes: What of the lesson is to be otherwise, such as `arenas` or `timing`; and `robot` and `response` as
+            for `Episodes`.
+
+    Raises:
+        ParameterError: If an argument is out of range.
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012  (as Gymnasium has it)
+
+    def __init__(self, lesson: str | EnvSpec, *, render_mode: str | None = None, **changes: Any) -> None:
+        self.render_mode = checked_mode(render_mode)
+        self.episodes = episodes_of(lesson, 1, changes | {"threads": 1})
+        self.observation_space, self.action_space = spaces_of(self.episodes.lesson)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Floats32, dict[str, Any]]:
+        """Begin an episode; one with the same seed is the same.
+
+        Raises:
+            ParameterError: If the seed is no whole number from 0 to 2^63 - 1.
+        """
+        super().reset(seed=checked_seed(seed))
+        self.episodes.begin([0], [self.np_random])
+        return self.episodes.observations()[0, 0], self._info()
+
+    def step(self, action: Floats32) -> tuple[Floats32, float, bool, bool, dict[str, Any]]:
+        """Set the wheels' speeds, wait for the next loop, and sense.
+
+        Raises:
+            ParameterError: If the action is not two numbers from -1 to 1.
+        """
+        reward = self.episodes.step([action])[0, 0]
+        is_over = bool(self.episodes.are_over()[0])
+        return self.episodes.observations()[0, 0], float(reward), is_over, False, self._info()
+
+    def render(self) -> Any:
+        """Return a picture from above, uint8 [row, column, 3]; None without a render mode."""
+        return None if self.render_mode is None else self.episodes.picture(0)
+
+    def _info(self) -> dict[str, Any]:
+        return {name: float(values[0, 0]) for name, values in self.episodes.facts().items()}
+
+
+class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[Any]]):
+    """Many worlds with one robot each, in one batch.
+
+    Args:
+        num_envs: How many.
+        lesson: What is to be learnt: a `EnvSpec` or the name of one.
+        max_episode_steps: After how many steps an episode is truncated; never if None.
+        autoreset_mode: When a world that has come to an end begins anew: in the next step, whose action it ignores; in
+            the same one, which then returns the first observation of the new episode; or by `reset` alone, with the
+            option 'reset_mask', bool [world].
+        render_mode: 'rgb_array' for pictures from above, None for none.
+        threads: How many threads; as many as the computer has cores if left out. Results do not depend on it.
+        **changes: As for `KheperaEnv`.
+
+    Raises:
+        ParameterError: If an argument is out of range.
+    """
+
+    metadata = {**KheperaEnv.metadata, "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
+
+    def __init__(
+        self,
+        num_envs: int,
+        lesson: str | EnvSpec,
+        *,
+        max_episode_steps: int | None = None,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        render_mode: str | None = None,
+        threads: int | None = None,
+        **changes: Any,
+    ) -> None:
+        self.render_mode = checked_mode(render_mode)
+        self.num_envs = num_envs = check_count("num_envs", num_envs, 1, WORLDS_LIMIT)
+        try:
+            self.autoreset_mode = AutoresetMode(autoreset_mode)
+        except ValueError:
+            modes = [mode.value for mode in AutoresetMode]
+            raise ParameterError(
+                f"autoreset_mode must be one of {modes}, but it was {shown(autoreset_mode)}."
+            ) from None
+        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
+        self.max_episode_steps = checked_limit("max_episode_steps", max_episode_steps)
+        self.episodes = episodes_of(lesson, num_envs, changes | {"threads": threads})
+        self.single_observation_space, self.single_action_space = spaces_of(self.episodes.lesson)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._chances: list[np.random.Generator] = []
+        self._step_counts = np.zeros(num_envs, np.int64)
+        self._are_done = np.zeros(num_envs, np.bool_)
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Floats32, dict[str, Any]]:
+        """Begin episodes: in all worlds, or in those of `options["reset_mask"]`.
+
+        Args:
+            seed: That of the first world, the next ones count up; or one for each. Without, each world goes on with its
+                own random numbers.
+            options: See above.
+
+        Raises:
+            ParameterError: If there are not as many seeds as worlds, or the mask is none.
+        """
+        mask = options.get("reset_mask") if isinstance(options, dict) else None
+        if mask is not None and not (
+            isinstance(mask, np.ndarray) and (mask.shape, mask.dtype) == ((self.num_envs,), bool)
+        ):
+            raise ParameterError(f"reset_mask must be bool [{self.num_envs}], but it was {shown(mask)}.")
+        seeds = self._seeds(seed)
+        chosen = np.arange(self.num_envs)
+        if not self._chances:
+            self._chances = [np_random(None if seeds is None else seeds[k])[0] for k in range(self.num_envs)]
+        elif mask is not None:
+            chosen = np.flatnonzero(mask)
+        if seeds is not None:
+            for k in chosen.tolist():
+                if seeds[k] is not None:
+                    self._chances[k] = np_random(seeds[k])[0]
+        self._begin(chosen)
+        return self.episodes.observations()[:, 0], self._infos()
+
+    def step(self, actions: Floats32) -> tuple[Floats32, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
+        """Let all robots act and sense again; worlds that came to an end begin anew as the autoreset mode says.
+
+        Raises:
+            ParameterError: If the actions are not two numbers from -1 to 1 for each robot, or a world has come to an
+                end that does not begin anew by itself.
+        """
+        if self.autoreset_mode is AutoresetMode.DISABLED and self._are_done.any():
+            raise ParameterError(
+                "worlds that have come to an end must begin anew before the next step, but "
+                f"{np.count_nonzero(self._are_done)} have not. Call reset(options={{'reset_mask': mask}})."
+            )
+        rewards = self.episodes.step(actions)[:, 0]
+        self._step_counts += 1
+        terminations = self.episodes.are_over()
+        truncations = np.zeros(self.num_envs, np.bool_)
+        if self.max_episode_steps is not None:
+            truncations = self._step_counts >= self.max_episode_steps
+        again, self._are_done = self._are_done, terminations | truncations
+        if self.autoreset_mode is AutoresetMode.NEXT_STEP and again.any():
+            rewards[again], terminations[again], truncations[again], self._are_done[again] = 0.0, False, False, False
+            self._begin(np.flatnonzero(again))
+        final: dict[str, Any] = {}
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and self._are_done.any():
+            final = self._final()
+            self._begin(np.flatnonzero(self._are_done))
+        return self.episodes.observations()[:, 0], rewards, terminations, truncations, self._infos() | final
+
+    def render(self) -> tuple[Any, ...] | None:
+        """Return a picture of each world, uint8 [row, column, 3]; None without a render mode."""
+        return None if self.render_mode is None else tuple(map(self.episodes.picture, range(self.num_envs)))
+
+    # ---- inside ----
+
+    def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None] | None:
+        """Return a seed for each world, or None for none at all."""
+        if seed is None:
+            return None
+        given: Any = seed
+        if isinstance(given, list | tuple) or (isinstance(given, np.ndarray) and given.ndim == 1):
+            if len(given) != self.num_envs:
+                raise ParameterError(
+                    f"seed must be one number, or one for each of {self.num_envs} worlds, but there were {len(given)}."
+                )
+            return [checked_seed(each) for each in given]
+        first = check_count("seed", seed, 0, SEED_LIMIT - self.num_envs)
+        return [first + k for k in range(self.num_envs)]
+
+    def _begin(self, chosen: NDArray[np.int64]) -> None:
+        self.episodes.begin(chosen, [self._chances[k] for k in chosen.tolist()])
+        self._step_counts[chosen] = 0
+        self._are_done[chosen] = False
+
+    def _infos(self) -> dict[str, Any]:
+        infos: dict[str, Any] = {}
+        for name, values in self.episodes.facts().items():
+            infos[name], infos[f"_{name}"] = values[:, 0], np.ones(self.num_envs, np.bool_)
+        return infos
+
+    def _final(self) -> dict[str, Any]:
+        """Return what worlds that are done saw last, as Gymnasium hands it on from a step that begins them anew."""
+        done = self._are_done.copy()
+        seen = np.full(self.num_envs, None, object)
+        for k in np.flatnonzero(done).tolist():
+            seen[k] = self.episodes.observations()[k, 0]
+        infos = {name: np.where(done, values, np.zeros_like(values)) for name, values in self._infos().items()}
+        return {"final_obs": seen, "_final_obs": done, "final_info": infos, "_final_info": done.copy()}
+
+
+def episodes_of(lesson: str | EnvSpec, worlds: int, changes: dict[str, Any]) -> Episodes:
+    """Return episodes of a lesson with changes, some of which are of the episodes and the others of the lesson.
+
+    Raises:
+        ParameterError: If an argument is unknown or out of range.
+    """
+    of_episodes = {name: changes[name] for name in ("robot", "robots", "response", "threads") if name in changes}
+    of_lesson = {name: value for name, value in changes.items() if name not in of_episodes}
+    return Episodes(lesson_of(lesson).with_changes(**of_lesson), worlds, **of_episodes)
+
+
+def checked_seed(seed: int | None) -> int | None:
+    """Return a seed, or None for none.
+
+    Raises:
+        ParameterError: If it is neither.
+    """
+    return None if seed is None else check_count("seed", seed, 0, SEED_LIMIT)
+
+
+def checked_limit(name: str, steps: int | None) -> int | None:
+    """Return a number of steps, or None for no limit.
+
+    Raises:
+        ParameterError: If it is neither.
+    """
+    return None if steps is None else check_count(name, steps, 1, SEED_LIMIT)
+
+
+def checked_mode(render_mode: str | None) -> str | None:
+    """Return a render mode.
+
+    Raises:
+        ParameterError: If it is unknown.
+    """
+    if not isinstance(render_mode, str | None) or render_mode not in (None, "rgb_array"):
+        raise ParameterError(f"render_mode must be 'rgb_array' or None, but it was {shown(render_mode)}.")
+    return render_mode
+
+
+for _name in LESSONS:
+    gymnasium.register(
+        f"kiks/{_name}-v0",
+        entry_point="kiks.learn.gymnasium_envs:KheperaEnv",
+        vector_entry_point="kiks.learn.gymnasium_envs:KheperaVectorEnv",
+        max_episode_steps=STEP_LIMIT,
+        kwargs={"lesson": _name},
+    )

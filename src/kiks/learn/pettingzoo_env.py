@@ -1,0 +1,126 @@
+"""A PettingZoo environment: several robots in one world, each an agent of its own."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.errors import ParameterError, installing, shown
+from kiks.learn.env_specs import EnvSpec
+from kiks.learn.episode_batch import SEED_LIMIT
+from kiks.learn.gymnasium_envs import STEP_LIMIT, checked_mode, checked_seed, episodes_of, spaces_of
+from kiks.model.checks import check_count
+
+try:
+    from gymnasium.utils.seeding import np_random
+    from pettingzoo import ParallelEnv
+except ModuleNotFoundError as error:
+    raise ModuleNotFoundError(
+        f"teams must have PettingZoo, but it is not installed. {installing('learn')}.", name="pettingzoo"
+    ) from error
+
+Floats32 = NDArray[np.float32]
+
+
+class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, unused-ignore]
+    """Robots that act at the same time; each is rewarded by what its own measure of the lesson gains.
+
+    An episode is over for all at once.
+
+    Args:
+        lesson: What is to be learnt: a `EnvSpec` or the name of one.
+        robots: How many robots.
+        max_cycles: After how many steps an episode is truncated.
+        render_mode: 'rgb_array' for pictures from above, None for none.
+        **changes: As for `kiks.learn.gymnasium_envs.KheperaEnv`.
+
+    Raises:
+        ParameterError: If an argument is out of range, or there is no room for so many.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"name": "kiks_team_v0", "render_modes": ["rgb_array"], "render_fps": 10}
+
+    def __init__(
+        self,
+        lesson: str | EnvSpec = "Gather",
+        *,
+        robots: int = 3,
+        max_cycles: int = STEP_LIMIT,
+        render_mode: str | None = None,
+        **changes: Any,
+    ) -> None:
+        self.render_mode = checked_mode(render_mode)
+        self.max_cycles = check_count("max_cycles", max_cycles, 1, SEED_LIMIT)
+        self.episodes = episodes_of(lesson, 1, changes | {"threads": 1, "robots": robots})
+        self.possible_agents = [f"robot_{number + 1}" for number in range(robots)]
+        self.agents: list[str] = []
+        spaces = {agent: spaces_of(self.episodes.lesson) for agent in self.possible_agents}
+        self.observation_spaces = {agent: observed for agent, (observed, _) in spaces.items()}
+        self.action_spaces = {agent: done for agent, (_, done) in spaces.items()}
+        self._chance: np.random.Generator | None = None
+        self._step_count = 0
+
+    def observation_space(self, agent: str) -> Any:
+        """Return what a robot observes."""
+        return self.observation_spaces[agent]
+
+    def action_space(self, agent: str) -> Any:
+        """Return how a robot may act."""
+        return self.action_spaces[agent]
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Floats32], dict[str, dict[str, Any]]]:
+        """Begin an episode; one with the same seed is the same.
+
+        Raises:
+            ParameterError: If the seed is no whole number from 0 to 2^63 - 1.
+        """
+        if seed is not None or self._chance is None:
+            self._chance, _ = np_random(checked_seed(seed))
+        self.episodes.begin([0], [self._chance])
+        self.agents = list(self.possible_agents)
+        self._step_count = 0
+        return self._each(self.episodes.observations()[0]), self._infos()
+
+    def step(
+        self, actions: dict[str, Floats32]
+    ) -> tuple[dict[str, Floats32], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
+        """Let all robots act and sense again.
+
+        Raises:
+            ParameterError: If an action is not two numbers from -1 to 1, or there is not one for each robot.
+        """
+        if not self.agents or not isinstance(actions, dict) or set(actions) != set(self.agents):
+            raise ParameterError(
+                f"actions must be given for {', '.join(self.agents) or 'nobody: the episode is over, reset() it'}, "
+                f"but they were for {shown(list(actions) if isinstance(actions, dict) else actions)}."
+            )
+        rewards = self.episodes.step([[actions[agent] for agent in self.agents]])[0]
+        self._step_count += 1
+        is_over, is_late = bool(self.episodes.are_over()[0]), self._step_count >= self.max_cycles
+        told = (
+            self._each(self.episodes.observations()[0]),
+            self._each(rewards.tolist()),
+            dict.fromkeys(self.agents, is_over),
+            dict.fromkeys(self.agents, is_late),
+            self._infos(),
+        )
+        if is_over or is_late:
+            self.agents = []
+        return told
+
+    def render(self) -> Any:
+        """Return a picture from above, uint8 [row, column, 3]; None without a render mode."""
+        return None if self.render_mode is None else self.episodes.picture(0)
+
+    def _each(self, values: Any) -> dict[str, Any]:
+        return dict(zip(self.agents, values, strict=True))
+
+    def _infos(self) -> dict[str, dict[str, Any]]:
+        facts = self.episodes.facts()
+        return {
+            agent: {name: float(values[0, k]) for name, values in facts.items()} for k, agent in enumerate(self.agents)
+        }

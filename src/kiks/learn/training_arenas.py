@@ -1,0 +1,163 @@
+"""Rooms to train in and to be examined in, drawn as strokes: walls are long ones, pillars short and thick ones."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from kiks.model.arena import Arena, Pose
+
+WALL_MM = 10.0
+"""Thickness of walls [mm]."""
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """A wall from one point to another, round at its ends, or a pillar where both are one.
+
+    Args:
+        begin_mm: x and y of its beginning.
+        end_mm: x and y of its end.
+        thickness_mm: Its thickness.
+        brightness: From 1, black, to 255, white.
+    """
+
+    begin_mm: tuple[float, float]
+    end_mm: tuple[float, float]
+    thickness_mm: float = WALL_MM
+    brightness: int = 255
+
+
+def pillar(x_mm: float, y_mm: float, diameter_mm: float, brightness: int = 255) -> Stroke:
+    """Return a pillar."""
+    return Stroke((x_mm, y_mm), (x_mm, y_mm), diameter_mm, brightness)
+
+
+def wall(*places_mm: tuple[float, float], brightness: int = 255) -> list[Stroke]:
+    """Return a wall from place to place."""
+    return [Stroke(begin, end, brightness=brightness) for begin, end in pairwise(places_mm)]
+
+
+def draw(width_mm: int, height_mm: int, strokes: Sequence[Stroke], name: str, brightness: int = 255) -> Arena:
+    """Return a room with a wall of a brightness around it, and strokes in it."""
+    cells = np.zeros((height_mm, width_mm), np.uint8)
+    edge = int(WALL_MM)
+    cells[:edge] = cells[-edge:] = cells[:, :edge] = cells[:, -edge:] = brightness
+    rows, columns = np.indices(cells.shape)
+    x_mm, y_mm = columns + 0.5, height_mm - rows - 0.5
+    for stroke in strokes:
+        (begin_x, begin_y), (end_x, end_y) = stroke.begin_mm, stroke.end_mm
+        along_x, along_y = end_x - begin_x, end_y - begin_y
+        length = along_x**2 + along_y**2
+        share = ((x_mm - begin_x) * along_x + (y_mm - begin_y) * along_y) / (length or 1.0)
+        share = np.clip(share, 0.0, 1.0)
+        away = (x_mm - begin_x - share * along_x) ** 2 + (y_mm - begin_y - share * along_y) ** 2
+        cells[away <= (stroke.thickness_mm / 2) ** 2] = stroke.brightness
+    return Arena.from_array(cells, name=name)
+
+
+def pillars() -> Arena:
+    """Return a room with pillars, thick and thin, bright and not so bright."""
+    return draw(
+        600,
+        600,
+        [
+            pillar(150, 150, 60),
+            pillar(430, 130, 30, 160),
+            pillar(300, 300, 90, 60),
+            pillar(120, 430, 24),
+            pillar(450, 460, 50, 30),
+            pillar(300, 480, 16, 120),
+        ],
+        "pillars",
+    )
+
+
+def corridors() -> Arena:
+    """Return a room of corridors with right-angled corners and a dead end."""
+    walls = [
+        *wall((130, 130), (130, 470), (330, 470)),
+        *wall((130, 130), (470, 130), (470, 600)),
+        *wall((250, 250), (250, 350), brightness=90),
+        *wall((250, 250), (350, 250), (350, 360)),
+    ]
+    return draw(600, 600, walls, "corridors", 200)
+
+
+def wedges() -> Arena:
+    """Return a room whose walls meet at acute and obtuse angles, with walls that end in it."""
+    walls = [
+        *wall((0, 500), (100, 600)),
+        *wall((600, 110), (490, 0), brightness=140),
+        *wall((0, 150), (210, 215)),
+        *wall((490, 380), (360, 330), (395, 490), brightness=70),
+        *wall((250, 0), (300, 110)),
+    ]
+    return draw(600, 600, walls, "wedges")
+
+
+def unseen() -> Arena:
+    """Return a room where nobody trains: slanted walls, pillars, a passage and a dead end."""
+    walls = [
+        *wall((0, 520), (240, 600)),
+        *wall((250, 0), (250, 240), (120, 330)),
+        *wall((380, 150), (640, 150), (700, 260)),
+        *wall((360, 800), (360, 560), (250, 470), brightness=170),
+        *wall((500, 420), (500, 680), (640, 680), brightness=150),
+        pillar(640, 420, 70),
+        pillar(110, 150, 40, 130),
+        pillar(660, 560, 25),
+        pillar(370, 350, 50),
+    ]
+    return draw(800, 800, walls, "unseen", 220)
+
+
+def follow_box() -> Arena:
+    """Return a room with a corner cut off and a block in its middle."""
+    walls = [*wall((0, 440), (160, 600)), pillar(330, 270, 130, 180)]
+    return draw(600, 600, walls, "box with a block")
+
+
+SIDE_MM = 27.5 / 0.015
+"""Side of the maze [mm]."""
+
+GOAL_MM = (0.15 * SIDE_MM, 0.9 * SIDE_MM)
+"""Where the robot is to go."""
+
+_SEGMENTS = (
+    ((0.25, 0.25), (0.25, 0.75)),
+    ((0.14, 0.45), (0.0, 0.65)),
+    ((0.25, 0.75), (0.0, 0.8)),
+    ((0.25, 0.75), (0.66, 0.875)),
+    ((0.355, 0.0), (0.525, 0.185)),
+    ((0.25, 0.5), (0.75, 0.215)),
+    ((1.0, 0.25), (0.435, 0.55)),
+    ((0.0, 0.8), (0.0, 1.0)),
+    ((0.355, 0.0), (1.0, 0.0)),
+)
+"""Walls within, in sides of the maze."""
+
+_START = (0.15, 0.15, math.pi / 2)
+"""x and y, in sides of the maze, and heading [rad]."""
+
+
+def kheperax() -> Arena:
+    """Return the maze, with its start."""
+    side = round(SIDE_MM + 2 * WALL_MM)
+    strokes = [Stroke(_place(*begin), _place(*end)) for begin, end in _SEGMENTS]
+    x_mm, y_mm = _place(*_START[:2])
+    return replace(draw(side, side, strokes, "kheperax"), starts=(Pose(x_mm, y_mm, _START[2]),))
+
+
+def goal_mm() -> tuple[float, float]:
+    """Return x and y of the goal in the arena [mm]."""
+    return GOAL_MM[0] + WALL_MM, GOAL_MM[1] + WALL_MM
+
+
+def _place(x: float, y: float) -> tuple[float, float]:
+    """Return a place in the arena, whose outer wall lies around the maze [mm]."""
+    return x * SIDE_MM + WALL_MM, y * SIDE_MM + WALL_MM

@@ -1,0 +1,163 @@
+"""How time passes while real programs are connected: live, or in lockstep with them.
+
+Live: the world runs at a multiple of real time, whoever is there, and bytes are sent when they come.
+Lockstep (`lockstep.py`): the world waits for each command, and then runs to the end of the reply.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from kiks.clock.pace import Pace
+from kiks.ports.endpoint import Channel
+from kiks.sim.simulation import Simulation
+from kiks.sim.wire import Wire
+from kiks.units import NS_PER_S
+
+IDLE_S = 0.05
+"""Longest sleep [s]: a request to stop is noticed within it."""
+
+COALESCE_S = 0.002
+"""How long the characters of a reply that is under way are collected before they are handed over [s]."""
+
+SLICE_NS = NS_PER_S
+"""Most simulated time that passes before the ports are looked at again [ns]."""
+
+LEFT_BEHIND_NS = 2 * NS_PER_S
+"""How long the commands of a client that has gone still act [ns]. Without an end, a client that is killed in the middle
+of a flood would keep the next one waiting for minutes."""
+
+_log = logging.getLogger("kiks.serve")
+
+
+@dataclass(eq=False)
+class Link:
+    """A robot's line and the client on it.
+
+    Attributes:
+        robot: Number of the robot, from 1.
+        wire: Its line in the simulation.
+        channel: The client; None while there is none.
+        is_leaving: Whether the client has gone, and what it left behind is still being done.
+        is_dropped: Whether the client is to be hung up on.
+        events: What the channel's descriptor is being waited for.
+        refused: Endpoints at which somebody was turned away since the client came.
+    """
+
+    robot: int
+    wire: Wire
+    channel: Channel | None = None
+    is_leaving: bool = False
+    is_dropped: bool = False
+    events: int = 0
+    refused: set[str] = field(default_factory=set)
+
+    def clear(self) -> None:
+        """Forget what a client has left behind; the robot drives on."""
+        self.is_leaving = self.is_dropped = False
+        self.refused.clear()
+        self.wire.hang_up()
+
+
+class TimePolicy(Protocol):
+    """One of the two ways. All of it is called with the simulation's lock held.
+
+    Attributes:
+        forgets: Whether commands of a client that has gone may be dropped. Which were read then is a matter of real
+            time.
+    """
+
+    forgets: bool
+
+    def start(self) -> None:
+        """Begin now."""
+
+    def enter(self, link: Link) -> None:
+        """Let a client take part."""
+
+    def leave(self, link: Link) -> None:
+        """Let the commands that a client has left behind act."""
+
+    def has_left(self, link: Link) -> bool:
+        """Say whether they have, as far as somebody must wait for that."""
+
+    def advance(self, links: Iterable[Link]) -> float:
+        """Let pass the time that is due, hand over what has arrived, and return how long nothing will happen [s]."""
+
+    def receive(self, link: Link, data: bytes) -> None:
+        """Take characters from a client."""
+
+    def is_full(self, link: Link) -> bool:
+        """Say whether the client has to wait until the line has carried what it sent."""
+
+
+class Live:
+    """The world runs at the pace of the wall clock."""
+
+    forgets = True
+
+    def __init__(self, sim: Simulation, pace: Pace) -> None:
+        self._sim = sim
+        self._pace = pace
+
+    def start(self) -> None:
+        """Bind the simulated time of now to the wall clock of now."""
+        self._pace.start(self._sim.now_ns)
+
+    def enter(self, link: Link) -> None:
+        """Do nothing: the world runs anyway."""
+
+    def leave(self, link: Link) -> None:
+        """Let what is on the line act, unless that takes too long."""
+        now_ns = self._sim.now_ns
+        if link.wire.drop_after(now_ns + LEFT_BEHIND_NS, now_ns):
+            _log.warning(
+                "the client of robot %d has gone, but its commands were more than %g s ahead of the robot: the rest of "
+                "them is dropped. Read a line after each command.",
+                link.robot,
+                LEFT_BEHIND_NS / NS_PER_S,
+            )
+
+    def has_left(self, link: Link) -> bool:
+        """Say yes: the next client's commands follow on the line."""
+        return True
+
+    def _catch_up(self) -> bool:
+        """Let time pass up to now, a slice at most; say whether that was all."""
+        sim, due_ns = self._sim, self._pace.now_ns()
+        until_ns = min(due_ns, sim.now_ns + SLICE_NS)
+        sim.advance_to(until_ns)
+        sim.sync()
+        return until_ns == due_ns
+
+    def advance(self, links: Iterable[Link]) -> float:
+        """Run up to the wall clock and deliver the characters that have arrived."""
+        sim, pace = self._sim, self._pace
+        has_caught_up = self._catch_up()
+        pace.report(sim.now_ns)
+        next_ns = sim.next_event_ns()
+        wait_s = IDLE_S if next_ns is None else min(pace.wall_wait_s(next_ns), IDLE_S)
+        for link in links:
+            line = link.wire.line
+            if link.channel is None:
+                continue
+            if line.waiting:
+                link.channel.write(line.take(line.arrived_count(sim.now_ns)))
+                last_ns = line.arrival_ns(len(line.waiting)) if line.waiting else None
+                if last_ns is not None:
+                    wait_s = min(wait_s, COALESCE_S, pace.wall_wait_s(last_ns))
+            if self.is_full(link):
+                wait_s = min(wait_s, pace.wall_wait_s(line.room_ns))
+        return wait_s if has_caught_up else 0.0
+
+    def receive(self, link: Link, data: bytes) -> None:
+        """Send the characters now."""
+        self._catch_up()
+        link.wire.send(data, self._sim.now_ns)
+
+    def is_full(self, link: Link) -> bool:
+        """Say whether as many characters are on the line as a serial driver holds."""
+        return link.wire.line.room_ns > self._sim.now_ns

@@ -1,0 +1,379 @@
+"""A program that keeps its own time, as the scheduler sees it; `remote_link.py` is the other end of its connection."""
+
+from __future__ import annotations
+
+import logging
+import socket
+from abc import abstractmethod
+from collections import deque
+
+from kiks.clock.serial_timing import BACKLOG_LIMIT
+from kiks.errors import KiksError
+from kiks.ports.memory import claim
+from kiks.ports.messages import ASKING, RECEIVE_SIZE, Answer, Kind, Request, take_request, unpack_reads
+from kiks.ports.port_names import PortNames
+from kiks.ports.program_scheduler import Participant, ProgramScheduler
+from kiks.ports.read_completion import NEVER_NS, end_of_read, end_of_wait, is_complete, never_ends
+from kiks.sim.simulation import Simulation
+
+_log = logging.getLogger("kiks.run")
+
+
+class ProgramParticipant(Participant):
+    """A program.
+
+    Args:
+        name: Who it is, for a person.
+        rank: Its number, from 1.
+        robot: Number of the robot that is its own; 0 if it has none until it claims one.
+        sim: The world.
+        scheduler: Decides when it acts.
+        names: Which robot answers on which port name.
+
+    Attributes:
+        is_silenced: Whether the world has parted from it because it was silent.
+        is_stopped: Whether a person has stopped it: then its robots stop, too, when it has gone.
+    """
+
+    def __init__(
+        self, name: str, rank: int, robot: int, sim: Simulation, scheduler: ProgramScheduler, names: PortNames
+    ) -> None:
+        super().__init__(name, rank)
+        self.robot = robot
+        self.is_here = False
+        self.is_silenced = False
+        self.is_stopped = False
+        self._sim = sim
+        self._scheduler = scheduler
+        self._names = names
+        self._requests: deque[Request] = deque()
+        self._read: Request | None = None
+        self._robots: set[int] = set()
+        self._used: set[int] = set()
+        self._ticket = 0
+        self._has_made_room = False
+        self._has_been_warned = False
+
+    @abstractmethod
+    def close(self) -> None:
+        """Close the connection."""
+
+    @abstractmethod
+    def tell(self, answer: Answer) -> None:
+        """Let the program have an answer."""
+
+    # ---- what it says ----
+
+    def leave(self) -> None:
+        """Let what the program has said still be done, then part from it."""
+        self.hear(Request(Kind.END, 0, self.acts_from_ns))
+
+    def part(self) -> None:
+        """Part from it at once: what it has said and is not done yet is forgotten."""
+        if self.has_left:
+            return
+        self._requests.clear()
+        self._read = None
+        self.waits = False
+        self._free_robots()
+        self.has_left = True
+
+    def hear(self, request: Request) -> None:
+        """Take something that the program says."""
+        if self.has_left:
+            return
+        if not self.is_here:
+            self.is_here = True
+            self.is_waited_for = not self.is_silenced
+            self.acts_from_ns = self._sim.now_ns
+        self.patience.renew()
+        if request.kind is Kind.REACHED and not self._requests and not self.waits:
+            self._note_thinking(request)
+            self.acts_from_ns = max(self.acts_from_ns, request.at_ns)
+        else:
+            self._requests.append(request)
+
+    def drop(self) -> None:
+        """Part from the program."""
+        self.is_silenced = True
+        self.is_waited_for = False
+
+    # ---- its turn ----
+
+    def next_ns(self) -> int | None:
+        """Return when the next thing that it has said is done [ns]."""
+        if not self._requests:
+            return None
+        return max(self._requests[0].at_ns, self.acts_from_ns, self._sim.now_ns)
+
+    @property
+    def is_held_up(self) -> bool:
+        """Say whether it waits for an answer: it does whenever it has asked for one."""
+        return self.waits or bool(self._requests and self._requests[-1].kind in ASKING)
+
+    def act(self) -> None:
+        """Do it."""
+        at_ns = self.next_ns()
+        assert at_ns is not None
+        request = self._requests[0]
+        if not self._has_made_room:
+            self._note_thinking(request)
+        self.acts_from_ns = at_ns
+        if request.kind in (Kind.SEND, Kind.SEND_AND_MEET) and not self._has_room(request.robot):
+            return
+        self._requests.popleft()
+        self._ticket = request.ticket
+        self._has_made_room = False
+        try:
+            self._do(request)
+        except KiksError as error:
+            self._answer(at_ns, is_good=False, data=str(error).encode())
+
+    def look(self) -> None:
+        """Answer a read, or a wait for several, if its end is known."""
+        request = self._read
+        if request is None:
+            return
+        if request.kind is Kind.WAIT:
+            self._look_at_all(request)
+            return
+        wire = self._sim.wires[request.robot - 1]
+        deadline_ns = NEVER_NS if request.second < 0 else self.acts_from_ns + request.second
+        end = end_of_read(
+            wire,
+            None if request.first < 0 else request.first,
+            request.data or None,
+            deadline_ns,
+            self.acts_from_ns + request.third,
+        )
+        if end is None:
+            return
+        self._read = None
+        self.waits = False
+        end_ns, count = end
+        if end_ns == NEVER_NS:
+            self._answer(self.acts_from_ns, is_good=False, data=str(never_ends(request.robot)).encode())
+        else:
+            end_ns = max(end_ns, self.acts_from_ns)
+            self._answer(end_ns, robot=request.robot, data=wire.line.take(count))
+
+    def _look_at_all(self, request: Request) -> None:
+        wires, reads = self._sim.wires, unpack_reads(request.data)
+        end_ns, is_known = end_of_wait(wires, reads, NEVER_NS if request.second < 0 else request.second)
+        if not is_known:
+            return
+        self._read = None
+        self.waits = False
+        now_ns = self.acts_from_ns if end_ns == NEVER_NS else max(end_ns, self.acts_from_ns)
+        self._answer(now_ns, data=bytes(is_complete(wires[read.robot - 1], read, now_ns) for read in reads))
+
+    def _has_room(self, robot: int) -> bool:
+        """Say whether the line can take more; if not, try again when it can."""
+        room_ns = self._sim.wires[robot - 1].line.room_ns
+        if room_ns <= self.acts_from_ns or self._has_made_room:
+            return True
+        self.acts_from_ns = room_ns
+        self._has_made_room = True
+        self._warn_of_flood(robot)
+        return False
+
+    def _warn_of_flood(self, robot: int) -> None:
+        """Tell a person that the program sends faster than the line carries."""
+        if not self._has_been_warned:
+            self._has_been_warned = True
+            _log.warning(
+                "%s must wait for its replies, but it is more than %d characters ahead of robot %d; what it sends now "
+                "has to wait. Read a line after each command.",
+                self.name,
+                BACKLOG_LIMIT,
+                robot,
+            )
+
+    def _note_thinking(self, request: Request) -> None:
+        """Let those who watch its robots know how long it has thought."""
+        if request.thought_ns:
+            until_ns = min(self.acts_from_ns + request.thought_ns, request.at_ns)
+            for robot in self._robots:
+                self._sim.wires[robot - 1].think(self.acts_from_ns, until_ns)
+
+    def _do(self, request: Request) -> None:
+        """Do what the program has said, at the instant at which it acts."""
+        at_ns, kind, robot = self.acts_from_ns, request.kind, request.robot
+        if kind is Kind.END:
+            self._end()
+        elif kind is Kind.MEET:
+            self._answer(at_ns)
+        elif kind is Kind.WAIT:
+            self._read = request
+            self.waits = True
+            self.look()
+        elif kind is Kind.FIND:
+            self._answer(at_ns, number=self._names.robot(request.data.decode(), self.robot))
+        elif kind is not Kind.REACHED:
+            self._use(request, robot, at_ns)
+
+    def _use(self, request: Request, robot: int, at_ns: int) -> None:
+        """Do what concerns a robot's line."""
+        wire, kind = self._sim.wires[robot - 1], request.kind
+        line = wire.line
+        if kind is Kind.SEND or kind is Kind.SEND_AND_MEET:
+            wire.send(request.data, at_ns)
+            if kind is Kind.SEND_AND_MEET:
+                self._answer(at_ns, robot=robot)
+        elif kind is Kind.READ:
+            self._read = request
+            self.waits = True
+            self.look()
+        elif kind is Kind.COUNT:
+            self._answer(at_ns, robot=robot, number=line.arrived_count(at_ns))
+        elif kind is Kind.DROP:
+            line.take(line.arrived_count(at_ns))
+        elif kind is Kind.SENT:
+            self._answer(at_ns, robot=robot, number=max(at_ns, line.sending_until_ns))
+        elif kind is Kind.ROOM:
+            if line.room_ns > at_ns:
+                self._warn_of_flood(robot)
+            self._answer(at_ns, robot=robot, number=max(at_ns, line.room_ns))
+        elif kind is Kind.SET_BAUD:
+            wire.set_baud(request.first)
+        elif kind is Kind.BAUD:
+            self._answer(at_ns, robot=robot, number=line.baud)
+        elif kind is Kind.CLAIM:
+            claim(wire, robot, request.data.decode())
+            self._robots.add(robot)
+            self._used.add(robot)
+            self._answer(at_ns, robot=robot)
+        elif kind is Kind.HANG_UP:
+            if request.first:
+                wire.holder = None
+                self._robots.discard(robot)
+            wire.hang_up()
+
+    def _end(self) -> None:
+        """Hang up for the program, which has gone."""
+        self._free_robots()
+        self._scheduler.see(self.acts_from_ns)
+        self.close()
+        self.has_left = True
+
+    def _free_robots(self) -> None:
+        """Let others have its robots; they drive on, unless a person has stopped the program."""
+        wires = self._sim.wires
+        for robot in self._robots:
+            wires[robot - 1].holder = None
+            wires[robot - 1].hang_up()
+        self._robots.clear()
+        if self.is_stopped:
+            for robot in {self.robot, *self._used}:
+                if wires[robot - 1].holder is None:
+                    wires[robot - 1].halt(self._sim.now_ns)
+
+    def _answer(self, now_ns: int, *, robot: int = 0, number: int = 0, is_good: bool = True, data: bytes = b"") -> None:
+        """Let the program go on."""
+        ahead_count = 0
+        if robot:
+            line = self._sim.wires[robot - 1].line
+            ahead_count = max(-((now_ns - line.sending_until_ns) // line.character_ns), 0)
+        self.acts_from_ns = now_ns
+        self.tell(Answer(self._ticket, is_good, now_ns, number, ahead_count, data))
+
+
+class RemoteParticipant(ProgramParticipant):
+    """A program in a process of its own.
+
+    Args:
+        here: The socket at whose other end it is.
+        name: Who it is, for a person.
+        rank: Its number, from 1.
+        robot: Number of the robot that is its own.
+        sim: The world.
+        scheduler: Decides when it acts.
+        names: Which robot answers on which port name.
+
+    Attributes:
+        has_hung_up: Whether nothing more is to be heard from it.
+    """
+
+    def __init__(
+        self,
+        here: socket.socket,
+        name: str,
+        rank: int,
+        robot: int,
+        sim: Simulation,
+        scheduler: ProgramScheduler,
+        names: PortNames,
+    ) -> None:
+        super().__init__(name, rank, robot, sim, scheduler, names)
+        self.has_hung_up = False
+        self._here = here
+        self._here.setblocking(False)
+        self._received = bytearray()
+        self._unsent = bytearray()
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._here.close()
+
+    def fileno(self) -> int:
+        """Return the socket, to wait on."""
+        return self._here.fileno()
+
+    def receive(self) -> bool:
+        """Take what the program says; return False when it has hung up."""
+        try:
+            received = self._here.recv(RECEIVE_SIZE)
+        except BlockingIOError:
+            return True
+        except OSError:
+            received = b""
+        if not received:
+            self.leave()
+            return False
+        self._received += received
+        while (request := take_request(self._received)) is not None:
+            self.hear(request)
+        return True
+
+    def tell(self, answer: Answer) -> None:
+        """Send an answer; what the program does not take waits."""
+        self._unsent += answer.pack()
+        self.flush()
+
+    @property
+    def has_unsent(self) -> bool:
+        """Say whether an answer waits until the program takes it; `flush` when the socket is writable."""
+        return bool(self._unsent)
+
+    def flush(self) -> None:
+        """Send what waits, as far as the program takes it."""
+        try:
+            del self._unsent[: self._here.send(self._unsent)]
+        except BlockingIOError:
+            pass
+        except OSError:
+            self._unsent.clear()
+
+
+class LocalParticipant(ProgramParticipant):
+    """A program that speaks through a thread of this process; its end is `near.NearConnection`.
+
+    Attributes:
+        answer: What it was answered last; None until the answer is there.
+        is_closed: Whether the world has ended.
+    """
+
+    def __init__(
+        self, name: str, rank: int, robot: int, sim: Simulation, scheduler: ProgramScheduler, names: PortNames
+    ) -> None:
+        super().__init__(name, rank, robot, sim, scheduler, names)
+        self.answer: Answer | None = None
+        self.is_closed = False
+
+    def close(self) -> None:
+        """Let it know that the world has ended, or that it has left."""
+        self.is_closed = True
+
+    def tell(self, answer: Answer) -> None:
+        """Lay the answer down."""
+        self.answer = answer

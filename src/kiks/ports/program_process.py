@@ -1,0 +1,400 @@
+"""A program's process: how it is started, what it prints, and how it ends."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import selectors
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO, NamedTuple, Protocol
+
+from kiks.errors import KiksError, ParameterError
+from kiks.model.atomic_files import program_in
+from kiks.model.project import Project
+from kiks.sim.ring_buffer import RingBuffer
+
+LATE, PUNCTUAL = "late", "punctual"
+"""When a program was started: after the world had begun, or before."""
+
+OUTPUT_LIMIT = 1000
+"""Lines of a program's output that are kept."""
+
+LINE_LIMIT = 2000
+"""Longest line of it [bytes]; a longer one is cut."""
+
+ENDING_S = 10.0
+"""How long the end of a process that was killed is waited for [s of real time]."""
+
+LAST_WORDS_S = 1.0
+"""How long the last output of a process that has ended is waited for [s of real time]: others may hold its pipes."""
+
+QUESTION_S = 0.2
+"""After what silence the beginning of a line is shown on a terminal [s of real time]: it may be a question."""
+
+_PIECE = 1 << 16
+_STREAMS = {False: 1, True: 2}
+_COLOURS = (36, 33, 35, 32, 34, 31)
+
+
+@dataclass(frozen=True)
+class Command:
+    """A program and what it finds in `sys.argv` after its name."""
+
+    program: Path
+    arguments: list[str] = field(default_factory=list)
+
+    def check_file(self) -> None:
+        """Check that the program is there.
+
+        Raises:
+            ParameterError: If it is not.
+        """
+        if not self.program.is_file():
+            raise ParameterError(
+                f"a program must be a Python file, but there is none at {str(self.program)!r}. Save it first."
+            )
+
+
+def commands_of(project: Project, folder: Path) -> list[Command | None]:
+    """Return the program of each robot of a project in a folder; None for a robot that has none.
+
+    Raises:
+        ParameterError: If one lies elsewhere, or is no program.
+    """
+    return [
+        None if robot.program is None else Command(program_in(folder, robot.program), list(robot.arguments))
+        for robot in project.robots
+    ]
+
+
+class OutputLine(NamedTuple):
+    """A line that a program has printed, and whether it was one of its errors."""
+
+    text: str
+    is_error: bool
+
+
+class Process:
+    """A program that runs by itself, at the other end of a socket.
+
+    A thread of its own starts it and waits for its end: Linux ends a child with the thread that started it
+    (`child_main.py`), so it must be one that lives as long.
+
+    Args:
+        words: What `kiks.script.child_main` is told before the program.
+        command: The program.
+        there: Its end of the socket.
+        is_heard: Whether its output is kept. Such a program has nobody at its keyboard, and a group of its own: what
+            it starts ends with it. Otherwise it has the terminal.
+        voice: What writes its output on the terminal, if it is not kept; it does so itself if None.
+        ended: Called when it has ended, by that thread.
+
+    Attributes:
+        output: What it has printed; None if it is not heard.
+
+    Raises:
+        KiksError: If the computer does not let it start.
+    """
+
+    def __init__(
+        self,
+        words: Sequence[str],
+        command: Command,
+        there: socket.socket,
+        *,
+        is_heard: bool,
+        voice: Voice | None = None,
+        ended: Callable[[], None],
+    ) -> None:
+        self.output: RingBuffer[OutputLine] | None = RingBuffer(OUTPUT_LIMIT) if is_heard else None
+        self._voice = _Keeper(self.output) if self.output is not None else voice
+        self._ended = ended
+        self._popen: subprocess.Popen[bytes] | None = None
+        self._is_over = threading.Event()
+        has_started = threading.Event()
+        failures: list[OSError] = []
+        # -P: the folder in which KiKS was started is none of the program's.
+        line = [sys.executable, "-P", "-m", "kiks.script.child_main", str(there.fileno()), *words]
+        line += [str(command.program), *command.arguments]
+
+        def attend() -> None:
+            try:
+                self._popen = self._start(line, there)
+            except OSError as error:
+                failures.append(error)
+                self._is_over.set()
+                return
+            finally:
+                has_started.set()
+            self._attend(self._popen)
+
+        threading.Thread(target=attend, name=f"kiks: {command.program.name}", daemon=True).start()
+        has_started.wait()
+        if failures:
+            raise KiksError(
+                f"a program must be able to start, but {command.program} was not: {failures[0]}. End other programs."
+            )
+
+    @property
+    def code(self) -> int | None:
+        """How it has ended: its exit code, or minus the number of the signal that ended it; None while it runs."""
+        return self._popen.returncode if self._popen is not None and self._is_over.is_set() else None
+
+    def interrupt(self) -> None:
+        """Do what Ctrl-C does."""
+        self._signal(signal.SIGINT)
+
+    def kill(self) -> None:
+        """End it at once."""
+        self._signal(signal.SIGKILL)
+
+    def wait(self) -> None:
+        """Wait until it has ended and has been heard to its last word; no longer than a killed one takes for that."""
+        self._is_over.wait(ENDING_S)
+
+    # ---- inside ----
+
+    def _start(self, line: list[str], there: socket.socket) -> subprocess.Popen[bytes]:
+        if self._voice is None:
+            return subprocess.Popen(line, pass_fds=[there.fileno()])
+        # What it prints comes at once, and not when some thousand characters have gathered.
+        environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
+        is_kept = self.output is not None
+        if is_kept:
+            environment["PYTHONIOENCODING"] = "utf-8:backslashreplace"
+        return subprocess.Popen(
+            line,
+            pass_fds=[there.fileno()],
+            stdin=subprocess.DEVNULL if is_kept else None,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            env=environment,
+            start_new_session=is_kept,
+        )
+
+    def _attend(self, popen: subprocess.Popen[bytes]) -> None:
+        if self._voice is None:
+            popen.wait()
+        else:
+            assert popen.stdout is not None
+            assert popen.stderr is not None
+            pipes = {popen.stdout: False, popen.stderr: True}
+            listener = threading.Thread(target=_listen, args=(pipes, self._voice), daemon=True)
+            listener.start()
+            popen.wait()
+            if self.output is not None:
+                with contextlib.suppress(ProcessLookupError, PermissionError):
+                    os.killpg(popen.pid, signal.SIGKILL)
+            listener.join(LAST_WORDS_S)
+        self._is_over.set()
+        self._ended()
+
+    def _signal(self, number: int) -> None:
+        popen = self._popen
+        if popen is None or popen.poll() is not None:
+            return
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            if self.output is None:
+                popen.send_signal(number)
+            else:
+                os.killpg(popen.pid, number)
+
+
+class Voice(Protocol):
+    """Who takes what a program prints, line by line.
+
+    Attributes:
+        longest: Longest line [bytes]; of one that becomes longer what there is of it is taken.
+        pause_s: After what silence `ask` is called [s of real time]; None for never.
+    """
+
+    longest: int
+    pause_s: float | None
+
+    def take(self, lines: list[bytes], is_error: bool) -> None:
+        """Take lines.
+
+        Raises:
+            OSError: If nobody reads them any more.
+        """
+
+    def ask(self, begun: bytes, is_error: bool) -> bool:
+        """Take the beginning of a line after which nothing came, as after a question; say whether it was taken."""
+
+
+class _Keeper:
+    """Keeps the newest lines, as a `Voice`; it never waits for anybody who reads them."""
+
+    longest = LINE_LIMIT
+    pause_s: float | None = None
+
+    def __init__(self, output: RingBuffer[OutputLine]) -> None:
+        self._output = output
+
+    def take(self, lines: list[bytes], is_error: bool) -> None:
+        skipped = max(len(lines) - OUTPUT_LIMIT, 0)
+        self._output.add([_line(each, is_error) for each in lines[skipped:]], skipped=skipped)
+
+    def ask(self, begun: bytes, is_error: bool) -> bool:
+        return False
+
+
+class Labels:
+    """Lets several programs print where this process prints, line by line, each with its program before it.
+
+    Labels are coloured on a terminal, unless NO_COLOR is set. There the beginning of a line, such as a question, is
+    shown after a moment; elsewhere a line comes when it is whole.
+
+    Args:
+        names: What the programs are called, the first one first; their labels are of one width.
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self._lock = threading.Lock()
+        self._is_begun = False
+        self._width = max(len(_label(number, name)) for number, name in enumerate(names, 1))
+        self.are_terminals = {is_error: os.isatty(stream) for is_error, stream in _STREAMS.items()}
+
+    def voice(self, number: int, name: str) -> Voice:
+        """Return who writes what a program prints."""
+        return _Labelled(self, number, _label(number, name).ljust(self._width))
+
+    def say(self, text: str) -> None:
+        """Write a line of KiKS among them."""
+        with contextlib.suppress(OSError):
+            self.write(f"kiks: {text}\n".encode(errors="replace"), is_error=True)
+
+    def write(self, data: bytes, *, is_error: bool, is_begun: bool = False) -> None:
+        """Write lines, or the beginning of one.
+
+        Raises:
+            OSError: If nobody reads them any more.
+        """
+        with self._lock:
+            data = b"\n" * self._is_begun + data
+            self._is_begun = is_begun
+            stream = _STREAMS[is_error]
+            while data:
+                try:
+                    data = data[os.write(stream, data) :]
+                except BlockingIOError:
+                    select.select([], [stream], [])
+
+
+class _Labelled:
+    """Writes what one program prints, as a `Voice`."""
+
+    longest = 1 << 16
+
+    def __init__(self, labels: Labels, number: int, label: str) -> None:
+        self._labels = labels
+        self.pause_s = QUESTION_S if any(labels.are_terminals.values()) else None
+        plain, colour = label.encode(errors="replace"), _COLOURS[(number - 1) % len(_COLOURS)]
+        has_colours = not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+        self._heads = {
+            is_error: (b"\033[%dm%b |\033[0m " % (colour, plain)) if has_colours and is_terminal else plain + b" | "
+            for is_error, is_terminal in labels.are_terminals.items()
+        }
+
+    def take(self, lines: list[bytes], is_error: bool) -> None:
+        head = self._heads[is_error]
+        self._labels.write(b"".join(head + line + b"\n" for line in lines), is_error=is_error)
+
+    def ask(self, begun: bytes, is_error: bool) -> bool:
+        if self._labels.are_terminals[is_error]:
+            self._labels.write(self._heads[is_error] + begun, is_error=is_error, is_begun=True)
+        return self._labels.are_terminals[is_error]
+
+
+def _label(number: int, name: str) -> str:
+    return f"{number} {name}"
+
+
+def _listen(pipes: dict[IO[bytes], bool], voice: Voice) -> None:
+    """Take what a process prints until it has said everything."""
+    with selectors.DefaultSelector() as selector:
+        rests = {}
+        for pipe, is_error in pipes.items():
+            selector.register(pipe, selectors.EVENT_READ, is_error)
+            rests[is_error] = b""
+        while selector.get_map():
+            ready = selector.select(voice.pause_s if any(rests.values()) else None)
+            if not ready:
+                taken = [is_error for is_error, rest in rests.items() if rest and voice.ask(rest, is_error)]
+                rests |= dict.fromkeys(taken, b"")
+            for key, _ in ready:
+                is_error = key.data
+                piece = os.read(key.fd, _PIECE)
+                *lines, rest = (rests[is_error] + piece).split(b"\n")
+                if not piece or len(rest) > voice.longest:
+                    lines += [rest] if rest else []
+                    rest = b""
+                rests[is_error] = rest
+                try:
+                    voice.take(lines, is_error)
+                except OSError:
+                    # Nobody reads it any more, which the program is to learn as if it wrote there itself.
+                    piece = b""
+                if not piece:
+                    selector.unregister(key.fileobj)
+                    key.fileobj.close()  # type: ignore[union-attr]
+
+
+def _line(line: bytes, is_error: bool) -> OutputLine:
+    return OutputLine(line[:LINE_LIMIT].decode(errors="replace").rstrip("\r"), is_error)
+
+
+class Permission:
+    """What programs may start.
+
+    The person at the terminal may start anything. What a browser or a file names must be a Python program in one of
+    some folders, and starts only where that was allowed.
+
+    Args:
+        granted: What the person at the terminal has named.
+        folders: Where other programs may lie, there or below.
+        may_start_others: Whether they may start at all.
+    """
+
+    def __init__(
+        self, granted: Iterable[Command | None] = (), *, folders: Sequence[Path] = (), may_start_others: bool = False
+    ) -> None:
+        self._granted = [command for command in granted if command is not None]
+        self._folders = [folder.resolve() for folder in folders]
+        self.may_start_others = may_start_others
+
+    def check(self, command: Command) -> None:
+        """Check that a program may start.
+
+        Raises:
+            ParameterError: If it may not.
+        """
+        if command in self._granted:
+            return
+        name = command.program.name[:80]
+        if not self.may_start_others:
+            raise ParameterError(
+                f"{name!r} must be started at the terminal of this desk, but a page or a file asked for it. kiks desk "
+                "--run-programs allows that: then everybody who sees the page can run anything on that computer."
+            )
+        path = command.program.resolve()
+        for folder in self._folders:
+            if path.is_relative_to(folder):
+                program_in(folder, path.relative_to(folder).as_posix())
+                return
+        raise ParameterError(f"{name!r} must lie in the desk's folder, but it is elsewhere. Copy it there.")
+
+
+class Anything(Permission):
+    """The permission of a person at a terminal, and of a program that uses KiKS."""
+
+    def check(self, command: Command) -> None:
+        """Let it start."""

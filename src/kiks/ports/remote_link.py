@@ -1,0 +1,241 @@
+"""The line to a robot whose world others share: a program's end of what `participant.py` is the other end of.
+
+The program keeps its own time: thinking, sleeping and asking cost it nothing but that. Only what needs the world goes
+there and back.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+import sys
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from typing import Any
+
+from kiks.clock.serial_timing import BACKLOG_LIMIT
+from kiks.errors import LinkError
+from kiks.ports.messages import RECEIVE_SIZE, WINDOW, Answer, Kind, Request, pack_reads, take_answer
+from kiks.ports.read_completion import NEVER_NS, Read
+from kiks.units import TICK_NS
+
+TELL_NS = TICK_NS
+"""How far a program's time runs on before it says so to those who wait for it [ns]."""
+
+
+class Connection(ABC):
+    """The way to the world, and the program's time.
+
+    Args:
+        is_late: Whether the world may have begun already: then the program's time begins when it first needs it.
+    """
+
+    def __init__(self, *, is_late: bool = False) -> None:
+        self.lock = threading.RLock()
+        self._now_ns = 0
+        self._is_to_meet = is_late
+        self._told_ns = 0
+        self._thought_ns = 0
+        self._unanswered_count = 0
+        self._ticket = 0
+
+    @abstractmethod
+    def _say(self, request: Request) -> None:
+        """Let the world know something."""
+
+    @abstractmethod
+    def _wait(self, ticket: int) -> Answer:
+        """Return the answer with a ticket, when it is there."""
+
+    @property
+    def now_ns(self) -> int:
+        """The program's time [ns]."""
+        if self._is_to_meet:
+            self.ask(Kind.MEET)
+        return self._now_ns
+
+    def pass_to(self, time_ns: int) -> None:
+        """Let time pass up to a time [ns]."""
+        self._now_ns = max(self.now_ns, time_ns)
+        if self._now_ns - self._told_ns >= TELL_NS:
+            self.tell(Kind.REACHED)
+
+    def think(self, time_ns: int) -> None:
+        """Let the time pass that the program has thought [ns]."""
+        now_ns = self.now_ns
+        self._thought_ns += time_ns
+        self.pass_to(now_ns + time_ns)
+
+    def tell(self, kind: Kind, robot: int = 0, *, first: int = 0, data: bytes = b"") -> None:
+        """Say something and go on."""
+        self._send(Request(kind, robot, self._now_ns, 0, first, 0, 0, self._thought_ns, data))
+        self._unanswered_count += 1
+        if self._unanswered_count >= WINDOW:
+            self.ask(Kind.MEET)
+
+    def ask(
+        self, kind: Kind, robot: int = 0, *, first: int = 0, second: int = 0, third: int = 0, data: bytes = b""
+    ) -> Answer:
+        """Say something and wait for the answer.
+
+        Raises:
+            LinkError: If the answer is an error.
+        """
+        # The answer to a question that Ctrl-C has interrupted is still to come: it has another ticket.
+        self._ticket = (self._ticket + 1) % (1 << 32)
+        self._send(Request(kind, robot, self._now_ns, self._ticket, first, second, third, self._thought_ns, data))
+        answer = self._wait(self._ticket)
+        self._unanswered_count = 0
+        self._now_ns = self._told_ns = answer.now_ns
+        self._is_to_meet = False
+        if not answer.is_good:
+            raise LinkError(answer.data.decode())
+        return answer
+
+    def _send(self, request: Request) -> None:
+        self._told_ns = self._now_ns
+        self._thought_ns = 0
+        self._say(request)
+
+
+class SocketConnection(Connection):
+    """The way to a world in another process.
+
+    Args:
+        there: The socket at whose other end it is.
+        is_late: Whether the world may have begun already.
+    """
+
+    def __init__(self, there: socket.socket, *, is_late: bool = False) -> None:
+        super().__init__(is_late=is_late)
+        self._there = there
+        self._received = bytearray()
+
+    def _say(self, request: Request) -> None:
+        try:
+            self._there.sendall(request.pack())
+        except OSError:
+            # Python ends a program by clearing all it holds in any order: a port may be closed after this socket.
+            if not sys.is_finalizing():
+                _end()
+
+    def _wait(self, ticket: int) -> Answer:
+        while (answer := take_answer(self._received)) is None or answer.ticket != ticket:
+            if answer is None:
+                self._receive()
+        return answer
+
+    def _receive(self) -> None:
+        try:
+            received = self._there.recv(RECEIVE_SIZE)
+        except OSError:
+            received = b""
+        if not received:
+            _end()
+        self._received += received
+
+
+class FarLine:
+    """A robot's line in a world that others share; see `Line`."""
+
+    def __init__(self, connection: Connection, robot: int) -> None:
+        self.lock: AbstractContextManager[Any] = connection.lock
+        self._connection = connection
+        self._robot = robot
+        self._is_claimed = False
+        # At least as many characters as are on the way to the robot.
+        self._ahead_count = 0
+
+    @property
+    def now_ns(self) -> int:
+        """The program's time [ns]."""
+        return self._connection.now_ns
+
+    def pass_to(self, time_ns: int) -> None:
+        """Let time pass up to a time [ns]."""
+        self._connection.pass_to(time_ns)
+
+    def think(self, time_ns: int) -> None:
+        """Let the time pass that the program has thought [ns]."""
+        self._connection.think(time_ns)
+
+    def send(self, data: bytes) -> None:
+        """Put characters on the line; wait while it is full."""
+        while data:
+            piece, data = data[:BACKLOG_LIMIT], data[BACKLOG_LIMIT:]
+            if self._ahead_count <= BACKLOG_LIMIT:
+                self._connection.tell(Kind.SEND, self._robot, data=piece)
+                self._ahead_count += len(piece)
+            else:
+                self._ask(Kind.SEND_AND_MEET, data=piece)
+
+    def read(self, size: int | None, terminator: bytes | None, timeout_ns: int | None, poll_ns: int) -> bytes:
+        """Wait for `size` characters or a terminator; see `Line.read`.
+
+        Raises:
+            LinkError: If it could wait for ever.
+        """
+        return self._ask(
+            Kind.READ,
+            first=-1 if size is None else size,
+            second=-1 if timeout_ns is None else timeout_ns,
+            third=poll_ns,
+            data=terminator or b"",
+        ).data
+
+    def arrived_count(self) -> int:
+        """Return how many characters have arrived and were not read."""
+        return self._ask(Kind.COUNT).number
+
+    def sent_ns(self) -> int:
+        """Return when everything will have been sent [ns]."""
+        return self._ask(Kind.SENT).number
+
+    def room_ns(self) -> int:
+        """Return when the line takes more characters [ns]."""
+        return self.now_ns if self._ahead_count <= BACKLOG_LIMIT else self._ask(Kind.ROOM).number
+
+    def wait_for(self, reads: Sequence[Read], until_ns: int) -> list[bool]:
+        """Let time pass until one of several reads is complete; see `Line.wait_for`."""
+        second = -1 if until_ns >= NEVER_NS else until_ns
+        return [bool(flag) for flag in self._connection.ask(Kind.WAIT, second=second, data=pack_reads(reads)).data]
+
+    def drop_arrived(self) -> None:
+        """Forget the characters that have arrived and were not read."""
+        self._connection.tell(Kind.DROP, self._robot)
+
+    @property
+    def baud(self) -> int:
+        """Speed of the line [bit/s]."""
+        return self._ask(Kind.BAUD).number
+
+    def set_baud(self, baud: int) -> None:
+        """Set both ends to a speed [bit/s]."""
+        self._connection.tell(Kind.SET_BAUD, self._robot, first=baud)
+
+    def claim(self, holder: str) -> None:
+        """Take the line for one alone.
+
+        Raises:
+            LinkError: If somebody holds it already.
+        """
+        self._ask(Kind.CLAIM, data=holder.encode())
+        self._is_claimed = True
+
+    def hang_up(self) -> None:
+        """Give the line back and forget what nobody read."""
+        self._connection.tell(Kind.HANG_UP, self._robot, first=self._is_claimed)
+        self._is_claimed = False
+
+    def _ask(self, kind: Kind, *, first: int = 0, second: int = 0, third: int = 0, data: bytes = b"") -> Answer:
+        answer = self._connection.ask(kind, self._robot, first=first, second=second, third=third, data=data)
+        self._ahead_count = answer.ahead_count
+        return answer
+
+
+def _end() -> None:
+    """End at once: the world has gone, and nothing that the program could still do has a meaning."""
+    sys.stdout.flush()
+    os._exit(1)

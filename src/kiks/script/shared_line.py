@@ -1,0 +1,113 @@
+"""A robot's line as the threads of a program use it: one that waits there lets the others go on."""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager
+from typing import Any
+
+from kiks.clock.serial_timing import BACKLOG_LIMIT
+from kiks.errors import LinkError
+from kiks.ports.port import Line
+from kiks.ports.read_completion import NEVER_NS, Read
+from kiks.script.thread_scheduler import ALONE, COMPLETE, SIGNALLED, Scheduler, Task
+
+
+class SharedLine:
+    """A line that several threads may use; see `Line`.
+
+    Args:
+        line: The line.
+        robot: Number of the robot, from 1.
+        scheduler: The program's threads.
+    """
+
+    def __init__(self, line: Line, robot: int, scheduler: Scheduler) -> None:
+        self.lock: AbstractContextManager[Any] = line.lock
+        self.robot = robot
+        self._line = line
+        self._scheduler = scheduler
+        self._readers: list[Task] = []
+        self._what = f"robot {robot}"
+        # What passes through as it is.
+        self.think = line.think
+        self.arrived_count = line.arrived_count
+        self.sent_ns = line.sent_ns
+        self.room_ns = line.room_ns
+        self.drop_arrived = line.drop_arrived
+        self.set_baud = line.set_baud
+        self.claim = line.claim
+        self.wait_for = line.wait_for
+
+    @property
+    def now_ns(self) -> int:
+        """The program's time [ns]."""
+        return self._line.now_ns
+
+    @property
+    def baud(self) -> int:
+        """Speed of the line [bit/s]."""
+        return self._line.baud
+
+    def pass_to(self, time_ns: int) -> None:
+        """Let time pass up to a time [ns]; other threads go on meanwhile."""
+        self._scheduler.sleep_until(time_ns)
+
+    def send(self, data: bytes) -> None:
+        """Put characters on the line; wait while it is full."""
+        while data:
+            while (room_ns := self._line.room_ns()) > self._line.now_ns:
+                self._scheduler.sleep_until(room_ns)
+            self._line.send(data[:BACKLOG_LIMIT])
+            data = data[BACKLOG_LIMIT:]
+
+    def read(self, size: int | None, terminator: bytes | None, timeout_ns: int | None, poll_ns: int) -> bytes:
+        """Wait for `size` characters or a terminator; see `Line.read`.
+
+        Raises:
+            LinkError: If it could wait for ever.
+        """
+        line, scheduler = self._line, self._scheduler
+        if scheduler.is_alone:
+            return line.read(size, terminator, timeout_ns, poll_ns)
+        if timeout_ns == 0:
+            data = line.read(size, terminator, 0, 0)
+            if poll_ns and not data:
+                scheduler.sleep_until(line.now_ns + poll_ns)
+            return data
+        if line.arrived_count() and line.wait_for([Read(self.robot, size, terminator)], line.now_ns)[0]:
+            return line.read(size, terminator, 0, 0)
+        return self._wait(size, terminator, NEVER_NS if timeout_ns is None else line.now_ns + timeout_ns)
+
+    def _wait(self, size: int | None, terminator: bytes | None, deadline_ns: int) -> bytes:
+        """Let other threads go on until a read is complete, or up to a time [ns]; return what it has read."""
+        line, scheduler, task = self._line, self._scheduler, self._scheduler.current
+        self._readers.append(task)
+        try:
+            data = b""
+            while True:
+                read = Read(self.robot, None if size is None else size - len(data), terminator)
+                cause = scheduler.wait(self._what, until_ns=deadline_ns, reads=(read,), may_go_alone=True)
+                if cause is ALONE:
+                    left_ns = None if deadline_ns == NEVER_NS else max(deadline_ns - line.now_ns, 0)
+                    try:
+                        return data + line.read(*read[1:], left_ns, 0)
+                    except LinkError:
+                        scheduler.end_stuck()
+                if cause is SIGNALLED:
+                    continue
+                data += line.read(*read[1:], 0, 0)
+                # Another thread may have taken characters first: then the wait goes on.
+                if cause is not COMPLETE or len(data) == size or (terminator is not None and data.endswith(terminator)):
+                    return data
+        finally:
+            self._readers.remove(task)
+
+    def cancel_read(self) -> None:
+        """Let the threads go on that wait for characters; they get what has arrived."""
+        for task in self._readers:
+            self._scheduler.wake(task, self)
+
+    def hang_up(self) -> None:
+        """Give the line back and forget what nobody read."""
+        self.cancel_read()
+        self._line.hang_up()

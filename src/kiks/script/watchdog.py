@@ -1,0 +1,173 @@
+"""A look from outside at the thread of the operating system that runs a program: is it stuck, or waits in real time?
+
+Code in C may wait by itself, and a loop may ask for nothing at all. Neither gives way to other threads, and simulated
+time stands still meanwhile. A thread of ours looks a few times a second, and ends the program with one line that names
+where it is. It never changes what a run does that ends well.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+# Bound here once: a program lives with a `_thread` that is simulated.
+from _thread import start_new_thread
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import FrameType
+
+from kiks.script.thread_scheduler import Scheduler
+from kiks.script.unsupported import ADVICE, where
+
+SAMPLE_S = 0.05
+"""How often the thread is looked at [s of real time]."""
+
+WAITING_SAMPLES = 5
+"""In how many looks it may wait by itself."""
+
+LOCKED_S = 10.0
+"""How long it may wait for a lock of a library [s of real time]: one that computes on all processors does so, too."""
+
+SPINNING_S = 30.0
+"""How long a thread may compute while others wait for a time or a robot [s of processor time]."""
+
+WARNING_SHARE = 0.2
+"""Share of that after which a person is told."""
+
+GRACE_S = 5.0
+"""How long code in C may go on before the process is ended from outside [s of real time]."""
+
+_MAY_WAIT = ("<", str(Path(__file__).parent.parent), subprocess.__file__)
+"""Whose code may wait in real time: imports, KiKS, and what waits for other programs."""
+
+_SIGNAL = signal.SIGRTMAX - 1
+
+
+@contextmanager
+def watched(scheduler: Scheduler) -> Iterator[None]:
+    """End the program if it waits by itself or asks for nothing; on Linux, and in the main thread of a process."""
+    if sys.platform != "linux" or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    watch = _Watch(scheduler)
+    before = signal.signal(_SIGNAL, watch.end)
+    watch.start()
+    try:
+        yield
+    finally:
+        watch.stop()
+        signal.signal(_SIGNAL, before)
+
+
+class _Watch:
+    """The thread that looks.
+
+    Args:
+        scheduler: The threads of the program.
+    """
+
+    def __init__(self, scheduler: Scheduler) -> None:
+        self._scheduler = scheduler
+        self._message = ""
+        self._watched = threading.get_ident()
+        self._folder = Path(f"/proc/self/task/{threading.get_native_id()}")
+        self._is_over = threading.Event()
+        self._has_ended = threading.Event()
+        # Bound here once: the program lives with clocks that are simulated.
+        self._cpu_s, self._now_s = time.process_time, time.monotonic
+
+    def start(self) -> None:
+        """Begin to look."""
+        # Unknown to `threading`: a program may count its threads, and wait until there is but one.
+        start_new_thread(self._look_on, ())
+
+    def stop(self) -> None:
+        """Look no more."""
+        self._is_over.set()
+        self._has_ended.wait()
+
+    def end(self, _number: int, _frame: FrameType | None) -> None:
+        """End the program, in its own thread."""
+        if not self._is_over.is_set():
+            self._scheduler.end(1, self._message)
+
+    def _look_on(self) -> None:
+        try:
+            self._look_again_and_again()
+        finally:
+            self._has_ended.set()
+
+    def _look_again_and_again(self) -> None:
+        waits, last, has_warned = 0, -1, False
+        active_cpu_s = locked_cpu_s = self._cpu_s()
+        locked_s = self._now_s()
+        while not self._is_over.wait(SAMPLE_S):
+            count, cpu_s, now_s = self._scheduler.program.act_count, self._cpu_s(), self._now_s()
+            if count != last:
+                last, active_cpu_s = count, cpu_s
+            what = self._waits_for()
+            if what == "lock" and cpu_s - locked_cpu_s < LOCKED_S / 10:
+                if now_s - locked_s > LOCKED_S:
+                    self._tell(f"it waited by itself{self._where()}")
+                    return
+            else:
+                locked_cpu_s, locked_s = cpu_s, now_s
+            waits += what == "time"
+            if waits >= WAITING_SAMPLES:
+                self._tell(f"it waited by itself{self._where()}")
+                return
+            spun_s = cpu_s - active_cpu_s
+            if spun_s < WARNING_SHARE * SPINNING_S or not self._scheduler.tasks:
+                continue
+            what = f"asked for neither time nor bytes for {spun_s:.0f} s while its other threads waited{self._where()}"
+            if spun_s > SPINNING_S and self._scheduler.has_timed:
+                self._tell(f"it {what}", "If it waits for a variable there, put time.sleep(0.001) into the loop, or ")
+                return
+            if not has_warned:
+                has_warned = True
+                # Not by `logging`, which would make this thread one of those that a program may count.
+                print(
+                    f"kiks: the program has {what}. If it computes, that is right; else press Ctrl-C.", file=sys.stderr
+                )
+
+    def _waits_for(self) -> str:
+        """Say whether the thread waits for a 'time' or file, or a 'lock', in code that is none of ours."""
+        try:
+            state = (self._folder / "stat").read_text().rpartition(")")[2].split()[0]
+            if state != "S":
+                return ""
+            reason = (self._folder / "wchan").read_text()
+        except OSError:
+            return ""
+        if "futex" in reason or ("pipe" in reason and self._scheduler.tasks):
+            # A pipe may be one that another thread of the program writes to.
+            kind = "lock"
+        elif any(word in reason for word in ("nanosleep", "poll", "select", "sigtimedwait")):
+            kind = "time"
+        else:
+            return ""
+        frame = sys._current_frames().get(self._watched)
+        name = frame.f_code.co_filename if frame is not None else "<"
+        return "" if name.startswith(_MAY_WAIT) else kind
+
+    def _where(self) -> str:
+        return where(sys._current_frames().get(self._watched))
+
+    def _tell(self, what: str, way: str = "") -> None:
+        advice = way + ADVICE
+        self._message = (
+            "a program in simulated time must wait by time.sleep, a lock or a port, but "
+            f"{what}. {advice[0].upper()}{advice[1:]}"
+        )
+        with suppress(OSError):
+            signal.pthread_kill(self._watched, _SIGNAL)
+        if not self._is_over.wait(GRACE_S):
+            # Code in C does not come back to Python.
+            sys.stdout.flush()
+            print(f"kiks: {self._message}", file=sys.stderr, flush=True)
+            os._exit(1)

@@ -1,0 +1,133 @@
+"""From a project to a simulation and back."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from kiks.engine.state import BALL
+from kiks.model.arena import Ball, Cylinder, Lamp, Pose
+from kiks.model.atomic_files import inside
+from kiks.model.free_disc import free_place
+from kiks.model.project import Project, ProjectRobot
+from kiks.model.robot import RobotSpec, specs_of
+from kiks.model.thinking_policy import split_thinking
+from kiks.sim.simulation import Simulation
+
+
+def simulation_of(
+    project: Project, folder: str | Path = ".", *, kinds: Sequence[str] = (), thinking: str | None = None
+) -> Simulation:
+    """Return the world of a project at its start, with turrets fitted and lines set; programs are not begun.
+
+    Args:
+        project: The project.
+        folder: Where it lies: robot files and replays are looked up from there.
+        kinds: Kinds of robots in place of the project's: one for all or one for each. Files among them lie anywhere.
+        thinking: What programs' computing costs, in place of what the project says; a replay lies anywhere.
+
+    Raises:
+        ParameterError: If a robot's file is none, a path leads out of the folder, or there are too few or too many
+            kinds.
+        ArenaError: If something has no free place.
+
+    Example:
+        >>> from kiks.model.project import ProjectRobot
+        >>> sim = simulation_of(Project(robots=(ProjectRobot(turrets=("k213",)),), baud=38400))
+        >>> sim.wires[0].line.baud, len(sim.image(1))
+        (38400, 64)
+    """
+    home = Path(folder)
+    if kinds:
+        others = specs_of(kinds, len(project.robots), project.response)
+        specs = [_as_set(spec, robot, project) for spec, robot in zip(others, project.robots, strict=True)]
+    else:
+        specs = [spec_of(robot, project, home) for robot in project.robots]
+    thinking = thinking_of(project, home) if thinking is None else thinking
+    sim = Simulation(project.arena, seed=project.seed, thinking=thinking, robot=specs)
+    for number, (robot, wire) in enumerate(zip(project.robots, sim.wires, strict=True), start=1):
+        for turret in robot.turrets:
+            sim.fit(number, turret)
+        if project.baud is not None:
+            wire.set_baud(project.baud)
+    return sim
+
+
+def spec_of(robot: ProjectRobot, project: Project, folder: Path) -> RobotSpec:
+    """Return what a robot of a project is.
+
+    Args:
+        robot: The robot.
+        project: The project, whose response and noise are its own.
+        folder: Where the project lies.
+
+    Raises:
+        ParameterError: If the robot's file is none, or leads out of the folder.
+    """
+    path = inside(folder, robot.kind, "kind") if robot.kind.lower().endswith(".toml") else robot.kind
+    return _as_set(RobotSpec.load(path, response=project.response), robot, project)
+
+
+def _as_set(spec: RobotSpec, robot: ProjectRobot, project: Project) -> RobotSpec:
+    """Return a kind of robot with what a project sets of its own."""
+    if robot.brightness is not None:
+        spec = spec.with_changes(body__brightness=robot.brightness)
+    return spec if project.noise else spec.without_noise()
+
+
+def thinking_of(project: Project, folder: Path) -> str:
+    """Return what the computing of a project's programs costs; a replay with its whole path.
+
+    Raises:
+        ParameterError: If the replay's path leads out of the folder.
+    """
+    kind, file = split_thinking(project.thinking)
+    return f"{kind}:{inside(folder, file, 'replay')}" if isinstance(file, str) else project.thinking
+
+
+def project_of(sim: Simulation, project: Project) -> Project:
+    """Return the project with everything where it is now: robots start there, bodies and lamps too.
+
+    Places are rounded to a thousandth of a millimetre, headings to a thousandth of a degree. What a gripper holds up
+    goes to the nearest place with room.
+
+    Args:
+        sim: A simulation of the project, or of one with as many robots.
+        project: Where all the rest comes from.
+
+    Raises:
+        ArenaError: If there is no room for what a gripper holds up.
+    """
+    with sim.lock:
+        poses, bodies, lamps = sim.poses(), sim.bodies(), sim.lamps.copy()
+        arena, radii_mm = sim.arena, [spec.body.radius_mm for spec in sim.specs]
+    starts = [
+        Pose(round(x_mm, 3), round(y_mm, 3), math.radians(round(math.degrees(heading_rad) % 360, 3)))
+        for x_mm, y_mm, heading_rad in poses.tolist()
+    ]
+    discs = [(pose.x_mm, pose.y_mm, radius_mm) for pose, radius_mm in zip(starts, radii_mm, strict=True)]
+    discs += [_disc(body) for body in bodies if not body["is_lifted"]]
+    balls: list[Ball] = []
+    cylinders: list[Cylinder] = []
+    for body in bodies:
+        x_mm, y_mm, radius_mm = _disc(body)
+        if body["is_lifted"]:
+            x_mm, y_mm = free_place(arena, discs, radius_mm, (x_mm, y_mm), "what a gripper holds up")
+            discs.append((x_mm, y_mm, radius_mm))
+        place = (round(x_mm, 3), round(y_mm, 3), radius_mm, float(body["friction_mm_s2"]), int(body["brightness"]))
+        if body["what"] == BALL:
+            balls.append(Ball(*place))
+        else:
+            cylinders.append(Cylinder(*place))
+    hung = [Lamp(round(x_mm, 3), round(y_mm, 3), power_w, is_on != 0) for x_mm, y_mm, power_w, is_on in lamps.tolist()]
+    return replace(
+        project,
+        arena=replace(arena, starts=tuple(starts), lamps=tuple(hung), balls=tuple(balls), cylinders=tuple(cylinders)),
+    )
+
+
+def _disc(body: Any) -> tuple[float, float, float]:
+    return float(body["x_mm"]), float(body["y_mm"]), float(body["radius_mm"])

@@ -1,0 +1,58 @@
+"""The simulations of this process by name, as the operating system keeps the table of its serial ports.
+
+`serial_for_url("kiks://1")` and `kopen([-1])` carry nothing but a name, so what the name means has to stand somewhere.
+This is the one table of the process; it holds no simulation alive.
+"""
+
+from __future__ import annotations
+
+import weakref
+from typing import TYPE_CHECKING
+
+from kiks.errors import LinkError, shown
+
+if TYPE_CHECKING:
+    from kiks.sim.simulation import Simulation
+
+
+SHOWN_NAMES = 5
+"""How many of the simulations that are alive a message names: the newest."""
+
+
+class Registry:
+    """Simulations in the order of their creation."""
+
+    def __init__(self) -> None:
+        self._simulations: weakref.WeakValueDictionary[str, Simulation] = weakref.WeakValueDictionary()
+        self._count = 0
+
+    def enter(self, sim: Simulation) -> str:
+        """Give a simulation a name."""
+        self._count += 1
+        name = f"sim{self._count}"
+        self._simulations[name] = sim
+        return name
+
+    def find(self, name: str) -> Simulation:
+        """Return the simulation of a name.
+
+        Raises:
+            LinkError: If none is alive under that name.
+        """
+        sim = self._simulations.get(name)
+        if sim is None:
+            known = sorted(self._simulations, key=lambda name: int(name[3:]))[-SHOWN_NAMES:]
+            alive = " or ".join(known) or "none now"
+            raise LinkError(
+                f"a simulation's name must be one that is alive, such as {alive}, but it was {shown(name)}. "
+                f"'kiks://1' without a name is robot 1 of the newest simulation."
+            )
+        return sim
+
+    def newest(self) -> Simulation | None:
+        """Return the simulation created last, if one is alive."""
+        return max(self._simulations.values(), key=lambda sim: int(sim.name[3:]), default=None)
+
+
+REGISTRY = Registry()
+"""The process's table."""

@@ -1,0 +1,111 @@
+"""A look at a simulation: where everybody is and what all sensors see, taken in one go."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.engine.parameters import RAY_COUNT
+from kiks.engine.sensing import observe
+from kiks.engine.state import BALL
+from kiks.errors import ParameterError
+from kiks.model.checks import check_numbers, wrapped
+from kiks.model.robot import SENSOR_COUNT
+
+if TYPE_CHECKING:
+    from kiks.sim.simulation import Simulation
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """Where everybody is at an instant, and what all sensors see.
+
+    Attributes:
+        poses: Of robots: x_mm, y_mm, heading_rad; float64 [robot, 3].
+        places: Of balls and cylinders: x_mm, y_mm; float64 [body, 2].
+        lengths_mm: How far each ray of each proximity sensor goes from the sensor to what it meets [mm], infinite where
+            nothing is within reach; float64 [robot, 8, 7], the leftmost ray first.
+        cosines: Of the angles at which rays meet surfaces; float64 [robot, 8, 7].
+        brightnesses: Of what they meet, 1..255, 0 for nothing; float64 [robot, 8, 7].
+        met: What they meet: a robot's index, the number of robots and a body's index, `WALL` or `NOTHING` of
+            `kiks.engine.sensing.observe`; int64 [robot, 8, 7].
+        proximity: The counts that command N would return; int64 [robot, 8].
+        ambient: The counts that command O would return; int64 [robot, 8].
+    """
+
+    poses: NDArray[np.float64]
+    places: NDArray[np.float64]
+    lengths_mm: NDArray[np.float64]
+    cosines: NDArray[np.float64]
+    brightnesses: NDArray[np.float64]
+    met: NDArray[np.int64]
+    proximity: NDArray[np.int64]
+    ambient: NDArray[np.int64]
+
+
+def look(sim: Simulation, networks: NDArray[np.void]) -> Snapshot:
+    """Return a look at a simulation that is locked and whose ticks are done.
+
+    Args:
+        sim: The simulation.
+        networks: What its robots' responses need besides rays.
+    """
+    robots, bodies, ticks, now_ns = sim.robot_count, sim.state.bodies.shape[1], sim.state.tick_count, sim.now_ns
+    poses, places = np.empty((robots, 3)), np.empty((bodies, 2))
+    observe.places_at(sim.scene, ticks, now_ns, poses, places)
+    lengths_mm, cosines, brightnesses, met = trace_rays(sim, 0, robots)
+    proximity, ambient = (np.empty((robots, SENSOR_COUNT), np.int64) for _ in range(2))
+    observe.read_everybody(sim.scene, sim.sight, networks, sim.lamps, ticks, now_ns, sim.seed, proximity, ambient)
+    return Snapshot(poses, places, lengths_mm, cosines, brightnesses, met, proximity, ambient)
+
+
+def trace_rays(
+    sim: Simulation, first: int, count: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Return lengths [mm], cosines, brightnesses and what was met (`Snapshot`) of `count` robots from `first`."""
+    rays = np.empty((count, SENSOR_COUNT, 3, RAY_COUNT))
+    met = np.empty((count, SENSOR_COUNT, RAY_COUNT), np.int64)
+    observe.gaze(sim.scene, sim.sight, sim.state.tick_count, sim.now_ns, first, rays, met)
+    lengths_mm = np.where(met == observe.NOTHING, np.inf, rays[:, :, 0])
+    return lengths_mm, rays[:, :, 1], rays[:, :, 2], met
+
+
+def proximity_from(sim: Simulation, robot: int, poses: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what `Simulation.proximity` would, float64 [pose, 8], if a robot stood at other poses, one by one.
+
+    Nothing keeps it from standing in a wall there; a simulation of a robot that is put down thousands of times for a
+    fit has no time to ask.
+
+    Args:
+        sim: The simulation.
+        robot: Number of the robot, from 1.
+        poses: float64 [pose, 3]: x_mm, y_mm, heading_rad.
+
+    Raises:
+        ParameterError: If there is no such robot, a number is not finite, or a place is outside the arena.
+    """
+    index = sim.index_of(robot)
+    poses = check_numbers("poses", poses, (None, 3))
+    size_mm = (sim.arena.width_mm, sim.arena.height_mm)
+    if not ((poses[:, :2] >= 0.0) & (poses[:, :2] <= size_mm)).all():
+        raise ParameterError(f"poses must be in the arena, {size_mm[0]:g} x {size_mm[1]:g} mm, but one was not.")
+    poses[:, 2] = [wrapped(heading_rad) for heading_rad in poses[:, 2].tolist()]
+    counts = np.empty((len(poses), SENSOR_COUNT))
+    with sim.lock:
+        sim.sync()
+        state = sim.state
+        observe.read_from(sim.scene, sim.sight, sim.networks, state.tick_count, sim.now_ns, index, poses, counts)
+    return counts
+
+
+def name_of(sim: Simulation, met: int) -> str:
+    """Return what people call a thing that a ray met: 'wall', 'robot 2', 'ball 1' or 'cylinder 3'."""
+    if met < 0:
+        return "wall"
+    if met < sim.robot_count:
+        return f"robot {met + 1}"
+    body = sim.state.bodies[0, met - sim.robot_count]
+    return f"{'ball' if body['what'] == BALL else 'cylinder'} {body['number']}"

@@ -1,0 +1,234 @@
+"""What the toolbox may ask of the robots and the things in a world: where they are, and to put them elsewhere."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from kiks.engine.numbers import uniform
+from kiks.engine.state import BALL
+from kiks.errors import ParameterError, shown
+from kiks.sim.free_space import ATTEMPTS
+from kiks.sim.simulation import Simulation
+from kiks.toolbox.matlab_arenas import place_mm, user_place
+from kiks.toolbox.session_client import SessionClient
+from kiks.toolbox.wire_format import matrix_text, numbers_of, numbers_text
+
+STREAM_SPAWN = 6
+"""Random stream of what is put at random places, and of headings that nobody has given."""
+
+LIGHT_ROW, BALL_ROW, CYLINDER_ROW = 1, 2, 3
+"""What an object is in lists, and to kiks_spawn."""
+
+ANGLE_MAX = 1e6
+"""Largest angle [rad]: beyond that a number has too few digits left for a heading."""
+
+
+def port_of(word: str) -> int:
+    """Return the number of a port; 1 stands for -1."""
+    if not (word.isascii() and word.isdigit() and len(word) < 10):
+        raise ParameterError(f"a port must be a whole number, -1, -2 and so on, but it was {shown(word)}.")
+    return int(word)
+
+
+# ---- robots ----
+
+
+def ask_pose(visitor: SessionClient, words: str) -> str:
+    """Return where the robot of a port is: x, y, heading [rad]; nothing if there is none."""
+    number = port_of(words)
+    if visitor.session.desk is None:
+        return ""
+
+    def pose(sim: Simulation) -> str:
+        robot = visitor.robot(number)
+        if robot is None:
+            return ""
+        x_mm, y_mm, heading_rad = sim.pose(robot)
+        return numbers_text((*user_place(sim.arena, x_mm, y_mm), heading_rad))
+
+    return visitor.do(pose)
+
+
+def ask_path(visitor: SessionClient, words: str) -> str:
+    """Return the path of the robot of a port, x in row 1 and y in row 2, since the port was opened."""
+    number = port_of(words)
+    opened = visitor.openings.get(number)
+
+    def path(sim: Simulation) -> str:
+        robot = visitor.robot(number)
+        if robot is None:
+            return "2 0"
+        paths = sim.paths()
+        # A robot that came after the recording began has no path yet.
+        points: Any = paths[robot - 1] if robot <= len(paths) else paths[0, :0]
+        if opened is not None:
+            points = points[points[:, 0] >= opened.opened_ns * 1e-9 - 1e-9]
+        points = points[~np.isnan(points[:, 1])]
+        x, y = user_place(sim.arena, points[:, 1], points[:, 2])
+        # A micrometre is more than anybody wants to know; it keeps the line short.
+        return matrix_text(np.round(np.vstack([x, y]), 3))
+
+    visitor.session.trace()
+    return visitor.do(path)
+
+
+def ask_distances(visitor: SessionClient, words: str) -> str:
+    """Return how far the robot of a port has driven forwards, backwards, and is from where it began [mm]."""
+    number = port_of(words)
+    opened = visitor.openings.get(number)
+
+    def distances(sim: Simulation) -> str:
+        robot = visitor.robot(number)
+        if robot is None:
+            return "0 0 0"
+        forwards_mm, backwards_mm, straight_mm = sim.distances_mm()[robot - 1].tolist()
+        if opened is not None:
+            x_mm, y_mm, _ = sim.pose(robot)
+            forwards_mm, backwards_mm = forwards_mm - opened.way_mm[0], backwards_mm - opened.way_mm[1]
+            straight_mm = math.hypot(x_mm - opened.start_mm[0], y_mm - opened.start_mm[1])
+        return numbers_text((forwards_mm, backwards_mm, straight_mm))
+
+    return visitor.do(distances)
+
+
+def ask_set_robot(visitor: SessionClient, words: str) -> str:
+    """Put the robot of a port somewhere; return 1, or 0 if there is no room."""
+    word, _, rest = words.partition(" ")
+    number = port_of(word)
+    x, y, angle = numbers_of(rest.split(), 3, "x, y and angle")
+    _check_angle(angle)
+
+    def set_robot(sim: Simulation) -> str:
+        robot = visitor.robot(number)
+        if robot is None:
+            raise ParameterError(f"port {-number} must have a robot, but it has none. Open it with kiks_kopen.")
+        turn = uniform(sim.seed, 0, 0, STREAM_SPAWN, sim.now_ns, 0)
+        heading_rad = 2 * math.pi * turn if math.isnan(angle) else angle
+        return _is_done(lambda: sim.place(robot, *place_mm(sim.arena, x, y), heading_rad))
+
+    return visitor.do(set_robot)
+
+
+# ---- objects ----
+
+
+def ask_objects(visitor: SessionClient, words: str) -> str:
+    """Return all lamps, balls and cylinders, a row each: type, x, y, speed, angle."""
+
+    def objects(sim: Simulation) -> str:
+        rows = [(LIGHT_ROW, *user_place(sim.arena, *lamp[:2]), 0.0, 0.0) for lamp in sim.lamps.tolist()]
+        for body in sim.bodies():
+            x, y = user_place(sim.arena, float(body["x_mm"]), float(body["y_mm"]))
+            velocity = float(body["velocity_x"]), float(body["velocity_y"])
+            angle = math.atan2(velocity[1], velocity[0])
+            rows.append((BALL_ROW if body["what"] == BALL else CYLINDER_ROW, x, y, math.hypot(*velocity), angle))
+        return matrix_text(np.array(rows, np.float64).reshape(-1, 5))
+
+    return visitor.do(objects)
+
+
+def ask_set_object(visitor: SessionClient, words: str) -> str:
+    """Put an object somewhere, with a speed; return 1, or 0 if there is no room."""
+    number, x, y, speed, angle = numbers_of(words.split(), 5, "row, x, y, speed and angle")
+    _check_angle(angle)
+
+    def set_object(sim: Simulation) -> str:
+        lamps, bodies = sim.lamps, sim.bodies()
+        if number not in range(1, len(lamps) + len(bodies) + 1):
+            raise ParameterError(
+                f"row must be one of the {len(lamps) + len(bodies)} that kiks_siminfo_objects lists, but it was "
+                f"{number:g}."
+            )
+        row = int(number) - 1
+        if row < len(lamps):
+            x_mm, y_mm = _kept(place_mm(sim.arena, x, y), lamps[row, :2].tolist())
+            is_inside = 0 <= x_mm <= sim.arena.width_mm and 0 <= y_mm <= sim.arena.height_mm
+            if is_inside:
+                lamps[row, :2] = x_mm, y_mm
+            return str(int(is_inside))
+        body: Any = bodies[row - len(lamps)]
+        here, velocity = (float(body["x_mm"]), float(body["y_mm"])), (body["velocity_x"], body["velocity_y"])
+        there = _kept(place_mm(sim.arena, x, y), here)
+        speed_mm_s = math.hypot(*velocity) if math.isnan(speed) else speed
+        heading_rad = math.atan2(velocity[1], velocity[0]) if math.isnan(angle) else angle
+        if speed_mm_s < 0:
+            speed_mm_s, heading_rad = -speed_mm_s, heading_rad + math.pi
+
+        def roll_from(place: tuple[float, float]) -> None:
+            sim.move_body(int(body["number"]), *place, speed_mm_s=min(speed_mm_s, 1000.0), heading_rad=heading_rad)
+
+        is_moved = _is_done(lambda: roll_from(there))
+        if is_moved == "0":
+            # Speed and angle count wherever it is (kiks-behaviour.md 1.4).
+            _is_done(lambda: roll_from(here))
+        return is_moved
+
+    return visitor.do(set_object)
+
+
+def ask_spawn(visitor: SessionClient, words: str) -> str:
+    """Put one more object into the world."""
+    kind, x, y = numbers_of(words.split(), 3, "type, x and y")
+    if kind not in (LIGHT_ROW, BALL_ROW, CYLINDER_ROW):
+        raise ParameterError(f"type must be 1 (light), 2 (ball) or 3 (cylinder), but it was {kind:g}.")
+
+    def spawn(sim: Simulation) -> None:
+        arena = sim.arena
+        add: Callable[..., object] = sim.add_lamp
+        greys = {}
+        if kind != LIGHT_ROW:
+            add = sim.add_ball if kind == BALL_ROW else sim.add_cylinder
+            settings = visitor.session.settings
+            brightness = settings.ball if kind == BALL_ROW else settings.cylinder
+            greys = {} if brightness is None else {"brightness": brightness}
+        place_given = None
+        if not math.isnan(x) and not math.isnan(y):
+            place_given = place_mm(arena, x, y)
+            if not (0 <= place_given[0] <= arena.width_mm and 0 <= place_given[1] <= arena.height_mm):
+                raise ParameterError(
+                    f"a place must lie in the arena, x from 1 to {arena.width_mm:g} and y from 1 to "
+                    f"{arena.height_mm:g}, but it was ({x:g}, {y:g})."
+                )
+        elif kind != LIGHT_ROW:
+            place_given = (arena.width_mm / 2, arena.height_mm / 2)
+        if place_given is not None and _is_done(lambda: add(*place_given, **greys)) == "1":
+            return
+        there = len(sim.lamps) + len(sim.bodies())
+        for attempt in range(ATTEMPTS):
+            shares = [uniform(sim.seed, 0, there, STREAM_SPAWN, attempt, axis) for axis in (1, 2)]
+            place = shares[0] * arena.width_mm, shares[1] * arena.height_mm
+            # A lamp may hang anywhere; it is of use over the floor.
+            is_good = kind != LIGHT_ROW or arena.clearance_at_mm(*place) > 0
+            if is_good and _is_done(lambda place=place: add(*place, **greys)) == "1":  # type: ignore[misc]
+                return
+        raise ParameterError("there must be room for one more object, but none was found. Take something away.")
+
+    visitor.do(spawn)
+    if visitor.session.desk is not None:
+        visitor.session.desk.tell()
+    visitor.session.mark()
+    return ""
+
+
+def _kept(wanted: tuple[float, float], there: Any) -> tuple[float, float]:
+    """Return a place of which what nobody has given stays as it is."""
+    x_mm, y_mm = (old if math.isnan(new) else new for new, old in zip(wanted, there, strict=True))
+    return float(x_mm), float(y_mm)
+
+
+def _is_done(act: Callable[[], object]) -> str:
+    """Do something and say 1, or 0 if the place for it is not free."""
+    try:
+        act()
+    except ParameterError:
+        return "0"
+    return "1"
+
+
+def _check_angle(angle: float) -> None:
+    if abs(angle) > ANGLE_MAX:
+        raise ParameterError(f"an angle must be from -{ANGLE_MAX:g} to {ANGLE_MAX:g} rad, but it was {angle:g}.")

@@ -1,0 +1,343 @@
+"""Calibration: hidden parameters of a simulated robot are found over the wire alone, and mistakes are named."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+from benchmarks.calibration_errors import half_distances_mm, hidden_robot
+from typer.testing import CliRunner
+
+import kiks
+from kiks.calibration import wall_fit
+from kiks.calibration.calibrate import Calibration, calibrate, checked_gaps, default_gaps_mm
+from kiks.calibration.measurements import CalibrationError, Run, processing_ms, rest, spin
+from kiks.calibration.placements import Instruction, Place, SimPlacements
+from kiks.cli.calibrate import calibrate as command
+from kiks.cli.calibrate import parse_gaps
+from kiks.model.robot import robot_toml, save_robot
+from kiks.ports.memory import SimPort
+
+app = typer.Typer()
+app.command()(command)
+
+BASE = kiks.RobotSpec.load("khepera")
+
+
+KHEPERA_II = kiks.RobotSpec.load("khepera_ii")
+
+
+def idle(spec: kiks.RobotSpec) -> tuple[list[float], float]:
+    """Return what each sensor reads in the open on average [counts], and the share of zeros in all readings."""
+    sim = kiks.Simulation(robot=spec, seed=5)
+    SimPlacements(sim).place(Instruction(Place.FREE, ""))
+    counts = rest(kiks.Khepera(sim.port(1)), 300).counts
+    return counts.mean(axis=0).tolist(), float((counts == 0).mean())
+
+
+def check(found: kiks.RobotSpec, hidden: kiks.RobotSpec) -> None:
+    """Fail unless one robot is the other, within what docs/calibration.md promises."""
+    assert found.proximity.direction_deg == pytest.approx(hidden.proximity.direction_deg, abs=2.0)
+    assert half_distances_mm(found, hidden) == pytest.approx(half_distances_mm(hidden, hidden), abs=1.0)
+    assert found.body.pulse_mm == pytest.approx(hidden.body.pulse_mm, rel=0.005)
+    assert found.body.wheel_base_mm == pytest.approx(hidden.body.wheel_base_mm, rel=0.005)
+    assert found.firmware.processing_ms == pytest.approx(hidden.firmware.processing_ms, abs=0.05)
+    assert found.proximity.noise_small == pytest.approx(hidden.proximity.noise_small, rel=0.35)
+    mean_counts, zero_share = idle(hidden)
+    assert idle(found)[0] == pytest.approx(mean_counts, abs=2.0)
+    assert idle(found)[1] == pytest.approx(zero_share, abs=0.1)
+
+
+def measured(hidden: kiks.RobotSpec, base: kiks.RobotSpec = BASE, seed: int = 0, skew_rad: float = 0.05) -> Calibration:
+    sim = kiks.Simulation(robot=hidden, seed=seed)
+    return calibrate(kiks.Khepera(sim.port(1)), SimPlacements(sim, skew_rad=skew_rad), base)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("base", "seed"), [(BASE, 2), (KHEPERA_II, 3)], ids=["khepera", "khepera_ii"])
+def test_any_hidden_parameters_are_found(base: kiks.RobotSpec, seed: int) -> None:
+    hidden = hidden_robot(seed, base)
+    found = measured(hidden, base, seed=seed, skew_rad=math.radians(6 * (-1) ** seed))
+    check(found.spec, hidden)
+    error = found.fit.uncertainty
+    assert error[:8].max() < 2.0
+    assert error[16:].max() < 0.005
+
+
+@pytest.mark.slow
+def test_a_robot_like_its_kind_reads_zero_as_often() -> None:
+    zero_share = idle(measured(BASE).spec)[1]
+    assert zero_share == pytest.approx(idle(BASE)[1], abs=0.05)
+    assert zero_share > 0.4
+
+
+@pytest.mark.parametrize("response", ["thesis", "fast"])
+def test_a_response_with_directions_of_its_own_is_refused(response: str) -> None:
+    placements = SimPlacements(kiks.Simulation())
+    base = BASE.with_changes(proximity__response=response)
+    with pytest.raises(
+        kiks.ParameterError, match=f"the response of the --base must be one of .* but it was '{response}'"
+    ):
+        calibrate(kiks.Khepera(placements.sim.port(1)), placements, base)
+
+
+@pytest.mark.parametrize("name", ["khepera", "khepera_ii"])
+def test_the_guide_names_the_default_marks(name: str) -> None:
+    guide = (Path(__file__).parents[2] / "docs" / "calibration.md").read_text(encoding="utf-8")
+    assert ", ".join(f"{gap:g}" for gap in default_gaps_mm(kiks.RobotSpec.load(name))) + " and" in guide
+
+
+# ---- the command ----
+
+
+@pytest.mark.slow
+def test_the_command_asks_measures_and_writes(tmp_path: Path) -> None:
+    hidden, out = hidden_robot(11, BASE), tmp_path / "mine.toml"
+    sim = kiks.Simulation(robot=hidden)
+    # In the open: there, again, there, fine. At the nearest gap a typing error and a gap of no wall, then 6 mm.
+    answers = ["", "y", "", "n", "six", "-1", "6", "n", *["", "n"] * 4]
+    result = CliRunner().invoke(app, ["--port", sim.url(1), "--out", str(out)], input="\n".join(answers) + "\n")
+    assert result.exit_code == 0, result.output + repr(result.exception)
+    assert "1. Put the robot in the open" in result.output
+    assert "7. Put the robot before the wall, facing it squarely, its rim at the 500 mm mark." in result.output
+    assert "The gap must be above 0" in result.output
+    assert f"Written: {out}" in result.output
+    found = kiks.RobotSpec.load(out)
+    assert found.name == "Khepera (calibrated)"
+    check(found, hidden)
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.toml"]
+    assert "wheel base" in out.read_text().splitlines()[1]
+    sim.port(1).claim("the next one")
+
+
+def test_the_command_refuses_before_it_measures(tmp_path: Path) -> None:
+    out = tmp_path / "mine.toml"
+    out.write_text("precious")
+    sim = kiks.Simulation()
+    for arguments, words in (
+        (["--out", str(out)], "Add --overwrite to replace it"),
+        (["--out", str(tmp_path / "no" / "x.toml")], "a file that can be written"),
+        (["--out", str(tmp_path / "x.toml"), "--gaps", "5;15"], "--gaps must be numbers with commas"),
+        (["--out", str(tmp_path / "x.toml"), "--gaps", "5"], "at least two different numbers from 2 to"),
+        (["--out", str(tmp_path / "x.toml"), "--base", "kephera"], "Did you mean 'khepera'"),
+    ):
+        result = CliRunner().invoke(app, ["--port", sim.url(1), "--yes", *arguments])
+        assert words in str(result.exception)
+    assert out.read_text() == "precious"
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.toml"]
+
+
+def test_nothing_is_written_by_a_calibration_that_fails(tmp_path: Path) -> None:
+    out = tmp_path / "mine.toml"
+    sim = kiks.Simulation(kiks.Arena.box(500, 650), robot=BASE.with_changes(proximity__range_mm=2.0))
+    result = CliRunner().invoke(app, ["--port", sim.url(1), "--out", str(out), "--yes"])
+    assert isinstance(result.exception, CalibrationError)
+    assert list(tmp_path.iterdir()) == []
+
+
+# ---- what goes wrong ----
+
+
+class Misplaced(SimPlacements):
+    """Somebody who puts the robot where it should not be."""
+
+    def __init__(self, sim: kiks.Simulation, errors_mm: dict[float, float]) -> None:
+        super().__init__(sim)
+        self.errors_mm = errors_mm
+        self.findings: list[str] = []
+
+    def place(self, instruction: Instruction) -> float:
+        error_mm = self.errors_mm.get(instruction.gap_mm, 0.0)
+        super().place(Instruction(instruction.place, instruction.text, instruction.gap_mm + error_mm))
+        return instruction.gap_mm
+
+    def wants_repeat(self, finding: str, *, is_good: bool) -> bool:
+        self.findings.append(finding)
+        return not is_good
+
+
+def stands_still(sim: kiks.Simulation) -> bool:
+    sim.run(0.5)
+    before = sim.pose(1)
+    sim.run(1.0)
+    return sim.pose(1) == pytest.approx(before, abs=0.1)
+
+
+def failure(placements: SimPlacements, gaps_mm: tuple[float, ...] = (5, 15)) -> str:
+    with pytest.raises(CalibrationError) as caught:
+        calibrate(kiks.Khepera(placements.sim.port(1)), placements, BASE, gaps_mm=gaps_mm)
+    assert stands_still(placements.sim)
+    return str(caught.value)
+
+
+def test_a_wall_that_is_not_seen_is_named_and_asked_for_again() -> None:
+    placements = Misplaced(kiks.Simulation(robot=BASE.with_changes(proximity__jitter_counts=(0.0,))), {5: 150})
+    words = failure(placements)
+    assert "some sensor must see the wall at 5 mm, but none reads more than 0 counts above its baseline" in words
+    assert len(placements.findings) == 3  # one good in the open, two before the last attempt
+    assert placements.findings[-1] == words
+
+
+def test_a_run_up_that_meets_no_wall_is_named() -> None:
+    class Backwards(Misplaced):
+        def place(self, instruction: Instruction) -> float:
+            gap_mm = super().place(instruction)
+            if gap_mm == 200:
+                self.sim.place(1, 250.0, 500.0, -math.pi / 2)
+            return gap_mm
+
+    placements = Backwards(kiks.Simulation(), {})
+    with pytest.raises(CalibrationError, match="the wall must come into sight 200 mm ahead, but after 27"):
+        calibrate(kiks.Khepera(placements.sim.port(1)), placements, BASE, gaps_mm=[5, 15], run_up_mm=200)
+    assert stands_still(placements.sim)
+
+
+def test_something_near_in_the_open_is_named() -> None:
+    class Cornered(Misplaced):
+        def place(self, instruction: Instruction) -> float:
+            return super().place(Instruction(Place.WALL, "", instruction.gap_mm or 5.0))
+
+    assert "the sensors must read little in the open, but sensor" in failure(Cornered(kiks.Simulation(), {}))
+
+
+@pytest.mark.slow
+def test_measurements_that_contradict_each_other_are_named() -> None:
+    words = failure(Misplaced(kiks.Simulation(), {15: 12}), (5, 15, 25))
+    assert "the measurements must agree with each other, but those at the" in words
+    assert "Check the marks" in words
+
+
+def test_wheels_that_do_not_turn_are_named() -> None:
+    class Stuck(SimPort):
+        def write(self, data: bytes) -> int:
+            return super().write(b"D,0,0\n" if data[:1] == b"D" else data)
+
+    sim = kiks.Simulation()
+    with pytest.raises(CalibrationError, match=r"the wheels must turn 5203 pulses in 22 s, but they turned 0"):
+        calibrate(kiks.Khepera(Stuck(sim, 1)), SimPlacements(sim), BASE)
+
+
+class Flaky(SimPort):
+    """A port on which something happens at a certain question."""
+
+    def __init__(self, sim: kiks.Simulation, last: int, error: BaseException | None) -> None:
+        super().__init__(sim, 1)
+        self.last = last
+        self.error = error
+
+    def write(self, data: bytes) -> int:
+        self.last -= data[:1] == b"N"
+        if self.last <= 0 and self.error is not None:
+            error, self.error = self.error, None
+            super().write(data)  # the answer stays unread
+            raise error
+        return super().write(data) if self.last > 0 or self.error is not None or data[:1] == b"D" else len(data)
+
+
+def test_a_robot_that_falls_silent_is_named() -> None:
+    sim = kiks.Simulation()
+    port = Flaky(sim, 500, kiks.LinkError("the cable fell out"))
+    with pytest.raises(kiks.LinkError, match=r"must come before the time-out|the cable fell out"):
+        calibrate(kiks.Khepera(port), SimPlacements(sim), BASE)
+    assert stands_still(sim)
+
+
+def test_ctrl_c_in_the_middle_of_a_spin_stops_the_robot() -> None:
+    sim = kiks.Simulation()
+    with pytest.raises(KeyboardInterrupt):
+        calibrate(kiks.Khepera(Flaky(sim, 260, KeyboardInterrupt())), SimPlacements(sim), BASE)
+    assert stands_still(sim)
+
+
+@pytest.mark.slow
+def test_a_person_may_measure_again() -> None:
+    class Fussy(SimPlacements):
+        asked = 0
+
+        def wants_repeat(self, finding: str, *, is_good: bool) -> bool:
+            self.asked += 1
+            return self.asked == 2
+
+    placements = Fussy(kiks.Simulation())
+    found = calibrate(kiks.Khepera(placements.sim.port(1)), placements, BASE, gaps_mm=[5, 20])
+    assert placements.asked == 5
+    assert found.spec.body.pulse_mm == pytest.approx(BASE.body.pulse_mm, rel=0.005)
+
+
+# ---- the parts ----
+
+
+@pytest.mark.parametrize("baud", [9600, 38400, 115200])
+def test_processing_time_is_what_the_line_does_not_explain(baud: int) -> None:
+    port = kiks.Simulation(robot=BASE.with_changes(firmware__processing_ms=3.5)).port(1)
+    port.baudrate = baud
+    assert processing_ms(kiks.Khepera(port), baud) == pytest.approx(3.5, abs=0.01)
+
+
+def test_odometry_follows_a_spin() -> None:
+    sim = kiks.Simulation()
+    sim.place(1, 250.0, 300.0, 0.0)
+    run = spin(kiks.Khepera(sim.port(1)), sim.spec, 100.0, -0.75)
+    gaps_mm, headings_rad = wall_fit.odometry(run, sim.spec, 0.0)
+    assert gaps_mm == pytest.approx(np.full(len(gaps_mm), 100.0), abs=0.5)
+    assert headings_rad[-1] == pytest.approx(-1.5 * math.pi, abs=0.1)
+    turned_rad = run.turned_pulses() * sim.spec.body.pulse_mm / sim.spec.body.wheel_base_mm
+    assert turned_rad == pytest.approx(sim.pose(1)[2], abs=0.01)
+
+
+def test_unknowns_and_robots_are_two_names_of_one_thing() -> None:
+    spec = hidden_robot(4, BASE)
+    unknowns = wall_fit.unknowns_of(BASE, spec)
+    assert wall_fit.unknowns_of(BASE, wall_fit.robot_of(BASE, unknowns)) == pytest.approx(unknowns)
+    unknowns[-1] = 1.0
+    with pytest.raises(CalibrationError, match="Name the right kind with --base"):
+        wall_fit.robot_of(BASE, unknowns)
+
+
+def test_a_heading_is_guessed_from_the_light() -> None:
+    stand = wall_fit.Stand(BASE)
+    headings_rad = np.linspace(0.4, 0.4 + 2 * math.pi, 100)
+    turned = (headings_rad - 0.4) * BASE.body.wheel_base_mm / BASE.body.pulse_mm / 2
+    counts = stand.readings(BASE, np.full(100, 10.0), headings_rad)
+    run = Run(10.0, np.stack((-turned, turned), axis=1), counts, (0, 0))
+    assert wall_fit.guess_heading_rad(stand, BASE, run) == pytest.approx(0.4, abs=0.1)
+
+
+def test_gaps_are_checked() -> None:
+    assert len(checked_gaps(None, 500, BASE)) == 4
+    assert checked_gaps([15, 5], 500, BASE) == [5, 15]
+    with pytest.raises(kiks.ParameterError, match="gaps_mm must be at least two different numbers"):
+        checked_gaps([5, 500], 500, BASE)
+    with pytest.raises(kiks.ParameterError, match="run_up_mm must be between"):
+        checked_gaps(None, 50, BASE)
+    with pytest.raises(kiks.ParameterError, match="--gaps must be numbers with commas, but it was '5;6'"):
+        parse_gaps("5;6")
+
+
+def test_a_placement_without_room_is_named() -> None:
+    placements = SimPlacements(kiks.Simulation(kiks.Arena.box(300, 300)))
+    with pytest.raises(kiks.ParameterError, match="the arena must have room for a robot 500 mm below"):
+        placements.place(Instruction(Place.WALL, "", 500.0))
+
+
+@pytest.mark.parametrize("name", ["khepera", "khepera_ii"])
+def test_a_robot_file_is_read_back_as_it_was(name: str, tmp_path: Path) -> None:
+    spec, path = kiks.RobotSpec.load(name), tmp_path / "robot.toml"
+    path.write_text("old")
+    save_robot(spec, path, comment="first\nsecond")
+    assert kiks.RobotSpec.load(path) == spec
+    assert path.read_text().startswith("# first\n# second\nname = ")
+    assert robot_toml(spec) in path.read_text()
+    assert [entry.name for entry in tmp_path.iterdir()] == ["robot.toml"]
+
+
+def test_a_robot_file_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    with pytest.raises(kiks.ParameterError, match="a robot must go to a file that can be written"):
+        save_robot(BASE, tmp_path / "no" / "robot.toml")
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(kiks.ParameterError, match=r"folder' cannot \(it is a folder\)"):
+        save_robot(BASE, tmp_path / "folder")
+    assert [entry.name for entry in tmp_path.iterdir()] == ["folder"]

@@ -1,0 +1,150 @@
+"""`kiks arena`: files made, files described, files left alone."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from typer.testing import CliRunner
+
+from kiks.cli import app
+from kiks.errors import KiksError
+from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
+from kiks.model.arena_file import save_arena
+
+MAZE = Path(__file__).parents[2] / "examples" / "arenas" / "maze.toml"
+
+
+def kiks_arena(*arguments: object) -> str:
+    result = CliRunner().invoke(app, ["arena", *map(str, arguments)])
+    if isinstance(result.exception, KiksError):
+        raise result.exception
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+@pytest.mark.parametrize("command", ["maze", "new", "info"])
+def test_each_has_help_with_an_example(command):
+    assert f"Example: kiks arena {command}" in kiks_arena(command, "--help")
+
+
+def test_maze_writes_the_arena_that_python_makes(tmp_path):
+    out = tmp_path / "mine.toml"
+    said = kiks_arena("maze", out, "--columns", 3, "--rows", 2, "--path-mm", 130, "--wall-mm", 20, "--seed", 5)
+    assert "mine.toml" in said
+    assert "mine.png" in said
+    arena, expected = Arena.load(out), Arena.maze(columns=3, rows=2, path_mm=130, wall_mm=20, seed=5)
+    assert np.array_equal(arena.brightness, expected.brightness)
+    assert (arena.name, arena.starts, arena.lamps) == ("mine", expected.starts, expected.lamps)
+
+
+def test_the_same_seed_writes_the_same_bytes(tmp_path):
+    for folder, seed in (("a", 3), ("b", 3), ("c", 4)):
+        (tmp_path / folder).mkdir()
+        kiks_arena("maze", tmp_path / folder / "maze.toml", "--seed", seed)
+    first, again, other = ((tmp_path / folder / "maze.png").read_bytes() for folder in "abc")
+    assert first == again != other
+    assert (tmp_path / "a" / "maze.toml").read_bytes() == (tmp_path / "b" / "maze.toml").read_bytes()
+
+
+@pytest.mark.parametrize(("given", "expected"), [("wood", 190), ("40", 40)])
+def test_new_writes_a_box_to_draw_in(tmp_path, given, expected):
+    out = tmp_path / "room.toml"
+    size = ("--width-mm", 300, "--height-mm", 200, "--wall-mm", 5, "--rounded-mm", 30)
+    kiks_arena("new", out, *size, "--brightness", given)
+    box = Arena.box(300, 200, wall_mm=5, rounded_mm=30, brightness=expected)
+    assert np.array_equal(Arena.load(out).brightness, box.brightness)
+    # What somebody draws into the picture is in the arena.
+    with Image.open(tmp_path / "room.png") as image:
+        picture = np.array(image)
+    picture[50, 100] = 77
+    Image.fromarray(picture).save(tmp_path / "room.png")
+    assert Arena.load(out).brightness[200 - 1 - 50, 100] == 77
+
+
+@pytest.mark.parametrize("there", ["x.toml", "x.png"])
+@pytest.mark.parametrize("command", [("maze",), ("new", "--width-mm", 200, "--height-mm", 200)])
+def test_files_that_are_there_stay_without_force(tmp_path, there, command):
+    (tmp_path / there).write_text("precious")
+    with pytest.raises(KiksError) as error:
+        kiks_arena(*command, tmp_path / "x.toml")
+    assert str(error.value) == (
+        f"The arena's files must be new, but {str(tmp_path / there)!r} is there. Choose another name or add --force."
+    )
+    assert [path.name for path in tmp_path.iterdir()] == [there]
+    assert (tmp_path / there).read_text() == "precious"
+    kiks_arena(*command, tmp_path / "x.toml", "--force")
+    Arena.load(tmp_path / "x.toml")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("maze", "maze.txt"), "path must end in '.toml', but it was 'maze.txt'."),
+        (("maze", ""), "OUT must go to a file that can be written, but '.' cannot (it is a folder)"),
+        (("maze", "no/such/folder/maze.toml"), "but 'no/such/folder/maze.toml' cannot (No such file or directory)"),
+        (("maze", "m.toml", "--path-mm", 80), "path_mm must be a whole number from 97 to 10000, but it was 80."),
+        (("new", "n.toml", "--width-mm", 50, "--height-mm", 200), "An arena must be at least 100 x 100 mm"),
+        (("new", "n.toml", "--width-mm", 200, "--height-mm", 200, "--brightness", "wod"), "Did you mean 'wood'?"),
+        (("new", "n.toml", "--width-mm", 200, "--height-mm", 200, "--brightness=-3"), "but it was -3. 1 is black"),
+        (("new", "n.toml", "--width-mm", 200, "--height-mm", 200, "--brightness=--3"), "but it was '--3'."),
+        (("info", "nothing.toml"), "Arena file 'nothing.toml' must exist, but there is no such file."),
+    ],
+)
+def test_errors_are_clear_and_nothing_is_written(tmp_path, monkeypatch, arguments, words):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(KiksError) as error:
+        kiks_arena(*arguments)
+    assert words in str(error.value)
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_error_is_one_line_for_a_person(tmp_path):
+    command = [sys.executable, "-m", "kiks", "arena", "info", "nothing.toml"]
+    result = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, check=False)
+    assert result.returncode == 2
+    assert result.stderr.startswith("kiks: Arena file 'nothing.toml' must exist")
+    assert len(result.stderr.splitlines()) == 1
+
+
+def test_info_of_an_example():
+    assert kiks_arena("info", MAZE).splitlines() == [
+        "Maze: 920 x 660 mm, cells of 1 mm, 10 % of it wall",
+        "Widest place: room for 149.0 mm across",
+        "Start 1: (70, 590) mm, heading 0 degrees, room for 119.0 mm across: a Khepera (55 mm) fits",
+        "Lamp 1: (850, 70) mm, 1 W, on",
+    ]
+
+
+def test_info_tells_all_that_stands_in_it(tmp_path):
+    box = Arena.box(300, 201, wall_mm=0)
+    arena = Arena(
+        box.brightness,
+        0.5,
+        "room",
+        starts=(Pose(75, 50, 0), Pose(20, 50, 1.5)),
+        lamps=(Lamp(10, 20, 2.5, False),),
+        balls=(Ball(30, 40),),
+        cylinders=(Cylinder(50, 60),),
+    )
+    save_arena(arena, tmp_path / "room.toml")
+    said = kiks_arena("info", tmp_path / "room.toml").splitlines()
+    assert said[0] == "room: 150 x 100.5 mm, cells of 0.5 mm, 0 % of it wall"
+    assert said[1] == "Widest place: room for 100.5 mm across"
+    assert said[2].endswith("a Khepera (55 mm) fits")
+    assert said[3].startswith("Start 2: (20, 50) mm")
+    assert said[3].endswith("room for 40.0 mm across: a Khepera (55 mm) does not fit")
+    assert said[4] == "Lamp 1: (10, 20) mm, 2.5 W, off"
+    assert said[5] == "Ball 1: (30, 40) mm, radius 32 mm, brightness 255"
+    assert said[6] == "Cylinder 1: (50, 60) mm, radius 16 mm, brightness 190"
+
+
+@pytest.mark.parametrize(
+    ("wall_mm", "words"),
+    [(10, "Start: none; a Khepera (55 mm) starts at (100.5, 60.5) mm"), (40, "a Khepera (55 mm) fits nowhere")],
+)
+def test_info_without_a_start_pose(tmp_path, wall_mm, words):
+    save_arena(Arena.box(201, 121, wall_mm=wall_mm), tmp_path / "box.toml")
+    assert words in kiks_arena("info", tmp_path / "box.toml")

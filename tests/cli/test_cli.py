@@ -1,0 +1,238 @@
+"""The commands, as a person calls them."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import get_args, get_type_hints
+
+import pytest
+
+from kiks.cli import app
+from kiks.errors import ParameterError
+
+pytestmark = pytest.mark.slow
+
+ROOT = Path(__file__).parents[2]
+ARENA = str(ROOT / "examples" / "arenas" / "office.toml")
+WANDER = str(ROOT / "tests" / "programs" / "wander.py")
+
+
+KIKS = [sys.executable, "-m", "kiks"]
+
+
+def kiks(
+    *arguments: str, cwd: Path | None = None, env: dict[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [*KIKS, *arguments],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        env={**os.environ, **(env or {})},
+        timeout=470,
+        check=False,
+    )
+
+
+def state_of(text: str) -> str:
+    found = re.search(r"state ([0-9a-f]{16})", text)
+    assert found, text
+    return found[1]
+
+
+@pytest.mark.parametrize(
+    "command", ["desk", "demo", "run", "serve", "monitor", "calibrate", "accuracy", "fit", "warmup"]
+)
+def test_every_command_has_help_with_an_example(command: str) -> None:
+    result = kiks(command, "--help")
+    assert result.returncode == 0
+    assert f"Example: kiks {command}" in result.stdout
+
+
+def test_help_and_version_need_no_engine() -> None:
+    script = (
+        "import sys; sys.argv = ['kiks', '--help']\nimport kiks.cli\ntry: kiks.cli.main()\nexcept SystemExit: pass\n"
+    )
+    script += (
+        "heavy = {'numba', 'scipy', 'numpy', 'PIL', 'rich', 'nicegui'} & set(sys.modules); assert not heavy, heavy"
+    )
+    assert subprocess.run([sys.executable, "-c", script], capture_output=True, check=False).returncode == 0
+    assert re.fullmatch(r"KiKS \d+\.\d+.*\n", kiks("--version").stdout)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("behaviour", ["avoid", "follow"])
+def test_a_demo_is_the_same_in_two_processes(behaviour: str, tmp_path: Path) -> None:
+    arguments = ("demo", behaviour, "--seconds", "30", "--arena", ARENA, "--seed", "4")
+    first = kiks(*arguments, "--picture", "run.png", cwd=tmp_path)
+    assert first.returncode == 0, first.stderr
+    assert (tmp_path / "run.png").stat().st_size > 5000
+    assert re.search(r"30\.\d s .* x real time .* m .* contacts", first.stdout)
+    second = kiks(*arguments, cwd=tmp_path)
+    assert state_of(first.stdout) == state_of(second.stdout)
+    assert (tmp_path / f"kiks-{behaviour}.png").exists()
+
+
+def test_a_cold_start_says_at_once_that_it_compiles(tmp_path: Path) -> None:
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    with subprocess.Popen([*KIKS, "warmup"], stderr=subprocess.PIPE, text=True, env=environment) as process:
+        assert process.stderr is not None
+        assert "Compiling the engine" in process.stderr.readline()
+        assert process.poll() is None
+        process.kill()
+
+
+@pytest.mark.timeout(470)  # without `kiks warmup` before, this compiles all
+def test_a_warm_start_compiles_nothing() -> None:
+    kiks("warmup")
+    again = kiks("warmup")
+    assert "The engine is ready" in again.stdout
+    assert "Compiling" not in again.stderr
+
+
+def test_a_program_runs_unchanged_in_simulated_time() -> None:
+    result = kiks("run", "--seed", "3", WANDER)
+    assert result.returncode == 0, result.stderr
+    version, counters = result.stdout.splitlines()
+    assert version == "b,5.02,5.01"
+    assert re.fullmatch(r"h,-?\d+,-?\d+", counters)
+    assert re.search(r"kiks: 2[01]\.\d{3} s simulated, seed 3, state", result.stderr)
+    again = kiks("run", "--seed", "3", "--map", "/dev/ttyUSB0=1", WANDER)
+    assert (again.stdout, state_of(again.stderr)) == (result.stdout, state_of(result.stderr))
+    other = kiks("run", "--seed", "3", "--thinking", "fixed:20", WANDER)
+    assert state_of(other.stderr) != state_of(result.stderr)
+
+
+def test_turrets_and_kinds_of_robots_from_the_command_line(tmp_path: Path) -> None:
+    program = tmp_path / "ask.py"
+    program.write_text(
+        "import serial\n"
+        "for name in 'ab':\n"
+        "    port = serial.Serial(name, timeout=1)\n"
+        "    for order in (b'B\\n', b'T,1,B\\n', b'T,4,B\\n'):\n"
+        "        port.write(order)\n"
+        "        print(port.readline())\n"
+    )
+    options = ("--robot", "khepera", "--robot", "khepera_ii", "--turret", "radio", "--turret", "gripper=2")
+    result = kiks("run", *options, str(program))
+    assert result.stdout.splitlines() == [
+        "b'b,5.02,5.01\\r\\n'",
+        "b'z,Turret order not supported\\r\\n'",
+        "b't,4,b,1,0\\r\\n'",
+        "b'b,6.01,6.01\\r\\n'",
+        "b't,1,b,1,0\\r\\n'",
+        "b't,4,b,1,0\\r\\n'",
+    ], result.stderr
+
+
+@pytest.mark.slow
+def test_a_programs_exit_code_and_errors_are_its_own(tmp_path: Path) -> None:
+    assert kiks("run", WANDER, "7").returncode == 7
+    program = tmp_path / "wrong.py"
+    program.write_text("import serial\nserial.Serial('COM1', timeout=1)\nprint(1 / 0)\n")
+    result = kiks("run", str(program))
+    assert result.returncode == 1
+    assert "ZeroDivisionError" in result.stderr
+    assert "runpy" not in result.stderr
+    assert f'File "{program}", line 3' in result.stderr
+    program.write_text("import serial\nserial.Serial('COM1')\nserial.Serial('COM2')\n")
+    assert "is one more than there are" in kiks("run", str(program)).stderr
+    assert kiks("run", "--robots", "2", str(program)).returncode == 0
+    program.write_text("import serial\nserial.Serial('COM1').read(1)\n")
+    assert "the read would never end" in kiks("run", str(program)).stderr
+
+
+def test_live_thinking_is_recorded_and_replayed(tmp_path: Path) -> None:
+    times = tmp_path / "times.txt"
+    live = kiks("run", "--thinking", "live", "--save-thinking", str(times), WANDER)
+    assert "not repeatable" in live.stderr
+    replays = [kiks("run", "--thinking", f"replay:{times}", WANDER) for _ in range(2)]
+    assert replays[0].stdout == replays[1].stdout == live.stdout
+    assert state_of(replays[0].stderr) == state_of(replays[1].stderr)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("run", "nowhere.py"), "PROGRAM must be a Python file, but there is no file 'nowhere.py'"),
+        (("run", "--map", "ttyS0", WANDER), "--map must be a port's name, = and a robot's number"),
+        (("run", "--map", "ttyS0=4", WANDER), "This simulation has robot 1"),
+        (("run", "--thinking", "slow", WANDER), "thinking must be 'none'"),
+        (("run", "--robot", "kephera", WANDER), "Did you mean 'khepera'"),
+        (("run", "--turret", "grippr", WANDER), "Did you mean 'gripper'"),
+        (("run", "--turret", "gripper=2", WANDER), "a robot's number from 1 to 1, but it was"),
+        (("run", "--turret", "gripper=x", WANDER), "--turret must be a turret, or one with = and a robot's number"),
+        (("demo", "--arena", "nowhere.png"), "nowhere.png"),
+        (
+            ("demo", "--seconds", "2", "--picture", "/no/folder/x.png"),
+            "a picture must go to a file that can be written",
+        ),
+        (("demo", "--seconds", "2", "--baud", "3"), "baudrate must be a whole number from 75"),
+    ],
+)
+def test_mistakes_end_in_one_clear_line(arguments: tuple[str, ...], words: str, tmp_path: Path) -> None:
+    result = kiks(*arguments, cwd=tmp_path)
+    assert result.returncode == 2, result.stdout + result.stderr
+    assert words in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+NO_RESULTS = {
+    ("run", "program"),
+    ("accuracy", "data"),
+    ("fit", "data"),
+    ("desk", "folder"),
+    ("drive", "champion"),
+    ("info", "file"),
+    ("serve", "link"),
+    ("session", "listen"),
+}
+"""Paths that are read, and those that are written when a command begins."""
+
+RESULTS = {
+    ("demo", "picture"): ("demo", "--picture", "PLACE"),
+    ("run", "save_thinking"): ("run", "--save-thinking", "PLACE", WANDER),
+    ("run", "picture"): ("run", "--picture", "PLACE", WANDER),
+    ("run", "csv"): ("run", "--csv", "PLACE", WANDER),
+    ("accuracy", "page"): ("accuracy", "--page", "PLACE"),
+    ("accuracy", "plots"): ("accuracy", "--plots", "PLACE"),
+    ("fit", "robot"): ("fit", "--robot", "PLACE"),
+    ("fit", "out"): ("fit", "--out", "PLACE"),
+    ("fit", "plots"): ("fit", "--plots", "PLACE"),
+    ("calibrate", "out"): ("calibrate", "--port", "kiks://1", "--out", "PLACE"),
+    ("monitor", "csv"): ("monitor", "--port", "kiks://1", "--csv", "PLACE"),
+    ("evolve", "out"): ("evolve", "--out", "PLACE"),
+    ("maze", "out"): ("arena", "maze", "PLACE"),
+    ("new", "out"): ("arena", "new", "--width-mm", "200", "--height-mm", "200", "PLACE"),
+}
+"""Paths that are written, and how a command is asked to."""
+
+
+def test_every_path_is_known_as_a_result_or_not() -> None:
+    groups = [app, *(each.typer_instance for each in app.registered_groups)]
+    callbacks = [command.callback for group in groups if group for command in group.registered_commands]
+    paths = {
+        (callback.__name__, name)
+        for callback in callbacks
+        if callback is not None
+        for name, kind in get_type_hints(callback).items()
+        if Path in (kind, *get_args(kind))
+    }
+    assert paths == NO_RESULTS | set(RESULTS)
+
+
+@pytest.mark.parametrize("words", RESULTS.values())
+def test_a_result_s_place_is_checked_before_the_run(words: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    def begin() -> None:
+        raise AssertionError("the run has begun")
+
+    for name in ("run", "demo", "accuracy", "calibrate", "monitor", "evolve", "engine_start"):
+        for word in ("ready_engine", "ready_batch"):
+            monkeypatch.setattr(sys.modules[f"kiks.cli.{name}"], word, begin, raising=False)
+    for place in ("/proc/none/x.png", "/dev/null/x.png"):
+        with pytest.raises(ParameterError, match=r"must go to a (file|folder) that can be written"):
+            app([place if word == "PLACE" else word for word in words], standalone_mode=False)

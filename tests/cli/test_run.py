@@ -1,0 +1,350 @@
+"""`kiks run`: a project runs like a program, and a run leaves a picture, a table, and a line for each robot."""
+
+from __future__ import annotations
+
+import csv
+import os
+import pty
+import re
+import subprocess
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from tests.cli.test_cli import KIKS, kiks, state_of
+from tests.served import GUARD_S, PROGRAMS, fresh
+
+from kiks.cli.record import COLUMNS, recorded, tell_run
+from kiks.errors import ParameterError
+from kiks.ports.program_process import Labels
+from kiks.sim.simulation import Simulation
+
+DRIVE = str(PROGRAMS / "drive.py")
+
+ASKS = """
+import serial, sys
+port = serial.Serial('COM1', timeout=1)
+for order in (b'B\\n', b'T,1,B\\n', b'D,5,5\\n'):
+    port.write(order)
+    print(*sys.argv[1:], port.readline().decode().strip())
+import time
+time.sleep(1)
+"""
+
+PROJECT = """
+kiks = 1
+seed = 5
+thinking = "fixed:1"
+
+[[robot]]
+turrets = ["gripper"]
+
+[[robot]]
+kind = "khepera_ii"
+program = "teacher.py"
+arguments = ["teacher"]
+
+[[start]]
+at_mm = [100.0, 150.0]
+heading_deg = 90.0
+
+[[start]]
+at_mm = [300.0, 150.0]
+
+[walls]
+size_mm = [400, 300]
+wall_mm = 10
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "exercise.kiks").write_text(PROJECT)
+    (tmp_path / "teacher.py").write_text(ASKS)
+    (tmp_path / "student.py").write_text(ASKS)
+    return tmp_path
+
+
+# ---- projects ----
+
+
+@pytest.mark.slow
+def test_a_project_starts_its_programs(folder: Path) -> None:
+    result = kiks("run", "exercise.kiks", "--csv", "rows.csv", cwd=folder)
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.splitlines() == [
+        "teacher b,6.01,6.01",
+        "teacher z,Turret order not supported",
+        "teacher d",
+    ]
+    assert "seed 5, state" in result.stderr
+    rows = list(csv.DictReader((folder / "rows.csv").read_text().splitlines()))
+    assert [(row["x_mm"], row["y_mm"], row["heading_deg"]) for row in rows[:2]] == [
+        ("100.000", "150.000", "90.000"),
+        ("300.000", "150.000", "90.000"),
+    ]
+    assert float(rows[-2]["driven_mm"]) == 0 < float(rows[-1]["driven_mm"])
+
+
+@pytest.mark.slow
+def test_programs_behind_a_project_take_the_place_of_its_own_from_robot_1_on(folder: Path) -> None:
+    both = kiks("run", "exercise.kiks", "--seed", "6", "student.py", "--fast", cwd=folder)
+    assert sorted(both.stdout.splitlines()) == [
+        "1 student.py | --fast b,5.02,5.01",
+        "1 student.py | --fast d",
+        "1 student.py | --fast t,1,b,1,0",
+        "2 teacher.py | teacher b,6.01,6.01",
+        "2 teacher.py | teacher d",
+        "2 teacher.py | teacher z,Turret order not supported",
+    ], both.stderr
+    assert "seed 6, state" in both.stderr
+    before = kiks("run", "--seed", "6", "exercise.kiks", "student.py", "--fast", cwd=folder)
+    assert state_of(before.stderr) == state_of(both.stderr)
+    one = kiks("run", "exercise.kiks", "--robots", "1", "student.py", cwd=folder)
+    assert one.stdout.splitlines() == ["b,5.02,5.01", "t,1,b,1,0", "d"]
+    assert "robot 2" not in one.stderr
+
+
+@pytest.mark.slow
+def test_a_project_as_an_arena_brings_its_robots_and_says_that_its_programs_stay_behind(folder: Path) -> None:
+    result = kiks("run", "--arena", "exercise.kiks", "--turret", "gripper", "student.py", cwd=folder)
+    assert result.stdout.splitlines() == ["b,5.02,5.01", "t,1,b,1,0", "d"]
+    left_out = "kiks: the programs of exercise.kiks are left out. kiks run exercise.kiks starts them, too."
+    assert left_out in result.stderr
+    assert "kiks: robot 2: 0.00 m driven" in result.stderr
+    assert "seed 5, state" in result.stderr
+
+
+@pytest.mark.slow
+def test_an_arena_in_place_of_the_project_s(folder: Path) -> None:
+    (folder / "wide.toml").write_text("size_mm = [900, 900]\nwall_mm = 10\n[[start]]\nat_mm = [800, 800]\n")
+    result = kiks("run", "exercise.kiks", "--arena", "wide.toml", "--csv", "rows.csv", cwd=folder)
+    assert "teacher b,6.01,6.01" in result.stdout, result.stderr
+    assert "\n0.00,1,800.000,800.000," in (folder / "rows.csv").read_text()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (
+            ("exercise.kiks", "--robots", "1"),
+            "a project must name a program for a robot to be run, but",
+        ),
+        (("nowhere.kiks",), "Project file 'nowhere.kiks' must exist"),
+        (("exercise.kiks", "nowhere.py"), "PROGRAM must be a Python file, but there is no file 'nowhere.py'"),
+        (("exercise.kiks", "--robot", "kephera"), "Did you mean 'khepera'"),
+        (("exercise.kiks", "--picture", "run.doc"), "Let it end in .png, .svg or .pdf."),
+        (("champion.toml", "student.py"), "a champion must drive all robots alone, but 'student.py' stands behind it"),
+    ],
+)
+@pytest.mark.slow
+def test_mistakes_end_in_one_clear_line(words: tuple[str, ...], message: str, folder: Path) -> None:
+    result = kiks("run", *words, cwd=folder)
+    assert result.returncode == 2
+    assert message in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+# ---- what a run leaves ----
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [1, 2])
+def test_recording_changes_nothing(count: int, tmp_path: Path) -> None:
+    programs = [DRIVE, "COM1", "40", "7", "6"] * count
+    plain = kiks("run", *programs)
+    kept = kiks("run", "--picture", "run.png", "--csv", "run.csv", *programs, cwd=tmp_path)
+    assert kept.returncode == 0, kept.stderr
+    assert state_of(kept.stderr) == state_of(plain.stderr)
+    assert {path.name for path in tmp_path.iterdir()} == {"run.png", "run.csv"}
+
+
+@pytest.mark.slow
+def test_the_last_lines_are_one_for_each_robot_and_that_of_the_state() -> None:
+    result = kiks("run", "--robots", "2", DRIVE, "COM1", "40", "7", "6")
+    *_, first, second, last = result.stderr.splitlines()
+    assert re.fullmatch(r"kiks: robot 1: 0\.\d\d m driven, 0 contacts, \d+\.\d{3} s", first)
+    assert re.fullmatch(r"kiks: robot 2: 0\.00 m driven, 0 contacts, \d+\.\d{3} s", second)
+    assert re.fullmatch(r"kiks: \d+\.\d{3} s simulated, seed 0, state [0-9a-f]{16}", last)
+
+
+def drive_into_a_wall(sim: Simulation, seconds: float = 3.0) -> None:
+    port = sim.port(1)
+    port.write(b"D,20,20\n")
+    sim.run(seconds)
+
+
+def test_a_contact_is_one_however_long_it_lasts(capsys: pytest.CaptureFixture[str]) -> None:
+    sim = fresh()
+    sim.place(1, 500, 300, 0.0)
+    drive_into_a_wall(sim)
+    tell_run(sim, "it was interrupted")
+    said = capsys.readouterr().err.splitlines()
+    assert re.fullmatch(r"kiks: robot 1: 0\.0\d m driven, 1 contact, 3\.000 s", said[0])
+    assert said[1].endswith("seed 7, not repeatable: it was interrupted")
+
+
+@pytest.mark.parametrize(
+    ("name", "begin"), [("run.png", b"\x89PNG"), ("run.svg", b"<svg "), ("run.PDF", b"%PDF")], ids=str
+)
+def test_pictures_of_each_kind(name: str, begin: bytes, tmp_path: Path) -> None:
+    sim = fresh(2)
+    with recorded(sim, tmp_path / name, None):
+        drive_into_a_wall(sim)
+    data = (tmp_path / name).read_bytes()
+    assert data.startswith(begin)
+    if name == "run.svg":
+        assert data.count(b"<polyline ") > 10
+        assert b">2</text>" in data
+
+
+def test_the_table_says_where_each_robot_was(tmp_path: Path) -> None:
+    sims = [fresh(2), fresh(2)]
+    with recorded(sims[0], None, tmp_path / "run.csv"):
+        drive_into_a_wall(sims[0])
+        assert not (tmp_path / "run.csv").exists()
+    drive_into_a_wall(sims[1])
+    assert sims[0].state_hash() == sims[1].state_hash()
+    head, *rows = csv.reader((tmp_path / "run.csv").read_text().splitlines())
+    assert tuple(head) == COLUMNS
+    assert [row[:2] for row in rows] == [[f"{k / 20:.2f}", robot] for k in range(61) for robot in "12"]
+    x_mm, y_mm, _ = sims[0].pose(1)
+    assert [float(value) for value in rows[-2][2:4]] == pytest.approx([x_mm, y_mm], abs=6e-4)
+    assert rows[-2][5:] == [f"{sims[0].travelled_mm(1):.3f}", str(sims[0].contacts(1))]
+    assert not sims[0].watchers
+
+
+def test_what_was_interrupted_is_kept(tmp_path: Path) -> None:
+    sim = fresh()
+
+    def interrupted() -> None:
+        with recorded(sim, tmp_path / "run.png", tmp_path / "run.csv"):
+            drive_into_a_wall(sim, 0.2)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert (tmp_path / "run.csv").read_text().count("\n") == 6
+    assert (tmp_path / "run.png").exists()
+
+
+def test_a_full_disk_does_not_disturb_the_run_and_is_told_at_its_end() -> None:
+    sim = fresh()
+
+    def record() -> None:
+        with recorded(sim, None, Path("/dev/full")):
+            drive_into_a_wall(sim, 60.0)
+            assert sim.time_s == 60
+
+    with pytest.raises(ParameterError, match=r"--csv must go to a file that can be written, but '/dev/full' cannot"):
+        record()
+
+
+def test_paths_of_a_long_run_are_thinned_out() -> None:
+    sim = fresh()
+    sim.record_paths(0.01, points_max=10)
+    drive_into_a_wall(sim, 5.0)
+    (path,) = sim.paths()
+    steps_s = {round(step, 6) for step in path[1:, 0] - path[:-1, 0]}
+    assert 5 <= len(path) <= 10
+    assert steps_s == {0.64}
+    assert path[0, 0] == 0
+
+
+def test_paths_stay_whole_if_ctrl_c_comes_while_a_point_is_kept() -> None:
+    class Interrupted:
+        def __getitem__(self, _index: int) -> Any:
+            raise KeyboardInterrupt
+
+    sim = fresh()
+    sim.record_paths(0.01)
+    drive_into_a_wall(sim, 0.1)
+    before = sim.paths().tolist()
+    state: Any = SimpleNamespace(tick_count=sim.state.tick_count, robots=sim.state.robots, bodies=Interrupted())
+    with pytest.raises(KeyboardInterrupt):
+        sim.watchers[0].look(state)
+    assert sim.paths().tolist() == before
+
+
+# ---- whose line it is ----
+
+
+@pytest.mark.slow
+def test_each_line_says_which_program_it_is_from(tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text("import sys\nprint('one')\nprint('no end', end='')\nsys.stderr.write('wrong\\n')\n")
+    (tmp_path / "other.py").write_text("import os\nos.write(1, b'\\xff' * 100_000 + b'\\nlast')\n")
+    result = subprocess.run([*KIKS, "run", "a.py", "other.py"], capture_output=True, cwd=tmp_path, check=True)
+    lines = result.stdout.splitlines()
+    assert [line for line in lines if line.startswith(b"1")] == [b"1 a.py     | one", b"1 a.py     | no end"]
+    others = [line.removeprefix(b"2 other.py | ") for line in lines if line.startswith(b"2")]
+    assert (b"".join(others), others[-1]) == (b"\xff" * 100_000 + b"last", b"last")
+    assert len(lines) == 2 + len(others)
+    assert b"1 a.py     | wrong\n" in result.stderr
+
+
+def at_a_terminal(folder: Path, **environment: str) -> str:
+    """Run two programs, one of which asks something, at a terminal; return what stands there at the end."""
+    (folder / "asks.py").write_text("print('got', input('go? '))\n")
+    (folder / "b.py").write_text("print('here')\n")
+    ours, theirs = pty.openpty()
+    command = [*KIKS, "run", "asks.py", "b.py"]
+    surroundings = {**os.environ, "TERM": "xterm", **environment}
+    text = ""
+    with subprocess.Popen(command, stdin=theirs, stdout=theirs, stderr=theirs, cwd=folder, env=surroundings) as process:
+        os.close(theirs)
+        has_answered = False
+        while True:
+            try:
+                text += os.read(ours, 1 << 16).decode()
+            except OSError:  # how Linux says that nobody is at the other end any more
+                break
+            if "go? " in text and not has_answered:
+                has_answered = True
+                os.write(ours, b"yes\n")
+        assert process.wait(GUARD_S) == 0, text
+    os.close(ours)
+    return text.replace("\r\n", "\n")
+
+
+@pytest.mark.slow
+def test_at_a_terminal_labels_are_coloured_and_questions_are_seen(tmp_path: Path) -> None:
+    text = at_a_terminal(tmp_path, NO_COLOR="")
+    assert "\033[36m1 asks.py |\033[0m go? yes\n" in text
+    assert "\033[36m1 asks.py |\033[0m got yes\n" in text
+    assert "\033[33m2 b.py    |\033[0m here\n" in text
+
+
+@pytest.mark.slow
+def test_no_color_is_heeded(tmp_path: Path) -> None:
+    text = at_a_terminal(tmp_path, NO_COLOR="1")
+    assert "1 asks.py | got yes\n" in text
+    assert "\033" not in text
+
+
+@pytest.mark.slow
+def test_a_program_learns_that_nobody_reads_it_any_more(tmp_path: Path) -> None:
+    (tmp_path / "talks.py").write_text("while True: print('more')\n")
+    (tmp_path / "silent.py").write_text("")
+    command = [*KIKS, "run", "talks.py", "silent.py"]
+    pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen(command, cwd=tmp_path, text=True, **pipes) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "1 talks.py  | more\n"
+        process.stdout.close()
+        assert process.stderr is not None
+        said = process.stderr.read()
+        assert process.wait(GUARD_S) == 1
+    assert "1 talks.py  | BrokenPipeError" in said
+
+
+def test_what_kiks_says_begins_a_line_of_its_own(capfd: pytest.CaptureFixture[str]) -> None:
+    labels = Labels(["a.py", "long.py"])
+    voice = labels.voice(1, "a.py")
+    assert not voice.ask(b"unfinished", is_error=False)  # no terminal: it waits until the line is whole
+    labels.write(b"go? ", is_error=True, is_begun=True)
+    labels.say("here I am")
+    voice.take([b"one", b"two"], is_error=False)
+    out, err = capfd.readouterr()
+    assert out == "1 a.py    | one\n1 a.py    | two\n"
+    assert err == "go? \nkiks: here I am\n"

@@ -1,0 +1,266 @@
+"""The gate through which simulated time passes while somebody watches."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+import pytest
+
+import kiks
+from kiks.clock.gate import LAG_NS, SLICE_NS, Gate
+from kiks.clock.pace import Pace
+from kiks.errors import ParameterError
+from kiks.model.arena import Pose
+from kiks.sim.drag import Drags
+
+GUARD_S = 20.0
+
+
+class Wall:
+    """A wall clock that stands still but for what is slept."""
+
+    def __init__(self) -> None:
+        self.now_ns = 0
+
+    def __call__(self) -> int:
+        return self.now_ns
+
+
+class QuickGate(Gate):
+    """A gate that sleeps by its own clock."""
+
+    def __init__(self, lock: threading.RLock, speed: float | None, wall: Wall) -> None:
+        self.wall = wall
+        super().__init__(lock, speed=speed, wall_ns=wall)
+
+    def _sleep(self, seconds: float) -> None:
+        self.wall.now_ns += round(seconds * 1e9) + 1
+
+
+def course(sim: kiks.Simulation) -> str:
+    """Drive for a while, with a program that sleeps, asks and reads."""
+    with kiks.Khepera(sim.port(1)) as robot:
+        robot.set_speed(6, 3)
+        for _ in range(20):
+            robot.proximity()
+            robot.pause(0.05)
+        robot.set_speed(0, 0)
+    return sim.state_hash()
+
+
+@contextmanager
+def driving(sim: kiks.Simulation, seconds: float) -> Iterator[threading.Thread]:
+    """Let a thread move a world."""
+    thread = threading.Thread(target=sim.run, args=(seconds,), daemon=True)
+    thread.start()
+    try:
+        yield thread
+    finally:
+        if sim.gate is not None:
+            sim.gate.close()
+        thread.join(GUARD_S)
+        assert not thread.is_alive()
+
+
+@pytest.mark.parametrize("speed", [None, 1000.0])
+def test_gate_changes_nothing(speed: float | None) -> None:
+    alone, watched = kiks.Simulation(seed=3), kiks.Simulation(seed=3)
+    watched.gate = QuickGate(watched.lock, speed, Wall())
+    looks = 0
+
+    def look() -> None:
+        nonlocal looks
+        looks += 1
+        watched.poses()
+        watched.proximity(1, noise=True)
+
+    watched.gate.keep(look)
+    assert course(watched) == course(alone)
+    assert looks > 100
+    assert watched.now_ns == alone.now_ns
+
+
+def test_time_keeps_the_pace() -> None:
+    wall = Wall()
+    gate = QuickGate(threading.RLock(), 2.0, wall)
+    now_ns = 0
+    while now_ns < 10**9:
+        next_ns = gate.admit(now_ns, 10**9)
+        assert next_ns - now_ns <= 2 * SLICE_NS
+        now_ns = next_ns
+    assert wall.now_ns == pytest.approx(5e8, rel=1e-3)
+
+
+def test_what_a_program_thinks_is_not_made_up_for() -> None:
+    wall = Wall()
+    gate = QuickGate(threading.RLock(), 1.0, wall)
+    now_ns = gate.admit(0, 10**12)
+    wall.now_ns += 100 * LAG_NS
+    begin_ns = wall.now_ns
+    for _ in range(10):
+        now_ns = gate.admit(now_ns, 10**12)
+    assert now_ns == 11 * SLICE_NS
+    assert wall.now_ns - begin_ns == pytest.approx(9 * SLICE_NS, rel=1e-3)
+
+
+def test_pause_step_and_go_on() -> None:
+    sim = kiks.Simulation()
+    gate = sim.gate = Gate(sim.lock, speed=None)
+    gate.pause(sim.now_ns)
+    with driving(sim, 1.0) as thread:
+        for count in range(1, 4):
+            gate.step(0.01)
+            while sim.now_ns < count * 10_000_000:
+                assert thread.is_alive()
+        assert gate.is_paused
+        assert gate.ask(lambda: sim.now_ns).result(GUARD_S) == 30_000_000
+        gate.go_on()
+        thread.join(GUARD_S)
+        assert sim.time_s == 1.0
+
+
+def test_requests_are_done_by_whoever_moves_the_world_or_at_once() -> None:
+    sim = kiks.Simulation()
+    gate = sim.gate = Gate(sim.lock, speed=None)
+    assert gate.ask(lambda: threading.current_thread()).result(0) is threading.current_thread()
+    with pytest.raises(ParameterError, match="robot must be the number"):
+        gate.ask(lambda: sim.pose(2)).result(0)
+    with sim.lock:
+        # Another thread cannot have the lock, so the one that has it does what was asked for.
+        futures = []
+        asking = threading.Thread(target=lambda: futures.append(gate.ask(lambda: threading.current_thread())))
+        asking.start()
+        asking.join(GUARD_S)
+        assert not futures[0].done()
+        sim.run(0.01)
+        assert futures[0].result(0) is threading.current_thread()
+    assert not gate.is_up
+
+
+def test_waiting_is_nobodys_patience() -> None:
+    wall = Wall()
+    gate = QuickGate(threading.RLock(), 0.1, wall)
+    before_ns = gate.wall_ns()
+    patience = gate.patience(1.0)
+    patience.left_s()
+    now_ns = 0
+    while now_ns < 10**8:
+        now_ns = gate.admit(now_ns, 10**8)
+    assert wall.now_ns > 5 * 10**8
+    assert gate.wall_ns() - before_ns < wall.now_ns / 2
+    assert patience.left_s() > 0.5
+
+
+def test_pace_changes_without_a_leap() -> None:
+    wall = Wall()
+    pace = Pace(2.0, wall_ns=wall)
+    pace.start(0)
+    wall.now_ns += 100
+    pace.set_speed(0.5, pace.now_ns())
+    wall.now_ns += 100
+    assert pace.now_ns() == 250
+    pace.hold(250)
+    wall.now_ns += 1000
+    assert pace.now_ns() == 250
+    assert pace.wall_wait_s(300) == float("inf")
+    pace.go_on()
+    wall.now_ns += 100
+    assert pace.now_ns() == 300
+    with pytest.raises(ParameterError, match="speed must be a number from"):
+        pace.set_speed(0, 0)
+
+
+# ---- hands ----
+
+
+def world() -> kiks.Simulation:
+    sim = kiks.Simulation(kiks.Arena.box(600, 400), robots=2, seed=1)
+    sim.place(1, 100, 100, 0)
+    sim.place(2, 300, 100, 0)
+    sim.add_ball(100, 250)
+    sim.add_lamp(50, 350)
+    return sim
+
+
+def test_held_things_slide_and_never_land_in_anything() -> None:
+    sim = world()
+    hands = Drags(sim)
+    hands.grab("a", "robot", 0)
+    hands.move("a", 1000, 1000)
+    x_mm, y_mm, _ = sim.pose(1)
+    assert x_mm == pytest.approx(600 - 10 - 27.5, abs=1.5)
+    assert y_mm == pytest.approx(400 - 10 - 27.5, abs=1.5)
+    hands.move("a", 300, 100)
+    x_mm, y_mm, _ = sim.pose(1)
+    assert ((x_mm - 300) ** 2 + (y_mm - 100) ** 2) ** 0.5 == pytest.approx(55, abs=0.6)
+    hands.turn("a", 1.5)
+    assert sim.pose(1)[2] == 1.5
+    hands.drop("a")
+    hands.move("a", 100, 100)
+    assert sim.pose(1)[:2] == (x_mm, y_mm)
+
+
+def test_what_has_gone_is_held_no_longer() -> None:
+    sim = world()
+    hands = Drags(sim)
+    hands.grab("a", "body", len(sim.bodies()) - 1)
+    sim.remove_body(len(sim.bodies()))
+    hands.move("a", 100, 100)
+    assert hands.are_empty
+
+
+def test_two_hands_and_all_kinds_of_things() -> None:
+    sim = world()
+    hands = Drags(sim)
+    hands.grab("a", "body", 0)
+    hands.grab("b", "lamp", 0)
+    hands.move("a", 200, 300)
+    hands.move("b", 5000, -3)
+    assert (sim.bodies()["x_mm"][0], sim.bodies()["y_mm"][0]) == (200, 300)
+    assert sim.lamps[0, :2].tolist() == [600, 0]
+    with pytest.raises(ParameterError, match="one hand must let go"):
+        hands.grab("b", "body", 0)
+    assert not hands.holds("lamp", 0)
+    for what, index in (("robot", 2), ("robot", -1), ("floor", 0), ("lamp", True + 1)):
+        with pytest.raises(ParameterError, match="a hand must take one of"):
+            hands.grab("a", what, index)
+    assert hands.are_empty
+
+
+def test_held_robot_stays_though_its_wheels_turn() -> None:
+    sim = world()
+    gate = sim.gate = Gate(sim.lock, speed=None)
+    hands = Drags(sim)
+    hands.grab("a", "robot", 0)
+    gate.keep(hands.keep)
+    robot = kiks.Khepera(sim.port(1))
+    robot.set_speed(20, 20)
+    sim.run(1.0)
+    gate.ask(lambda: None).result(0)
+    assert sim.pose(1) == (100, 100, 0)
+    assert sim.travelled_mm(1) > 100
+    sim.remove_body(1)
+    gate.leave(hands.keep)
+    hands.drop("a")
+    sim.run(0.5)
+    assert sim.pose(1)[0] > 150
+
+
+def test_others_may_press_upon_what_is_held() -> None:
+    starts = (Pose(200, 38, 0), Pose(140, 38, 0), Pose(260, 38, math.pi), Pose(200, 100, -math.pi / 2))
+    sim = kiks.Simulation(replace(kiks.Arena.box(400, 400), starts=starts), robots=4, seed=1)
+    for robot in range(1, 5):
+        kiks.Khepera(sim.port(robot)).set_speed(20, 20)
+    gate = sim.gate = Gate(sim.lock, speed=None)
+    hands = Drags(sim)
+    hands.grab("a", "robot", 0)
+    gate.keep(hands.keep)
+    for step in range(100):
+        hands.move("a", 200 + step, 38)
+        hands.turn("a", step / 10)
+        sim.run(0.05)
+    assert abs(sim.pose(1)[1] - 38) < 60

@@ -1,0 +1,309 @@
+"""Who may come to the desk."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import re
+import socket
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from kiks.desk.server.access import BODY_LIMIT, AccessControl
+from kiks.desk.server.token import Token, user_of
+
+TOKEN = "a-secret"
+COOKIE = "kiks_token=a-secret"
+
+
+async def app(scope: Any, receive: Any, send: Any) -> None:
+    while (message := await receive())["type"] == "http.request" and message.get("more_body"):
+        pass
+    if message["type"] == "http.disconnect":
+        return
+    if scope["type"] == "websocket":
+        await send({"type": "websocket.accept"})
+        return
+    await send({"type": "http.response.start", "status": 200, "headers": []})
+    await send({"type": "http.response.body", "body": b"welcome"})
+
+
+def come(
+    *,
+    kind: str = "http",
+    method: str = "GET",
+    path: str = "/desk/1",
+    query: bytes = b"",
+    body: list[bytes] | None = None,
+    is_local: bool = True,
+    application: Any = app,
+    key: Token | None = None,
+    ends: tuple[Any, Any] | None = None,
+    headers: list[tuple[bytes, bytes]] | None = None,
+    **named: str,
+) -> list[dict[str, Any]]:
+    """Return what is answered to a request with these headers."""
+    pieces = list(body or [b""])
+    sent: list[dict[str, Any]] = []
+
+    async def receive() -> dict[str, Any]:
+        if kind == "websocket":
+            return {"type": "websocket.connect"}
+        piece = pieces.pop(0)
+        return {"type": "http.request", "body": piece, "more_body": bool(pieces)}
+
+    async def send(message: Any) -> None:
+        sent.append(message)
+
+    given = {"host": "127.0.0.1:8123", **{name.replace("_", "-"): value for name, value in named.items()}}
+    scope = {
+        "type": kind,
+        "method": method,
+        "path": path,
+        "query_string": query,
+        "headers": headers or [(name.encode(), value.encode("utf-8")) for name, value in given.items()],
+    }
+    if ends is not None:
+        scope["client"], scope["server"] = ends
+    asyncio.run(AccessControl(application, key or Token(TOKEN), is_local=is_local)(scope, receive, send))
+    return sent
+
+
+def status(answers: list[dict[str, Any]]) -> int:
+    first = answers[0]
+    return 403 if first["type"] == "websocket.close" else first.get("status", 101)
+
+
+def page(answers: list[dict[str, Any]]) -> str:
+    return str(answers[1]["body"].decode())
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1:8123", "localhost:8123", "[::1]:8123", "localhost"])
+@pytest.mark.parametrize("kind", ["http", "websocket"])
+def test_a_browser_with_the_token_may_come(kind: str, host: str) -> None:
+    welcome = 200 if kind == "http" else 101
+    assert status(come(kind=kind, host=host, cookie=COOKIE)) == welcome
+    assert status(come(kind=kind, host=host, cookie=COOKIE, origin=f"http://{host}")) == welcome
+    # Other programs of this computer have cookies in the same jar, of any form.
+    assert status(come(kind=kind, host=host, cookie=f'a={{"b": [1; 2]}}; x; =; {COOKIE}; c="')) == welcome
+
+
+def test_only_pages_of_this_computer_may_show_it_within_theirs() -> None:
+    policy = dict(come(cookie=COOKIE)[0]["headers"])[b"content-security-policy"]
+    assert policy.startswith(b"frame-ancestors 'self' http://localhost:*")
+    assert b" *" not in policy.replace(b":*", b"")
+
+
+@pytest.mark.parametrize("kind", ["http", "websocket"])
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"origin": "http://evil.example"},
+        {"origin": "null"},
+        {"origin": ""},
+        {"origin": "http://127.0.0.1:9999"},
+        {"host": "evil.example:8123"},
+        {"host": "evil.example:8123", "origin": "http://evil.example:8123"},
+        {"host": ""},
+    ],
+)
+def test_a_page_of_another_site_may_not_even_with_the_token(kind: str, headers: dict[str, str]) -> None:
+    assert status(come(kind=kind, cookie=COOKIE, **headers)) == 403
+    assert status(come(kind=kind, query=b"token=a-secret", **headers)) == 403
+
+
+@pytest.mark.parametrize("is_local", [True, False])
+@pytest.mark.parametrize("kind", ["http", "websocket"])
+@pytest.mark.parametrize(
+    "cookie",
+    ["", "kiks_token=", "kiks_token=wrong", "other=a-secret", "kiks_token=a-secre", "\x80", "kiks_token=\u20ac"],
+)
+def test_without_the_token_nobody_may(kind: str, cookie: str, is_local: bool) -> None:
+    headers = {"cookie": cookie} if cookie else {}
+    for query in (b"", b"token=", b"token=wrong", b"token=%E2%82%AC", b"ticket=", b"ticket=a-secret"):
+        answers = come(kind=kind, query=query, is_local=is_local, **headers)
+        assert status(answers) == 403
+        assert all(TOKEN not in str(answer) for answer in answers)
+    assert status(come(kind="websocket", query=b"token=a-secret", is_local=is_local, **headers)) == 403
+
+
+def test_refused_page_says_what_to_do() -> None:
+    answers = come()
+    assert "must be opened with its token" in page(answers)
+    assert "Open the whole address that KiKS printed" in page(answers)
+    assert "<script" not in page(come(path="/<script>alert(1)</script>\x01", host="<script>"))
+
+
+def test_token_becomes_a_cookie_and_leaves_the_address() -> None:
+    answers = come(query=b"token=a-secret&x=1", host="robots.example:8123", is_local=False)
+    headers = dict(answers[0]["headers"])
+    assert answers[0]["status"] == 303
+    assert headers[b"location"] == b"/desk/1?x=1"
+    assert headers[b"set-cookie"] == b"kiks_token=a-secret; Path=/; HttpOnly; SameSite=Strict"
+    assert status(come(host="robots.example:8123", cookie="a=b; kiks_token=a-secret", is_local=False)) == 200
+
+
+def test_a_notebook_of_another_site_has_a_cookie_of_its_own() -> None:
+    within = {"sec_fetch_site": "cross-site", "sec_fetch_dest": "iframe"}
+    cookie = dict(come(query=b"token=a-secret", **within)[0]["headers"])[b"set-cookie"]
+    assert cookie.endswith(b"HttpOnly; SameSite=None; Secure; Partitioned")
+    assert status(come(**within)) == 403
+
+
+@given(path=st.text(max_size=30).map(lambda text: f"/{text}"), query=st.binary(max_size=30))
+def test_the_way_to_the_cookie_leads_to_the_desk(path: str, query: bytes) -> None:
+    answers = come(path=path, query=b"token=a-secret&" + query)
+    if status(answers) == 303:
+        location = dict(answers[0]["headers"])[b"location"]
+        assert re.fullmatch(rb"/([!-.0-~][!-~]*)?", location)
+        assert TOKEN.encode() not in location or b"token" in query or "secret" in path
+    else:
+        assert status(answers) in (400, 403)
+
+
+RAW = st.one_of(
+    st.binary(max_size=40),
+    st.sampled_from(
+        [
+            b"http://[",
+            b"http://[::1",
+            b"//",
+            b"http://a]b",
+            b"http://127.0.0.1:99999999",
+            b"\r\nx: y",
+            b"kiks_token=\xff",
+        ]
+    ),
+)
+
+
+@given(
+    kind=st.sampled_from(["http", "websocket"]),
+    path=st.text(max_size=20).map(lambda text: f"/{text}"),
+    query=st.binary(max_size=20),
+    headers=st.lists(
+        st.tuples(st.sampled_from([b"host", b"origin", b"cookie", b"content-length", b"sec-fetch-site", b"x"]), RAW),
+        min_size=1,
+        max_size=6,
+    ),
+    is_local=st.booleans(),
+)
+def test_whatever_a_stranger_sends_is_answered_and_lets_nobody_in(
+    kind: str, path: str, query: bytes, headers: list[tuple[bytes, bytes]], is_local: bool
+) -> None:
+    async def inside(scope: Any, receive: Any, send: Any) -> None:
+        raise AssertionError("a stranger is in")
+
+    answers = come(kind=kind, path=path, query=query, headers=headers, is_local=is_local, application=inside)
+    assert status(answers) in (400, 403, 413)
+
+
+@pytest.mark.parametrize("origin", ["http://[", "http://[::1", "http://a]b"])
+def test_an_origin_that_is_none_is_a_bad_request(origin: str) -> None:
+    assert status(come(origin=origin, cookie=COOKIE)) == 400
+
+
+def test_a_path_with_the_end_of_a_line_is_a_bad_request() -> None:
+    assert status(come(path="/desk/1\r\nset-cookie: a=b", query=b"token=a-secret")) == 400
+
+
+# ---- too much, and what fails ----
+
+
+@pytest.mark.parametrize("length", [str(BODY_LIMIT + 1), "9" * 30, "-1", "x"])
+def test_what_is_announced_too_large_is_refused(length: str) -> None:
+    assert status(come(method="POST", content_length=length, cookie=COOKIE)) == 413
+
+
+def test_what_is_too_large_is_cut_off() -> None:
+    piece = b"x" * (1 << 20)
+    assert status(come(body=[piece] * (BODY_LIMIT >> 20), cookie=COOKIE)) == 200
+    assert status(come(body=[piece] * ((BODY_LIMIT >> 20) + 1), cookie=COOKIE)) == 413
+
+
+@pytest.mark.parametrize("kind", ["http", "websocket"])
+def test_what_fails_inside_is_a_line(kind: str, caplog: pytest.LogCaptureFixture) -> None:
+    async def fails(scope: Any, receive: Any, send: Any) -> None:
+        await receive()
+        raise KeyError("x" * 1000)
+
+    answers = come(kind=kind, application=fails, cookie=COOKIE)
+    assert answers[0].get("status", 500) == 500
+    (said,) = [record for record in caplog.records if record.levelno >= logging.WARNING]
+    assert said.getMessage().startswith("The desk: It could not answer '/desk/1': KeyError(")
+    assert len(said.getMessage()) < 250
+    assert said.exc_info is None
+
+
+def test_an_upload_that_is_none_is_a_bad_request() -> None:
+    async def stumbles(scope: Any, receive: Any, send: Any) -> None:
+        await send({"type": "http.response.start", "status": 500, "headers": []})
+        raise AttributeError("'str' object has no attribute 'filename'")
+
+    assert status(come(method="POST", application=stumbles, cookie=COOKIE)) == 400
+
+
+def test_a_client_that_has_left_is_answered_nothing(caplog: pytest.LogCaptureFixture) -> None:
+    async def fails(scope: Any, receive: Any, send: Any) -> None:
+        await receive()
+        raise RuntimeError("No response returned.")
+
+    async def receive() -> dict[str, Any]:
+        return {"type": "http.disconnect"}
+
+    async def send(message: Any) -> None:
+        raise AssertionError(message)
+
+    headers = [(b"host", b"localhost"), (b"cookie", COOKIE.encode())]
+    scope = {"type": "http", "method": "GET", "path": "/", "headers": headers}
+    asyncio.run(AccessControl(fails, Token(TOKEN))(scope, receive, send))
+    assert not caplog.records
+
+
+# ---- tickets ----
+
+
+@pytest.fixture(params=["127.0.0.1", "::1"])
+def ends(request: pytest.FixtureRequest) -> Any:
+    """Two ends of a connection on this computer: the browser's address, and the desk's."""
+    family = socket.AF_INET6 if ":" in request.param else socket.AF_INET
+    try:
+        listener = socket.create_server((request.param, 0), family=family)
+    except OSError:
+        pytest.skip(f"this computer has no {request.param}")
+    with listener, socket.create_connection(listener.getsockname()[:2]) as client:
+        yield client.getsockname()[:2], listener.getsockname()[:2]
+
+
+def test_a_ticket_opens_once_and_to_this_user_alone(ends: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    key = Token(TOKEN)
+    ticket = key.new_ticket()
+    query = f"ticket={ticket}".encode()
+    nowhere = (ends[0][0], 1), ends[1]
+    assert status(come(query=query, key=key)) == 403
+    assert status(come(query=query, key=key, ends=nowhere)) == 403
+    mine = os.getuid()
+    monkeypatch.setattr(os, "getuid", lambda: mine + 1)
+    monkeypatch.setattr("kiks.desk.server.token.user_of", lambda client, server: mine + 2)
+    assert status(come(query=query, key=key, ends=ends)) == 403
+    monkeypatch.undo()
+    answers = come(query=query, key=key, ends=ends)
+    assert status(answers) == 303
+    headers = dict(answers[0]["headers"])
+    assert headers[b"location"] == b"/desk/1"
+    assert headers[b"set-cookie"].startswith(f"kiks_token_{ends[1][1]}=a-secret;".encode())
+    assert status(come(query=query, key=key, ends=ends)) == 403
+    assert status(come(key=key, ends=ends, cookie=f"kiks_token_{ends[1][1]}=a-secret")) == 200
+
+
+def test_the_user_of_a_connection_is_known(ends: Any) -> None:
+    client, server = ends
+    assert user_of(client, server) == os.getuid()
+    assert user_of(server, client) is not None
+    assert user_of((client[0], 1), server) is None
+    assert user_of(("192.0.2.1", client[1]), server) is None
+    assert user_of(("no address", 1), server) is None

@@ -1,0 +1,330 @@
+"""What comes over the wire to the desk's server: bytes that are no request, too many strangers, sockets misused."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import logging
+import random
+import socket
+from collections.abc import Iterator
+from contextlib import suppress
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+
+import kiks
+from kiks.desk.server import connection_limit
+from kiks.desk.server.access import BODY_LIMIT
+from kiks.desk.server.server import MESSAGE_LIMIT, SERVER
+from kiks.desk.server.show import Shown, show
+from kiks.desk.server.token import COOKIE
+
+GUARD_S = 20.0
+
+
+@pytest.fixture
+def shown() -> Iterator[Shown]:
+    shown = show(kiks.Simulation(kiks.Arena.box(300, 300)), port=0, browser=False)
+    yield shown
+    shown.close()
+
+
+@pytest.fixture
+def said(caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]) -> Iterator[list[str]]:
+    """What is told to a person; it must never be a traceback."""
+    lines: list[str] = []
+    yield lines
+    lines += [record.getMessage() for record in caplog.records if record.levelno >= logging.WARNING]
+    assert not [record for record in caplog.records if record.levelno >= logging.WARNING and record.exc_info]
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def door_of(shown: Shown) -> tuple[str, int, str]:
+    """Return where the server is, and the header with the token."""
+    url = urlsplit(shown.url)
+    assert url.hostname is not None
+    assert url.port is not None
+    return url.hostname, url.port, f"{COOKIE}_{url.port}={SERVER.key.token}"
+
+
+def knock(shown: Shown, data: bytes) -> bytes:
+    """Send bytes and nothing more; return all that is answered."""
+    host, port, _ = door_of(shown)
+    with socket.create_connection((host, port), timeout=GUARD_S) as stranger:
+        with suppress(OSError):
+            stranger.sendall(data)
+            stranger.shutdown(socket.SHUT_WR)
+        answer = b""
+        with suppress(ConnectionError):
+            while piece := stranger.recv(1 << 16):
+                answer += piece
+    return answer
+
+
+def ask(shown: Shown, method: str, path: str, body: bytes | None = None, **headers: str) -> tuple[int, bytes]:
+    """Return what a browser with the token is answered: the status and the page."""
+    host, port, cookie = door_of(shown)
+    asking = http.client.HTTPConnection(host, port, timeout=GUARD_S)
+    asking.request(method, path, body, {"Cookie": cookie, **headers})
+    answer = asking.getresponse()
+    page = answer.read()
+    asking.close()
+    return answer.status, page
+
+
+def is_well(shown: Shown) -> bool:
+    """Say whether a browser with the token gets its page."""
+    status, page = ask(shown, "GET", urlsplit(shown.url).path)
+    return status == 200 and b"KiKS" in page
+
+
+NO_REQUESTS = [
+    b"",
+    b"\0" * 1000,
+    b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03" + b"\xaa" * 100,
+    b"D,10,10\n",
+    b"GET\r\n\r\n",
+    b"GET / HTTP/9.9\r\n\r\n",
+    b"GET / HTTP/1.1\r\n\r\n",
+    b"GET / HTTP/1.1\r\nHost: a\r\nHost: b\r\n\r\n",
+    b"GET /\x00\xff HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n",
+    b"GET /%0d%0aset-cookie:%20a=b HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n",
+    b"GET //evil.example/%2e%2e HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n",
+    b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nOrigin: http://[\r\n\r\n",
+    b"GET / HTTP/1.1\r\nHost: [\r\n\r\n",
+    b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nCookie: \xff\xfe;;;=;\r\n\r\n",
+    b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 99999999999999999999\r\n\r\n",
+    b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: -1\r\n\r\n",
+    b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nTransfer-Encoding: chunked\r\n\r\nFFFFFFFFFFFFFFFFFF\r\n",
+    b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n" + b"x: y\r\n" * 100_000,
+    b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nx: " + b"y" * 1_000_000,
+    b"GET /" + b"a" * 1_000_000 + b" HTTP/1.1\r\n\r\n",
+    b"GET /_nicegui_ws/socket.io/?EIO=4&transport=polling HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n",
+    b"GET /desk/1/feed HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n\r\n",
+    b"GET /desk/1/feed HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: h2c\r\nConnection: Upgrade\r\n\r\n",
+]
+
+
+def test_what_is_no_request_is_refused_and_nothing_else(shown: Shown, said: list[str]) -> None:
+    chance = random.Random(1)
+    whole = b"GET /desk/1?x=1 HTTP/1.1\r\nHost: 127.0.0.1\r\nOrigin: http://127.0.0.1\r\nCookie: a=b\r\n\r\n"
+    spoilt = []
+    for _ in range(200):
+        data = bytearray(whole)
+        for _ in range(chance.randrange(1, 5)):
+            data[chance.randrange(len(data))] = chance.randrange(256)
+        spoilt.append(bytes(data))
+    for data in NO_REQUESTS + spoilt:
+        answer = knock(shown, data)
+        assert answer == b"" or answer.split(b" ", 2)[1] in (b"400", b"403", b"413", b"426", b"431"), data[:200]
+        assert SERVER.key.token.encode() not in answer
+    assert is_well(shown)
+    assert not said
+
+
+def test_strangers_who_say_nothing_keep_nobody_out(shown: Shown, said: list[str]) -> None:
+    host, port, _ = door_of(shown)
+    idle = [socket.create_connection((host, port), timeout=GUARD_S) for _ in range(3 * connection_limit.STRANGERS_MAX)]
+    for half in idle[::2]:
+        with suppress(OSError):
+            half.sendall(b"GET / HTTP/1.1\r\n")
+    assert is_well(shown)
+    # The first to come are the first to go.
+    for early in idle[: connection_limit.STRANGERS_MAX]:
+        with suppress(ConnectionError):
+            assert early.recv(1) == b""
+    for each in idle:
+        each.close()
+    assert is_well(shown)
+
+
+def test_a_stranger_has_little_time(shown: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connection_limit, "STRANGER_S", 0.0)
+    host, port, _ = door_of(shown)
+    with socket.create_connection((host, port), timeout=GUARD_S) as stranger, suppress(ConnectionError):
+        assert stranger.recv(1) == b""
+
+
+def test_a_browser_that_is_in_may_take_its_time(shown: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
+    host, port, cookie = door_of(shown)
+    path = urlsplit(shown.url).path
+    with connect(f"ws://{host}:{port}{path}/feed", additional_headers={"Cookie": cookie}, open_timeout=GUARD_S) as feed:
+        idle = [
+            socket.create_connection((host, port), timeout=GUARD_S) for _ in range(2 * connection_limit.STRANGERS_MAX)
+        ]
+        for _ in range(5):
+            while not isinstance(feed.recv(GUARD_S), bytes):
+                pass
+            feed.send('{"kind": "ack"}')
+        for each in idle:
+            each.close()
+
+
+# ---- a browser that is in, and misbehaves ----
+
+
+@pytest.mark.parametrize(
+    "frames",
+    [
+        b"\x81\x84\0\0\0\0\xff\xfe\xff\xfe",  # a text that is none
+        b"\x82\x81\0\0\0\0x",  # bytes, not a text
+        b"\x81\x01x",  # not masked
+        b"\xf1\x80\0\0\0\0",  # bits that mean nothing
+        b"\x83\x80\0\0\0\0",  # an opcode that is none
+        b"\x89\xfe\xff\xff\0\0\0\0",  # a ping that is too long
+        b"\x80\x80\0\0\0\0",  # goes on where nothing began
+        b"\x81\xff" + (MESSAGE_LIMIT + 1).to_bytes(8, "big") + b"\0\0\0\0",  # too long
+        b"\x81\xff\xff\xff\xff\xff\xff\xff\xff\xff\0\0\0\0",
+        b"\x88\x81\0\0\0\0x",  # a close that is half
+        b"\x88\x82\0\0\0\0\xff\xff",
+        bytes(range(256)),
+    ],
+)
+@pytest.mark.parametrize("which", ["feed", "socket.io"])
+def test_frames_that_are_none_end_their_socket(shown: Shown, said: list[str], which: str, frames: bytes) -> None:
+    host, port, cookie = door_of(shown)
+    path = f"{urlsplit(shown.url).path}/feed"
+    path = path if which == "feed" else "/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
+    with connect(f"ws://{host}:{port}{path}", additional_headers={"Cookie": cookie}, open_timeout=GUARD_S) as client:
+        client.socket.sendall(frames)
+        # Below the library: it would object itself.
+        with suppress(OSError):
+            client.socket.shutdown(socket.SHUT_WR)
+        with suppress(Exception):
+            while client.recv(GUARD_S):
+                pass
+    assert is_well(shown)
+    assert not said
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        *(
+            "",
+            "9",
+            "4",
+            "42",
+            "42[]",
+            "42{}",
+            "42[1]",
+            "42[null]",
+            '42["event"]',
+            '42["event",1]',
+            '42["event",{}]',
+            "44",
+        ),
+        *('42["event",{"client_id":[]}]', '42["handshake",{}]', '42["handshake",{"client_id":1,"tab_id":{}}]'),
+        *(
+            '42["javascript_response",{}]',
+            '42["ack",{}]',
+            '42["log",{}]',
+            '42["connect"]',
+            '42["disconnect"]',
+            "451-[]",
+        ),
+        *("42" + "[" * 100_000, '42["event",1e400]', f'42["event",{"9" * 5000}]', "40/nowhere,", "b4AAAA", "41", "1"),
+        *('45999999-["event",{"_placeholder":true,"num":0}]', '42["\\ud800"]', '420["event",{}]', "2probe", "5", "6"),
+    ],
+    ids=lambda text: text[:40],
+)
+def test_events_that_are_none_hurt_nobody(
+    shown: Shown, caplog: pytest.LogCaptureFixture, message: str, said: Any
+) -> None:
+    host, port, cookie = door_of(shown)
+    path = "/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
+    with connect(f"ws://{host}:{port}{path}", additional_headers={"Cookie": cookie}, open_timeout=GUARD_S) as client:
+        client.send("40")
+        client.recv(GUARD_S)
+        client.send(message)
+        with suppress(ConnectionClosed):  # the desk may hang up on it
+            client.send("3")
+    assert is_well(shown)
+
+
+def test_uploads_that_are_none_are_refused(shown: Shown, said: list[str]) -> None:
+    from nicegui import app, ui
+
+    @ui.page("/with-an-upload")
+    def page() -> None:
+        ui.upload()
+
+    ask(shown, "GET", "/with-an-upload")
+    (path,) = {route.path for route in app.routes if "/upload/" in getattr(route, "path", "")}
+    kinds = [
+        ("text/plain", b"x"),
+        ("multipart/form-data", b"x"),
+        ("multipart/form-data; boundary=b", b"x"),
+        ("multipart/form-data; boundary=b", b'--b\r\nContent-Disposition: form-data; name="a"\r\n\r\nx\r\n--b--\r\n'),
+        ("multipart/form-data; boundary=b", b"--b\r\n\r\n\r\n--b--\r\n"),
+        ("multipart/form-data; boundary=" + "b" * 5000, b"--b"),
+        ("\xff", b""),
+    ]
+    for kind, body in kinds:
+        assert ask(shown, "POST", path, body, **{"Content-Type": kind})[0] in (200, 400, 415), (kind, body)
+    assert is_well(shown)
+
+
+def test_a_body_that_is_too_large_is_not_kept(shown: Shown, said: list[str]) -> None:
+    host, port, cookie = door_of(shown)
+    for headers, body in (
+        ({"Content-Length": str(BODY_LIMIT + 1)}, b""),
+        ({"Transfer-Encoding": "chunked"}, b"100000\r\n" + b"x" * 0x100000 + b"\r\n"),
+    ):
+        head = {
+            "Host": f"{host}:{port}",
+            "Cookie": cookie,
+            "Content-Type": "multipart/form-data; boundary=b",
+            **headers,
+        }
+        lines = "".join(f"{name}: {value}\r\n" for name, value in head.items())
+        with socket.create_connection((host, port), timeout=GUARD_S) as client:
+            client.sendall(f"POST /desk/1 HTTP/1.1\r\n{lines}\r\n".encode())
+            with suppress(OSError):
+                for _ in range(BODY_LIMIT // 0x100000 + 2):
+                    if body:
+                        client.sendall(body)
+            with suppress(ConnectionError):
+                assert client.recv(100).split(b" ", 2)[1] in (b"413", b"405")
+    assert is_well(shown)
+
+
+def test_json_of_the_gateway_never_raises(shown: Shown, said: list[str]) -> None:
+    host, port, cookie = door_of(shown)
+    chance = random.Random(2)
+    values: list[Any] = [
+        None,
+        True,
+        "",
+        "robot",
+        -1,
+        0,
+        10**30,
+        1e308,
+        float("nan"),
+        float("inf"),
+        [],
+        {},
+        [[]],
+        "x" * 999,
+    ]
+    names = ["kind", "what", "index", "x_mm", "y_mm", "heading_rad", "count", ""]
+    path = urlsplit(shown.url).path
+    with connect(f"ws://{host}:{port}{path}/feed", additional_headers={"Cookie": cookie}, open_timeout=GUARD_S) as feed:
+        for _ in range(1000):
+            message = {name: chance.choice(values) for name in chance.sample(names, chance.randrange(len(names)))}
+            message["kind"] = chance.choice(["grab", "move", "turn", "drop", "ack"])
+            feed.send(json.dumps(message))
+            if chance.random() < 0.1:
+                feed.send('{"kind": "ack"}')
+            with suppress(TimeoutError):
+                feed.recv(0)
+        feed.send('{"kind": "fly"}')
+        while not (isinstance(heard := feed.recv(GUARD_S), str) and "'fly'" in heard):
+            feed.send('{"kind": "ack"}')
+    assert is_well(shown)
+    assert not said

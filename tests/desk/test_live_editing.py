@@ -1,0 +1,287 @@
+"""Drawing in a living world: what is drawn is there at once, what cannot be changes nothing, and all goes back."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kiks.clock.gate import Gate
+from kiks.desk.server.desk import Desk
+from kiks.desk.server.live_editing import Editing
+from kiks.errors import KiksError, LinkError, ParameterError
+from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
+from kiks.model.project import Project, ProjectRobot
+from kiks.model.sketch_things import SketchRobot
+from kiks.ports.programs import Programs
+from kiks.sim.from_project import simulation_of
+from kiks.sim.simulation import Simulation
+
+
+@pytest.fixture
+def desk(tmp_path: Path) -> Iterator[Desk]:
+    arena = replace(
+        Arena.box(500, 400),
+        starts=(Pose(100, 100, 0.0),),
+        balls=(Ball(300, 300),),
+        cylinders=(Cylinder(400, 100),),
+        lamps=(Lamp(50, 350),),
+    )
+    project = Project(arena, robots=(ProjectRobot(turrets=("k213",), name="Ada"),), seed=4)
+    hosts: list[Programs] = []
+
+    def new_programs(sim: Simulation, _commands: object, gate: Gate) -> Programs:
+        hosts.append(Programs(sim, is_heard=True, new_patience=gate.patience))
+        return hosts[-1]
+
+    sim = simulation_of(project, tmp_path)
+    desk = Desk(sim, project=project, folder=tmp_path, owns_world=True, speed=None, new_programs=new_programs)
+    yield desk
+    desk.close()
+    # Whoever drives a desk closes the hosts of the worlds before; nobody drives this one.
+    for host in hosts[:-1]:
+        host.close()
+
+
+def in_order(desk: Desk, *acts: Callable[[Editing], Awaitable[None]]) -> Editing:
+    async def do() -> Editing:
+        editing = desk.editing
+        for act in acts:
+            await act(editing)
+        return editing
+
+    return asyncio.run(do())
+
+
+def line(editing: Editing) -> Awaitable[None]:
+    return editing.draw(lambda sketch: sketch.line([(200, 10), (200, 200)], width_mm=6))
+
+
+def counts(desk: Desk) -> tuple[int, int, int]:
+    return desk.sim.robot_count, len(desk.sim.bodies()), len(desk.sim.lamps)
+
+
+def test_walls_come_into_the_living_world(desk):
+    sim, scene = desk.sim, desk.scene
+    sim.port(1).write(b"D,5,5\n")
+    sim.run(1.0)
+    time_s, pose = sim.time_s, sim.pose(1)
+    in_order(desk, line)
+    assert desk.sim is sim
+    assert (sim.time_s, sim.pose(1)) == (time_s, pose)
+    assert sim.arena.brightness[100, 200] == 255
+    assert desk.scene > scene
+    sim.run(20.0)
+    assert sim.pose(1)[0] == pytest.approx(197 - 27.5, abs=0.2)
+
+
+def test_steps_go_back_and_forth_in_the_world(desk):
+    sim = desk.sim
+    before = sim.arena.brightness.copy()
+    editing = in_order(desk, line)
+
+    async def do() -> None:
+        await editing.undo()
+        assert np.array_equal(sim.arena.brightness, before)
+        assert editing.can_redo
+        await editing.redo()
+        assert sim.arena.brightness[100, 200] == 255
+        await editing.place(Ball(430, 320))
+        await editing.place(Lamp(20, 20, 2.0))
+        assert counts(desk) == (1, 3, 2)
+        await editing.remove(400, 105)
+        await editing.remove(50, 352)
+        assert counts(desk) == (1, 2, 1)
+        assert sim.lamps.tolist() == [[20, 20, 2.0, 1.0]]
+        assert sorted(sim.bodies()["x_mm"].tolist()) == [300, 430]
+        for _ in range(4):
+            await editing.undo()
+        assert counts(desk) == (1, 2, 1)
+        assert sorted(sim.bodies()["x_mm"].tolist()) == [300, 400]
+        assert sim.lamps.tolist() == [[50, 350, 1.0, 1.0]]
+        for _ in range(9):
+            await editing.redo()
+        assert counts(desk) == (1, 2, 1)
+        assert sorted(sim.bodies()["x_mm"].tolist()) == [300, 430]
+
+    asyncio.run(do())
+
+
+def test_what_cannot_be_changes_nothing(desk):
+    sim = desk.sim
+    editing = desk.editing
+    before, hash_before = sim.arena, sim.state_hash()
+
+    async def refused(act: Awaitable[None], words: str) -> None:
+        with pytest.raises(KiksError, match=words):
+            await act
+        assert sim.arena is before
+        assert sim.state_hash() == hash_before
+        assert not editing.can_undo
+        assert not editing.can_redo
+
+    async def do() -> None:
+        await refused(editing.draw(lambda sketch: sketch.rectangle(90, 90, 110, 110)), "robot 1")
+        await refused(editing.place(Ball(100, 100)), "robot 1")
+        await refused(editing.remove(250, 20), "nothing")
+        await refused(editing.remove(100, 100), "only one")
+        await refused(editing.place(SketchRobot(250, 200, 0.0, "kepera")), "Did you mean")
+
+    asyncio.run(do())
+
+
+def test_the_world_has_the_last_word(desk, monkeypatch):
+    editing = desk.editing
+
+    def refuse(_arena: Arena) -> None:
+        raise ParameterError("no room")
+
+    monkeypatch.setattr(desk.sim, "set_arena", refuse)
+
+    async def do() -> None:
+        with pytest.raises(ParameterError, match="no room"):
+            await line(editing)
+        assert not editing.can_undo
+        assert not editing.can_redo
+        monkeypatch.undo()
+        await line(editing)
+        await editing.undo()
+        monkeypatch.setattr(desk.sim, "set_arena", refuse)
+        with pytest.raises(ParameterError, match="no room"):
+            await editing.redo()
+        assert editing.can_redo
+
+    asyncio.run(do())
+
+
+def test_the_sketch_follows_what_moves(desk):
+
+    async def do() -> None:
+        editing = desk.editing
+        await line(editing)
+        desk.sim.place(1, 400, 300, 0.0)
+        desk.sim.move_body(1, 50, 50)
+        with pytest.raises(KiksError, match="robot 1"):
+            await editing.draw(lambda sketch: sketch.rectangle(390, 290, 410, 310))
+        await editing.draw(lambda sketch: sketch.rectangle(95, 95, 105, 105))
+        assert editing.can_undo
+        await editing.undo()
+        await editing.undo()
+        assert not editing.can_undo
+
+    asyncio.run(do())
+
+
+def test_somebody_else_may_change_the_world(desk):
+
+    async def do() -> None:
+        editing = desk.editing
+        await line(editing)
+        desk.sim.remove_body(1)
+        desk.sim.add_lamp(300, 50)
+        await editing.remove(300, 50)
+        assert counts(desk) == (1, 1, 1)
+        await editing.undo()
+        assert counts(desk) == (1, 1, 2)
+        assert not editing.can_undo
+
+    asyncio.run(do())
+
+
+def test_resets_go_back_to_what_was_drawn(desk):
+
+    async def do() -> None:
+        editing = desk.editing
+        desk.sim.place(1, 400, 300, 0.0)
+        await editing.draw(lambda sketch: sketch.rectangle(50, 50, 150, 150))
+        desk.sim.place(1, 250, 200, 0.0)
+        await desk.reset()
+        assert desk.sim.pose(1)[:2] == (400, 300)
+        await desk.start_over()
+        assert desk.sim.pose(1)[:2] == (400, 300)
+        assert desk.sim.arena.brightness[100, 100] == 255
+
+    asyncio.run(do())
+
+
+def test_another_robot_is_another_world(desk):
+    first = desk.sim
+
+    async def do() -> None:
+        editing = desk.editing
+        await line(editing)
+        await editing.place(SketchRobot(400, 300, 1.0, "khepera_ii"))
+        assert desk.sim is not first
+        assert [spec.name for spec in desk.sim.specs] == ["Khepera", "Khepera II"]
+        assert desk.sim.pose(2) == pytest.approx((400, 300, 1.0), abs=1e-4)
+        assert desk.names() == ["Ada", "2"]
+        await editing.remove(100, 100)
+        assert [spec.name for spec in desk.sim.specs] == ["Khepera II"]
+        await editing.undo()
+        assert desk.names() == ["Ada", "2"]
+        assert len(desk.sim.wires[0].firmware.fitted) == 1
+        await editing.undo()
+        await editing.undo()
+        assert counts(desk) == (1, 2, 1)
+        assert not desk.sim.arena.brightness[100, 200]
+        assert not editing.can_undo
+
+    asyncio.run(do())
+
+
+def test_another_arena_keeps_the_robots(desk):
+
+    async def do() -> None:
+        editing = desk.editing
+        await editing.begin(Arena.maze(columns=3, rows=3))
+        assert desk.sim.arena.name == "maze"
+        assert counts(desk) == (1, 0, 1)
+        assert len(desk.sim.wires[0].firmware.fitted) == 1
+        await editing.draw(lambda sketch: sketch.line([(500, 50)], width_mm=30, brightness=0))
+        await editing.undo()
+        await editing.undo()
+        assert counts(desk) == (1, 2, 1)
+        assert desk.sim.arena.width_mm == 500
+
+    asyncio.run(do())
+
+
+def test_a_world_of_another_program_keeps_its_robots():
+    sim = Simulation(Arena.box(500, 400), robots=2, seed=1)
+    desk = Desk(sim)
+
+    async def do() -> None:
+        editing = desk.editing
+        await line(editing)
+        assert sim.arena.brightness[100, 200] == 255
+        for act in (editing.place(SketchRobot(400, 300)), editing.begin(Arena.box(300, 300))):
+            with pytest.raises(LinkError, match="own"):
+                await act
+            assert editing.can_undo
+            assert desk.sim is sim
+        await editing.undo()
+        assert not sim.arena.brightness[100, 200]
+        assert not editing.can_undo
+
+    try:
+        asyncio.run(do())
+    finally:
+        desk.close()
+
+
+def test_two_people_may_draw_at_once(desk):
+
+    async def do() -> None:
+        editing = desk.editing
+        strokes = [
+            editing.draw(lambda sketch, y=y: sketch.line([(240, y), (260, y)], width_mm=4, brightness=y))
+            for y in range(20, 240, 20)
+        ]
+        await asyncio.gather(*strokes)
+        assert [int(desk.sim.arena.brightness[y, 250]) for y in range(20, 240, 20)] == list(range(20, 240, 20))
+
+    asyncio.run(do())

@@ -1,0 +1,426 @@
+"""Laws of robots, balls and cylinders that push and hit each other. Tolerances: measured, then rounded up."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.piles import DEEPEST_MM, SHOVED_MM, Pile, calm, rush
+
+from kiks.engine.physics import motor
+from kiks.model.arena import Arena
+from kiks.model.arena_objects import Ball, Cylinder, Pose
+from kiks.sim.simulation import Simulation
+
+PULSE_MM = 0.08
+ROBOT_MM, BALL_MM, CYLINDER_MM = 27.5, 32.0, 16.0
+FLOOR = Arena.box(2000, 2000)
+STEADY_S = 0.5
+"""After this long, a motor turns at the speed it was told."""
+
+
+class Company:
+    """A few robots, balls and cylinders on a floor.
+
+    Args:
+        robots: Their poses.
+        balls: Their places, and whatever else `Ball` takes.
+        cylinders: Likewise.
+        arena: The floor; none is near by default.
+    """
+
+    def __init__(self, robots=((1900.0, 1900.0, 0.0),), balls=(), cylinders=(), arena=None, **changes):
+        self.sim = Simulation(
+            replace(
+                arena or FLOOR,
+                starts=tuple(Pose(*robot) for robot in robots),
+                balls=tuple(Ball(*ball) for ball in balls),
+                cylinders=tuple(Cylinder(*cylinder) for cylinder in cylinders),
+            ),
+            robots=len(robots),
+            **changes,
+        )
+
+    def speed(self, robot, left, right=None):
+        self.sim.sync()
+        motor.set_speed(self.sim.state.robots, 0, robot - 1, left, left if right is None else right)
+
+    def roll(self, body, velocity_x, velocity_y=0.0):
+        self.bodies["velocity_x"][body - 1], self.bodies["velocity_y"][body - 1] = velocity_x, velocity_y
+
+    def run(self, seconds):
+        self.sim.run(seconds)
+        self.sim.sync()
+
+    def tick(self, count=1):
+        for _ in range(count):
+            self.run(0.01)
+            yield
+
+    @property
+    def bodies(self):
+        return self.sim.state.bodies[0]
+
+    @property
+    def places(self):
+        return np.column_stack([self.bodies["x_mm"], self.bodies["y_mm"]])
+
+    @property
+    def velocities(self):
+        return np.column_stack([self.bodies["velocity_x"], self.bodies["velocity_y"]])
+
+    @property
+    def speeds(self):
+        return np.hypot(*self.velocities.T)
+
+    def wheels(self, robot):
+        return self.sim.state.robots["wheel_pulses"][0, robot - 1].copy()
+
+
+# ---- pile-ups ----
+
+
+@pytest.mark.parametrize("number", [*range(8), 95, 97])
+def test_in_a_pile_up_nobody_is_inside_anybody(number):
+    """In 95 and 97 a robot once pushed a ball 4 mm deep into a post. All 1000: benchmarks/pileups.py."""
+    pile = Pile.make(number)
+    assert max(rush(pile, 5000)) <= DEEPEST_MM
+    overlap, depth, moved = calm(pile, 1000)
+    assert max(overlap, depth) <= DEEPEST_MM
+    assert moved <= SHOVED_MM
+
+
+def test_what_rests_rests():
+    """Once the last body has stopped, not a bit of a place changes."""
+    pile = Pile.make(5)
+    rush(pile, 1000)
+    calm(pile, 100)
+    pile.sim.run(60.0)
+    pile.sim.sync()
+    assert pile.energy() == 0.0
+    before = pile.discs()
+    pile.sim.run(5.0)
+    pile.sim.sync()
+    assert (pile.discs() == before).all()
+
+
+# ---- bodies alone ----
+
+
+@pytest.mark.parametrize(("kind", "friction"), [("balls", 20.0), ("cylinders", 160.0)])
+@pytest.mark.parametrize("speed", [10.0, 37.0, 170.0, 400.0])
+def test_a_body_rolls_as_far_as_its_friction_lets_it(kind, friction, speed):
+    company = Company(robots=[(60.0, 150.0, 0.0)], arena=Arena.box(4600, 300), **{kind: [(300.0, 150.0)]})
+    company.roll(1, speed)
+    company.run(speed / friction - 0.02)
+    assert company.speeds[0] == pytest.approx(0.02 * friction, abs=0.011 * friction)
+    company.run(1.0)
+    assert company.speeds[0] == 0.0
+    assert company.places[0, 0] - 300.0 == pytest.approx(speed**2 / (2 * friction), rel=1e-9, abs=1e-9)
+    assert company.places[0, 1] == 150.0
+
+
+@pytest.mark.parametrize("angle_deg", [0, 20, 45, 70, 85])
+@pytest.mark.parametrize("speed", [30.0, 1000.0])
+def test_off_a_wall_a_quarter_of_the_speed_across_comes_back(angle_deg, speed):
+    cosine, sine = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
+    company = Company(balls=[(1957.0, 1000.0, BALL_MM, 0.0)])
+    company.roll(1, speed * cosine, speed * sine)
+    for _ in company.tick(100):
+        if company.velocities[0, 0] < 0.0:
+            break
+    assert company.velocities[0] == pytest.approx((-0.25 * speed * cosine, speed * sine), rel=1e-6)
+
+
+# ---- nothing tunnels ----
+
+
+def thin_walls(count=1):
+    """Return a floor of 600 x 400 mm with an upright wall of one cell, as long as the floor, and a post of one cell."""
+    picture = np.zeros((800, 1200), np.uint8)
+    picture[:, 600 : 600 + count] = 255
+    return Arena.from_array(picture, mm_per_pixel=0.5)
+
+
+@pytest.mark.parametrize("offset", np.linspace(0.0, 20.0, 9).tolist())
+@pytest.mark.parametrize("angle_deg", [0, 30, 80])
+def test_a_ball_does_not_get_through_a_wall_of_one_cell(offset, angle_deg):
+    company = Company(robots=[(500.0, 100.0, 0.0)], balls=[(200.0 + offset, 70.0, 10.0, 0.0)], arena=thin_walls())
+    company.roll(1, 1000.0 * math.cos(math.radians(angle_deg)), 1000.0 * math.sin(math.radians(angle_deg)))
+    for _ in company.tick(100):
+        assert company.places[0, 0] <= 290.0 + DEEPEST_MM
+
+
+@pytest.mark.parametrize("what", ["robot", "ball", "cylinder"])
+@pytest.mark.parametrize("offset", np.linspace(-1.0, 1.0, 11).tolist())
+@pytest.mark.parametrize("start", [0.0, 3.3, 7.7])
+def test_a_fast_ball_meets_what_is_in_its_way(what, offset, start):
+    """Dead on and grazing: whatever it would have overlapped it hits, and never is inside it."""
+    here = (1000.0, 1000.0)
+    radius = {"robot": ROBOT_MM, "ball": BALL_MM, "cylinder": CYLINDER_MM}[what]
+    aside = offset * (radius + BALL_MM - 2.0)
+    ball = (800.0 + start, 1000.0 + aside, BALL_MM, 0.0)
+    company = Company(
+        robots=[(*here, 0.3)] if what == "robot" else [(1900.0, 1900.0, 0.0)],
+        balls=[ball] if what != "ball" else [ball, here],
+        cylinders=[here] if what == "cylinder" else [],
+    )
+    company.roll(1, 1000.0)
+    for _ in company.tick(40):
+        target = company.sim.pose(1)[:2] if what == "robot" else company.places[1]
+        assert math.dist(company.places[0], target) >= radius + BALL_MM - DEEPEST_MM
+    assert abs(company.velocities[0, 1]) > 1.0 or offset == 0.0
+    assert company.velocities[0, 0] < 1000.0
+
+
+def test_small_bodies_at_full_speed_meet():
+    company = Company(balls=[(500.0, 1000.0, 10.0, 0.0), (700.0, 1000.0, 10.0, 0.0)])
+    company.roll(1, 1000.0)
+    company.roll(2, -1000.0)
+    for _ in company.tick(50):
+        assert company.places[1, 0] - company.places[0, 0] >= 20.0 - DEEPEST_MM
+
+
+# ---- hits ----
+
+
+@pytest.mark.parametrize("kinds", [("balls", "balls"), ("balls", "cylinders"), ("cylinders", "cylinders")])
+@pytest.mark.parametrize("speed", [50.0, 300.0, 1000.0])
+@pytest.mark.parametrize("aside", [0.0, 10.0, 25.0])
+def test_hits_keep_momentum_and_give_back_95_percent(kinds, speed, aside):
+    places = {"balls": [], "cylinders": []}
+    for number, kind in enumerate(kinds):
+        radius = BALL_MM if kind == "balls" else CYLINDER_MM
+        places[kind].append((800.0 + 80.0 * number, 1000.0 + aside * number, radius, 0.0))
+    company = Company(**places)
+    company.roll(1, speed)
+    company.roll(2, -0.3 * speed, 0.1 * speed)
+    before = company.velocities.copy()
+    for _ in company.tick(300):
+        if (company.velocities != before).any():
+            break
+    after = company.velocities
+    assert after.sum(axis=0) == pytest.approx(before.sum(axis=0), rel=1e-12, abs=1e-9)
+    normal = after[1] - before[1]
+    normal /= np.hypot(*normal)
+    relative = (before[0] - before[1]) @ normal
+    assert (after[1] - after[0]) @ normal == pytest.approx(0.95 * relative, rel=1e-9)
+    along = np.array([-normal[1], normal[0]])
+    assert after @ along == pytest.approx(before @ along, rel=1e-9, abs=1e-9)
+
+
+def test_off_a_robot_that_stands_a_quarter_comes_back():
+    company = Company(robots=[(1000.0, 1000.0, 0.7)], balls=[(900.0, 1000.0, BALL_MM, 0.0)])
+    company.roll(1, 200.0)
+    company.run(0.5)
+    assert company.velocities[0] == pytest.approx((-50.0, 0.0), abs=1e-9)
+    assert company.sim.pose(1) == (1000.0, 1000.0, 0.7)
+
+
+@pytest.mark.parametrize("speed", [10, 50, 127])
+def test_a_robot_kicks_a_ball_at_nearly_its_own_speed(speed):
+    company = Company(robots=[(300.0, 1000.0, 0.0)], balls=[(900.0, 1000.0, BALL_MM, 0.0)])
+    company.speed(1, speed)
+    for _ in company.tick(6000 // speed * 100):
+        if company.speeds[0] > 0.0:
+            break
+    robot = company.sim.state.robots[0, 0]
+    true_speed = (robot["x_mm"] - robot["trail"][0, 0]) / 0.01
+    assert company.velocities[0] == pytest.approx((0.975 * true_speed, 0.0), abs=0.2)  # it may have rolled for a tick
+
+
+def test_a_ball_that_comes_gets_a_quarter_on_top():
+    company = Company(robots=[(300.0, 1000.0, 0.0)], balls=[(900.0, 1000.0, BALL_MM, 0.0)])
+    company.speed(1, 50)
+    company.run(STEADY_S)
+    company.roll(1, -200.0)
+    company.run(2.0)
+    assert company.velocities[0, 0] == pytest.approx(0.975 * 400.0 + 50.0, rel=0.02)
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2, 3, 4), (4, 3, 2, 1, 0), (2, 0, 4, 1, 3)])
+def test_a_row_of_balls_passes_a_hit_on(order):
+    """Newton's cradle: the last leaves with what four hits leave, 0.975^4; whatever numbers the balls have."""
+    places = [(600.0, 1000.0), *((700.0 + 64.0 * k, 1000.0) for k in range(4))]
+    company = Company(balls=[(*places[k], BALL_MM, 0.0) for k in order])
+    first, last = order.index(0), order.index(4)
+    company.roll(first + 1, 300.0)
+    company.run(0.4)
+    assert company.velocities[last] == pytest.approx((0.975**4 * 300.0, 0.0), rel=1e-6)
+    assert company.velocities.sum(axis=0) == pytest.approx((300.0, 0.0), rel=1e-9)
+    assert company.speeds[first] < 0.03 * 300.0
+
+
+@pytest.mark.parametrize("kinds", [("balls", "balls"), ("balls", "cylinders")])
+def test_two_bodies_in_a_mirror(kinds):
+    for aside in (0.0, 7.0, 31.0):
+        ends = []
+        for sign in (1.0, -1.0):
+            places = {"balls": [], "cylinders": []}
+            for number, kind in enumerate(kinds):
+                places[kind].append((800.0 + 100.0 * number, 1000.0 + sign * aside * number))
+            company = Company(**places)
+            company.roll(1, 400.0)
+            company.roll(2, 0.0, -20.0 * sign)
+            company.run(3.0)
+            ends.append((company.places - (0.0, 1000.0)) * (1.0, sign))
+        assert ends[0] == pytest.approx(ends[1], abs=1e-9)
+
+
+# ---- robots among bodies ----
+
+
+def test_a_cylinder_keeps_no_speed_from_a_push():
+    company = Company(robots=[(300.0, 1000.0, 0.0)], cylinders=[(400.0, 1000.0)])
+    company.speed(1, 60)
+    company.run(1.0)
+    assert company.places[0, 0] > 450.0
+    assert company.speeds[0] == 0.0
+    company.speed(1, 0)
+    company.run(STEADY_S)
+    stands = company.places.copy()
+    company.run(1.0)
+    assert company.places == pytest.approx(stands, abs=0.01)  # the motor creeps
+
+
+@pytest.mark.parametrize("speed", [1, 5, 40, 127])
+def test_what_gives_way_slows_no_robot(speed):
+    """Pushing a cylinder, it comes exactly as far as alone, its wheels turn as fast, and it is one contact."""
+    ends, wheels, contacts = [], [], []
+    for cylinders in ([], [(600.0, 1000.0)]):
+        company = Company(robots=[(555.0, 1000.0, 0.0)], cylinders=cylinders)
+        company.speed(1, speed)
+        company.run(40.0 / speed + 1.0)
+        ends.append(company.sim.pose(1))
+        wheels.append(company.wheels(1))
+        contacts.append(company.sim.contacts(1))
+    assert ends[1] == pytest.approx(ends[0], abs=1e-9)
+    assert wheels[1] == pytest.approx(wheels[0], abs=1e-9)
+    assert contacts == [0, 1]
+
+
+def test_a_ball_pushed_along_is_one_contact():
+    company = Company(robots=[(300.0, 1000.0, 0.0)], balls=[(362.0, 1000.0)])
+    company.speed(1, 20)
+    company.run(2.0)  # at first it runs ahead of a robot that was faster for a moment
+    contacts = company.sim.contacts(1)
+    company.run(7.0)
+    assert company.sim.contacts(1) == contacts <= 3
+
+
+@pytest.mark.parametrize("body", ["balls", "cylinders"])
+@pytest.mark.parametrize("speed", [5, 20, 100])
+def test_what_cannot_give_way_stops_a_robot(body, speed):
+    """Against a wall: it stands, its wheels turn at 10 to 15 %, and it drives out backwards unhindered."""
+    radius = BALL_MM if body == "balls" else CYLINDER_MM
+    x = 1990.0 - radius
+    company = Company(robots=[(x - radius - ROBOT_MM - 20.0, 1000.0, 0.0)], **{body: [(x, 1000.0)]})
+    company.speed(1, speed)
+    company.run(40.0 / speed + 2.0)
+    pose, before, contacts = company.sim.pose(1), company.wheels(1), company.sim.contacts(1)
+    company.run(10.0)
+    assert math.dist(company.sim.pose(1)[:2], pose[:2]) < 0.05
+    share = (company.wheels(1) - before) / 1000 / speed
+    assert (share >= 0.10).all()
+    assert (share <= 0.15).all()
+    assert company.sim.contacts(1) == contacts
+    company.speed(1, -speed)
+    company.run(STEADY_S)
+    x_mm = company.sim.pose(1)[0]
+    company.run(1.0)
+    assert x_mm - company.sim.pose(1)[0] == pytest.approx(speed * PULSE_MM * 100, rel=0.02, abs=0.5)
+    assert pose[0] - company.sim.pose(1)[0] > 0.5 * speed * PULSE_MM * 100
+
+
+def test_two_robots_head_on_stand_still():
+    company = Company(robots=[(900.0, 1000.0, 0.0), (1000.0, 1000.0, math.pi)])
+    company.speed(1, 30)
+    company.speed(2, 30)
+    company.run(2.0)
+    poses, before = company.sim.poses(), [company.wheels(1), company.wheels(2)]
+    company.run(5.0)
+    assert company.sim.poses() == pytest.approx(poses, abs=0.05)
+    for robot in (1, 2):
+        share = (company.wheels(robot) - before[robot - 1]) / 500 / 30
+        assert (share >= 0.10).all()
+        assert (share <= 0.15).all()
+        assert company.sim.contacts(robot) == 1
+
+
+def test_a_robot_shoves_another_at_half_its_speed():
+    company = Company(robots=[(900.0, 1000.0, 0.0), (960.0, 1000.0, 1.0)])
+    company.speed(1, 40)
+    company.run(1.0)
+    before = company.sim.poses()
+    company.run(2.0)
+    moved = company.sim.poses() - before
+    assert moved[:, 0] == pytest.approx([40 * PULSE_MM * 100] * 2, rel=0.01)
+    assert moved[1, 2] == 0.0
+    assert (company.wheels(2) == 0.0).all()
+
+
+@pytest.mark.parametrize("aside", [30.0, 45.0, 54.0])
+def test_robots_that_graze_slide_past_each_other(aside):
+    company = Company(robots=[(800.0, 1000.0, 0.0), (1000.0, 1000.0 + aside, math.pi)])
+    company.speed(1, 30)
+    company.speed(2, 30)
+    company.run(2.0)
+    (first_x, first_y, _), (second_x, second_y, _) = company.sim.poses()
+    assert first_x > second_x
+    assert second_y - first_y >= 2 * ROBOT_MM - DEEPEST_MM
+    assert company.sim.contacts(1) == company.sim.contacts(2) == 1
+
+
+def test_a_robot_pushes_a_row_of_cylinders():
+    company = Company(robots=[(300.0, 1000.0, 0.0)], cylinders=[(400.0 + 33.0 * k, 1000.0) for k in range(6)])
+    company.speed(1, 20)
+    for _ in company.tick(1000):
+        gaps = np.diff(company.places[:, 0])
+        assert gaps.min() >= 2 * CYLINDER_MM - DEEPEST_MM
+    assert company.places[5, 0] > 700.0
+
+
+# ---- the same run, however time is cut ----
+
+
+def everything() -> Company:
+    rng = np.random.default_rng(7)
+    places = [(x, y) for x in np.arange(60, 460, 80) for y in np.arange(60, 460, 80)]
+    rng.shuffle(places)
+    company = Company(
+        robots=[(*places.pop(), rng.uniform(-3, 3)) for _ in range(5)],
+        balls=[places.pop() for _ in range(8)],
+        cylinders=[places.pop() for _ in range(8)],
+        arena=Arena.box(500, 500, rounded_mm=60),
+        seed=3,
+    )
+    for robot in range(1, 6):
+        company.speed(robot, *rng.integers(-20, 128, 2).tolist())
+    return company
+
+
+def test_how_time_is_cut_does_not_matter():
+    hashes = set()
+    for cuts in (1, 10, 100, 1000):
+        company = everything()
+        for _ in range(cuts):
+            company.sim.run(10.0 / cuts)
+        hashes.add(company.sim.state_hash())
+    assert len(hashes) == 1
+
+
+def test_a_run_goes_on_from_a_snapshot_to_the_bit():
+    company = everything()
+    company.run(3.0)
+    snapshot = company.sim.state.snapshot()
+    time_ns = company.sim.now_ns
+    company.run(5.0)
+    expected = company.sim.state_hash(), company.sim.proximity(1, noise=True)
+    company.sim.state.restore(snapshot)
+    company.sim.now_ns = time_ns
+    company.sim._enter()
+    assert company.sim.state.hash() == snapshot.hash()
+    company.run(5.0)
+    assert (company.sim.state_hash(), company.sim.proximity(1, noise=True)) == expected

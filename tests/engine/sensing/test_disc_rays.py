@@ -1,0 +1,222 @@
+"""What sensors see of robots, balls and cylinders: discs by geometry, each where it was when the sensor looked."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from kiks.engine.sensing.disc_rays import meet_disc, meet_discs_all
+from kiks.engine.simd.f64x8 import LANES
+from kiks.model.arena import Arena
+from kiks.model.arena_objects import Ball, Cylinder, Lamp, Pose
+from kiks.model.robot import RobotSpec
+from kiks.sim.simulation import Simulation
+from kiks.units import SENSOR_SLOT_NS, TICK_NS
+
+ROBOT_MM, REACH_MM = 27.5, 60.0
+EXACT = RobotSpec.load("khepera").with_changes(
+    proximity__noise_small=0.0, proximity__noise_large=0.0, proximity__jitter_counts=(0.0, 0.0)
+)
+"""A Khepera without noise."""
+
+
+def meet_by_quadratic(discs, x, y, angle, reach):
+    """Return the length of a ray to the first disc and which one that is, None if it meets none."""
+    first = reach, None
+    for k, (disc_x, disc_y, radius) in enumerate(discs):
+        # |origin + t direction - centre|^2 = radius^2
+        half_b = (x - disc_x) * math.cos(angle) + (y - disc_y) * math.sin(angle)
+        c = (x - disc_x) ** 2 + (y - disc_y) ** 2 - radius**2
+        if half_b**2 > c:
+            roots = -half_b - math.sqrt(half_b**2 - c), -half_b + math.sqrt(half_b**2 - c)
+            if roots[1] > 0.0 and max(roots[0], 0.0) < first[0]:
+                first = max(roots[0], 0.0), k
+    return first
+
+
+@settings(derandomize=True, deadline=None, max_examples=300)
+@given(draw=st.integers(0, 2**32), count=st.integers(0, 20))
+def test_rays_meet_the_first_disc(draw, count):
+    """Also from within a disc, in lanes as one by one."""
+    rng = np.random.default_rng(draw)
+    discs = np.column_stack([rng.uniform(-80, 80, (count, 2)), rng.uniform(0.5, 60, count)])
+    seen = np.column_stack([discs, np.arange(1, count + 1)]).ravel()
+    angles = rng.uniform(-math.pi, math.pi, LANES)
+    reach = rng.uniform(0, 100)
+    lengths, squarely, shades = met = np.array([np.full(LANES, reach), np.ones(LANES), np.zeros(LANES)])
+    meet_discs_all(seen, count, np.cos(angles), np.sin(angles), met)
+    for lane, angle in enumerate(angles):
+        expected, which = meet_by_quadratic(discs, 0.0, 0.0, angle, reach)
+        assert lengths[lane] == pytest.approx(expected, abs=1e-6)
+        assert shades[lane] == (0 if which is None else which + 1)
+        alone = meet_disc(seen, count, 0.0, 0.0, math.cos(angle), math.sin(angle), reach)
+        assert alone == (lengths[lane], squarely[lane], shades[lane])
+        if which is not None and lengths[lane] > 0.0:
+            hit = lengths[lane] * np.array([math.cos(angle), math.sin(angle)])
+            inward = (discs[which, :2] - hit) / discs[which, 2]
+            assert squarely[lane] == pytest.approx(inward @ (math.cos(angle), math.sin(angle)), abs=1e-6)
+
+
+def drawn(arena: Arena, discs) -> Arena:
+    """Return an arena with discs, x, y, radius and brightness, drawn into it as walls."""
+    picture = arena.brightness.copy()
+    cell = arena.mm_per_cell
+    rows, columns = (np.mgrid[: picture.shape[0], : picture.shape[1]] + 0.5) * cell
+    for x, y, radius, brightness in discs:
+        picture[np.hypot(columns - x, rows - y) <= radius] = brightness
+    return Arena(picture, cell, "drawn")
+
+
+@pytest.mark.parametrize("radius_mm", [10.0, 16.0, 32.0, 100.0])
+@pytest.mark.parametrize("gap_mm", [2.0, 8.0, 20.0])
+def test_a_disc_reads_like_the_same_disc_drawn_as_a_wall(radius_mm, gap_mm):
+    """Counts within 5 % and 15: what drawing in cells of half a millimetre costs, a thin disc most."""
+    floor = Arena.from_array(np.zeros((1000, 1000), np.uint8), mm_per_pixel=0.5)
+    for angle in np.linspace(-3, 3, 9):
+        far = ROBOT_MM + gap_mm + radius_mm
+        x, y = 250.0 + far * math.cos(angle), 250.0 + far * math.sin(angle)
+        start = (Pose(250.0, 250.0, 0.4),)
+        with_ball = Simulation(replace(floor, starts=start, balls=(Ball(x, y, radius_mm),)))
+        with_wall = Simulation(replace(drawn(floor, [(x, y, radius_mm, 255)]), starts=start))
+        assert with_ball.proximity(1) == pytest.approx(with_wall.proximity(1), rel=0.05, abs=15)
+
+
+@settings(derandomize=True, deadline=None, max_examples=20)
+@given(draw=st.integers(0, 2**32))
+def test_a_camera_sees_discs_as_it_sees_walls(draw):
+    rng = np.random.default_rng(draw)
+    floor = Arena.from_array(np.zeros((600, 600), np.uint8), mm_per_pixel=1.0)
+    discs = []
+    while len(discs) < 4:
+        x, y, radius = rng.uniform(120, 480), rng.uniform(120, 480), rng.uniform(10, 60)
+        clear = all(math.hypot(x - u, y - v) > radius + r + 1 for u, v, r, _ in discs)
+        if clear and math.hypot(x - 300, y - 300) > radius + 60:
+            discs.append((x, y, radius, int(rng.integers(1, 256))))
+    start = (Pose(300.0, 300.0, rng.uniform(-3, 3)),)
+    balls = tuple(Ball(x, y, radius, brightness=shade) for x, y, radius, shade in discs)
+    with_balls = Simulation(replace(floor, starts=start, balls=balls))
+    with_walls = Simulation(replace(drawn(floor, discs), starts=start))
+    for sim in (with_balls, with_walls):
+        sim.fit(1, "k213")
+    difference = np.abs(np.subtract(with_balls.image(1), with_walls.image(1)))
+    assert np.median(difference) < 1.0
+    assert (difference > 20.0).sum() <= 8  # two pixels at the edges of each
+
+
+def test_a_sensor_sees_a_ball_where_it_was_when_it_looked():
+    """A ball passes at 1 m/s: within the 20 ms of a round it moves by 20 mm."""
+    floor = Arena.box(800, 800)
+    start = (Pose(400.0, 400.0, math.pi / 2),)
+    sim = Simulation(replace(floor, starts=start, balls=(Ball(300.0, 480.0, 32.0, 0.0),)), robot=EXACT)
+    sim.state.bodies["velocity_x"] = 1000.0
+    still = Simulation(replace(floor, starts=start, balls=(Ball(300.0, 480.0),)), robot=EXACT)
+    different = 0
+    for _ in range(20):
+        sim.run(0.01)
+        sim.sync()
+        read = sim.proximity(1, noise=True)
+        now = sim.proximity(1)
+        for sensor in range(8):
+            slot_ns = sensor * SENSOR_SLOT_NS
+            turn_ns = 8 * SENSOR_SLOT_NS
+            if sim.now_ns < slot_ns:
+                continue
+            instant_ns = (sim.now_ns - slot_ns) // turn_ns * turn_ns + slot_ns
+            x = 300.0 + 1000.0 * instant_ns * 1e-9
+            still.move_body(1, x, 480.0)
+            then = still.proximity(1)
+            assert read[sensor] == pytest.approx(then[sensor], abs=0.51)
+            different += abs(then[sensor] - now[sensor]) > 20
+    assert sim.now_ns % TICK_NS == 0
+    assert different >= 5
+
+
+def test_a_robot_sees_others_and_never_itself():
+    alone = Simulation(Arena.box(800, 800), robot=EXACT)
+    baseline = alone.proximity(1)
+    for heading in np.linspace(0, 6, 7):
+        starts = (Pose(200.0, 400.0, heading), Pose(600.0, 400.0, heading))
+        sim = Simulation(replace(Arena.box(800, 800), starts=starts), robots=2, robot=EXACT)
+        assert sim.proximity(1) == baseline
+        assert sim.proximity(2) == baseline
+        sim.place(2, 200.0 + 62.0 * math.cos(heading), 400.0 + 62.0 * math.sin(heading), heading + math.pi)
+        assert max(sim.proximity(1)) > max(baseline) + 20
+        assert max(sim.proximity(2)) > max(baseline) + 20
+
+
+def test_a_darker_disc_reads_less_and_none_reads_more_than_white():
+    readings = []
+    for brightness in (255, 190, 70, 25):
+        balls = (Ball(460.0, 400.0, 25.0, 0.0, brightness),)
+        arena = replace(Arena.box(800, 800), starts=(Pose(400.0, 400.0, 0.0),), balls=balls)
+        readings.append(max(Simulation(arena).proximity(1)))
+    assert readings == sorted(readings, reverse=True)
+    assert readings[0] > 2 * readings[-1]
+
+
+def test_what_is_lifted_nobody_sees_or_meets():
+    ball = Ball(480.0, 400.0)
+    floor = replace(Arena.box(800, 800), starts=(Pose(400.0, 400.0, 0.0),), lamps=(Lamp(700.0, 400.0, 5.0),))
+    alone, lifted = Simulation(floor), Simulation(replace(floor, balls=(ball,)))
+    for sim in (alone, lifted):
+        sim.fit(1, "k213")
+    assert lifted.proximity(1) != alone.proximity(1)
+    assert lifted.ambient(1) != alone.ambient(1)
+    lifted.state.bodies["is_lifted"] = 1
+    lifted._enter()
+    assert lifted.proximity(1) == alone.proximity(1)
+    assert lifted.ambient(1) == alone.ambient(1)
+    assert lifted.image(1) == alone.image(1)
+    for sim in (alone, lifted):
+        sim.port(1).write(b"D,30,30\n")
+        sim.run(1.0)
+    assert lifted.pose(1) == pytest.approx(alone.pose(1), abs=1e-9)
+    assert lifted.pose(1)[0] > 520.0
+    assert lifted.contacts(1) == 0
+
+
+@pytest.mark.parametrize("what", ["robot", "ball", "cylinder"])
+def test_robots_balls_and_cylinders_hide_lamps(what):
+    """A lamp is hidden from a sensor if the straight line to it leads through a disc, and only then."""
+    rng = np.random.default_rng(4)
+    floor = replace(Arena.box(1000, 1000), lamps=(Lamp(900.0, 900.0, 3.0),))
+    radius = {"robot": ROBOT_MM, "ball": 32.0, "cylinder": 16.0}[what]
+    start, met = Pose(500.0, 500.0, 0.7), {True: 0, False: 0}
+    things = {"starts": (start, Pose(100.0, 100.0, 0.0)) if what == "robot" else (start,)}
+    if what != "robot":
+        things[f"{what}s"] = ((Ball if what == "ball" else Cylinder)(100.0, 100.0),)
+    sim = Simulation(replace(floor, **things), robots=2 if what == "robot" else 1)
+    alone = Simulation(replace(floor, starts=(start,)))
+    alone.lamps[0, 3] = 0.0
+    dark = alone.ambient(1)
+    alone.lamps[0, 3] = 1.0
+    parameters = alone.scene[2][0]
+    cosine, sine = math.cos(start.heading_rad), math.sin(start.heading_rad)
+    for _ in range(150):
+        lamp = rng.uniform(100, 900, 2)
+        x, y = (rng.uniform(0.2, 0.8) * (lamp - 500) + 500 + rng.uniform(-40, 40, 2)).tolist()
+        over = math.hypot(lamp[0] - x, lamp[1] - y) <= radius + 1
+        if over or math.hypot(x - 500, y - 500) < radius + ROBOT_MM + 1:
+            continue
+        sim.lamps[0, :2] = alone.lamps[0, :2] = lamp
+        if what == "robot":
+            sim.place(2, x, y, 0.0)
+        else:
+            sim.move_body(1, x, y)
+        lit = alone.ambient(1)
+        for sensor, count in enumerate(sim.ambient(1)):
+            out_x, out_y = parameters["mount_x_mm"][sensor], parameters["mount_y_mm"][sensor]
+            eye = np.array([500 + out_x * cosine - out_y * sine, 500 + out_x * sine + out_y * cosine])
+            line = eye + np.linspace(0, 1, 4001)[:, None] * (lamp - eye)
+            nearest = np.hypot(line[:, 0] - x, line[:, 1] - y).min()
+            if abs(nearest - radius) < 0.1 or lit[sensor] == dark[sensor]:
+                continue
+            assert count == (dark if nearest < radius else lit)[sensor]
+            met[nearest < radius] += 1
+    assert met[True] >= 20
+    assert met[False] >= 20

@@ -1,0 +1,154 @@
+"""The proximity sensors: sampled in turn, symmetric, nearer is more, darker is less."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from tests.symmetry import mirrored, symmetric
+
+import kiks
+from kiks.model.robot import RobotSpec
+from kiks.sim.snapshot import proximity_from
+
+QUIET = RobotSpec.load("khepera").with_changes(
+    proximity__noise_small=0.0,
+    proximity__noise_large=0.0,
+    proximity__baseline_counts=(0.0,) * 8,
+    proximity__jitter_counts=(0.0,),
+)
+
+
+def at_wall(gap_mm: float, *, brightness: int = 255, robot: RobotSpec = QUIET, seed: int = 0) -> kiks.Simulation:
+    """A robot that looks straight at a wall, a gap before its rim."""
+    sim = kiks.Simulation(kiks.Arena.box(600, 600, brightness=brightness), robot=robot, seed=seed)
+    sim.place(1, 300, 590 - robot.body.radius_mm - gap_mm, math.pi / 2)
+    return sim
+
+
+def read(sim: kiks.Simulation) -> list[int]:
+    robot = kiks.Khepera(sim.port(1))
+    readings = robot.proximity()
+    robot.close()
+    return readings
+
+
+def test_nothing_near_reads_nothing() -> None:
+    sim = kiks.Simulation(kiks.Arena.box(600, 600), robot=QUIET)
+    assert read(sim) == [0] * 8
+    assert sim.proximity(1) == [0.0] * 8
+
+
+def test_nearer_is_more_and_the_front_sees_it() -> None:
+    rows = np.array([sim.proximity(1) for sim in map(at_wall, np.linspace(60, 0, 61))])
+    assert np.all(np.diff(rows[:, 1:5], axis=0) >= -1e-9)
+    assert np.all(rows[0] == 0)
+    assert np.all(rows[-1, 2:4] > 900)
+    assert np.all(rows[:, 6:8] == 0)
+
+
+def test_left_and_right_are_mirror_images() -> None:
+    left = kiks.Simulation(kiks.Arena.box(600, 600), robot=symmetric(QUIET))
+    right = kiks.Simulation(kiks.Arena.box(600, 600), robot=symmetric(QUIET))
+    rng = np.random.default_rng(3)
+    for _ in range(50):
+        x, y, heading = rng.uniform(45, 120), rng.uniform(45, 120), rng.uniform(-np.pi, np.pi)
+        left.place(1, x, y, heading)
+        right.place(1, 600 - x, y, np.pi - heading)
+        assert left.proximity(1) == pytest.approx(mirrored(right.proximity(1)), abs=2.0)
+
+
+def test_a_quarter_turn_of_the_world_changes_nothing() -> None:
+    sim = kiks.Simulation(kiks.Arena.box(600, 600), robot=QUIET)
+    rng = np.random.default_rng(4)
+    for _ in range(50):
+        x, y, heading = rng.uniform(45, 120), rng.uniform(45, 300), rng.uniform(-np.pi, np.pi)
+        sim.place(1, x, y, heading)
+        first = sim.proximity(1)
+        sim.place(1, 600 - y, x, heading + np.pi / 2)
+        assert first == pytest.approx(sim.proximity(1), abs=2.0)
+
+
+def test_darker_is_less() -> None:
+    fronts = [at_wall(20, brightness=brightness).proximity(1)[2] for brightness in (1, 60, 130, 255)]
+    assert fronts == sorted(fronts)
+    assert fronts[0] < 0.6 * fronts[-1]
+
+
+def test_each_sensor_is_sampled_every_20_ms_in_turn() -> None:
+    """A robot that turns: sensor i changes at 20 k + 2.5 i ms and at no other time."""
+    sim = kiks.Simulation(kiks.Arena.box(150, 150, rounded_mm=45), robot=QUIET)
+    sim.place(1, 60, 75, 0.0)
+    kiks.Khepera(sim.port(1)).set_speed(20, -20)
+    sim.run(1.0 - sim.time_s)
+    before = sim.proximity(1, noise=True)
+    changed_ms: dict[int, list[float]] = {}
+    for k in range(1, 400):
+        sim.run(1.0 + k * 0.0005 - sim.time_s)
+        now = sim.proximity(1, noise=True)
+        for sensor in range(8):
+            if now[sensor] != before[sensor]:
+                changed_ms.setdefault(sensor, []).append(k * 0.5)
+        before = now
+    assert len(changed_ms) >= 4
+    for sensor, times in changed_ms.items():
+        assert all(time % 20 == pytest.approx(2.5 * sensor) for time in times)
+
+
+def test_two_reads_in_a_round_agree_to_the_bit_and_noise_changes_with_the_round() -> None:
+    sim = at_wall(20, robot=RobotSpec.load("khepera"), seed=1)
+    first = sim.proximity(1, noise=True)
+    assert first == sim.proximity(1, noise=True)
+    sim.run(0.05)
+    assert first != sim.proximity(1, noise=True)
+
+
+def test_readings_are_latched_while_they_travel() -> None:
+    """The reply to N tells of the instant at which the command acted, not of the one at which it is read."""
+    sim = at_wall(20)
+    port = sim.port(1)
+    port.write(b"N\n")
+    sim.run(0.005)
+    sim.place(1, 300, 300, 0.0)
+    readings = [int(word) for word in port.readline().split(b",")[1:]]
+    assert max(readings) > 0
+
+
+def test_ambient_is_dark() -> None:
+    sim = kiks.Simulation(seed=3)
+    readings = kiks.Khepera(sim.port(1)).ambient()
+    assert all(440 <= reading <= 460 for reading in readings)
+    assert len(set(readings)) > 2
+
+
+@pytest.mark.parametrize("response", ["reflection", "fast"])
+def test_readings_from_many_poses_are_those_of_a_robot_that_is_put_there(response: str) -> None:
+    sim = kiks.Simulation(kiks.Arena.box(400, 400, wall_mm=0), robots=3, seed=3, response=response)
+    sim.place(1, 340.0, 60.0, 0.0)
+    sim.place(2, 200.0, 200.0, 0.0)
+    sim.place(3, 60.0, 340.0, 1.0)
+    sim.port(2).write(b"D,9,9\n")
+    sim.run(0.5)
+    turns = [*np.linspace(-9.0, 9.0, 13).tolist(), 1e20]
+    poses = [[x, y, turn] for x, y in ((28.5, 100.0), (174.0, 203.0), (100.0, 100.0), (60.0, 275.0)) for turn in turns]
+    before = sim.state_hash()
+    readings = proximity_from(sim, 1, np.array(poses))
+    assert sim.state_hash() == before
+    for pose, expected in zip(poses, readings.tolist(), strict=True):
+        sim.place(1, *pose)
+        assert sim.proximity(1) == expected
+    assert [(reading > 100).any() for reading in np.split(readings, 4)] == [True, True, False, True]
+
+
+@pytest.mark.parametrize(
+    ("poses", "words"),
+    [
+        ([[1.0, 2.0]], "poses must be numbers of the shape"),
+        ([[math.nan, 2.0, 0.0]], "poses must be finite numbers"),
+        ([[1e9, 2.0, 0.0]], "poses must be in the arena, 600 x 600 mm"),
+    ],
+)
+def test_poses_that_cannot_be_are_refused(poses: list[list[float]], words: str) -> None:
+    with pytest.raises(kiks.ParameterError, match=words):
+        proximity_from(kiks.Simulation(kiks.Arena.box(600, 600)), 1, np.array(poses))

@@ -1,0 +1,133 @@
+"""Record8 worlds at once are eight worlds, to the bit: the same physics compiled for lanes and for a robot alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tests.engine.by_eights import read_after
+
+from kiks.batch.kernel_args import PROXIMITY
+from kiks.engine import step
+from kiks.engine.parameters import pack
+from kiks.engine.physics import motor
+from kiks.engine.scene import make_scene
+from kiks.engine.sensing.rays import sight_of
+from kiks.engine.sensing.thesis_networks import networks_for
+from kiks.engine.state import State
+from kiks.model.arena import PAD
+from kiks.model.robot import RobotSpec
+from kiks.units import TICK_NS
+
+KINDS = (
+    {},
+    {"body__wheel_base_mm": 48.0, "body__diameter_mm": 58.0, "body__wall_friction": 0.1, "motor__left_gain": 0.94},
+    {"motor__dead_band_pwm": 15.0, "motor__time_constant_ms": 60.0, "body__slip_ratio_min": 0.02},
+)
+
+
+class Worlds:
+    """Worlds with a lone robot each, in one arena, twice: for lanes, and one by one."""
+
+    def __init__(self, arena, count, number):
+        self.rng = np.random.default_rng([77, number])
+        self.arena, self.count = arena, count
+        specs = [RobotSpec.load("khepera").with_changes(**changes) for changes in KINDS]
+        self.kinds = np.concatenate([pack(spec) for spec in specs])
+        self.lanes = State.empty(world_count=count, robot_count=1).robots
+        self.seeds = self.rng.integers(0, 2**63, count)
+        self.ticks = self.rng.integers(0, 1000, count)
+        free = np.argwhere(arena.clearance[PAD:-PAD, PAD:-PAD] > 31.0)
+        for robot in self.lanes[:, 0]:
+            row, column = free[self.rng.integers(len(free))]
+            robot["x_mm"], robot["y_mm"] = (column + 0.5) * arena.mm_per_cell, (row + 0.5) * arena.mm_per_cell
+            robot["heading_rad"] = self.rng.uniform(-50.0, 50.0)
+            robot["trail"][:] = robot["x_mm"], robot["y_mm"], robot["heading_rad"]
+            robot["kind"] = self.rng.integers(len(KINDS))
+            robot["speed_gains"] = specs[0].reset.speed_gains
+            robot["position_gains"] = specs[0].reset.position_gains
+            robot["profile_speed"] = specs[0].reset.profile_speed_pulses
+            robot["profile_acceleration"] = specs[0].reset.profile_acceleration
+        self.alone = self.lanes.copy()
+
+    @property
+    def ground(self):
+        return self.arena.clearance, float(self.arena.mm_per_cell), PAD
+
+    def command(self, name, most):
+        """Give a third of the robots a new command."""
+        for world in np.flatnonzero(self.rng.random(self.count) < 0.35):
+            left, right = (int(value) for value in self.rng.integers(-most, most + 1, 2))
+            for robots in (self.lanes, self.alone):
+                getattr(motor, name)(robots, world, 0, left, right)
+
+    def advance(self, ticks_to):
+        before, self.ticks = self.ticks, ticks_to
+        lanes = State(self.lanes, State.empty(world_count=self.count, robot_count=1).bodies)
+        scene = make_scene(lanes, self.kinds, self.arena.width_mm, self.arena.height_mm)
+        lamps = np.zeros((self.count, 0, 4))
+        places = self.ground, sight_of(self.arena), networks_for("reflection"), lamps
+        read_after(scene, *places, self.seeds, before, ticks_to * TICK_NS, PROXIMITY)
+        for world in range(self.count):
+            state = State(self.alone[world : world + 1], State.empty(world_count=1, robot_count=1).bodies)
+            scene = make_scene(state, self.kinds, self.arena.width_mm, self.arena.height_mm)
+            ticks = max(ticks_to[world] - before[world], 0)
+            step.advance(scene, self.ground, self.seeds[world], before[world], ticks)
+
+    def assert_equal(self):
+        for name in self.lanes.dtype.names:
+            assert self.lanes[name].tobytes() == self.alone[name].tobytes(), name
+
+
+@pytest.mark.parametrize("number", range(6))
+@pytest.mark.parametrize(("name", "most"), [("set_speed", 20), ("set_speed", 127), ("set_pwm", 255)])
+def test_drives_are_those_of_robots_alone(make_random_arena, number, name, most):
+    worlds = Worlds(make_random_arena(number), 1 + 5 * number, number)
+    for _ in range(60):
+        worlds.command(name, most)
+        worlds.advance(worlds.ticks + worlds.rng.integers(1, 20))
+        worlds.assert_equal()
+    if worlds.count > 10:
+        assert (worlds.lanes["contact_count"] > 0).sum() > 2
+
+
+def test_positions_are_those_of_robots_alone(make_random_arena):
+    """Some in one mode, some in another, beside each other."""
+    worlds = Worlds(make_random_arena(3), 21, 9)
+    for _ in range(40):
+        worlds.command("set_position", 800)
+        worlds.command("set_speed", 40)
+        worlds.command("set_pwm", 120)
+        worlds.command("set_counters", 2**31 - 1)
+        worlds.advance(worlds.ticks + 15)
+        worlds.assert_equal()
+
+
+def test_each_world_has_its_own_ticks(make_random_arena):
+    worlds = Worlds(make_random_arena(1), 13, 4)
+    for _ in range(60):
+        worlds.command("set_speed", 60)
+        worlds.advance(worlds.ticks + worlds.rng.integers(-2, 12, worlds.count).clip(0))
+        worlds.assert_equal()
+
+
+def test_grippers_move(make_random_arena):
+    worlds = Worlds(make_random_arena(2), 11, 5)
+    for robots in (worlds.lanes, worlds.alone):
+        robots["has_gripper"] = (np.arange(11) % 3 == 0)[:, None]
+        robots["arm"], robots["jaws"] = 127.0, 200.0
+        robots["arm_target"] = np.linspace(0.0, 255.0, 11)[:, None]
+        robots["is_closing"] = (np.arange(11) % 2)[:, None]
+    for _ in range(10):
+        worlds.command("set_speed", 10)
+        worlds.advance(worlds.ticks + 7)
+        worlds.assert_equal()
+    assert len(set(worlds.lanes["arm"].ravel())) > 2
+
+
+def test_a_time_that_has_come_changes_nothing(make_random_arena):
+    worlds = Worlds(make_random_arena(0), 9, 6)
+    worlds.command("set_speed", 30)
+    worlds.advance(worlds.ticks + 30)
+    before = worlds.lanes.copy()
+    worlds.advance(worlds.ticks.copy())
+    assert worlds.lanes.tobytes() == before.tobytes()

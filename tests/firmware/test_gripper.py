@@ -1,0 +1,472 @@
+"""The gripper: what it grips, how it carries and puts down, and that what it holds stays outside of everything else."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import kiks
+from kiks.engine.physics import contact
+
+RIM_MM, CYLINDER_MM = 27.5, 16.0
+TOUCHING_MM = RIM_MM + CYLINDER_MM
+
+
+def ask(sim: kiks.Simulation, order: str, robot: int = 1) -> list[int]:
+    return kiks.Khepera(sim.port(robot)).turret(1, order)
+
+
+def tell(sim: kiks.Simulation, line: str, robot: int = 1) -> None:
+    kiks.Khepera(sim.port(robot)).send(line)
+
+
+def closed(sim: kiks.Simulation, robot: int = 1) -> None:
+    """Lower the arm, jaws open, and close them."""
+    for order, seconds in (("D,0", 0.0), ("E,255", 1.0), ("D,1", 0.6)):
+        ask(sim, order, robot)
+        sim.run(seconds)
+
+
+def a_simulation(ahead_mm: float = TOUCHING_MM + 1, aside_mm: float = 0.0, *, robots: int = 1) -> kiks.Simulation:
+    """A robot at (300, 300) mm that looks to the right at a cylinder; others wait far off."""
+    sim = kiks.Simulation(kiks.Arena.box(900, 600), seed=1, robots=robots)
+    for robot in range(2, robots + 1):
+        sim.place(robot, 60.0, 60.0 * robot, 0.0)
+    sim.place(1, 300, 300, 0.0)
+    sim.add_cylinder(300 + ahead_mm, 300 + aside_mm)
+    for robot in range(1, robots + 1):
+        sim.fit(robot, "gripper")
+    return sim
+
+
+def holding(*, robots: int = 1) -> kiks.Simulation:
+    sim = a_simulation(robots=robots)
+    closed(sim)
+    assert held_by(sim) == 1
+    return sim
+
+
+def held_by(sim: kiks.Simulation) -> int:
+    return int(sim.bodies()["holder"][0])
+
+
+def records(sim: kiks.Simulation) -> tuple[Any, Any]:
+    """Robots and bodies at one instant, the end of the tick: `pose` and `bodies` may be of two."""
+    sim.sync()
+    return sim.state.robots[0], sim.state.bodies[0]
+
+
+def place_of(sim: kiks.Simulation) -> tuple[float, float]:
+    body = sim.bodies()[0]
+    return float(body["x_mm"]), float(body["y_mm"])
+
+
+def seen_from(sim: kiks.Simulation, robot: int = 1) -> tuple[float, float]:
+    """Where the body is, ahead and to the left of the robot."""
+    robots, bodies = records(sim)
+    x, y, heading = robots[["x_mm", "y_mm", "heading_rad"]][robot - 1].tolist()
+    dx, dy = bodies["x_mm"][0] - x, bodies["y_mm"][0] - y
+    c, s = math.cos(heading), math.sin(heading)
+    return dx * c + dy * s, dy * c - dx * s
+
+
+def deepest_overlap_mm(sim: kiks.Simulation) -> float:
+    """An oracle that looks at every wall and pair of what stands on the floor."""
+    (robots, bodies), deepest = records(sim), 0.0
+    discs = [(r["x_mm"], r["y_mm"], spec.body.radius_mm) for r, spec in zip(robots, sim.specs, strict=True)]
+    discs += [(b["x_mm"], b["y_mm"], b["radius_mm"]) for b in bodies[bodies["is_lifted"] == 0]]
+    for k, (x, y, radius) in enumerate(discs):
+        deepest = max(deepest, -contact.clearance_of_disc(*sim.ground, x, y, radius))
+        for other_x, other_y, other_radius in discs[:k]:
+            deepest = max(deepest, radius + other_radius - math.hypot(x - other_x, y - other_y))
+    return deepest
+
+
+# ---- gripping ----
+
+
+def test_it_grips_carries_and_puts_down() -> None:
+    sim = a_simulation()
+    robot, port = kiks.Khepera(sim.port(1)), sim.port(1)
+    assert ask(sim, "G") == [0]  # the arm is up
+    ask(sim, "E,255")
+    sim.run(0.6)
+    assert ask(sim, "G") == [255]
+    assert ask(sim, "F") == [int(sim.bodies()["brightness"][0])]
+    ask(sim, "D,1")
+    sim.run(0.6)
+    assert held_by(sim) == 1
+    assert ask(sim, "H,0") == [115]  # 200 (16 - 0.5)/27
+    ask(sim, "E,150")
+    sim.run(0.6)
+    assert sim.bodies()["is_lifted"][0] == 1
+    assert ask(sim, "G") == [255]
+    robot.set_speed(10, 10)
+    sim.run(2.0)
+    robot.set_speed(0, 0)
+    sim.run(0.2)
+    assert sim.pose(1)[0] > 440
+    assert seen_from(sim) == pytest.approx((TOUCHING_MM + 1, 0.0), abs=1e-9)
+    ask(sim, "E,255")
+    sim.run(0.6)
+    assert held_by(sim) == 1
+    assert sim.bodies()["is_lifted"][0] == 0
+    ask(sim, "D,0")
+    sim.run(0.6)
+    assert held_by(sim) == 0
+    where = place_of(sim)
+    robot.set_speed(-10, -10)
+    sim.run(1.0)
+    assert place_of(sim) == where
+    assert sim.bodies()[["velocity_x", "velocity_y"]].tolist() == [(0.0, 0.0)]
+    assert ask(sim, "G") == [0]
+    port.close()
+
+
+@pytest.mark.parametrize(
+    ("ahead_mm", "aside_mm", "is_gripped"),
+    [
+        (TOUCHING_MM + 0.1, 0.0, True),
+        (RIM_MM + 36.5, 0.0, True),
+        (RIM_MM + 37.5, 0.0, False),
+        (TOUCHING_MM + 5, 11.0, True),
+        (TOUCHING_MM + 5, -11.0, True),
+        (TOUCHING_MM + 5, 12.5, False),  # one jaw would come down on it
+        (-TOUCHING_MM - 1, 0.0, False),
+        (0.0, TOUCHING_MM + 1, False),
+    ],
+)
+def test_what_stands_between_the_jaws_is_gripped(ahead_mm: float, aside_mm: float, is_gripped: bool) -> None:
+    sim = a_simulation(ahead_mm, aside_mm)
+    closed(sim)
+    assert held_by(sim) == is_gripped
+    assert ask(sim, "H,0") == [115 if is_gripped else 0]
+    if is_gripped:
+        ahead, aside = seen_from(sim)
+        assert aside == pytest.approx(0.0, abs=0.02)
+        assert ahead >= TOUCHING_MM
+    assert deepest_overlap_mm(sim) < 0.02
+
+
+def test_what_is_too_wide_or_far_above_is_not_gripped() -> None:
+    sim = a_simulation()
+    sim.remove_body(1)
+    sim.add_ball(300 + RIM_MM + 32.5, 300)
+    closed(sim)
+    assert held_by(sim) == 0
+    sim = a_simulation()
+    ask(sim, "E,200")
+    sim.run(0.5)
+    ask(sim, "D,1")
+    sim.run(0.6)
+    assert held_by(sim) == 0
+    ask(sim, "E,255")  # closed jaws grip nothing
+    sim.run(0.6)
+    assert held_by(sim) == 0
+
+
+def test_two_grippers_at_one_cylinder() -> None:
+    sim = a_simulation(robots=2)
+    x, _ = place_of(sim)
+    sim.place(2, x + TOUCHING_MM + 1, 300, math.pi)
+    for robot in (1, 2):
+        ask(sim, "E,255", robot)
+    sim.run(0.6)
+    for robot in (1, 2):
+        tell(sim, "T,1,D,1", robot)
+    sim.run(0.7)
+    assert held_by(sim) == 1
+    assert ask(sim, "H,0", 2) == [0]
+    ask(sim, "D,0", 1)
+    closed(sim, 2)
+    assert held_by(sim) == 2
+
+
+# ---- held on the floor ----
+
+
+def test_it_drags_what_it_holds_as_fast_as_it_drives() -> None:
+    ways = []
+    for sim in (a_simulation(200.0), holding()):
+        begin = sim.pose(1)[0]
+        kiks.Khepera(sim.port(1)).set_speed(10, 10)
+        sim.run(1.0)
+        ways.append(sim.pose(1)[0] - begin)
+    assert ways[1] == pytest.approx(ways[0], rel=0.01)
+    kiks.Khepera(sim.port(1)).set_speed(-5, 8)
+    sim.run(3.0)
+    assert seen_from(sim) == pytest.approx((TOUCHING_MM + 1, 0.0), abs=0.01)
+
+
+def test_a_wall_stops_both() -> None:
+    sim = holding()
+    robot = kiks.Khepera(sim.port(1))
+    robot.set_speed(20, 20)
+    sim.run(8.0)
+    x, y = place_of(sim)
+    assert (x, y) == pytest.approx((890 - CYLINDER_MM, 300), abs=0.05)
+    assert sim.pose(1)[0] == pytest.approx(x - TOUCHING_MM - 1, abs=0.05)
+    assert sim.contacts(1) == 1
+    assert max(robot.speed()) <= 5  # wheels slip, as a robot's at a wall
+    assert deepest_overlap_mm(sim) < 0.02
+
+
+def test_a_wall_beside_the_load_stops_the_turn() -> None:
+    sim = holding()
+    sim.place(1, 300, 300, 0.0)
+    ask(sim, "E,150")
+    sim.run(0.6)
+    sim.place(1, 861, 300, math.pi / 2)  # almost at the wall at its right, which the load meets after 0.3 rad
+    ask(sim, "E,255")
+    sim.run(0.6)
+    assert sim.bodies()["is_lifted"][0] == 0
+    before = sim.state.robots["wheel_pulses"][0, 0].copy()
+    kiks.Khepera(sim.port(1)).set_speed(5, -5)
+    sim.run(0.8)
+    free_turn = 2 * 5 * 0.08 * 80 / 53
+    assert math.pi / 2 - 0.7 * free_turn < sim.pose(1)[2] < math.pi / 2 - 0.29
+    assert sim.pose(1)[0] < 860.0  # it levers itself off
+    assert np.abs(sim.state.robots["wheel_pulses"][0, 0] - before).max() < 0.8 * 5 * 80
+    assert deepest_overlap_mm(sim) < 0.02
+    assert held_by(sim) == 1
+
+
+def test_another_robot_pushes_both() -> None:
+    sim = holding(robots=2)
+    begin_x, begin_y = place_of(sim)
+    sim.place(2, 300 - 2 * RIM_MM - 2, 300, 0.0)
+    kiks.Khepera(sim.port(2)).set_speed(10, 10)
+    sim.run(2.0)
+    x, y = place_of(sim)
+    assert x > begin_x + 20
+    assert y == pytest.approx(begin_y, abs=0.1)
+    assert seen_from(sim) == pytest.approx((TOUCHING_MM + 1, 0.0), abs=0.02)
+    assert deepest_overlap_mm(sim) < 0.02
+
+
+def test_who_pushes_the_load_aside_turns_the_robot() -> None:
+    sim = holding(robots=2)
+    x, y = place_of(sim)
+    sim.place(2, x, y + TOUCHING_MM + 1, -math.pi / 2)
+    kiks.Khepera(sim.port(2)).set_speed(10, 10)
+    sim.run(1.0)
+    assert sim.pose(1)[2] < -0.3
+    assert sim.pose(1)[1] < 299
+    assert held_by(sim) == 1
+    assert seen_from(sim) == pytest.approx((TOUCHING_MM + 1, 0.0), abs=0.02)
+
+
+# ---- lifted ----
+
+
+def test_what_is_lifted_is_neither_seen_nor_met() -> None:
+    sim = a_simulation(robots=2)
+    sim.place(2, 300 + TOUCHING_MM + 1 + CYLINDER_MM + RIM_MM + 10, 300, math.pi)
+    sim.fit(2, "k213")
+    closed(sim)
+    seen, picture = sim.proximity(2), sim.image(2)
+    own = sim.proximity(1)
+    ask(sim, "E,100")
+    sim.run(0.7)
+    assert sim.bodies()["is_lifted"][0] == 1
+    assert max(sim.proximity(2)[2:4]) < 0.6 * max(seen[2:4])
+    assert max(sim.proximity(1)[2:4]) < 0.6 * max(own[2:4])
+    assert sim.image(2) != picture
+    kiks.Khepera(sim.port(2)).set_speed(10, 10)
+    sim.run(0.3)
+    assert sim.pose(2)[0] < 380  # it drives through where the cylinder was
+    assert sim.contacts(2) == 0
+
+
+def test_it_puts_down_only_where_there_is_room() -> None:
+    sim = holding(robots=2)
+    ask(sim, "E,100")
+    sim.run(0.7)
+    sim.place(2, 300 + TOUCHING_MM + 25, 300, 0.0)
+    ask(sim, "E,255")
+    sim.run(1.0)
+    assert sim.bodies()["is_lifted"][0] == 1
+    assert 205 <= ask(sim, "H,1")[0] < 215  # it rests on the robot
+    ask(sim, "D,0")
+    sim.run(1.0)
+    assert held_by(sim) == 1
+    assert deepest_overlap_mm(sim) == 0.0
+    sim.place(2, 60, 120, 0.0)
+    sim.run(1.0)
+    assert held_by(sim) == 0
+    assert sim.bodies()["is_lifted"][0] == 0
+    assert ask(sim, "H,0") == [200]
+    assert ask(sim, "H,1") == [255]
+
+
+def test_opened_in_the_air_it_drops_the_load_in_front() -> None:
+    sim = holding()
+    ask(sim, "E,100")
+    sim.run(0.7)
+    ask(sim, "D,0")
+    sim.run(0.1)
+    assert held_by(sim) == 0
+    assert place_of(sim) == pytest.approx((300 + TOUCHING_MM + 1, 300), abs=0.01)
+
+
+# ---- hands from outside ----
+
+
+def test_hands_take_things_out_of_the_jaws() -> None:
+    sim = holding()
+    sim.move_body(1, 600, 400)
+    sim.run(0.6)
+    assert held_by(sim) == 0
+    assert place_of(sim) == (600, 400)
+    assert ask(sim, "H,0") == [0]
+    sim = holding()
+    sim.remove_body(1)
+    sim.run(0.6)
+    assert ask(sim, "H,0") == [0]
+    assert ask(sim, "G") == [0]
+
+
+def test_a_robot_that_is_lifted_leaves_what_stands_on_the_floor() -> None:
+    sim = holding()
+    where = place_of(sim)
+    sim.place(1, 500, 500, 1.0)
+    sim.run(0.1)
+    assert held_by(sim) == 0
+    assert place_of(sim) == where
+
+
+@pytest.mark.parametrize("is_open", [True, False])
+def test_a_reset_takes_the_grip_back(is_open: bool) -> None:
+    sim = holding()
+    ask(sim, "E,100")
+    sim.run(0.7)
+    lifted = sim.checkpoint()
+    kiks.Khepera(sim.port(1)).set_speed(-10, -10)
+    if is_open:
+        ask(sim, "D,0")
+    sim.run(1.0)
+    sim.reset(lifted)
+    kiks.Khepera(sim.port(1)).set_speed(0, 0)
+    sim.run(0.5)
+    assert held_by(sim) == (0 if is_open else 1)
+    assert seen_from(sim)[0] == pytest.approx(TOUCHING_MM + 1, abs=12)
+    assert deepest_overlap_mm(sim) < 0.02
+
+
+def test_a_reset_to_before_the_grip_lets_go() -> None:
+    sim = a_simulation()
+    before = sim.checkpoint()
+    closed(sim)
+    ask(sim, "E,100")
+    sim.run(0.7)
+    sim.reset(before)
+    assert held_by(sim) == 0
+    sim.run(0.6)
+    assert held_by(sim) == 0
+    assert ask(sim, "H,0") == [0]
+
+
+# ---- the state ----
+
+
+def test_the_same_carry_again_to_the_bit_and_from_a_snapshot() -> None:
+    def begin() -> kiks.Simulation:
+        sim = holding(robots=2)
+        for line in ("T,1,E,100", "D,12,8"):
+            tell(sim, line)
+        tell(sim, "D,10,10", 2)
+        sim.run(0.35)
+        sim.sync()
+        return sim
+
+    def end(sim: kiks.Simulation) -> list[str]:
+        hashes = []
+        for line in ("T,1,E,255", "D,5,-9", "T,1,D,0", "D,9,9"):
+            tell(sim, line)
+            sim.run(0.43)
+            hashes.append(sim.state_hash())
+        return hashes
+
+    sim = begin()
+    snapshot, now_ns = sim.state.snapshot(), sim.now_ns
+    first = end(sim)
+    assert end(begin()) == first
+    sim.state.restore(snapshot)
+    sim._enter()
+    sim.now_ns = now_ns
+    assert sim.state_hash() == snapshot.hash()
+    # The line has moved on with the clock, so orders are carried out at once.
+    other = begin()
+    assert other.state_hash() == snapshot.hash()
+    for world in (sim, other):
+        world.run(0.5)
+    assert sim.state_hash() == other.state_hash()
+
+
+def test_it_does_not_matter_how_often_one_looks() -> None:
+    hashes = set()
+    for looks in (1, 7, 60):
+        sim = holding(robots=2)
+        tell(sim, "T,1,E,100")
+        tell(sim, "D,12,8")
+        for _ in range(looks):
+            sim.run(1.26 / looks)
+            sim.poses()
+        hashes.add(sim.state_hash())
+    assert len(hashes) == 1
+
+
+# ---- laws ----
+
+
+@settings(max_examples=12, deadline=None)
+@given(seed=st.integers(0, 10_000))
+def test_nothing_overlaps_and_nothing_is_lost(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    size = [int(mm) for mm in rng.integers(280, 500, 2)]
+    sim = kiks.Simulation(
+        kiks.Arena.box(size[0], size[1], rounded_mm=60), seed=seed, robot=["khepera", "khepera_ii", "khepera"]
+    )
+    for robot in (1, 2, 3):
+        sim.fit(robot, "gripper")
+    for k in range(40):
+        try:
+            add = sim.add_ball if k % 3 == 0 else sim.add_cylinder
+            add(*rng.uniform(0, size), radius_mm=float(rng.uniform(4, 26)))
+        except kiks.ParameterError:
+            continue
+    count = len(sim.bodies())
+    for _ in range(60):
+        for robot in (1, 2, 3):
+            approach(sim, robot, rng)
+            left, right = rng.integers(-40, 60, 2)
+            line = (f"D,{left},{right}", "D,15,15", "T,1,D,1", "T,1,D,0", "T,1,E,255", "T,1,E,100")[rng.integers(0, 6)]
+            tell(sim, line, robot)
+        sim.run(float(rng.uniform(0.05, 0.5)))
+        bodies = sim.bodies()
+        on_floor = bodies[bodies["is_lifted"] == 0]
+        assert len(bodies) == count
+        assert (bodies["holder"][bodies["is_lifted"] != 0] > 0).all()
+        assert ((on_floor["x_mm"] > 0) & (on_floor["x_mm"] < size[0])).all()
+        assert ((on_floor["y_mm"] > 0) & (on_floor["y_mm"] < size[1])).all()
+        assert deepest_overlap_mm(sim) < 0.3
+
+
+def approach(sim: kiks.Simulation, robot: int, rng: np.random.Generator) -> None:
+    """Put a robot in front of some body, now and then, and grip it."""
+    bodies = sim.bodies()
+    if rng.random() > 0.15 or not len(bodies) or (bodies["holder"] == robot).any():
+        return
+    body, angle = bodies[rng.integers(0, len(bodies))], rng.uniform(0, 2 * math.pi)
+    way = sim.specs[robot - 1].body.radius_mm + body["radius_mm"] + rng.uniform(0.1, 3)
+    try:
+        sim.place(robot, body["x_mm"] - way * math.cos(angle), body["y_mm"] - way * math.sin(angle), angle)
+    except kiks.ParameterError:
+        return
+    kiks.Khepera(sim.port(robot)).set_speed(0, 0)
+    closed(sim, robot)

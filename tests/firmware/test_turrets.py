@@ -1,0 +1,287 @@
+"""The one interface of all turrets: tables, names, errors, turrets of a user's own, and what they remember."""
+
+from __future__ import annotations
+
+import logging
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+from tests.reply_grammar import ORDERS
+from tests.session_player import FOLDER, TURRETS
+
+import kiks
+from kiks.engine.state import BODY, MEMORY_COUNT, ROBOT
+from kiks.firmware.general_io import GeneralIO
+from kiks.firmware.turret import Orders, Shape, Turret
+
+ROOT = Path(__file__).parents[2]
+
+
+class Counter(Turret):
+    """A turret that counts, rolls dice and fails."""
+
+    number, name, memory_count = 24, "Counter", 2
+
+    def count(self, step: int) -> tuple[int, ...]:
+        """C: count on."""
+        self.site.memory[0] += step
+        return (int(self.site.memory[0]),)
+
+    def roll(self) -> tuple[int, ...]:
+        """R: a die."""
+        return (1 + int(6 * self.site.random()),)
+
+    def fail(self) -> tuple[int, ...]:
+        """X: fail."""
+        raise ZeroDivisionError
+
+    def babble(self) -> Any:
+        """Y: answer nonsense."""
+        return ("seven",)
+
+    def reset(self) -> None:
+        """Begin again."""
+        if hasattr(self, "site"):
+            self.site.memory[:] = 0
+
+    orders: ClassVar[Orders] = {"C": (1, count), "R": (0, roll), "X": (0, fail), "Y": (0, babble)}
+
+
+def execute(sim: kiks.Simulation, line: str, robot: int = 1) -> str:
+    sim.sync()
+    return sim.wires[robot - 1].firmware.execute(line.encode(), sim.now_ns).decode().rstrip()
+
+
+# ---- all of them ----
+
+
+def test_records_have_no_gaps() -> None:
+    """The hash takes their bytes, and bytes between the fields are nobody's."""
+    for record in (ROBOT, BODY):
+        assert sum(record[name].itemsize for name in record.names or ()) == record.itemsize
+
+
+def test_tables_are_complete_and_say_what_orders_do() -> None:
+    sim = kiks.Simulation()
+    for name in TURRETS:
+        turret = sim.fit(1, name)
+        assert (set(turret.orders) if turret.number >= 0 else set()) == {
+            letter.decode() for letter in ORDERS.get(turret.number, {})
+        }
+        for letter, (count, act) in turret.orders.items():
+            assert count >= 0
+            assert (act.__doc__ or "").startswith(f"{letter}: ")
+
+
+def test_every_order_has_a_transcript_and_a_line_in_the_documents() -> None:
+    sent = "".join(path.read_text(encoding="ascii") for path in FOLDER.glob("*.txt"))
+    page = (ROOT / "docs" / "turrets.md").read_text(encoding="utf-8")
+    for number, orders in ORDERS.items():
+        for letter in (*orders, b"B"):
+            order = f"T,{number},{letter.decode()}"
+            assert re.search(rf"^> .*{order}\b", sent, re.MULTILINE), order
+            assert re.search(rf"`{order}\b", page), order
+
+
+def test_all_of_them_can_be_drawn() -> None:
+    sim = kiks.Simulation()
+    before = {}
+    for name in TURRETS:
+        before[name] = sim.fit(1, name)
+    digest = sim.state_hash()
+    for turret in before.values():
+        shapes = turret.shapes()
+        assert shapes
+        for shape in shapes:
+            assert isinstance(shape, Shape)
+            assert re.fullmatch("#[0-9a-f]{6}", shape.colour)
+            assert (len(shape.points) == 1) == (shape.radius_mm > 0)
+            assert all(abs(mm) < 100 for point in shape.points for mm in point)
+    assert sim.state_hash() == digest
+    down, up = [], []
+    for arm, into in ((255, down), (127, up)):
+        execute(sim, f"T,1,E,{arm}")
+        sim.run(1.1)
+        sim.sync()
+        into += [max(x for x, _ in shape.points) for shape in before["gripper"].shapes()]
+    assert min(down) > 60 > 0 > max(up)
+
+
+def test_what_a_turret_adds_is_in_net_and_in_no_other_robot() -> None:
+    sim = kiks.Simulation(robots=2)
+    for name in TURRETS:
+        sim.fit(2, name)
+    assert execute(sim, "net") == "No intelligent turret"
+    assert [line.split(", ")[1] for line in execute(sim, "net", 2).splitlines()] == ["ID 1", "ID 2", "ID 4", "ID 99"]
+
+
+# ---- General I/O ----
+
+
+def test_general_io_is_wired_to_the_outside() -> None:
+    sim = kiks.Simulation()
+    io = sim.fit(1, "io")
+    assert isinstance(io, GeneralIO)
+    robot = kiks.Khepera(sim.port(1))
+    robot.write_bus(170, 32)
+    assert io.outputs == 170
+    io.inputs = 0b101
+    io.set_input(7, True)
+    io.set_input(0, False)
+    assert robot.read_bus(32) == io.inputs == 0b1000_0100
+    assert robot.read_bus(31) == 0
+    for channel, volts in ((3, 2.0), (4, -1.0), (5, 100.0)):
+        io.set_analog(channel, volts)
+    assert [robot.analog(channel) for channel in (3, 4, 5)] == [500, 0, 1023]
+    digest = sim.state_hash()
+    io.set_analog(3, 2.1)
+    assert sim.state_hash() != digest
+    robot.send("restart")
+    sim.run(0.1)
+    assert io.outputs == 0
+    assert io.inputs == 0b1000_0100
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda io: setattr(io, "inputs", 256), "inputs must be a whole number from 0 to 255, but it was 256"),
+        (lambda io: setattr(io, "inputs", 1.5), "inputs must be a whole number from 0 to 255, but it was 1.5"),
+        (lambda io: io.set_input(8, True), "wire must be a whole number from 0 to 7, but it was 8"),
+        (lambda io: io.set_analog(2, 1.0), "channel must be a whole number from 3 to 5, but it was 2"),
+        (lambda io: io.set_analog(3, float("nan")), "volts must be a finite number, but it was nan"),
+        (lambda io: io.set_analog(3, "1"), "volts must be a finite number, but it was '1'"),
+    ],
+)
+def test_general_io_minds_its_numbers(call: Any, words: str) -> None:
+    with pytest.raises(kiks.ParameterError, match=words):
+        call(kiks.Simulation().fit(1, "io"))
+
+
+# ---- of one's own ----
+
+
+def test_the_example_runs() -> None:
+    path = ROOT / "examples" / "turrets" / "compass.py"
+    done = subprocess.run([sys.executable, str(path)], capture_output=True, text=True, check=True)
+    assert re.fullmatch(r"heading 30\nturned by 8\d\n", done.stdout)
+    assert len(path.read_text(encoding="utf-8").splitlines()) < 60
+
+
+def test_what_it_remembers_stands_in_the_state() -> None:
+    sim = kiks.Simulation(robots=2)
+    for robot in (1, 2):
+        sim.fit(robot, Counter())
+    assert execute(sim, "T,24,C,5") == "t,24,c,5"
+    snapshot = sim.state.snapshot()
+    digest = sim.state_hash()
+    assert execute(sim, "T,24,C,5") == "t,24,c,10"
+    assert execute(sim, "T,24,C,1", 2) == "t,24,c,1"
+    assert sim.state_hash() != digest
+    sim.state.restore(snapshot)
+    assert sim.state_hash() == digest
+    assert execute(sim, "T,24,C,5") == "t,24,c,10"
+    execute(sim, "restart")
+    assert execute(sim, "T,24,C,5") == "t,24,c,5"
+
+
+def test_two_of_them_do_not_share_their_numbers() -> None:
+    class Other(Counter):
+        number, name, memory_count = 25, "Other", MEMORY_COUNT - 2
+
+    class Third(Counter):
+        number, name, memory_count = 26, "Third", 1
+
+    sim = kiks.Simulation()
+    sim.fit(1, Counter())
+    sim.fit(1, Other())
+    execute(sim, "T,24,C,5")
+    assert execute(sim, "T,25,C,7") == "t,25,c,7"
+    assert execute(sim, "T,24,C,0") == "t,24,c,5"
+    with pytest.raises(kiks.ParameterError, match="memory_count of a turret must be at most 0, but it was 1"):
+        sim.fit(1, Third())
+
+
+def test_chance_repeats() -> None:
+    def rolls(seed: int, robot: int) -> list[str]:
+        sim = kiks.Simulation(robots=2, seed=seed)
+        sim.fit(robot, Counter())
+        found = []
+        for _ in range(20):
+            found.append(execute(sim, "T,24,R", robot))
+            sim.run(0.01)
+        return found
+
+    assert rolls(1, 1) == rolls(1, 1)
+    assert len({tuple(rolls(seed, robot)) for seed in (1, 2) for robot in (1, 2)}) == 4
+
+
+def test_its_faults_never_reach_the_wire(caplog: pytest.LogCaptureFixture) -> None:
+    sim = kiks.Simulation()
+    sim.fit(1, Counter())
+    with caplog.at_level(logging.ERROR):
+        for order in "XY":
+            assert execute(sim, f"T,24,{order}") == "z,Protocol error"
+    assert "Turret 24 (Counter) must not raise, but order X did." in caplog.text
+    assert "ZeroDivisionError" in caplog.text
+
+
+def test_a_ray_finds_what_is_there() -> None:
+    sim = kiks.Simulation(kiks.Arena.box(600, 600), robots=2)
+    sim.place(1, 300, 300, 0.0)
+    sim.place(2, 300, 400, 0.0)
+    ball = sim.add_ball(200, 300)
+    site = sim.fit(1, Counter()).site
+    wall = site.ray()
+    assert (wall.robot, wall.body) == (0, 0)
+    assert wall.distance_mm == pytest.approx(290, abs=0.1)
+    above = site.ray(np.pi / 2)
+    assert (above.robot, above.body) == (2, 0)
+    assert above.distance_mm == pytest.approx(72.5, abs=1e-6)
+    behind = site.ray(-np.pi)
+    assert (behind.robot, behind.body) == (0, ball)
+    assert behind.distance_mm == pytest.approx(100 - sim.bodies()["radius_mm"][0], abs=1e-6)
+    assert site.poses() == [pytest.approx((300, 300, 0)), pytest.approx((300, 400, 0))]
+    assert len(site.bodies()) == 1
+    assert site.arena_mm == (600, 600)
+    assert site.robot == 1
+
+
+def a_turret(**changes: Any) -> Turret:
+    return type("Odd", (Counter,), changes)()
+
+
+@pytest.mark.parametrize(
+    ("turret", "words"),
+    [
+        ("griper", "turret must be one of 'k213', .* but it was 'griper'. Did you mean 'gripper'"),
+        (7, "turret must be a name or a kiks.firmware.turret.Turret, but it was 7"),
+        (Counter, "turret must be a name or a kiks.firmware.turret.Turret"),
+        (a_turret(number=100), "number of a turret must be a whole number from 0 to 99, but it was 100"),
+        (a_turret(number="1"), "number of a turret must be a whole number from 0 to 99, but it was '1'"),
+        (a_turret(name="Gr\u00fc\u00dfe"), "name of a turret must be a line of ASCII"),
+        (a_turret(name=""), "name of a turret must be a line of ASCII"),
+        (a_turret(revision=(1, -1)), r"revision of a turret must be two whole numbers, but it was \(1, -1\)"),
+        (a_turret(orders={"B": (0, len)}), "orders of a turret must be capital letters other than B, but one was 'B'"),
+        (a_turret(orders={"c": (0, len)}), "orders of a turret must be capital letters other than B, but one was 'c'"),
+        (a_turret(orders={"C": len}), "orders of a turret must be a count of numbers and a function, but C was"),
+        (a_turret(memory_count=17), "memory_count of a turret must be at most 16, but it was 17"),
+    ],
+)
+def test_what_is_no_turret_is_refused(turret: Any, words: str) -> None:
+    with pytest.raises(kiks.ParameterError, match=words):
+        kiks.Simulation().fit(1, turret)
+
+
+@pytest.mark.parametrize("name", TURRETS)
+def test_nothing_is_fitted_twice(name: str) -> None:
+    sim = kiks.Simulation()
+    first = sim.fit(1, name)
+    with pytest.raises(kiks.ParameterError, match="turret must be one that robot 1 has not got"):
+        sim.fit(1, name)
+    assert sim.wires[0].firmware.fitted == [first]

@@ -1,0 +1,204 @@
+"""Networks: exact gradients, training that trains, the same by the same seed; kernels that agree with NumPy."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+
+import numpy as np
+import pytest
+
+from kiks.engine.numbers import tanh
+from kiks.engine.sensing import thesis_networks as kernels
+from kiks.errors import ParameterError
+from kiks.fit import train_networks
+from kiks.fit.samples import Samples
+from kiks.model.thesis_networks import THESIS, NetworkResponse
+
+SIZES = sorted(train_networks.SIZES)
+
+
+def parameters_of(layers, rng):
+    return train_networks._draw(layers, 7, rng)
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_the_jacobian_is_exact(size):
+    rng = np.random.default_rng(1)
+    layers = train_networks.SIZES[size]
+    parameters = parameters_of(layers, rng)
+    inputs, targets = rng.random((20, 7)), rng.uniform(0.1, 0.9, 20)
+    _, jacobian = train_networks.residuals_and_jacobian(parameters, layers, inputs, targets)
+    for k in range(len(parameters)):
+        step = np.zeros(len(parameters))
+        step[k] = 1e-6
+        above, _ = train_networks.residuals_and_jacobian(parameters + step, layers, inputs, targets)
+        below, _ = train_networks.residuals_and_jacobian(parameters - step, layers, inputs, targets)
+        np.testing.assert_allclose(jacobian[:, k], (above - below) / 2e-6, atol=1e-7)
+
+
+def test_what_the_converter_cuts_off_is_no_error():
+    parameters = np.array([0.0] * 7 + [1.5])
+    inputs, layers = np.zeros((2, 7)), train_networks.SIZES["no hidden layer"]
+    residuals, jacobian = train_networks.residuals_and_jacobian(parameters, layers, inputs, np.array([1.0, 0.5]))
+    assert residuals.tolist() == [0.0, 1.0]
+    assert jacobian[:, 7].tolist() == [0.0, 1.0]
+    residuals, _ = train_networks.residuals_and_jacobian(-parameters, layers, inputs, np.array([0.01, 0.5]))
+    assert residuals.tolist() == [0.0, -2.0]
+
+
+def made_up(count=400):
+    rng = np.random.default_rng(3)
+    inputs = rng.random((count, 7))
+    return inputs, 1023.0 / (1.0 + np.exp(-20.0 * (inputs[:, 3] * inputs[:, 2] - 0.3)))
+
+
+def error_of(network, inputs, counts):
+    return float(np.mean(np.abs(network(inputs) - counts)))
+
+
+def test_training_reduces_the_error():
+    inputs, counts = made_up()
+    layers = train_networks.SIZES[train_networks.THESIS_SIZE]
+    start = train_networks.Network(
+        train_networks.unpack(parameters_of(layers, np.random.default_rng(0)), layers, 7), (True, False, False)
+    )
+    linear = train_networks.train(inputs, counts, train_networks.SIZES["no hidden layer"], seed=0, starts=1)
+    thesis = train_networks.train(inputs, counts, layers, seed=0, starts=2)
+    assert error_of(linear, inputs, counts) < 0.7 * error_of(start, inputs, counts)
+    assert error_of(thesis, inputs, counts) < 0.5 * error_of(linear, inputs, counts)
+
+
+def test_the_same_seed_trains_the_same_network():
+    inputs, counts = made_up(150)
+    one, two, other = (
+        train_networks.train(inputs, counts, train_networks.SIZES[train_networks.THESIS_SIZE], seed=seed, starts=1)
+        for seed in (4, 4, 5)
+    )
+    for a, b, c in zip(one.weights, two.weights, other.weights, strict=True):
+        np.testing.assert_array_equal(a, b)
+        assert not np.array_equal(a, c)
+
+
+def test_too_few_samples():
+    with pytest.raises(ParameterError, match="at least 10 samples with something near and 1 start"):
+        train_networks.train(np.zeros((9, 7)), np.zeros(9), train_networks.SIZES["7 linear"], seed=0)
+
+
+def test_sensors_are_trained_on_samples_and_saved(tmp_path):
+    angles = np.tile(np.arange(0.0, 360.0, 10.0), (5, 1))
+    counts = np.random.default_rng(0).integers(0, 1024, (5, 36, 8))
+    samples = Samples("wall", math.inf, np.arange(5.0, 15.0, 2.0), angles, counts)
+    said = []
+    trained = train_networks.train_sensors(
+        [samples], train_networks.SIZES[train_networks.THESIS_SIZE], starts=1, progress=said.append
+    )
+    assert said == [f"sensor {sensor}" for sensor in range(8)]
+    answers, expected = train_networks.predictions([samples], trained)
+    assert answers.shape == expected.shape
+    assert train_networks.errors(answers, answers + 3.0) == pytest.approx((3.0, 3.0, 3.0))
+    response = train_networks.response_of(trained)
+    response.save(tmp_path / "mine.json")
+    again = NetworkResponse.load(tmp_path / "mine.json")
+    for here, there in zip(response.weights, again.weights, strict=True):
+        np.testing.assert_allclose(here, there, rtol=1e-5)
+    fan = train_networks.fan_of(again)
+    np.testing.assert_allclose(np.degrees(fan.direction_rad[2]), [72, 52, 32, 12, -8, -28, -48])
+    # The kernel says what NumPy says.
+    inputs, _ = train_networks.pairs([samples], fan, 5)
+    seen = np.zeros((len(inputs), 8, 7))
+    seen[:, 5] = inputs
+    out = np.empty((len(inputs), 8))
+    kernels.respond_networks(kernels.pack_networks(response), seen, out)
+    np.testing.assert_allclose(out[:, 5], np.clip(trained[5](inputs), 0, 1023), atol=0.3)
+    assert not out[:, :5].any()  # nothing near, nothing read
+
+
+def test_tanh():
+    for x in np.linspace(-20.0, 20.0, 4001):
+        assert tanh(x) == pytest.approx(math.tanh(x), abs=7e-6)
+        assert tanh(-x) == -tanh(x)
+        assert abs(tanh(x)) <= 1.0
+
+
+def test_the_table_is_the_mean_of_the_networks():
+    response = NetworkResponse.load()
+    table = kernels.networks_for("fast")["table"][0]
+    assert table.shape == (6**7,)
+    assert table[0] == 0.0
+    assert table.min() >= 0.0
+    assert table.max() <= 1023.0
+    rng = np.random.default_rng(0)
+    levels = rng.integers(0, 6, (50, 7))
+    seen = np.repeat((levels / 5.0)[:, None], 8, axis=1)
+    out, looked_up = np.empty((50, 8)), np.empty((50, 8))
+    kernels.respond_networks(kernels.pack_networks(response), seen, out)
+    # Anything that rounds to the same level is the same entry.
+    nearby = np.clip(seen + rng.uniform(-0.09, 0.09, seen.shape), 0.0, 1.0)
+    kernels.respond_table(table, nearby, looked_up)
+    np.testing.assert_allclose(looked_up, np.repeat(out.mean(axis=1)[:, None], 8, axis=1), rtol=1e-5, atol=1e-3)
+
+
+def test_kernels_against_numpy():
+    response = NetworkResponse.load()
+    seen = np.random.default_rng(1).random((200, 8, 7))
+    out = np.empty((200, 8))
+    kernels.respond_networks(kernels.pack_networks(response), seen, out)
+    for sensor in range(8):
+        hidden, middle, last = (each[sensor] for each in response.weights)
+        network = train_networks.Network((hidden, middle, last[None]), (True, False, False))
+        np.testing.assert_allclose(out[:, sensor], np.clip(network(seen[:, sensor]), 0, 1023), atol=0.5)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "must be JSON in UTF-8"),
+        ("[" * 100_000, "nested too deeply"),
+        ("[]", "must be a table, but it was []. `kiks fit"),
+        ("{}", "mount_angle_deg must be given, but it is missing"),
+        (None, "there is no such file"),
+    ],
+)
+def test_files_that_hold_no_networks(tmp_path, text, words):
+    file = tmp_path / "net.json"
+    if text is not None:
+        file.write_text(text)
+    with pytest.raises(ParameterError) as caught:
+        NetworkResponse.load(file)
+    assert words in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"hidden": [[1.0]]}, r"hidden\[0\]\[0\] must be a list of 8 values, each a number from -1e6 to 1e6"),
+        ({"hidden": []}, "hidden must be a list of 8 values, each a list of 13 values, each a list of 8 values"),
+        (
+            {"hidden": [[[0.0] * 8] * 13] * 7 + [[[0.0] * 8] * 12 + [[1e7] * 8]]},
+            r"hidden\[7\]\[12\]\[0\] must be a number",
+        ),
+        ({"last": "x"}, "last must be a list of 8 values"),
+        ({"range_mm": [1.0]}, "range_mm must be a number from 1 to 1000"),
+        ({"range_mm": 0}, "range_mm must be a number from 1 to 1000, but it was 0"),
+        ({"field_of_view_deg": 1e9}, "field_of_view_deg must be a number above 0 and at most 180"),
+        ({"direction_deg": [1.0]}, "direction_deg must be a list of 8 values"),
+        ({"mount_radius_mm": [float("nan")] * 8}, r"mount_radius_mm\[0\] must be a number"),
+    ],
+)
+def test_networks_have_their_shape(tmp_path, change, words):
+    data = json.loads(THESIS.read_text()) | change
+    (tmp_path / "net.json").write_text(json.dumps(data))
+    with pytest.raises(ParameterError, match=words):
+        NetworkResponse.load(tmp_path / "net.json")
+    with pytest.raises(ParameterError, match="networks must go to a file that can be written"):
+        NetworkResponse.load().save(tmp_path / "no" / "net.json")
+
+
+def test_networks_never_change():
+    response = NetworkResponse.load()
+    with pytest.raises(TypeError, match="does not support item assignment"):
+        response.hidden[0][0] = 1.0
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        response.range_mm = 1.0

@@ -1,0 +1,271 @@
+"""Environments: as Gymnasium and PettingZoo want them, and the same episodes in all of them."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode
+from pettingzoo.test import parallel_api_test
+
+import kiks
+import kiks.learn.gymnasium_envs
+from kiks.errors import ParameterError
+from kiks.learn.env_specs import LESSONS, EnvSpec
+from kiks.learn.gymnasium_envs import KheperaEnv, KheperaVectorEnv
+from kiks.learn.pettingzoo_env import KheperaTeam
+
+IDS = [f"kiks/{name}-v0" for name in LESSONS]
+
+
+def lesson(**changes: Any) -> EnvSpec:
+    """Return a small lesson that ends when the robot has gone 40 mm."""
+
+    @kiks.measure
+    def arrived(moment: Any, notes: Any) -> None:
+        notes[0] = 1.0 if moment.path_mm > 40.0 else 0.0
+
+    return EnvSpec("go", (kiks.Arena.box(400, 300),), kiks.measures.path_mm, arrived).with_changes(**changes)
+
+
+def vector(count: int = 3, **options: Any) -> KheperaVectorEnv:
+    return KheperaVectorEnv(count, "Avoid", **options)
+
+
+def some_actions(*shape: int) -> Any:
+    return np.random.default_rng(5).uniform(-1, 1, (*shape, 2)).astype(np.float32)
+
+
+@pytest.mark.parametrize("name", IDS)
+@pytest.mark.filterwarnings("error")
+def test_gymnasium_accepts_each(name: str) -> None:
+    env = gymnasium.make(name, render_mode="rgb_array")
+    assert env.spec is not None
+    assert env.spec.max_episode_steps == 600
+    check_env(env.unwrapped)
+
+
+def test_each_is_registered_by_naming_its_module() -> None:
+    code = "import gymnasium; print(gymnasium.make('kiks.learn.gymnasium_envs:kiks/Avoid-v0').unwrapped)"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert "KheperaEnv" in found.stdout, found.stderr
+
+
+def test_kiks_alone_imports_no_gymnasium() -> None:
+    code = "import sys, kiks; assert not {'gymnasium', 'pettingzoo', 'numba'} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize(
+    ("missing", "module"), [("gymnasium", "kiks.learn.gymnasium_envs"), ("pettingzoo", "kiks.learn.pettingzoo_env")]
+)
+def test_what_is_not_installed_is_named(missing: str, module: str) -> None:
+    code = f"import sys; sys.modules['{missing}'] = None; import {module}"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert "pip install '.[learn]'" in found.stderr
+
+
+@pytest.mark.parametrize("name", ["kiks/Avoid-v0", "kiks/Maze-v0"])
+def test_one_robot_and_one_of_many_have_the_same_episodes(name: str) -> None:
+    many = gymnasium.make_vec(name, num_envs=9, max_episode_steps=7, threads=2)
+    assert isinstance(many, KheperaVectorEnv)
+    actions = some_actions(24, 9)
+    alone = gymnasium.make(name, max_episode_steps=7)
+    lane = 4
+    seen, _ = many.reset(seed=10)
+    expected, _ = alone.reset(seed=10 + lane)
+    is_done = False
+    for action in actions:
+        np.testing.assert_array_equal(seen[lane], expected)
+        seen, rewards, terminations, truncations, infos = many.step(action)
+        if is_done:  # the step in which the vector environment begins anew
+            expected, _ = alone.reset()
+            is_done = False
+            assert rewards[lane] == 0.0
+            continue
+        expected, reward, terminated, truncated, info = alone.step(action[lane])
+        assert (reward, terminated, truncated) == (rewards[lane], terminations[lane], truncations[lane])
+        assert info == {key: infos[key][lane] for key in info}
+        assert all(infos[f"_{key}"].all() for key in info)
+        is_done = truncated
+    hashes = [env.unwrapped.episodes.batch.state_hash(k) for env, k in ((many, lane), (alone, 0))]
+    assert hashes[0] == hashes[1]
+
+
+def test_a_seed_is_an_episode_and_none_goes_on() -> None:
+    env = KheperaEnv("Avoid")
+
+    def episode(seed: int | None) -> list[float]:
+        seen, _ = env.reset(seed=seed)
+        return [*seen.tolist(), *env.step(np.ones(2, np.float32))[0].tolist(), *env.episodes.batch.poses[0, 0]]
+
+    first, second = episode(7), episode(None)
+    assert first != second
+    assert [episode(7), episode(None)] == [first, second]
+    assert episode(8) != first
+
+
+def test_lanes_differ_and_seeds_may_be_given_for_each() -> None:
+    envs = vector()
+    envs.reset(seed=[4, 9, 4])
+    one, two, three = (envs.episodes.batch.poses[k].tolist() for k in range(3))
+    assert one == three != two
+    envs.reset(seed=3)
+    assert envs.episodes.batch.poses[1].tolist() == one
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+def test_each_way_to_begin_anew(mode: AutoresetMode) -> None:
+    envs = KheperaVectorEnv(2, lesson(), autoreset_mode=mode)
+    assert envs.metadata["autoreset_mode"] is mode
+    envs.reset(seed=1)
+    actions = np.array([[1, 1], [0, 0]], np.float32)
+    for _ in range(20):
+        seen, rewards, terminations, truncations, infos = envs.step(actions)
+        if terminations.any():
+            break
+    assert terminations.tolist() == [True, False]
+    assert not truncations.any()
+    assert rewards[0] > 0.0
+    if mode is AutoresetMode.SAME_STEP:
+        assert infos["final_obs"][0] in envs.single_observation_space
+        assert infos["_final_obs"].tolist() == [True, False]
+        assert infos["final_info"]["path_mm"][0] > 40.0
+    else:
+        assert infos["path_mm"][0] > 40.0
+        if mode is AutoresetMode.DISABLED:
+            with pytest.raises(ParameterError, match="reset_mask"):
+                envs.step(actions)
+            seen, infos = envs.reset(options={"reset_mask": np.array([True, False])})
+        else:
+            seen, rewards, terminations, _, infos = envs.step(actions)
+            assert rewards[0] == 0.0
+            assert not terminations.any()
+    assert infos["path_mm"][0] == 0.0
+    assert infos["time_s"][0] == 0.0
+    assert infos["time_s"][1] > 0.0
+    assert seen in envs.observation_space
+
+
+def test_gymnasiums_wrappers_take_the_vector_environment() -> None:
+    envs = gymnasium.wrappers.vector.RecordEpisodeStatistics(
+        gymnasium.make_vec("kiks/Avoid-v0", num_envs=2, max_episode_steps=3)
+    )
+    envs.reset(seed=0)
+    for _ in range(3):
+        *_, infos = envs.step(envs.action_space.sample())
+    assert infos["episode"]["l"].tolist() == [3, 3]
+
+
+def test_rewards_add_up_to_the_measure() -> None:
+    envs = vector(4, threads=1)
+    envs.reset(seed=2)
+    total = sum(envs.step(action)[1] for action in some_actions(12, 4))
+    np.testing.assert_allclose(total / 12, envs.episodes.batch.values[:, 0, 0])
+
+
+def test_timing_and_robot_may_be_chosen() -> None:
+    env = KheperaEnv("Avoid", timing=kiks.Timing(0.05, None), response="fast")
+    env.reset(seed=1)
+    assert env.step(np.zeros(2, np.float32))[4]["time_s"] == 0.05
+    slow = KheperaEnv("Avoid", timing=kiks.Timing(0.0, 9600))
+    slow.reset(seed=1)
+    assert 0.03 < slow.step(np.zeros(2, np.float32))[4]["time_s"] < 0.09
+
+
+@pytest.mark.parametrize(
+    ("action", "words"),
+    [
+        (np.array([0.0, 1.5]), "from -1 to 1, but among them was 1.5"),
+        (np.array([0.0, np.nan]), "from -1 to 1, but among them was nan"),
+        (np.zeros(3), "two for each robot"),
+        ("ahead", "two for each robot"),
+    ],
+)
+def test_actions_that_are_none_are_refused(action: Any, words: str) -> None:
+    env = KheperaEnv("Avoid")
+    env.reset(seed=0)
+    with pytest.raises(ParameterError, match=words):
+        env.step(action)
+
+
+def test_step_before_reset_is_refused() -> None:
+    with pytest.raises(ParameterError, match="reset"):
+        KheperaEnv("Avoid").step(np.zeros(2, np.float32))
+    with pytest.raises(ParameterError, match="reset"):
+        vector().step(np.zeros((3, 2), np.float32))
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: KheperaEnv("Avoit"), "Did you mean 'Avoid'"),
+        (lambda: KheperaEnv("Avoid", arena=1), "Known are name, arenas"),
+        (lambda: KheperaEnv("Avoid", render_mode="human"), "rgb_array"),
+        (lambda: KheperaEnv("Avoid", speed_limit=0), "above 0"),
+        (lambda: KheperaEnv("Avoid", senses=("sound",)), "proximity, ambient"),
+        (lambda: KheperaEnv("Avoid", starts="here"), "one of 'random', 'arena'"),
+        (lambda: KheperaEnv("Avoid", reward=3), "must be a kiks.Measure"),
+        (lambda: vector().reset(seed=[1]), "one for each of 3 worlds"),
+        (lambda: vector().reset(options={"reset_mask": [1, 0]}), "reset_mask must be bool"),
+    ],
+)
+def test_wrong_arguments_are_named(make: Any, words: str) -> None:
+    with pytest.raises(ParameterError, match=words):
+        make()
+
+
+def test_pictures_show_the_robot() -> None:
+    env = KheperaEnv("Avoid", render_mode="rgb_array")
+    env.reset(seed=1)
+    before = env.render()
+    for _ in range(5):
+        env.step(np.ones(2, np.float32))
+    assert before.shape == (480, 480, 3)
+    assert (env.render() != before).any()
+    envs = vector(2, render_mode="rgb_array")
+    envs.reset(seed=1)
+    pictures = envs.render()
+    assert pictures is not None
+    np.testing.assert_array_equal(pictures[0], before)
+
+
+def test_a_team_must_have_room() -> None:
+    team = KheperaTeam("Avoid", robots=40, arenas=kiks.Arena.box(500, 500))
+    with pytest.raises(ParameterError, match="room for 40 robots"):
+        team.reset(seed=1)
+
+
+def test_pettingzoo_accepts_teams() -> None:
+    parallel_api_test(KheperaTeam(robots=3), num_cycles=30)
+
+
+def test_a_team_of_one_is_the_single_environment() -> None:
+    team, env = KheperaTeam("Avoid", robots=1), KheperaEnv("Avoid")
+    seen, _ = team.reset(seed=3)
+    expected, _ = env.reset(seed=3)
+    for action in some_actions(5, 1)[:, 0]:
+        np.testing.assert_array_equal(seen["robot_1"], expected)
+        seen, rewards, *_, infos = team.step({"robot_1": action})
+        expected, reward, *_, info = env.step(action)
+        assert (rewards["robot_1"], infos["robot_1"]) == (reward, info)
+
+
+def test_an_episode_of_a_team_ends_for_all_at_once() -> None:
+    team = KheperaTeam(lesson(), robots=2)
+    team.reset(seed=1)
+    actions = {"robot_1": np.ones(2, np.float32), "robot_2": np.zeros(2, np.float32)}
+    for _ in range(20):
+        _, rewards, terminations, truncations, _ = team.step(actions)
+        if not team.agents:
+            break
+    assert terminations == {"robot_1": True, "robot_2": True}
+    assert truncations == {"robot_1": False, "robot_2": False}
+    assert rewards["robot_1"] > rewards["robot_2"]
+    with pytest.raises(ParameterError, match="the episode is over"):
+        team.step(actions)

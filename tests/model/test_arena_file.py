@@ -1,0 +1,443 @@
+"""Pictures and arena files: every format that is read, and the words of every refusal."""
+
+import importlib.util
+import math
+import struct
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from kiks.errors import ArenaError, ParameterError
+from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
+from kiks.model.arena_file import save_arena
+
+EXAMPLES = Path(__file__).parents[2] / "examples" / "arenas"
+ARENAS = sorted(EXAMPLES.glob("*.toml"))
+ROOM_MM = 40
+
+
+def grey_picture(shape: tuple[int, int] = (120, 150)) -> np.ndarray:
+    rng = np.random.default_rng(5)
+    picture = np.zeros(shape, np.uint8)
+    picture[20:60, 30:110] = rng.integers(0, 256, (40, 80))
+    picture[0] = np.arange(shape[1]) % 256
+    return picture
+
+
+def read(path: Path) -> np.ndarray:
+    return Arena.load(path).brightness[::-1]
+
+
+GREY_FORMATS = [
+    ("a.png", {}),
+    ("a.pgm", {}),
+    ("a.bmp", {}),
+    ("a.tif", {}),
+    ("a.tif", {"compression": "tiff_lzw"}),
+    ("a.tif", {"compression": "packbits"}),
+    ("a.tiff", {"compression": "tiff_adobe_deflate"}),
+    ("A.TIF", {"compression": "tiff_deflate"}),
+]
+BIT_FORMATS = [
+    ("a.png", {}),
+    ("a.pbm", {}),
+    ("a.bmp", {}),
+    ("a.tif", {}),
+    ("a.tif", {"compression": "group4"}),
+    ("a.tif", {"compression": "group3"}),
+    ("a.tif", {"compression": "packbits"}),
+    ("a.tif", {"compression": "tiff_lzw"}),
+    ("a.tif", {"compression": "group4", "tiffinfo": {262: 0}}),
+]
+
+
+@pytest.mark.parametrize(("name", "options"), GREY_FORMATS)
+def test_greys_come_back_unchanged(tmp_path, name, options):
+    picture = grey_picture()
+    Image.fromarray(picture).save(tmp_path / name, **options)
+    assert np.array_equal(read(tmp_path / name), picture)
+
+
+@pytest.mark.parametrize(("name", "options"), BIT_FORMATS)
+def test_bits_come_back_unchanged(tmp_path, name, options):
+    walls = grey_picture() > 90
+    Image.fromarray(walls).save(tmp_path / name, **options)
+    assert np.array_equal(read(tmp_path / name), walls * 255)
+
+
+@pytest.mark.parametrize("white_is_zero", [False, True])
+@pytest.mark.parametrize("bits", [1, 8])
+def test_a_tif_may_count_from_white_to_black(tmp_path, white_is_zero, bits):
+    # Written by hand, so that Pillow's writer has no say in what the tags mean: one strip, uncompressed.
+    walls = grey_picture((120, 152)) > 90
+    stored = ~walls if white_is_zero else walls
+    data = (np.packbits(stored, axis=1) if bits == 1 else stored * np.uint8(255)).tobytes()
+    tags = [(256, 152), (257, 120), (258, bits), (259, 1), (262, 0 if white_is_zero else 1), (273, 0)]
+    tags += [(277, 1), (278, 120), (279, len(data))]
+    start = 8 + 2 + 12 * len(tags) + 4
+    entries = b"".join(struct.pack("<HHII", tag, 4, 1, start if tag == 273 else value) for tag, value in tags)
+    path = tmp_path / "a.tif"
+    path.write_bytes(b"II*\0" + struct.pack("<IH", 8, len(tags)) + entries + bytes(4) + data)
+    assert np.array_equal(read(path), walls * 255)
+
+
+def test_a_colour_never_becomes_floor(tmp_path):
+    colours = np.zeros((120, 150, 3), np.uint8)
+    colours[10, 10:13] = [(0, 0, 1), (0, 1, 0), (1, 0, 0)]
+    colours[11, 10:13] = [(255, 255, 255), (0, 0, 255), (100, 100, 100)]
+    for name in ("a.png", "a.tif", "a.bmp", "a.ppm"):
+        Image.fromarray(colours).save(tmp_path / name)
+        found = read(tmp_path / name)
+        assert found[10, 10:13].min() == 1
+        assert found[11, 10:13].tolist() == [255, 29, 100]
+        assert np.count_nonzero(found) == 6
+
+
+def test_a_palette_is_read_as_its_colours(tmp_path):
+    indices = np.zeros((120, 150), np.uint8)
+    indices[5, 5], indices[6, 6] = 1, 2
+    image = Image.fromarray(indices).convert("P")
+    image.putpalette([0, 0, 0, 0, 0, 2, 200, 200, 200])
+    image.putdata(indices.ravel().tolist())
+    for name in ("a.png", "a.bmp", "a.tif"):
+        image.save(tmp_path / name)
+        found = read(tmp_path / name)
+        assert (found[5, 5], found[6, 6], np.count_nonzero(found)) == (1, 200, 2)
+
+
+@pytest.mark.parametrize("mode", ["LA", "RGBA"])
+def test_what_is_transparent_is_floor(tmp_path, mode):
+    layered = Image.new(mode, (150, 120), 0)
+    colour = (90,) if mode == "LA" else (90, 90, 90)
+    layered.putpixel((3, 4), (*colour, 255))
+    layered.putpixel((4, 4), (*colour, 1))
+    layered.putpixel((5, 4), (*colour, 0))
+    layered.save(tmp_path / "a.png")
+    found = read(tmp_path / "a.png")
+    assert found[4, 3:6].tolist() == [90, 90, 0]
+    assert np.count_nonzero(found) == 2
+
+
+def test_a_transparent_grey_is_floor(tmp_path):
+    Image.fromarray(grey_picture()).save(tmp_path / "a.png", transparency=90)
+    expected = np.where(grey_picture() == 90, 0, grey_picture())
+    assert np.array_equal(read(tmp_path / "a.png"), expected)
+
+
+@pytest.mark.parametrize("name", ["a.png", "a.tif", "a.pgm"])
+def test_sixteen_bits_are_scaled(tmp_path, name):
+    deep = np.zeros((120, 150), np.uint16)
+    deep[7, :4] = 1, 257, 32896, 65535
+    Image.fromarray(deep).save(tmp_path / name)
+    assert read(tmp_path / name)[7, :5].tolist() == [1, 1, 128, 255, 0]
+
+
+@pytest.mark.parametrize(
+    ("dtype", "values", "expected"),
+    [
+        (np.float32, (0.001, 0.5, 1.0), [1, 128, 255]),
+        (np.float32, (0.1, 100.0, 255.0), [1, 100, 255]),
+        (np.int32, (1, 100, 255), [1, 100, 255]),
+        (np.int32, (1, 257, 65535), [1, 1, 255]),
+        (np.int32, (1, 65536, 2**31 - 1), [1, 1, 127]),
+    ],
+)
+def test_thirty_two_bits_are_scaled(tmp_path, dtype, values, expected):
+    deep = np.zeros((120, 150), dtype)
+    deep[7, :3] = values
+    Image.fromarray(deep).save(tmp_path / "a.tif")
+    assert read(tmp_path / "a.tif")[7, :4].tolist() == [*expected, 0]
+
+
+@pytest.mark.parametrize("value", [-1.0, math.nan, math.inf])
+def test_brightness_is_a_number_from_zero(tmp_path, value):
+    deep = np.zeros((120, 150), np.float32)
+    deep[0, 0] = value
+    Image.fromarray(deep).save(tmp_path / "a.tif")
+    with pytest.raises(ArenaError, match=r"must hold brightness from 0 up, but its values span .* Save the arena as"):
+        Arena.load(tmp_path / "a.tif")
+
+
+def test_the_first_frame_counts(tmp_path):
+    first, second = Image.fromarray(grey_picture()), Image.new("L", (300, 300), 255)
+    first.save(tmp_path / "a.tif", save_all=True, append_images=[second])
+    assert np.array_equal(read(tmp_path / "a.tif"), grey_picture())
+
+
+def test_a_picture_gives_the_name_and_the_scale(tmp_path):
+    Image.fromarray(grey_picture()).save(tmp_path / "yard.png")
+    arena = Arena.from_image(str(tmp_path / "yard.png"), 2)
+    assert (arena.name, arena.width_mm, arena.height_mm) == ("yard", 300, 240)
+    with pytest.raises(ParameterError, match="mm_per_pixel must be a number"):
+        Arena.from_image(tmp_path / "yard.png", 0)
+
+
+def test_a_missing_file_and_a_folder_are_refused(tmp_path):
+    for name in ("none.png", "none.toml"):
+        with pytest.raises(ArenaError, match=rf"{name}' must exist, but there is no such file. Check the name"):
+            Arena.load(tmp_path / name)
+    (tmp_path / "folder.toml").mkdir()
+    for name in ("", "folder.toml"):
+        with pytest.raises(ArenaError, match=r"must be a file, but it is a folder. Name a file in it"):
+            Arena.load(tmp_path / name)
+
+
+@pytest.mark.parametrize("content", [b"", b"hello", b"\x89PNG\r\n\x1a\n", b"P5 0 0 255 ", b"BM" + bytes(60)])
+def test_what_is_no_picture_is_refused(tmp_path, content):
+    (tmp_path / "a.png").write_bytes(content)
+    with pytest.raises(ArenaError, match=r"Picture '.*a.png' must be"):
+        Arena.load(tmp_path / "a.png")
+
+
+@pytest.mark.parametrize(
+    ("name", "words"), [("a.jpg", "JPEG. Lossy"), ("a.webp", "WEBP. Lossy"), ("a.gif", "GIF. Save")]
+)
+def test_other_types_are_refused(tmp_path, name, words):
+    Image.fromarray(grey_picture()).save(tmp_path / name)
+    with pytest.raises(
+        ArenaError, match=rf"must be a lossless picture, but it is of type {words}.*PNG, TIF, PGM or BMP"
+    ):
+        Arena.load(tmp_path / name)
+
+
+def test_a_lossy_tif_is_refused(tmp_path):
+    Image.fromarray(grey_picture()).save(tmp_path / "a.tif", compression="jpeg")
+    with pytest.raises(ArenaError, match=r"but it is a TIFF compressed with .*jpeg. Lossy compression smears walls"):
+        Arena.load(tmp_path / "a.tif")
+
+
+@pytest.mark.parametrize(("name", "options"), GREY_FORMATS)
+@pytest.mark.parametrize("share", [0.02, 0.3, 0.6])
+def test_truncated_pictures_are_refused(tmp_path, name, options, share):
+    path = tmp_path / name
+    Image.fromarray(np.random.default_rng(0).integers(0, 256, (120, 150), np.uint8)).save(path, **options)
+    content = path.read_bytes()
+    path.write_bytes(content[: int(len(content) * share)])
+    with pytest.raises(ArenaError, match=r"must be (complete and readable|a picture), but"):
+        Arena.load(path)
+
+
+@pytest.mark.parametrize("share", [0.02, 0.3, 0.6])
+def test_a_truncated_fax_is_refused(tmp_path, share):
+    Image.fromarray(grey_picture() > 90).save(tmp_path / "a.tif", compression="group4")
+    content = (tmp_path / "a.tif").read_bytes()
+    (tmp_path / "a.tif").write_bytes(content[: int(len(content) * share)])
+    with pytest.raises(ArenaError, match=r"must be (complete and readable|a picture), but"):
+        Arena.load(tmp_path / "a.tif")
+
+
+def bitmap_header(width: int, height: int) -> bytes:
+    return b"BM" + struct.pack("<IHHI", 54, 0, 0, 54) + struct.pack("<IiiHHIIiiII", 40, width, height, 1, 24, *[0] * 6)
+
+
+@pytest.mark.parametrize("side", [8001, 9600, 60000])
+def test_size_is_checked_before_pixels_are_read(tmp_path, side):
+    # There are no pixels behind the header: reading them would say something else.
+    (tmp_path / "a.bmp").write_bytes(bitmap_header(side, side))
+    with pytest.raises(ArenaError, match=r"must have at most 64 million"):
+        Arena.load(tmp_path / "a.bmp")
+    (tmp_path / "a.bmp").write_bytes(bitmap_header(1000, 1000))
+    with pytest.raises(ArenaError, match=r"a.bmp': An arena must have at most 64 million cells, .* 1000 x 1000 pixels"):
+        Arena.from_image(tmp_path / "a.bmp", 9)
+
+
+def test_small_and_full_pictures_are_refused(tmp_path):
+    Image.new("L", (99, 200)).save(tmp_path / "a.png")
+    with pytest.raises(ArenaError, match=r"a.png': An arena must be at least 100 x 100 mm, but .* 99 x 200 pixels"):
+        Arena.load(tmp_path / "a.png")
+    Image.new("L", (200, 200), 9).save(tmp_path / "b.png")
+    with pytest.raises(ArenaError, match=r"Arena 'b' must have floor, but every cell is wall"):
+        Arena.load(tmp_path / "b.png")
+
+
+def test_an_empty_picture_is_an_arena(tmp_path):
+    Image.new("L", (200, 200)).save(tmp_path / "a.png")
+    assert Arena.load(tmp_path / "a.png").find_start(27.5).x_mm == 99.5
+
+
+FULL = """
+picture = "sub/maze.png"
+mm_per_pixel = 2.0
+name = "Maze"
+[[start]]
+at_mm = [55, 20]
+heading_deg = 180
+[[start]]
+at_mm = [60.5, 20]
+[[lamp]]
+at_mm = [200, 10]
+power_w = 2
+is_on = false
+[[lamp]]
+at_mm = [0, 0]
+[[ball]]
+at_mm = [250, 50]
+[[cylinder]]
+at_mm = [20, 50]
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "sub").mkdir()
+    Image.fromarray(grey_picture()).save(tmp_path / "sub" / "maze.png")
+    return tmp_path
+
+
+def write(folder: Path, text: str) -> Path:
+    (folder / "a.toml").write_text(text, encoding="utf-8")
+    return folder / "a.toml"
+
+
+def test_an_arena_file_says_everything(folder):
+    arena = Arena.load(write(folder, FULL))
+    assert np.array_equal(arena.brightness[::-2, ::2], grey_picture())
+    assert (arena.name, arena.width_mm) == ("Maze", 300)
+    assert arena.starts == (Pose(55, 20, math.pi), Pose(60.5, 20, math.pi / 2))
+    assert arena.lamps == (Lamp(200, 10, 2.0, False), Lamp(0, 0, 1.0, True))
+    assert (arena.balls, arena.cylinders) == ((Ball(250, 50),), (Cylinder(20, 50),))
+
+
+def test_an_arena_file_may_be_a_box(tmp_path):
+    arena = Arena.load(write(tmp_path, "size_mm = [500, 650]\nrounded_mm = 100"))
+    assert np.array_equal(arena.brightness, Arena.default().brightness)
+    assert arena.name == "a"
+    arena = Arena.load(write(tmp_path, "size_mm = [200, 300]\nbrightness = 'pink sponge'"))
+    assert arena.brightness.max() == 86
+    arena = Arena.load(write(tmp_path, "size_mm = [200, 300]\nwall_mm = 5\nbrightness = 9"))
+    assert np.array_equal(arena.brightness, Arena.box(200, 300, wall_mm=5, brightness=9).brightness)
+
+
+def test_a_saved_arena_comes_back(folder):
+    arena = replace(Arena.load(write(folder, FULL)), name='Quotes " \\ and\nlines, \x7f, ö and 🤖')
+    save_arena(arena, folder / "b.toml")
+    again = Arena.load(folder / "b.toml")
+    assert np.array_equal(again.brightness, arena.brightness)
+    assert (again.name, again.mm_per_cell) == (arena.name, arena.mm_per_cell)
+    assert (again.starts, again.lamps) == (arena.starts, arena.lamps)
+    assert (again.balls, again.cylinders) == (arena.balls, arena.cylinders)
+
+
+def test_save_arena_says_why_it_cannot(tmp_path):
+    with pytest.raises(ParameterError, match=r"path must end in '.toml', but it was .*a.png'. The picture goes beside"):
+        save_arena(Arena.default(), tmp_path / "a.png")
+    with pytest.raises(ParameterError, match=r"an arena must go to a file .* cannot \(No such file or directory\)"):
+        save_arena(Arena.default(), tmp_path / "none" / "a.toml")
+
+
+BOX = "size_mm = [300, 200]\n"
+REFUSED = [
+    ("size_mm = [1,\n2\nname = 3", r"must be TOML in UTF-8, but: .*line 3.* Correct the file"),
+    ("a = " + "[" * 5000, r"must be TOML in UTF-8, but: "),
+    ("a = 1" + "0" * 5000, r"must be TOML in UTF-8, but: "),
+    ("", r"must have a picture or a size, but it has neither. Give picture"),
+    ("nmae = 'x'", r"the file must have known keys only, but it has 'nmae'. Did you mean 'name'\? Known are size_mm"),
+    (BOX + "[[ball]]\nat_m = [1, 2]", r"ball 1 must have known keys only, but it has 'at_m'. Did you mean 'at_mm'\?"),
+    (BOX + "brightness = 'gray'", r"one of \['white', .*, 'black'\], but it was 'gray'. Did you mean 'grey'"),
+    (BOX + "picture = 'maze.png'", r"must be either a picture or a box, but picture came with size_mm. Remove"),
+    (BOX + "mm_per_pixel = 1", r"mm_per_pixel must come with a picture, but there is none. Boxes have cells of 1 mm"),
+    ("picture = 'sub/maze.png'\nwall_mm = 1", r"but picture came with wall_mm"),
+    ("picture = 3", r"picture must be a text of up to 1000 characters, but it was 3. A picture in"),
+    (
+        "picture = '../maze.png'",
+        r"picture must lie in the folder of the file that names it, or below, but '../maze.png' leads",
+    ),
+    ("picture = 'sub/../../maze.png'", r"picture must lie in the folder of the file that names it"),
+    ("picture = '/etc/passwd'", r"picture must lie in the folder of .* Copy it there"),
+    ('picture = "a\\u0000b"', r"picture must be a text of up to 1000 characters, but it was 'a"),
+    ("picture = 'link.png'", r"picture must lie in the folder of the file that names it"),
+    ("picture = 'none.png'", r"Picture '.*none.png' must exist"),
+    ("picture = 'a.toml'", r"Picture '.*a.toml' must be a picture"),
+    ("picture = ''", r"picture must lie in the folder of the file that names it, or below, but '' leads elsewhere"),
+    ("picture = 'sub'", r"must be a file, but it is a folder"),
+    ("picture = 'sub/maze.png'\nmm_per_pixel = 'x'", r"mm_per_pixel must be a number from 0.1 to 100, but it was 'x'"),
+    ("picture = 'sub/maze.png'\nmm_per_pixel = nan", r"mm_per_pixel must be a number"),
+    ("size_mm = 3", r"size_mm must be two whole numbers in mm, but it was 3. Give size_mm = "),
+    ("size_mm = [300, inf]", r"size_mm\[1\] must be a whole number from 1 to 1000000000, but it was inf"),
+    (
+        "size_mm = [300.5, 200]",
+        r"size_mm\[0\] must be a whole number from 1 to .* but it was 300.5. Boxes are drawn in whole",
+    ),
+    (
+        f"size_mm = [1{'0' * 400}, 200]",
+        r"size_mm\[0\] must be a whole number .* but it was 10{30,60}\.\.\.0{30,60}\. Boxes",
+    ),
+    ("size_mm = [100000, 200000]", r"at most 64 million cells"),
+    (BOX + "brightness = 0", r"brightness must be a whole number from 1 to 255"),
+    (BOX + "name = 1", r"name must be a text of up to 1000 characters, but it was 1"),
+    (
+        BOX + "[start]\nat_mm = [50, 50]",
+        r"start must be a list of 0 to 1000 tables, but it was .* Head each with \[\[start\]\]",
+    ),
+    (BOX + "lamp = [1]", r"lamp 1 must be a table, but it was 1. Head each with"),
+    (BOX + "[[start]]\nheading_deg = 1", r"start 1: at_mm must be given, but it is missing. Give at_mm = \[x, y\]"),
+    (BOX + "[[start]]\nat_mm = [50]", r"start 1: at_mm must be two numbers in mm, but it was \[50\]"),
+    (
+        BOX + "[[start]]\nat_mm = [50, 50]\nheading_deg = 'up'",
+        r"start 1: heading_deg must be a number from -1e9 to 1e9, but it was 'up'",
+    ),
+    (BOX + "[[start]]\nat_mm=[50, 50]\n[[start]]\nat_mm=[1, 1]", r"start 2 must stand on floor, but at \(1, 1\) mm"),
+    (BOX + "[[lamp]]\nat_mm = [500, 50]", r"lamp 1 must lie inside the arena"),
+    (
+        BOX + "[[lamp]]\nat_mm = [50, 50]\npower_w = true",
+        r"lamp 1: power_w must be a number above 0 and at most 1e9, but it was True",
+    ),
+    (
+        BOX + "[[lamp]]\nat_mm = [50, 50]\npower_w = -1",
+        r"lamp 1: power_w must be a number above 0 and at most 1e9, but it was -1",
+    ),
+    (BOX + "[[lamp]]\nat_mm = [50, 50]\nis_on = 1", r"lamp 1: is_on must be true or false, but it was 1"),
+    (BOX + "[[cylinder]]\nat_mm = [0, 0]", r"cylinder 1 must stand on floor"),
+]
+
+
+@pytest.mark.parametrize(("text", "words"), REFUSED)
+def test_an_arena_file_that_is_wrong_says_where(folder, text, words):
+    if "link.png" in text:
+        outside = folder.parent / f"{folder.name}.png"
+        Image.fromarray(grey_picture()).save(outside)
+        (folder / "link.png").symlink_to(outside)
+    with pytest.raises(ArenaError, match=rf"(?s)^Arena file '.*a.toml'.*{words}"):
+        Arena.load(write(folder, text))
+
+
+def test_an_arena_file_is_utf_8(tmp_path):
+    (tmp_path / "a.toml").write_bytes(b'name = "\xff"')
+    with pytest.raises(ArenaError, match=r"a.toml' must be TOML in UTF-8, but: "):
+        Arena.load(tmp_path / "a.toml")
+
+
+@pytest.mark.parametrize("path", ARENAS, ids=lambda path: path.stem)
+def test_example_arenas_have_free_starts(path):
+    arena = Arena.load(path)
+    assert arena.starts
+    assert all(arena.free_for(start.x_mm, start.y_mm, ROOM_MM) for start in arena.starts)
+
+
+@pytest.mark.parametrize("path", ARENAS, ids=lambda path: path.stem)
+def test_all_floor_with_room_for_a_robot_can_be_reached(path):
+    from scipy.ndimage import label
+
+    arena = Arena.load(path)
+    _, part_count = label(arena.clearance - 0.5 >= ROOM_MM)
+    assert part_count == 1
+
+
+def test_the_default_arena_is_also_a_picture():
+    assert np.array_equal(Arena.load(EXAMPLES / "default.toml").brightness, Arena.default().brightness)
+
+
+def test_the_script_draws_the_committed_pictures(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    spec = importlib.util.spec_from_file_location("draw", EXAMPLES / "draw.py")
+    draw = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(draw)
+    draw.draw_all(tmp_path)
+    drawn = {path.name for path in tmp_path.iterdir()}
+    assert drawn == {path.name for path in EXAMPLES.iterdir() if path.suffix in (".png", ".tif")}
+    for name in drawn:
+        assert np.array_equal(Image.open(tmp_path / name), Image.open(EXAMPLES / name)), name

@@ -1,0 +1,179 @@
+"""Files are written whole or not at all, whatever goes wrong on the way."""
+
+from __future__ import annotations
+
+import os
+import resource
+import stat
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import kiks
+from kiks.clock.thinking import save_thinking
+from kiks.control.controllers import linear
+from kiks.drawing import check_picture, draw_world, save_picture
+from kiks.errors import ParameterError
+from kiks.learn.champion import Champion
+from kiks.model.arena import Arena
+from kiks.model.arena_file import save_arena
+from kiks.model.atomic_files import check_writable, make_folder, path_of, replace_file, replace_files
+from kiks.model.kad import save_kad
+from kiks.model.project import Project
+from kiks.model.robot import RobotSpec, save_robot
+from kiks.model.thesis_networks import NetworkResponse
+
+ROOM = Arena.box(300, 200)
+
+
+def champion(path: Path) -> None:
+    controller = linear()
+    parameters = (0.5,) * (controller.parameter_count or 0)
+    Champion(controller, parameters, task="avoid", fitness=1.0, measures={}, generation=1).save(path)
+
+
+def picture(path: Path) -> None:
+    empty = np.zeros((0, 4))
+    save_picture(draw_world(ROOM, empty, kiks.Simulation(ROOM).bodies(), np.zeros((0, 3)), []), path)
+
+
+WRITERS: dict[str, Callable[[Path], object]] = {
+    "arena.toml": lambda path: save_arena(ROOM, path),
+    "arena.kad": lambda path: save_kad(ROOM, path),
+    "project.kiks": lambda path: Project().save(path),
+    "robot.toml": lambda path: save_robot(kiks.RobotSpec.load("khepera"), path),
+    "networks.json": lambda path: NetworkResponse.load().save(path),
+    "thinking.txt": lambda path: save_thinking([12_345] * 100, path),
+    "champion.toml": champion,
+    "picture.png": picture,
+}
+
+
+@contextmanager
+def full_disk(bytes_left: int) -> Iterator[None]:
+    """Let no file grow beyond so many bytes, as on a disk that is full."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (bytes_left, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+@pytest.mark.parametrize("bytes_left", [0, 100])
+@pytest.mark.parametrize("name", WRITERS)
+def test_on_a_full_disk_all_is_as_it_was(name: str, bytes_left: int, tmp_path: Path) -> None:
+    path = tmp_path / name
+    with full_disk(bytes_left), pytest.raises(ParameterError, match="must go to a file that can be written"):
+        WRITERS[name](path)
+    assert content(tmp_path) == {}
+    for each in (path, path.with_suffix(".png")):
+        each.write_bytes(b"old")
+    before = content(tmp_path)
+    with full_disk(bytes_left), pytest.raises(ParameterError, match="must go to a file that can be written"):
+        WRITERS[name](path)
+    assert content(tmp_path) == before
+    WRITERS[name](path)
+    assert content(tmp_path)[name] != b"old"
+
+
+def test_files_that_belong_together_are_replaced_together(tmp_path: Path) -> None:
+    first, second = tmp_path / "first", tmp_path / "second"
+    first.write_text("old")
+    with full_disk(100), pytest.raises(ParameterError, match="second"):
+        replace_files({first: "new", second: bytes(200)})
+    assert content(tmp_path) == {"first": b"old"}
+
+
+def test_rights_are_those_of_the_umask_and_of_the_earlier_file(tmp_path: Path) -> None:
+    def rights(name: str) -> int:
+        return stat.S_IMODE((tmp_path / name).stat().st_mode)
+
+    before = os.umask(0o027)
+    try:
+        replace_file(tmp_path / "new", b"")
+        replace_file(tmp_path / "private", b"", rights=0o600)
+        (tmp_path / "old").touch()
+        (tmp_path / "old").chmod(0o604)
+        replace_file(tmp_path / "old", b"")
+        (tmp_path / "taken").touch()
+        replace_file(tmp_path / "taken", b"", rights=0o600)
+    finally:
+        os.umask(before)
+    assert [rights(name) for name in ("new", "private", "old", "taken")] == [0o640, 0o600, 0o604, 0o600]
+
+
+def test_a_link_stays_a_link(tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to("file")
+    for text in ("one", "two"):
+        replace_file(tmp_path / "link", text)
+        assert (tmp_path / "file").read_text() == text
+    assert (tmp_path / "link").is_symlink()
+
+
+def test_what_is_no_file_is_written_to(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    check_writable(pipe, "--out")
+    replace_file(pipe, "text")
+    assert os.read(reader, 100) == b"text"
+    os.close(reader)
+    assert stat.S_ISFIFO(pipe.stat().st_mode)
+    check_writable("/dev/null", "--out")
+
+
+@pytest.mark.parametrize("name", ["none/x", "file/x", "folder", ""])
+def test_what_cannot_be_written_is_told_before_and_after_in_the_same_words(name: str, tmp_path: Path) -> None:
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "file").touch()
+    before = sorted(tmp_path.rglob("*"))
+    path = tmp_path / name
+    for attempt in (lambda: check_writable(path, "--out"), lambda: replace_file(path, b"", "--out")):
+        with pytest.raises(ParameterError, match=r"^--out must go to a file that can be written, but '") as caught:
+            attempt()
+        assert "\n" not in str(caught.value)
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_check_leaves_nothing_and_changes_nothing(tmp_path: Path) -> None:
+    check_writable(tmp_path / "new", "--out")
+    check_picture(tmp_path / "new.png")
+    assert content(tmp_path) == {}
+    (tmp_path / "old").write_text("old")
+    check_writable(tmp_path / "old", "--out")
+    with pytest.raises(ParameterError, match=r"--out must name a new file, but .*old' is there"):
+        check_writable(tmp_path / "old", "--out", is_new=True)
+    with pytest.raises(ParameterError, match="ends like no picture"):
+        check_picture(tmp_path / "x.nothing")
+    with pytest.raises(ParameterError, match=r"--out must go to a folder that can be written, but .* \(File exists\)"):
+        make_folder(tmp_path / "old", "--out")
+    assert content(tmp_path) == {"old": b"old"}
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="the superuser may write everywhere")
+def test_a_protected_file_is_not_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    path.write_text("old")
+    path.chmod(0o444)
+    for attempt in (lambda: check_writable(path, "--out"), lambda: replace_file(path, b"", "--out")):
+        with pytest.raises(ParameterError, match="write-protected"):
+            attempt()
+
+
+@pytest.mark.parametrize("path", [5, None, b"a", "", "a\0b", "a" * 256, "a/" * 4096, "\ud800"])
+def test_what_is_no_path_is_named(path: object) -> None:
+    with pytest.raises(ParameterError, match="must be the name of a file, of at most 255 bytes, but it was"):
+        path_of(path)
+    for attempt in (check_writable, lambda path, what: replace_file(path, b"", what)):
+        with pytest.raises(ParameterError, match=r"^--out must be the name of a file"):
+            attempt(path, "--out")
+    with pytest.raises(ParameterError, match="robot must be the name of a file"):
+        RobotSpec.load(path)  # type: ignore[arg-type]

@@ -1,0 +1,338 @@
+"""Several unchanged programs in one world: `kiks run A.py B.py`."""
+
+from __future__ import annotations
+
+import os
+import re
+import select
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import IO, Any
+
+import pytest
+from tests.cli.test_cli import kiks, state_of
+from tests.ports.test_lockstep import busy_computer, said
+from tests.served import GUARD_S, PROGRAMS, fresh
+
+import kiks as package
+from kiks.cli.run import parse_words
+from kiks.errors import LinkError, ParameterError
+from kiks.ports.port_names import Names
+from kiks.ports.program_process import Command
+from kiks.ports.programs import Programs
+from kiks.script.runner import run_here
+
+# Each test starts processes.
+pytestmark = pytest.mark.slow
+
+DRIVE, SLEEPER, WATCHER, WANDER, ANY, INTO_FILE = (
+    str(PROGRAMS / f"{name}.py") for name in ("drive", "sleeper", "watcher", "wander", "any_port", "into_file")
+)
+
+HANGS = """
+import os, serial
+port = serial.Serial('COM1', timeout=1)
+port.write(b'L,0,1\\n')
+os.write(2, port.readline())
+while True: pass
+"""
+
+
+ENDS = """
+import serial, sys
+port = serial.Serial('COM1', timeout=1)
+for _ in range(400):
+    port.write(b'N\\n')
+    assert port.readline().startswith(b'n,')
+open(sys.argv[1], 'w').close()
+"""
+
+
+def run(commands: Sequence[Sequence[str]], **options: Any) -> tuple[str, int, int, list[str], str]:
+    """Run programs; return state, time, exit code, what is said of their ends, and why it might not be repeatable."""
+    sim = fresh(len(commands))
+    ends: list[str] = []
+    every = [Command(Path(program), arguments) for program, *arguments in commands]
+    programs = Programs(sim, every, say=ends.append, **{"patience_s": GUARD_S, **options})
+    code = programs.run()
+    return sim.state_hash(), sim.now_ns, code, sorted(ends), programs.doubt
+
+
+def write(folder: Path, name: str, text: str) -> str:
+    path = folder / name
+    path.write_text(text)
+    return str(path)
+
+
+@contextmanager
+def started(*words: str) -> Iterator[tuple[subprocess.Popen[bytes], IO[bytes], IO[bytes]]]:
+    """Start the command; yield its process and what it says, and let nothing of it outlive the test."""
+    command = [sys.executable, "-m", "kiks", "run", *words]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen(command, start_new_session=True, **pipes) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        try:
+            yield process, process.stdout, process.stderr
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+
+
+# ---- the same as alone, the same again ----
+
+
+@pytest.mark.parametrize("thinking", ["none", "fixed:2.5"])
+@pytest.mark.parametrize(
+    "words",
+    [
+        (WANDER,),
+        (SLEEPER, "8"),
+        (WATCHER, "2"),
+        (DRIVE, "COM1", "9", "3", "5"),
+        *((ANY, str(seed)) for seed in range(6)),
+    ],
+    ids=lambda words: f"{Path(words[0]).stem} {' '.join(words[1:])}",
+)
+def test_program_in_a_process_of_its_own_sees_what_it_sees_in_ours(
+    words: tuple[str, ...], thinking: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    state, now_ns, code, _, doubt = run([words], thinking=thinking)
+    there = capfd.readouterr().out
+    sim = fresh(thinking=thinking)
+    assert run_here(sim, Path(words[0]), list(words[1:]), {}) == code == 0
+    assert capfd.readouterr().out == there
+    assert (sim.state_hash(), sim.now_ns) == (state, now_ns)
+    assert not doubt
+
+
+FOUR = ([DRIVE, "COM1", "40", "3", "7"], [DRIVE, "COM1", "25", "-4", "7"], [SLEEPER, "12"], [WATCHER, "1.5"])
+
+
+def run_and_read(commands: Sequence[Sequence[str]], folder: Path, **options: Any) -> tuple[object, ...]:
+    """Run programs; return how it ended, and what each of them has printed."""
+    files = [folder / str(number) for number in range(len(commands))]
+    end = run([[INTO_FILE, str(file), *words] for file, words in zip(files, commands, strict=True)], **options)
+    return end[:3], end[4], *(file.read_text() for file in files)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("thinking", ["none", "fixed:3.5"])
+def test_programs_do_the_same_again_on_a_busy_computer(thinking: str, tmp_path: Path) -> None:
+    with busy_computer():
+        assert len({run_and_read(FOUR, tmp_path, thinking=thinking) for _ in range(4)}) == 1
+
+
+def test_two_programs_do_the_same_again(tmp_path: Path) -> None:
+    assert len({run_and_read(FOUR[1:3], tmp_path) for _ in range(3)}) == 1
+
+
+def test_live_thinking_of_each_is_recorded_and_replayed(tmp_path: Path) -> None:
+    times = tmp_path / "times"
+    live = run(FOUR[:2], thinking="live", record=times)
+    assert {path.name for path in tmp_path.iterdir()} == {"times.1", "times.2"}
+    assert run(FOUR[:2], thinking=f"replay:{times}")[:2] == live[:2]
+
+
+def test_one_program_alone_has_a_file_without_a_number(tmp_path: Path) -> None:
+    times = tmp_path / "times"
+    live = run(FOUR[:1], thinking="live", record=times)
+    assert times.exists()
+    assert run(FOUR[:1], thinking=f"replay:{times}")[:2] == live[:2]
+    sim = fresh(thinking=f"replay:{times}")
+    assert run_here(sim, Path(FOUR[0][0]), list(FOUR[0][1:]), {}) == 0
+    assert (sim.state_hash(), sim.now_ns) == live[:2]
+
+
+# ---- who ends, crashes, hangs or babbles ----
+
+
+def silences(caplog: pytest.LogCaptureFixture) -> list[str]:
+    """Return what a person is told of the programs, but for who is late at the beginning: a busy computer is slow."""
+    return [text for text in said(caplog) if not text.startswith("the world begins when")]
+
+
+@pytest.mark.parametrize(
+    ("ending", "code", "how"),
+    [
+        ("1 / 0", 1, "with exit code 1"),
+        ("raise SystemExit(7)", 7, "with exit code 7"),
+        ("import os; os._exit(3)", 3, "with exit code 3"),
+        ("import os; os.kill(os.getpid(), 9)", 137, "by signal 9"),
+    ],
+)
+def test_end_of_a_program_concerns_nobody_else(
+    ending: str, code: int, how: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    program = write(tmp_path, "ends.py", f"import serial\nserial.Serial('COM1').write(b'L,0,1\\nH')\n{ending}\n")
+    states = set()
+    for _ in range(2):
+        state, _, found, ends, doubt = run([[program], [DRIVE, "COM1", "20", "3", "3"]])
+        assert found == code
+        assert ends == [f"program 1 (ends.py) has ended {how}.", "program 2 (drive.py) has ended with exit code 0."]
+        assert not doubt
+        states.add(state)
+        out = capfd.readouterr().out
+        assert out.count("\nn,") == 19
+    assert len(states) == 1
+
+
+def test_program_without_a_port_takes_part(tmp_path: Path) -> None:
+    silent = write(tmp_path, "silent.py", "print('nothing to do')\n")
+    assert run([[silent], [DRIVE, "COM1", "5", "3", "3"]])[2] == 0
+
+
+def test_hanging_program_is_ignored(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    over = tmp_path / "over"
+    hangs = write(tmp_path, "hangs.py", HANGS.replace("while True", f"while not os.path.exists({str(over)!r})"))
+    _, _, code, ends, doubt = run([[hangs], [write(tmp_path, "ends.py", ENDS), str(over)]], patience_s=0.2)
+    assert code == 0
+    assert ends == [
+        "program 1 (hangs.py) has ended with exit code 0.",
+        "program 2 (ends.py) has ended with exit code 0.",
+    ]
+    assert doubt == "the world did not wait for every program"
+    assert silences(caplog)[0].startswith("program 1 (hangs.py) must act while others wait, but it did nothing for 0.")
+
+
+def test_program_that_is_left_hanging_is_named(tmp_path: Path) -> None:
+    with started("--patience", "0.2", write(tmp_path, "hangs.py", HANGS), WATCHER, "1") as (_, _, errors):
+        told = b""
+        while b"Ctrl-C" not in told:
+            told = errors.readline()
+    assert told == b"kiks: program 1 (hangs.py), which the world does not wait for, still runs. Ctrl-C ends it.\n"
+
+
+def test_hanging_program_is_dropped(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    hangs = write(tmp_path, "hangs.py", HANGS)
+    _, _, code, ends, doubt = run([[hangs], [DRIVE, "COM1", "20", "3", "3"]], patience_s=1, when_silent="drop")
+    assert code == 137
+    assert ends == ["program 1 (hangs.py) has ended by signal 9.", "program 2 (drive.py) has ended with exit code 0."]
+    assert doubt
+    assert silences(caplog) == [
+        "program 1 (hangs.py) must act within 1 s while others wait, but it did not: the world parts from it. "
+        "--patience gives it more time."
+    ]
+
+
+def test_babbling_program_hinders_nobody(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    over = tmp_path / "over"
+    babbles = write(
+        tmp_path,
+        "babbles.py",
+        f"import os, serial\nport = serial.Serial('COM1')\n"
+        f"while not os.path.exists({str(over)!r}): port.write(b'H\\n' * 500)\n",
+    )
+    _, _, code, ends, _ = run([[babbles], [write(tmp_path, "ends.py", ENDS), str(over)]])
+    assert code == 0
+    assert len(ends) == 2
+    assert silences(caplog) == [
+        "program 1 (babbles.py) must wait for its replies, but it is more than 4096 characters ahead of robot 1; what "
+        "it sends now has to wait. Read a line after each command."
+    ]
+
+
+def test_ctrl_c_ends_all_programs(tmp_path: Path) -> None:
+    hangs = write(tmp_path, "hangs.py", HANGS)
+    tidy = write(
+        tmp_path,
+        "tidy.py",
+        "import serial\nport = serial.Serial('COM1', timeout=1)\ntry:\n    while True:\n        port.write(b'H\\n')\n"
+        "        port.readline()\nexcept KeyboardInterrupt:\n    port.write(b'D,0,0\\n')\n"
+        "    while port.readline() != b'd\\r\\n': pass\n    print('tidied')\n",
+    )
+    with started(hangs, tidy) as (process, _, errors):
+        while errors.readline() != b"1 hangs.py | l\r\n":
+            pass
+        os.killpg(process.pid, signal.SIGINT)
+        out, told = process.communicate(timeout=GUARD_S)
+    assert process.returncode == 130
+    assert out == b"2 tidy.py  | tidied\n"
+    assert b"not repeatable: it was interrupted" in told
+    assert b"Traceback" not in told
+
+
+def test_no_program_outlives_a_killed_kiks(tmp_path: Path) -> None:
+    hangs = write(tmp_path, "hangs.py", "import os\nos.write(1, f'{os.getpid()}\\n'.encode())\n" + HANGS)
+    with started(hangs, hangs) as (process, output, _):
+        watched = [os.pidfd_open(int(output.readline().partition(b"|")[2])) for _ in range(2)]
+        process.kill()
+        process.wait(GUARD_S)
+        # Nobody but its end has told them.
+        for descriptor in watched:
+            assert select.select([descriptor], [], [], GUARD_S)[0]
+            os.close(descriptor)
+
+
+# ---- names, words and the command ----
+
+
+def test_each_program_has_the_robot_of_its_number() -> None:
+    names = Names(fresh(4), {"/dev/ttyS9": 3}, 2)
+    assert [names.robot("COM1", 2), names.robot("COM1", 1), names.robot("COM2", 2)] == [2, 1, 4]
+    assert [names.robot("/dev/ttyS9", 1), names.robot("COM1", 2)] == [3, 2]
+    with pytest.raises(LinkError, match=r"'COM2' is one more than there are: \{'/dev/ttyS9': 3, 'COM1': 1\}"):
+        names.robot("COM2", 1)
+    with pytest.raises(LinkError, match=r"names robot 7 and the simulation has robots 1 to"):
+        names.robot("kiks://7")
+    with pytest.raises(LinkError, match=r"must be without options"):
+        names.robot("kiks://1?seed=3")
+    other, world = package.Simulation(), fresh()
+    with pytest.raises(LinkError, match=r"must belong to the world that the programs share"):
+        Names(world, {}).robot(other.url(1))
+
+
+def test_names_of_kiks_mean_this_world(tmp_path: Path) -> None:
+    program = write(
+        tmp_path,
+        "names.py",
+        "import kiks, sys\nwith kiks.Khepera(f'kiks://{sys.argv[1]}') as robot:\n"
+        "    robot.pause(1)\n    print(robot.time_s >= 1, robot.encoders())\n"
+        "try: kiks.kopen([-7])\nexcept kiks.LinkError as error: print(error)\n",
+    )
+    _, _, *outs = run_and_read([[program, "2"], [program, "1"]], tmp_path)
+    for out in outs:
+        assert str(out).startswith("True (0, 0)\n")
+        assert "names robot 7 and the simulation has robots 1 to 2" in str(out)
+
+
+def test_words_are_programs_and_arguments(tmp_path: Path) -> None:
+    one, two, odd = (write(tmp_path, name, "") for name in ("a.py", "b.py", "my program"))
+    assert parse_words([one, "1", "-x"]) == [Command(Path(one), ["1", "-x"])]
+    assert parse_words([one, "1", two, "c.py"]) == [Command(Path(one), ["1"]), Command(Path(two), ["c.py"])]
+    assert parse_words([f"{one} {two} 'a b'", two]) == [Command(Path(one), [two, "a b"]), Command(Path(two))]
+    assert parse_words([odd, "it's", "two words"]) == [Command(Path(odd), ["it's", "two words"])]
+    with pytest.raises(ParameterError, match=r"PROGRAM must be a Python file, but there is no file 'c\.py'\. Give"):
+        parse_words(["c.py", one])
+    with pytest.raises(ParameterError, match=r"PROGRAM must be a Python file, but '.*' is a folder\. Give"):
+        parse_words([str(tmp_path), one])
+
+
+def test_command_runs_two_programs() -> None:
+    results = [kiks("run", "--seed", "3", DRIVE, "COM1", "9", "3", "5", DRIVE, "COM1", "5", "7", "5") for _ in range(2)]
+    for result in results:
+        assert result.returncode == 0, result.stderr
+        assert result.stdout.count("n,") == 14
+        assert "kiks: program 2 (drive.py) has ended with exit code 0." in result.stderr
+        assert re.search(r"kiks: 0\.\d{3} s simulated, seed 3, state", result.stderr)
+    assert state_of(results[0].stderr) == state_of(results[1].stderr)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--when-silent", "igno"), "when_silent must be 'wait', 'drop' or 'ignore', but it was 'igno'. Did you mean"),
+        (("--patience", "-1"), "patience must be a number of seconds above 0"),
+        (("--thinking", "replay:nowhere"), "replay file 'nowhere.1' must exist, but there is no such file"),
+        (("--map", "COM1=5"), "This simulation has robots 1 to 2"),
+    ],
+)
+def test_mistakes_end_in_one_clear_line(words: tuple[str, ...], message: str) -> None:
+    result = kiks("run", *words, WATCHER, "1", WATCHER, "1")
+    assert result.returncode == 2
+    assert message in result.stderr
+    assert "Traceback" not in result.stderr

@@ -1,0 +1,254 @@
+"""Programs that are started and stopped while the world is there, as the desk does."""
+
+from __future__ import annotations
+
+import os
+import select
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.served import GUARD_S, PROGRAMS, fresh
+
+from kiks.clock.patience import Patience
+from kiks.errors import KiksError, ParameterError
+from kiks.ports import programs as module
+from kiks.ports.program_process import OUTPUT_LIMIT, Command
+from kiks.ports.programs import Handle, Programs
+from kiks.sim.simulation import Simulation
+
+pytestmark = pytest.mark.slow
+
+DRIVE, SLEEPER = (
+    Command(PROGRAMS / f"{name}.py", words)
+    for name, words in (("drive", ["COM1", "40", "3", "7"]), ("sleeper", ["12"]))
+)
+
+FOR_EVER = """
+import serial
+port = serial.Serial('COM1', timeout=1)
+port.write(b'D,5,5\\n')
+print(port.readline(), flush=True)
+while True:
+    port.write(b'N\\n')
+    port.readline()
+"""
+
+STUBBORN = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n" + FOR_EVER
+
+
+class Gate:
+    """Stands in for a person who lets the world stand still: `advance_to` waits, and the lock is released."""
+
+    def __init__(self, sim: Simulation) -> None:
+        self._changed = threading.Condition(sim.lock)
+        self._advance = sim.advance_to
+        self.is_paused = False
+        self.is_waited_at = threading.Event()
+        sim.advance_to = self._advance_to  # type: ignore[method-assign]
+
+    def _advance_to(self, time_ns: int) -> None:
+        while self.is_paused:
+            self.is_waited_at.set()
+            self._changed.wait()
+        self._advance(time_ns)
+
+    def pause(self) -> None:
+        with self._changed:
+            self.is_waited_at.clear()
+            self.is_paused = True
+
+    def go_on(self) -> None:
+        with self._changed:
+            self.is_paused = False
+            self._changed.notify_all()
+
+
+class Driven:
+    """Programs whose rounds a thread does again and again."""
+
+    def __init__(self, programs: Programs) -> None:
+        self.programs = programs
+        programs.begin()
+        self._is_over = False
+        self._round = threading.Condition()
+        self._thread = threading.Thread(target=self._drive, daemon=True)
+        self._thread.start()
+
+    def _drive(self) -> None:
+        while not self._is_over:
+            self.programs.round(0.01)
+            with self._round:
+                self._round.notify_all()
+
+    def wait_for(self, fact: Callable[[], object]) -> None:
+        """Wait until something is so, looked at after each round."""
+        with self._round:
+            assert self._round.wait_for(fact, GUARD_S), "it did not happen in time"
+
+    def end(self) -> None:
+        self._is_over = True
+        self._thread.join(GUARD_S)
+        assert not self._thread.is_alive()
+        self.programs.close()
+
+
+@contextmanager
+def driven(sim: Simulation, commands: Sequence[Command] = (), **options: Any) -> Iterator[Driven]:
+    run = Driven(Programs(sim, commands, is_heard=True, **{"patience_s": GUARD_S, **options}))
+    try:
+        yield run
+    finally:
+        run.end()
+
+
+def command(folder: Path, text: str) -> Command:
+    path = folder / "program.py"
+    path.write_text(text)
+    return Command(path)
+
+
+def printed(handle: Handle) -> list[str]:
+    assert handle.output is not None
+    return [line.text for line in handle.output.since(0)[1]]
+
+
+def wheels(sim: Simulation, robot: int = 1) -> list[int]:
+    return sim.state.robots["speed_setpoint"][0, robot - 1].tolist()
+
+
+def test_programs_that_begin_together_do_what_they_do_under_kiks_run() -> None:
+    alone, watched = fresh(2), fresh(2)
+    assert Programs(alone, [DRIVE, SLEEPER]).run() == 0
+    with driven(watched, [DRIVE, SLEEPER]) as run:
+        run.wait_for(lambda: not run.programs.drive)
+        assert watched.state_hash() == alone.state_hash()
+        assert not run.programs.doubt
+
+
+def test_program_joins_at_the_present_time(tmp_path: Path) -> None:
+    sim = fresh(2)
+    sim.run(5)
+    first = command(tmp_path, "import time\nprint(time.monotonic())\ntime.sleep(3)\nprint(time.monotonic())\n")
+    with driven(sim) as run:
+        assert not run.programs.drive
+        handle = run.programs.start(first, robot=2)
+        assert (handle.name, handle.robot, handle.state) == ("program 1 (program.py)", 2, "running")
+        run.wait_for(lambda: not handle.is_running and not run.programs.drive)
+        assert printed(handle) == ["5.0", "8.0"]
+        assert handle.state == "ended with exit code 0"
+        assert sim.time_s == 8
+        again = run.programs.start(first, robot=2)
+        run.wait_for(lambda: not again.is_running)
+        assert printed(again) == ["8.0", "11.0"]
+        assert run.programs.handles == [again]
+        assert run.programs.doubt
+
+
+@pytest.mark.parametrize("text", [FOR_EVER, STUBBORN], ids=["friendly", "stubborn"])
+@pytest.mark.parametrize("is_paused", [False, True], ids=["running", "paused"])
+def test_stopped_program_leaves_a_robot_that_stands_and_is_free(
+    text: str, is_paused: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "GRACE_S", 0.1)
+    sim = fresh()
+    gate = Gate(sim)
+    with driven(sim) as run:
+        handle = run.programs.start(command(tmp_path, text))
+        run.wait_for(lambda: printed(handle) == ["b'd\\r\\n'"])
+        assert wheels(sim) == [5, 5]
+        with pytest.raises(ParameterError, match=r"robot 1 must be free .* but program 1 \(program.py\) has it"):
+            run.programs.start(handle.command)
+        if is_paused:
+            gate.pause()
+            assert gate.is_waited_at.wait(GUARD_S)
+        with sim.lock:
+            run.programs.stop(handle)
+        assert handle.has_ended.wait(GUARD_S)
+        assert sim.wires[0].holder is None
+        assert handle.state == "stopped"
+        assert not any("Traceback" in line for line in printed(handle))
+        following = run.programs.start(handle.command)
+        gate.go_on()
+        run.wait_for(lambda: len(printed(following)) == 1)
+        run.programs.stop(following)
+        run.wait_for(lambda: not following.is_running and not run.programs.drive)
+        sim.run(0.1)
+        assert wheels(sim) == [0, 0]
+
+
+def test_what_a_program_has_started_ends_with_it(tmp_path: Path) -> None:
+    text = (
+        "import subprocess, time\nchild = subprocess.Popen(['cat'], stdin=-1)\n"
+        "print(child.pid)\ntime.sleep(1)\nopen('/dev/stdin').read()\n"
+        "while True: pass\n"
+    )
+    with driven(fresh()) as run:
+        handle = run.programs.start(command(tmp_path, text))
+        run.wait_for(lambda: printed(handle))
+        child = os.pidfd_open(int(printed(handle)[0]))
+        run.programs.stop(handle)
+        run.programs.stop(handle)
+        assert select.select([child], [], [], GUARD_S)[0]
+        os.close(child)
+
+
+def test_endless_output_hinders_nobody_and_stays_small(tmp_path: Path) -> None:
+    sim = fresh(2)
+    babbles = command(tmp_path, "number = 0\nwhile True:\n    print('x' * 3000, number)\n    number += 1\n")
+    with driven(sim) as run:
+        handle = run.programs.start(babbles)
+        other = run.programs.start(DRIVE, robot=2)
+        assert handle.output is not None
+        output = handle.output
+        run.wait_for(lambda: not other.is_running and output.count > 3 * OUTPUT_LIMIT)
+        first, lines = output.since(0)
+        assert first > 0
+        assert len(lines) == OUTPUT_LIMIT
+        assert max(len(line.text) for line in lines) <= 2000
+
+
+def test_output_and_errors_are_told_apart(tmp_path: Path) -> None:
+    text = "import sys\nprint('grün')\nsys.stdout.write('no end')\n1 / 0\n"
+    with driven(fresh()) as run:
+        handle = run.programs.start(command(tmp_path, text))
+        run.wait_for(lambda: not handle.is_running)
+        assert handle.output is not None
+        lines = handle.output.since(0)[1]
+        assert [line.text for line in lines if not line.is_error] == ["grün", "no end"]
+        errors = [line.text for line in lines if line.is_error]
+        assert errors[0] == "Traceback (most recent call last):"
+        assert errors[-1] == "ZeroDivisionError: division by zero"
+        assert not any("kiks" in line for line in errors)
+        assert (handle.code, handle.state) == (1, "ended with exit code 1")
+
+
+def test_nobody_loses_patience_while_the_world_stands_still(tmp_path: Path) -> None:
+    sim = fresh(2)
+    gate = Gate(sim)
+    wall_ns = [0]
+
+    def patience(seconds: float) -> Patience:
+        return Patience(seconds, wall_ns=lambda: wall_ns[0])
+
+    with driven(sim, [DRIVE, SLEEPER], patience_s=1e-3, new_patience=patience) as run:
+        run.wait_for(lambda: sim.now_ns > 0)
+        gate.pause()
+        assert gate.is_waited_at.wait(GUARD_S)
+        gate.go_on()
+        run.wait_for(lambda: not run.programs.drive)
+        assert not run.programs.doubt
+
+
+def test_mistakes_are_told_before_anything_starts(tmp_path: Path) -> None:
+    with driven(fresh()) as run:
+        with pytest.raises(ParameterError, match=r"must be a Python file, but there is none at"):
+            run.programs.start(Command(tmp_path / "nothing.py"))
+        with pytest.raises(ParameterError, match=r"robot must be the number of one there is, but it was 2"):
+            run.programs.start(DRIVE, robot=2)
+        assert run.programs.handles == []
+    with pytest.raises(KiksError, match=r"must have a world, but that of drive.py has ended"):
+        run.programs.start(DRIVE)

@@ -1,0 +1,129 @@
+"""Arenas as the Matlab KiKS has them, and matrices as lines."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from kiks.errors import KiksError, ParameterError
+from kiks.toolbox.framing import FRAME_MIN, frame
+from kiks.toolbox.matlab_arenas import arena_of, place_mm, user_place
+from kiks.toolbox.preferences import Settings
+from kiks.toolbox.wire_format import escape, matrices_of, matrix_text, numbers_of, unescape
+
+
+@given(arrays(np.int16, st.tuples(st.integers(0, 9), st.integers(0, 9)), elements=st.integers(-3, 3)))
+def test_matrices_come_back_as_they_were(matrix: np.ndarray) -> None:
+    read, again = matrices_of(f"{matrix_text(matrix)} {matrix_text(matrix / 2)}")
+    assert np.array_equal(read, matrix)
+    assert np.array_equal(again, matrix / 2)
+
+
+@given(st.text())
+def test_texts_come_back_as_they_were_and_are_one_line(text: str) -> None:
+    assert unescape(escape(text)) == text
+    assert "\n" not in escape(text)
+    assert "\r" not in escape(text)
+
+
+@given(st.text(max_size=300))
+def test_frames_say_how_long_they_are(text: str) -> None:
+    sent = frame(text)
+    length = int(sent[:8])
+    assert len(sent) == max(FRAME_MIN, length + 8)
+    assert sent[8 : 8 + length].decode() == text.replace("\x02", "?"), "that character ends the answer to Ctrl-C"
+
+
+@pytest.mark.parametrize(
+    "words", ["", "2", "2 2", "2 2 1 0", "1 1 2 0", "2 2 5 0", "2 2 0 1 4 1", "-1 2 1 1", "2 2 4 x", "99999 99999 1 1"]
+)
+def test_what_is_no_matrix_is_refused(words: str) -> None:
+    with pytest.raises(ParameterError, match="a matrix must be"):
+        matrices_of(words)
+
+
+def test_numbers_must_be_as_many_as_wanted() -> None:
+    assert numbers_of(["1", "NaN"], 2, "both")[0] == 1
+    for words in (["1"], ["1", "x"], ["1", "inf"]):
+        with pytest.raises(ParameterError, match="both must be 2 finite numbers"):
+            numbers_of(words, 2, "both")
+
+
+def test_rows_count_downwards_and_columns_to_the_right() -> None:
+    codes = np.zeros((300, 400))
+    codes[0] = 1  # the upper edge
+    codes[:, 0] = 1  # the left edge
+    codes[19, 49] = 2
+    codes[149, 199] = -90
+    arena = arena_of(codes)
+    assert arena.brightness[-1].all()  # rows of arenas begin at the bottom
+    assert arena.brightness[:, 0].all()
+    assert arena.lamps[0][:2] == (49.5, 280.5)
+    assert user_place(arena, *arena.lamps[0][:2]) == (50, 20)
+    assert place_mm(arena, 200, 150) == arena.starts[0][:2]
+    assert arena.starts[0].heading_rad == pytest.approx(math.pi / 2)
+
+
+def test_the_most_negative_element_is_the_first_robots() -> None:
+    codes = np.zeros((300, 400))
+    codes[99, 99], codes[99, 299] = -90, -360
+    starts = arena_of(codes).starts
+    assert [start.x_mm for start in starts] == [299.5, 99.5]
+    assert starts[0].heading_rad == 0.0
+
+
+def test_things_leave_no_mark_on_the_floor() -> None:
+    codes = np.zeros((300, 400))
+    codes[99, 99], codes[99, 199], codes[199, 199] = 2, 3, 4
+    arena = arena_of(codes, ball=40, cylinder=90)
+    assert not arena.brightness.any()
+    assert (len(arena.lamps), len(arena.balls), len(arena.cylinders)) == (1, 1, 1)
+    assert (arena.balls[0].brightness, arena.cylinders[0].brightness) == (40, 90)
+
+
+def test_a_colour_mask_says_how_bright_walls_are() -> None:
+    codes, greys = np.zeros((200, 200)), np.zeros((200, 200))
+    codes[:10], greys[:10, :100], greys[100, 100] = 1, 61, 99
+    brightness = arena_of(codes, greys, wall=200).brightness[::-1]
+    assert brightness[5, 50] == 61
+    assert brightness[5, 150] == 200
+    assert brightness[100, 100] == 0, "a grey where there is no wall is none"
+
+
+def test_an_element_that_stands_for_nothing_is_named() -> None:
+    codes = np.zeros((200, 200))
+    codes[4, 6] = 7
+    with pytest.raises(ParameterError, match=r"ARENA\(5,7\) is 7"):
+        arena_of(codes)
+
+
+def test_a_mask_of_another_size_is_refused() -> None:
+    with pytest.raises(ParameterError, match="200 x 200, but it is 200 x 201"):
+        arena_of(np.zeros((200, 200)), np.zeros((200, 201)))
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        *(("seed", "x"), ("seed", "1.5"), ("seed", "9" * 400), ("seed", "1e400"), ("seed", "-1")),
+        *(("noise", "2"), ("noise", "yes"), ("ball", "0"), ("wall", "256"), ("brightness", "wood")),
+        *(("latency_s", "-1"), ("latency_s", "nan"), ("latency_s", "11"), ("robots", "1001"), ("programs", "0")),
+        *(("turrets", "k213 griper"), ("turrets", "k213 " * 1000), ("response", "thesi"), ("thinking", "liv")),
+        *(("sed", "1"), ("x" * 1000, "1"), ("robot", "x" * 1001), ("robot", "a\0b")),
+    ],
+)
+def test_settings_that_are_none_are_refused(name: str, value: str) -> None:
+    with pytest.raises(KiksError, match=r"^kiks_preferences: .* must (be|have known keys)") as caught:
+        Settings().changed(name, value)
+    assert len(str(caught.value)) < 400
+
+
+def test_an_empty_setting_is_the_usual_one() -> None:
+    changed = Settings().changed("ball", "40").changed("turrets", "gripper k213")
+    assert (changed.ball, changed.turrets) == (40, ("gripper", "k213"))
+    assert changed.changed("ball", "").ball is None

@@ -1,0 +1,563 @@
+"""Programs of Octave and MATLAB in a session, asked for things as the toolbox does."""
+
+from __future__ import annotations
+
+import threading
+import time
+import tracemalloc
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.served import GUARD_S
+
+from kiks.model.arena import Arena
+from kiks.ports.local_link import Patient
+from kiks.sim.simulation import Simulation
+from kiks.toolbox.requests import REQUESTS, answer
+from kiks.toolbox.session import Session
+from kiks.toolbox.session_client import SessionClient
+from kiks.toolbox.wire_format import matrices_of, matrix_text
+
+HEAD = 20
+"""Sign, port and time come before what was asked for."""
+
+
+class Asker:
+    """Asks, and takes errors for what they are."""
+
+    def __init__(self, session: Session, number: int = 1) -> None:
+        self.visitor = SessionClient(session, number)
+
+    def __call__(self, request: str) -> str:
+        told = self.told(request)
+        assert told[0] == "+", told
+        return told[HEAD:]
+
+    def told(self, request: str) -> str:
+        return answer(self.visitor, request)
+
+    def refused(self, request: str) -> str:
+        told = self.told(request)
+        assert told[0] == "-", told
+        return told[HEAD:]
+
+    def numbers(self, request: str) -> list[float]:
+        return [float(word) for word in self(request).split()]
+
+
+@contextmanager
+def running(session: Session) -> Iterator[Session]:
+    """Let the session's own thread go round."""
+    is_over = threading.Event()
+
+    def go_round() -> None:
+        while not is_over.is_set():
+            session.round()
+
+    thread = threading.Thread(target=go_round, daemon=True)
+    thread.start()
+    try:
+        yield session
+    finally:
+        is_over.set()
+        thread.join(GUARD_S)
+        session.close()
+        assert not thread.is_alive()
+
+
+@pytest.fixture
+def session() -> Iterator[Session]:
+    with running(Session()) as each:
+        yield each
+
+
+def begun(session: Session, *settings: str, world: str = "default") -> Asker:
+    ask = Asker(session)
+    for setting in ("thinking none", *settings):
+        ask(f"set {setting}")
+    ask(f"world {world}")
+    return ask
+
+
+def drive(ask: Asker, port: int = 1, loops: int = 30) -> list[str]:
+    """Drive as a program does; return all that it was told."""
+    ask(f"open {port} 9600")
+    told = []
+    for loop in range(loops):
+        told += [ask(f"ask {port} N"), ask(f"ask {port} D,{loop % 7},{loop % 5}")]
+    told += [ask(f"time {port}"), ask(f"pose {port}")]
+    ask(f"close {port}")
+    return told
+
+
+def test_what_is_told_is_what_a_port_in_memory_tells(session: Session) -> None:
+    """The same physics, line and clock, to the bit: a session is another way to ask."""
+    ask = begun(session, "seed 3", "turrets k213")
+    ask("open 1 9600")
+    sim = Simulation(seed=3)
+    sim.fit(1, "k213")
+    port = sim.port(1)
+    port.timeout = 10
+    for loop in range(40):
+        for command in ("N", f"D,{loop % 7},{loop % 5}", "H", "T,2,L"):
+            port.write(f"{command}\n".encode())
+            assert ask(f"ask 1 {command}") == port.readline().decode().rstrip()
+    assert float(ask("time 1")) == pytest.approx(sim.time_s, abs=1e-9)
+    assert ask("state") == sim.state_hash()
+
+
+def test_the_same_seed_gives_the_same_run(session: Session) -> None:
+    runs = [drive(begun(session, f"seed {seed}")) for seed in (5, 5, 6)]
+    assert runs[0] == runs[1]
+    assert runs[0] != runs[2]
+
+
+def test_asking_for_the_time_again_and_again_lets_it_pass(session: Session) -> None:
+    ask = begun(session)
+    ask("open 1 9600")
+    ask("ask 1 D,5,5")
+    for _ in range(20_000):
+        if float(ask("time 1")) > 2.0:
+            break
+    else:
+        pytest.fail("time stood still")
+    assert ask.numbers("pose 1")[1] < 320, "and the robot drives meanwhile"
+
+
+def test_so_does_looking_at_the_world(session: Session) -> None:
+    ask = begun(session)
+    ask("open 1 9600")
+    ask("ask 1 D,5,5")
+    y = ask.numbers("pose 1")[1]
+    for _ in range(3000):
+        ask("pose 1")
+    assert ask.numbers("pose 1")[1] < y - 10
+
+
+def test_nothing_moves_while_nobody_asks(session: Session) -> None:
+    ask = begun(session)
+    ask("open 1 9600")
+    ask("ask 1 D,5,5")
+    ask("close 1")
+    state = ask("state")
+    for _ in range(100):
+        ask("objects")
+    assert ask("state") == state
+
+
+def test_who_watches_sees_thinking_pass_as_it_happens(session: Session) -> None:
+    """And it is not charged again: the robot has driven for as long as the program has thought, no longer."""
+    ask = Asker(session)
+    ask("set thinking live")
+    ask("world default")
+    assert session.desk is not None
+    session.desk.gate.set_speed(1.0, session.world.now_ns)
+    ask("open 1 9600")
+    ask("ask 1 D,5,5")
+    begin_ns, begin_s = session.world.now_ns, time.monotonic()
+    driven_ns = begin_ns + 500_000_000
+    guard = threading.Event()
+    for _ in range(200):
+        if session.world.now_ns >= driven_ns:
+            break
+        guard.wait(GUARD_S / 200)
+    assert session.world.now_ns >= driven_ns, "time passes although nobody asks"
+    ask("ask 1 H")
+    thought_s = time.monotonic() - begin_s
+    assert (session.world.now_ns - begin_ns) * 1e-9 < thought_s + 0.1, "what has passed is not charged again"
+
+
+def test_a_pause_lets_simulated_time_pass(session: Session) -> None:
+    ask = begun(session)
+    ask("open 1 9600")
+    ask("ask 1 D,5,5")
+    before = ask.numbers("pose 1")
+    ask("pause 2")
+    after = ask.numbers("pose 1")
+    assert before[1] - after[1] == pytest.approx(80, abs=3), "2 s at 40 mm/s, upwards: y is less"
+    forwards, backwards, straight = ask.numbers("distances 1")
+    assert (forwards, backwards) == (pytest.approx(straight, abs=1), 0)
+
+
+def test_distances_and_paths_begin_when_the_port_is_opened(session: Session) -> None:
+    ask = begun(session)
+    for _ in range(2):
+        ask("open 1 9600")
+        assert ask.numbers("distances 1") == pytest.approx([0, 0, 0], abs=1e-3)
+        ask("ask 1 D,5,5")
+        ask("pause 1")
+        ask("ask 1 D,0,0")
+        ask("pause 0.2")
+        assert ask.numbers("distances 1")[0] == pytest.approx(40, abs=5)
+        path = matrices_of(ask("path 1"))[0]
+        assert path.shape[0] == 2
+        assert 20 < path.shape[1] < 60
+        assert np.ptp(path[0]) < 1
+        assert np.ptp(path[1]) == pytest.approx(40, abs=5)
+        ask("close 1")
+
+
+def test_a_late_reply_answers_nothing_else(session: Session) -> None:
+    ask = begun(session)
+    ask("open 1 9600")
+    assert ask(r"send 1 N\nH\n").startswith("n,")
+    assert ask("ask 1 H").startswith("h,")
+    assert ask("send 1 H") == "", "no terminator, no answer"
+    assert ask(r"send 1 \n").startswith("h,"), "now it is there"
+    assert ask(r"send 1 \n") == "", "empty lines are not answered"
+    assert ask("ask 1 E").startswith("e,")
+
+
+def test_replies_of_several_lines_are_heard_to_their_end(session: Session) -> None:
+    ask = begun(session)
+    ask("open 1 9600")
+    first = ask("ask 1 help")
+    rest = ask("listen 1")
+    assert first
+    assert rest.count(r"\n") > 3
+    assert ask("ask 1 H").startswith("h,")
+
+
+def test_every_port_has_a_robot_of_its_own_and_keeps_it(session: Session) -> None:
+    ask = begun(session)
+    for port in (1, 2, 3):
+        ask(f"open {port} 9600")
+    poses = {ask(f"pose {port}") for port in (1, 2, 3)}
+    assert len(poses) == 3
+    ask("close 0")
+    ask("open 2 9600")
+    assert ask("pose 2") in poses
+    assert session.world.robot_count == 3
+
+
+def test_a_port_is_opened_once(session: Session) -> None:
+    ask = begun(session)
+    ask("open 1 9600")
+    assert "use kiks_kclose([])" in ask.refused("open 1 9600").lower()
+    ask("close 1")
+    ask("close 1")
+    ask("open 1 19200")
+    assert "baudrate must be" in ask.refused("open 2 7")
+    assert "must be -1, -2" in ask.refused("open 0 9600")
+
+
+def test_another_world_ends_ports_with_a_word(session: Session) -> None:
+    ask = begun(session)
+    ask("open 1 9600")
+    ask("world default")
+    assert "must be open, but it is not" in ask.refused("ask 1 N")
+    ask("open 1 9600")
+    assert ask("ask 1 N").startswith("n,")
+    Asker(session, 2)("world default")
+    assert "another world has taken its place" in ask.refused("ask 1 N")
+    ask("open 1 9600")
+    assert ask("ask 1 N").startswith("n,")
+
+
+@pytest.mark.parametrize("request_", ["ask 1 N", "pause 5", "time 1", "pose 1", "close 1", "listen 1"])
+def test_what_a_paused_world_keeps_waiting_can_be_called_off(session: Session, request_: str) -> None:
+    awaited = Patient()
+    ask = begun(session)
+    ask.visitor.leave()
+    ask.visitor = SessionClient(session, 1, awaited)
+    told: list[str] = []
+    is_paused = threading.Event()
+
+    def drive() -> None:
+        ask("open 1 9600")
+        assert session.desk is not None
+        session.desk.gate.pause(session.world.now_ns)
+        is_paused.set()
+        told.append(ask.told(request_))
+        awaited.is_called_off = False
+        session.desk.gate.go_on()
+        told.append(ask.told("ask 1 N"))
+
+    thread = threading.Thread(target=drive)
+    thread.start()
+    assert is_paused.wait(GUARD_S)
+    for _ in range(1000):
+        if told:
+            break
+        awaited.is_called_off = True
+        ask.visitor.call_off()
+        thread.join(GUARD_S / 1000)
+    thread.join(GUARD_S)
+    assert not thread.is_alive()
+    assert told[0][0] == "+" or "the program was interrupted" in told[0]
+    assert told[1][HEAD:].startswith("n,") or request_ == "close 1", told
+
+
+def test_waiting_for_others_to_begin_can_be_called_off(session: Session) -> None:
+    awaited = Patient()
+    ask = begun(session, "programs 2")
+    ask.visitor.leave()
+    ask.visitor = SessionClient(session, 1, awaited)
+    told: list[str] = []
+    thread = threading.Thread(target=lambda: told.append(ask.told("open 1 9600")))
+    thread.start()
+    for _ in range(1000):
+        if told:
+            break
+        awaited.is_called_off = True
+        thread.join(GUARD_S / 1000)
+    assert "the program was interrupted" in told[0]
+
+
+def test_two_programs_drive_two_robots_in_one_world(session: Session) -> None:
+    """Each in a thread of its own, as two Octaves are; what happens does not depend on who is faster."""
+    codes = np.zeros((500, 500))
+    codes[249, 129], codes[249, 369] = -360, -90
+
+    def run() -> tuple[list[str], list[str], str]:
+        first = begun(session, "seed 4", "programs 2", world=f"matrix {matrix_text(codes)}")
+        second = Asker(session, 2)
+        told: dict[int, list[str]] = {1: [], 2: []}
+
+        def loop(ask: Asker, number: int) -> None:
+            ask("open 1 9600")
+            for step in range(60):
+                told[number] += [ask("ask 1 N"), ask(f"ask 1 D,{3 + number},{step % 6}"), ask("time 1")]
+            ask("close 1")
+
+        threads = [threading.Thread(target=loop, args=(ask, number)) for number, ask in ((1, first), (2, second))]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join(GUARD_S)
+        for ask in (first, second):
+            ask.visitor.leave()
+        return told[1], told[2], Asker(session)("state")
+
+    runs = [run() for _ in range(3)]
+    assert len(runs[0][0]) == len(runs[0][1]) == 180
+    assert runs[0] == runs[1] == runs[2]
+
+
+def test_who_leaves_frees_the_robot(session: Session) -> None:
+    first = begun(session)
+    first("open 1 9600")
+    second = Asker(session, 2)
+    second("open 1 9600")
+    assert session.world.robot_count == 2
+    first.visitor.leave()
+    third = Asker(session, 3)
+    third("open 1 9600")
+    assert session.world.robot_count == 2
+    assert third("ask 1 N").startswith("n,")
+
+
+def test_objects_are_listed_lights_first_and_can_be_moved(session: Session) -> None:
+    ask = begun(session, world=f"matrix {matrix_text(np.zeros((500, 600)))}")
+    for spawned in ("2 100 400", "1 50 60", "3 200 400"):
+        ask(f"spawn {spawned}")
+    objects = matrices_of(ask("objects"))[0]
+    assert objects[:, 0].tolist() == [1, 2, 3]
+    assert objects[:, 1:3].tolist() == [[50, 60], [100, 400], [200, 400]]
+    assert ask("set_object 2 101 400 100 1.5") == "1", "a short move, too: what it stands on itself is free"
+    assert ask("set_object 2 NaN NaN 100 1.5") == "1"
+    row = matrices_of(ask("objects"))[0][1]
+    assert row.tolist() == [2, 101, 400, pytest.approx(100), pytest.approx(1.5)]
+    assert ask("set_object 2 200 400 50 0") == "0", "there is the cylinder"
+    row = matrices_of(ask("objects"))[0][1]
+    assert row.tolist() == [2, 101, 400, pytest.approx(50), pytest.approx(0)], "but it rolls"
+    assert ask("set_object 1 70 80 0 0") == "1"
+    assert matrices_of(ask("objects"))[0][0, 1:3].tolist() == [70, 80]
+    assert "row must be one of the 3" in ask.refused("set_object 4 1 1 1 1")
+
+
+def test_what_is_spawned_without_a_place_finds_one(session: Session) -> None:
+    ask = begun(session, world=f"matrix {matrix_text(np.zeros((500, 600)))}")
+    for _ in range(5):
+        ask("spawn 3 NaN NaN")
+    ask("spawn 1 NaN NaN")
+    objects = matrices_of(ask("objects"))[0]
+    assert objects[:, 0].tolist() == [1, 3, 3, 3, 3, 3]
+    assert len({tuple(place) for place in objects[:, 1:3].tolist()}) == 6
+    assert "must lie in the arena" in ask.refused("spawn 2 700 10")
+    assert "type must be" in ask.refused("spawn 4 10 10")
+
+
+def test_a_robot_is_put_where_there_is_room(session: Session) -> None:
+    ask = begun(session)
+    ask("open 1 9600")
+    assert ask("set_robot 1 100 200 0.5") == "1"
+    assert ask.numbers("pose 1") == [100, 200, 0.5]
+    assert ask("set_robot 1 5 5 0.5") == "0"
+    assert ask.numbers("pose 1") == [100, 200, 0.5]
+    assert ask("set_robot 1 200 200 NaN") == "1"
+    assert ask("ask 1 N").startswith("n,"), "the port stays open"
+
+
+def test_a_reset_puts_everything_back(session: Session) -> None:
+    ask = begun(session)
+    ask("spawn 2 100 200")
+    ask("open 1 9600")
+    before = ask("pose 1"), ask("objects")
+    ask("ask 1 D,5,5")
+    ask("set_object 1 300 300 0 0")
+    ask("pause 1")
+    ask("reset")
+    assert ask("objects") == before[1]
+    assert ask.numbers("pose 1") == pytest.approx([float(word) for word in before[0].split()], abs=0.5)
+
+
+def test_worlds_are_saved_and_read(session: Session, tmp_path: Path) -> None:
+    codes = np.zeros((300, 400))
+    codes[:10], codes[149, 99], codes[149, 299] = 1, -90, 3
+    ask = begun(session, world=f"matrix {matrix_text(codes)}")
+    for name in ("a.kad", "b.kiks", "c.toml"):
+        ask(f"save {tmp_path / name}")
+        assert np.array_equal(Arena.load(tmp_path / name).brightness[::-1] > 0, codes == 1)
+        greys = matrices_of(ask(f"read {tmp_path / name}"))[0]
+        assert np.array_equal(greys > 0, codes == 1)
+        ask(f"world file {tmp_path / name}")
+        assert matrices_of(ask("objects"))[0][:, 1:3].tolist() == [[300, 150]]
+    assert "must end in .kad" in ask.refused(f"save {tmp_path / 'd.txt'}")
+    assert "no such file" in ask.refused(f"read {tmp_path / 'none.kad'}").lower()
+
+
+def test_settings_hold_for_the_next_world(session: Session) -> None:
+    ask = begun(session, "robot khepera_ii", "robots 2", "turrets gripper", "noise 0", "brightness 7", "ball 40")
+    sim = session.world
+    assert sim.robot_count == 2
+    assert {spec.name for spec in sim.specs} == {"Khepera II"}
+    assert {spec.body.brightness for spec in sim.specs} == {7}
+    assert not sim.specs[0].is_noisy
+    assert [turret.name for turret in sim.turrets(2)] == [turret.name for turret in sim.turrets(1)]
+    ask("spawn 2 100 300")
+    assert sim.bodies()["brightness"].tolist() == [40]
+    ask("set robot nobody")
+    assert "nobody" in ask.refused("world default")
+    assert session.world is sim, "the old world is still there"
+
+
+def test_what_an_exchange_costs_on_another_computer_is_charged(session: Session) -> None:
+    ask = begun(session, "latency_s 0.5")
+    ask("open 1 9600")
+    before = float(ask("time 1"))
+    ask("ask 1 H")
+    assert float(ask("time 1")) - before == pytest.approx(0.5, abs=0.05)
+
+
+REFUSED: Sequence[str] = (
+    "nothing",
+    "",
+    "open",
+    "open 1",
+    "open x 9600",
+    "ask 9 N",
+    "send 1",
+    "listen 1",
+    "pass 1",
+    "pause 1",
+    "pause x",
+    "world",
+    "world file",
+    "world matrix 3",
+    "world matrix 2 2 4 0",
+    "set_robot 1 2",
+    "spawn 1",
+    "set x 1",
+    "save",
+    "read",
+)
+
+
+@pytest.mark.parametrize("request_", REFUSED)
+def test_bad_requests_are_refused_with_a_word(session: Session, request_: str) -> None:
+    ask = begun(session)
+    assert "KiKS itself has failed" not in ask.refused(request_)
+    assert ask("active") == "1"
+
+
+@pytest.mark.parametrize("request_", ["pose 1", "path 1", "objects", "state", "save x.kad", "checkpoint", "reset"])
+def test_without_a_world_one_is_asked_for(session: Session, request_: str) -> None:
+    told = Asker(session).told(request_)
+    assert (told[0] == "+" and told[HEAD:] == "") or "there must be a world first" in told
+
+
+HOSTILE = (
+    *("", "x", "-1", "1 2 3 4 5 6 7", "nan", "1e300", "-5 nan inf", "99999999999999999999", "\\", "\0", "1\0"),
+    *("\ufffd", "1 " + "9" * 400, "9" * 5000, "1 1e400", "1 100 100 1e20", "1 -1e308 1e308 -1e308", "1 1e9 1e9 1e6"),
+    *("1 1 1 1e9 1e9", "1 nan nan 1e308 1e308", "1 nan nan -1e9 nan", "2 1e308 1e308", "2 1e9 -1e9", "1e-320", "1_0"),
+    *("0x10", "\u0661", "1 " * 20_000, "a" * 99_000, "x" * 200_000, "a.kad/" * 500, "[" * 50_000),
+    *("1 " + "D,9" * 3000, "1 " + "\r" * 3000, "robots 1e9", "robots nan", "seed 1e300", "seed -1", "noise 2"),
+    *("turrets " + "k213 " * 9000, "thinking live:1e308", "latency_s 1e9", "wall 1e400", "robot \0", "programs 1001"),
+    "response " + "9" * 5000,
+)
+
+
+@pytest.mark.parametrize(
+    "name", sorted({*REQUESTS, "nothing", "", "x" * 70_000, "\ufffd", "\0"}), ids=lambda name: name[:20]
+)
+def test_whatever_words_come_an_answer_goes_out(
+    session: Session, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No request may end the process or fail inside, and what is refused is refused in a line."""
+    monkeypatch.chdir(tmp_path)
+    ask = begun(session, world=f"matrix {matrix_text(np.zeros((200, 200), np.int16))}")
+    ask("spawn 1 50 50")
+    ask("spawn 2 150 150")
+    ask("open 1 9600")
+    for words in HOSTILE:
+        told = ask.told(f"{name} {words}")
+        assert told[0] in "+-"
+        assert "KiKS itself has failed" not in told, (words[:80], told)
+        if told[0] == "-":
+            assert len(told) < 500, words[:80]
+            assert told.isprintable(), words[:80]
+            # What is wrong with a file says the reader of files.
+            assert len(words) <= 80 or words[:81] not in told or name in ("read", "save")
+    assert ask("active") == "1"
+    for setting in ("seed", "robot", "robots", "response", "turrets", "thinking", "programs", "latency_s"):
+        ask(f"set {setting} ")
+    ask("world default")
+    ask("open 1 9600")
+    assert ask("ask 1 N").startswith("n,")
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        ("2000 2000 4000000 3", "at most 10000 robots"),
+        ("64000000 64000000 1 1", "a matrix must be"),
+        ("8000 8000 64000000 1e300", "a matrix must be"),
+        ("200 200 40000 nan", "a matrix must be"),
+        ("200 200 40000 -inf", "a matrix must be"),
+        ("200 200 39999.5 0 0.5 0", "a matrix must be"),
+        ("1e9 1", "a matrix must be"),
+        ("200 200 40000 0 200 200 40000 0 200 200 40000 0", "a matrix must be"),
+        ("200 200 40000 1.5", "an arena's elements must be"),
+        ("200 200 40000 1 200 200 40000 256", "greys of walls must be"),
+        (" ".join("9" * 3000), "a matrix must be"),
+    ],
+)
+def test_no_memory_is_taken_on_the_word_of_a_matrix(session: Session, words: str, why: str) -> None:
+    ask = begun(session)
+    tracemalloc.start()
+    try:
+        told = ask.refused(f"world matrix {words}")
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert why in told
+    assert len(told) < 500
+    assert peak < 100e6
+
+
+def test_a_robot_may_be_a_file(session: Session, tmp_path: Path) -> None:
+    ours = resources.files("kiks.model").joinpath("robots", "khepera.toml").read_text(encoding="utf-8")
+    file = tmp_path / "mine.toml"
+    file.write_text(ours.replace("pulse_mm = 0.08 ", "pulse_mm = 0.082 "), encoding="utf-8")
+    ask = begun(session, f"robot {file}", "robots 1")
+    assert session.world.specs[0].body.pulse_mm == 0.082
+    ask("open 1 9600")
+    ask("open 2 9600")
+    assert session.world.specs[1].body.pulse_mm == 0.082, "who comes later is of the same kind"
+    ask(f"set robot {tmp_path / 'none.toml'}")
+    assert "none.toml" in ask.refused("world default")

@@ -1,0 +1,390 @@
+"""The process of a session: who may come in, and that nothing is left when the last has gone."""
+
+from __future__ import annotations
+
+import os
+import resource
+import select
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+
+import pytest
+from tests.served import GUARD_S
+
+from kiks.cli.matlab import toolbox_folder
+
+pytestmark = pytest.mark.slow
+
+KIKS = [sys.executable, "-m", "kiks"]
+
+STARTER = [sys.executable, "-c", "import subprocess, sys; subprocess.run(sys.argv[1:])"]
+"""A process that starts another one and waits for it."""
+
+
+class Session:
+    """A process of a session, and who started it."""
+
+    def __init__(self, *words: str, folder: Path, starter: Sequence[str] = ()) -> None:
+        self.process = subprocess.Popen(
+            [*starter, *KIKS, "session", *words],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            bufsize=0,
+            env={**os.environ, "XDG_RUNTIME_DIR": str(folder), "DISPLAY": "", "WAYLAND_DISPLAY": ""},
+        )
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        self.to, self.out = self.process.stdin.fileno(), self.process.stdout.fileno()
+        # select.select() refuses descriptors from 1024 on, and a test opens a thousand first.
+        self.poll = select.poll()
+        self.poll.register(self.out, select.POLLIN)
+        self.greeting = self.hear()
+
+    def hear(self, *, confirms: bool = True) -> str:
+        """Return the next answer; confirm that it is waited for where it takes long, if nothing else is said."""
+        while (heard := self.hear_frame()) == "~":
+            if confirms:
+                os.write(self.to, b"\n")
+        return heard
+
+    def hear_frame(self) -> str:
+        length = int(self._read(8))
+        return self._read(max(length, 88))[:length]
+
+    def say(self, request: str) -> None:
+        os.write(self.to, f"{request}\n".encode())
+
+    def ask(self, request: str) -> str:
+        self.say(request)
+        heard = self.hear()
+        assert heard[0] == "+", heard
+        return heard[20:]
+
+    def hang_up(self) -> None:
+        assert self.process.stdin is not None
+        self.process.stdin.close()
+
+    def wait(self) -> int:
+        return self.process.wait(GUARD_S)
+
+    def _read_until(self, end: str) -> str:
+        heard = ""
+        while not heard.endswith(end):
+            heard += self._read(1)
+        return heard
+
+    def _read(self, count: int) -> str:
+        data = b""
+        while len(data) < count:
+            assert self.poll.poll(3 * GUARD_S * 1000), "nothing came"
+            piece = os.read(self.out, count - len(data))
+            assert piece, f"it has ended after {data!r}"
+            data += piece
+        return data.decode()
+
+
+def ended(*words: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Return how a process ends by itself."""
+    return subprocess.run(
+        [*KIKS, "session", *words],
+        capture_output=True,
+        text=True,
+        stdin=subprocess.DEVNULL,
+        timeout=3 * GUARD_S,
+        env={**os.environ, "XDG_RUNTIME_DIR": str(folder)},
+    )
+
+
+def wait_until(fact: Callable[[], object]) -> None:
+    """Look until something is so."""
+    end_s = time.monotonic() + 3 * GUARD_S
+    while not fact():
+        assert time.monotonic() < end_s, "it never was so"
+
+
+@contextmanager
+def started(*words: str, folder: Path, starter: Sequence[str] = ()) -> Iterator[Session]:
+    session = Session(*words, folder=folder, starter=starter)
+    try:
+        if session.greeting.startswith("KiKS"):
+            # Only who takes part lets others find the session.
+            session.ask("active")
+        yield session
+    finally:
+        session.process.kill()
+        session.process.wait()
+        assert session.process.stdout is not None
+        session.process.stdout.close()
+        if not session.process.stdin.closed:  # type: ignore[union-attr]
+            session.process.stdin.close()  # type: ignore[union-attr]
+
+
+def test_a_session_ends_when_the_last_has_hung_up_and_leaves_nothing(tmp_path: Path) -> None:
+    with started(folder=tmp_path) as session:
+        assert session.greeting.startswith("KiKS ")
+        session.ask("world default")
+        session.ask("open 1 9600")
+        assert session.ask("ask 1 N").startswith("n,")
+        assert len(list((tmp_path / "kiks").glob("session-*"))) == 1
+        session.hang_up()
+        assert session.wait() == 0
+        assert not list((tmp_path / "kiks").iterdir())
+
+
+def test_another_program_joins_and_the_session_lives_until_both_have_gone(tmp_path: Path) -> None:
+    with started(folder=tmp_path) as first, started("--join", "0", folder=tmp_path) as second:
+        first.ask("set thinking none")
+        first.ask("world default")
+        assert second.greeting == first.greeting
+        assert second.ask("active") == "1"
+        second.ask("open 1 9600")
+        assert second.ask("ask 1 H") == "h,0,0"
+        first.hang_up()
+        assert second.ask("ask 1 H") == "h,0,0"
+        assert first.process.poll() is None
+        second.hang_up()
+        assert second.wait() == 0
+        assert first.wait() == 0
+
+
+def test_who_joins_is_told_that_there_is_no_session(tmp_path: Path) -> None:
+    for words, told in ((["--join", "0"], "must run before it is joined"), (["--join", "7"], "session 7 must run")):
+        process = ended(*words, folder=tmp_path)
+        assert told in process.stdout
+        assert process.returncode == 2
+
+
+def test_a_session_that_was_killed_is_forgotten(tmp_path: Path) -> None:
+    with started(folder=tmp_path) as session:
+        session.process.kill()
+        session.wait()
+        assert list((tmp_path / "kiks").glob("session-*"))
+        with started(folder=tmp_path) as other, started("--join", "0", folder=tmp_path) as participant:
+            assert participant.greeting == other.greeting
+            assert len(list((tmp_path / "kiks").glob("session-*"))) == 1
+
+
+def test_a_joined_program_notices_that_the_session_was_killed(tmp_path: Path) -> None:
+    with started(folder=tmp_path) as first, started("--join", "0", folder=tmp_path) as second:
+        first.process.kill()
+        assert second.wait() == 0
+        assert os.read(second.out, 1) == b""
+
+
+def test_without_the_token_nobody_gets_in(tmp_path: Path) -> None:
+    with started(folder=tmp_path) as session:
+        words = session.greeting.split()
+        for token in ("", "x" * 32, words[7][:-1], "y" * 10_000):
+            with socket.create_connection(("127.0.0.1", int(words[5]))) as client:
+                client.settimeout(GUARD_S)
+                client.sendall(f"{token}\nversion\n".encode())
+                heard = b""
+                with suppress(ConnectionResetError):
+                    heard = client.recv(100)
+                assert heard == b""
+        door = next((tmp_path / "kiks").glob("session-*"))
+        assert door.stat().st_mode & 0o077 == 0, "the token is the user's alone"
+        with socket.create_connection(("127.0.0.1", int(words[5]))) as client:
+            client.settimeout(GUARD_S)
+            client.sendall(f"{words[7]}\n".encode())
+            assert b"KiKS" in client.recv(200)
+
+
+def test_ctrl_c_is_meant_for_octave_and_sigterm_ends_it(tmp_path: Path) -> None:
+    with started(folder=tmp_path) as session:
+        session.process.send_signal(signal.SIGINT)
+        assert session.ask("active") == "0"
+        session.process.send_signal(signal.SIGTERM)
+        assert session.wait() == 0
+        assert not list((tmp_path / "kiks").iterdir())
+
+
+def test_a_paused_world_does_not_keep_a_session_whose_octave_has_gone(tmp_path: Path) -> None:
+    """The request waits in the world, so nobody reads, and the pipe's end must be noticed all the same."""
+    with started("--window", folder=tmp_path) as session:
+        session.ask("set thinking none")
+        session.ask("world default")
+        session.ask("open 1 9600")
+        os.write(session.to, b"pause 100000\n")  # at real speed, with a window: longer than anybody waits
+        os.write(session.to, b"ask 1 N\n")
+        session.hang_up()
+        assert session.wait() == 0
+
+
+def test_what_is_printed_never_mixes_with_answers(tmp_path: Path) -> None:
+    with started(folder=tmp_path) as session:
+        os.write(session.to, f"world file {tmp_path / 'none.kad'}\n".encode())
+        assert session.hear().startswith("-")
+        assert session.ask("version")
+
+
+def test_octave_is_told_where_the_toolbox_is() -> None:
+    assert (toolbox_folder() / "kiks.m").is_file()
+    told = subprocess.run([*KIKS, "matlab"], capture_output=True, text=True, check=True, timeout=GUARD_S).stdout
+    assert str(toolbox_folder()) in told
+
+
+# ---- strangers ----
+
+
+def test_a_thousand_strangers_keep_nobody_out(tmp_path: Path) -> None:
+    with started(folder=tmp_path) as session, ExitStack() as strangers:
+        session.ask("world default")
+        address = ("127.0.0.1", int(session.greeting.split()[5]))
+        for _ in range(1000):
+            strangers.enter_context(socket.create_connection(address))
+        assert session.ask("active") == "1"
+        with started("--join", "0", folder=tmp_path) as participant:
+            assert participant.ask("active") == "1"
+        assert len(os.listdir(f"/proc/{session.process.pid}/fd")) < 100
+
+
+def test_running_out_of_descriptors_ends_no_session(tmp_path: Path) -> None:
+    with started(folder=tmp_path) as session, ExitStack() as friends:
+        session.ask("world default")
+        words = session.greeting.split()
+        used = len(os.listdir(f"/proc/{session.process.pid}/fd"))
+        resource.prlimit(session.process.pid, resource.RLIMIT_NOFILE, (used + 10, used + 10))
+        for _ in range(30):
+            friend = friends.enter_context(socket.create_connection(("127.0.0.1", int(words[5]))))
+            friend.settimeout(GUARD_S)
+            with suppress(OSError):
+                friend.sendall(f"{words[7]}\n".encode())
+                friend.recv(200)
+        assert session.ask("active") == "1"
+        friends.close()
+        wait_until(lambda: len(os.listdir(f"/proc/{session.process.pid}/fd")) <= used)
+        with started("--join", "0", folder=tmp_path) as participant:
+            assert participant.ask("active") == "1"
+
+
+def test_a_file_of_another_kind_tells_of_no_session(tmp_path: Path) -> None:
+    with started(folder=tmp_path) as session:
+        session.ask("active")
+        folder = tmp_path / "kiks"
+        file = folder / f"session-{session.process.pid}"
+        link, readable, pipe = (folder / f"session-{number}" for number in (1, 2, 3))
+        link.symlink_to(file)
+        readable.write_bytes(file.read_bytes().replace(str(session.process.pid).encode(), b"2", 1))
+        readable.chmod(0o644)
+        os.mkfifo(pipe, 0o600)
+        line = session.greeting.replace(f"session {session.process.pid}", "session 4")
+        (folder / "session-4").write_text(line + "\n", encoding="ascii")
+        (folder / "session-4").chmod(0o600)  # nobody holds it
+        for number in (1, 2, 3, 4):
+            done = ended("--where", str(number), folder=tmp_path)
+            assert done.returncode == 2
+            assert f"those that run are [{session.process.pid}]" in done.stdout
+        assert {each.name for each in folder.iterdir()} == {file.name, link.name, readable.name, pipe.name}
+        folder.chmod(0o777)
+        assert "others can write there" in ended("--where", "0", folder=tmp_path).stdout
+
+
+def test_a_session_is_announced_when_somebody_takes_part(tmp_path: Path) -> None:
+    """Octave may have forgotten it before: Ctrl-C."""
+    session = Session(folder=tmp_path)
+    assert not list((tmp_path / "kiks").glob("session-*"))
+    session.ask("active")
+    assert len(list((tmp_path / "kiks").glob("session-*"))) == 1
+    session.hang_up()
+    assert session.wait() == 0
+    assert session.process.stdout is not None
+    session.process.stdout.close()
+
+
+def test_a_file_that_is_there_is_not_written_over(tmp_path: Path) -> None:
+    file = tmp_path / "there"
+    file.write_text("mine", encoding="ascii")
+    done = ended("--listen", str(file), folder=tmp_path)
+    assert "must be a new file" in done.stdout
+    assert file.read_text(encoding="ascii") == "mine"
+    assert list(tmp_path.glob(".there*")) == []
+
+
+# ---- waiting ----
+
+
+def test_an_answer_that_takes_long_is_announced_and_ends_when_it_is_called_off(tmp_path: Path) -> None:
+    with started(folder=tmp_path) as session:
+        for request in ("set thinking none", "world default", "open 1 9600"):
+            session.ask(request)
+        session.say("pause 1e6")
+        for _ in range(3):
+            assert session.hear_frame() == "~"
+            session.say("")
+        session.say("\x18!")
+        session.say("time 1")
+        stale = session._read_until("\x02")
+        assert session._read(1) == "!"
+        assert stale.endswith("\x01" * 190 + "\x02")
+        assert 0 < float(session.hear()[20:]) < 1e6
+
+
+def test_time_stands_still_for_a_program_that_does_not_say_that_it_waits(tmp_path: Path) -> None:
+    with started(folder=tmp_path) as session:
+        for request in ("set thinking none", "world default", "open 1 9600"):
+            session.ask(request)
+        session.say("pause 1e6")
+        assert session.hear_frame() == "~"
+        status = Path(f"/proc/{session.process.pid}/stat")
+
+        def worked() -> int:
+            """Return how much processor time it has had; it rests when it has none for a while."""
+            words = status.read_text(encoding="ascii").rpartition(")")[2].split()
+            return int(words[11]) + int(words[12])
+
+        def rests() -> bool:
+            before = worked()
+            return not select.select([session.out], [], [], 1.0)[0] and worked() - before < 20
+
+        wait_until(rests)
+        session.say("")
+        assert session.hear_frame() == "~", "it goes on"
+
+
+def test_good_bye_is_enough_where_a_pipe_stays_open(tmp_path: Path) -> None:
+    with started(folder=tmp_path) as session:
+        session.ask("world default")
+        session.say("\x04")
+        assert session.wait() == 0
+
+
+def test_who_goes_first_is_told_that_the_session_goes_on(tmp_path: Path) -> None:
+    with started(folder=tmp_path) as first:
+        first.ask("world default")
+        with started("--join", "0", folder=tmp_path) as second:
+            second.ask("active")
+            first.say("\x04")
+            assert first.hear() == ">"
+            assert os.read(first.out, 1) == b""
+            assert first.process.poll() is None
+            assert second.ask("active") == "1"
+            second.say("\x04")
+            assert second.wait() == 0
+        assert first.wait() == 0
+
+
+def test_a_killed_program_that_was_started_ends_a_session_at_any_moment(tmp_path: Path) -> None:
+    """Its parent is gone, although the pipe is held open here."""
+    with started(folder=tmp_path, starter=STARTER) as session:
+        session.ask("world default")
+        session.process.kill()
+        session.process.wait()
+        assert os.read(session.out, 1) == b"", "its end closes its output"
+
+
+def test_sigterm_ends_a_session_that_was_started_with_signals_blocked(tmp_path: Path) -> None:
+    """As Octave starts it."""
+    blocked = {signal.SIGTERM, signal.SIGINT, signal.SIGHUP}
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, blocked)
+    with ExitStack() as after:
+        after.callback(signal.pthread_sigmask, signal.SIG_SETMASK, before)
+        session = after.enter_context(started(folder=tmp_path))
+        session.process.send_signal(signal.SIGTERM)
+        assert session.wait() == 0
