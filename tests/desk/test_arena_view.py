@@ -178,11 +178,12 @@ def test_tab_leaves_the_view_after_the_last_thing(visit: Callable[..., Visit]) -
 def test_a_click_picks_and_chooses(visit: Callable[..., Visit]) -> None:
     here = visit()
     x_mm, y_mm, heading_rad = here.pose(2)
-    here.click(x_mm, y_mm)
     angle = heading_rad + SENSOR_RAD
-    here.click(x_mm + 24 * math.cos(angle), y_mm + 24 * math.sin(angle))
-    here.click(500, 520)
-    said = here.heard("(said) => said.length === 3")
+    sensor_mm = x_mm + 24 * math.cos(angle), y_mm + 24 * math.sin(angle)
+    for count, place_mm in enumerate(((x_mm, y_mm), sensor_mm, (500, 520)), 1):
+        here.click(*place_mm)
+        # One after the other: the server may hear two that come at once in either order.
+        said = here.heard(f"(said) => said.length === {count}")
     assert [(pick["what"], pick["index"], pick["sensor"]) for pick in said] == [
         ("robot", 2, -1),
         ("sensor", 2, 0),

@@ -29,7 +29,7 @@ def said_by_process(**environment: str) -> str:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(900)  # it compiles engine and batch, with the checks for the first time
+@pytest.mark.timeout(470)  # it compiles engine and batch, with the checks for the first time
 def test_every_index_is_within_its_array_and_no_bit_depends_on_the_build() -> None:
     """An index outside its array is an IndexError with the checks; without them the process may end."""
     assert said_by_process(**PLAIN_AND_CHECKED) == said_by_process()

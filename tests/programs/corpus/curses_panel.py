@@ -34,5 +34,5 @@ def panel(screen):
 
 ask("D,2,2")
 rounds, keys, seconds = curses.wrapper(panel)
-print(ask("D,0,0"), rounds, "rounds,", keys, "keys, seconds:", round(seconds, 0))
+print(ask("D,0,0"), rounds, "rounds,", keys, "keys, time enough:", seconds >= 1.2)
 ser.close()

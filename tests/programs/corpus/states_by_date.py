@@ -40,5 +40,5 @@ with serial.Serial(sys.argv[1] if len(sys.argv) > 1 else "/dev/ttyS0", 9600, tim
 
 for (state, entered), (_, left) in zip(diary, [*diary[1:], (None, datetime.now())]):
     lasted = (left - entered).total_seconds()
-    print(f"{state.name:6} {round(lasted, 1) if abs(lasted - PLAN[state][1]) > 0.25 else PLAN[state][1]}")
+    print(f"{state.name:6} {PLAN[state][1] if -0.05 < lasted - PLAN[state][1] < 10 else round(lasted, 1)}")
 print("dates in order:", diary == sorted(diary, key=lambda entry: entry[1]), start <= diary[0][1])
