@@ -25,10 +25,10 @@ import time
 from typing import Any
 
 import numpy as np
-from calibration import calibration_loops_per_s, report
 from numba import njit
 
 import kiks
+from calibration import calibration_loops_per_s, report
 from kiks.engine import step
 from kiks.engine.sensing import proximity
 from kiks.units import TICK_NS
@@ -115,7 +115,7 @@ class Crowd:
         across = min(tiles, TILES_ACROSS)
         arena = kiks.Arena.from_array(np.tile(tile(), (-(-tiles // across), across)))
         self.sim = kiks.Simulation(arena, robots=count, seed=1)
-        robots: Any = self.sim.state.robots[0]
+        robots: Any = self.sim.world.state.robots[0]
         for index in range(count):
             x, y, heading = start_poses(min(count, PER_TILE))[index % PER_TILE]
             row, column = divmod(index // PER_TILE, across)
@@ -129,8 +129,8 @@ class Crowd:
 
     def run(self, step_count: int) -> None:
         """Do some steps."""
-        sim = self.sim
-        drive(sim.scene, sim.ground, sim.sight, sim._networks, WEIGHTS, self.tick, step_count, self._out)
+        world = self.sim.world
+        drive(world.scene, world.ground, world.sight, world.networks, WEIGHTS, self.tick, step_count, self._out)
         self.tick += step_count * TICKS_PER_STEP
 
     def step_s(self) -> float:
@@ -151,7 +151,7 @@ class WireCrowd(Crowd):
     def __init__(self, count: int) -> None:
         super().__init__(count)
         self.sim.advance_to(self.tick * TICK_NS)
-        self.sim.state.tick_count = self.tick
+        self.sim.world.state.tick_count = self.tick
         self._ports = [self.sim.port(robot) for robot in range(1, count + 1)]
 
     def step_s(self) -> float:

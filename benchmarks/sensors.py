@@ -21,10 +21,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from calibration import calibration_loops_per_s, report
 from numba import njit
 
 import kiks
+from calibration import calibration_loops_per_s, report
 from kiks.demos.avoid import Avoid
 from kiks.demos.follow import Follow
 from kiks.engine.parameters import pack
@@ -67,10 +67,12 @@ class Ride:
             for _ in range(LOOPS_BETWEEN):
                 program.step(robot)
             sim.sync()
-            scenes.append(make_scene(sim.state.snapshot(), pack(sim.spec), sim.arena.width_mm, sim.arena.height_mm))
+            scenes.append(
+                make_scene(sim.world.state.snapshot(), pack(sim.spec), sim.arena.width_mm, sim.arena.height_mm)
+            )
         name = f"{arena}_{behaviour.__name__.lower()}"
         networks = networks_for(sim.spec.proximity.response)
-        return Ride(name, scenes, sim.sight, networks, sim.lamps)
+        return Ride(name, scenes, sim.world.sight, networks, sim.lamps)
 
 
 def read_proximity(ride: Ride) -> None:
@@ -145,7 +147,7 @@ def response_rows(repeats: int) -> list[tuple[str, float, str]]:
 
     def reading_ns(networks: Any, kinds: Any) -> float:
         start_s = time.perf_counter()
-        expect_all(sim.sight, networks, kinds, poses, out)
+        expect_all(sim.world.sight, networks, kinds, poses, out)
         return (time.perf_counter() - start_s) / out.size * 1e9
 
     reading_ns(*robots[0])  # compiles

@@ -96,7 +96,7 @@ class Pile:
             is_free = all(math.hypot(x - u, y - v) > radius + r for u, v, r in places)
             if is_free and worst_depth_mm(np.array([(x, y, radius)]), walls) < 0.0:
                 places.append((x, y, radius))
-        robots: Any = sim.state.robots[0]
+        robots: Any = sim.world.state.robots[0]
         robots["x_mm"], robots["y_mm"] = np.array(places)[:EACH, :2].T
         robots["heading_rad"] = rng.uniform(-4, 4, EACH)
         for index, (x, y, radius) in enumerate(places[EACH:]):
@@ -110,22 +110,24 @@ class Pile:
         for robot in range(EACH):
             draw = self.rng.random()
             if draw < 0.3:
-                motor.set_speed(self.sim.state.robots, 0, robot, fastest, fastest)
+                motor.set_speed(self.sim.world.state.robots, 0, robot, fastest, fastest)
             elif draw < 0.6:
-                motor.set_speed(self.sim.state.robots, 0, robot, *self.rng.integers(-fastest, fastest + 1, 2).tolist())
+                motor.set_speed(
+                    self.sim.world.state.robots, 0, robot, *self.rng.integers(-fastest, fastest + 1, 2).tolist()
+                )
             elif draw < 0.7 and fastest == 127:
-                motor.set_pwm(self.sim.state.robots, 0, robot, *self.rng.integers(-255, 256, 2).tolist())
+                motor.set_pwm(self.sim.world.state.robots, 0, robot, *self.rng.integers(-255, 256, 2).tolist())
 
     def stop(self) -> None:
         """Switch all motors off, at once."""
         for robot in range(EACH):
-            motor.set_pwm(self.sim.state.robots, 0, robot, 0, 0)
-        self.sim.state.robots["motor_speed"] = 0.0
+            motor.set_pwm(self.sim.world.state.robots, 0, robot, 0, 0)
+        self.sim.world.state.robots["motor_speed"] = 0.0
 
     def scatter(self) -> None:
         """Set all bodies rolling, at up to 1 m/s."""
         for axis in ("velocity_x", "velocity_y"):
-            self.sim.state.bodies[axis][0] = self.rng.uniform(-700, 700, 2 * EACH)
+            self.sim.world.state.bodies[axis][0] = self.rng.uniform(-700, 700, 2 * EACH)
 
     def tick(self) -> None:
         """Let a tick pass."""
@@ -134,7 +136,7 @@ class Pile:
 
     def discs(self) -> np.ndarray:
         """Return x, y and radius [mm] of all, robots first."""
-        robots, bodies = self.sim.state.robots[0], self.sim.state.bodies[0]
+        robots, bodies = self.sim.world.state.robots[0], self.sim.world.state.bodies[0]
         discs = np.empty((len(robots) + len(bodies), 3))
         discs[:EACH, 0], discs[:EACH, 1], discs[:EACH, 2] = robots["x_mm"], robots["y_mm"], 27.5
         discs[EACH:, 0], discs[EACH:, 1], discs[EACH:, 2] = bodies["x_mm"], bodies["y_mm"], bodies["radius_mm"]
@@ -147,7 +149,7 @@ class Pile:
 
     def energy(self) -> float:
         """Return twice the kinetic energy of the bodies for masses of 1 [mm^2/s^2]."""
-        bodies = self.sim.state.bodies[0]
+        bodies = self.sim.world.state.bodies[0]
         return float((bodies["velocity_x"] ** 2 + bodies["velocity_y"] ** 2).sum())
 
 

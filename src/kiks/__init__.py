@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import serial  # noqa: TID253  (pyserial has to be told where our plug-in is)
 
+from kiks import upwards
+
 if TYPE_CHECKING:
     from kiks.batch.batch import Batch
     from kiks.batch.loop_timing import Timing
@@ -102,6 +104,11 @@ _HOMES = {
 
 _MODULES = {"controllers", "measures", "tasks"}
 """Names of whole modules."""
+
+upwards.load_arena_file.provide("kiks.model.arena_formats", "load_arena_file")
+upwards.draw_arena.provide("kiks.drawing", "arena_for_notebook")
+upwards.draw_simulation.provide("kiks.drawing", "simulation_for_notebook")
+upwards.show_in_browser.provide("kiks.desk.server.show", "show")
 
 if "kiks.ports.pyserial" not in serial.protocol_handler_packages:
     serial.protocol_handler_packages.append("kiks.ports.pyserial")

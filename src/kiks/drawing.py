@@ -122,6 +122,18 @@ def draw_arena(arena: Arena) -> Image:
     return draw_world(arena, lamps, bodies, starts, [RobotSpec.load("khepera").body.radius_mm] * len(starts))
 
 
+def simulation_for_notebook(sim: Simulation) -> tuple[bytes, dict[str, int]]:
+    """Return a picture of a simulation as it stands, as `png_for_notebook` does."""
+    with sim.lock:
+        image = draw_simulation(sim)
+    return png_for_notebook(image)
+
+
+def arena_for_notebook(arena: Arena) -> tuple[bytes, dict[str, int]]:
+    """Return a picture of an arena, as `png_for_notebook` does."""
+    return png_for_notebook(draw_arena(arena))
+
+
 def png_for_notebook(image: Image) -> tuple[bytes, dict[str, int]]:
     """Return a picture as a PNG, and at which size a notebook shows it: half, so it is sharp on any screen."""
     pixels = BytesIO()

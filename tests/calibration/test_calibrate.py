@@ -19,7 +19,7 @@ from kiks.calibration.placements import Instruction, Place, SimPlacements
 from kiks.cli.calibrate import calibrate as command
 from kiks.cli.calibrate import parse_gaps
 from kiks.model.robot import robot_toml, save_robot
-from kiks.ports.memory import SimPort
+from kiks.sim.simulation import SimPort
 
 app = typer.Typer()
 app.command()(command)

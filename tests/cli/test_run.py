@@ -261,7 +261,9 @@ def test_paths_stay_whole_if_ctrl_c_comes_while_a_point_is_kept() -> None:
     sim.record_paths(0.01)
     drive_into_a_wall(sim, 0.1)
     before = sim.paths().tolist()
-    state: Any = SimpleNamespace(tick_count=sim.state.tick_count, robots=sim.state.robots, bodies=Interrupted())
+    state: Any = SimpleNamespace(
+        tick_count=sim.world.state.tick_count, robots=sim.world.state.robots, bodies=Interrupted()
+    )
     with pytest.raises(KeyboardInterrupt):
         sim.watchers[0].look(state)
     assert sim.paths().tolist() == before

@@ -30,7 +30,7 @@ def make_app(folder: Path, may_run_programs: bool) -> FastAPI:
 
     @app.get("/speeds")
     def speeds() -> list[list[int]]:
-        setpoints: list[list[int]] = sim.state.robots["speed_setpoint"][0].tolist()
+        setpoints: list[list[int]] = sim.world.state.robots["speed_setpoint"][0].tolist()
         return setpoints
 
     @app.get("/watched")

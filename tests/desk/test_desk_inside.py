@@ -18,7 +18,7 @@ pytestmark = pytest.mark.slow
 
 
 def setpoints(visitor: Visitor, robot: int = 1) -> list[int]:
-    found: list[int] = visitor.sim.state.robots["speed_setpoint"][0, robot - 1].tolist()
+    found: list[int] = visitor.sim.world.state.robots["speed_setpoint"][0, robot - 1].tolist()
     return found
 
 

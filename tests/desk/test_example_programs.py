@@ -39,7 +39,7 @@ def run(sim: Simulation, name: str, seconds: float = math.inf) -> int | None:
 
 def speeds(sim: Simulation) -> list[int]:
     sim.run(0.1)
-    return sim.state.robots["speed_setpoint"][0, 0].tolist()
+    return sim.world.state.robots["speed_setpoint"][0, 0].tolist()
 
 
 def test_all_are_tested() -> None:

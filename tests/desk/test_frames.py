@@ -105,7 +105,7 @@ def test_a_frame_says_what_the_simulation_says():
     assert (frame.time_s, frame.speed_now, frame.speed_average) == (sim.time_s, 3.5, 2.25)
     assert len(frame.robots) == 4
     for number, robot in enumerate(frame.robots, 1):
-        record = sim.state.robots[0, number - 1]
+        record = sim.world.state.robots[0, number - 1]
         assert robot.pose == pytest.approx(sim.pose(number), rel=1e-6)
         assert robot.measured == record["measured_speed"].tolist()
         assert robot.contacts == sim.contacts(number)
@@ -121,7 +121,7 @@ def test_a_frame_says_what_the_simulation_says():
                 assert packed == NO_HIT if math.isinf(length_mm) else packed / 100 == pytest.approx(length_mm, abs=6e-3)
     assert frame.robots[0].commanded == [10, -6]
     assert frame.robots[1].commanded == [7, 9]
-    assert frame.robots[2].commanded == sim.state.robots["trajectory_speed"][0, 2].tolist()
+    assert frame.robots[2].commanded == sim.world.state.robots["trajectory_speed"][0, 2].tolist()
     assert any(ray != NO_HIT for robot in frame.robots for row in robot.rays for ray in row)
 
 
@@ -136,8 +136,8 @@ def test_bodies_lamps_and_cameras():
     for index, light, pixels in frame.cameras:
         camera = sim.turrets(index + 1)[0]
         assert (light, pixels) == (camera.light, camera.pixels)
-    sim.state.bodies["holder"][0, 1:] = 3
-    sim.state.bodies["is_lifted"][0, 2] = 1
+    sim.world.state.bodies["holder"][0, 1:] = 3
+    sim.world.state.bodies["is_lifted"][0, 2] = 1
     assert [body[2] for body in read_frame(pack_frame(sim, scene=1)).bodies] == [0, 1, 2]
 
 
@@ -164,7 +164,7 @@ def test_encoders_are_what_the_robot_answers():
 
 def test_counters_wrap_as_the_robots_do():
     sim = Simulation(Arena.box(400, 400))
-    sim.state.robots["pulse_count"][0, 0] = (2**31 + 5, -(2**31) - 1)
+    sim.world.state.robots["pulse_count"][0, 0] = (2**31 + 5, -(2**31) - 1)
     assert read_frame(pack_frame(sim, scene=1)).robots[0].encoders == [-(2**31) + 5, 2**31 - 1]
 
 

@@ -152,7 +152,7 @@ class Visitor:
         """Say whether a robot stands where it can stand."""
         with self.sim.lock:
             x_mm, y_mm, _ = self.sim.pose(robot)
-            return bool(self.sim.freedom(robot - 1)(x_mm, y_mm))
+            return bool(self.sim.world.free_space.may_lie(robot - 1)(x_mm, y_mm))
 
     def picture(self, name: str) -> None:
         """Leave a picture of the page for a person."""

@@ -62,22 +62,22 @@ def sense_everything(sim: Simulation) -> None:
 def wild_states() -> None:
     """Write wild numbers where the kernels look, one field at a time and all at once."""
     sim = furnished()
-    begin = sim.state.snapshot()
+    begin = sim.world.state.snapshot()
     lamps = sim.lamps.copy()
     for wild in WILD:
         for names, records, kind in ((PLACES, "robots", ROBOT), (BODY_PLACES, "bodies", BODY)):
             for name in (*names, ""):
-                sim.state.restore(begin)
-                sim.state.tick_count = -(-sim.now_ns // 10_000_000)
+                sim.world.state.restore(begin)
+                sim.world.state.tick_count = -(-sim.now_ns // 10_000_000)
                 for each in [name] if name else list(names):
                     assert kind.names is not None
                     assert each in kind.names
-                    getattr(sim.state, records)[each] = wild
-                sim._enter()
+                    getattr(sim.world.state, records)[each] = wild
+                sim.world.rebuild_scene()
                 sense_everything(sim)
-        sim.state.restore(begin)
-        sim.state.tick_count = -(-sim.now_ns // 10_000_000)
-        sim._enter()
+        sim.world.state.restore(begin)
+        sim.world.state.tick_count = -(-sim.now_ns // 10_000_000)
+        sim.world.rebuild_scene()
         for column in range(4):
             sim.lamps[...] = lamps
             sim.lamps[:, column] = wild

@@ -81,8 +81,8 @@ def test_things_stop_a_shot(what: str) -> None:
         sim.place(3, 300, 300, 0.0)
     else:
         sim.add_ball(300, 300)
-        sim.state.bodies["is_lifted"] = what == "lifted"
-        sim._enter()
+        sim.world.state.bodies["is_lifted"] = what == "lifted"
+        sim.world.rebuild_scene()
     target, distance_mm = ask(sim, "F")
     assert target == {"wall": -1, "ball": -1, "robot without the turret": 3, "lifted": 2}[what]
     assert distance_mm == {"wall": 62, "ball": 140, "robot without the turret": 145, "lifted": 445}[what]
@@ -118,8 +118,8 @@ def test_a_match_repeats_to_the_bit() -> None:
 
 def test_energy_stands_in_the_state() -> None:
     sim = a_simulation()
-    snapshot = sim.state.snapshot()
+    snapshot = sim.world.state.snapshot()
     ask(sim, "F")
     assert sim.state_hash() != snapshot.hash()
-    sim.state.restore(snapshot)
+    sim.world.state.restore(snapshot)
     assert ask(sim, "S")[5] == 27

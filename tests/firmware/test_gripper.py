@@ -58,7 +58,7 @@ def held_by(sim: kiks.Simulation) -> int:
 def records(sim: kiks.Simulation) -> tuple[Any, Any]:
     """Robots and bodies at one instant, the end of the tick: `pose` and `bodies` may be of two."""
     sim.sync()
-    return sim.state.robots[0], sim.state.bodies[0]
+    return sim.world.state.robots[0], sim.world.state.bodies[0]
 
 
 def place_of(sim: kiks.Simulation) -> tuple[float, float]:
@@ -81,7 +81,7 @@ def deepest_overlap_mm(sim: kiks.Simulation) -> float:
     discs = [(r["x_mm"], r["y_mm"], spec.body.radius_mm) for r, spec in zip(robots, sim.specs, strict=True)]
     discs += [(b["x_mm"], b["y_mm"], b["radius_mm"]) for b in bodies[bodies["is_lifted"] == 0]]
     for k, (x, y, radius) in enumerate(discs):
-        deepest = max(deepest, -contact.clearance_of_disc(*sim.ground, x, y, radius))
+        deepest = max(deepest, -contact.clearance_of_disc(*sim.world.ground, x, y, radius))
         for other_x, other_y, other_radius in discs[:k]:
             deepest = max(deepest, radius + other_radius - math.hypot(x - other_x, y - other_y))
     return deepest
@@ -225,13 +225,13 @@ def test_a_wall_beside_the_load_stops_the_turn() -> None:
     ask(sim, "E,255")
     sim.run(0.6)
     assert sim.bodies()["is_lifted"][0] == 0
-    before = sim.state.robots["wheel_pulses"][0, 0].copy()
+    before = sim.world.state.robots["wheel_pulses"][0, 0].copy()
     kiks.Khepera(sim.port(1)).set_speed(5, -5)
     sim.run(0.8)
     free_turn = 2 * 5 * 0.08 * 80 / 53
     assert math.pi / 2 - 0.7 * free_turn < sim.pose(1)[2] < math.pi / 2 - 0.29
     assert sim.pose(1)[0] < 860.0  # it levers itself off
-    assert np.abs(sim.state.robots["wheel_pulses"][0, 0] - before).max() < 0.8 * 5 * 80
+    assert np.abs(sim.world.state.robots["wheel_pulses"][0, 0] - before).max() < 0.8 * 5 * 80
     assert deepest_overlap_mm(sim) < 0.02
     assert held_by(sim) == 1
 
@@ -393,12 +393,12 @@ def test_the_same_carry_again_to_the_bit_and_from_a_snapshot() -> None:
         return hashes
 
     sim = begin()
-    snapshot, now_ns = sim.state.snapshot(), sim.now_ns
+    snapshot, now_ns = sim.world.state.snapshot(), sim.now_ns
     first = end(sim)
     assert end(begin()) == first
-    sim.state.restore(snapshot)
-    sim._enter()
-    sim.now_ns = now_ns
+    sim.world.state.restore(snapshot)
+    sim.world.rebuild_scene()
+    sim.world.now_ns = now_ns
     assert sim.state_hash() == snapshot.hash()
     # The line has moved on with the clock, so orders are carried out at once.
     other = begin()

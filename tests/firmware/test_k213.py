@@ -292,23 +292,23 @@ def test_the_camera_is_part_of_the_state() -> None:
     sim.wires[0].firmware.execute(b"T,2,U,1", sim.now_ns)
     sim.run(0.3)
     sim.sync()
-    snapshot, now_ns = sim.state.snapshot(), sim.now_ns
+    snapshot, now_ns = sim.world.state.snapshot(), sim.now_ns
     straight_on = pictures(sim)
     assert len(set(straight_on[0])) > 20
     for detour in (None, b"T,2,U,6", b"D,-9,4", b"restart"):
-        sim.state.restore(snapshot)
-        sim.now_ns = now_ns
+        sim.world.state.restore(snapshot)
+        sim.world.now_ns = now_ns
         assert sim.state_hash() == snapshot.hash()
         assert pictures(sim) == straight_on
-        sim.state.restore(snapshot)
-        sim.now_ns = now_ns
+        sim.world.state.restore(snapshot)
+        sim.world.now_ns = now_ns
         if detour is not None:
             assert pictures(sim, first_order=detour) != straight_on
 
 
 def test_the_hash_tells_pictures_and_periods_apart() -> None:
     sim = scene((200, 480, 95, 20, 1))
-    before = sim.state.snapshot()
+    before = sim.world.state.snapshot()
     camera = sim.wires[0].firmware.turrets[2]
     assert isinstance(camera, K213)
     camera.order("U", (3,))
@@ -318,7 +318,7 @@ def test_the_hash_tells_pictures_and_periods_apart() -> None:
     camera.look(0)
     assert sim.state_hash() == before.hash()
     sim.place(1, 300, 300, 0.3)
-    turned = sim.state.snapshot()
+    turned = sim.world.state.snapshot()
     sim.place(1, 300, 300, math.pi / 2)
     assert sim.state_hash() == before.hash() != turned.hash()
 

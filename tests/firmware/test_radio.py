@@ -159,11 +159,11 @@ def test_a_message_on_its_way_stands_in_the_state() -> None:
     idle = sim.state_hash()
     send(sim, 1, 2, [5])
     assert sim.state_hash() != idle
-    snapshot, now_ns = sim.state.snapshot(), sim.now_ns
+    snapshot, now_ns = sim.world.state.snapshot(), sim.now_ns
     sim.run(0.1)
     first = read(sim, 2)
-    sim.state.restore(snapshot)
-    sim.now_ns = now_ns
+    sim.world.state.restore(snapshot)
+    sim.world.now_ns = now_ns
     assert status(sim, 2) == READY
     sim.run(0.1)
     assert read(sim, 2) == first == [1, 1, 5, *[0] * 15]

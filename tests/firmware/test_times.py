@@ -5,8 +5,7 @@ from fractions import Fraction
 import pytest
 
 from kiks.model.arena import Arena
-from kiks.ports.memory import SimPort
-from kiks.sim.simulation import Simulation
+from kiks.sim.simulation import SimPort, Simulation
 from kiks.units import character_ns
 
 PROCESSING_NS = 1_000_000

@@ -178,12 +178,12 @@ def test_what_it_remembers_stands_in_the_state() -> None:
     for robot in (1, 2):
         sim.fit(robot, Counter())
     assert execute(sim, "T,24,C,5") == "t,24,c,5"
-    snapshot = sim.state.snapshot()
+    snapshot = sim.world.state.snapshot()
     digest = sim.state_hash()
     assert execute(sim, "T,24,C,5") == "t,24,c,10"
     assert execute(sim, "T,24,C,1", 2) == "t,24,c,1"
     assert sim.state_hash() != digest
-    sim.state.restore(snapshot)
+    sim.world.state.restore(snapshot)
     assert sim.state_hash() == digest
     assert execute(sim, "T,24,C,5") == "t,24,c,10"
     execute(sim, "restart")

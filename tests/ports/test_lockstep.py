@@ -402,7 +402,7 @@ def test_client_that_dies_hinders_nobody(thinking: str, caplog: pytest.LogCaptur
             run.wait_rounds(3)
             wall.pass_s(0.1)
             assert one.lines.readline() == b"h,0,0\r\n"
-        assert run.sim.state.robots["led"][0, 1, 0] == 1
+        assert run.sim.world.state.robots["led"][0, 1, 0] == 1
         assert not said(caplog)
 
 

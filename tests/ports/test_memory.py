@@ -97,7 +97,7 @@ def test_replies_that_nobody_waits_for_any_more_are_dropped() -> None:
     port.close()
     sim.run(1.0)
     assert port.in_waiting == 0
-    assert sim.state.robots["led"][0, 0, 0] == 1
+    assert sim.world.state.robots["led"][0, 0, 0] == 1
     port.write(b"B\n")
     assert port.readline() == b"b,5.02,5.01\r\n"
 

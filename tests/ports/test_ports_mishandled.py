@@ -113,7 +113,7 @@ def test_a_page_in_a_browser_drives_no_robot(
                 while browser.recv(100):
                     pass
             run.wait_free()
-        robot = run.sim.state.robots[0, 0]
+        robot = run.sim.world.state.robots[0, 0]
         assert robot["speed_setpoint"].tolist() == [0, 0]
         assert not run.sim.wires[0].pending
         if kind is TcpEndpoint and thinking == "none":
@@ -199,7 +199,7 @@ def test_a_flood_is_carried_whole_although_another_client_knocks() -> None:
         run.wait_for(lambda: run.sim.wires[0].line.sending_until_ns > BACKLOG_LIMIT * NS_PER_S // 1000)
         with connect(endpoint) as other:
             assert other.recv(1) == b""
-        while run.sim.state.robots[0, 0]["speed_setpoint"].tolist() != [3, 4]:
+        while run.sim.world.state.robots[0, 0]["speed_setpoint"].tolist() != [3, 4]:
             wall.pass_ns(NS_PER_S)
             run.wait_rounds(2)
             assert run.sim.now_ns < 2 * 6 * count * NS_PER_S // 960
@@ -213,7 +213,7 @@ def test_a_few_commands_left_behind_all_act() -> None:
             run.wait_for(lambda: len(run.sim.wires[0].pending) == 101)
         run.wait_free()
         wall.pass_ns(2 * NS_PER_S)
-        run.wait_for(lambda: run.sim.state.robots[0, 0]["speed_setpoint"].tolist() == [3, 4])
+        run.wait_for(lambda: run.sim.world.state.robots[0, 0]["speed_setpoint"].tolist() == [3, 4])
 
 
 def test_lockstep_tells_how_long_the_next_one_waits(caplog: pytest.LogCaptureFixture) -> None:

@@ -117,7 +117,7 @@ def printed(handle: Handle) -> list[str]:
 
 
 def wheels(sim: Simulation, robot: int = 1) -> list[int]:
-    return sim.state.robots["speed_setpoint"][0, robot - 1].tolist()
+    return sim.world.state.robots["speed_setpoint"][0, robot - 1].tolist()
 
 
 def test_programs_that_begin_together_do_what_they_do_under_kiks_run() -> None:

@@ -18,8 +18,7 @@ from kiks.model.arena import AnArena, Arena
 from kiks.model.checks import HEADING_KEPT_RAD, check_count, check_numbers, wrapped
 from kiks.model.data_file import OneOf
 from kiks.model.robot import RobotSpec
-from kiks.sim.simulation import Simulation
-from kiks.sim.world import check_kinds
+from kiks.sim.simulation import Simulation, check_kinds
 
 ARENAS_LIMIT = 10_000
 """Most arenas that worlds share."""
@@ -87,7 +86,7 @@ class Beginning:
         self.networks = networks_for(*dict.fromkeys(spec.proximity.response for spec in self.specs))
         self.arena_indices = np.arange(worlds) % len(self.arenas)
         self._models = [Simulation(each, robot=list(named[0])) for each in self.arenas]
-        body_counts = {model.state.bodies.shape[1] for model in self._models}
+        body_counts = {model.world.state.bodies.shape[1] for model in self._models}
         if len(body_counts) > 1:
             raise ParameterError(
                 f"the arenas of one batch must hold the same number of balls and cylinders, but they hold "
@@ -160,7 +159,7 @@ class Beginning:
         if starts is None:
             poses = np.zeros(shape)
             for k, world in enumerate(chosen):
-                poses[k] = self._models[self.arena_indices[world]].start_poses(int(seeds[k]))
+                poses[k] = self._models[self.arena_indices[world]].world.free_space.start_poses(int(seeds[k]))
             return poses
         given = check_numbers("starts", starts)
         try:
@@ -171,7 +170,7 @@ class Beginning:
                 f"{given.shape}."
             ) from None
         for k, world in enumerate(chosen):
-            self._models[self.arena_indices[world]].check_start_poses(poses[k], f"of world {world}")
+            self._models[self.arena_indices[world]].world.free_space.check_start_poses(poses[k], f"of world {world}")
         return poses
 
     def put_back(self, state: State, worlds: NDArray[np.int64], starts: NDArray[np.float64]) -> None:
@@ -184,8 +183,8 @@ class Beginning:
         """
         for index, model in enumerate(self._models):
             here = worlds[self.arena_indices[worlds] == index]
-            state.robots[here] = model.state.robots[0]
-            state.bodies[here] = model.state.bodies[0]
+            state.robots[here] = model.world.state.robots[0]
+            state.bodies[here] = model.world.state.bodies[0]
         robots: Any = state.robots[worlds]
         robots["kind"] = self._kind_numbers[np.minimum(worlds, len(self._kind_numbers) - 1)]
         if (np.abs(starts[:, :, 2]) > HEADING_KEPT_RAD).any():

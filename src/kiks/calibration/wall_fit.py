@@ -26,7 +26,6 @@ from kiks.calibration.measurements import Array, CalibrationError, Run
 from kiks.model.arena import Arena
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
 from kiks.sim.simulation import Simulation
-from kiks.sim.snapshot import proximity_from
 
 NOISE_COUNTS, NOISE_SHARE = 8.0, 0.05
 """What a reading is taken to be uncertain by: so many counts and that share of it."""
@@ -102,7 +101,7 @@ class Stand:
         poses = np.full((np.count_nonzero(in_sight), 3), middle_mm)
         poses[:, 0] = wall_mm - np.maximum(gaps_mm[in_sight], GAP_MIN_MM)
         poses[:, 2] = headings_rad[in_sight]
-        expected[in_sight] = proximity_from(sim, 1, poses)
+        expected[in_sight] = sim.proximity_at(1, poses)
         return expected
 
 

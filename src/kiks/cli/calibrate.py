@@ -111,7 +111,7 @@ def _ask_gap(question: str, default_mm: float) -> float:
 def hand_of(robot: Khepera) -> Placements | None:
     """Return what can move the robot: nothing but a person, unless it is simulated in this very process."""
     from kiks.calibration.placements import SimPlacements
-    from kiks.ports.memory import SimPort
+    from kiks.sim.simulation import SimPort
 
     port = robot.port
     return SimPlacements(port.sim, port.robot) if isinstance(port, SimPort) else None

@@ -41,7 +41,6 @@ def compile_everything() -> None:
     from kiks.client.khepera import Khepera
     from kiks.model.arena import Arena
     from kiks.sim.simulation import Simulation
-    from kiks.sim.snapshot import proximity_from
 
     sim = Simulation(Arena.box(200, 200))
     robot = Khepera(sim.port(1))
@@ -54,7 +53,7 @@ def compile_everything() -> None:
     robot.ambient()
     sim.proximity(1)
     sim.ambient(1)
-    proximity_from(sim, 1, sim.poses())
+    sim.proximity_at(1, sim.poses())
     sim.look()
     sim.explain(1, 0)
     sim.explain_light(1, 0)

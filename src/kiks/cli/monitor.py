@@ -76,7 +76,7 @@ def _pacer(robot: object) -> Callable[[], None]:
 
     from kiks.client.khepera import Khepera
     from kiks.clock.pace import Pace
-    from kiks.ports.memory import SimPort
+    from kiks.sim.simulation import SimPort
 
     port = robot.port if isinstance(robot, Khepera) else None
     if not isinstance(port, SimPort):

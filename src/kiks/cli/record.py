@@ -72,7 +72,7 @@ def recorded(sim: Simulation, picture: Path | None, csv: Path | None) -> Iterato
         if csv is not None:
             file = GrowingFile(csv, "--csv")
             at_the_end.callback(file.close)
-            rows = _Rows(file, sim.state)
+            rows = _Rows(file, sim.world.state)
             sim.watchers.append(rows)
             at_the_end.callback(sim.watchers.remove, rows)
             # The last ticks may not have been asked for yet.

@@ -10,7 +10,7 @@ from kiks.client.port import TIMEOUT_S, Port, open_port
 from kiks.errors import LinkError, ParameterError, shown
 from kiks.firmware.receiver import LINE_LIMIT
 from kiks.model.checks import SECONDS_MAX, check_count, check_kind, check_number
-from kiks.ports.port import VirtualPort
+from kiks.sim.port import VirtualPort
 
 ARRIVAL_MAX_S = 600.0
 """Longest time that wheels are waited for [s]: at the usual speed a robot drives a hundred metres in it."""

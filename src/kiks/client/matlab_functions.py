@@ -13,7 +13,7 @@ from typing import Any
 from kiks.client.port import Port, open_port
 from kiks.errors import LinkError, ParameterError, shown
 from kiks.model.checks import SECONDS_MAX, check_kind, check_number, check_numbers
-from kiks.ports.port import VirtualPort
+from kiks.sim.port import VirtualPort
 
 
 class Reference(tuple[float, ...]):

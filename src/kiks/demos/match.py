@@ -140,9 +140,9 @@ class Match(Simulation):
     def _look(self) -> None:
         """See where everything is, and do what a referee does."""
         self.sync()
-        ball = self.state.bodies[0, 0]
+        ball = self.world.state.bodies[0, 0]
         x_mm, y_mm, radius_mm = float(ball["x_mm"]), float(ball["y_mm"]), float(ball["radius_mm"])
-        robots = self.state.robots[0]
+        robots = self.world.state.robots[0]
         places = [float(robots[axis][index]) for index in (0, 1) for axis in ("x_mm", "y_mm")]
         self.report.trail.append((*places, x_mm, y_mm))
         side = scorer(x_mm, radius_mm)

@@ -34,7 +34,6 @@ def default(samples: Samples, response: str | None = None) -> Floats:
     """
     from kiks.model.arena import Arena
     from kiks.sim.simulation import Simulation
-    from kiks.sim.snapshot import proximity_from
 
     side_mm = 2 * (BODY_RADIUS_MM + float(samples.gap_mm.max()) + _ROOM_MM)
     cells = math.ceil(side_mm / _CELL_MM)
@@ -50,7 +49,7 @@ def default(samples: Samples, response: str | None = None) -> Floats:
     poses[..., 0] = centre_mm - BODY_RADIUS_MM - samples.gap_mm[:, None]
     poses[..., 1] = centre_mm
     poses[..., 2] = np.radians(samples.angle_deg)
-    return proximity_from(sim, 1, poses.reshape(-1, 3)).reshape(samples.counts.shape)
+    return sim.proximity_at(1, poses.reshape(-1, 3)).reshape(samples.counts.shape)
 
 
 def thesis(samples: Samples, response: NetworkResponse | None = None) -> Floats:

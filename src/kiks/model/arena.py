@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import InstanceOf
 
+from kiks import upwards
 from kiks.errors import ArenaError, ParameterError, counted, shown
 from kiks.model.arena_objects import Ball, Cylinder, Lamp, Pose, checked_places
 from kiks.model.atomic_files import path_of
@@ -116,9 +117,8 @@ class Arena:
 
     def _repr_png_(self) -> tuple[bytes, dict[str, int]]:
         """Return a picture, which notebooks show."""
-        from kiks.drawing import draw_arena, png_for_notebook
-
-        return png_for_notebook(draw_arena(self))
+        picture: tuple[bytes, dict[str, int]] = upwards.draw_arena(self)
+        return picture
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Through the constructor: a plain pickle would bring the raster back writable and carry the caches along.
@@ -181,21 +181,8 @@ class Arena:
         Raises:
             ArenaError: If the file is missing, damaged or no arena.
         """
-        path = path_of(path)
-        match path.suffix.lower():
-            case ".toml":
-                from kiks.model.arena_file import load_arena
-
-                return load_arena(path)
-            case ".kiks":
-                from kiks.model.project import Project
-
-                return Project.load(path).arena
-            case ".kad":
-                from kiks.model.kad import load_kad
-
-                return load_kad(path)
-        return cls.from_image(path)
+        arena: Arena = upwards.load_arena_file(path_of(path))
+        return arena
 
     @classmethod
     def default(cls) -> Arena:

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from kiks.errors import LinkError
-from kiks.ports.memory import NearLine
 from kiks.ports.messages import Answer, Kind, Request
 from kiks.ports.programs import Programs
 from kiks.ports.remote_link import Connection, FarLine
+from kiks.sim.local_line import LocalLine
 from kiks.sim.simulation import Simulation
 from kiks.units import NS_PER_S
 
@@ -174,7 +174,7 @@ class VisitorLine(FarLine):
         self.lock = sim.lock
         self._sim = sim
         self._way = connection
-        self._near = NearLine(sim, robot)
+        self._near = LocalLine(sim.loop, robot)
 
     def think(self, time_ns: int) -> None:
         """Let the time pass that the program has thought [ns]."""

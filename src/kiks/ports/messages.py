@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from enum import IntEnum
 from typing import NamedTuple
 
-from kiks.ports.read_completion import Read
+from kiks.sim.read_completion import Read
 
 RECEIVE_SIZE = 1 << 16
 """Most bytes taken from the connection at once."""

@@ -9,11 +9,11 @@ from collections import deque
 
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import KiksError
-from kiks.ports.memory import claim
 from kiks.ports.messages import ASKING, RECEIVE_SIZE, Answer, Kind, Request, take_request, unpack_reads
 from kiks.ports.port_names import PortNames
 from kiks.ports.program_scheduler import Participant, ProgramScheduler
-from kiks.ports.read_completion import NEVER_NS, end_of_read, end_of_wait, is_complete, never_ends
+from kiks.sim.local_line import claim
+from kiks.sim.read_completion import NEVER_NS, end_of_read, end_of_wait, is_complete, never_ends
 from kiks.sim.simulation import Simulation
 
 _log = logging.getLogger("kiks.run")

@@ -33,7 +33,7 @@ from collections.abc import Callable
 
 from kiks.clock.patience import Patience
 from kiks.errors import ParameterError, nearest, shown
-from kiks.ports.read_completion import NEVER_NS
+from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.simulation import Simulation
 
 START_WORD_S = 1.0

@@ -18,7 +18,7 @@ from typing import Any
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import LinkError
 from kiks.ports.messages import RECEIVE_SIZE, WINDOW, Answer, Kind, Request, pack_reads, take_answer
-from kiks.ports.read_completion import NEVER_NS, Read
+from kiks.sim.read_completion import NEVER_NS, Read
 from kiks.units import TICK_NS
 
 TELL_NS = TICK_NS

@@ -16,8 +16,8 @@ from kiks.errors import ParameterError, shown
 from kiks.ports.endpoint import Endpoint
 from kiks.ports.live import Link, Live, TimePolicy
 from kiks.ports.lockstep import Lockstep
-from kiks.ports.port import BAUD_MAX, BAUD_MIN
 from kiks.ports.program_scheduler import PATIENCE_S
+from kiks.sim.port import BAUD_MAX, BAUD_MIN
 from kiks.sim.simulation import Simulation
 
 _log = logging.getLogger("kiks.serve")

@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl, urlsplit
 
 from kiks.errors import LinkError, ParameterError, nearest, shown
-from kiks.sim.registry import REGISTRY
+from kiks.sim.simulation import REGISTRY
 
 if TYPE_CHECKING:
-    from kiks.ports.memory import SimPort
-    from kiks.sim.simulation import Simulation
+    from kiks.sim.simulation import SimPort, Simulation
 
 _OPTIONS = ("arena", "robots", "robot", "seed", "thinking")
 
@@ -29,8 +28,7 @@ def find_port(url: str) -> SimPort:
         ParameterError: If an option is unknown or out of range.
         ArenaError: If the arena cannot be read.
     """
-    from kiks.ports.memory import SimPort
-    from kiks.sim.simulation import Simulation
+    from kiks.sim.simulation import SimPort, Simulation
 
     parts = urlsplit(url)
     path = parts.path.strip("/")

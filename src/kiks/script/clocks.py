@@ -9,8 +9,8 @@ from collections.abc import Callable
 from typing import Any
 
 from kiks.clock.program_clock import EPOCH_S
-from kiks.ports.port import VirtualPort
 from kiks.script.thread_scheduler import Scheduler
+from kiks.sim.port import VirtualPort
 from kiks.units import NS_PER_S
 
 CALENDARS = frozenset(getattr(time, name) for name in ("CLOCK_REALTIME", "CLOCK_TAI") if hasattr(time, name))

@@ -13,9 +13,9 @@ import selectors
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from kiks.ports.read_completion import NEVER_NS, Read
 from kiks.script.shared_line import SharedLine
 from kiks.script.thread_scheduler import Scheduler, timeout_ns
+from kiks.sim.read_completion import NEVER_NS, Read
 
 BLOCK_MS = 50
 """How long a wait in real time lasts before signals are looked at [ms]."""

@@ -14,8 +14,8 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from kiks.ports.read_completion import NEVER_NS
 from kiks.script.thread_scheduler import SIGNALLED, Scheduler, Task, timeout_ns
+from kiks.sim.read_completion import NEVER_NS
 
 REAL_LOCK = _thread.allocate_lock
 REAL_SLEEP = time.sleep

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 from kiks.clock.program_clock import ProgramClock
 from kiks.errors import KiksError
-from kiks.ports.port import Line, VirtualPort
 from kiks.script import clocks, event_loops, libraries, locks, serial_ports, unsupported
 from kiks.script.file_waits import OpenPorts, RealFiles
 from kiks.script.patching import replaced
@@ -20,6 +19,7 @@ from kiks.script.shared_line import SharedLine
 from kiks.script.signals import Signals
 from kiks.script.thread_scheduler import EndedError, Scheduler
 from kiks.script.watchdog import watched
+from kiks.sim.port import Line, VirtualPort
 
 if TYPE_CHECKING:
     from kiks.sim.simulation import Simulation
@@ -39,9 +39,9 @@ def run_here(sim: Simulation, program: Path, arguments: list[str], told: dict[st
     Raises:
         ParameterError: If `told` names a robot that is not there.
     """
-    from kiks.ports.memory import NearLine
     from kiks.ports.port_names import PortNames
     from kiks.ports.url import find_port
+    from kiks.sim.local_line import LocalLine
 
     names = PortNames(sim, told)
 
@@ -51,7 +51,7 @@ def run_here(sim: Simulation, program: Path, arguments: list[str], told: dict[st
         port = find_port(name)
         return port.robot if port.sim is sim else port
 
-    return run_program(program, arguments, lambda robot: NearLine(sim, robot), find, sim.program, names.offered())
+    return run_program(program, arguments, lambda robot: LocalLine(sim.loop, robot), find, sim.program, names.offered())
 
 
 def run_program(

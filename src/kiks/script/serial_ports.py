@@ -10,9 +10,9 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from kiks.ports import url as urls
-from kiks.ports.port import VirtualPort
 from kiks.script.file_waits import OpenPorts
 from kiks.script.shared_line import SharedLine
+from kiks.sim.port import VirtualPort
 
 USB_ADAPTER = (0x0403, 0x6001)
 """Vendor and product of the most common adapter from USB to a serial line, FTDI's FT232: programs look for it."""

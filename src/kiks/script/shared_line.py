@@ -7,9 +7,9 @@ from typing import Any
 
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import LinkError
-from kiks.ports.port import Line
-from kiks.ports.read_completion import NEVER_NS, Read
 from kiks.script.thread_scheduler import ALONE, COMPLETE, SIGNALLED, Scheduler, Task
+from kiks.sim.port import Line
+from kiks.sim.read_completion import NEVER_NS, Read
 
 
 class SharedLine:

@@ -13,8 +13,8 @@ from types import FrameType
 from typing import Any
 
 import kiks
-from kiks.ports.read_completion import NEVER_NS
 from kiks.script.thread_scheduler import SIGNALLED, Scheduler, timeout_ns
+from kiks.sim.read_completion import NEVER_NS
 from kiks.units import s_from_ns
 
 EXIT_OF_SIGNAL = 128

@@ -24,8 +24,8 @@ import greenlet
 
 from kiks.clock.program_clock import PollCost, ProgramClock
 from kiks.model.checks import SECONDS_MAX
-from kiks.ports.port import Line
-from kiks.ports.read_completion import NEVER_NS, Read
+from kiks.sim.port import Line
+from kiks.sim.read_completion import NEVER_NS, Read
 from kiks.units import wait_ns
 
 TASK_IDENT = 1 << 20

@@ -1,30 +1,27 @@
-"""The cameras of a simulation: which robots carry one, when each takes its pictures, and what they show."""
+"""The cameras of a world: which robots carry one, when each takes its pictures, and what they show."""
 
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kiks.engine.sensing import camera
 from kiks.engine.state import PIXEL_COUNT
 from kiks.firmware.k213 import K213, Picture
+from kiks.sim.world import World
 from kiks.units import TICK_NS
-
-if TYPE_CHECKING:
-    from kiks.sim.simulation import Simulation
 
 
 class Cameras:
     """K213 turrets on robots.
 
     Pictures are taken when the time is a multiple of a camera's reading period. All periods are whole ticks, so the
-    engine stops there, on a tick's boundary, however seldom or often somebody looks.
+    engine stops there, on a tick's boundary, however often the state is read.
     """
 
-    def __init__(self, sim: Simulation) -> None:
-        self._sim = sim
+    def __init__(self, world: World) -> None:
+        self._world = world
         self._fitted: dict[int, K213] = {}
         self._pixels = np.zeros(PIXEL_COUNT, np.float64)
 
@@ -33,54 +30,54 @@ class Cameras:
 
     def camera(self, index: int) -> K213:
         """Return a new camera for a robot."""
-        return K213(partial(self._take, index), self._sim.state.robots[0, index])
+        return K213(partial(self._take, index), self._world.state.robots[0, index])
 
     def fit(self, index: int, camera: K213) -> None:
         """Let a robot's camera take its pictures from now on, and the first at once."""
         self._fitted[index] = camera
-        camera.look(self._sim.now_ns)
+        camera.look(self._world.now_ns)
 
-    def take(self) -> None:
-        """Take the arrays of the state, which were replaced."""
+    def take_state(self) -> None:
+        """Use the arrays of the state after they were replaced."""
         for index, fitted in self._fitted.items():
-            fitted.record = self._sim.state.robots[0, index]
+            fitted.record = self._world.state.robots[0, index]
 
     def sync(self) -> None:
-        """Let each camera take the last of its pictures that is due; the earlier ones nobody can ask for.
+        """Let each camera take the last of its pictures that is due; a program cannot ask for earlier ones.
 
-        An instant that the engine has passed came with a change of the period: no picture is taken of the past.
+        After a change of the period the engine may have passed an instant already: no picture is taken of the past.
         """
-        sim = self._sim
-        instants = [(sim.now_ns // each.period_ns * each.period_ns, index) for index, each in self._fitted.items()]
+        world = self._world
+        instants = [(world.now_ns // each.period_ns * each.period_ns, index) for index, each in self._fitted.items()]
         for instant_ns, index in sorted(instants):
             fitted = self._fitted[index]
-            if instant_ns > fitted.taken_ns and instant_ns >= sim.state.tick_count * TICK_NS:
-                sim.tick_to(instant_ns)
+            if instant_ns > fitted.taken_ns and instant_ns >= world.state.tick_count * TICK_NS:
+                world.tick_to(instant_ns)
                 fitted.look(instant_ns)
 
-    def look_again(self) -> None:
-        """Take those pictures again that were taken at this very instant: something was put elsewhere since."""
+    def retake(self) -> None:
+        """Take those pictures again that were taken at this very instant, before something was moved."""
         for fitted in self._fitted.values():
-            if fitted.taken_ns == self._sim.now_ns:
+            if fitted.taken_ns == self._world.now_ns:
                 fitted.look(fitted.taken_ns)
 
     def expect(self, index: int) -> list[float]:
         """Return what a camera would see now, without noise or rounding."""
-        self._kernel(index, self._sim.now_ns, is_noisy=False)
+        self._kernel(index, self._world.now_ns, is_noisy=False)
         return [float(grey) for grey in self._pixels]
 
     def _take(self, index: int, time_ns: int) -> Picture:
-        light = self._kernel(index, time_ns, is_noisy=self._sim.specs[index].is_noisy)
+        light = self._kernel(index, time_ns, is_noisy=self._world.specs[index].is_noisy)
         return np.clip(np.rint(self._pixels), 0, 255).astype(np.int64).tolist(), light
 
     def _kernel(self, index: int, time_ns: int, *, is_noisy: bool) -> int:
-        sim = self._sim
+        world = self._world
         light: int = camera.take_image(
-            sim.scene,
-            sim.sight,
-            sim.state.tick_count,
+            world.scene,
+            world.sight,
+            world.state.tick_count,
             time_ns,
-            sim.seed,
+            world.seed,
             index,
             is_noisy,
             self._pixels,

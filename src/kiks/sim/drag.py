@@ -156,7 +156,7 @@ class Drags:
         return {"robot": self._sim.robot_count, "body": len(self._bodies()), "lamp": len(self._sim.lamps)}
 
     def _bodies(self) -> Any:
-        return self._sim.state.bodies[0]
+        return self._sim.world.state.bodies[0]
 
     def _found(self, what: str, index: int) -> Held:
         """Return a thing as it lies there."""
@@ -188,7 +188,9 @@ class Drags:
 
     def _freedom(self, held: Held) -> Callable[[float, float], bool]:
         self._sim.sync()
-        return self._sim.freedom(held.index if held.what == "robot" else self._sim.robot_count + held.index)
+        return self._sim.world.free_space.may_lie(
+            held.index if held.what == "robot" else self._sim.robot_count + held.index
+        )
 
     def _put(self, held: Held) -> None:
         """Put a thing where its hand is; where others press upon it, it stays as it lies until they let it go."""

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kiks.engine.parameters import RAY_COUNT
 from kiks.engine.sensing import explain
@@ -15,9 +14,7 @@ from kiks.engine.sensing.observe import NOTHING
 from kiks.model.checks import check_count
 from kiks.model.robot import SENSOR_COUNT
 from kiks.sim.snapshot import name_of
-
-if TYPE_CHECKING:
-    from kiks.sim.simulation import Simulation
+from kiks.sim.world import World
 
 SENSOR_NAMES = ("left 90", "left 45", "left 10", "right 10", "right 45", "right 90", "back right", "back left")
 """What sensors are called, by their index in the answers to N and O (khepera-protocol.md 7.4)."""
@@ -208,32 +205,31 @@ class LightExplanation:
         return "\n".join(lines)
 
 
-def explain_proximity(sim: Simulation, networks: NDArray[np.void], robot: int, sensor: int) -> Explanation:
-    """Return why N returns what it returns for a sensor of a simulation that is locked and whose ticks are done.
+def explain_proximity(world: World, robot: int, sensor: int) -> Explanation:
+    """Return why N returns what it returns for a sensor in a world whose ticks are done.
 
     Args:
-        sim: The simulation.
-        networks: What its robots' responses need besides rays.
+        world: The world.
         robot: Number of the robot, from 1.
         sensor: Index of the sensor, from 0.
 
     Raises:
         ParameterError: If there is no such robot or sensor.
     """
-    index = sim.index_of(robot)
+    index = world.index_of(robot)
     _check_sensor(sensor)
     rays, met, without = np.empty((3, RAY_COUNT)), np.empty(RAY_COUNT, np.int64), np.empty(RAY_COUNT)
     sampled_ns, expected, scattered, jitter, count = explain.explain_proximity(
-        *(sim.scene, sim.sight, networks, sim.state.tick_count, sim.now_ns, sim.seed, index, sensor),
+        *(world.scene, world.sight, world.networks, world.state.tick_count, world.now_ns, world.seed, index, sensor),
         *(rays, met, without),
     )
-    parameters = _parameters(sim, index)
+    parameters = _parameters(world, index)
     angles_deg = np.degrees(np.arctan2(parameters["ray_sin"][sensor], parameters["ray_cos"][sensor])).tolist()
     seen = tuple(
         SeenRay(
             angle_deg=angles_deg[ray],
             length_mm=math.inf if met[ray] == NOTHING else float(rays[0, ray]),
-            met="nothing" if met[ray] == NOTHING else name_of(sim, int(met[ray])),
+            met="nothing" if met[ray] == NOTHING else name_of(world, int(met[ray])),
             brightness=int(rays[2, ray]),
             incidence_deg=math.nan if met[ray] == NOTHING else math.degrees(math.acos(min(rays[1, ray], 1.0))),
             contribution_counts=expected - float(without[ray]),
@@ -245,10 +241,10 @@ def explain_proximity(sim: Simulation, networks: NDArray[np.void], robot: int, s
         robot=robot,
         sensor=sensor,
         name=SENSOR_NAMES[sensor],
-        age_ms=(sim.now_ns - sampled_ns) / 1e6,
+        age_ms=(world.now_ns - sampled_ns) / 1e6,
         reach_mm=float(parameters["reach_mm"]),
         rays=seen,
-        response=sim.specs[index].proximity.response,
+        response=world.specs[index].proximity.response,
         gain=float(parameters["gain"][sensor]),
         baseline_counts=baseline,
         response_counts=expected - baseline,
@@ -260,36 +256,36 @@ def explain_proximity(sim: Simulation, networks: NDArray[np.void], robot: int, s
     )
 
 
-def explain_ambient(sim: Simulation, robot: int, sensor: int) -> LightExplanation:
-    """Return why O returns what it returns for a sensor of a simulation that is locked and whose ticks are done.
+def explain_ambient(world: World, robot: int, sensor: int) -> LightExplanation:
+    """Return why O returns what it returns for a sensor in a world whose ticks are done.
 
     Raises:
         ParameterError: If there is no such robot or sensor.
     """
-    index = sim.index_of(robot)
+    index = world.index_of(robot)
     _check_sensor(sensor)
-    facts, why = np.empty((len(sim.lamps), 3)), np.empty((len(sim.lamps), 2), np.int64)
+    facts, why = np.empty((len(world.lamps), 3)), np.empty((len(world.lamps), 2), np.int64)
     sampled_ns, expected, noise, count, unlit = explain.explain_ambient(
-        *(sim.scene, sim.sight, sim.lamps, sim.state.tick_count, sim.now_ns, sim.seed, index, sensor),
+        *(world.scene, world.sight, world.lamps, world.state.tick_count, world.now_ns, world.seed, index, sensor),
         *(facts, why),
     )
-    parameters = _parameters(sim, index)
+    parameters = _parameters(world, index)
     lamps = tuple(
         SeenLamp(
             lamp=row + 1,
             distance_mm=float(facts[row, 0]),
             angle_deg=math.degrees(math.acos(max(min(facts[row, 1], 1.0), -1.0))),
-            power_w=float(sim.lamps[row, 2]),
-            state=_state_of(sim, int(why[row, 0]), int(why[row, 1])),
+            power_w=float(world.lamps[row, 2]),
+            state=_state_of(world, int(why[row, 0]), int(why[row, 1])),
             contribution_counts=float(facts[row, 2]) - expected,
         )
-        for row in range(len(sim.lamps))
+        for row in range(len(world.lamps))
     )
     return LightExplanation(
         robot=robot,
         sensor=sensor,
         name=SENSOR_NAMES[sensor],
-        age_ms=(sim.now_ns - sampled_ns) / 1e6,
+        age_ms=(world.now_ns - sampled_ns) / 1e6,
         lamps=lamps,
         unlit_counts=unlit,
         expected_counts=expected,
@@ -300,17 +296,17 @@ def explain_ambient(sim: Simulation, robot: int, sensor: int) -> LightExplanatio
     )
 
 
-def _parameters(sim: Simulation, index: int) -> Any:
-    return sim.scene[2][int(sim.state.robots["kind"][0, index])]
+def _parameters(world: World, index: int) -> Any:
+    return world.scene[2][int(world.state.robots["kind"][0, index])]
 
 
 def _check_sensor(sensor: int) -> None:
     check_count("sensor", sensor, 0, SENSOR_COUNT - 1, "0 looks to the left, 2 and 3 ahead, 6 and 7 back.")
 
 
-def _state_of(sim: Simulation, how: int, hider: int) -> str:
+def _state_of(world: World, how: int, hider: int) -> str:
     if how == explain.HIDDEN:
-        return f"hidden by {name_of(sim, hider)}"
+        return f"hidden by {name_of(world, hider)}"
     return {
         explain.SHINING: "seen",
         explain.OFF: "off",

@@ -1,4 +1,4 @@
-"""Where there is room in a world: what is in the way of a robot or body, and where robots start."""
+"""Free space in a world: what is in the way of a robot or body, and where robots start."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from kiks.engine.numbers import uniform
 from kiks.engine.physics import contact
 from kiks.engine.state import BALL, State
 from kiks.errors import ArenaError, ParameterError, shown
-from kiks.model.arena import Arena
+from kiks.model.arena import PAD, Arena
 from kiks.model.checks import check_number
 from kiks.model.free_disc import OVERLAP_MM
 from kiks.model.robot import RobotSpec
@@ -28,25 +28,27 @@ PRESSED_MM = 0.5
 others, and none is ever deeper than this."""
 
 
-class Floor:
-    """The floor of a world: who stands where on it, and where there is room.
+class FreeSpace:
+    """Tells what is in the way of a robot or body in an arena, and where robots may start.
+
+    Args:
+        arena: The walls.
+        specs: What each robot is.
+        state: Where everything is.
 
     Attributes:
-        arena: The walls.
-        ground: What the engine asks for the way to the nearest wall.
-        specs: What each robot is.
-        state: Where everybody is.
+        ground: What the engine needs to find the distance to the nearest wall.
     """
 
-    arena: Arena
-    ground: tuple[NDArray[np.float32], float, int]
-    specs: list[RobotSpec]
-    state: State
+    def __init__(self, arena: Arena, specs: list[RobotSpec], state: State) -> None:
+        self.arena = arena
+        self.ground = (arena.clearance, float(arena.mm_per_cell), PAD)
+        self._specs = specs
+        self._state = state
 
     @property
-    def robot_count(self) -> int:
-        """How many robots there are."""
-        return len(self.specs)
+    def _robot_count(self) -> int:
+        return len(self._specs)
 
     def start_poses(self, seed: int) -> NDArray[np.float64]:
         """Return where robots start in this arena with a seed, float64 [robot, 3]: x_mm, y_mm, heading_rad.
@@ -54,31 +56,31 @@ class Floor:
         Raises:
             ArenaError: If there is no free place for one.
         """
-        poses = np.zeros((self.robot_count, 3))
-        # Robots that have no place yet are nowhere.
+        poses = np.zeros((self._robot_count, 3))
+        # A robot without a place yet blocks nothing.
         bodies = [(body.x_mm, body.y_mm, body.radius_mm) for body in self.arena.bodies]
-        discs = np.array([(0.0, 0.0, -math.inf)] * self.robot_count + bodies).reshape(-1, 3)
-        for index, spec in enumerate(self.specs):
+        discs = np.array([(0.0, 0.0, -math.inf)] * self._robot_count + bodies).reshape(-1, 3)
+        for index, spec in enumerate(self._specs):
             poses[index] = self._start(index, seed, discs)
             discs[index] = *poses[index, :2], spec.body.radius_mm
         return poses
 
     def check_start_poses(self, poses: NDArray[np.float64], whose: str) -> None:
-        """Raise a ParameterError unless robots could stand at poses, float64 [robot, 3], bodies being where they are.
+        """Check that robots could stand at these poses while bodies are where they are.
 
         Args:
-            poses: The poses.
-            whose: Whose they are, for the message.
+            poses: x_mm, y_mm, heading_rad, float64 [robot, 3].
+            whose: Whose poses they are, for the message.
 
         Raises:
             ParameterError: If a number is not finite, or something is in the way.
         """
-        discs = self._discs()
-        discs[: self.robot_count, :2] = poses[:, :2]
+        discs = self.discs()
+        discs[: self._robot_count, :2] = poses[:, :2]
         for index, (x_mm, y_mm, heading_rad) in enumerate(poses.tolist()):
             for name, value in zip(("x_mm", "y_mm", "heading_rad"), (x_mm, y_mm, heading_rad), strict=True):
                 check_number(name, value)
-            obstacle = self._obstacle(x_mm, y_mm, self.specs[index].body.radius_mm, discs, index, PRESSED_MM)
+            obstacle = self.obstacle(x_mm, y_mm, self._specs[index].body.radius_mm, discs, index, PRESSED_MM)
             if obstacle is not None:
                 raise ParameterError(
                     f"the start of robot {index + 1} {whose} must be free, but at ({x_mm:g}, {y_mm:g}) mm "
@@ -91,25 +93,25 @@ class Floor:
         Raises:
             ArenaError: If there is no free place for it.
         """
-        radius_mm = self.specs[index].body.radius_mm
+        radius_mm = self._specs[index].body.radius_mm
         if index == 0 and not self.arena.starts:
             widest = self.arena.find_start(radius_mm)
-            if self._obstacle(widest.x_mm, widest.y_mm, radius_mm, others) is None:
+            if self.obstacle(widest.x_mm, widest.y_mm, radius_mm, others) is None:
                 return widest
         if index < len(self.arena.starts):
             start = self.arena.starts[index]
-            # Whatever else the arena puts there says so itself.
-            robots = others[: self.robot_count]
-            obstacle = self._obstacle(start.x_mm, start.y_mm, radius_mm, robots, overlap_mm=PRESSED_MM)
+            # Bodies that overlap it are reported when they are added.
+            robots = others[: self._robot_count]
+            obstacle = self.obstacle(start.x_mm, start.y_mm, radius_mm, robots, overlap_mm=PRESSED_MM)
             if obstacle is not None:
                 raise ArenaError(
                     f"Arena {shown(self.arena.name)}: start {index + 1} at ({start.x_mm:g}, {start.y_mm:g}) mm must be "
                     f"free, but {self._is_inside(obstacle)}. Move it."
                 )
             return start
-        return self._random_place(index, seed, radius_mm, others, self.robot_count)
+        return self.random_place(index, seed, radius_mm, others, self._robot_count)
 
-    def _random_place(
+    def random_place(
         self, index: int, seed: int, radius_mm: float, others: NDArray[np.float64], count: int
     ) -> tuple[float, float, float]:
         """Return a random free place for one of some robots.
@@ -120,18 +122,18 @@ class Floor:
         for attempt in range(ATTEMPTS):
             x, y, turn = (uniform(seed, 0, index, STREAM_PLACE, attempt, axis) for axis in range(3))
             x, y = x * self.arena.width_mm, y * self.arena.height_mm
-            if self._obstacle(x, y, radius_mm, others) is None:
+            if self.obstacle(x, y, radius_mm, others) is None:
                 return x, y, 2 * math.pi * turn
         raise ArenaError(
             f"Arena {shown(self.arena.name)} must have room for {count} robots, but {ATTEMPTS} random places for "
             f"robot {index + 1} were all taken. Ask for fewer, give start poses, or take a larger arena."
         )
 
-    def _discs(self) -> NDArray[np.float64]:
+    def discs(self) -> NDArray[np.float64]:
         """Return place and radius [mm] of everything that may be in the way, float64 [disc, 3], robots first."""
-        robots, bodies = self.state.robots[0], self.state.bodies[0]
-        radii = [spec.body.radius_mm for spec in self.specs]
-        # What a gripper has lifted is in nobody's way.
+        robots, bodies = self._state.robots[0], self._state.bodies[0]
+        radii = [spec.body.radius_mm for spec in self._specs]
+        # A lifted body blocks nothing.
         body_radii = np.where(bodies["is_lifted"] != 0, -math.inf, bodies["radius_mm"])
         return np.vstack(
             [
@@ -140,13 +142,18 @@ class Floor:
             ]
         )
 
-    def _name(self, disc: int) -> str:
-        if disc < self.robot_count:
+    def wall_gap_mm(self, x_mm: float, y_mm: float, radius_mm: float) -> float:
+        """Return the gap between a disc and the nearest wall [mm]; negative where they overlap."""
+        return float(contact.clearance_of_disc(*self.ground, float(x_mm), float(y_mm), radius_mm))
+
+    def name_of(self, disc: int) -> str:
+        """Return the name of a robot, ball or cylinder for a message."""
+        if disc < self._robot_count:
             return f"robot {disc + 1}"
-        body = self.state.bodies[0, disc - self.robot_count]
+        body = self._state.bodies[0, disc - self._robot_count]
         return f"{'ball' if body['what'] == BALL else 'cylinder'} {body['number']}"
 
-    def _obstacle(
+    def obstacle(
         self,
         x_mm: float,
         y_mm: float,
@@ -155,11 +162,14 @@ class Floor:
         but: int = -1,
         overlap_mm: float = OVERLAP_MM,
     ) -> tuple[int, float] | None:
-        """Return which disc but one is in the way of a disc, -1 for a wall, and how deep [mm]; None if it is free."""
+        """Return which disc is in the way (-1: a wall) and how deep it overlaps [mm]; None if the place is free.
+
+        The disc `but` is ignored.
+        """
         inside = 0 <= x_mm <= self.arena.width_mm and 0 <= y_mm <= self.arena.height_mm
-        gap_mm = contact.clearance_of_disc(*self.ground, float(x_mm), float(y_mm), radius_mm)
+        gap_mm = self.wall_gap_mm(x_mm, y_mm, radius_mm)
         if not inside or gap_mm < -overlap_mm:
-            return -1, -float(gap_mm)
+            return -1, -gap_mm
         overlaps_mm = radius_mm + discs[:, 2] - np.hypot(discs[:, 0] - x_mm, discs[:, 1] - y_mm)
         if but >= 0:
             overlaps_mm[but] = -math.inf
@@ -170,18 +180,18 @@ class Floor:
     def _is_inside(self, obstacle: tuple[int, float]) -> str:
         """Say in words what is in the way."""
         disc, depth_mm = obstacle
-        return f"{'a wall' if disc < 0 else self._name(disc)} is {depth_mm:.1f} mm inside it"
+        return f"{'a wall' if disc < 0 else self.name_of(disc)} is {depth_mm:.1f} mm inside it"
 
-    def freedom(self, disc: int) -> Callable[[float, float], bool]:
-        """Return a function that says whether a disc, robots counted first, from 0, could lie at a place [mm].
+    def may_lie(self, disc: int) -> Callable[[float, float], bool]:
+        """Return a function that says whether a disc (robots first, from 0) could lie at a place [mm].
 
         It holds as long as nothing else moves.
         """
-        discs = self._discs()
+        discs = self.discs()
         radius_mm = float(discs[disc, 2])
-        return lambda x_mm, y_mm: self._obstacle(x_mm, y_mm, radius_mm, discs, disc) is None
+        return lambda x_mm, y_mm: self.obstacle(x_mm, y_mm, radius_mm, discs, disc) is None
 
-    def _check_free(
+    def check_free(
         self,
         what: str,
         x_mm: float,
@@ -190,8 +200,12 @@ class Floor:
         but: int = -1,
         overlap_mm: float = OVERLAP_MM,
     ) -> None:
-        """Raise a ParameterError if a disc [mm] would be in a wall or, but for one disc, in something else."""
-        obstacle = self._obstacle(x_mm, y_mm, radius_mm, self._discs(), but, overlap_mm)
+        """Check that a disc [mm] would overlap neither a wall nor another disc than `but`.
+
+        Raises:
+            ParameterError: If it would.
+        """
+        obstacle = self.obstacle(x_mm, y_mm, radius_mm, self.discs(), but, overlap_mm)
         if obstacle is not None:
             raise ParameterError(
                 f"{what} must be free, but at ({x_mm:g}, {y_mm:g}) mm {self._is_inside(obstacle)}. "

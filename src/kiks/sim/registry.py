@@ -1,4 +1,4 @@
-"""The simulations of this process by name, as the operating system keeps the table of its serial ports.
+"""A registry of the simulations of this process by name, like the operating system's table of serial ports.
 
 `serial_for_url("kiks://1")` and `kopen([-1])` carry nothing but a name, so what the name means has to stand somewhere.
 This is the one table of the process; it holds no simulation alive.
@@ -7,33 +7,38 @@ This is the one table of the process; it holds no simulation alive.
 from __future__ import annotations
 
 import weakref
-from typing import TYPE_CHECKING
+from typing import Generic, Protocol, TypeVar
 
 from kiks.errors import LinkError, shown
 
-if TYPE_CHECKING:
-    from kiks.sim.simulation import Simulation
 
+class Named(Protocol):
+    """What a registry holds."""
+
+    name: str
+
+
+Entry = TypeVar("Entry", bound=Named)
 
 SHOWN_NAMES = 5
 """How many of the simulations that are alive a message names: the newest."""
 
 
-class Registry:
+class Registry(Generic[Entry]):
     """Simulations in the order of their creation."""
 
     def __init__(self) -> None:
-        self._simulations: weakref.WeakValueDictionary[str, Simulation] = weakref.WeakValueDictionary()
+        self._simulations: weakref.WeakValueDictionary[str, Entry] = weakref.WeakValueDictionary()
         self._count = 0
 
-    def enter(self, sim: Simulation) -> str:
+    def enter(self, sim: Entry) -> str:
         """Give a simulation a name."""
         self._count += 1
         name = f"sim{self._count}"
         self._simulations[name] = sim
         return name
 
-    def find(self, name: str) -> Simulation:
+    def find(self, name: str) -> Entry:
         """Return the simulation of a name.
 
         Raises:
@@ -49,10 +54,6 @@ class Registry:
             )
         return sim
 
-    def newest(self) -> Simulation | None:
+    def newest(self) -> Entry | None:
         """Return the simulation created last, if one is alive."""
         return max(self._simulations.values(), key=lambda sim: int(sim.name[3:]), default=None)
-
-
-REGISTRY = Registry()
-"""The process's table."""

@@ -1,45 +1,49 @@
-"""Simulation: robots at the ends of serial lines, and time that passes when somebody lets it."""
+"""Simulation: robots at the ends of serial lines, and time that passes when a program lets it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from threading import RLock
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kiks.clock.gate import Gate
 from kiks.clock.program_clock import ProgramClock
-from kiks.engine.sensing import ambient, proximity
-from kiks.engine.sensing.thesis_networks import networks_for
-from kiks.errors import ParameterError, shown
-from kiks.firmware.k213 import K213
+from kiks.engine.sensing.rays import sight_of
+from kiks.errors import ParameterError, counted, shown
 from kiks.firmware.khepera import Firmware
-from kiks.firmware.radio import Radio, deliver
 from kiks.firmware.turret import Turret
-from kiks.model.arena import Arena
-from kiks.model.checks import CLOCK_END_NS, SECONDS_MAX, check_count, check_number
-from kiks.model.robot import SENSOR_COUNT, RobotSpec, specs_of
-from kiks.sim.cameras import Cameras
+from kiks.model.arena import Arena, Ball, Cylinder
+from kiks.model.checks import SECONDS_MAX, check_count, check_kind, check_number
+from kiks.model.robot import RobotSpec, specs_of
+from kiks.sim.event_loop import EventLoop
 from kiks.sim.explanation import Explanation, LightExplanation, explain_ambient, explain_proximity
-from kiks.sim.registry import REGISTRY
-from kiks.sim.snapshot import Snapshot, look, trace_rays
-from kiks.sim.things import Things
-from kiks.sim.turret_host import RobotSite, first_memory, named
-from kiks.sim.wire import Agenda, Wire
-from kiks.sim.world import check_arena, check_kinds
-from kiks.units import ns_from_s
+from kiks.sim.free_space import FreeSpace
+from kiks.sim.local_line import LocalLine
+from kiks.sim.paths import Paths, Watcher
+from kiks.sim.port import VirtualPort
+from kiks.sim.registry import Registry
+from kiks.sim.sensors import Sensors
+from kiks.sim.snapshot import Snapshot, look, proximity_at, trace_rays
+from kiks.sim.things import Checkpoint, Things
+from kiks.sim.turret_host import Turrets
+from kiks.sim.wire import Wire
+from kiks.sim.world import World
+from kiks.units import ns_from_s, s_from_ns
+from kiks.upwards import draw_simulation, show_in_browser
 
-if TYPE_CHECKING:
-    from kiks.desk.server.show import Shown
-    from kiks.ports.memory import SimPort
 
-
-class Simulation(Things):
+class Simulation:
     r"""Robots in an arena, each at the end of a serial line.
 
-    Time passes only when somebody lets it: a program that waits for a reply on a port, or `run`.
+    Time passes only when a program waits for a reply on a port, or calls `run`.
+
+    This class holds the lock, brings the world up to date, and calls its parts, which do neither.
 
     Args:
         arena: Where the robots drive; the classic 500 x 650 mm box if left out.
@@ -52,8 +56,10 @@ class Simulation(Things):
             the robot's file says if left out.
 
     Attributes:
-        gate: Where its time passes while somebody watches; None while nobody does.
-        networks: What the responses of its robots need besides rays.
+        world: The arena with all that stands and moves in it.
+        loop: Lets time pass, event by event.
+        program: What the computing of the program on its ports costs.
+        name: The name in its ports' URLs.
 
     Raises:
         ParameterError: If a number is out of range or a name unknown.
@@ -81,59 +87,136 @@ class Simulation(Things):
         response: str | None = None,
     ) -> None:
         if arena is not None:
-            check_arena(arena)
+            _check_arena(arena)
         check_kinds(robot, response)
         robots = None if robots is None else check_count("robots", robots, 1, 1000, "Say how many you need.")
         seed = check_count("seed", seed, 0, 2**63 - 1, "Any small number will do.")
         self.thinking = thinking
         self.program = ProgramClock(thinking)
-        self.gate: Gate | None = None
-        self._cameras = Cameras(self)
-        super().__init__(Arena.default() if arena is None else arena, specs_of(robot, robots, response), seed)
-        self.spec = self.specs[0]
-        self.networks = networks_for(*(spec.proximity.response for spec in self.specs))
-        self._counts = np.zeros(SENSOR_COUNT, np.int64)
-        self._expected = np.zeros(SENSOR_COUNT, np.float64)
-        self._radios: dict[int, Radio] = {}
-        self._agenda = Agenda()
-        self.wires = [Wire(self._firmware(index), self._agenda, index) for index in range(self.robot_count)]
+        self.world = World(Arena.default() if arena is None else arena, specs_of(robot, robots, response), seed)
+        self._things = Things(self.world)
+        self._sensors = Sensors(self.world)
+        self._firmwares: list[Firmware] = []
+        self._turrets = Turrets(self.world, self._firmwares)
+        self.loop = EventLoop(self.world, self._turrets.sync)
+        for index in range(self.robot_count):
+            self._power_up(index)
+        self._paths: Paths | None = None
         self._ports: dict[int, SimPort] = {}
         self.name = REGISTRY.enter(self)
 
-    def _firmware(self, index: int) -> Firmware:
-        return Firmware(
-            self.specs[index],
-            self.state,
+    def _power_up(self, index: int) -> None:
+        """Give a robot its firmware and its serial line."""
+        firmware = Firmware(
+            self.world.specs[index],
+            self.world.state,
             index,
-            sense_proximity=partial(self._sense_proximity, index),
-            sense_ambient=partial(self._sense_ambient, index),
+            sense_proximity=partial(self._sensors.proximity, index),
+            sense_ambient=partial(self._sensors.ambient, index),
         )
+        self._firmwares.append(firmware)
+        self.loop.add_wire(firmware)
 
-    def _sense_proximity(self, index: int, is_noisy: bool = True) -> list[Any]:
-        return self._sense(proximity.read_proximity, self.networks, index, is_noisy)
+    def __repr__(self) -> str:
+        robots = counted(self.robot_count, "robot")
+        return f"<{type(self).__name__}: {robots} in {shown(self.arena.name)} at {self.time_s:.3f} s, seed {self.seed}>"
 
-    def _sense_ambient(self, index: int, is_noisy: bool = True) -> list[Any]:
-        return self._sense(ambient.read_ambient, self.lamps, index, is_noisy)
+    def _repr_png_(self) -> tuple[bytes, dict[str, int]]:
+        """Return a picture of it as it stands, which notebooks show."""
+        picture: tuple[bytes, dict[str, int]] = draw_simulation(self)
+        return picture
 
-    def _sense(self, read: Callable[..., Any], given: NDArray[Any], index: int, is_noisy: bool) -> list[Any]:
-        """Return what an entry of the engine reads, which besides what rays meet needs one thing more."""
-        if not isinstance(is_noisy, bool):
-            raise ParameterError(f"noise must be True or False, but it was {shown(is_noisy)}.")
-        out = self._counts if is_noisy else self._expected
-        read(
-            self.scene,
-            self.sight,
-            given,
-            self.state.tick_count,
-            self.now_ns,
-            self.seed,
-            index,
-            is_noisy,
-            out,
-        )
-        return out.tolist()
+    @contextmanager
+    def _up_to_date(self) -> Iterator[World]:
+        """Hold the lock, and do the ticks that have begun."""
+        with self.lock:
+            self.sync()
+            yield self.world
+
+    @contextmanager
+    def _changing(self) -> Iterator[World]:
+        """Hold the lock, do the ticks that have begun, and let cameras see what was changed."""
+        with self._up_to_date() as world:
+            yield world
+            self._turrets.cameras.retake()
+
+    # ---- what it consists of ----
+
+    @property
+    def lock(self) -> RLock:
+        """Held by every thread that reads or changes the simulation."""
+        return self.world.lock
+
+    @property
+    def arena(self) -> Arena:
+        """The walls, and what stood in them at the beginning."""
+        return self.world.arena
+
+    @property
+    def seed(self) -> int:
+        """Seed of all random numbers."""
+        return self.world.seed
+
+    @property
+    def specs(self) -> list[RobotSpec]:
+        """What each robot is."""
+        return self.world.specs
+
+    @property
+    def spec(self) -> RobotSpec:
+        """What robot 1 is."""
+        return self.world.specs[0]
+
+    @property
+    def robot_count(self) -> int:
+        """Number of robots."""
+        return self.world.robot_count
+
+    @property
+    def wires(self) -> list[Wire]:
+        """The robots' serial lines."""
+        return self.loop.wires
+
+    @property
+    def watchers(self) -> list[Watcher]:
+        """Objects that read the state after ticks of their own choice."""
+        return self.world.watchers
+
+    @property
+    def gate(self) -> Gate | None:
+        """Decides how far time may go while it is watched; None while nothing watches it."""
+        return self.loop.gate
+
+    @gate.setter
+    def gate(self, gate: Gate | None) -> None:
+        self.loop.gate = gate
+
+    @property
+    def lamps(self) -> NDArray[np.float64]:
+        """The lamps: x_mm, y_mm, power_w, and 1 for on or 0 for off: float64 [lamp, 4].
+
+        Write to it to move or switch them; a lamp at a place that is no number is nowhere.
+
+        Raises:
+            ParameterError: If it is set to anything but finite numbers of that shape.
+        """
+        return self.world.lamps
+
+    @lamps.setter
+    def lamps(self, lamps: NDArray[np.float64]) -> None:
+        self.world.lamps = lamps
 
     # ---- time ----
+
+    @property
+    def now_ns(self) -> int:
+        """The simulated time [ns]."""
+        return self.world.now_ns
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time since the start [s]."""
+        return s_from_ns(self.world.now_ns)
 
     def run(self, seconds: float) -> None:
         """Let simulated time pass: robots drive on, and commands on the line act when they are due.
@@ -146,72 +229,67 @@ class Simulation(Things):
         """
         passing_ns = ns_from_s(check_number("seconds", seconds, 0, SECONDS_MAX, "Time never runs backwards."))
         with self.lock:
-            self.advance_to(self.now_ns + passing_ns)
+            self.loop.advance_to(self.now_ns + passing_ns)
 
     def advance_to(self, time_ns: int) -> None:
-        """Let time pass up to a time [ns]; nothing happens if it is over already.
+        """Let time pass up to a time [ns]; does nothing if that has passed already.
 
         Raises:
             ParameterError: If it is no whole number, or beyond the end of the clock.
         """
-        if not (time_ns.__class__ is int and time_ns <= CLOCK_END_NS):
-            time_ns = check_count("time_ns", time_ns, -CLOCK_END_NS, CLOCK_END_NS)
-        gate = self.gate
-        if gate is not None and gate.is_up:
-            while (until_ns := gate.admit(self.now_ns, time_ns)) < time_ns:
-                self._advance_to(until_ns)
-        self._advance_to(time_ns)
-
-    def _advance_to(self, time_ns: int) -> None:
-        wire = self._agenda.first(self.wires)
-        while wire.next_ns is not None and wire.next_ns <= time_ns:
-            if wire.next_ns > self.now_ns:
-                self.now_ns = wire.next_ns
-            self.sync()
-            wire.act(self.now_ns)
-            wire = self._agenda.first(self.wires)
-        if time_ns > self.now_ns:
-            self.now_ns = time_ns
+        self.loop.advance_to(time_ns)
 
     def next_event_ns(self) -> int | None:
-        """Return when a robot does something next [ns], None while all of them wait for characters."""
-        return self._agenda.first(self.wires).next_ns
+        """Return when a robot acts next [ns]; None while all of them wait for characters."""
+        return self.loop.next_event_ns()
 
     def sync(self) -> None:
-        """Do the ticks that have begun; let cameras take the pictures that are due on the way, and messages arrive."""
-        if self._cameras:
-            self._cameras.sync()
-        super().sync()
-        if self._radios:
-            deliver(self._radios, self.now_ns)
+        """Do the ticks that have begun, take the pictures that are due on the way, and deliver radio messages.
 
-    # ---- to be seen ----
-
-    def show(
-        self, *, speed: float | None = 1.0, is_alive: bool = False, port: int | None = None, browser: bool = True
-    ) -> Shown:
-        """Show this world in a browser, to be watched, paused and touched, and say where; in a notebook below the cell.
-
-        Looking changes nothing: the run is the same, to the bit, unless somebody reaches in.
-
-        Args:
-            speed: Simulated seconds in a real one from now on; None for as fast as possible.
-            is_alive: Whether time passes by itself, in a thread; else it does when the program lets it.
-            port: TCP port of the page, on this computer only; 8123, or a free one, if left out.
-            browser: False for its address alone.
-
-        Returns:
-            What is shown, with its `url`; `close()` ends it.
-
-        Raises:
-            LinkError: If the page cannot be served there.
-            ParameterError: If the speed is out of range, or the desk is open on another port.
+        The engine is behind the clock until the state is read.
         """
-        from kiks.desk.server.show import show
-
-        return show(self, speed=speed, is_alive=is_alive, port=port, browser=browser)
+        self._turrets.sync()
 
     # ---- robots ----
+
+    def index_of(self, robot: int) -> int:
+        """Return the index of a robot by its number.
+
+        Raises:
+            ParameterError: If there is no such robot.
+        """
+        return self.world.index_of(robot)
+
+    def pose(self, robot: int) -> tuple[float, float, float]:
+        """Return where a robot is at this very instant: x_mm, y_mm, heading_rad (not wrapped).
+
+        Raises:
+            ParameterError: If there is no such robot.
+        """
+        index = self.index_of(robot)
+        with self._up_to_date() as world:
+            return world.pose(index)
+
+    def poses(self) -> NDArray[np.float64]:
+        """Return where all robots are at this very instant, float64 [robot, 3]: x_mm, y_mm, heading_rad."""
+        with self._up_to_date() as world:
+            return world.poses()
+
+    def place(self, robot: int, x_mm: float, y_mm: float, heading_rad: float) -> None:
+        """Lift a robot and put it down somewhere else; its wheels and counters do not notice.
+
+        Args:
+            robot: Number of the robot, from 1.
+            x_mm: From the arena's lower left corner to the right.
+            y_mm: From the arena's lower left corner upwards.
+            heading_rad: Counter-clockwise from the x axis; wrapped to one turn beyond a million.
+
+        Raises:
+            ParameterError: If there is no such robot, a number is not finite, or something is in the way.
+        """
+        index = self.index_of(robot)
+        with self._changing() as world:
+            world.place_robot(index, x_mm, y_mm, heading_rad)
 
     def add_robot(self, robot: str | RobotSpec = "khepera") -> int:
         """Put one more robot into the world; return its number.
@@ -233,40 +311,13 @@ class Simulation(Things):
         """
         check_kinds(robot)
         (spec,) = specs_of(robot, 1, None)
-        with self.lock:
-            self.sync()
-            index = self._add_robot(spec)
-            for wire in self.wires:
-                wire.firmware.take(self.state)
-            self._cameras.take()
-            self.networks = networks_for(*(spec.proximity.response for spec in self.specs))
-            self.wires.append(Wire(self._firmware(index), self._agenda, index))
-            self._enter()
+        with self._changing() as world:
+            index = world.add_robot(spec)
+            for firmware in self._firmwares:
+                firmware.take(world.state)
+            self._turrets.cameras.take_state()
+            self._power_up(index)
             return index + 1
-
-    def port(self, robot: int) -> SimPort:
-        """Return the computer's end of a robot's line: one object, always the same.
-
-        Args:
-            robot: Number of the robot, from 1.
-
-        Raises:
-            ParameterError: If there is no such robot.
-        """
-        from kiks.ports.memory import SimPort
-
-        index = self.index_of(robot)
-        if index not in self._ports:
-            self._ports[index] = SimPort(self, robot)
-        return self._ports[index]
-
-    def url(self, robot: int) -> str:
-        """Return the name under which pyserial opens a robot's port: 'kiks://sim1/1'.
-
-        Raises:
-            ParameterError: If there is no such robot.
-        """
-        return f"kiks://{self.name}/{self.index_of(robot) + 1}"
 
     def fit(self, robot: int, turret: str | Turret) -> Turret:
         r"""Put a turret on a robot; it answers to `T,<its number>,...` from now on (docs/turrets.md).
@@ -290,23 +341,8 @@ class Simulation(Things):
             b't,2,b,1,0\r\n'
         """
         index = self.index_of(robot)
-        with self.lock:
-            self.sync()
-            firmware = self.wires[index].firmware
-            fitted = named(turret, partial(self._cameras.camera, index))
-            there = [each for each in firmware.fitted if each.number == fitted.number]
-            if there:
-                raise ParameterError(
-                    f"turret must be one that robot {robot} has not got, but {shown(there[0].name)} has its number, "
-                    f"{fitted.number}. Give a turret of your own another, 24 to 31."
-                )
-            fitted.fit(RobotSite(self, index, fitted, first_memory(fitted, firmware.fitted)))
-            firmware.fit(fitted)
-            if isinstance(fitted, Radio):
-                self._radios = fitted.site.turrets(Radio)
-            elif isinstance(fitted, K213):
-                self._cameras.fit(index, fitted)
-        return fitted
+        with self._up_to_date():
+            return self._turrets.fit(index, turret)
 
     def turrets(self, robot: int) -> tuple[Turret, ...]:
         """Return the turrets that a robot carries, in the order in which they were fitted.
@@ -316,9 +352,183 @@ class Simulation(Things):
         """
         return tuple(self.wires[self.index_of(robot)].firmware.fitted)
 
-    def _look_again(self) -> None:
-        super()._look_again()
-        self._cameras.look_again()
+    def port(self, robot: int) -> SimPort:
+        """Return the computer's end of a robot's line: one object, always the same.
+
+        Args:
+            robot: Number of the robot, from 1.
+
+        Raises:
+            ParameterError: If there is no such robot.
+        """
+        index = self.index_of(robot)
+        if index not in self._ports:
+            self._ports[index] = SimPort(self, robot)
+        return self._ports[index]
+
+    def url(self, robot: int) -> str:
+        """Return the name under which pyserial opens a robot's port: 'kiks://sim1/1'.
+
+        Raises:
+            ParameterError: If there is no such robot.
+        """
+        return f"kiks://{self.name}/{self.index_of(robot) + 1}"
+
+    def travelled_mm(self, robot: int) -> float:
+        """Return the length of a robot's path so far [mm].
+
+        Raises:
+            ParameterError: If there is no such robot.
+        """
+        forwards_mm, backwards_mm, _ = self.distances_mm()[self.index_of(robot)]
+        return float(forwards_mm + backwards_mm)
+
+    def distances_mm(self) -> NDArray[np.float64]:
+        """Return how far robots have come, float64 [robot, 3] [mm].
+
+        The columns are the way driven forwards, the way driven backwards, and the straight distance from where the
+        robot started or was put last.
+        """
+        with self._up_to_date() as world:
+            return world.distances_mm()
+
+    def contacts(self, robot: int) -> int:
+        """Return how often a robot has met something so far: a wall, a robot, a ball or a cylinder.
+
+        Raises:
+            ParameterError: If there is no such robot.
+        """
+        index = self.index_of(robot)
+        with self._up_to_date() as world:
+            return int(world.state.robots["contact_count"][0, index])
+
+    # ---- walls, balls, cylinders and lamps ----
+
+    def set_arena(self, arena: Arena) -> None:
+        """Put other walls around everything; time, robots, programs, balls, cylinders and lamps stay as they are.
+
+        Args:
+            arena: The walls; what else the arena holds is only kept in `arena`.
+
+        Raises:
+            ParameterError: If a robot, ball or cylinder would be deeper in a wall than it is.
+        """
+        _check_arena(arena)
+        # These take a while: they are computed before other threads have to wait.
+        free_space = FreeSpace(arena, self.world.specs, self.world.state)
+        sight_of(arena)
+        with self._changing() as world:
+            world.set_arena(free_space)
+
+    def add_ball(self, x_mm: float, y_mm: float, **changes: Any) -> int:
+        """Put a ball into the arena, at rest; return its number.
+
+        Args:
+            x_mm: Its centre [mm].
+            y_mm: Its centre [mm].
+            **changes: `radius_mm`, `friction_mm_s2` or `brightness` (1..255 or a material), where not the usual ones.
+
+        Raises:
+            ParameterError: If a value is out of range, or something is in the way.
+
+        Example:
+            >>> from kiks import Arena, Simulation
+            >>> sim = Simulation(Arena.box(500, 500))
+            >>> ball = sim.add_ball(100, 100)
+            >>> sim.move_body(ball, 100, 100, speed_mm_s=200.0)
+            >>> sim.run(0.5)
+            >>> round(float(sim.bodies()["x_mm"][0]), 1)
+            197.5
+        """
+        with self._changing():
+            return self._things.add_body(Ball, x_mm, y_mm, changes)
+
+    def add_cylinder(self, x_mm: float, y_mm: float, **changes: Any) -> int:
+        """Put a cylinder into the arena; return its number.
+
+        Args:
+            x_mm: Its centre [mm].
+            y_mm: Its centre [mm].
+            **changes: `radius_mm`, `friction_mm_s2` or `brightness` (1..255 or a material), where not the usual ones.
+
+        Raises:
+            ParameterError: If a value is out of range, or something is in the way.
+        """
+        with self._changing():
+            return self._things.add_body(Cylinder, x_mm, y_mm, changes)
+
+    def bodies(self) -> NDArray[np.void]:
+        """Return a copy of what there is of balls and cylinders: records of `kiks.engine.state.BODY`, shape [body].
+
+        Of their fields `number`, `what` (3 a ball, 4 a cylinder), `x_mm`, `y_mm`, `velocity_x` and `velocity_y` [mm/s],
+        `radius_mm` and `brightness` are of use.
+        """
+        with self._up_to_date() as world:
+            copied: NDArray[np.void] = world.state.bodies[0].copy()
+        return copied
+
+    def move_body(
+        self, body: int, x_mm: float, y_mm: float, *, speed_mm_s: float = 0.0, heading_rad: float = 0.0
+    ) -> None:
+        """Lift a ball or cylinder and put it down somewhere else, or set it rolling.
+
+        Args:
+            body: Its number.
+            x_mm: Where its centre goes [mm].
+            y_mm: Where its centre goes [mm].
+            speed_mm_s: How fast it rolls from there [mm/s].
+            heading_rad: Where to.
+
+        Raises:
+            ParameterError: If there is no such body, a number is out of range, or something is in the way.
+        """
+        with self._changing():
+            self._things.move_body(body, x_mm, y_mm, speed_mm_s, heading_rad)
+
+    def remove_body(self, body: int) -> None:
+        """Take a ball or cylinder away.
+
+        Raises:
+            ParameterError: If there is no such body.
+        """
+        with self._changing():
+            self._things.remove_body(body)
+
+    def add_lamp(self, x_mm: float, y_mm: float, power_w: float = 1.0, *, is_on: bool = True) -> int:
+        """Hang a lamp into the arena; return its row in `lamps`, counted from 1.
+
+        Raises:
+            ParameterError: If it would hang outside the arena, or a value is out of range.
+        """
+        with self._up_to_date():
+            return self._things.add_lamp(x_mm, y_mm, power_w, is_on)
+
+    def remove_lamp(self, lamp: int) -> None:
+        """Take a lamp away; those behind it move up a row.
+
+        Raises:
+            ParameterError: If there is no such lamp.
+        """
+        with self._up_to_date():
+            self._things.remove_lamp(lamp)
+
+    def checkpoint(self) -> Checkpoint:
+        """Return where everything stands, for `reset`."""
+        with self._up_to_date():
+            return self._things.checkpoint()
+
+    def reset(self, checkpoint: Checkpoint) -> None:
+        """Put everything back where it stood at a checkpoint; what was added since goes, what was removed comes back.
+
+        Time goes on, and so do programs, wheels and counters: it is as if a hand had tidied up.
+
+        Raises:
+            ParameterError: If it is no checkpoint, or one of a simulation with another number of robots.
+        """
+        with self._changing():
+            self._things.reset(checkpoint)
+
+    # ---- what sensors read ----
 
     def proximity(self, robot: int, *, noise: bool = False) -> list[float]:
         """Return what the eight proximity sensors would read at this instant and pose, without waiting for their round.
@@ -331,9 +541,24 @@ class Simulation(Things):
             ParameterError: If there is no such robot.
         """
         index = self.index_of(robot)
-        with self.lock:
-            self.sync()
-            return [float(count) for count in self._sense_proximity(index, noise)]
+        with self._up_to_date():
+            return [float(count) for count in self._sensors.proximity(index, noise)]
+
+    def proximity_at(self, robot: int, poses: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what `proximity` would return if a robot stood at other poses, float64 [pose, 8].
+
+        Nothing checks whether the robot fits there: a fit asks thousands of times.
+
+        Args:
+            robot: Number of the robot, from 1.
+            poses: float64 [pose, 3]: x_mm, y_mm, heading_rad.
+
+        Raises:
+            ParameterError: If there is no such robot, a number is not finite, or a place is outside the arena.
+        """
+        index = self.index_of(robot)
+        with self._up_to_date() as world:
+            return proximity_at(world, index, poses)
 
     def ambient(self, robot: int, *, noise: bool = False) -> list[float]:
         """Return what the eight light sensors would read at this instant and pose, without waiting for their round.
@@ -346,9 +571,8 @@ class Simulation(Things):
             ParameterError: If there is no such robot.
         """
         index = self.index_of(robot)
-        with self.lock:
-            self.sync()
-            return [float(count) for count in self._sense_ambient(index, noise)]
+        with self._up_to_date():
+            return [float(count) for count in self._sensors.ambient(index, noise)]
 
     def rays(self, robot: int) -> NDArray[np.float64]:
         """Return how far each ray of a robot's proximity sensors goes at this instant and pose, float64 [8, 7] [mm].
@@ -360,9 +584,8 @@ class Simulation(Things):
             ParameterError: If there is no such robot.
         """
         index = self.index_of(robot)
-        with self.lock:
-            self.sync()
-            lengths_mm, _, _, _ = trace_rays(self, index, 1)
+        with self._up_to_date() as world:
+            lengths_mm, _, _, _ = trace_rays(world, index, 1)
             return np.ascontiguousarray(lengths_mm[0])
 
     def explain(self, robot: int, sensor: int) -> Explanation:
@@ -384,9 +607,8 @@ class Simulation(Things):
             >>> why.rays[3].met, why.rays[3].brightness
             ('wall', 255)
         """
-        with self.lock:
-            self.sync()
-            return explain_proximity(self, self.networks, robot, sensor)
+        with self._up_to_date() as world:
+            return explain_proximity(world, robot, sensor)
 
     def explain_light(self, robot: int, sensor: int) -> LightExplanation:
         """Return why command `O` returns what it returns for a light sensor at this instant.
@@ -398,15 +620,8 @@ class Simulation(Things):
         Raises:
             ParameterError: If there is no such robot or sensor.
         """
-        with self.lock:
-            self.sync()
-            return explain_ambient(self, robot, sensor)
-
-    def look(self) -> Snapshot:
-        """Return where everybody is at this instant, and what all sensors see; looking changes nothing."""
-        with self.lock:
-            self.sync()
-            return look(self, self.networks)
+        with self._up_to_date() as world:
+            return explain_ambient(world, robot, sensor)
 
     def image(self, robot: int) -> list[float]:
         """Return what a K213 would see at this instant and pose, 64 greys from the left, without noise or rounding.
@@ -415,6 +630,127 @@ class Simulation(Things):
             ParameterError: If there is no such robot.
         """
         index = self.index_of(robot)
+        with self._up_to_date():
+            return self._turrets.cameras.expect(index)
+
+    def look(self) -> Snapshot:
+        """Return where everybody is at this instant, and what all sensors see; looking changes nothing."""
+        with self._up_to_date() as world:
+            return look(world)
+
+    # ---- the run as a whole ----
+
+    def record_paths(self, every_s: float = 0.1, *, points_max: int | None = None) -> None:
+        """Keep where all robots, balls and cylinders are from now on; what was kept before is dropped.
+
+        Args:
+            every_s: Time between two points [s]: whole hundredths, at least one.
+            points_max: Most points that are kept, from 2. When there are more, every second one is dropped, and from
+                then on half as many come; None for all.
+
+        Raises:
+            ParameterError: If one is none of these.
+        """
+        ticks = 100 * check_number("every_s", every_s, 0, 1e7, "Take 0.1.")
+        if ticks < 1 - 1e-9 or abs(ticks - round(ticks)) > 1e-6:
+            raise ParameterError(f"every_s must be a multiple of 0.01 s, but it was {shown(every_s)}. Take 0.1.")
+        if points_max is not None:
+            check_count("points_max", points_max, 2, 10**9, "Take 10000.")
+        with self._up_to_date() as world:
+            world.watchers = [each for each in world.watchers if each is not self._paths]
+            self._paths = Paths(round(ticks), world.state, points_max)
+            world.watchers.append(self._paths)
+
+    def paths(self) -> NDArray[np.float64]:
+        """Return the paths since `record_paths`, float64 [robot, point, 4]: time_s, x_mm, y_mm, heading_rad.
+
+        Raises:
+            ParameterError: If none were recorded.
+        """
         with self.lock:
-            self.sync()
-            return self._cameras.expect(index)
+            return self._recorded().array()
+
+    def body_paths(self) -> dict[int, list[tuple[float, float]]]:
+        """Return where balls and cylinders were since `record_paths`, by their numbers: x_mm, y_mm.
+
+        Raises:
+            ParameterError: If nothing was recorded.
+        """
+        with self.lock:
+            return self._recorded().of_bodies()
+
+    def _recorded(self) -> Paths:
+        self.sync()
+        if self._paths is None:
+            raise ParameterError("paths must be recorded before they are asked for. Call record_paths() first.")
+        return self._paths
+
+    def state_hash(self) -> str:
+        """Return 16 hexadecimal digits that any two equal runs agree on."""
+        with self._up_to_date() as world:
+            return world.state.hash()
+
+    def show(
+        self, *, speed: float | None = 1.0, is_alive: bool = False, port: int | None = None, browser: bool = True
+    ) -> Any:
+        """Show this world in a browser, to be watched, paused and touched, and say where; in a notebook below the cell.
+
+        Looking changes nothing: the run is the same, to the bit, unless somebody reaches in.
+
+        Args:
+            speed: Simulated seconds in a real one from now on; None for as fast as possible.
+            is_alive: Whether time passes by itself, in a thread; else it does when the program lets it.
+            port: TCP port of the page, on this computer only; 8123, or a free one, if left out.
+            browser: False for its address alone.
+
+        Returns:
+            What is shown, with its `url`; `close()` ends it.
+
+        Raises:
+            LinkError: If the page cannot be served there.
+            ParameterError: If the speed is out of range, or the desk is open on another port.
+        """
+        return show_in_browser(self, speed=speed, is_alive=is_alive, port=port, browser=browser)
+
+
+class SimPort(VirtualPort):
+    """The computer's end of a robot's line in a simulation of this process.
+
+    Attributes:
+        sim: The simulation.
+        robot: Number of the robot, from 1.
+    """
+
+    def __init__(self, sim: Simulation, robot: int) -> None:
+        super().__init__(LocalLine(sim.loop, robot), sim.program)
+        self.sim = sim
+        self.robot = robot
+
+
+REGISTRY: Registry[Simulation] = Registry()
+"""The simulations of this process."""
+
+
+def check_kinds(kinds: object, response: object = None) -> None:
+    """Check what says of which kind robots are.
+
+    Args:
+        kinds: The name of a kind, a robot file or a `RobotSpec`, or a list of such.
+        response: The name of a response of their proximity sensors, or None.
+
+    Raises:
+        ParameterError: If one is something else.
+    """
+    for kind in kinds if isinstance(kinds, list | tuple) else (kinds,):
+        if not isinstance(kind, str | os.PathLike | RobotSpec):
+            raise ParameterError(
+                f"robot must be the name of a kind, a robot file or a kiks.RobotSpec, but it was {shown(kind)}. "
+                "Take 'khepera'."
+            )
+    if response is not None and not isinstance(response, str):
+        raise ParameterError(f"response must be a name such as 'thesis', but it was {shown(response)}.")
+
+
+def _check_arena(arena: object) -> None:
+    """Check that this is an arena."""
+    check_kind("arena", arena, Arena, "Read a file with kiks.Arena.load(path).")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +13,7 @@ from kiks.engine.state import BALL
 from kiks.errors import ParameterError
 from kiks.model.checks import check_numbers, wrapped
 from kiks.model.robot import SENSOR_COUNT
-
-if TYPE_CHECKING:
-    from kiks.sim.simulation import Simulation
+from kiks.sim.world import World
 
 
 @dataclass(frozen=True)
@@ -46,66 +43,58 @@ class Snapshot:
     ambient: NDArray[np.int64]
 
 
-def look(sim: Simulation, networks: NDArray[np.void]) -> Snapshot:
-    """Return a look at a simulation that is locked and whose ticks are done.
-
-    Args:
-        sim: The simulation.
-        networks: What its robots' responses need besides rays.
-    """
-    robots, bodies, ticks, now_ns = sim.robot_count, sim.state.bodies.shape[1], sim.state.tick_count, sim.now_ns
+def look(world: World) -> Snapshot:
+    """Return a snapshot of a world whose ticks are done."""
+    robots, bodies, ticks, now_ns = world.robot_count, world.state.bodies.shape[1], world.state.tick_count, world.now_ns
     poses, places = np.empty((robots, 3)), np.empty((bodies, 2))
-    observe.places_at(sim.scene, ticks, now_ns, poses, places)
-    lengths_mm, cosines, brightnesses, met = trace_rays(sim, 0, robots)
+    observe.places_at(world.scene, ticks, now_ns, poses, places)
+    lengths_mm, cosines, brightnesses, met = trace_rays(world, 0, robots)
     proximity, ambient = (np.empty((robots, SENSOR_COUNT), np.int64) for _ in range(2))
-    observe.read_everybody(sim.scene, sim.sight, networks, sim.lamps, ticks, now_ns, sim.seed, proximity, ambient)
+    observe.read_everybody(
+        world.scene, world.sight, world.networks, world.lamps, ticks, now_ns, world.seed, proximity, ambient
+    )
     return Snapshot(poses, places, lengths_mm, cosines, brightnesses, met, proximity, ambient)
 
 
 def trace_rays(
-    sim: Simulation, first: int, count: int
+    world: World, first: int, count: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """Return lengths [mm], cosines, brightnesses and what was met (`Snapshot`) of `count` robots from `first`."""
     rays = np.empty((count, SENSOR_COUNT, 3, RAY_COUNT))
     met = np.empty((count, SENSOR_COUNT, RAY_COUNT), np.int64)
-    observe.gaze(sim.scene, sim.sight, sim.state.tick_count, sim.now_ns, first, rays, met)
+    observe.gaze(world.scene, world.sight, world.state.tick_count, world.now_ns, first, rays, met)
     lengths_mm = np.where(met == observe.NOTHING, np.inf, rays[:, :, 0])
     return lengths_mm, rays[:, :, 1], rays[:, :, 2], met
 
 
-def proximity_from(sim: Simulation, robot: int, poses: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return what `Simulation.proximity` would, float64 [pose, 8], if a robot stood at other poses, one by one.
+def proximity_at(world: World, index: int, poses: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what a robot's proximity sensors would read without noise at other poses, float64 [pose, 8].
 
-    Nothing keeps it from standing in a wall there; a simulation of a robot that is put down thousands of times for a
-    fit has no time to ask.
+    Nothing checks whether the robot fits there: a fit asks thousands of times.
 
     Args:
-        sim: The simulation.
-        robot: Number of the robot, from 1.
+        world: The world, whose ticks are done.
+        index: The robot's index.
         poses: float64 [pose, 3]: x_mm, y_mm, heading_rad.
 
     Raises:
-        ParameterError: If there is no such robot, a number is not finite, or a place is outside the arena.
+        ParameterError: If a number is not finite, or a place is outside the arena.
     """
-    index = sim.index_of(robot)
     poses = check_numbers("poses", poses, (None, 3))
-    size_mm = (sim.arena.width_mm, sim.arena.height_mm)
+    size_mm = (world.arena.width_mm, world.arena.height_mm)
     if not ((poses[:, :2] >= 0.0) & (poses[:, :2] <= size_mm)).all():
         raise ParameterError(f"poses must be in the arena, {size_mm[0]:g} x {size_mm[1]:g} mm, but one was not.")
     poses[:, 2] = [wrapped(heading_rad) for heading_rad in poses[:, 2].tolist()]
-    counts = np.empty((len(poses), SENSOR_COUNT))
-    with sim.lock:
-        sim.sync()
-        state = sim.state
-        observe.read_from(sim.scene, sim.sight, sim.networks, state.tick_count, sim.now_ns, index, poses, counts)
+    counts, state = np.empty((len(poses), SENSOR_COUNT)), world.state
+    observe.read_from(world.scene, world.sight, world.networks, state.tick_count, world.now_ns, index, poses, counts)
     return counts
 
 
-def name_of(sim: Simulation, met: int) -> str:
+def name_of(world: World, met: int) -> str:
     """Return what people call a thing that a ray met: 'wall', 'robot 2', 'ball 1' or 'cylinder 3'."""
     if met < 0:
         return "wall"
-    if met < sim.robot_count:
+    if met < world.robot_count:
         return f"robot {met + 1}"
-    body = sim.state.bodies[0, met - sim.robot_count]
+    body = world.state.bodies[0, met - world.robot_count]
     return f"{'ball' if body['what'] == BALL else 'cylinder'} {body['number']}"

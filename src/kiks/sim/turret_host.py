@@ -1,10 +1,10 @@
-"""What a simulation tells a turret of the robot that it sits on, and which turrets there are by name."""
+"""Turrets on the robots of a world: which there are by name, and what one may ask of the robot it sits on."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from kiks.engine.physics.gripper import find_object
 from kiks.engine.sensing.range_finder import chance, probe
@@ -14,13 +14,13 @@ from kiks.firmware.battle import Battle
 from kiks.firmware.general_io import GeneralIO
 from kiks.firmware.gripper import Gripper
 from kiks.firmware.k213 import K213
-from kiks.firmware.radio import Radio
+from kiks.firmware.khepera import Firmware
+from kiks.firmware.radio import Radio, deliver
 from kiks.firmware.turret import AnyTurret, Met, Turret
 from kiks.model.checks import check_heading
 from kiks.model.robot import RobotSpec
-
-if TYPE_CHECKING:
-    from kiks.sim.simulation import Simulation
+from kiks.sim.cameras import Cameras
+from kiks.sim.world import World
 
 KINDS: dict[str, type[Turret]] = {"gripper": Gripper, "radio": Radio, "io": GeneralIO, "battle": Battle}
 
@@ -31,18 +31,80 @@ STREAM_TURRET = 1000
 """Random streams from here on are the turrets', each its number farther."""
 
 
+class Turrets:
+    """The turrets on all robots of a world.
+
+    Args:
+        world: The world.
+        firmwares: Of its robots, in their order; the list grows when robots are added.
+    """
+
+    def __init__(self, world: World, firmwares: Sequence[Firmware]) -> None:
+        self._world = world
+        self._firmwares = firmwares
+        self.cameras = Cameras(world)
+        self._radios: dict[int, Radio] = {}
+
+    def sync(self) -> None:
+        """Do the ticks that have begun, take the pictures that are due on the way, and deliver radio messages."""
+        if self.cameras:
+            self.cameras.sync()
+        self._world.tick_to(self._world.now_ns)
+        if self._radios:
+            deliver(self._radios, self._world.now_ns)
+
+    def fit(self, index: int, turret: str | Turret) -> Turret:
+        """Put a turret on a robot; return it.
+
+        Args:
+            index: The robot's index.
+            turret: Its name, or one of a user's own.
+
+        Raises:
+            ParameterError: If there is no such turret, or the robot has one of its number already.
+        """
+        firmware = self._firmwares[index]
+        fitted = named(turret, lambda: self.cameras.camera(index))
+        there = [each for each in firmware.fitted if each.number == fitted.number]
+        if there:
+            raise ParameterError(
+                f"turret must be one that robot {index + 1} has not got, but {shown(there[0].name)} has its number, "
+                f"{fitted.number}. Give a turret of your own another, 24 to 31."
+            )
+        site = RobotSite(self._world, self.sync, self._firmwares, index, fitted, first_memory(fitted, firmware.fitted))
+        fitted.fit(site)
+        firmware.fit(fitted)
+        if isinstance(fitted, Radio):
+            self._radios = site.turrets(Radio)
+        elif isinstance(fitted, K213):
+            self.cameras.fit(index, fitted)
+        return fitted
+
+
 class RobotSite:
     """A `kiks.firmware.turret.Site`: the back of a robot of a simulation.
 
     Args:
-        sim: The simulation.
-        index: Which robot, from 0.
-        turret: Who asks.
-        first: Where its numbers begin among those that turrets remember.
+        world: The world.
+        sync: Brings the world up to date.
+        firmwares: Of all robots.
+        index: The robot's index.
+        turret: The turret that sits here.
+        first: Index of its first number among those that turrets remember.
     """
 
-    def __init__(self, sim: Simulation, index: int, turret: Turret, first: int) -> None:
-        self._sim = sim
+    def __init__(
+        self,
+        world: World,
+        sync: Callable[[], None],
+        firmwares: Sequence[Firmware],
+        index: int,
+        turret: Turret,
+        first: int,
+    ) -> None:
+        self._world = world
+        self._sync = sync
+        self._firmwares = firmwares
         self._index = index
         self._stream = STREAM_TURRET + turret.number
         self._first, self._count = first, turret.memory_count
@@ -55,12 +117,12 @@ class RobotSite:
     @property
     def spec(self) -> RobotSpec:
         """What kind of robot it is."""
-        return self._sim.specs[self._index]
+        return self._world.specs[self._index]
 
     @property
     def record(self) -> Any:
         """The robot's record of `kiks.engine.state.ROBOT`."""
-        return self._sim.state.robots[0, self._index]
+        return self._world.state.robots[0, self._index]
 
     @property
     def memory(self) -> Any:
@@ -70,57 +132,63 @@ class RobotSite:
     @property
     def arena_mm(self) -> tuple[float, float]:
         """Width and height of the arena [mm]."""
-        return float(self._sim.arena.width_mm), float(self._sim.arena.height_mm)
+        return float(self._world.arena.width_mm), float(self._world.arena.height_mm)
 
     @property
     def lock(self) -> AbstractContextManager[Any]:
         """To be held by whoever changes something from outside the simulation."""
-        return self._sim.lock
+        return self._world.lock
 
     @property
     def time_ns(self) -> int:
         """The simulated time [ns]."""
-        return self._sim.now_ns
+        return self._world.now_ns
 
     def pose(self) -> tuple[float, float, float]:
         """Return where the robot is: x_mm, y_mm, heading_rad."""
-        return self._sim.pose(self._index + 1)
+        with self.lock:
+            self._sync()
+            return self._world.pose(self._index)
 
     def ray(self, angle_rad: float = 0.0) -> Met:
         """Return what is in a direction, counter-clockwise from ahead."""
-        sim = self._sim
-        sim.sync()
-        ticks, now_ns = sim.state.tick_count, sim.now_ns
+        world = self._world
+        self._sync()
+        ticks, now_ns = world.state.tick_count, world.now_ns
         angle_rad = check_heading("angle_rad", angle_rad)
-        distance_mm, disc, brightness = probe(sim.scene, sim.sight, ticks, now_ns, self._index, angle_rad)
+        distance_mm, disc, brightness = probe(world.scene, world.sight, ticks, now_ns, self._index, angle_rad)
         if disc < 0:
             return Met(distance_mm, brightness)
-        if disc < sim.robot_count:
+        if disc < world.robot_count:
             return Met(distance_mm, brightness, robot=disc + 1)
-        body: Any = sim.state.bodies[0, disc - sim.robot_count]
+        body: Any = world.state.bodies[0, disc - world.robot_count]
         return Met(distance_mm, brightness, body=int(body["number"]))
 
     def random(self, index: int = 0, time_ns: int | None = None) -> float:
         """Return a number in [0, 1) that belongs to this seed, robot, turret, time (the present one) and index."""
-        time_ns = self._sim.now_ns if time_ns is None else time_ns
-        return float(chance(self._sim.seed, self._index, self._stream, time_ns, index))
+        time_ns = self._world.now_ns if time_ns is None else time_ns
+        return float(chance(self._world.seed, self._index, self._stream, time_ns, index))
 
     def poses(self) -> list[tuple[float, float, float]]:
         """Return where all robots are, robot 1 first."""
-        return [(x_mm, y_mm, heading_rad) for x_mm, y_mm, heading_rad in self._sim.poses().tolist()]
+        with self.lock:
+            self._sync()
+            return [self._world.pose(index) for index in range(self._world.robot_count)]
 
     def bodies(self) -> Any:
         """Return the balls and cylinders, records of `kiks.engine.state.BODY`."""
-        return self._sim.bodies()
+        with self.lock:
+            self._sync()
+            return self._world.state.bodies[0].copy()
 
     def held_body(self) -> Any:
         """Return the record of what a gripper holds or has between its jaws, None for nothing."""
-        row = find_object(self._sim.scene, self._index)
-        return None if row < 0 else self._sim.state.bodies[0, row]
+        row = find_object(self._world.scene, self._index)
+        return None if row < 0 else self._world.state.bodies[0, row]
 
     def turrets(self, kind: type[AnyTurret]) -> dict[int, AnyTurret]:
         """Return the turrets of a kind on all robots, by the robots' numbers, in rising order."""
-        found = enumerate((wire.firmware.fitted for wire in self._sim.wires), 1)
+        found = enumerate((firmware.fitted for firmware in self._firmwares), 1)
         return {robot: each for robot, fitted in found for each in fitted if isinstance(each, kind)}
 
 

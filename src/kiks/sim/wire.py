@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from heapq import heappop, heappush
 
 from kiks.clock.serial_timing import SerialTiming
 from kiks.firmware.khepera import Firmware
@@ -18,31 +17,12 @@ Hear = Callable[[bytes, int], None]
 """Takes a reply, and when its last character arrives [ns]."""
 
 
-class Agenda:
-    """Which of many wires acts first, without a look at each of them."""
-
-    def __init__(self) -> None:
-        self._entries: list[tuple[int, int]] = []
-
-    def note(self, time_ns: int, index: int) -> None:
-        """Note that a wire is going to act at a time [ns]."""
-        heappush(self._entries, (time_ns, index))
-
-    def first(self, wires: list[Wire]) -> Wire:
-        """Return the wire that acts first, of two at the same instant the one with the lower number."""
-        entries = self._entries
-        # A wire that has acted, or acts sooner than it was noted for, has left an entry behind.
-        while entries and wires[entries[0][1]].next_ns != entries[0][0]:
-            heappop(entries)
-        return wires[entries[0][1] if entries else 0]
-
-
 class Wire:
     """One robot's line, its firmware, and the commands that have been sent but have not acted yet.
 
     Args:
         firmware: The robot's.
-        agenda: Where it notes when it acts next.
+        plan: Is called with the time [ns] and the robot's index when the next event of this line is known.
         index: The robot's index.
 
     Attributes:
@@ -53,9 +33,9 @@ class Wire:
         next_ns: When the robot does something next [ns], or None while it only waits for characters.
     """
 
-    def __init__(self, firmware: Firmware, agenda: Agenda, index: int) -> None:
+    def __init__(self, firmware: Firmware, plan: Callable[[int, int], None], index: int) -> None:
         self.firmware = firmware
-        self._agenda = agenda
+        self._add_event = plan
         self._index = index
         self.line = SerialTiming(firmware.baud)
         self.holder: str | None = None
@@ -90,7 +70,7 @@ class Wire:
             self.pending.append((self._last_act_ns, line, hear))
             if self.next_ns is None or self._last_act_ns < self.next_ns:
                 self.next_ns = self._last_act_ns
-                self._agenda.note(self.next_ns, self._index)
+                self._add_event(self.next_ns, self._index)
         if (log := self.log) is not None:
             due = list(self.pending)[len(self.pending) - len(lines) :] if lines else []
             log.send(data, start_ns, character_ns, [(k, each[0]) for (k, _), each in zip(lines, due, strict=True)])
@@ -124,7 +104,7 @@ class Wire:
         else:
             self.next_ns = min(command_ns, demo_ns)
         if self.next_ns is not None:
-            self._agenda.note(self.next_ns, self._index)
+            self._add_event(self.next_ns, self._index)
 
     def watch(self, now_ns: int) -> WireLog:
         """Remember what goes over the line from now [ns] on, if nobody does yet; `unwatch` as often as this."""

@@ -11,7 +11,7 @@ from kiks.clock.program_clock import ProgramClock
 from kiks.errors import LinkError
 from kiks.ports.local_link import Awaited, NearConnection, Patient, VisitorLine
 from kiks.ports.messages import Kind
-from kiks.ports.port import VirtualPort
+from kiks.sim.port import VirtualPort
 from kiks.sim.simulation import Simulation
 from kiks.toolbox.session import Session
 from kiks.units import s_from_ns

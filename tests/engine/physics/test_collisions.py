@@ -45,7 +45,7 @@ class Company:
 
     def speed(self, robot, left, right=None):
         self.sim.sync()
-        motor.set_speed(self.sim.state.robots, 0, robot - 1, left, left if right is None else right)
+        motor.set_speed(self.sim.world.state.robots, 0, robot - 1, left, left if right is None else right)
 
     def roll(self, body, velocity_x, velocity_y=0.0):
         self.bodies["velocity_x"][body - 1], self.bodies["velocity_y"][body - 1] = velocity_x, velocity_y
@@ -61,7 +61,7 @@ class Company:
 
     @property
     def bodies(self):
-        return self.sim.state.bodies[0]
+        return self.sim.world.state.bodies[0]
 
     @property
     def places(self):
@@ -76,7 +76,7 @@ class Company:
         return np.hypot(*self.velocities.T)
 
     def wheels(self, robot):
-        return self.sim.state.robots["wheel_pulses"][0, robot - 1].copy()
+        return self.sim.world.state.robots["wheel_pulses"][0, robot - 1].copy()
 
 
 # ---- pile-ups ----
@@ -226,7 +226,7 @@ def test_a_robot_kicks_a_ball_at_nearly_its_own_speed(speed):
     for _ in company.tick(6000 // speed * 100):
         if company.speeds[0] > 0.0:
             break
-    robot = company.sim.state.robots[0, 0]
+    robot = company.sim.world.state.robots[0, 0]
     true_speed = (robot["x_mm"] - robot["trail"][0, 0]) / 0.01
     assert company.velocities[0] == pytest.approx((0.975 * true_speed, 0.0), abs=0.2)  # it may have rolled for a tick
 
@@ -414,13 +414,13 @@ def test_how_time_is_cut_does_not_matter():
 def test_a_run_goes_on_from_a_snapshot_to_the_bit():
     company = everything()
     company.run(3.0)
-    snapshot = company.sim.state.snapshot()
+    snapshot = company.sim.world.state.snapshot()
     time_ns = company.sim.now_ns
     company.run(5.0)
     expected = company.sim.state_hash(), company.sim.proximity(1, noise=True)
-    company.sim.state.restore(snapshot)
-    company.sim.now_ns = time_ns
-    company.sim._enter()
-    assert company.sim.state.hash() == snapshot.hash()
+    company.sim.world.state.restore(snapshot)
+    company.sim.world.now_ns = time_ns
+    company.sim.world.rebuild_scene()
+    assert company.sim.world.state.hash() == snapshot.hash()
     company.run(5.0)
     assert (company.sim.state_hash(), company.sim.proximity(1, noise=True)) == expected

@@ -113,7 +113,7 @@ def test_a_sensor_sees_a_ball_where_it_was_when_it_looked():
     floor = Arena.box(800, 800)
     start = (Pose(400.0, 400.0, math.pi / 2),)
     sim = Simulation(replace(floor, starts=start, balls=(Ball(300.0, 480.0, 32.0, 0.0),)), robot=EXACT)
-    sim.state.bodies["velocity_x"] = 1000.0
+    sim.world.state.bodies["velocity_x"] = 1000.0
     still = Simulation(replace(floor, starts=start, balls=(Ball(300.0, 480.0),)), robot=EXACT)
     different = 0
     for _ in range(20):
@@ -168,7 +168,7 @@ def test_what_is_lifted_nobody_sees_or_meets():
     assert lifted.proximity(1) != alone.proximity(1)
     assert lifted.ambient(1) != alone.ambient(1)
     lifted.state.bodies["is_lifted"] = 1
-    lifted._enter()
+    lifted.world.rebuild_scene()
     assert lifted.proximity(1) == alone.proximity(1)
     assert lifted.ambient(1) == alone.ambient(1)
     assert lifted.image(1) == alone.image(1)
@@ -195,7 +195,7 @@ def test_robots_balls_and_cylinders_hide_lamps(what):
     alone.lamps[0, 3] = 0.0
     dark = alone.ambient(1)
     alone.lamps[0, 3] = 1.0
-    parameters = alone.scene[2][0]
+    parameters = alone.world.scene[2][0]
     cosine, sine = math.cos(start.heading_rad), math.sin(start.heading_rad)
     for _ in range(150):
         lamp = rng.uniform(100, 900, 2)

@@ -10,7 +10,6 @@ from tests.symmetry import mirrored, symmetric
 
 import kiks
 from kiks.model.robot import RobotSpec
-from kiks.sim.snapshot import proximity_from
 
 QUIET = RobotSpec.load("khepera").with_changes(
     proximity__noise_small=0.0,
@@ -133,7 +132,7 @@ def test_readings_from_many_poses_are_those_of_a_robot_that_is_put_there(respons
     turns = [*np.linspace(-9.0, 9.0, 13).tolist(), 1e20]
     poses = [[x, y, turn] for x, y in ((28.5, 100.0), (174.0, 203.0), (100.0, 100.0), (60.0, 275.0)) for turn in turns]
     before = sim.state_hash()
-    readings = proximity_from(sim, 1, np.array(poses))
+    readings = sim.proximity_at(1, np.array(poses))
     assert sim.state_hash() == before
     for pose, expected in zip(poses, readings.tolist(), strict=True):
         sim.place(1, *pose)
@@ -151,4 +150,4 @@ def test_readings_from_many_poses_are_those_of_a_robot_that_is_put_there(respons
 )
 def test_poses_that_cannot_be_are_refused(poses: list[list[float]], words: str) -> None:
     with pytest.raises(kiks.ParameterError, match=words):
-        proximity_from(kiks.Simulation(kiks.Arena.box(600, 600)), 1, np.array(poses))
+        kiks.Simulation(kiks.Arena.box(600, 600)).proximity_at(1, np.array(poses))

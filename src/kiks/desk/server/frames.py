@@ -100,7 +100,7 @@ def pack_frame(
         is_held: Says of "robot" and an index whether a hand holds it; nobody does if left out.
     """
     seen = sim.look()
-    records: Any = sim.state.robots[0]
+    records: Any = sim.world.state.robots[0]
     robots: Any = np.zeros(sim.robot_count, ROBOT)
     robots["pose"] = seen.poses
     robots["measured_speed"] = records["measured_speed"]
@@ -141,7 +141,7 @@ def _commanded(records: Any) -> NDArray[np.float64]:
 
 
 def _pack_bodies(sim: Simulation, places: NDArray[np.float64]) -> NDArray[np.float32]:
-    records: Any = sim.state.bodies[0]
+    records: Any = sim.world.state.bodies[0]
     bodies = np.empty((len(records), 3), "<f4")
     bodies[:, :2] = places
     bodies[:, 2] = np.where(records["is_lifted"] != 0, LIFTED, np.where(records["holder"] != 0, GRIPPED, 0.0))
@@ -152,7 +152,7 @@ def _pack_cameras(sim: Simulation) -> NDArray[np.void]:
     who = [
         index for index, wire in enumerate(sim.wires) if any(isinstance(each, K213) for each in wire.firmware.fitted)
     ]
-    records: Any = sim.state.robots[0, who]
+    records: Any = sim.world.state.robots[0, who]
     cameras: Any = np.zeros(len(who), CAMERA)
     cameras["robot"], cameras["light"], cameras["pixels"] = who, records["camera_light"], records["camera_pixels"]
     packed: NDArray[np.void] = cameras
@@ -198,7 +198,7 @@ def describe_scene(sim: Simulation, scene: int, names: Sequence[str] | None = No
 
 def _describe_robot(sim: Simulation, index: int, name: str) -> dict[str, Any]:
     spec, turrets = sim.specs[index], sim.turrets(index + 1)
-    parameters = sim.scene[2][int(sim.state.robots["kind"][0, index])]
+    parameters = sim.world.scene[2][int(sim.world.state.robots["kind"][0, index])]
     # A thousandth of a millimetre and of a radian's hundredth: more digits would only make the message longer.
     angles_rad = np.arctan2(parameters["ray_sin"], parameters["ray_cos"])[:, :RAY_COUNT].round(5).tolist()
     x_mm, y_mm = (parameters[name].round(3).tolist() for name in ("ray_x_mm", "ray_y_mm"))

@@ -129,7 +129,7 @@ class Gateway:
     def _look(self, sim: Simulation) -> bytes:
         desk = self._desk
         sim.sync()
-        seen = (sim, sim.arena, desk.scene, len(sim.lamps), *sim.state.bodies["number"][0].tolist())
+        seen = (sim, sim.arena, desk.scene, len(sim.lamps), *sim.world.state.bodies["number"][0].tolist())
         turrets = sum(len(wire.firmware.fitted) for wire in sim.wires)
         if (*seen, turrets) != self._seen:
             self._seen = (*seen, turrets)

@@ -9,7 +9,7 @@ from serial import PortNotOpenError, SerialBase, SerialException  # noqa: TID253
 
 from kiks.errors import KiksError, shown
 from kiks.ports import url
-from kiks.ports.port import VirtualPort
+from kiks.sim.port import VirtualPort
 
 
 class Serial(SerialBase):  # type: ignore[misc, unused-ignore]

@@ -13,10 +13,10 @@ from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from kiks.ports.port import VirtualPort
 from kiks.script.file_waits import poll_files
 from kiks.script.thread_scheduler import Scheduler
 from kiks.script.unsupported import refuse
+from kiks.sim.port import VirtualPort
 
 BLINK_S = 0.02
 """How often a window or a keyboard is looked at while only a person can go on [s of real time]."""

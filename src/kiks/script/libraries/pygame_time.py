@@ -7,9 +7,9 @@ from collections import deque
 from types import ModuleType
 from typing import Any
 
-from kiks.ports.read_completion import NEVER_NS
 from kiks.script.libraries import BLINK_S, Host
 from kiks.script.thread_scheduler import STUCK, Task, timeout_ns
+from kiks.sim.read_completion import NEVER_NS
 
 NS_PER_MS = 1_000_000
 FPS_FRAMES = 10

@@ -7,9 +7,9 @@ import time
 from types import ModuleType
 from typing import Any
 
-from kiks.ports.read_completion import NEVER_NS
 from kiks.script.libraries import BLINK_S, Host
 from kiks.script.thread_scheduler import STUCK, Task
+from kiks.sim.read_completion import NEVER_NS
 from kiks.units import NS_PER_S
 
 _real_sleep = time.sleep

@@ -1,74 +1,61 @@
-"""The port in memory: a serial port without a wire, in the program's own process, whose waits cost no time.
+"""The line behind a port in memory: program and simulation run in one process, so waiting takes no real time.
 
-A program that reads waits in simulated time: up to the instant at which the characters have arrived, or its time-out.
+A program that reads waits in simulated time: until the characters have arrived, or until its timeout.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import SHOWN_MAX, LinkError, shown
 from kiks.model.checks import check_kind
-from kiks.ports.port import VirtualPort
-from kiks.ports.read_completion import NEVER_NS, Read, end_of_read, end_of_wait, is_complete, never_ends
-
-if TYPE_CHECKING:
-    from kiks.sim.simulation import Simulation
-    from kiks.sim.wire import Wire
+from kiks.sim.event_loop import EventLoop
+from kiks.sim.read_completion import NEVER_NS, Read, end_of_read, end_of_wait, is_complete, never_ends
+from kiks.sim.wire import Wire
 
 
-class SimPort(VirtualPort):
-    """The computer's end of a robot's line in a simulation of this process.
+class LocalLine:
+    """A robot's line in this process: the program's time is that of the simulation.
 
-    Attributes:
-        sim: The simulation.
+    Args:
+        loop: The event loop of the simulation.
         robot: Number of the robot, from 1.
     """
 
-    def __init__(self, sim: Simulation, robot: int) -> None:
-        super().__init__(NearLine(sim, robot), sim.program)
-        self.sim = sim
-        self.robot = robot
-
-
-class NearLine:
-    """A robot's line in this process: the program's time is the simulation's."""
-
-    def __init__(self, sim: Simulation, robot: int) -> None:
-        self.lock = sim.lock
-        self._sim = sim
+    def __init__(self, loop: EventLoop, robot: int) -> None:
+        self.lock = loop.lock
+        self._loop = loop
+        self._world = loop.world
         self._robot = robot
-        self._wire = sim.wires[robot - 1]
+        self._wire = loop.wires[robot - 1]
         self._is_claimed = False
 
     @property
     def now_ns(self) -> int:
         """The simulated time [ns]."""
-        return self._sim.now_ns
+        return self._world.now_ns
 
     def pass_to(self, time_ns: int) -> None:
         """Let time pass up to a time [ns]."""
-        self._sim.advance_to(time_ns)
+        self._loop.advance_to(time_ns)
 
     def think(self, time_ns: int) -> None:
         """Let the time pass that the program has thought [ns]; it is one program, whichever of its ports it uses."""
-        sim = self._sim
-        from_ns = sim.now_ns
-        sim.advance_to(from_ns + time_ns)
-        for wire in sim.wires:
+        from_ns = self._world.now_ns
+        self._loop.advance_to(from_ns + time_ns)
+        for wire in self._loop.wires:
             if wire is self._wire or wire.holder is not None:
                 wire.think(from_ns, from_ns + time_ns)
 
     def send(self, data: bytes) -> None:
         """Put characters on the line; wait while it is full."""
-        sim, wire = self._sim, self._wire
+        world, advance_to, wire = self._world, self._loop.advance_to, self._wire
         while data:
             room_ns = wire.line.room_ns
-            if room_ns > sim.now_ns:
-                sim.advance_to(room_ns)
-            wire.send(data[:BACKLOG_LIMIT], sim.now_ns)
+            if room_ns > world.now_ns:
+                advance_to(room_ns)
+            wire.send(data[:BACKLOG_LIMIT], world.now_ns)
             data = data[BACKLOG_LIMIT:]
 
     def read(self, size: int | None, terminator: bytes | None, timeout_ns: int | None, poll_ns: int) -> bytes:
@@ -77,38 +64,38 @@ class NearLine:
         Raises:
             LinkError: If it could wait for ever.
         """
-        sim, wire = self._sim, self._wire
-        begin_ns = sim.now_ns
+        world, advance_to, wire = self._world, self._loop.advance_to, self._wire
+        begin_ns = world.now_ns
         deadline_ns = NEVER_NS if timeout_ns is None else begin_ns + timeout_ns
         while (end := end_of_read(wire, size, terminator, deadline_ns, begin_ns + poll_ns)) is None:
-            sim.advance_to(wire.next_ns or 0)
+            advance_to(wire.next_ns or 0)
         end_ns, count = end
         if end_ns == NEVER_NS:
             raise never_ends(self._robot)
-        sim.advance_to(end_ns)
+        advance_to(end_ns)
         return wire.line.take(count)
 
     def arrived_count(self) -> int:
         """Return how many characters have arrived and were not read."""
-        return self._wire.line.arrived_count(self._sim.now_ns)
+        return self._wire.line.arrived_count(self._world.now_ns)
 
     def sent_ns(self) -> int:
         """Return when everything will have been sent [ns]."""
-        return max(self._wire.line.sending_until_ns, self._sim.now_ns)
+        return max(self._wire.line.sending_until_ns, self._world.now_ns)
 
     def room_ns(self) -> int:
         """Return when the line takes more characters [ns]."""
-        return max(self._wire.line.room_ns, self._sim.now_ns)
+        return max(self._wire.line.room_ns, self._world.now_ns)
 
     def wait_for(self, reads: Sequence[Read], until_ns: int) -> list[bool]:
         """Let time pass until one of several reads is complete; see `Line.wait_for`."""
-        sim = self._sim
+        loop, world = self._loop, self._world
         while True:
-            end_ns, is_known = end_of_wait(sim.wires, reads, until_ns)
+            end_ns, is_known = end_of_wait(loop.wires, reads, until_ns)
             if end_ns < NEVER_NS:
-                sim.advance_to(end_ns)
+                loop.advance_to(end_ns)
             if is_known:
-                return [is_complete(sim.wires[read.robot - 1], read, sim.now_ns) for read in reads]
+                return [is_complete(loop.wires[read.robot - 1], read, world.now_ns) for read in reads]
 
     def drop_arrived(self) -> None:
         """Forget the characters that have arrived and were not read."""

@@ -15,7 +15,7 @@ from typing import Any, Protocol
 from kiks.clock.program_clock import ProgramClock
 from kiks.errors import ParameterError, shown
 from kiks.model.checks import SECONDS_MAX, check_count, check_number
-from kiks.ports.read_completion import Read
+from kiks.sim.read_completion import Read
 from kiks.units import ns_from_s, s_from_ns, wait_ns
 
 BAUD_MIN = 75

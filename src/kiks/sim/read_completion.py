@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from kiks.errors import LinkError
-
-if TYPE_CHECKING:
-    from kiks.sim.wire import Wire
+from kiks.sim.wire import Wire
 
 NEVER_NS = 1 << 63
 """A time [ns] that no simulation reaches."""

@@ -1,0 +1,86 @@
+"""The event loop of a simulation: time passes from one event on a robot's serial line to the next."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from heapq import heappop, heappush
+
+from kiks.clock.gate import Gate
+from kiks.firmware.khepera import Firmware
+from kiks.model.checks import CLOCK_END_NS, check_count
+from kiks.sim.wire import Wire
+from kiks.sim.world import World
+
+
+class EventQueue:
+    """The events to come, so that the earliest one is found without asking every wire."""
+
+    def __init__(self) -> None:
+        self._entries: list[tuple[int, int]] = []
+
+    def add(self, time_ns: int, index: int) -> None:
+        """Add the next event of a wire, at a time [ns]."""
+        heappush(self._entries, (time_ns, index))
+
+    def first(self, wires: list[Wire]) -> Wire:
+        """Return the wire with the earliest event; at the same instant, the one with the lower number."""
+        entries = self._entries
+        # A wire that has acted, or acts sooner than it was added for, leaves an outdated entry behind.
+        while entries and wires[entries[0][1]].next_ns != entries[0][0]:
+            heappop(entries)
+        return wires[entries[0][1] if entries else 0]
+
+
+class EventLoop:
+    """Lets time pass in a world: does the events on its serial lines in their order.
+
+    Args:
+        world: The world.
+        sync: Brings the world up to date before an event.
+
+    Attributes:
+        wires: The robots' serial lines.
+        gate: Decides how far time may go while it is watched; None while nothing watches it.
+    """
+
+    def __init__(self, world: World, sync: Callable[[], None]) -> None:
+        self.world = world
+        self.lock = world.lock
+        self.wires: list[Wire] = []
+        self.gate: Gate | None = None
+        self._sync = sync
+        self._events = EventQueue()
+
+    def add_wire(self, firmware: Firmware) -> None:
+        """Add the serial line of one more robot."""
+        self.wires.append(Wire(firmware, self._events.add, len(self.wires)))
+
+    def advance_to(self, time_ns: int) -> None:
+        """Let time pass up to a time [ns]; does nothing if that has passed already.
+
+        Raises:
+            ParameterError: If it is no whole number, or beyond the end of the clock.
+        """
+        if not (time_ns.__class__ is int and time_ns <= CLOCK_END_NS):
+            time_ns = check_count("time_ns", time_ns, -CLOCK_END_NS, CLOCK_END_NS)
+        gate = self.gate
+        if gate is not None and gate.is_up:
+            while (until_ns := gate.admit(self.world.now_ns, time_ns)) < time_ns:
+                self._advance_to(until_ns)
+        self._advance_to(time_ns)
+
+    def _advance_to(self, time_ns: int) -> None:
+        world, events, wires = self.world, self._events, self.wires
+        wire = events.first(wires)
+        while wire.next_ns is not None and wire.next_ns <= time_ns:
+            if wire.next_ns > world.now_ns:
+                world.now_ns = wire.next_ns
+            self._sync()
+            wire.act(world.now_ns)
+            wire = events.first(wires)
+        if time_ns > world.now_ns:
+            world.now_ns = time_ns
+
+    def next_event_ns(self) -> int | None:
+        """Return when a robot acts next [ns]; None while all of them wait for characters."""
+        return self._events.first(self.wires).next_ns

@@ -1,0 +1,53 @@
+"""What the proximity and light sensors of the robots in a world read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.engine.sensing import ambient, proximity
+from kiks.errors import ParameterError, shown
+from kiks.model.robot import SENSOR_COUNT
+from kiks.sim.world import World
+
+
+class Sensors:
+    """Reads sensors by the engine's kernels; the ticks that have begun are done.
+
+    Args:
+        world: The world.
+    """
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._counts = np.zeros(SENSOR_COUNT, np.int64)
+        self._expected = np.zeros(SENSOR_COUNT, np.float64)
+
+    def proximity(self, index: int, is_noisy: bool = True) -> list[Any]:
+        """Return what a robot's proximity sensors read now: counts with noise, or what is expected without it."""
+        return self._read(proximity.read_proximity, self._world.networks, index, is_noisy)
+
+    def ambient(self, index: int, is_noisy: bool = True) -> list[Any]:
+        """Return what a robot's light sensors read now: counts with noise, or what is expected without it."""
+        return self._read(ambient.read_ambient, self._world.lamps, index, is_noisy)
+
+    def _read(self, kernel: Callable[..., Any], given: NDArray[Any], index: int, is_noisy: bool) -> list[Any]:
+        if not isinstance(is_noisy, bool):
+            raise ParameterError(f"noise must be True or False, but it was {shown(is_noisy)}.")
+        world = self._world
+        out = self._counts if is_noisy else self._expected
+        kernel(
+            world.scene,
+            world.sight,
+            given,
+            world.state.tick_count,
+            world.now_ns,
+            world.seed,
+            index,
+            is_noisy,
+            out,
+        )
+        return out.tolist()
