@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import serial  # noqa: TID253  (pyserial has to be told where our plug-in is)
 
 from kiks import upwards
+from kiks.version import __version__
 
 if TYPE_CHECKING:
     from kiks.batch.batch import Batch
@@ -36,8 +37,6 @@ if TYPE_CHECKING:
     from kiks.model.robot import RobotSpec
     from kiks.sim.simulation import Simulation
 
-__version__ = "3.0.0.dev0"
-
 __all__ = [
     "Arena",
     "ArenaError",
@@ -56,6 +55,7 @@ __all__ = [
     "Status",
     "Task",
     "Timing",
+    "__version__",
     "controller",
     "controllers",
     "drive",

@@ -19,7 +19,7 @@ from tests.ports.test_lockstep import busy_computer, said
 from tests.served import GUARD_S, PROGRAMS, fresh
 
 import kiks as package
-from kiks.cli.run import parse_words
+from kiks.cli.options import parse_words
 from kiks.errors import LinkError, ParameterError
 from kiks.ports.port_names import Names
 from kiks.ports.program_process import Command

@@ -6,7 +6,6 @@ import sys
 
 import typer
 
-from kiks import __version__
 from kiks.cli.accuracy import accuracy
 from kiks.cli.arena import arena
 from kiks.cli.calibrate import calibrate
@@ -24,6 +23,7 @@ from kiks.cli.session import session
 from kiks.cli.warmup import warmup
 from kiks.errors import KiksError
 from kiks.ports.file_descriptors import raise_limit
+from kiks.version import __version__
 
 app = typer.Typer(
     help="KiKS Is a Khepera Simulator: programs for a real Khepera robot run on a simulated one, unchanged.",

@@ -149,7 +149,7 @@ def _exam(evolution: Evolution) -> str:
 def _controller(kind: ControllerKind, task: Task) -> Controller:
     """Return a controller of a kind with the senses and the speed limit of a task's own."""
     from kiks.control.controllers import from_recipe
-    from kiks.learn.tasks import SPEED_LIMIT
+    from kiks.learn.ready_tasks import SPEED_LIMIT
 
     recipe: dict[str, Any] = {"kind": str(kind), "senses": list(task.controller.senses), "speed_limit": SPEED_LIMIT}
     if kind is ControllerKind.CTRNN:

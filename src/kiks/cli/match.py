@@ -92,7 +92,7 @@ def player(words: str | None, robot: int, side: str) -> Command:
         >>> player(None, 2, "right").arguments
         ['kiks://2', 'right']
     """
-    from kiks.cli.run import parse_words
+    from kiks.cli.options import parse_words
     from kiks.demos import soccer
     from kiks.ports.program_process import Command
 

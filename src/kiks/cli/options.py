@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import shlex
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -14,8 +16,8 @@ from kiks.model.atomic_files import check_writable, make_folder
 if TYPE_CHECKING:
     from kiks.model.arena import Arena
     from kiks.model.project import Project
+    from kiks.ports.program_process import Command
     from kiks.sim.simulation import Simulation
-import logging
 
 ArenaFile = Annotated[
     str | None, typer.Option(help="Arena (.toml, .kad), picture, or project's world (.kiks); the classic box if none.")
@@ -185,3 +187,37 @@ def show_log(*, is_quiet: bool = False) -> None:
     log = logging.getLogger("kiks")
     log.handlers = [_Lines()]
     log.setLevel(logging.WARNING if is_quiet else logging.INFO)
+
+
+def parse_words(words: list[str]) -> list[Command]:
+    """Return the programs that the words of a command line name, each with its arguments.
+
+    A word that names a file ending in .py begins a program. A word with blanks that is no file is split as a shell
+    does; if it begins with such a file, it is a program with all its arguments, which may then be .py files themselves.
+
+    Raises:
+        ParameterError: If the first word is no file.
+    """
+    from kiks.ports.program_process import Command
+
+    commands: list[Command] = []
+    for word in words:
+        parts = _split(word)
+        if Path(word).is_file() and (word.endswith(".py") or not commands):
+            commands.append(Command(Path(word)))
+        elif len(parts) > 1 and parts[0].endswith(".py") and Path(parts[0]).is_file():
+            commands.append(Command(Path(parts[0]), parts[1:]))
+        elif commands:
+            commands[-1].arguments.append(word)
+        else:
+            found = f"{shown(word)} is a folder" if Path(word).is_dir() else f"there is no file {shown(word)}"
+            raise ParameterError(f"PROGRAM must be a Python file, but {found}. Give its path before its own arguments.")
+    return commands
+
+
+def _split(word: str) -> list[str]:
+    """Return the words of a quoted word; none if its quotes are not closed."""
+    try:
+        return shlex.split(word)
+    except ValueError:
+        return []

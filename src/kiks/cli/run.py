@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -26,6 +25,7 @@ from kiks.cli.options import (
     is_project,
     load_arena,
     load_world,
+    parse_words,
     say,
     show_log,
     with_robots,
@@ -233,40 +233,6 @@ def _run_one(sim: Simulation, command: Command, told: dict[str, int], record: Pa
             from kiks.clock.thinking import save_thinking
 
             save_thinking(sim.program.measured_ns, record)
-
-
-def parse_words(words: list[str]) -> list[Command]:
-    """Return the programs that the words of a command line name, each with its arguments.
-
-    A word that names a file ending in .py begins a program. A word with blanks that is no file is split as a shell
-    does; if it begins with such a file, it is a program with all its arguments, which may then be .py files themselves.
-
-    Raises:
-        ParameterError: If the first word is no file.
-    """
-    from kiks.ports.program_process import Command
-
-    commands: list[Command] = []
-    for word in words:
-        parts = _split(word)
-        if Path(word).is_file() and (word.endswith(".py") or not commands):
-            commands.append(Command(Path(word)))
-        elif len(parts) > 1 and parts[0].endswith(".py") and Path(parts[0]).is_file():
-            commands.append(Command(Path(parts[0]), parts[1:]))
-        elif commands:
-            commands[-1].arguments.append(word)
-        else:
-            found = f"{shown(word)} is a folder" if Path(word).is_dir() else f"there is no file {shown(word)}"
-            raise ParameterError(f"PROGRAM must be a Python file, but {found}. Give its path before its own arguments.")
-    return commands
-
-
-def _split(word: str) -> list[str]:
-    """Return the words of a quoted word; none if its quotes are not closed."""
-    try:
-        return shlex.split(word)
-    except ValueError:
-        return []
 
 
 def parse_map(entry: str) -> tuple[str, int]:

@@ -9,14 +9,11 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kiks.engine.physics import motor
-
-if TYPE_CHECKING:
-    from kiks.firmware.khepera import Firmware
+from kiks.firmware.robot import Robot
 
 Reply = tuple[object, ...]
 
@@ -76,54 +73,54 @@ def _gains(*values: int) -> list[int]:
     return [min(value, 32767) for value in values]
 
 
-def set_speed_gains(robot: Firmware, kp: int, ki: int, kd: int) -> Reply:
+def set_speed_gains(robot: Robot, kp: int, ki: int, kd: int) -> Reply:
     """Set the gains of the speed controllers of both motors."""
     robot.view.speed_gains[:] = _gains(kp, ki, kd)
     return ()
 
 
-def version(robot: Firmware) -> Reply:
+def version(robot: Robot) -> Reply:
     """Report the versions of the BIOS and of the protocol."""
     return (robot.spec.firmware.bios_version, robot.spec.firmware.protocol_version)
 
 
-def go_to_position(robot: Firmware, left: int, right: int) -> Reply:
+def go_to_position(robot: Robot, left: int, right: int) -> Reply:
     """Move each wheel to a counter reading along a trapezoid of speed; the reply does not wait for the arrival."""
     motor.set_position(robot.robots, robot.world, robot.number, _limit(left), _limit(right))
     return ()
 
 
-def set_speed(robot: Firmware, left: int, right: int) -> Reply:
+def set_speed(robot: Robot, left: int, right: int) -> Reply:
     """Turn the wheels at these speeds until the next command that moves them."""
     motor.set_speed(robot.robots, robot.world, robot.number, _limit(left), _limit(right))
     return ()
 
 
-def read_speed(robot: Firmware) -> Reply:
+def read_speed(robot: Robot) -> Reply:
     """Report the speeds measured in the last 10 ms."""
     return tuple(robot.view.measured_speed.tolist())
 
 
-def set_position_gains(robot: Firmware, kp: int, ki: int, kd: int) -> Reply:
+def set_position_gains(robot: Robot, kp: int, ki: int, kd: int) -> Reply:
     """Set the gains of the position controllers of both motors."""
     robot.view.position_gains[:] = _gains(kp, ki, kd)
     return ()
 
 
-def set_counters(robot: Firmware, left: int, right: int) -> Reply:
+def set_counters(robot: Robot, left: int, right: int) -> Reply:
     """Set the position counters; nothing moves."""
     # Beyond 32 bits the low ones count (khepera-protocol.md 4.8).
     motor.set_counters(robot.robots, robot.world, robot.number, left & 0xFFFFFFFF, right & 0xFFFFFFFF)
     return ()
 
 
-def read_counters(robot: Firmware) -> Reply:
+def read_counters(robot: Robot) -> Reply:
     """Report the position counters."""
     view = robot.view
     return tuple(((view.pulse_count + view.counter_offset + 2**31) % 2**32 - 2**31).tolist())
 
 
-def read_analog(robot: Firmware, channel: int) -> Reply:
+def read_analog(robot: Robot, channel: int) -> Reply:
     """Report an analogue input.
 
     Channel 0 is the charger, 1 the reflected and 2 the ambient light of the sensor being scanned, 3 to 5 are those of
@@ -139,14 +136,14 @@ def read_analog(robot: Firmware, channel: int) -> Reply:
     return (int(robot.view.analog_inputs[channel - 3]),) if channel >= 3 else (0,)
 
 
-def set_profile(robot: Firmware, max_left: int, acc_left: int, max_right: int, acc_right: int) -> Reply:
+def set_profile(robot: Robot, max_left: int, acc_left: int, max_right: int, acc_right: int) -> Reply:
     """Set the largest speed and the acceleration of position moves; applies at once, to a move in progress too."""
     robot.view.profile_speed[:] = _clamp(max_left, 1, 127), _clamp(max_right, 1, 127)
     robot.view.profile_acceleration[:] = _clamp(acc_left, 1, 255), _clamp(acc_right, 1, 255)
     return ()
 
 
-def read_status(robot: Firmware) -> Reply:
+def read_status(robot: Robot) -> Reply:
     """Report for each motor: T on target, M mode (0 speed, 1 position, 2 PWM), E error (command minus measurement)."""
     view = robot.view
     on_target, mode = view.on_target.tolist(), view.motor_mode.tolist()
@@ -154,7 +151,7 @@ def read_status(robot: Firmware) -> Reply:
     return (on_target[0], mode[0], error[0], on_target[1], mode[1], error[1])
 
 
-def set_led(robot: Firmware, led: int, action: int) -> Reply:
+def set_led(robot: Robot, led: int, action: int) -> Reply:
     """Switch the lateral (0) or the frontal (1) LED: 0 off, 1 on, 2 toggle."""
     _in_range(led, 0, 1)
     _in_range(action, 0, 2)
@@ -162,29 +159,29 @@ def set_led(robot: Firmware, led: int, action: int) -> Reply:
     return ()
 
 
-def read_proximity(robot: Firmware) -> Reply:
+def read_proximity(robot: Robot) -> Reply:
     """Report the reflected light of the eight sensors, clockwise from the left; more is nearer."""
     return tuple(robot.sense_proximity())
 
 
-def read_ambient(robot: Firmware) -> Reply:
+def read_ambient(robot: Robot) -> Reply:
     """Report the ambient light of the eight sensors, clockwise from the left; less is brighter."""
     return tuple(robot.sense_ambient())
 
 
-def set_pwm(robot: Firmware, left: int, right: int) -> Reply:
+def set_pwm(robot: Robot, left: int, right: int) -> Reply:
     """Feed the motors without control."""
     motor.set_pwm(robot.robots, robot.world, robot.number, _limit(left), _limit(right))
     return ()
 
 
-def read_bus(robot: Firmware, address: int) -> Reply:
+def read_bus(robot: Robot, address: int) -> Reply:
     """Read a byte from the extension bus; where nothing is fitted it is 0."""
     _in_range(address, 0, 63)
     return (int(robot.view.bus_inputs[address]),)
 
 
-def send_to_turret(robot: Firmware, turret: int, order: str, *values: int) -> Reply:
+def send_to_turret(robot: Robot, turret: int, order: str, *values: int) -> Reply:
     """Pass an order to a turret, whose number comes before its answer; order B asks for its version and revision."""
     fitted = robot.turrets.get(turret)
     if fitted is None:
@@ -202,7 +199,7 @@ def send_to_turret(robot: Firmware, turret: int, order: str, *values: int) -> Re
     return (turret, order.lower(), *reply)
 
 
-def write_bus(robot: Firmware, data: int, address: int) -> Reply:
+def write_bus(robot: Robot, data: int, address: int) -> Reply:
     """Write the low 8 bits of a number to the extension bus: data first, then the address."""
     _in_range(address, 0, 63)
     robot.view.bus[address] = np.uint8(data & 0xFF)

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from types import SimpleNamespace
-from typing import Any
 
-from kiks.engine.state import MODE_SPEED, ROBOT, State
+from kiks.engine.state import State
 from kiks.firmware import tools
 from kiks.firmware.commands import COMMANDS, NoTurretError, ProtocolError, Reply, set_speed
 from kiks.firmware.receiver import LINE_LIMIT, Receiver
-from kiks.firmware.turret import Turret
+from kiks.firmware.robot import Robot
 from kiks.model.robot import RobotSpec
-from kiks.units import SENSOR_SLOT_NS
 
 UNKNOWN = b"Command not found\r\n"
 PROTOCOL_ERROR = b"z,Protocol error\r\n"
@@ -25,22 +22,8 @@ DEMO_PERIOD_NS = 20_000_000
 _NUMBER = re.compile(rb"[ \t]*([+-]?[0-9]+)[ \t]*")
 
 
-class Firmware:
-    """The program of one robot.
-
-    Args:
-        spec: What kind of robot it is.
-        state: The world's state, of which the robot owns one record.
-        number: Which record, counted from 0.
-        sense_proximity: Returns the eight counts latched at this time.
-        sense_ambient: The same for light.
-
-    Attributes:
-        fitted: All turrets.
-        turrets: Those that answer orders, by their numbers.
-        baud: Speed of the line now [bit/s]; the tool `serial` changes it.
-        selected_baud: Speed that the mode selector asks for [bit/s]: the robot reads it at a reset.
-    """
+class Firmware(Robot):
+    """The program of one robot: it answers lines; for the arguments see `Robot`."""
 
     def __init__(
         self,
@@ -51,62 +34,9 @@ class Firmware:
         sense_proximity: Callable[[], list[int]],
         sense_ambient: Callable[[], list[int]],
     ) -> None:
-        self.spec = spec
-        self.world = 0
-        self.number = number
-        self.sense_proximity = sense_proximity
-        self.sense_ambient = sense_ambient
-        self.fitted: list[Turret] = []
-        self.turrets: dict[int, Turret] = {}
+        super().__init__(spec, state, number, sense_proximity=sense_proximity, sense_ambient=sense_ambient)
         self.receiver = Receiver(keeps_empty_lines=spec.quirks.answer_empty_lines)
-        self.now_ns = 0
-        self.selected_baud = spec.firmware.baud
-        self.demo_wakes_ns: int | None = None
-        self.take(state)
         self._commands = {command.letter.encode(): (command.act, len(command.parameters)) for command in COMMANDS}
-        self.reset()
-
-    def take(self, state: State) -> None:
-        """Take the arrays of a state for those of the robot; due again when they were replaced."""
-        self.robots = state.robots
-        # Writable views of this robot's fields: a field of one number has shape [1], the others keep their own.
-        fields: dict[str, Any] = {}
-        for name in ROBOT.names or ():
-            column = state.robots[name][self.world]
-            fields[name] = column[self.number] if column.ndim > 1 else column[self.number : self.number + 1]
-        self.view = SimpleNamespace(**fields)
-
-    def fit(self, turret: Turret) -> None:
-        """Take a turret on; one without a number answers no orders."""
-        self.fitted.append(turret)
-        if turret.number >= 0:
-            self.turrets[turret.number] = turret
-
-    # ---- power ----
-
-    def reset(self) -> None:
-        """Put all that the firmware holds to its default (khepera-protocol.md 6.7); the body stays where it is."""
-        view, reset = self.view, self.spec.reset
-        for name in ("target_pulses", "trajectory_pulses", "trajectory_speed", "error_sum", "last_error", "pwm"):
-            getattr(view, name)[:] = 0
-        for name in ("speed_setpoint", "pwm_setpoint", "on_target", "led", "bus", "slip_pulses", "slip_count"):
-            getattr(view, name)[:] = 0
-        view.motor_mode[:] = MODE_SPEED
-        view.counter_offset[:] = -view.pulse_count
-        view.speed_gains[:] = reset.speed_gains
-        view.position_gains[:] = reset.position_gains
-        view.profile_speed[:] = reset.profile_speed_pulses
-        view.profile_acceleration[:] = reset.profile_acceleration
-        self.baud = self.selected_baud
-        self.demo_wakes_ns = None
-        for turret in self.fitted:
-            turret.reset()
-
-    def banner(self) -> bytes:
-        """Return what the robot prints when it starts in protocol mode (khepera-protocol.md 2.4)."""
-        firmware = self.spec.firmware
-        lines = (f"KiKS, {self.spec.name}", f"{firmware.banner}, Rev. {firmware.bios_version}", tools.PROTOCOL_MODE)
-        return tools.text(*lines)
 
     # ---- a line ----
 
@@ -168,15 +98,7 @@ class Firmware:
     def _unknown(self) -> bytes:
         return b"z," + UNKNOWN if self.spec.quirks.unknown_command_with_z else UNKNOWN
 
-    def scanned_sensor(self) -> int:
-        """Return the sensor that is being sampled now."""
-        return self.now_ns // SENSOR_SLOT_NS % 8
-
     # ---- the demonstration of mode 0 ----
-
-    def start_demo(self) -> None:
-        """Begin to avoid obstacles without a host (khepera-protocol.md 6.9)."""
-        self.demo_wakes_ns = self.now_ns
 
     def run_demo(self, now_ns: int) -> None:
         """Take one step: Braitenberg's vehicle 3 with K-Team's weights (khepera-protocol.md 6.9)."""

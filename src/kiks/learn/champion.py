@@ -9,7 +9,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-import kiks
 from kiks.batch.loop_timing import Baud, Timing
 from kiks.client.drive import Driver, drive
 from kiks.client.port import Port
@@ -21,6 +20,7 @@ from kiks.model.arena_file import quoted
 from kiks.model.atomic_files import path_of, replace_files
 from kiks.model.data_file import Number, Text, Whole, as_list, check, parse_toml, read_file, record
 from kiks.sim.simulation import Simulation
+from kiks.version import __version__
 
 FORMAT = 1
 """Version of the file's format."""
@@ -91,7 +91,7 @@ class Champion:
     seed: Seed = 0
     robot: Text = "khepera"
     timing: Timing = field(default_factory=Timing)
-    kiks: Text = kiks.__version__
+    kiks: Text = __version__
 
     # Functions cannot be compared: a champion equals itself alone.
     __eq__ = object.__eq__

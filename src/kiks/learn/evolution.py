@@ -15,14 +15,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-import kiks
 from kiks.errors import ParameterError, shown
 from kiks.learn.algorithms import make_algorithm
 from kiks.learn.champion import Champion
 from kiks.learn.evolution_log import Folder, Generation, Identity
-from kiks.learn.executors import Executor, executor_for
+from kiks.learn.executor import Executor
+from kiks.learn.executors import executor_for
 from kiks.learn.task import Task
 from kiks.model.checks import check_count, check_kind, check_number, check_numbers
+from kiks.version import __version__
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -263,9 +264,7 @@ class Evolution:
         """
         task = self.task
         folder.check_identity(
-            Identity(
-                task.name, self.name, self.seed, self.population, task.controller.name, task.digest(), kiks.__version__
-            )
+            Identity(task.name, self.name, self.seed, self.population, task.controller.name, task.digest(), __version__)
         )
         most = len(task.value_names)
         while (saved := folder.generation(len(self.generations), self.ask().shape, most)) is not None:

@@ -18,9 +18,9 @@ from concurrent.futures import Future
 from contextlib import suppress
 from typing import Any
 
-import kiks
 from kiks.errors import ParameterError, installing
 from kiks.learn.evaluation import Answer, Evaluation, Floats, Integers, Lost, Raised, Ready, Values, Worker
+from kiks.version import __version__
 
 _log = logging.getLogger("kiks.learn")
 
@@ -133,7 +133,7 @@ class RayCrew:
         actor_class = self._ray.remote(num_cpus=1, max_restarts=0, max_task_retries=0)(RayWorker)
         for _ in range(worker_count - len(self._actors)):
             actor = self._actors[self._next_number] = actor_class.remote()
-            self._owed[actor.prepare.remote(self._shipped, kiks.__version__)] = self._next_number
+            self._owed[actor.prepare.remote(self._shipped, __version__)] = self._next_number
             self._next_number += 1
         return worker_count
 
@@ -174,9 +174,9 @@ class RayWorker:
         """Take the work and prepare it, if this is the same KiKS as that of the program which sends it."""
         import pickle
 
-        if version != kiks.__version__:
+        if version != __version__:
             return Raised(
-                f"ParameterError: All computers must have the same KiKS, but one has {kiks.__version__}, and the one"
+                f"ParameterError: All computers must have the same KiKS, but one has {__version__}, and the one"
                 f" where the evolution was started {version}. Install the same on all.",
                 "",
             )

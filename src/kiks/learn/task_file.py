@@ -14,8 +14,8 @@ from kiks.control.controller import Controller
 from kiks.control.controller_spec import Recipe
 from kiks.control.controllers import controller_of
 from kiks.errors import KiksError, ParameterError
+from kiks.learn.ready_tasks import TASKS
 from kiks.learn.task import ROBOTS_MAX, WORLDS_MAX, Seconds, Task
-from kiks.learn.tasks import TASKS
 from kiks.model.arena import Arena
 from kiks.model.atomic_files import inside
 from kiks.model.data_file import OneOf, Rule, Text, Whole, check, parse_toml, read_file, record

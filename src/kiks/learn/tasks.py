@@ -1,244 +1,19 @@
-"""The tasks that come with KiKS, and how those of a user's own are found."""
+"""Tasks by name: those that come with KiKS, and those of a user's files."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from kiks.control import controllers, measures
 from kiks.control.controller import Controller
 from kiks.control.controller_spec import module_in
 from kiks.errors import ParameterError, nearest, shown
-from kiks.learn import mazes, training_arenas
-from kiks.learn.task import Axis, Task, cautious_mean
-from kiks.model.arena import Arena, Cylinder, Lamp
+from kiks.learn.ready_tasks import TASKS, avoid, follow, gather, light, maze, maze_qd
+from kiks.learn.task import Task
+from kiks.learn.task_file import load_task_file
 from kiks.model.atomic_files import path_of
 
-Floats = NDArray[np.float64]
-Values = Mapping[str, Floats]
-
-SPEED_LIMIT = 8.0
-"""Highest speed of the ready-made tasks [pulses/10 ms]: 64 mm/s."""
-
-CONTACT_COST = 3.0
-"""By how much more than once each contact a world divides fitness, where contacts are to vanish."""
-
-CONTACTS_COUNTED = 3.0
-"""Most contacts of a world that count: a robot that is stuck has hundreds, and is no worse."""
-
-
-def without_contacts(fitness: Floats, values: Values) -> Floats:
-    """Return a fitness that contacts make less, but never less than nothing: who drives and bumps beats who stands."""
-    contacts = np.minimum(values["contacts"], CONTACTS_COUNTED).mean(axis=1)
-    reduced: Floats = fitness / (1 + CONTACT_COST * contacts)
-    return reduced
-
-
-# ---- avoid ----
-
-
-def avoid_fitness(values: Values) -> Floats:
-    """Return the fitness of `avoid`: the paper's, for a robot that gets somewhere."""
-    return without_contacts(cautious_mean(values["avoidance"] * values["roaming"]), values)
-
-
-def avoid(controller: Controller | None = None, **changes: Any) -> Task:
-    """Return the task to drive fast, straight and about, and touch nothing (after Floreano and Mondada 1994).
-
-    Args:
-        controller: What is evolved; a linear one if left out.
-        changes: Other arguments of `Task`.
-    """
-    task = Task(
-        "avoid",
-        (training_arenas.pillars(), training_arenas.corridors(), training_arenas.wedges()),
-        controllers.linear(speed_limit=SPEED_LIMIT) if controller is None else controller,
-        (measures.avoidance, measures.roaming, measures.contacts, measures.path_mm, measures.straightness),
-        fitness=avoid_fitness,
-        seconds=20.0,
-        worlds=12,
-        axes=(Axis("path_mm", 0, 1500), Axis("straightness", 0, 1)),
-        exam=training_arenas.unseen(),
-        about="drive fast, straight and about, touch nothing",
-    )
-    return replace(task, **changes)
-
-
-# ---- follow ----
-
-
-def follow_fitness(values: Values) -> Floats:
-    """Return the fitness of `follow`."""
-    return without_contacts(cautious_mean(values["wall_following"]), values)
-
-
-def follow(controller: Controller | None = None, **changes: Any) -> Task:
-    """Return the task to follow walls on the left.
-
-    Args:
-        controller: What is evolved; a network with three hidden units if left out.
-        changes: Other arguments of `Task`.
-    """
-    task = Task(
-        "follow",
-        (training_arenas.follow_box(), training_arenas.corridors(), training_arenas.wedges()),
-        controllers.mlp(hidden=(4,), speed_limit=SPEED_LIMIT) if controller is None else controller,
-        (measures.wall_following("left"), measures.contacts, measures.path_mm, measures.straightness),
-        fitness=follow_fitness,
-        seconds=40.0,
-        worlds=12,
-        axes=(Axis("path_mm", 0, 3000), Axis("wall_following", 0, 1)),
-        exam=training_arenas.unseen(),
-        about="drive along walls, on the robot's left",
-    )
-    return replace(task, **changes)
-
-
-# ---- light ----
-
-
-def light_fitness(values: Values) -> Floats:
-    """Return the fitness of `light`."""
-    return without_contacts(cautious_mean(values["near_light_share"] - values["light_mm"] / 1000 + 1), values)
-
-
-def light(controller: Controller | None = None, **changes: Any) -> Task:
-    """Return the task to go to the lamp and stay there.
-
-    Args:
-        controller: What is evolved; a network of both senses with four hidden units if left out.
-        changes: Other arguments of `Task`.
-    """
-    usual = controllers.mlp(hidden=(4,), senses=("proximity", "ambient"), speed_limit=SPEED_LIMIT)
-    task = Task(
-        "light",
-        (
-            _lit(training_arenas.pillars(), 200, 300),
-            _lit(training_arenas.wedges(), 300, 300),
-            _lit(training_arenas.corridors(), 400, 400),
-        ),
-        usual if controller is None else controller,
-        (measures.near_light_share(100.0), measures.light_mm, measures.contacts, measures.path_mm),
-        fitness=light_fitness,
-        seconds=40.0,
-        worlds=12,
-        axes=(Axis("light_mm", 0, 600), Axis("path_mm", 0, 3000)),
-        exam=_lit(training_arenas.unseen(), 550, 320),
-        about="go to the lamp and stay with it",
-    )
-    return replace(task, **changes)
-
-
-def _lit(arena: Arena, x_mm: float, y_mm: float) -> Arena:
-    """Return an arena with a lamp."""
-    return replace(arena, lamps=(Lamp(x_mm, y_mm),))
-
-
-# ---- gather ----
-
-
-def gather_fitness(values: Values) -> Floats:
-    """Return the fitness of `gather`."""
-    return cautious_mean(values["gathered"] - values["spread_mm"] / 1000)
-
-
-def gather(controller: Controller | None = None, **changes: Any) -> Task:
-    """Return the task to push cylinders to the middle of a room.
-
-    Args:
-        controller: What is evolved; gated recurrent units if left out, which remember what they do.
-        changes: Other arguments of `Task`.
-    """
-    task = Task(
-        "gather",
-        tuple(_with_cylinders(number) for number in range(3)),
-        controllers.gru(units=4, speed_limit=SPEED_LIMIT) if controller is None else controller,
-        (measures.gathered(300, 300, radius_mm=150), measures.spread_mm, measures.contacts, measures.path_mm),
-        fitness=gather_fitness,
-        seconds=90.0,
-        worlds=12,
-        axes=(Axis("spread_mm", 0, 300), Axis("path_mm", 0, 6000)),
-        exam=_with_cylinders(3),
-        about="push six cylinders to the middle",
-    )
-    return replace(task, **changes)
-
-
-def _with_cylinders(number: int) -> Arena:
-    """Return a room with six cylinders around its middle, otherwise for each number."""
-    angles = np.arange(6) * np.pi / 3 + number * 0.4
-    away_mm = 170.0 + 15.0 * ((np.arange(6) + number) % 3)
-    places = zip(300 + away_mm * np.cos(angles), 300 + away_mm * np.sin(angles), strict=True)
-    return replace(
-        Arena.box(600, 600),
-        name=f"cylinders {number + 1}",
-        cylinders=tuple(Cylinder(float(x), float(y)) for x, y in places),
-    )
-
-
-# ---- maze ----
-
-
-def maze_fitness(values: Values) -> Floats:
-    """Return the fitness of `maze`: minus the distance to the goal, in metres."""
-    return -cautious_mean(values["goal_mm"]) / 1000
-
-
-def maze(controller: Controller | None = None, **changes: Any) -> Task:
-    """Return the task to end near the goal of Kheperax's maze, for which the way there leads astray.
-
-    Args:
-        controller: What is evolved; a network with eight hidden units if left out.
-        changes: Other arguments of `Task`.
-    """
-    task = Task(
-        "maze",
-        (mazes.kheperax(),),
-        controllers.mlp(hidden=(8,), speed_limit=SPEED_LIMIT) if controller is None else controller,
-        (measures.goal_mm(*mazes.goal_mm()), measures.final_x_mm, measures.final_y_mm, measures.turned_pulses),
-        fitness=maze_fitness,
-        seconds=100.0,
-        worlds=2,
-        axes=(Axis("final_x_mm", 0, mazes.SIDE_MM, 32), Axis("final_y_mm", 0, mazes.SIDE_MM, 32)),
-        starts="arena",
-        about="end near the goal of the Kheperax maze",
-    )
-    return replace(task, **changes)
-
-
-def maze_qd_fitness(values: Values) -> Floats:
-    """Return the fitness of `maze-qd`: minus what the wheels have turned, in thousands of pulses."""
-    fitness: Floats = -values["turned_pulses"].mean(axis=1) / 1000
-    return fitness
-
-
-def maze_qd(controller: Controller | None = None, **changes: Any) -> Task:
-    """Return the task to find ways to everywhere in Kheperax's maze, and short ones.
-
-    Args:
-        controller: What is evolved; a network with eight hidden units if left out.
-        changes: Other arguments of `Task`.
-    """
-    given = {"name": "maze-qd", "fitness": maze_qd_fitness, "worlds": 1}
-    return maze(controller, **given | {"about": "reach every place in the Kheperax maze, by short ways"} | changes)
-
-
-# ---- by their names ----
-
-TASKS: dict[str, Callable[..., Task]] = {
-    "avoid": avoid,
-    "follow": follow,
-    "light": light,
-    "gather": gather,
-    "maze": maze,
-    "maze-qd": maze_qd,
-}
-"""The tasks that come with KiKS."""
+__all__ = ["TASKS", "avoid", "follow", "gather", "light", "load", "maze", "maze_qd"]
 
 
 def load(name: str | Path, controller: Controller | None = None) -> Task:
@@ -259,9 +34,6 @@ def load(name: str | Path, controller: Controller | None = None) -> Task:
         return TASKS[name](controller)
     path = Path(name)
     if path.suffix == ".toml":
-        # A task file is a change of one of the tasks here.
-        from kiks.learn.task_file import load_task_file
-
         return load_task_file(path, controller)
     if path.suffix != ".py" or not path.is_file():
         raise ParameterError(

@@ -10,7 +10,7 @@ import numpy as np
 from kiks.errors import WorkError
 from kiks.learn.chunks import LOSSES_ALLOWED, Chunk, Chunks
 from kiks.learn.evaluation import Answer, Floats, Integers, Lost, Raised, Ready, Values
-from kiks.learn.executors import Executor, work_error
+from kiks.learn.executor import Executor, work_error
 
 _log = logging.getLogger("kiks.learn")
 

@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 from kiks.clock.program_clock import ProgramClock
 from kiks.errors import KiksError
-from kiks.script import clocks, event_loops, libraries, locks, serial_ports, unsupported
+from kiks.script import clocks, event_loops, locks, serial_ports, unsupported
 from kiks.script.file_waits import OpenPorts, RealFiles
+from kiks.script.libraries.adapters import adapted
+from kiks.script.libraries.host import Host, keyboard
 from kiks.script.patching import replaced
 from kiks.script.shared_line import SharedLine
 from kiks.script.signals import Signals
@@ -85,7 +87,7 @@ def run_program(
         return VirtualPort(lines[found], policy)
 
     clock = VirtualPort(SharedLine(world, 1, scheduler), policy)
-    host, ports = libraries.Host(scheduler, clock), OpenPorts(scheduler)
+    host, ports = Host(scheduler, clock), OpenPorts(scheduler)
     ends, signals = _AtExit(), Signals(scheduler)
 
     def end_at_once(code: int) -> None:
@@ -101,7 +103,7 @@ def run_program(
         signals.replacements(),
         unsupported.replacements(scheduler),
         ends.replacements(),
-        libraries.keyboard(host),
+        keyboard(host),
         {"os": {"_exit": end_at_once}},
         {"threading": {"excepthook": _print_thread_trace, "__excepthook__": _print_thread_trace}},
     )
@@ -121,7 +123,7 @@ def run_program(
             watched(scheduler),
             signals.taken(),
             replaced(replacements, replacements["threading"]["Lock"]),
-            libraries.adapted(host),
+            adapted(host),
             unsupported.watched(scheduler),
         ):
             return scheduler.run(main)

@@ -6,7 +6,6 @@ import logging
 from collections.abc import Callable
 from pathlib import Path
 
-from kiks import __version__
 from kiks.errors import KiksError, ParameterError, shown
 from kiks.model.arena import Arena
 from kiks.model.arena_file import save_arena
@@ -24,6 +23,7 @@ from kiks.toolbox.world_requests import (
     ask_spawn,
     port_of,
 )
+from kiks.version import __version__
 
 WORDS_MAX = 100_000
 """Longest request other than for a world."""

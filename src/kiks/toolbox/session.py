@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from kiks.clock.gate import Gate
 from kiks.errors import LinkError
@@ -23,7 +23,6 @@ from kiks.units import NS_PER_S
 if TYPE_CHECKING:
     from kiks.desk.server.desk import Desk
     from kiks.desk.server.show import Shown
-    from kiks.toolbox.session_client import SessionClient
 
 WAIT_S = 0.05
 """Longest time for which the world does not look around [s of real time]."""
@@ -33,6 +32,14 @@ SLICE_NS = NS_PER_S // 50
 
 PATH_PERIOD_S = 0.04
 """Time between two points of a path [s]: KiKS moved its robot 25 times a second (kiks-behaviour.md 7.1)."""
+
+
+class Client(Protocol):
+    """What a session asks of a program that takes part in it; see `kiks.toolbox.session_client.SessionClient`."""
+
+    def live(self, slice_ns: int) -> bool:
+        """Let time pass as the wall clock does, while the program thinks; return whether any has."""
+        ...
 
 
 class Session:
@@ -45,7 +52,7 @@ class Session:
     Attributes:
         settings: What is wanted of the next world.
         desk: The world and all that belongs to it; None before the first.
-        visitors: Those who take part.
+        clients: The programs that take part.
         owners: Who has which robot as its own, by the robot's number.
         lock: Held by whoever makes a world or takes a robot.
     """
@@ -53,7 +60,7 @@ class Session:
     def __init__(self, *, ready: Callable[[], None] = lambda: None, has_window: bool = False) -> None:
         self.settings = Settings()
         self.desk: Desk | None = None
-        self.visitors: list[SessionClient] = []
+        self.clients: list[Client] = []
         self.owners: dict[int, object] = {}
         self.lock = threading.RLock()
         self._ready = ready
@@ -218,8 +225,8 @@ class Session:
             return
         desk = self.desk
         assert desk is not None
-        is_seen = desk.gate.speed is not None and desk.project.thinking == "live" and len(self.visitors) == 1
-        has_lived = is_seen and any(visitor.live(SLICE_NS) for visitor in self.visitors)
+        is_seen = desk.gate.speed is not None and desk.project.thinking == "live" and len(self.clients) == 1
+        has_lived = is_seen and any(client.live(SLICE_NS) for client in self.clients)
         desk.programs.round(0 if has_lived else WAIT_S)
         desk.clear_away()
 

@@ -81,7 +81,7 @@ class SessionClient:
         self.openings: dict[int, OpenPort] = {}
         self._sim: Simulation | None = None
         self._connection: NearConnection | None = None
-        session.visitors.append(self)
+        session.clients.append(self)
 
     # ---- ports ----
 
@@ -146,7 +146,7 @@ class SessionClient:
         """Go: what was said is still done, and the robots belong to others."""
         self._lose_world()
         self.session.leave(self)
-        self.session.visitors.remove(self)
+        self.session.clients.remove(self)
 
     def call_off(self) -> None:
         """Let the request end that is under way; any thread may say so."""

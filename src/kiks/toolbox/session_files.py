@@ -10,9 +10,9 @@ import stat
 from pathlib import Path
 from typing import NamedTuple
 
-from kiks import __version__
 from kiks.errors import LinkError, shown
 from kiks.ports.pty import default_folder
+from kiks.version import __version__
 
 FILE_MAX = 1000
 """Most bytes of a file that tells of a session."""

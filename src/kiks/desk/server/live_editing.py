@@ -6,7 +6,8 @@ import asyncio
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeVar
+from pathlib import Path
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -14,13 +15,10 @@ from kiks.engine.state import BALL
 from kiks.errors import KiksError, ParameterError
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp
 from kiks.model.atomic_files import inside
-from kiks.model.project import ProjectRobot
+from kiks.model.project import Project, ProjectRobot
 from kiks.model.sketch import Sketch
 from kiks.model.sketch_things import SketchRobot, Thing, radius_of
 from kiks.sim.simulation import Simulation
-
-if TYPE_CHECKING:
-    from kiks.desk.server.desk import Desk
 
 Done = TypeVar("Done")
 
@@ -28,6 +26,31 @@ LAMP_REACH_MM = 20.0
 """How far from a lamp it can still be pointed at [mm]."""
 
 _LARGE_CELLS = 4_000_000
+
+
+class EditedDesk(Protocol):
+    """What drawing needs of a desk; see `kiks.desk.server.desk.Desk`."""
+
+    sim: Simulation
+    project: Project
+    folder: Path
+
+    async def present_project(self) -> Project:
+        """Return the project with everything where it is now."""
+        ...
+
+    async def replace(self, project: Project) -> None:
+        """Put another world on the desk."""
+
+    async def do(self, act: Callable[[Simulation], Done]) -> Done:
+        """Do something in the world between two events."""
+        ...
+
+    async def mark(self) -> None:
+        """Let resets go back to how everything stands now."""
+
+    def tell(self) -> None:
+        """Tell the browsers that the scene is another one."""
 
 
 class Editing:
@@ -41,7 +64,7 @@ class Editing:
         desk: The desk.
     """
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: EditedDesk) -> None:
         self._desk = desk
         self._lock = asyncio.Lock()
         self._sim: Simulation | None = None

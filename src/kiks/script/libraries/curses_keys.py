@@ -6,7 +6,7 @@ import time
 from types import ModuleType
 from typing import Any
 
-from kiks.script.libraries import BLINK_S, Host, refuse_keyboard
+from kiks.script.libraries.host import BLINK_S, Host, refuse_keyboard
 
 _real_sleep = time.sleep
 

@@ -7,7 +7,7 @@ from collections import deque
 from types import ModuleType
 from typing import Any
 
-from kiks.script.libraries import BLINK_S, Host
+from kiks.script.libraries.host import BLINK_S, Host
 from kiks.script.thread_scheduler import STUCK, Task, timeout_ns
 from kiks.sim.read_completion import NEVER_NS
 

@@ -7,7 +7,7 @@ import time
 from types import ModuleType
 from typing import Any
 
-from kiks.script.libraries import BLINK_S, Host
+from kiks.script.libraries.host import BLINK_S, Host
 from kiks.script.thread_scheduler import STUCK, Task
 from kiks.sim.read_completion import NEVER_NS
 from kiks.units import NS_PER_S

@@ -1,0 +1,77 @@
+"""Libraries whose code in C waits by itself: each has an adapter here, put in place when a program imports it."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from importlib.abc import MetaPathFinder
+from importlib.machinery import ModuleSpec
+from types import ModuleType
+from typing import Any
+
+from kiks.script.libraries import curses_keys, pygame_time, tk_loop
+from kiks.script.libraries.host import Host
+
+Adapter = Callable[[ModuleType, Host], dict[Any, dict[str, Any]]]
+"""Returns what stands in for names, by the module or class that has them."""
+
+
+def _adapters() -> dict[str, Adapter]:
+    return {
+        "tkinter": tk_loop.adapt,
+        "pygame.time": pygame_time.adapt,
+        "pygame.event": pygame_time.adapt_events,
+        "curses": curses_keys.adapt,
+    }
+
+
+@contextmanager
+def adapted(host: Host) -> Iterator[None]:
+    """Let libraries wait in simulated time, those that are imported meanwhile, too."""
+    adapters = _adapters()
+    undo: list[tuple[Any, str, Any]] = []
+
+    def adapt(name: str, module: ModuleType) -> None:
+        for owner, names in adapters[name](module, host).items():
+            for attribute, value in names.items():
+                undo.append((owner, attribute, vars(owner)[attribute]))
+                setattr(owner, attribute, value)
+
+    for name in adapters:
+        if name in sys.modules:
+            adapt(name, sys.modules[name])
+    finder = _Finder(set(adapters), adapt)
+    sys.meta_path.insert(0, finder)
+    try:
+        yield
+    finally:
+        sys.meta_path.remove(finder)
+        for owner, attribute, value in reversed(undo):
+            setattr(owner, attribute, value)
+
+
+class _Finder(MetaPathFinder):
+    """Finds a library as Python does, and adapts it when it has been imported."""
+
+    def __init__(self, names: set[str], adapt: Callable[[str, ModuleType], None]) -> None:
+        self._names = names
+        self._adapt = adapt
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        if fullname not in self._names:
+            return None
+        self._names.discard(fullname)
+        spec = importlib.util.find_spec(fullname)
+        if spec is not None and spec.loader is not None:
+            execute = spec.loader.exec_module
+
+            def execute_and_adapt(module: ModuleType) -> None:
+                execute(module)
+                self._adapt(fullname, module)
+
+            spec.loader.exec_module = execute_and_adapt  # type: ignore[method-assign]
+        return spec

@@ -1,0 +1,41 @@
+"""What an adapter of a library works with, and the keyboard."""
+
+from __future__ import annotations
+
+import builtins
+import select
+import sys
+from typing import Any, NamedTuple
+
+from kiks.script.file_waits import poll_files
+from kiks.script.thread_scheduler import Scheduler
+from kiks.script.unsupported import refuse
+from kiks.sim.port import VirtualPort
+
+BLINK_S = 0.02
+"""How often a window or a keyboard is looked at while only a person can go on [s of real time]."""
+
+
+class Host(NamedTuple):
+    """What an adapter works with: the program's threads, and a port of its world for the time."""
+
+    scheduler: Scheduler
+    clock: VirtualPort
+
+
+def keyboard(host: Host) -> dict[str, dict[str, Any]]:
+    """Return what stands in for `input`."""
+    real_input = builtins.input
+
+    def read_line(prompt: object = "", /) -> str:
+        if sys.stdin is not None and sys.stdin.isatty() and not poll_files({sys.stdin.fileno(): select.POLLIN}, 0):
+            refuse_keyboard(host.scheduler)
+        return real_input(prompt)
+
+    return {"builtins": {"input": read_line}}
+
+
+def refuse_keyboard(scheduler: Scheduler) -> None:
+    """End the program if it waits for a key while other threads could go on: no simulated time waits for a person."""
+    if not scheduler.is_alone:
+        refuse(scheduler, "not wait for the keyboard while other threads drive a robot", "it did")
