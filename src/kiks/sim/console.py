@@ -1,4 +1,4 @@
-"""What a person types to a robot by hand: KiKS 2.2.0 called it active mode."""
+"""Commands that a person types to a robot: KiKS 2.2.0 called this active mode."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ class LocalLine:
         self._loop.advance_to(time_ns)
 
     def think(self, time_ns: int) -> None:
-        """Let the time pass that the program has thought [ns]; it is one program, whichever of its ports it uses."""
+        """Let the time pass that the program has thought [ns]; all ports of a simulation belong to one program."""
         from_ns = self._world.now_ns
         self._loop.advance_to(from_ns + time_ns)
         for wire in self._loop.wires:
@@ -62,7 +62,7 @@ class LocalLine:
         """Wait for `size` characters or a terminator; see `Line.read`.
 
         Raises:
-            LinkError: If it could wait for ever.
+            LinkError: If the wait could have no end.
         """
         world, advance_to, wire = self._world, self._loop.advance_to, self._wire
         begin_ns = world.now_ns
@@ -98,7 +98,7 @@ class LocalLine:
                 return [is_complete(loop.wires[read.robot - 1], read, world.now_ns) for read in reads]
 
     def drop_arrived(self) -> None:
-        """Forget the characters that have arrived and were not read."""
+        """Drop the characters that have arrived and were not read."""
         self._wire.line.take(self.arrived_count())
 
     @property
@@ -111,16 +111,16 @@ class LocalLine:
         self._wire.set_baud(baud)
 
     def claim(self, holder: str) -> None:
-        """Take the line for one alone.
+        """Reserve the line for one program.
 
         Raises:
-            LinkError: If somebody holds it already.
+            LinkError: If another program holds it.
         """
         claim(self._wire, self._robot, holder)
         self._is_claimed = True
 
     def hang_up(self) -> None:
-        """Give the line back and forget what nobody read."""
+        """Release the line and drop what was not read."""
         if self._is_claimed:
             self._wire.holder = None
             self._is_claimed = False
@@ -128,11 +128,11 @@ class LocalLine:
 
 
 def claim(wire: Wire, robot: int, holder: str) -> None:
-    """Let somebody have a robot's line alone.
+    """Reserve a robot's line for one program.
 
     Raises:
-        ParameterError: If the holder is no text.
-        LinkError: If somebody holds it already.
+        ParameterError: If the name of the holder is no text.
+        LinkError: If another program holds it.
     """
     if wire.holder is not None:
         raise LinkError(

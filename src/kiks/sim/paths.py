@@ -1,4 +1,4 @@
-"""The paths of robots, balls and cylinders, kept as they move; and who looks on while ticks are done."""
+"""The paths of robots, balls and cylinders, recorded while ticks are done."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from kiks.units import TICK_NS
 
 
 class Watcher(Protocol):
-    """Who looks at a world after ticks of its own choice. It changes nothing, and asks the world for nothing."""
+    """Reads the state after ticks of its own choice, and changes nothing."""
 
     def ticks_left(self, tick_count: int) -> int:
-        """Return how many ticks may be done before the next look, at least one."""
+        """Return how many ticks may be done before the next call of `look`, at least one."""
 
     def look(self, state: State) -> None:
-        """Snapshot at the state, after ticks that are no more than were left; called between two looks, too."""
+        """Read the state, after at most as many ticks as were left."""
 
 
 class _Point(NamedTuple):
-    """Where everybody was after so many ticks: columns of x_mm, y_mm, heading_rad, and of number, x_mm, y_mm."""
+    """Places after a number of ticks: rows x_mm, y_mm, heading_rad of robots, and number, x_mm, y_mm of bodies."""
 
     tick_count: int
     poses: NDArray[np.float64]
@@ -34,9 +34,9 @@ class Paths:
 
     Args:
         period_ticks: Ticks between two points.
-        state: What is looked at; its present poses are the first point.
-        points_max: Most points that are kept. When there are more, every second one is dropped, and from then on half
-            as many come; None for all.
+        state: The state; its present poses are the first point.
+        points_max: Most points that are kept. When there are more, every second one is dropped, and half as many are
+            added from then on. None: no limit.
     """
 
     def __init__(self, period_ticks: int, state: State, points_max: int | None = None) -> None:
@@ -59,13 +59,13 @@ class Paths:
         bodies: Any = state.bodies[0]
         poses = np.array([robots["x_mm"], robots["y_mm"], robots["heading_rad"]])
         places = np.array([bodies["number"], bodies["x_mm"], bodies["y_mm"]])
-        # In one step, as Ctrl-C may come anywhere, and paths are asked for after it.
+        # In one step, as Ctrl-C may come anywhere, and paths are read after it.
         self._points.append(_Point(state.tick_count, poses, places))
         if self._points_max is not None and len(self._points) > self._points_max:
             self._thin_out()
 
     def _thin_out(self) -> None:
-        """Drop every second point; the first stays, at whatever tick it was."""
+        """Drop every second point; the first one stays."""
         period_ticks = 2 * self._period_ticks
         first, *others = self._points
         self._points = [first, *(each for each in others if each.tick_count % period_ticks == 0)]
@@ -80,7 +80,7 @@ class Paths:
         return ways
 
     def of_bodies(self) -> dict[int, list[tuple[float, float]]]:
-        """Return the places of each ball and cylinder that there was, by its number: x_mm, y_mm."""
+        """Return the places of each ball and cylinder, by its number: x_mm, y_mm."""
         places: dict[int, list[tuple[float, float]]] = {}
         for point in self._points:
             for number, x_mm, y_mm in point.bodies.T.tolist():

@@ -22,15 +22,15 @@ BAUD_MIN = 75
 BAUD_MAX = 4_000_000
 
 ZEROS_MAX = 1_000_000
-"""Most zeros that a number in place of bytes stands for."""
+"""Most zeros that a number in place of bytes may stand for."""
 
 
 class Line(Protocol):
-    """The way from a port to its robot. The program's time is `now_ns`; every method may let it go on, never back."""
+    """The way from a port to its robot. The program's time is `now_ns`; methods may advance it, never turn it back."""
 
     @property
     def lock(self) -> AbstractContextManager[Any]:
-        """What is held while the line is used, if several threads may do so."""
+        """Held while the line is used, if several threads may use it."""
 
     @property
     def baud(self) -> int:
@@ -50,16 +50,16 @@ class Line(Protocol):
         """Put characters on the line; wait while it is full."""
 
     def read(self, size: int | None, terminator: bytes | None, timeout_ns: int | None, poll_ns: int) -> bytes:
-        """Wait for `size` characters or a terminator, whichever comes first, until the time-out is over.
+        """Wait for `size` characters or a terminator, whichever comes first, until the timeout.
 
         Args:
             size: How many at most; None: up to the terminator.
             terminator: What ends the read; None: the size alone.
             timeout_ns: Longest wait [ns]; None: for ever.
-            poll_ns: What it costs at least if the time-out is over first [ns].
+            poll_ns: What the read costs at least if it times out [ns].
 
         Raises:
-            LinkError: If it could wait for ever.
+            LinkError: If the wait could have no end.
         """
 
     def arrived_count(self) -> int:
@@ -72,33 +72,33 @@ class Line(Protocol):
         """Return when the line takes more characters without a wait [ns]."""
 
     def wait_for(self, reads: Sequence[Read], until_ns: int) -> list[bool]:
-        """Let time pass until one of several reads is complete, which takes no character, or up to a time [ns].
+        """Let time pass until one of several reads is complete, or up to a time [ns]; read no character.
 
-        With `NEVER_NS`, and no command on any of the lines, nothing happens.
+        Do nothing with `NEVER_NS` and no command on any of the lines.
 
         Args:
-            reads: What is waited for, on lines of the same world.
+            reads: The reads to wait for, on lines of the same world.
             until_ns: When the wait ends at the latest [ns]; `NEVER_NS` if it has no end.
 
         Returns:
-            Which of them are complete.
+            Whether each of them is complete.
         """
 
     def drop_arrived(self) -> None:
-        """Forget the characters that have arrived and were not read."""
+        """Drop the characters that have arrived and were not read."""
 
     def set_baud(self, baud: int) -> None:
         """Set both ends to a speed [bit/s]."""
 
     def claim(self, holder: str) -> None:
-        """Take the line for one alone.
+        """Reserve the line for one program.
 
         Raises:
-            LinkError: If somebody holds it already.
+            LinkError: If another program holds it.
         """
 
     def hang_up(self) -> None:
-        """Give the line back and forget what nobody read."""
+        """Release the line and drop what was not read."""
 
 
 class VirtualPort:
@@ -106,10 +106,10 @@ class VirtualPort:
 
     Args:
         line: The way to the robot.
-        program: The program whose port this is: what its thinking and its waiting cost.
+        program: Charges thinking and polling to the program whose port this is.
 
     Attributes:
-        line: The same way.
+        line: The way to the robot.
     """
 
     def __init__(self, line: Line, program: ProgramClock) -> None:
@@ -122,10 +122,10 @@ class VirtualPort:
 
     @property
     def timeout(self) -> float | None:
-        """Longest time a read waits [s] of simulated time; None waits for ever.
+        """Longest simulated time that a read waits [s]; None waits without end.
 
         Raises:
-            ParameterError: If it is set to a negative number, or to none.
+            ParameterError: If it is set to anything but None or a number from 0.
         """
         return self._timeout_s
 
@@ -133,7 +133,7 @@ class VirtualPort:
     def timeout(self, timeout_s: float | None) -> None:
         checked_s = None if timeout_s is None else check_number("timeout", timeout_s, 0)
         self._timeout_s = timeout_s
-        # What is longer than any run is for ever.
+        # A timeout longer than any run never ends a read.
         self._timeout_ns = None if checked_s is None or checked_s > SECONDS_MAX else ns_from_s(checked_s)
 
     @property
@@ -148,10 +148,10 @@ class VirtualPort:
             self.line.set_baud(baud)
 
     def write(self, data: bytes) -> int:
-        """Send characters; return how many. They leave one after the other while the program goes on.
+        """Send characters; return how many. They go out one after the other while the program goes on.
 
         Raises:
-            TypeError: If they are a text, or nothing that consists of numbers; as pyserial has it.
+            TypeError: If they are a text, or no numbers at all, as in pyserial.
             ParameterError: If a number is out of range.
         """
         if data.__class__ is not bytes:
@@ -166,34 +166,34 @@ class VirtualPort:
         return len(data)
 
     def read(self, size: int = 1) -> bytes:
-        """Return `size` characters, fewer if the time-out is over first.
+        """Return `size` characters, fewer after the timeout.
 
         Raises:
-            LinkError: If there is no time-out and no reply can come any more.
+            LinkError: If there is no timeout and no reply can come any more.
         """
         return self._read(_count(size), None)
 
     def read_until(self, expected: bytes = b"\n", size: int | None = None) -> bytes:
-        """Return everything up to and including a terminator, less if the time-out is over first.
+        """Return everything up to and including a terminator, less after the timeout.
 
         Raises:
-            LinkError: If there is no time-out and no reply can come any more.
+            LinkError: If there is no timeout and no reply can come any more.
         """
         if expected.__class__ is not bytes:
             expected = _characters(expected)
         return self._read(None if size is None else _count(size), expected)
 
     def readline(self, size: int | None = -1) -> bytes:
-        """Return a line with its end, or what came of it before the time-out.
+        """Return a line with its end, or the part of it that came before the timeout.
 
         Raises:
-            LinkError: If there is no time-out and no reply can come any more.
+            LinkError: If there is no timeout and no reply can come any more.
         """
         return self._read(None if size is None or (count := index(size)) < 0 else count, b"\n")
 
     @property
     def in_waiting(self) -> int:
-        """Characters that have arrived and were not read. Asking again and again lets time pass."""
+        """Number of characters that have arrived and were not read. Repeated polls let time pass."""
         with self.line.lock:
             self._ask()
             return self.line.arrived_count()
@@ -212,32 +212,32 @@ class VirtualPort:
         """Do nothing: what was written is on the line already."""
 
     def claim(self, holder: str) -> None:
-        """Take the line for this port alone, as opening it by name does; `close` gives it back.
+        """Reserve the line for this port, as opening it by name does; `close` releases it.
 
         Args:
-            holder: Who it is, in words for the next one who tries.
+            holder: Name of the program, for the error message of the next one that tries.
 
         Raises:
-            LinkError: If somebody holds it already.
+            LinkError: If another program holds it.
         """
         self.line.claim(holder)
 
     def close(self) -> None:
-        """Hang up: forget what nobody read. The robot drives on, and the port may be opened again."""
+        """Close the port and drop what was not read. The robot drives on, and the port may be opened again."""
         with self.line.lock:
             self.line.hang_up()
 
-    # ---- time, as the program lives it ----
+    # ---- the program's time ----
 
     def ask_ns(self) -> int:
-        """Return the simulated time [ns]; asking again and again lets time pass, so that a loop may wait for it."""
+        """Return the simulated time [ns]. Repeated polls let time pass, so a loop may wait for a time."""
         with self.line.lock:
             self._ask()
             return self.line.now_ns
 
     @property
     def time_s(self) -> float:
-        """The simulated time [s], asked for in the same way."""
+        """The simulated time [s], polled in the same way."""
         return s_from_ns(self.ask_ns())
 
     def sleep(self, seconds: float) -> None:
@@ -256,13 +256,13 @@ class VirtualPort:
     # ---- inside ----
 
     def _think(self, *, is_command: bool) -> None:
-        """Let the time pass that the program has thought."""
+        """Charge the time that the program has computed."""
         time_ns = self._program.enter(is_command=is_command)
         if time_ns:
             self.line.think(time_ns)
 
     def _ask(self) -> None:
-        """Let the time pass that a question costs."""
+        """Charge a poll."""
         if self._program.thinks:
             self._think(is_command=False)
         cost_ns = self._program.ask()
@@ -276,7 +276,7 @@ class VirtualPort:
             if program.thinks:
                 self._think(is_command=False)
             self._has_read = True
-            # A read that does not wait is a question like any other.
+            # A read that does not wait is a poll.
             poll_ns = program.ask() if timeout_ns == 0 and size != 0 else 0
             data = line.read(size, terminator, timeout_ns, poll_ns)
             program.leave(has_acted=bool(data))
@@ -284,16 +284,16 @@ class VirtualPort:
 
 
 def _characters(data: Any) -> bytes:
-    """Return what a program hands over as pyserial takes it: bytes, or numbers from 0 to 255.
+    """Return the bytes of what a program writes; pyserial takes bytes, or numbers from 0 to 255.
 
     Raises:
-        TypeError: If it is a text, or nothing that consists of numbers.
+        TypeError: If it is a text, or no numbers at all.
         ParameterError: If a number is out of range.
     """
     if isinstance(data, str):
         raise TypeError(f"unicode strings are not supported, please encode to bytes: {shown(data)}")
     if isinstance(data, int):
-        check_count("a count of zeros", data, most=ZEROS_MAX)  # As pyserial has it: a number is so many zeros.
+        check_count("a count of zeros", data, most=ZEROS_MAX)  # In pyserial a number n stands for n zeros.
     try:
         return bytes(data)
     except (TypeError, ValueError, OverflowError) as error:
@@ -302,5 +302,5 @@ def _characters(data: Any) -> bytes:
 
 
 def _count(size: Any) -> int:
-    """Return how many characters are wanted; TypeError if it is no whole number, as pyserial has it."""
+    """Return the number of characters to read; as in pyserial, anything but a whole number is a TypeError."""
     return max(index(size), 0)

@@ -1,4 +1,4 @@
-"""When a read ends: what the port in memory and a program in another process have in common."""
+"""When a read is complete: one rule for the port in memory and for programs in other processes."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from kiks.errors import LinkError
 from kiks.sim.wire import Wire
 
 NEVER_NS = 1 << 63
-"""A time [ns] that no simulation reaches."""
+"""A time that no simulation reaches [ns]."""
 
 
 class Read(NamedTuple):
-    """What a thread of a program waits for on a line.
+    """A read that a thread of a program waits for.
 
     Attributes:
         robot: Number of the robot, from 1.
@@ -29,9 +29,9 @@ class Read(NamedTuple):
 def end_of_read(
     wire: Wire, size: int | None, terminator: bytes | None, deadline_ns: int, asked_until_ns: int
 ) -> tuple[int, int] | None:
-    """Return when a read ends [ns] and with how many characters; None as long as that hangs on a command to come.
+    """Return when a read ends [ns] and with how many characters; None while that depends on a command to come.
 
-    It is known as soon as the robot has answered, before the characters arrive: nobody else can send to this robot.
+    It is known once the robot has answered, before the characters arrive: no other program can send to this robot.
 
     Args:
         wire: The robot's line, with every command carried out that acts up to now.

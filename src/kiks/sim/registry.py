@@ -1,7 +1,7 @@
-"""A registry of the simulations of this process by name, like the operating system's table of serial ports.
+"""A registry of simulations by name, like the operating system's table of serial ports.
 
-`serial_for_url("kiks://1")` and `kopen([-1])` carry nothing but a name, so what the name means has to stand somewhere.
-This is the one table of the process; it holds no simulation alive.
+`serial_for_url("kiks://1")` and `kopen([-1])` carry nothing but a name, so its meaning has to stand somewhere. The
+registry keeps no simulation alive.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ class Named(Protocol):
 Entry = TypeVar("Entry", bound=Named)
 
 SHOWN_NAMES = 5
-"""How many of the simulations that are alive a message names: the newest."""
+"""Most simulations that a message names: the newest."""
 
 
 class Registry(Generic[Entry]):

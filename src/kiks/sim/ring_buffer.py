@@ -1,4 +1,4 @@
-"""The newest of what comes without end, for anybody who looks now and then."""
+"""A ring buffer with numbered entries, so that several readers can each read on from where they were."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ Item = TypeVar("Item")
 
 
 class RingBuffer(Generic[Item]):
-    """Keeps the newest things and forgets the older ones. Each has a number, so that several may read, each on its own.
+    """Keeps the newest entries and drops older ones. Entries are numbered from 0.
 
     Args:
-        limit: How many are kept.
+        limit: How many entries are kept.
 
     Example:
         >>> ring = RingBuffer(3)
@@ -33,11 +33,11 @@ class RingBuffer(Generic[Item]):
 
     @property
     def count(self) -> int:
-        """How many have come, those included that are forgotten; the number of the next one."""
+        """Number of the next entry: how many were added, dropped ones included."""
         return self._count
 
     def add(self, items: Iterable[Item], *, skipped: int = 0) -> None:
-        """Take things, in their order; before them others came that were not worth keeping, as many as `skipped`."""
+        """Add entries in order, after `skipped` entries that are dropped at once."""
         new = list(items)
         with self._lock:
             if skipped:
@@ -46,13 +46,13 @@ class RingBuffer(Generic[Item]):
             self._count += skipped + len(new)
 
     def append(self, item: Item) -> None:
-        """Take one thing."""
+        """Add one entry."""
         with self._lock:
             self._items.append(item)
             self._count += 1
 
     def since(self, number: int) -> tuple[int, list[Item]]:
-        """Return what is kept from a number on, and the number of its first: a larger one if some are forgotten."""
+        """Return the entries from a number on, and the number of the first: larger if some were dropped."""
         with self._lock:
             first = max(number, self._count - len(self._items))
             kept_from = self._count - len(self._items)

@@ -276,7 +276,7 @@ class Simulation:
             return world.poses()
 
     def place(self, robot: int, x_mm: float, y_mm: float, heading_rad: float) -> None:
-        """Lift a robot and put it down somewhere else; its wheels and counters do not notice.
+        """Move a robot elsewhere; its wheels and counters do not change.
 
         Args:
             robot: Number of the robot, from 1.
@@ -292,7 +292,7 @@ class Simulation:
             world.place_robot(index, x_mm, y_mm, heading_rad)
 
     def add_robot(self, robot: str | RobotSpec = "khepera") -> int:
-        """Put one more robot into the world; return its number.
+        """Add a robot; return its number.
 
         It starts where the arena has a start for it, if that is free, else at a random place. Robots, programs and
         bodies that are there do not notice, until they meet it.
@@ -384,7 +384,7 @@ class Simulation:
         return float(forwards_mm + backwards_mm)
 
     def distances_mm(self) -> NDArray[np.float64]:
-        """Return how far robots have come, float64 [robot, 3] [mm].
+        """Return how far robots have come [mm], float64 [robot, 3].
 
         The columns are the way driven forwards, the way driven backwards, and the straight distance from where the
         robot started or was put last.
@@ -393,7 +393,7 @@ class Simulation:
             return world.distances_mm()
 
     def contacts(self, robot: int) -> int:
-        """Return how often a robot has met something so far: a wall, a robot, a ball or a cylinder.
+        """Return how often a robot has touched something so far: a wall, a robot, a ball or a cylinder.
 
         Raises:
             ParameterError: If there is no such robot.
@@ -405,10 +405,10 @@ class Simulation:
     # ---- walls, balls, cylinders and lamps ----
 
     def set_arena(self, arena: Arena) -> None:
-        """Put other walls around everything; time, robots, programs, balls, cylinders and lamps stay as they are.
+        """Replace the walls; time, robots, programs, balls, cylinders and lamps stay as they are.
 
         Args:
-            arena: The walls; what else the arena holds is only kept in `arena`.
+            arena: The walls; lamps, balls, cylinders and starts in it are ignored.
 
         Raises:
             ParameterError: If a robot, ball or cylinder would be deeper in a wall than it is.
@@ -421,7 +421,7 @@ class Simulation:
             world.set_arena(free_space)
 
     def add_ball(self, x_mm: float, y_mm: float, **changes: Any) -> int:
-        """Put a ball into the arena, at rest; return its number.
+        """Add a ball at rest; return its number.
 
         Args:
             x_mm: Its centre [mm].
@@ -444,7 +444,7 @@ class Simulation:
             return self._things.add_body(Ball, x_mm, y_mm, changes)
 
     def add_cylinder(self, x_mm: float, y_mm: float, **changes: Any) -> int:
-        """Put a cylinder into the arena; return its number.
+        """Add a cylinder at rest; return its number.
 
         Args:
             x_mm: Its centre [mm].
@@ -458,7 +458,7 @@ class Simulation:
             return self._things.add_body(Cylinder, x_mm, y_mm, changes)
 
     def bodies(self) -> NDArray[np.void]:
-        """Return a copy of what there is of balls and cylinders: records of `kiks.engine.state.BODY`, shape [body].
+        """Return a copy of the balls and cylinders: records of `kiks.engine.state.BODY`, shape [body].
 
         Of their fields `number`, `what` (3 a ball, 4 a cylinder), `x_mm`, `y_mm`, `velocity_x` and `velocity_y` [mm/s],
         `radius_mm` and `brightness` are of use.
@@ -470,7 +470,7 @@ class Simulation:
     def move_body(
         self, body: int, x_mm: float, y_mm: float, *, speed_mm_s: float = 0.0, heading_rad: float = 0.0
     ) -> None:
-        """Lift a ball or cylinder and put it down somewhere else, or set it rolling.
+        """Move a ball or cylinder elsewhere, or set it rolling.
 
         Args:
             body: Its number.
@@ -486,7 +486,7 @@ class Simulation:
             self._things.move_body(body, x_mm, y_mm, speed_mm_s, heading_rad)
 
     def remove_body(self, body: int) -> None:
-        """Take a ball or cylinder away.
+        """Remove a ball or cylinder.
 
         Raises:
             ParameterError: If there is no such body.
@@ -495,7 +495,7 @@ class Simulation:
             self._things.remove_body(body)
 
     def add_lamp(self, x_mm: float, y_mm: float, power_w: float = 1.0, *, is_on: bool = True) -> int:
-        """Hang a lamp into the arena; return its row in `lamps`, counted from 1.
+        """Add a lamp; return its row in `lamps`, counted from 1.
 
         Raises:
             ParameterError: If it would hang outside the arena, or a value is out of range.
@@ -504,7 +504,7 @@ class Simulation:
             return self._things.add_lamp(x_mm, y_mm, power_w, is_on)
 
     def remove_lamp(self, lamp: int) -> None:
-        """Take a lamp away; those behind it move up a row.
+        """Remove a lamp; those below it move up a row.
 
         Raises:
             ParameterError: If there is no such lamp.
@@ -518,9 +518,9 @@ class Simulation:
             return self._things.checkpoint()
 
     def reset(self, checkpoint: Checkpoint) -> None:
-        """Put everything back where it stood at a checkpoint; what was added since goes, what was removed comes back.
+        """Move everything back to a checkpoint: bodies and lamps added since then go, removed ones come back.
 
-        Time goes on, and so do programs, wheels and counters: it is as if a hand had tidied up.
+        Time, programs, wheels and counters go on.
 
         Raises:
             ParameterError: If it is no checkpoint, or one of a simulation with another number of robots.
@@ -531,7 +531,7 @@ class Simulation:
     # ---- what sensors read ----
 
     def proximity(self, robot: int, *, noise: bool = False) -> list[float]:
-        """Return what the eight proximity sensors would read at this instant and pose, without waiting for their round.
+        """Return what the eight proximity sensors would read if all were sampled at this instant.
 
         Args:
             robot: Number of the robot, from 1.
@@ -561,7 +561,7 @@ class Simulation:
             return proximity_at(world, index, poses)
 
     def ambient(self, robot: int, *, noise: bool = False) -> list[float]:
-        """Return what the eight light sensors would read at this instant and pose, without waiting for their round.
+        """Return what the eight light sensors would read if all were sampled at this instant.
 
         Args:
             robot: Number of the robot, from 1.
@@ -578,7 +578,7 @@ class Simulation:
         """Return how far each ray of a robot's proximity sensors goes at this instant and pose, float64 [8, 7] [mm].
 
         The leftmost ray is first; lengths are counted from the sensor, and infinite where nothing is within its reach.
-        They are exact, however roughly the robot's response takes them.
+        They are exact, even where the robot's response uses coarser ones.
 
         Raises:
             ParameterError: If there is no such robot.
@@ -634,14 +634,14 @@ class Simulation:
             return self._turrets.cameras.expect(index)
 
     def look(self) -> Snapshot:
-        """Return where everybody is at this instant, and what all sensors see; looking changes nothing."""
+        """Return where everything is at this instant, and what all sensors see. This changes nothing."""
         with self._up_to_date() as world:
             return look(world)
 
     # ---- the run as a whole ----
 
     def record_paths(self, every_s: float = 0.1, *, points_max: int | None = None) -> None:
-        """Keep where all robots, balls and cylinders are from now on; what was kept before is dropped.
+        """Record the paths of all robots, balls and cylinders from now on; earlier records are dropped.
 
         Args:
             every_s: Time between two points [s]: whole hundredths, at least one.
@@ -693,13 +693,13 @@ class Simulation:
     def show(
         self, *, speed: float | None = 1.0, is_alive: bool = False, port: int | None = None, browser: bool = True
     ) -> Any:
-        """Show this world in a browser, to be watched, paused and touched, and say where; in a notebook below the cell.
+        """Show this simulation in a browser and print its address; in a notebook, below the cell.
 
-        Looking changes nothing: the run is the same, to the bit, unless somebody reaches in.
+        The run stays the same, to the bit, unless a user changes something.
 
         Args:
-            speed: Simulated seconds in a real one from now on; None for as fast as possible.
-            is_alive: Whether time passes by itself, in a thread; else it does when the program lets it.
+            speed: Simulated seconds per real second from now on; None for full speed.
+            is_alive: Whether time passes by itself, in a thread; else only when the program lets it.
             port: TCP port of the page, on this computer only; 8123, or a free one, if left out.
             browser: False for its address alone.
 

@@ -1,4 +1,4 @@
-"""A look at a simulation: where everybody is and what all sensors see, taken in one go."""
+"""A snapshot for people who watch: where everything is and what all sensors see at an instant."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from kiks.sim.world import World
 
 @dataclass(frozen=True)
 class Snapshot:
-    """Where everybody is at an instant, and what all sensors see.
+    """Where everything is at an instant, and what all sensors see.
 
     Attributes:
         poses: Of robots: x_mm, y_mm, heading_rad; float64 [robot, 3].

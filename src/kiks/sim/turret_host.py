@@ -136,7 +136,7 @@ class RobotSite:
 
     @property
     def lock(self) -> AbstractContextManager[Any]:
-        """To be held by whoever changes something from outside the simulation."""
+        """Hold it while you change something from outside the simulation."""
         return self._world.lock
 
     @property

@@ -1,4 +1,4 @@
-"""A robot's end of the serial line: characters become commands, commands act when they are due, replies set out."""
+"""A robot's serial line: characters become commands, commands act when they are due, replies are sent."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ STOP = b"D,0,0\n"
 """The command that stops the wheels."""
 
 Hear = Callable[[bytes, int], None]
-"""Takes a reply, and when its last character arrives [ns]."""
+"""A callback that takes a reply, and when its last character arrives [ns]."""
 
 
 class Wire:
@@ -26,10 +26,10 @@ class Wire:
         index: The robot's index.
 
     Attributes:
-        holder: Who has opened the robot's port, in words for the next one who tries; None while nobody has.
-        log: Remembers what goes over the line; None unless somebody watches it.
-        pending: Commands on their way: when each acts [ns], its line, and who hears the reply instead of the host.
-        thinks_since_ns: Since when a real program is at the port, whose every gap counts as thinking [ns]; else None.
+        holder: Name of the program that has opened the port; None while it is free.
+        log: Records what goes over the line; None while it is not watched.
+        pending: Commands on their way: when each acts [ns], its line, and what takes the reply in place of the host.
+        thinks_since_ns: Since when a real program has the port, whose every gap counts as thinking [ns]; else None.
         next_ns: When the robot does something next [ns], or None while it only waits for characters.
     """
 
@@ -49,7 +49,7 @@ class Wire:
         self._orphan_count = 0
 
     def set_baud(self, baud: int) -> None:
-        """Set both ends of the line to a speed [bit/s], as the person does who turns the robot's mode selector."""
+        """Set both ends of the line to a baud rate [bit/s], as the robot's mode selector does."""
         self.firmware.baud = self.firmware.selected_baud = baud
         self.line.set_baud(baud)
 
@@ -59,7 +59,7 @@ class Wire:
         Args:
             data: The characters.
             at_ns: When they are sent [ns].
-            hear: Who takes the replies; the host if left out.
+            hear: A callback for the replies; the host reads them if left out.
         """
         start_ns = self.line.send(len(data), at_ns)
         character_ns = self.line.character_ns
@@ -96,7 +96,7 @@ class Wire:
         self._plan()
 
     def _plan(self) -> None:
-        """Find out when the robot does something next."""
+        """Schedule the robot's next event."""
         command_ns = self.pending[0][0] if self.pending else None
         demo_ns = self.firmware.demo_wakes_ns
         if demo_ns is None or command_ns is None:
@@ -107,7 +107,7 @@ class Wire:
             self._add_event(self.next_ns, self._index)
 
     def watch(self, now_ns: int) -> WireLog:
-        """Remember what goes over the line from now [ns] on, if nobody does yet; `unwatch` as often as this."""
+        """Record what goes over the line from now [ns] on; call `unwatch` once for each call."""
         self._watcher_count += 1
         log = self.log
         if log is None:
@@ -115,35 +115,35 @@ class Wire:
         return log
 
     def unwatch(self) -> None:
-        """Watch it no longer; when nobody does, nothing is remembered."""
+        """Stop watching; the record ends with the last watcher."""
         self._watcher_count -= 1
         if self._watcher_count == 0:
             self.log = None
 
     def think(self, from_ns: int, until_ns: int) -> None:
-        """Note that the program has thought, for whoever watches."""
+        """Record that the program has thought, if the line is watched."""
         if (log := self.log) is not None:
             log.think(from_ns, until_ns)
 
     def shares(self, from_ns: int, until_ns: int) -> TimeShares | None:
-        """Return where the time of a window went; None if nobody watches."""
+        """Return where the time of a window went; None if the line is not watched."""
         log = self.log
         return None if log is None else log.shares(from_ns, until_ns, thinks_since_ns=self.thinks_since_ns)
 
     def enter_client(self, holder: str, now_ns: int) -> None:
-        """Let a real program have the line: all that it does between a reply and a command is thinking."""
+        """Give the line to a real program: all time between a reply and its next command is thinking."""
         self.holder = holder
         self.thinks_since_ns = now_ns
 
     def leave_client(self, now_ns: int) -> None:
-        """Let the line be free again."""
+        """Free the line."""
         self.holder = None
         if self.thinks_since_ns is not None:
             self.think(self.thinks_since_ns, now_ns)
         self.thinks_since_ns = None
 
     def halt(self, now_ns: int) -> None:
-        """Hang up and stop the wheels, as is done for a program that a person has stopped."""
+        """Stop the wheels and free the line, for a program that a user has stopped."""
         self.hang_up()
         self.send(STOP, now_ns)
         self.hang_up()
@@ -152,7 +152,7 @@ class Wire:
         """Drop the host's commands that would act late, and all replies; return how many commands.
 
         Args:
-            until_ns: Until when commands still act [ns].
+            until_ns: Commands up to this time still act [ns].
             now_ns: The time [ns]: from now on the line is free for replies.
         """
         kept = [each for each in self.pending if each[0] <= until_ns or each[2] is not None]
@@ -165,7 +165,7 @@ class Wire:
         return dropped_count
 
     def hang_up(self) -> None:
-        """Forget what the host left behind: an unfinished command, and replies that nobody will read.
+        """Drop what the host left behind: an unfinished command, and replies that will not be read.
 
         Commands that were sent whole still act, and the robot drives on (khepera-protocol.md 11.3).
         """

@@ -1,4 +1,4 @@
-"""What went over a robot's line and when, and where the time went."""
+"""A record of what went over a robot's line and when, and of where the time went."""
 
 from __future__ import annotations
 
@@ -8,26 +8,26 @@ from typing import NamedTuple
 from kiks.sim.ring_buffer import RingBuffer
 
 PIECE_LIMIT = 4096
-"""Pieces that are remembered: a second of a robot at 115200 bit/s to whom one talks without a break has about 300."""
+"""Most pieces that are kept: a second of uninterrupted traffic at 115200 bit/s has about 300."""
 
 THOUGHT_LIMIT = 4096
-"""Times of thinking that are remembered."""
+"""Most spans of thinking that are kept."""
 
 _TERMINATORS = b"\r\n"
 
 Span = tuple[int, int]
-"""From when until when [ns]."""
+"""Beginning and end [ns]."""
 
 
 class Piece(NamedTuple):
     """Characters that belong together: a command with its end, a reply, or a part of a command.
 
     Attributes:
-        is_sent: Whether they went to the robot; else they came from it.
+        is_sent: True: to the robot. False: from the robot.
         data: The characters.
-        first_ns: When the first one set out [ns].
-        last_ns: When the last one has arrived [ns].
-        acted_ns: When the command acts whose end this is, or whose reply [ns]; None for a part of a command.
+        first_ns: When the first character began [ns].
+        last_ns: When the last character has arrived [ns].
+        acted_ns: When the command acts that ends here, or that this replies to [ns]; None for a part of a command.
     """
 
     is_sent: bool
@@ -42,9 +42,9 @@ class TimeShares(NamedTuple):
 
     Attributes:
         link_ns: Characters were on the line, either way.
-        robot_ns: The robot had a command and no answer yet.
+        robot_ns: The robot processed a command.
         thinking_ns: The program thought.
-        waiting_ns: All else: the program waited on purpose, or nobody wanted anything.
+        waiting_ns: All else: the program waited, or there was no program.
     """
 
     link_ns: int
@@ -54,18 +54,18 @@ class TimeShares(NamedTuple):
 
     @property
     def window_ns(self) -> int:
-        """The whole [ns]."""
+        """Length of the window [ns]."""
         return sum(self)
 
 
 class WireLog:
-    """Remembers the newest of what goes over one robot's line.
+    """Keeps the newest pieces that went over one robot's line.
 
     Args:
-        now_ns: When it begins [ns].
+        now_ns: When the record begins [ns].
 
     Attributes:
-        pieces: What went over the line. A piece is known as soon as it is certain, which is before it has arrived.
+        pieces: What went over the line. A piece is recorded once it is certain, which is before it has arrived.
     """
 
     def __init__(self, now_ns: int) -> None:
@@ -78,11 +78,11 @@ class WireLog:
 
         Args:
             data: The characters.
-            start_ns: When the first one sets out [ns].
+            start_ns: When the first character begins [ns].
             character_ns: How long each takes [ns].
             acts: For each command that they complete: the index of its terminator, and when it acts [ns].
         """
-        if len(acts) == 1 and acts[0][0] == len(data) - 1:  # what nearly every program sends: one whole line
+        if len(acts) == 1 and acts[0][0] == len(data) - 1:  # the usual case: one whole line
             self.pieces.append(Piece(True, data, start_ns, start_ns + len(data) * character_ns, acts[0][1]))
             return
         begin = 0
@@ -111,7 +111,7 @@ class WireLog:
 
     @property
     def since_ns(self) -> int:
-        """From when on everything is remembered [ns]."""
+        """The record is complete from this time on [ns]."""
         first, pieces = self.pieces.since(0)
         first_thought, thoughts = self._thoughts.since(0)
         return max(
@@ -121,12 +121,12 @@ class WireLog:
         )
 
     def shares(self, from_ns: int, until_ns: int, *, thinks_since_ns: int | None = None) -> TimeShares:
-        """Return where the time of a window went; of a later one, if its beginning is forgotten.
+        """Return where the time of a window went; the window begins later if the record does.
 
         Args:
             from_ns: When the window begins [ns].
             until_ns: When it ends [ns].
-            thinks_since_ns: Since when all that is not the line's or the robot's counts as thinking [ns].
+            thinks_since_ns: From this time on, all time that neither line nor robot takes counts as thinking [ns].
         """
         pieces, thoughts = self.pieces.since(0)[1], self._thoughts.since(0)[1]
         if thinks_since_ns is not None:
@@ -140,9 +140,7 @@ class WireLog:
 
 
 def share_time(window: Span, *, link: Iterable[Span], robot: Iterable[Span], thinking: Iterable[Span]) -> TimeShares:
-    """Give each instant of a window to the first that claims it.
-
-    Each claim adds to what is taken already, so the shares add up to the window exactly.
+    """Give each instant of a window to the first claim on it, so the shares add up to the window exactly.
 
     Example:
         >>> share_time((0, 10), link=[(0, 2), (5, 8)], robot=[(1, 6)], thinking=[(9, 20)])
@@ -159,7 +157,7 @@ def share_time(window: Span, *, link: Iterable[Span], robot: Iterable[Span], thi
 
 
 def _union(taken: list[Span], spans: Iterable[Span], window: Span) -> list[Span]:
-    """Return what is covered within a window: spans in their order that do not meet."""
+    """Return the union of spans within a window, sorted and disjoint."""
     begin_ns, end_ns = window
     inside = [
         (max(from_ns, begin_ns), min(until_ns, end_ns))
