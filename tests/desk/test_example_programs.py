@@ -20,7 +20,7 @@ NAMES = sorted(path.stem for path in FOLDER.glob("[!_]*.py"))
 
 def run(sim: Simulation, name: str, seconds: float = math.inf) -> int | None:
     """Run an example to its end, or interrupt it after a simulated time; then it returns None."""
-    advance_to = sim.advance_to
+    advance_to = sim.loop.advance_to
     limit_ns = math.inf if seconds == math.inf else ns_from_s(seconds)
 
     def advance_and_interrupt(time_ns: int) -> None:
@@ -30,7 +30,7 @@ def run(sim: Simulation, name: str, seconds: float = math.inf) -> int | None:
             limit_ns = math.inf
             raise KeyboardInterrupt
 
-    sim.advance_to = advance_and_interrupt  # type: ignore[method-assign]
+    sim.loop.advance_to = advance_and_interrupt  # type: ignore[method-assign]
     try:
         return run_here(sim, FOLDER / f"{name}.py", [], {})
     except KeyboardInterrupt:

@@ -21,7 +21,7 @@ from tests.served import GUARD_S, PROGRAMS, fresh
 import kiks as package
 from kiks.cli.options import parse_words
 from kiks.errors import LinkError, ParameterError
-from kiks.ports.port_names import Names
+from kiks.ports.port_names import PortNames
 from kiks.ports.program_process import Command
 from kiks.ports.programs import Programs
 from kiks.script.runner import run_here
@@ -272,7 +272,7 @@ def test_no_program_outlives_a_killed_kiks(tmp_path: Path) -> None:
 
 
 def test_each_program_has_the_robot_of_its_number() -> None:
-    names = Names(fresh(4), {"/dev/ttyS9": 3}, 2)
+    names = PortNames(fresh(4), {"/dev/ttyS9": 3}, 2)
     assert [names.robot("COM1", 2), names.robot("COM1", 1), names.robot("COM2", 2)] == [2, 1, 4]
     assert [names.robot("/dev/ttyS9", 1), names.robot("COM1", 2)] == [3, 2]
     with pytest.raises(LinkError, match=r"'COM2' is one more than there are: \{'/dev/ttyS9': 3, 'COM1': 1\}"):
@@ -283,7 +283,7 @@ def test_each_program_has_the_robot_of_its_number() -> None:
         names.robot("kiks://1?seed=3")
     other, world = package.Simulation(), fresh()
     with pytest.raises(LinkError, match=r"must belong to the world that the programs share"):
-        Names(world, {}).robot(other.url(1))
+        PortNames(world, {}).robot(other.url(1))
 
 
 def test_names_of_kiks_mean_this_world(tmp_path: Path) -> None:

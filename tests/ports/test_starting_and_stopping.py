@@ -45,10 +45,10 @@ class Gate:
 
     def __init__(self, sim: Simulation) -> None:
         self._changed = threading.Condition(sim.lock)
-        self._advance = sim.advance_to
+        self._advance = sim.loop.advance_to
         self.is_paused = False
         self.is_waited_at = threading.Event()
-        sim.advance_to = self._advance_to  # type: ignore[method-assign]
+        sim.loop.advance_to = self._advance_to  # type: ignore[method-assign]
 
     def _advance_to(self, time_ns: int) -> None:
         while self.is_paused:

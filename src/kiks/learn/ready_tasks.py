@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from kiks.control import controllers, measures
 from kiks.control.controller import Controller
-from kiks.learn import mazes, training_arenas
+from kiks.learn import training_arenas
 from kiks.learn.task import Axis, Task, cautious_mean
 from kiks.model.arena import Arena, Cylinder, Lamp
 
@@ -194,13 +194,18 @@ def maze(controller: Controller | None = None, **changes: Any) -> Task:
     """
     task = Task(
         "maze",
-        (mazes.kheperax(),),
+        (training_arenas.kheperax(),),
         controllers.mlp(hidden=(8,), speed_limit=SPEED_LIMIT) if controller is None else controller,
-        (measures.goal_mm(*mazes.goal_mm()), measures.final_x_mm, measures.final_y_mm, measures.turned_pulses),
+        (
+            measures.goal_mm(*training_arenas.goal_mm()),
+            measures.final_x_mm,
+            measures.final_y_mm,
+            measures.turned_pulses,
+        ),
         fitness=maze_fitness,
         seconds=100.0,
         worlds=2,
-        axes=(Axis("final_x_mm", 0, mazes.SIDE_MM, 32), Axis("final_y_mm", 0, mazes.SIDE_MM, 32)),
+        axes=(Axis("final_x_mm", 0, training_arenas.SIDE_MM, 32), Axis("final_y_mm", 0, training_arenas.SIDE_MM, 32)),
         starts="arena",
         about="end near the goal of the Kheperax maze",
     )

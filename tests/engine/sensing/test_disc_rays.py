@@ -167,7 +167,7 @@ def test_what_is_lifted_nobody_sees_or_meets():
         sim.fit(1, "k213")
     assert lifted.proximity(1) != alone.proximity(1)
     assert lifted.ambient(1) != alone.ambient(1)
-    lifted.state.bodies["is_lifted"] = 1
+    lifted.world.state.bodies["is_lifted"] = 1
     lifted.world.rebuild_scene()
     assert lifted.proximity(1) == alone.proximity(1)
     assert lifted.ambient(1) == alone.ambient(1)
