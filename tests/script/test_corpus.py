@@ -37,6 +37,8 @@ AT_ONCE = 2
 """Simulated runs at the same time: one a core."""
 IN_REAL_TIME = 6
 """Programs at the same time that live in real time: they mostly wait."""
+ATTEMPTS_IN_REAL_TIME = 3
+"""A computer that is busy for a moment delays programs that live in real time, so these may try again."""
 GROUP = 13
 """Programs that share a world: so many begin together within the time in which the world waits for them."""
 SEED = "3"
@@ -206,10 +208,20 @@ def run_real(name: str, ports: Mapping[str, str], environment: Mapping[str, str]
     return done.stdout + (f"exit code {done.returncode}: {done.stderr}" if done.returncode else "")
 
 
+def run_all_real(names: Sequence[str], folder: Path, environment: Mapping[str, str]) -> dict[str, str]:
+    """Run programs in real time, each on a robot of its own; return what each of them said."""
+    folder.mkdir()
+    with served(folder, len(names)) as ports, ThreadPoolExecutor(IN_REAL_TIME) as pool:
+        jobs = {name: pool.submit(run_real, name, port, environment) for name, port in zip(names, ports, strict=True)}
+    return {name: job.result() for name, job in jobs.items()}
+
+
 def test_programs_do_the_same_in_real_time(
     alone: tuple[Runs, Runs], tmp_path: Path, environment: dict[str, str]
 ) -> None:
-    with served(tmp_path, len(CORPUS)) as ports, ThreadPoolExecutor(IN_REAL_TIME) as pool:
-        jobs = {name: pool.submit(run_real, name, port, environment) for name, port in zip(CORPUS, ports, strict=True)}
-    said = {name: job.result() for name, job in jobs.items()}
-    assert said == printed(alone[0])
+    expected = printed(alone[0])
+    said: dict[str, str] = {}
+    for attempt in range(ATTEMPTS_IN_REAL_TIME):
+        if late := [name for name in CORPUS if said.get(name) != expected[name]]:
+            said |= run_all_real(late, tmp_path / str(attempt), environment)
+    assert said == expected
