@@ -43,7 +43,7 @@ def said(caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]) ->
     assert "Traceback" not in capfd.readouterr().err
 
 
-def door_of(shown: Shown) -> tuple[str, int, str]:
+def address_and_cookie(shown: Shown) -> tuple[str, int, str]:
     """Return where the server is, and the header with the token."""
     url = urlsplit(shown.url)
     assert url.hostname is not None
@@ -53,7 +53,7 @@ def door_of(shown: Shown) -> tuple[str, int, str]:
 
 def knock(shown: Shown, data: bytes) -> bytes:
     """Send bytes and nothing more; return all that is answered."""
-    host, port, _ = door_of(shown)
+    host, port, _ = address_and_cookie(shown)
     with socket.create_connection((host, port), timeout=GUARD_S) as stranger:
         with suppress(OSError):
             stranger.sendall(data)
@@ -67,7 +67,7 @@ def knock(shown: Shown, data: bytes) -> bytes:
 
 def ask(shown: Shown, method: str, path: str, body: bytes | None = None, **headers: str) -> tuple[int, bytes]:
     """Return what a browser with the token is answered: the status and the page."""
-    host, port, cookie = door_of(shown)
+    host, port, cookie = address_and_cookie(shown)
     asking = http.client.HTTPConnection(host, port, timeout=GUARD_S)
     asking.request(method, path, body, {"Cookie": cookie, **headers})
     answer = asking.getresponse()
@@ -127,14 +127,14 @@ def test_what_is_no_request_is_refused_and_nothing_else(shown: Shown, said: list
 
 
 def test_strangers_who_say_nothing_keep_nobody_out(shown: Shown, said: list[str]) -> None:
-    host, port, _ = door_of(shown)
-    idle = [socket.create_connection((host, port), timeout=GUARD_S) for _ in range(3 * connection_limit.STRANGERS_MAX)]
+    host, port, _ = address_and_cookie(shown)
+    idle = [socket.create_connection((host, port), timeout=GUARD_S) for _ in range(3 * connection_limit.UNAUTHENTICATED_MAX)]
     for half in idle[::2]:
         with suppress(OSError):
             half.sendall(b"GET / HTTP/1.1\r\n")
     assert is_well(shown)
     # The first to come are the first to go.
-    for early in idle[: connection_limit.STRANGERS_MAX]:
+    for early in idle[: connection_limit.UNAUTHENTICATED_MAX]:
         with suppress(ConnectionError):
             assert early.recv(1) == b""
     for each in idle:
@@ -143,18 +143,18 @@ def test_strangers_who_say_nothing_keep_nobody_out(shown: Shown, said: list[str]
 
 
 def test_a_stranger_has_little_time(shown: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(connection_limit, "STRANGER_S", 0.0)
-    host, port, _ = door_of(shown)
+    monkeypatch.setattr(connection_limit, "AUTHENTICATION_S", 0.0)
+    host, port, _ = address_and_cookie(shown)
     with socket.create_connection((host, port), timeout=GUARD_S) as stranger, suppress(ConnectionError):
         assert stranger.recv(1) == b""
 
 
 def test_a_browser_that_is_in_may_take_its_time(shown: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
-    host, port, cookie = door_of(shown)
+    host, port, cookie = address_and_cookie(shown)
     path = urlsplit(shown.url).path
     with connect(f"ws://{host}:{port}{path}/feed", additional_headers={"Cookie": cookie}, open_timeout=GUARD_S) as feed:
         idle = [
-            socket.create_connection((host, port), timeout=GUARD_S) for _ in range(2 * connection_limit.STRANGERS_MAX)
+            socket.create_connection((host, port), timeout=GUARD_S) for _ in range(2 * connection_limit.UNAUTHENTICATED_MAX)
         ]
         for _ in range(5):
             while not isinstance(feed.recv(GUARD_S), bytes):
@@ -186,7 +186,7 @@ def test_a_browser_that_is_in_may_take_its_time(shown: Shown, monkeypatch: pytes
 )
 @pytest.mark.parametrize("which", ["feed", "socket.io"])
 def test_frames_that_are_none_end_their_socket(shown: Shown, said: list[str], which: str, frames: bytes) -> None:
-    host, port, cookie = door_of(shown)
+    host, port, cookie = address_and_cookie(shown)
     path = f"{urlsplit(shown.url).path}/feed"
     path = path if which == "feed" else "/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
     with connect(f"ws://{host}:{port}{path}", additional_headers={"Cookie": cookie}, open_timeout=GUARD_S) as client:
@@ -235,7 +235,7 @@ def test_frames_that_are_none_end_their_socket(shown: Shown, said: list[str], wh
 def test_events_that_are_none_hurt_nobody(
     shown: Shown, caplog: pytest.LogCaptureFixture, message: str, said: Any
 ) -> None:
-    host, port, cookie = door_of(shown)
+    host, port, cookie = address_and_cookie(shown)
     path = "/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
     with connect(f"ws://{host}:{port}{path}", additional_headers={"Cookie": cookie}, open_timeout=GUARD_S) as client:
         client.send("40")
@@ -270,7 +270,7 @@ def test_uploads_that_are_none_are_refused(shown: Shown, said: list[str]) -> Non
 
 
 def test_a_body_that_is_too_large_is_not_kept(shown: Shown, said: list[str]) -> None:
-    host, port, cookie = door_of(shown)
+    host, port, cookie = address_and_cookie(shown)
     for headers, body in (
         ({"Content-Length": str(BODY_LIMIT + 1)}, b""),
         ({"Transfer-Encoding": "chunked"}, b"100000\r\n" + b"x" * 0x100000 + b"\r\n"),
@@ -294,7 +294,7 @@ def test_a_body_that_is_too_large_is_not_kept(shown: Shown, said: list[str]) -> 
 
 
 def test_json_of_the_gateway_never_raises(shown: Shown, said: list[str]) -> None:
-    host, port, cookie = door_of(shown)
+    host, port, cookie = address_and_cookie(shown)
     chance = random.Random(2)
     values: list[Any] = [
         None,

@@ -49,7 +49,7 @@ def desk(tmp_path: Path) -> Iterator[Desk]:
 
 def in_order(desk: Desk, *acts: Callable[[Editing], Awaitable[None]]) -> Editing:
     async def do() -> Editing:
-        editing = desk.editing
+        editing = Editing(desk)
         for act in acts:
             await act(editing)
         return editing
@@ -113,7 +113,7 @@ def test_steps_go_back_and_forth_in_the_world(desk):
 
 def test_what_cannot_be_changes_nothing(desk):
     sim = desk.sim
-    editing = desk.editing
+    editing = Editing(desk)
     before, hash_before = sim.arena, sim.state_hash()
 
     async def refused(act: Awaitable[None], words: str) -> None:
@@ -135,7 +135,7 @@ def test_what_cannot_be_changes_nothing(desk):
 
 
 def test_the_world_has_the_last_word(desk, monkeypatch):
-    editing = desk.editing
+    editing = Editing(desk)
 
     def refuse(_arena: Arena) -> None:
         raise ParameterError("no room")
@@ -161,7 +161,7 @@ def test_the_world_has_the_last_word(desk, monkeypatch):
 def test_the_sketch_follows_what_moves(desk):
 
     async def do() -> None:
-        editing = desk.editing
+        editing = Editing(desk)
         await line(editing)
         desk.sim.place(1, 400, 300, 0.0)
         desk.sim.move_body(1, 50, 50)
@@ -179,7 +179,7 @@ def test_the_sketch_follows_what_moves(desk):
 def test_somebody_else_may_change_the_world(desk):
 
     async def do() -> None:
-        editing = desk.editing
+        editing = Editing(desk)
         await line(editing)
         desk.sim.remove_body(1)
         desk.sim.add_lamp(300, 50)
@@ -195,7 +195,7 @@ def test_somebody_else_may_change_the_world(desk):
 def test_resets_go_back_to_what_was_drawn(desk):
 
     async def do() -> None:
-        editing = desk.editing
+        editing = Editing(desk)
         desk.sim.place(1, 400, 300, 0.0)
         await editing.draw(lambda sketch: sketch.rectangle(50, 50, 150, 150))
         desk.sim.place(1, 250, 200, 0.0)
@@ -212,7 +212,7 @@ def test_another_robot_is_another_world(desk):
     first = desk.sim
 
     async def do() -> None:
-        editing = desk.editing
+        editing = Editing(desk)
         await line(editing)
         await editing.place(SketchRobot(400, 300, 1.0, "khepera_ii"))
         assert desk.sim is not first
@@ -236,7 +236,7 @@ def test_another_robot_is_another_world(desk):
 def test_another_arena_keeps_the_robots(desk):
 
     async def do() -> None:
-        editing = desk.editing
+        editing = Editing(desk)
         await editing.begin(Arena.maze(columns=3, rows=3))
         assert desk.sim.arena.name == "maze"
         assert counts(desk) == (1, 0, 1)
@@ -255,7 +255,7 @@ def test_a_world_of_another_program_keeps_its_robots():
     desk = Desk(sim)
 
     async def do() -> None:
-        editing = desk.editing
+        editing = Editing(desk)
         await line(editing)
         assert sim.arena.brightness[100, 200] == 255
         for act in (editing.place(SketchRobot(400, 300)), editing.begin(Arena.box(300, 300))):
@@ -276,7 +276,7 @@ def test_a_world_of_another_program_keeps_its_robots():
 def test_two_people_may_draw_at_once(desk):
 
     async def do() -> None:
-        editing = desk.editing
+        editing = Editing(desk)
         strokes = [
             editing.draw(lambda sketch, y=y: sketch.line([(240, y), (260, y)], width_mm=4, brightness=y))
             for y in range(20, 240, 20)

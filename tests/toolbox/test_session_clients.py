@@ -273,7 +273,7 @@ def test_what_a_paused_world_keeps_waiting_can_be_called_off(session: Session, r
         session.desk.gate.pause(session.world.now_ns)
         is_paused.set()
         told.append(ask.told(request_))
-        awaited.is_called_off = False
+        awaited.is_cancelled = False
         session.desk.gate.go_on()
         told.append(ask.told("ask 1 N"))
 
@@ -283,8 +283,8 @@ def test_what_a_paused_world_keeps_waiting_can_be_called_off(session: Session, r
     for _ in range(1000):
         if told:
             break
-        awaited.is_called_off = True
-        ask.visitor.call_off()
+        awaited.is_cancelled = True
+        ask.visitor.cancel()
         thread.join(GUARD_S / 1000)
     thread.join(GUARD_S)
     assert not thread.is_alive()
@@ -303,7 +303,7 @@ def test_waiting_for_others_to_begin_can_be_called_off(session: Session) -> None
     for _ in range(1000):
         if told:
             break
-        awaited.is_called_off = True
+        awaited.is_cancelled = True
         thread.join(GUARD_S / 1000)
     assert "the program was interrupted" in told[0]
 

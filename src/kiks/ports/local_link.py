@@ -30,11 +30,11 @@ class Awaited(Protocol):
     """What a program lets be known of the answer that it waits for.
 
     Attributes:
-        is_called_off: Whether it does not wait any more.
+        is_cancelled: Whether it does not wait any more.
         is_held: Whether it does not say so at present: then no time is to pass for it.
     """
 
-    is_called_off: bool
+    is_cancelled: bool
     is_held: bool
 
 
@@ -42,7 +42,7 @@ class Awaited(Protocol):
 class Patient:
     """A program that waits for whatever it has asked for."""
 
-    is_called_off: bool = False
+    is_cancelled: bool = False
     is_held: bool = False
 
 
@@ -101,7 +101,7 @@ class NearConnection(Connection):
             self._programs.wait(LOOK_S)
             self._check_awaited()
 
-    def call_off(self) -> None:
+    def cancel(self) -> None:
         """Let what the program waits for end at once, even if the world stands still; any thread may say so."""
         gate = self._programs.sim.gate
         if gate is not None:
@@ -109,13 +109,13 @@ class NearConnection(Connection):
 
     def _look_at_gate(self) -> None:
         gate = self._programs.sim.gate
-        if threading.get_ident() == self._thread or not self._awaited.is_called_off:
+        if threading.get_ident() == self._thread or not self._awaited.is_cancelled:
             assert gate is not None
             gate.leave(self._look_at_gate)
             self._check_awaited()
 
     def _check_awaited(self) -> None:
-        if self._awaited.is_called_off:
+        if self._awaited.is_cancelled:
             raise LinkError("the answer must be waited for, but the program was interrupted. Ask again.")
 
     @property

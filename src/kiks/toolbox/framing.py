@@ -89,10 +89,10 @@ class Exchange:
         said: What it has said already.
 
     Attributes:
-        is_called_off: Whether nobody waits for the answer under way any more.
+        is_cancelled: Whether nobody waits for the answer under way any more.
         is_held: Whether the program has not confirmed that it waits.
         has_left: Whether it has hung up or said good-bye.
-        called_off: Called by the pulse while something is to be ended that is under way.
+        on_cancel: Called by the pulse while something is to be ended that is under way.
     """
 
     def __init__(
@@ -106,10 +106,10 @@ class Exchange:
     ) -> None:
         self.source = source
         self._close: Callable[[], None] | None = close
-        self.is_called_off = False
+        self.is_cancelled = False
         self.is_held = False
         self.has_left = False
-        self.called_off: Callable[[], None] = lambda: None
+        self.on_cancel: Callable[[], None] = lambda: None
         self._sink = sink
         self._parent = parent
         self._lock = threading.Lock()
@@ -140,7 +140,7 @@ class Exchange:
             if line.startswith(CANCEL):
                 write_all(self._sink, MARK + MARK_END + line[len(CANCEL) :][:1])
             elif line:
-                self.is_called_off = False
+                self.is_cancelled = False
                 self._since_ns = time.monotonic_ns()
                 self._is_awaited = True
                 yield line.decode("utf-8", errors="replace")
@@ -184,14 +184,14 @@ class Exchange:
                 self._listen(0)
             self.has_left = self.has_left or self.is_orphaned
             is_cancelled = any(line.startswith(CANCEL) for line in self._heard)
-            self.is_called_off = self.is_called_off or self.has_left or is_cancelled
+            self.is_cancelled = self.is_cancelled or self.has_left or is_cancelled
             self.is_held = self._is_unconfirmed
             if not self._is_unconfirmed and not self.has_left and _has_room(self._sink):
                 with contextlib.suppress(OSError):
                     write_all(self._sink, STILL)
                 self._is_unconfirmed = True
-        if self.is_called_off:
-            self.called_off()
+        if self.is_cancelled:
+            self.on_cancel()
 
     # ---- inside ----
 
@@ -239,7 +239,7 @@ class Exchange:
                 self._heard.append(line)
 
 
-class Pulse:
+class Heartbeat:
     """A thread that does some things again and again.
 
     Attributes:

@@ -148,11 +148,11 @@ class SessionClient:
         self.session.leave(self)
         self.session.visitors.remove(self)
 
-    def call_off(self) -> None:
+    def cancel(self) -> None:
         """Let the request end that is under way; any thread may say so."""
         connection = self._connection
         if connection is not None:
-            connection.call_off()
+            connection.cancel()
 
     def opened(self, number: int) -> OpenPort:
         """Return a port that is open.

@@ -23,7 +23,7 @@ CONNECT_S = 10.0
 _PREFIX = "session-"
 
 
-class Door(NamedTuple):
+class SessionAddress(NamedTuple):
     """Where a session is found.
 
     Attributes:
@@ -41,11 +41,11 @@ class Door(NamedTuple):
         return f"KiKS {__version__} session {self.number} port {self.port} token {self.token}\n"
 
     @staticmethod
-    def parse(line: bytes) -> Door | None:
-        """Return the door that a file tells of; None if it tells of none."""
+    def parse(line: bytes) -> SessionAddress | None:
+        """Return the address that a file tells of; None if it tells of none."""
         try:
             words = line.decode("ascii").split()
-            return Door(int(words[3]), int(words[5]), words[7])
+            return SessionAddress(int(words[3]), int(words[5]), words[7])
         except (ValueError, IndexError):
             return None
 
@@ -66,19 +66,19 @@ class Door(NamedTuple):
         return connection
 
 
-class DoorFile:
+class SessionFile:
     """The file that tells of a session of this process, from `open` on until `close` or the end of the process.
 
     Args:
-        door: Where the session is found.
+        address: Where the session is found.
 
     Raises:
         LinkError: If this user has no folder for it.
     """
 
-    def __init__(self, door: Door) -> None:
-        self._door = door
-        self._path = default_folder() / f"{_PREFIX}{door.number}"
+    def __init__(self, address: SessionAddress) -> None:
+        self._address = address
+        self._path = default_folder() / f"{_PREFIX}{address.number}"
         self._file = -1
 
     def open(self) -> None:
@@ -90,7 +90,7 @@ class DoorFile:
         if self._file < 0:
             # What another process of this number has left behind.
             self._path.unlink(missing_ok=True)
-            self._file = _create(self._path, self._door)
+            self._file = _create(self._path, self._address)
 
     def close(self) -> None:
         """Remove it, if it is there."""
@@ -100,7 +100,7 @@ class DoorFile:
             self._file = -1
 
 
-def find_door(number: int) -> Door:
+def find_session(number: int) -> SessionAddress:
     """Return where a session of this user runs on this computer.
 
     Args:
@@ -109,23 +109,23 @@ def find_door(number: int) -> Door:
     Raises:
         LinkError: If there is none.
     """
-    doors = [door for path in _newest_first(default_folder()) if (door := _read(path)) is not None]
-    for door in doors:
-        if number in (0, door.number):
-            return door
-    known = f"those that run are {[door.number for door in doors]}" if doors else "none runs on this computer"
+    sessions = [address for path in _newest_first(default_folder()) if (address := _read(path)) is not None]
+    for address in sessions:
+        if number in (0, address.number):
+            return address
+    known = f"those that run are {[address.number for address in sessions]}" if sessions else "none runs on this computer"
     which = "a session" if number == 0 else f"session {number}"
     raise LinkError(f"{which} must run before it is joined, but {known}. Start one with kiks(ARENA) in another Octave.")
 
 
-def write_door(door: Door, path: Path) -> None:
+def write_session_file(address: SessionAddress, path: Path) -> None:
     """Write where a session is found into a new file that this user alone can read.
 
     Raises:
         LinkError: If the file is there already, or cannot be written.
     """
     beside = path.with_name(f".{path.name}-{os.getpid()}")
-    os.close(_create(beside, door))
+    os.close(_create(beside, address))
     try:
         # A link fails where a file is; so whoever reads the file finds all of it, and finds this one.
         os.link(beside, path)
@@ -135,7 +135,7 @@ def write_door(door: Door, path: Path) -> None:
         beside.unlink(missing_ok=True)
 
 
-def _create(path: Path, door: Door) -> int:
+def _create(path: Path, address: SessionAddress) -> int:
     """Write a new file and return it, locked."""
     try:
         file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o600)
@@ -143,7 +143,7 @@ def _create(path: Path, door: Door) -> int:
         raise _not_new(path, error) from None
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        os.write(file, door.line().encode("ascii"))
+        os.write(file, address.line().encode("ascii"))
     except OSError as error:
         os.close(file)
         path.unlink(missing_ok=True)
@@ -163,8 +163,8 @@ def _newest_first(folder: Path) -> list[Path]:
     return sorted(times, key=times.__getitem__, reverse=True)
 
 
-def _read(path: Path) -> Door | None:
-    """Return the door of a session that lives; the file of one that was killed goes, any other file is left alone."""
+def _read(path: Path) -> SessionAddress | None:
+    """Return the address of a session that lives; the file of one that was killed goes, any other file is left alone."""
     try:
         file = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
     except OSError:
@@ -176,7 +176,7 @@ def _read(path: Path) -> Door | None:
         try:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
         except BlockingIOError:
-            return Door.parse(os.read(file, FILE_MAX))
+            return SessionAddress.parse(os.read(file, FILE_MAX))
         path.unlink(missing_ok=True)
     except OSError:
         return None

@@ -18,11 +18,11 @@ import threading
 from kiks.errors import LinkError
 from kiks.ports.file_descriptors import opening
 from kiks.ports.pending_connections import PendingConnections
-from kiks.toolbox.framing import LOOK_MS, Exchange, Pulse, write_all
+from kiks.toolbox.framing import LOOK_MS, Exchange, Heartbeat, write_all
 from kiks.toolbox.requests import answer
 from kiks.toolbox.session import Session
 from kiks.toolbox.session_client import SessionClient
-from kiks.toolbox.session_files import Door, DoorFile
+from kiks.toolbox.session_files import SessionAddress, SessionFile
 
 FIRST_S = 30.0
 """How long a process that listens waits for the first who comes [s of real time]."""
@@ -45,14 +45,14 @@ class SessionProcess:
         LinkError: If this user's folder for sessions cannot be written.
     """
 
-    def __init__(self, session: Session, pulse: Pulse) -> None:
+    def __init__(self, session: Session, pulse: Heartbeat) -> None:
         self._session = session
         self._pulse = pulse
         with opening("the port of a session"), contextlib.ExitStack() as undo:
             listener = undo.enter_context(socket.create_server(("127.0.0.1", 0)))
-            self.door = Door(os.getpid(), listener.getsockname()[1], secrets.token_urlsafe(TOKEN_BYTES))
-            self._file = DoorFile(self.door)
-            self._lobby = PendingConnections(listener, self.door.token, self._let_in)
+            self.address = SessionAddress(os.getpid(), listener.getsockname()[1], secrets.token_urlsafe(TOKEN_BYTES))
+            self._file = SessionFile(self.address)
+            self._lobby = PendingConnections(listener, self.address.token, self._let_in)
             undo.pop_all()
         self._there: list[Exchange] = []
         self._count = 0
@@ -66,7 +66,7 @@ class SessionProcess:
             self._count += 1
             self._there.append(exchange)
             visitor = SessionClient(self._session, self._count, exchange)
-        exchange.called_off = visitor.call_off
+        exchange.on_cancel = visitor.cancel
         if exchange.beat not in self._pulse.acts:
             self._pulse.acts.append(exchange.beat)
         threading.Thread(target=self._attend, args=(visitor, exchange), name=visitor.name, daemon=True).start()
@@ -99,7 +99,7 @@ class SessionProcess:
         """Answer a program line by line until it hangs up."""
         try:
             with contextlib.suppress(OSError):
-                if exchange.greet(self.door.line()):
+                if exchange.greet(self.address.line()):
                     self._announce()
                     for line in exchange.lines():
                         exchange.reply(answer(visitor, line))
@@ -137,13 +137,13 @@ class SessionProcess:
             self._session.let_go()
 
 
-def join(door: Door, exchange: Exchange, source: int, sink: int) -> None:
+def join(address: SessionAddress, exchange: Exchange, source: int, sink: int) -> None:
     """Carry what a program says on two descriptors to a session and back, until one of the two hangs up.
 
     Raises:
         LinkError: If the session has ended.
     """
-    with door.connect() as connection, contextlib.suppress(OSError):
+    with address.connect() as connection, contextlib.suppress(OSError):
         connection.sendall(exchange.hand_over())
         while not exchange.is_orphaned:
             ready, _, _ = select.select([source, connection.fileno()], [], [], LOOK_MS / 1000)

@@ -166,7 +166,7 @@ class EditorPanel:
         self._refresh()
 
     def _drawn(self, stroke: Stroke) -> Awaitable[None]:
-        editing, tool, points = self._desk.editing, self._tool, stroke.points
+        editing, tool, points = self._editing, self._tool, stroke.points
         if not points:
             raise ParameterError("A stroke must have a point, but it had none. Draw again.")
         grey = 0 if tool.startswith("erase") else int(self._brightness.value)
@@ -185,28 +185,28 @@ class EditorPanel:
 
     @told
     async def _step_back(self) -> None:
-        await self._desk.editing.undo()
+        await self._editing.undo()
         self._refresh()
 
     @told
     async def _step_forth(self) -> None:
-        await self._desk.editing.redo()
+        await self._editing.redo()
         self._refresh()
 
     @told
     async def _clear(self) -> None:
-        await self._desk.editing.draw(lambda sketch: sketch.clear())
+        await self._editing.draw(lambda sketch: sketch.clear())
         self._refresh()
 
     @told
     async def _new_box(self) -> None:
         if (arena := await ask_for_box()) is not None:
-            await self._desk.editing.begin(arena)
+            await self._editing.begin(arena)
 
     @told
     async def _new_maze(self) -> None:
         if (arena := await ask_for_maze()) is not None:
-            await self._desk.editing.begin(arena)
+            await self._editing.begin(arena)
 
     async def _press(self, event: KeyEventArguments) -> None:
         if not event.action.keydown or not (event.modifiers.ctrl or event.modifiers.meta):
@@ -218,8 +218,8 @@ class EditorPanel:
             await self._step_forth()
 
     def _refresh(self) -> None:
-        self._undo.set_enabled(self._desk.editing.can_undo)
-        self._redo.set_enabled(self._desk.editing.can_redo)
+        self._undo.set_enabled(self._editing.can_undo)
+        self._redo.set_enabled(self._editing.can_redo)
 
 
 def _button(word: str, icon: str, name: str, hint: str, act: object) -> ui.button:

@@ -127,7 +127,7 @@ class FilesPanel:
             mm_per_pixel = self._mm_per_pixel.value
             raster = await asyncio.to_thread(decode_picture, data, mm_per_pixel)
             arena = Arena.from_array(raster, mm_per_pixel=mm_per_pixel, name=PurePosixPath(name).stem[:100])
-            await self._desk.editing.begin(arena)
+            await self._editing.begin(arena)
         else:
             await self._begin(await asyncio.to_thread(decode, name, data))
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import parse_qsl, quote, urlencode, urlsplit
 
-from kiks.desk.server.connection_limit import DOOR
+from kiks.desk.server.connection_limit import CONNECTION_KEY
 from kiks.desk.server.server_log import note
 from kiks.desk.server.token import Token
 
@@ -89,9 +89,9 @@ class AccessControl:
         if refusal is not None:
             await _refuse(scope, send, refusal)
             return
-        door = scope.get("state", {}).get(DOOR)
-        if door is not None:
-            door.let_in()
+        connection = scope.get("state", {}).get(CONNECTION_KEY)
+        if connection is not None:
+            connection.note_token()
         await self._pass_on(scope, receive, send)
 
     def _refusal(self, scope: Message, headers: dict[str, str]) -> Refusal | None:
