@@ -128,7 +128,9 @@ def test_what_is_no_request_is_refused_and_nothing_else(shown: Shown, said: list
 
 def test_strangers_who_say_nothing_keep_nobody_out(shown: Shown, said: list[str]) -> None:
     host, port, _ = address_and_cookie(shown)
-    idle = [socket.create_connection((host, port), timeout=GUARD_S) for _ in range(3 * connection_limit.UNAUTHENTICATED_MAX)]
+    idle = [
+        socket.create_connection((host, port), timeout=GUARD_S) for _ in range(3 * connection_limit.UNAUTHENTICATED_MAX)
+    ]
     for half in idle[::2]:
         with suppress(OSError):
             half.sendall(b"GET / HTTP/1.1\r\n")
@@ -154,7 +156,8 @@ def test_a_browser_that_is_in_may_take_its_time(shown: Shown, monkeypatch: pytes
     path = urlsplit(shown.url).path
     with connect(f"ws://{host}:{port}{path}/feed", additional_headers={"Cookie": cookie}, open_timeout=GUARD_S) as feed:
         idle = [
-            socket.create_connection((host, port), timeout=GUARD_S) for _ in range(2 * connection_limit.UNAUTHENTICATED_MAX)
+            socket.create_connection((host, port), timeout=GUARD_S)
+            for _ in range(2 * connection_limit.UNAUTHENTICATED_MAX)
         ]
         for _ in range(5):
             while not isinstance(feed.recv(GUARD_S), bytes):

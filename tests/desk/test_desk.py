@@ -75,7 +75,7 @@ def test_space_on_a_button_presses_that_button_alone(visitor: Visitor) -> None:
 def test_speed_changes(visitor: Visitor) -> None:
     visitor.choose("speed", "10 x")
     visitor.until(lambda: visitor.desk.gate.speed == 10)
-    visitor.choose("speed", "as fast as it can")
+    visitor.choose("speed", "full speed")
     visitor.until(lambda: visitor.desk.gate.speed is None)
     visitor.until(lambda: visitor.desk.meter.momentary > 10)
     visitor.picture("as_fast_as_it_can")
@@ -86,7 +86,7 @@ def test_speed_changes(visitor: Visitor) -> None:
 def test_checkpoint_and_reset(visitor: Visitor) -> None:
     visitor.drag((150, 200), (250, 250))
     visitor.at("mark").click()
-    visitor.told("Remembered where everything stands.")
+    visitor.told("Checkpoint taken.")
     there = visitor.sim.pose(1)
     visitor.drag(there[:2], (120, 120))
     assert visitor.sim.pose(1) != there
@@ -206,7 +206,7 @@ def test_robot_is_followed(visitor: Visitor) -> None:
     visitor.sim.place(2, 300, 250, 0)
     visitor.until(is_in_the_middle)
     visitor.picture("followed")
-    visitor.menu("follow", "Nobody")
+    visitor.menu("follow", "No robot")
     visitor.sim.place(2, 450, 300, 0)
     visitor.until(lambda: not is_in_the_middle())
 

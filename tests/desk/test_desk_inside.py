@@ -129,7 +129,7 @@ def test_wall_is_drawn_saved_and_opened_again(visitor: Visitor) -> None:
     visitor.told("Saved as mine.kiks.")
     visitor.at("example-name").scroll_into_view_if_needed()
     visitor.at("open-example").click()
-    visitor.told("This is ")
+    visitor.told("Opened ")
     visitor.until(lambda: visitor.sim.arena.brightness.shape != saved.shape)
     visitor.choose("open-name", "mine.kiks")
     visitor.at("open").click()

@@ -134,7 +134,7 @@ def test_console_has_history_suggestions_and_replies(page: Page, address: str) -
     console.fill("D,3,4")
     console.press("Enter")
     expect(at(page, "console-log")).to_contain_text("→ D,3,4")
-    expect(page.locator(".q-notification")).to_contain_text("Time stands still")
+    expect(page.locator(".q-notification")).to_contain_text("Time is paused")
     expect(at(page, "console-log")).not_to_contain_text("←")
     page.request.get(f"{address}/go-on")
     expect(at(page, "console-log")).to_contain_text("← d")

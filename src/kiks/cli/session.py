@@ -70,7 +70,9 @@ def session(
         raise typer.Exit(2) from None
 
 
-def _serve(pulse: Heartbeat, window: bool | None, *, exchange: Exchange | None = None, listen: Path | None = None) -> None:
+def _serve(
+    pulse: Heartbeat, window: bool | None, *, exchange: Exchange | None = None, listen: Path | None = None
+) -> None:
     from kiks.desk.server.show import has_screen
     from kiks.toolbox.session import Session
     from kiks.toolbox.session_files import write_session_file

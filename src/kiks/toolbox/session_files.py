@@ -113,7 +113,9 @@ def find_session(number: int) -> SessionAddress:
     for address in sessions:
         if number in (0, address.number):
             return address
-    known = f"those that run are {[address.number for address in sessions]}" if sessions else "none runs on this computer"
+    known = (
+        f"those that run are {[address.number for address in sessions]}" if sessions else "none runs on this computer"
+    )
     which = "a session" if number == 0 else f"session {number}"
     raise LinkError(f"{which} must run before it is joined, but {known}. Start one with kiks(ARENA) in another Octave.")
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from nicegui import ui
 
-from kiks.desk.panels.feedback import told
+from kiks.desk.panels.widgets import told
 from kiks.desk.server.desk import Desk
 from kiks.errors import ParameterError
 from kiks.model.project import TURRETS, ProjectRobot

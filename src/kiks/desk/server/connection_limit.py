@@ -47,7 +47,9 @@ class LimitedConnection(H11Protocol):
         """Start the timer of a new connection and enforce the limit."""
         super().connection_made(transport)
         self._timer = self.loop.call_later(AUTHENTICATION_S, transport.abort)
-        unauthenticated = [each for each in self.connections if isinstance(each, LimitedConnection) and each._is_unauthenticated]
+        unauthenticated = [
+            each for each in self.connections if isinstance(each, LimitedConnection) and each._is_unauthenticated
+        ]
         if len(unauthenticated) > UNAUTHENTICATED_MAX:
             min(unauthenticated, key=lambda each: each._came_s).transport.abort()
 
