@@ -15,7 +15,7 @@ import pytest
 from tests.served import GUARD_S
 
 from kiks.model.arena import Arena
-from kiks.ports.local_link import Patient
+from kiks.ports.local_link import AwaitedAnswer
 from kiks.sim.simulation import Simulation
 from kiks.toolbox.requests import REQUESTS, answer
 from kiks.toolbox.session import Session
@@ -30,7 +30,7 @@ class Asker:
     """Asks, and takes errors for what they are."""
 
     def __init__(self, session: Session, number: int = 1) -> None:
-        self.visitor = SessionClient(session, number)
+        self.client = SessionClient(session, number)
 
     def __call__(self, request: str) -> str:
         told = self.told(request)
@@ -38,7 +38,7 @@ class Asker:
         return told[HEAD:]
 
     def told(self, request: str) -> str:
-        return answer(self.visitor, request)
+        return answer(self.client, request)
 
     def refused(self, request: str) -> str:
         told = self.told(request)
@@ -260,10 +260,10 @@ def test_another_world_ends_ports_with_a_word(session: Session) -> None:
 
 @pytest.mark.parametrize("request_", ["ask 1 N", "pause 5", "time 1", "pose 1", "close 1", "listen 1"])
 def test_what_a_paused_world_keeps_waiting_can_be_called_off(session: Session, request_: str) -> None:
-    awaited = Patient()
+    awaited = AwaitedAnswer()
     ask = begun(session)
-    ask.visitor.leave()
-    ask.visitor = SessionClient(session, 1, awaited)
+    ask.client.leave()
+    ask.client = SessionClient(session, 1, awaited)
     told: list[str] = []
     is_paused = threading.Event()
 
@@ -284,7 +284,7 @@ def test_what_a_paused_world_keeps_waiting_can_be_called_off(session: Session, r
         if told:
             break
         awaited.is_cancelled = True
-        ask.visitor.cancel()
+        ask.client.cancel()
         thread.join(GUARD_S / 1000)
     thread.join(GUARD_S)
     assert not thread.is_alive()
@@ -293,10 +293,10 @@ def test_what_a_paused_world_keeps_waiting_can_be_called_off(session: Session, r
 
 
 def test_waiting_for_others_to_begin_can_be_called_off(session: Session) -> None:
-    awaited = Patient()
+    awaited = AwaitedAnswer()
     ask = begun(session, "programs 2")
-    ask.visitor.leave()
-    ask.visitor = SessionClient(session, 1, awaited)
+    ask.client.leave()
+    ask.client = SessionClient(session, 1, awaited)
     told: list[str] = []
     thread = threading.Thread(target=lambda: told.append(ask.told("open 1 9600")))
     thread.start()
@@ -330,7 +330,7 @@ def test_two_programs_drive_two_robots_in_one_world(session: Session) -> None:
         for thread in threads:
             thread.join(GUARD_S)
         for ask in (first, second):
-            ask.visitor.leave()
+            ask.client.leave()
         return told[1], told[2], Asker(session)("state")
 
     runs = [run() for _ in range(3)]
@@ -344,7 +344,7 @@ def test_who_leaves_frees_the_robot(session: Session) -> None:
     second = Asker(session, 2)
     second("open 1 9600")
     assert session.world.robot_count == 2
-    first.visitor.leave()
+    first.client.leave()
     third = Asker(session, 3)
     third("open 1 9600")
     assert session.world.robot_count == 2

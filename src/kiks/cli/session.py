@@ -52,10 +52,10 @@ def session(
         elif listen is not None:
             _serve(Heartbeat(), window, listen=listen)
         else:
-            pulse = Heartbeat()
-            pulse.acts.append(exchange.beat)
+            heartbeat = Heartbeat()
+            heartbeat.acts.append(exchange.beat)
             if join is None:
-                _serve(pulse, window, exchange=exchange)
+                _serve(heartbeat, window, exchange=exchange)
             else:
                 from kiks.toolbox.session_files import find_session
                 from kiks.toolbox.session_process import join as take_part
@@ -71,7 +71,7 @@ def session(
 
 
 def _serve(
-    pulse: Heartbeat, window: bool | None, *, exchange: Exchange | None = None, listen: Path | None = None
+    heartbeat: Heartbeat, window: bool | None, *, exchange: Exchange | None = None, listen: Path | None = None
 ) -> None:
     from kiks.desk.server.show import has_screen
     from kiks.toolbox.session import Session
@@ -79,10 +79,10 @@ def _serve(
     from kiks.toolbox.session_process import SessionProcess
 
     end_as_with_ctrl_c()
-    host = SessionProcess(Session(ready=ready_engine, has_window=has_screen() if window is None else window), pulse)
+    host = SessionProcess(Session(ready=ready_engine, has_window=has_screen() if window is None else window), heartbeat)
     try:
         if exchange is not None:
-            host.speak_with(exchange)
+            host.add(exchange)
         if listen is not None:
             write_session_file(host.address, listen)
         host.run()

@@ -1,4 +1,4 @@
-"""Where sessions are found: files that this user alone can read and write, each locked while its session lives."""
+"""Session files, by which programs find sessions: readable by this user alone, and locked while the session runs."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from kiks.errors import LinkError, shown
 from kiks.ports.pty import default_folder
 
 FILE_MAX = 1000
-"""Most bytes of a file that tells of a session."""
+"""Maximum size of a session file [bytes]."""
 
 CONNECT_S = 10.0
-"""How long a session on this computer is waited for that does not let anybody in [s of real time]."""
+"""Timeout of a connection to a session [s of real time]."""
 
 _PREFIX = "session-"
 
 
 class SessionAddress(NamedTuple):
-    """Where a session is found.
+    """Address of a session on this computer.
 
     Attributes:
-        number: Its number, that of its process.
+        number: Number of the session and of its process.
         port: Its TCP port.
-        token: What has to be said first there.
+        token: The token that a client must send first.
     """
 
     number: int
@@ -37,12 +37,12 @@ class SessionAddress(NamedTuple):
     token: str
 
     def line(self) -> str:
-        """Return it as the toolbox reads it."""
+        """Return the line that the toolbox reads."""
         return f"KiKS {__version__} session {self.number} port {self.port} token {self.token}\n"
 
     @staticmethod
     def parse(line: bytes) -> SessionAddress | None:
-        """Return the address that a file tells of; None if it tells of none."""
+        """Parse the line of a session file; return None if it is not valid."""
         try:
             words = line.decode("ascii").split()
             return SessionAddress(int(words[3]), int(words[5]), words[7])
@@ -50,7 +50,7 @@ class SessionAddress(NamedTuple):
             return None
 
     def connect(self) -> socket.socket:
-        """Return a connection that is let in.
+        """Connect to the session and send the token.
 
         Raises:
             LinkError: If the session has ended.
@@ -67,10 +67,10 @@ class SessionAddress(NamedTuple):
 
 
 class SessionFile:
-    """The file that tells of a session of this process, from `open` on until `close` or the end of the process.
+    """The session file of this process; it exists from `open` until `close` or the end of the process.
 
     Args:
-        address: Where the session is found.
+        address: Address of the session.
 
     Raises:
         LinkError: If this user has no folder for it.
@@ -82,18 +82,18 @@ class SessionFile:
         self._file = -1
 
     def open(self) -> None:
-        """Write it, if it is not there.
+        """Write the file, unless it exists.
 
         Raises:
             LinkError: If it cannot be written.
         """
         if self._file < 0:
-            # What another process of this number has left behind.
+            # An earlier process of this number may have left its file behind.
             self._path.unlink(missing_ok=True)
             self._file = _create(self._path, self._address)
 
     def close(self) -> None:
-        """Remove it, if it is there."""
+        """Remove the file if it exists."""
         if self._file >= 0:
             self._path.unlink(missing_ok=True)
             os.close(self._file)
@@ -101,10 +101,10 @@ class SessionFile:
 
 
 def find_session(number: int) -> SessionAddress:
-    """Return where a session of this user runs on this computer.
+    """Return the address of a session of this user on this computer.
 
     Args:
-        number: Its number; 0 for the one that was started last.
+        number: Number of the session; 0 for the newest.
 
     Raises:
         LinkError: If there is none.
@@ -121,15 +121,15 @@ def find_session(number: int) -> SessionAddress:
 
 
 def write_session_file(address: SessionAddress, path: Path) -> None:
-    """Write where a session is found into a new file that this user alone can read.
+    """Write the address of a session into a new file that this user alone can read.
 
     Raises:
-        LinkError: If the file is there already, or cannot be written.
+        LinkError: If the file exists or cannot be written.
     """
     beside = path.with_name(f".{path.name}-{os.getpid()}")
     os.close(_create(beside, address))
     try:
-        # A link fails where a file is; so whoever reads the file finds all of it, and finds this one.
+        # A link fails if the file exists, and a reader never sees a part of the file.
         os.link(beside, path)
     except OSError as error:
         raise _not_new(path, error) from None
@@ -138,7 +138,7 @@ def write_session_file(address: SessionAddress, path: Path) -> None:
 
 
 def _create(path: Path, address: SessionAddress) -> int:
-    """Write a new file and return it, locked."""
+    """Write a new file, lock it and return its descriptor."""
     try:
         file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o600)
     except OSError as error:
@@ -166,7 +166,7 @@ def _newest_first(folder: Path) -> list[Path]:
 
 
 def _read(path: Path) -> SessionAddress | None:
-    """Return the address of a session that lives; the file of one that was killed goes, any other file is left alone."""
+    """Return the address in a locked session file; delete one without a lock, and ignore any other file."""
     try:
         file = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
     except OSError:
