@@ -21,7 +21,7 @@ from kiks.desk.server.connection_limit import LimitedConnection
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.gateway import Gateway
 from kiks.desk.server.live_editing import Editing
-from kiks.desk.server.server_log import note_fault, speak_plainly
+from kiks.desk.server.server_log import log_plainly, note_fault
 from kiks.desk.server.token import Token
 from kiks.errors import LinkError, ParameterError
 from kiks.ports.file_descriptors import SHORTAGES, opening, shortage
@@ -172,7 +172,7 @@ class DeskServer:
             ws_per_message_deflate=False,
             timeout_graceful_shutdown=1,
         )
-        speak_plainly()
+        log_plainly()
         assert self._socket is not None
         try:
             uvicorn.Server(config).run(sockets=[self._socket])
