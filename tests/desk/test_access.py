@@ -134,7 +134,7 @@ def test_without_the_token_nobody_may(kind: str, cookie: str, is_local: bool) ->
 def test_refused_page_says_what_to_do() -> None:
     answers = come()
     assert "must be opened with its token" in page(answers)
-    assert "Open the whole address that KiKS printed" in page(answers)
+    assert "Open the complete address that KiKS printed" in page(answers)
     assert "<script" not in page(come(path="/<script>alert(1)</script>\x01", host="<script>"))
 
 

@@ -166,7 +166,7 @@ def test_settings_make_a_new_world(visitor: Visitor) -> None:
     visitor.at("add-robot").click()
     visitor.picture("settings")
     visitor.at("apply").click()
-    visitor.told("A new world, with these settings.")
+    visitor.told("Restarted with these settings.")
     assert visitor.sim is not old
     project = visitor.desk.project
     assert (project.seed, project.response, project.baud, project.noise) == (42, "fast", 38400, False)
@@ -175,7 +175,7 @@ def test_settings_make_a_new_world(visitor: Visitor) -> None:
     assert visitor.sim.pose(1)[:2] == pytest.approx((250, 250), abs=1)
     visitor.page.wait_for_function("() => kiksDesk.scene().robots.length === 3 && kiksDesk.pose(2)")
     visitor.at("start-over").click()
-    visitor.told("From the start again.")
+    visitor.told("Started over.")
     assert visitor.sim.robot_count == 3
     expect(visitor.at("seed")).to_have_value("42")
     visitor.picture("another_world")
@@ -197,6 +197,6 @@ def test_start_over_begins_at_the_very_start(visitor: Visitor) -> None:
     old = visitor.sim
     visitor.tab("settings")
     visitor.at("start-over").click()
-    visitor.told("From the start again.")
+    visitor.told("Started over.")
     assert visitor.sim is not old
     assert visitor.sim.pose(1) == (150, 200, 0)

@@ -50,7 +50,7 @@ def test_without_the_token_a_page_says_what_to_do(browser: Browser, shown: Shown
         answer = page.goto(shown.url.split("?")[0])
         assert answer is not None
         assert answer.status == 403
-        assert "Open the whole address that KiKS printed" in page.inner_text("body")
+        assert "Open the complete address that KiKS printed" in page.inner_text("body")
         SCREENSHOTS.mkdir(exist_ok=True)
         page.screenshot(path=SCREENSHOTS / f"refused_{scheme}.png")
         page.close()
