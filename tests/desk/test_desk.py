@@ -64,7 +64,8 @@ def test_run_pause_and_step(visitor: Visitor) -> None:
 def test_space_on_a_button_presses_that_button_alone(visitor: Visitor) -> None:
     visitor.at("step").focus()
     visitor.page.keyboard.press("Space")
-    visitor.until(lambda: visitor.desk.gate.is_paused)
+    gate = visitor.desk.gate
+    visitor.until(lambda: gate.is_paused and visitor.sim.now_ns == gate.pace.now_ns())
     now_ns = visitor.sim.now_ns
     visitor.page.keyboard.press("Space")
     visitor.until(lambda: visitor.sim.now_ns > now_ns)

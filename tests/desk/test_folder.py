@@ -93,7 +93,7 @@ def test_files_are_kept_and_listed(home):
     assert folder.open("old.KAD").arena.width_mm == 300
     assert folder.has("room")
     assert not folder.has("rooms")
-    with pytest.raises(ParameterError, match="is there"):
+    with pytest.raises(ParameterError, match="exists"):
         folder.save(project, "room")
     folder.save(replace(project, seed=6), "room", may_replace=True)
     assert folder.open("room.kiks").seed == 6

@@ -41,7 +41,7 @@ def _state_of(turret: Turret) -> str:
         return f"inputs {turret.inputs:08b}, outputs {turret.outputs:08b}"
     if isinstance(turret, K213):
         return (
-            f"one picture every {1000 * s_from_ns(turret.period_ns):g} ms, the last one at "
+            f"a picture every {1000 * s_from_ns(turret.period_ns):g} ms, the last one at "
             f"{s_from_ns(turret.taken_ns):.3f} s, light level {turret.light}"
         )
     return "of a user's own class"
