@@ -9,9 +9,8 @@ function dance(port, baud, seconds, partner)
 %
 %   dance(port, baud, seconds, partner) is for the robot on port (-1; a real one as in kopen) at baud (9600). The dance
 %   lasts for seconds (30) from when the partner has answered. partner is the number of the other robot's radio; 0
-%   follows the leader. If it is left out, the program that begins the world leads robot 2, and one that joins follows. It
-%   prints
-%   the number of figures.
+%   follows the leader. If it is left out, the program that begins the world leads robot 2, and one that joins follows.
+%   It prints the number of figures.
 %
 %   Example:
 %     dance

@@ -1,4 +1,4 @@
-"""What comes over the wire to the desk's server: bytes that are no request, too many strangers, sockets misused."""
+"""Abuse of the desk's server: malformed requests, too many connections, misused sockets."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def shown() -> Iterator[Shown]:
 
 @pytest.fixture
 def said(caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]) -> Iterator[list[str]]:
-    """What is told to a person; it must never be a traceback."""
+    """Lines of the log, which must never contain a traceback."""
     lines: list[str] = []
     yield lines
     lines += [record.getMessage() for record in caplog.records if record.levelno >= logging.WARNING]
@@ -44,7 +44,7 @@ def said(caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]) ->
 
 
 def address_and_cookie(shown: Shown) -> tuple[str, int, str]:
-    """Return where the server is, and the header with the token."""
+    """Return the server's host and port, and the cookie with the token."""
     url = urlsplit(shown.url)
     assert url.hostname is not None
     assert url.port is not None
@@ -52,7 +52,7 @@ def address_and_cookie(shown: Shown) -> tuple[str, int, str]:
 
 
 def knock(shown: Shown, data: bytes) -> bytes:
-    """Send bytes and nothing more; return all that is answered."""
+    """Send bytes and return the complete answer."""
     host, port, _ = address_and_cookie(shown)
     with socket.create_connection((host, port), timeout=GUARD_S) as stranger:
         with suppress(OSError):
@@ -66,7 +66,7 @@ def knock(shown: Shown, data: bytes) -> bytes:
 
 
 def ask(shown: Shown, method: str, path: str, body: bytes | None = None, **headers: str) -> tuple[int, bytes]:
-    """Return what a browser with the token is answered: the status and the page."""
+    """Return the answer to a browser with the token: the status and the page."""
     host, port, cookie = address_and_cookie(shown)
     asking = http.client.HTTPConnection(host, port, timeout=GUARD_S)
     asking.request(method, path, body, {"Cookie": cookie, **headers})
@@ -77,7 +77,7 @@ def ask(shown: Shown, method: str, path: str, body: bytes | None = None, **heade
 
 
 def is_well(shown: Shown) -> bool:
-    """Say whether a browser with the token gets its page."""
+    """Return whether a browser with the token gets its page."""
     status, page = ask(shown, "GET", urlsplit(shown.url).path)
     return status == 200 and b"KiKS" in page
 
@@ -109,7 +109,7 @@ NO_REQUESTS = [
 ]
 
 
-def test_what_is_no_request_is_refused_and_nothing_else(shown: Shown, said: list[str]) -> None:
+def test_malformed_requests_are_refused(shown: Shown, said: list[str]) -> None:
     chance = random.Random(1)
     whole = b"GET /desk/1?x=1 HTTP/1.1\r\nHost: 127.0.0.1\r\nOrigin: http://127.0.0.1\r\nCookie: a=b\r\n\r\n"
     spoilt = []
@@ -126,7 +126,7 @@ def test_what_is_no_request_is_refused_and_nothing_else(shown: Shown, said: list
     assert not said
 
 
-def test_strangers_who_say_nothing_keep_nobody_out(shown: Shown, said: list[str]) -> None:
+def test_silent_connections_do_not_block_others(shown: Shown, said: list[str]) -> None:
     host, port, _ = address_and_cookie(shown)
     idle = [
         socket.create_connection((host, port), timeout=GUARD_S) for _ in range(3 * connection_limit.UNAUTHENTICATED_MAX)
@@ -135,7 +135,7 @@ def test_strangers_who_say_nothing_keep_nobody_out(shown: Shown, said: list[str]
         with suppress(OSError):
             half.sendall(b"GET / HTTP/1.1\r\n")
     assert is_well(shown)
-    # The first to come are the first to go.
+    # The server closes the oldest connections first.
     for early in idle[: connection_limit.UNAUTHENTICATED_MAX]:
         with suppress(ConnectionError):
             assert early.recv(1) == b""
@@ -144,14 +144,14 @@ def test_strangers_who_say_nothing_keep_nobody_out(shown: Shown, said: list[str]
     assert is_well(shown)
 
 
-def test_a_stranger_has_little_time(shown: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unauthenticated_connection_times_out(shown: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(connection_limit, "AUTHENTICATION_S", 0.0)
     host, port, _ = address_and_cookie(shown)
     with socket.create_connection((host, port), timeout=GUARD_S) as stranger, suppress(ConnectionError):
         assert stranger.recv(1) == b""
 
 
-def test_a_browser_that_is_in_may_take_its_time(shown: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_authenticated_connection_does_not_time_out(shown: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
     host, port, cookie = address_and_cookie(shown)
     path = urlsplit(shown.url).path
     with connect(f"ws://{host}:{port}{path}/feed", additional_headers={"Cookie": cookie}, open_timeout=GUARD_S) as feed:
@@ -167,7 +167,7 @@ def test_a_browser_that_is_in_may_take_its_time(shown: Shown, monkeypatch: pytes
             each.close()
 
 
-# ---- a browser that is in, and misbehaves ----
+# ---- an authenticated browser that misbehaves ----
 
 
 @pytest.mark.parametrize(
@@ -188,7 +188,7 @@ def test_a_browser_that_is_in_may_take_its_time(shown: Shown, monkeypatch: pytes
     ],
 )
 @pytest.mark.parametrize("which", ["feed", "socket.io"])
-def test_frames_that_are_none_end_their_socket(shown: Shown, said: list[str], which: str, frames: bytes) -> None:
+def test_malformed_websocket_frames_close_the_socket(shown: Shown, said: list[str], which: str, frames: bytes) -> None:
     host, port, cookie = address_and_cookie(shown)
     path = f"{urlsplit(shown.url).path}/feed"
     path = path if which == "feed" else "/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
@@ -235,9 +235,7 @@ def test_frames_that_are_none_end_their_socket(shown: Shown, said: list[str], wh
     ],
     ids=lambda text: text[:40],
 )
-def test_events_that_are_none_hurt_nobody(
-    shown: Shown, caplog: pytest.LogCaptureFixture, message: str, said: Any
-) -> None:
+def test_malformed_events_are_ignored(shown: Shown, caplog: pytest.LogCaptureFixture, message: str, said: Any) -> None:
     host, port, cookie = address_and_cookie(shown)
     path = "/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
     with connect(f"ws://{host}:{port}{path}", additional_headers={"Cookie": cookie}, open_timeout=GUARD_S) as client:
@@ -249,7 +247,7 @@ def test_events_that_are_none_hurt_nobody(
     assert is_well(shown)
 
 
-def test_uploads_that_are_none_are_refused(shown: Shown, said: list[str]) -> None:
+def test_malformed_uploads_are_refused(shown: Shown, said: list[str]) -> None:
     from nicegui import app, ui
 
     @ui.page("/with-an-upload")
@@ -272,7 +270,7 @@ def test_uploads_that_are_none_are_refused(shown: Shown, said: list[str]) -> Non
     assert is_well(shown)
 
 
-def test_a_body_that_is_too_large_is_not_kept(shown: Shown, said: list[str]) -> None:
+def test_a_too_large_body_is_not_stored(shown: Shown, said: list[str]) -> None:
     host, port, cookie = address_and_cookie(shown)
     for headers, body in (
         ({"Content-Length": str(BODY_LIMIT + 1)}, b""),

@@ -1,4 +1,4 @@
-"""The desk in a real browser: time, hands and views. The engine is asked whether what the page shows is so."""
+"""The desk in a real browser: time, drags and views, compared with the state of the engine."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_run_pause_and_step(visitor: Visitor) -> None:
     visitor.until(lambda: visitor.desk.gate.is_paused)
 
 
-def test_space_on_a_button_presses_that_button_alone(visitor: Visitor) -> None:
+def test_space_on_a_button_presses_only_that_button(visitor: Visitor) -> None:
     visitor.at("step").focus()
     visitor.page.keyboard.press("Space")
     gate = visitor.desk.gate
@@ -235,7 +235,7 @@ def test_3d_view_shows(visitor: Visitor) -> None:
     visitor.picture("both_views")
 
 
-def test_without_webgl_the_view_from_above_goes_on(
+def test_without_webgl_the_desk_shows_the_top_view(
     new_page: NewPage, shown: Shown, browser_without_3d: Browser
 ) -> None:
     visitor = Visitor(new_page(by=browser_without_3d), shown)
@@ -246,7 +246,7 @@ def test_without_webgl_the_view_from_above_goes_on(
     visitor.picture("without_webgl")
 
 
-def test_page_that_sleeps_comes_back(visitor: Visitor) -> None:
+def test_a_hidden_page_gets_frames_again_when_visible(visitor: Visitor) -> None:
     hide = """(isHidden) => {
         Object.defineProperty(document, 'hidden', { value: isHidden, configurable: true });
         document.dispatchEvent(new Event('visibilitychange'));
