@@ -34,10 +34,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from calibration import calibration_loops_per_s, report
 from PIL import Image, ImageDraw
 
 import kiks
+from calibration import calibration_loops_per_s, report
 from kiks.batch.initial_state import random_starts
 from kiks.model.arena_objects import Ball
 

@@ -28,9 +28,8 @@ from contextlib import contextmanager
 from typing import Any
 from urllib.parse import urlsplit
 
-from calibration import report
-
 import kiks
+from calibration import report
 from kiks.demos.follow import Follow
 from kiks.desk.server.show import show
 from kiks.desk.server.token import COOKIE

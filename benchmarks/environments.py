@@ -18,9 +18,9 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-from calibration import report
 
 import kiks.learn.gymnasium_envs  # noqa: F401  (registers them)
+from calibration import report
 
 COUNTS, THREADS = (1, 100, 1000, 10_000), (1, 2)
 STEPS = 20_000

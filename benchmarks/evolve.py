@@ -16,9 +16,8 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from calibration import report
-
 import kiks
+from calibration import report
 from kiks.batch.initial_state import random_starts
 from kiks.model.arena import Pose
 

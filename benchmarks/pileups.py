@@ -15,8 +15,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from calibration import report
 from tests.piles import DEEPEST_MM, SHOVED_MM, Pile, calm, rush
+
+from calibration import report
 
 RUSH_TICKS, CALM_TICKS = 5000, 1000
 

@@ -13,9 +13,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from calibration import report
-
 import kiks
+from calibration import report
 from kiks.ports.program_process import Command
 from kiks.ports.programs import Programs
 from kiks.script.runner import run_here

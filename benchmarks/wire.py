@@ -16,9 +16,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from calibration import calibration_loops_per_s, median_of, report
-
 import kiks
+from calibration import calibration_loops_per_s, median_of, report
 from kiks.demos.follow import Follow
 
 ARENA = Path(__file__).parent.parent / "examples" / "arenas" / "office.toml"

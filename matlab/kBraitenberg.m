@@ -2,8 +2,8 @@ function kBraitenberg(ref, speed, seconds)
 % kBraitenberg  Let the robot drive about and avoid obstacles, as Braitenberg's third vehicle does.
 %
 %   kBraitenberg(ref, speed, seconds) couples the proximity sensors of robot ref to its wheels. speed is a factor for
-%   all speeds, 0.7 if left out: 14 pulses/10 ms where nothing is near. It goes on for so many seconds, by kiks_ktime;
-%   without end, until Ctrl-C, if left out. The robot is stopped whatever ends it.
+%   all speeds, 0.7 if left out: 14 pulses/10 ms with no obstacle near. It runs for that many seconds, by kiks_ktime,
+%   or until Ctrl-C if they are left out. The robot stops at the end, also after Ctrl-C or an error.
 %
 %   A robot that does not answer is an error.
 %

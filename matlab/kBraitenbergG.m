@@ -2,10 +2,10 @@ function kBraitenbergG(ref, gain, seconds)
 % kBraitenbergG  Let the robot drive about and avoid obstacles, and draw its path.
 %
 %   kBraitenbergG(ref, gain, seconds) does what kBraitenberg does, gain being its speed, and draws the path that the
-%   counters of the wheels tell [mm, from where the robot starts, which looks to the right]. It ends when the window is
-%   closed, on Ctrl-C, or after so many seconds by kiks_ktime if they are given. The robot is stopped whatever ends it.
+%   counters of the wheels tell [mm, from the start, heading to the right]. It ends when the window is
+%   closed, on Ctrl-C, or after that many seconds by kiks_ktime if they are given. The robot stops at the end.
 %
-%   The counters are set to 0. Without a display, and if the robot does not answer, it is an error.
+%   The counters are set to 0. It is an error if there is no display or the robot does not answer.
 %
 %   Example:
 %     ref = kiks_kopen([-1 9600 1]);

@@ -1,8 +1,8 @@
 function text = kFlush(ref)
-% kFlush  Take away what the robot has sent and nobody has read.
+% kFlush  Discard unread characters of the robot.
 %
-%   kFlush(ref) sends a blank to robot ref, which makes it complain, and reads until it is silent. Afterwards replies
-%   and commands belong together again. text = kFlush(ref) returns what was read.
+%   kFlush(ref) sends a blank to robot ref, which replies with an error, and reads until it is silent. Afterwards replies
+%   and commands match again. text = kFlush(ref) returns the characters read.
 %
 %   Example:
 %     ref = kiks_kopen([-1 9600 1]);

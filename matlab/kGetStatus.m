@@ -5,7 +5,7 @@ function status = kGetStatus(ref)
 %   if it does not answer.
 %     T  1 if the wheel has arrived where kMoveTo sent it, else 0
 %     M  0: speed (kSetSpeed), 1: position (kMoveTo), 2: pulse width (kSetPWM)
-%     E  what is asked for less what is measured [pulses/10 ms, or pulses while M is 1]
+%     E  set point minus measured value [pulses/10 ms, or pulses while M is 1]
 %
 %   Example:
 %     ref = kiks_kopen([-1 9600 1]);

@@ -2,13 +2,13 @@ function result = kLED(ref, led, action)
 % kLED  Switch the lights on the robot.
 %
 %   result = kLED(ref, led, action) switches a light of robot ref: led is 0 (at the side) or 1 (in front), action 0 off,
-%   1 on, 2 over. Both may be vectors, for several lights one after the other; a single action holds for all of them.
+%   1 on, 2 toggle. Both may be vectors, for several lights one after the other; a single action holds for all of them.
 %   Returns the actions, with -1 for each that the robot did not confirm.
 %
 %   Example:
 %     ref = kiks_kopen([-1 9600 1]);
 %     kLED(ref, 0, 1);          % light 0 on
-%     kLED(ref, [0 1], 2);      % both over
+%     kLED(ref, [0 1], 2);      % toggle both
 %     kiks_kclose(ref)
 %
 %   See also kcmd.

@@ -1,7 +1,7 @@
 function text = kList(ref)
 % kList  List the programs in the robot's memory.
 %
-%   kList(ref) prints what robot ref has in its ROM; text = kList(ref) returns it, with a line feed between the lines.
+%   kList(ref) prints the programs in the ROM of robot ref; text = kList(ref) returns them, one per line.
 %
 %   Example:
 %     ref = kiks_kopen([-1 9600 1]);

@@ -1,11 +1,11 @@
 function kProximityG(ref, kind, seconds)
 % kProximityG  Show the proximity sensors in a window.
 %
-%   kProximityG(ref, kind, seconds) reads the eight sensors of robot ref again and again and draws them: kind is
+%   kProximityG(ref, kind, seconds) reads and draws the eight sensors of robot ref repeatedly: kind is
 %   'bar', which it is if left out, or 'polar', around a robot that looks upwards. It ends when the window is closed,
-%   on Ctrl-C, or after so many seconds by kiks_ktime if they are given. The robot does not move.
+%   on Ctrl-C, or after that many seconds by kiks_ktime if they are given. The robot does not move.
 %
-%   Without a display, and if the robot does not answer, it is an error.
+%   It is an error if there is no display or the robot does not answer.
 %
 %   Example:
 %     ref = kiks_kopen([-1 9600 1]);
@@ -70,7 +70,7 @@ end
 end
 
 function [x, y] = rays(readings)
-% The rear sensors both look straight back; apart they can be told from each other.
+% Both rear sensors point straight back; they are drawn apart to be distinguishable.
 angles = pi / 2 + [90 45 10 -10 -45 -90 -165 165]' * pi / 180;
 gap = nan(8, 1);
 x = [zeros(8, 1) readings .* cos(angles) gap]';

@@ -21,7 +21,7 @@ if isempty(port) || ~isnumeric(port)
 elseif port(1) >= 0
     t = robot_link('time', port(1));
 else
-    % Who asks again and again without doing anything lets time pass.
+    % Polling lets simulated time pass.
     t = simulator('--clock', -port(1));
     if (isempty(t) || t == last) && simulator('--is-running', [])
         t = sscanf(simulator(sprintf('time %d', -port(1))), '%f', 1);

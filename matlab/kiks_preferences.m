@@ -1,4 +1,4 @@
-% kiks_preferences  What is simulated, and how: constants to be changed by the user.
+% kiks_preferences  Constants of the simulation, for the user to change.
 %
 %   This file is a script that sets constants. Copy it into the folder of your programs and change it there: the copy
 %   in the current folder wins, and may hold only the lines that differ. A program can also set a constant as a global
@@ -15,11 +15,11 @@
 %
 %   See also kiks, kiks_arena.
 
-% What is drawn by chance (noise, wheels that slip, random places): the same number, the same run. From 0 on.
+% The seed of all random numbers (noise, wheel slip, random places), from 0 on: the same seed gives the same run.
 KIKS_SEED = 0;
 
 % How long a program takes between a reply and its next command, in the robot's time: 'live' as long as it really takes,
-% 'live:FACTOR' that many times as long, 'fixed:MS' always so many milliseconds, 'none' no time. With 'fixed' and
+% 'live:FACTOR' that many times as long, 'fixed:MS' always MS milliseconds, 'none' no time. With 'fixed' and
 % 'none' each run of a program is the same.
 KIKS_THINKING = 'live';
 
@@ -31,7 +31,7 @@ KIKS_EMULATED_CPU = '';
 % 'Khepera', 'Khepera_II', or the name of a robot's file .toml.
 KIKS_ROBOT = 'Khepera';
 
-% What its proximity sensors go by: '' the robot's own, 'reflection', 'thesis', 'fast', 'standin' or 'curve'.
+% The model of its proximity sensors: '' the robot's own, 'reflection', 'thesis', 'fast', 'standin' or 'curve'.
 KIKS_RESPONSE = '';
 
 % 1: sensors are noisy; 0: they are not.
@@ -40,34 +40,35 @@ KIKS_NOISE = 1;
 % The turrets on each robot, of: k213 radio battle gripper.
 KIKS_TURRETS = 'k213 radio battle';
 
-% How many robots; [] as many as the arena has start poses, at least one.
+% The number of robots; [] for the number of start poses in the arena, at least one.
 KIKS_ROBOTS = [];
 
-% How many programs (Octaves, see kiks('--join')) begin together: the world waits until each has opened its port, and
-% then for each. So runs of several are the same each time, with 'fixed' and 'none'. 1: whoever comes begins.
+% The number of programs (Octaves, see kiks('--join')) that start together: the world waits until each has opened its
+% port, and then for each. So runs of several programs are repeatable, with 'fixed' and 'none'. 1: each starts when it
+% joins.
 KIKS_PROGRAMS = 1;
 
-% What elements 2, 3 and 4 of an arena matrix are: 'kiks' (light, ball, cylinder) or 'thesis' (ball, light, cylinder).
+% The meaning of elements 2, 3 and 4 of an arena matrix: 'kiks' (light, ball, cylinder) or 'thesis' (ball, light, cylinder).
 KIKS_ARENA_CODING = 'kiks';
 
-% A window that shows the world: [] if there is a display, 0 never, 1 always. It is read when a session starts.
+% Whether a window shows the world: [] if there is a display, 0 never, 1 always. It is read when a session starts.
 KIKS_WINDOW = [];
 
 % The brightness of things as sensors see them, 1 black to 255 white. [] suits the response: white balls, wooden
 % cylinders and the robot's own brightness with the responses of real robots; the values of KiKS 2.2.0 (ball 25,
-% cylinder 70, robot 120) with 'thesis', 'fast' and 'standin', which go by its rule of colours. A sensor that goes by
-% the light that comes back hardly sees a ball of 25.
+% cylinder 70, robot 120) with 'thesis', 'fast' and 'standin', which use its rule of colours. A sensor that measures
+% reflected light hardly sees a ball of 25.
 KIKS_COLOR_BALL = [];
 KIKS_COLOR_CYLINDER = [];
 KIKS_COLOR_ROBOT = [];
 
-% The brightness of walls that come without one, 1 to 255.
+% The brightness of walls without an own one, 1 to 255.
 KIKS_ARENA_DEFAULT_COLOR = 255;
 
-% How many lines kiks_status keeps.
+% The number of lines that kiks_status keeps.
 KIKS_LOG_HISTORY = 1000;
 
-% Without effect: the responses are measured, noise with them (KIKS_RESPONSE, KIKS_NOISE).
+% Without effect: responses and noise are measured ones (KIKS_RESPONSE, KIKS_NOISE).
 KIKS_SIM_PROX_EMAX = 0.25;
 KIKS_SIM_PROX_EMIN = 0.10;
 KIKS_SIM_PROX_EEXP = 3;
@@ -81,7 +82,7 @@ KIKS_SIM_PROX_STEP = 5;
 KIKS_K213_STEP = 10;
 KIKS_MMPERPIXEL = 2;
 
-% Without effect: paths are kept whole.
+% Without effect: paths are kept completely.
 KIKS_TRACE_MAX = 8^5;
 
 % Without effect: films are not recorded yet.

@@ -1,7 +1,7 @@
 function kiks_recordmovie(name)
-% kiks_recordmovie  Not there yet: films are not recorded.
+% kiks_recordmovie  Not available: KiKS does not record films.
 %
-%   kiks_recordmovie(name) says that, and records nothing, so that old programs run. The simulator's window shows a run
+%   kiks_recordmovie(name) says so and records nothing, so that old programs run. The simulator's window shows a run
 %   while it happens.
 %
 %   Example:

@@ -1,5 +1,5 @@
 function kiks_reset()
-% kiks_reset  Put robots and things back to where they were at the last checkpoint.
+% kiks_reset  Move robots and things back to where they were at the last checkpoint.
 %
 %   kiks_reset moves everything back. Time, open ports and the wheels' speeds go on.
 %

@@ -1,5 +1,5 @@
 function kiks_save(file)
-% kiks_save  Write the world into a file.
+% kiks_save  Write the world to a file.
 %
 %   kiks_save(file) writes the present world: walls, start poses and things. The ending says how:
 %
@@ -7,7 +7,7 @@ function kiks_save(file)
 %     .toml   arena file with a picture beside it
 %     .kiks   project: the arena and all settings
 %
-%   An earlier file of that name is replaced.
+%   An existing file of that name is replaced.
 %
 %   Example:
 %     kiks, kiks_save('mine.kad'), kiks_quit

@@ -1,10 +1,10 @@
 function dist = kiks_siminfo_robotdist(port)
-% kiks_siminfo_robotdist  Tell how far a simulated robot has gone.
+% kiks_siminfo_robotdist  Return how far a simulated robot has driven.
 %
 %   dist = kiks_siminfo_robotdist() is [forward backward straight] of this program's robot since its kiks_kopen [mm]:
-%   what its centre has gone forwards, what backwards, and how far it is from where it was. It is [] before a session.
+%   how far its centre has moved forwards and backwards, and its distance from the start. It is [] before a session.
 %
-%   kiks_siminfo_robotdist(port) is that of port -1, -2, ...; port may be a reference.
+%   kiks_siminfo_robotdist(port) is for port -1, -2, ...; port may be a reference.
 %
 %   Example:
 %     ref = kiks_kopen; kSetSpeed(ref, 5, 5); kiks_pause(1), kiks_siminfo_robotdist, kiks_kclose(ref)

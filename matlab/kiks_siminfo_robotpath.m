@@ -1,10 +1,10 @@
 function path_xy = kiks_siminfo_robotpath(port)
-% kiks_siminfo_robotpath  Tell where a simulated robot has been.
+% kiks_siminfo_robotpath  Return the path of a simulated robot.
 %
 %   path_xy = kiks_siminfo_robotpath() is 2xN: row 1 x, row 2 y [mm] of this program's robot since its kiks_kopen. It is
 %   2x0 before a session.
 %
-%   kiks_siminfo_robotpath(port) is that of port -1, -2, ...; port may be a reference.
+%   kiks_siminfo_robotpath(port) is for port -1, -2, ...; port may be a reference.
 %
 %   Example:
 %     ref = kiks_kopen; kSetSpeed(ref, 5, 5); kiks_pause(1), size(kiks_siminfo_robotpath), kiks_kclose(ref)

@@ -1,10 +1,10 @@
 function pos = kiks_siminfo_robotpos(port)
-% kiks_siminfo_robotpos  Tell where a simulated robot is.
+% kiks_siminfo_robotpos  Return the pose of a simulated robot.
 %
 %   pos = kiks_siminfo_robotpos() is [x y angle] of this program's robot [mm, mm, rad]: x from 1 to the right, y from 1
 %   down, the angle counter-clockwise, 0 looking right, not wrapped. pos is [] before a session.
 %
-%   kiks_siminfo_robotpos(port) is that of port -1, -2, ...; port may be a reference.
+%   kiks_siminfo_robotpos(port) is for port -1, -2, ...; port may be a reference.
 %
 %   Example:
 %     kiks, kiks_siminfo_robotpos, kiks_quit

@@ -1,7 +1,7 @@
 function ok = kiks_siminfo_setrobot(x, y, radians, port)
-% kiks_siminfo_setrobot  Put a simulated robot somewhere else.
+% kiks_siminfo_setrobot  Move a simulated robot to another place.
 %
-%   ok = kiks_siminfo_setrobot(x, y, radians) puts this program's robot to x, y [mm] with the heading radians, a random
+%   ok = kiks_siminfo_setrobot(x, y, radians) moves this program's robot to x, y [mm] with the heading radians, a random
 %   one if it is left out or []. ok is 1; it is 0, and nothing changes, if the place is not free, if x or y is missing,
 %   or before a session. An open port stays open.
 %

@@ -1,5 +1,5 @@
 function speed = kiks_siminfo_speed()
-% kiks_siminfo_speed  Tell how fast the simulation runs.
+% kiks_siminfo_speed  Return the speed of the simulation.
 %
 %   speed = kiks_siminfo_speed() is [average momentary], in percent of real time: since the world began, and since the
 %   last call. It is [100 100] before a session.

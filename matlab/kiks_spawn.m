@@ -1,11 +1,11 @@
 function kiks_spawn(type, place)
-% kiks_spawn  Put a light, a ball or a cylinder into the world.
+% kiks_spawn  Add a light, a ball or a cylinder to the world.
 %
-%   kiks_spawn(type, [x y]) puts one with its centre at x, y [mm, from 1, x to the right, y down]. type is 1 for a
-%   light, 2 for a ball, 3 for a cylinder. If the place is not free, it comes to a random one.
+%   kiks_spawn(type, [x y]) adds one with its centre at x, y [mm, from 1, x to the right, y down]. type is 1 for a
+%   light, 2 for a ball, 3 for a cylinder. If the place is not free, a random one is used.
 %
-%   kiks_spawn(type) puts lights at a random place, balls and cylinders in the middle, or, where that is not free, at a
-%   random place. An error if the place is outside the arena, or if there is no free one.
+%   kiks_spawn(type) adds a light at a random place, a ball or cylinder in the middle, or, if that is not free, at a
+%   random place. It is an error if the place is outside the arena, or if there is no free one.
 %
 %   Example:
 %     kiks(zeros(400)), kiks_spawn(2, [300 300]), kiks_siminfo_objects, kiks_quit

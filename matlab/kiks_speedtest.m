@@ -2,8 +2,8 @@ function index = kiks_speedtest(n)
 % kiks_speedtest  Measure how fast this computer is: the computer speed index.
 %
 %   index = kiks_speedtest(n) does a fixed piece of work n times (4) and returns the processor seconds of the fastest:
-%   the smaller, the faster. The work is a mixture of small matrices and a loop, as in robots' programs. A computer of
-%   today has 0.1 to 0.5; on the scale of KiKS 2.2.0, which is meant here, a PC of 2001 has about 4 (1 GHz Pentium III:
+%   the smaller, the faster. The work is a mixture of small matrices and a loop, as in programs for robots. A present
+%   computer has 0.1 to 0.5; on the scale of KiKS 2.2.0, which is used here, a PC of 2001 has about 4 (1 GHz Pentium III:
 %   4.39). How well the scales agree is an estimate, so factors between indexes are good to a factor of two.
 %
 %   KIKS_EMULATED_CPU in kiks_preferences uses it: then a program thinks as slowly as on that computer.
@@ -23,12 +23,12 @@ for k = 1:n
     work();
     index = min(index, cputime() - begin);
 end
-% A clock of coarse steps may show none.
+% A coarse clock may measure 0.
 index = max(index, 0.001);
 end
 
 function total = work()
-% Matrices small enough to stay in the nearest memory and on one thread.
+% Matrices small enough for the cache and for a single thread.
 total = 0;
 values = reshape(sin(1:1024), 32, 32);
 row = cos(1:4096);

@@ -3,7 +3,7 @@ function ref = kopen(port, baud, timeout)
 %
 %   ref = kopen([number baud timeout]) opens a serial port: 0 is COM1 on Windows and /dev/ttyS0 elsewhere, 1 the next.
 %   baud is the speed of the line [bit/s, 9600 if left out] and timeout how long to wait for a reply [s, 1 if left out].
-%   A timeout of 100 is 100 seconds: so long does each command wait for a robot that is switched off.
+%   A timeout of 100 is 100 seconds: each command waits that long for a robot that is switched off.
 %
 %   ref = kopen(name, baud, timeout) opens a port by its name:
 %     kopen('/dev/ttyUSB0', 9600, 1)          a serial port
@@ -14,10 +14,10 @@ function ref = kopen(port, baud, timeout)
 %   ref = kopen([-1 9600 1]) opens a simulated robot, as kiks_kopen does.
 %
 %   Returns [number baud timeout handle], 1x4, for the functions named k...; a port with a name has a number that is
-%   free, from 100 on, unless it is one of those above. handle is different each time. Nothing is sent, so the robot
-%   may be switched on later. That the port does not open, or is open already, is an error.
+%   free, from 100 on, unless it is one of those above. handle is different each time. kopen sends nothing, so the robot
+%   may be switched on later. It is an error if the port does not open or is open already.
 %
-%   In Octave this needs the package instrument-control; without it, serial ports of Linux work too.
+%   In Octave this needs the package instrument-control; without it, serial ports work on Linux only.
 %
 %   Example:
 %     ref = kopen('/dev/ttyUSB0', 9600, 1);
@@ -76,7 +76,7 @@ end
 end
 
 function number = serial_number(name)
-% The number by which kopen([number ...]) opens the same port; [] if there is none.
+% The number with which kopen([number ...]) opens the same port; [] if there is none.
 number = sscanf(upper(name), 'COM%d', 1) - 1;
 if isempty(number)
     number = sscanf(name, '/dev/ttyS%d', 1);

@@ -2,7 +2,7 @@ function ksends(cmd, ref)
 % ksends  Send a command to a robot and do not wait for its reply.
 %
 %   ksends(cmd, ref) sends the text cmd, which ends in a line feed or a carriage return, to robot ref. Its reply is
-%   dropped before the next command is sent. A simulated robot replies anyway, as that is what lets its time pass.
+%   dropped before the next command is sent. A simulated robot's reply is awaited, as that lets its time pass.
 %
 %   Example:
 %     ref = kopen('/dev/ttyUSB0', 9600, 1);

@@ -2,7 +2,7 @@ function avoid(port, baud, seconds)
 % avoid  Demo: wander about and keep away from the walls.
 %
 %   avoid(port, baud, seconds) drives for seconds (60) with the robot on port (-1, the simulated one; a real one as in
-%   kopen) at baud (9600), in the world that there is, else in the default arena. In each loop it reads the proximity
+%   kopen) at baud (9600), in the present world, else in the default arena. In each loop it reads the proximity
 %   and the light sensors and sets the speeds. It prints how many loops there were and how far the robot has come.
 %
 %   Example:

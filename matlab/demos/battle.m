@@ -7,7 +7,7 @@ function battle(port, baud, seconds)
 %   Ctrl-C if they are left out.
 %
 %   Every second it prints where the robot is, where it looks, how far it can see and how much energy it has, and what
-%   comes by radio. With a simulated robot it drives in the world that there is, else in a room with a second robot;
+%   comes by radio. With a simulated robot it drives in the present world, else in a room with a second robot;
 %   another Octave can drive that one: kiks('--join'), battle.
 %
 %   Example:

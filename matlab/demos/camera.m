@@ -3,7 +3,7 @@ function camera(port, baud, seconds)
 %
 %   camera(port, baud, seconds) drives for seconds (60) with the robot on port (-1, the simulated one; a real one as in
 %   kopen) at baud (19200, so that a picture takes 150 ms) and keeps away from the walls. It needs the turret K213. With
-%   a simulated robot it drives in the world that there is, else in a room with bands of different grey on its walls.
+%   a simulated robot it drives in the present world, else in a room with bands of different grey on its walls.
 %
 %   Every 5 s it prints the picture as a line of characters, heavy ones for dark pixels, and at the end how many
 %   pictures there were.

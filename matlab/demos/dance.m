@@ -9,8 +9,8 @@ function dance(port, baud, seconds, partner)
 %
 %   dance(port, baud, seconds, partner) is for the robot on port (-1; a real one as in kopen) at baud (9600). The dance
 %   lasts for seconds (30) from when the partner has answered. partner is the number of the other robot's radio; 0
-%   follows whoever leads. If it is left out, who begins the world leads robot 2, and who finds one follows. It prints
-%   how many figures there were.
+%   follows the leader. If it is left out, the program that begins the world leads robot 2, and one that joins follows.
+%   It prints the number of figures.
 %
 %   Example:
 %     dance
@@ -91,7 +91,7 @@ end
 end
 
 function step(ref, number, left)
-% A figure: there and back, so that nobody leaves the floor. left is the wheel that takes the left one's part.
+% A figure: forth and back, so that no robot leaves the floor. left is the wheel that plays the left one.
 speeds = [6 2; 2 6; 5 -5; -5 5; 6 6; -6 -6];
 speeds = speeds(number, [left 3 - left]);
 for direction = [1 -1]

@@ -2,7 +2,7 @@ function follow(port, baud, seconds)
 % follow  Demo: follow the wall on the left.
 %
 %   follow(port, baud, seconds) drives for seconds (30) with the robot on port (-1, the simulated one; a real one as in
-%   kopen) at baud (9600), in the world that there is, else in the default arena. Until there is a wall the robot drifts
+%   kopen) at baud (9600), in the present world, else in the default arena. Until there is a wall the robot drifts
 %   to the left; then it keeps the wall on its left, clockwise round the arena. It prints for how much of the time there
 %   was one.
 %

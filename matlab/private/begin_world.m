@@ -1,7 +1,7 @@
 function begin_world(arena, colormask, changes)
 % begin_world  Begin a new world; start the simulator's process if there is none.
 %
-%   begin_world(arena, colormask) takes the arguments of kiks and what kiks_preferences says.
+%   begin_world(arena, colormask) takes the arguments of kiks and the values of kiks_preferences.
 %   begin_world(arena, colormask, changes) takes values of the struct changes instead of those preferences.
 
 allow_numbers_in_text();
@@ -12,13 +12,13 @@ if nargin > 2
         preferences.(names{k}) = changes.(names{k});
     end
 end
-% What is wrong with the arena is to be said before a process and its window are there.
+% Report errors of the arena before a process starts and opens a window.
 world = world_request(plain_text(arena), colormask, preferences);
 settings = setting_requests(preferences);
 is_new = ~is_active();
 cellfun(@simulator, settings, 'UniformOutput', false);
 simulator(world);
-% The ports were those of the world before.
+% The ports belonged to the old world.
 open_ports('remove', 0);
 if is_new
     address = simulator('desk');

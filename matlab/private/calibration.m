@@ -1,5 +1,5 @@
 function known = calibration()
-% calibration  What kiks_calibrate has found: the variables of kiks_data.mat in the current folder.
+% calibration  The results of kiks_calibrate: the variables of kiks_data.mat in the current folder.
 %
 %   known = calibration() is a struct; without the file there is no latency and KIKS_COMPUTER_SPEED is empty.
 

@@ -1,5 +1,5 @@
 function cmd = checked_command(cmd)
-% checked_command  Refuse what is no command: a row of characters, or of their numbers.
+% checked_command  Check a command: it must be a row of characters or of their numbers.
 
 cmd = plain_text(cmd);
 if isempty(cmd) && (ischar(cmd) || isnumeric(cmd))

@@ -1,5 +1,5 @@
 function text = escaped(text)
-% escaped  Make one line of a text: the simulator's process is spoken to in lines.
+% escaped  Write a text as one line, as requests to the simulator's process are lines.
 %
 %   text = escaped(text) writes line feeds, carriage returns and backslashes as \n, \r and \\.
 %

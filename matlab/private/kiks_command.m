@@ -1,8 +1,8 @@
 function command = kiks_command()
 % kiks_command  The command that starts the simulator, as a row of words.
 %
-%   What the environment variable KIKS_COMMAND says; else the command of the Python environment that this folder
-%   belongs to; else `kiks`, wherever the system finds it.
+%   It is the environment variable KIKS_COMMAND, else the command of the Python environment that this folder
+%   belongs to, else `kiks` on the system's path.
 
 given = getenv('KIKS_COMMAND');
 if ~isempty(given)

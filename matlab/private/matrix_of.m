@@ -9,7 +9,7 @@ values = numbers(4:2:end);
 ends = cumsum(counts);
 matrix = zeros(numbers(1), numbers(2));
 if ~isempty(ends)
-    % Each value takes the place of the one before from where its run begins.
+    % Each value overwrites its predecessor from the start of its run.
     steps = zeros(ends(end), 1);
     steps([1; ends(1:end - 1) + 1]) = 1;
     matrix(:) = values(cumsum(steps));

@@ -1,7 +1,7 @@
-function need_display(who, instead)
+function need_display(name, instead)
 % need_display  Stop with a message if no window can be opened.
 %
-%   need_display(who, instead) names the function that draws and says what does the same without a window.
+%   need_display(name, instead) names the function that draws and the alternative without a window.
 
 if is_octave()
     has_display = have_window_system();
@@ -9,6 +9,6 @@ else
     has_display = feature('ShowFigureWindows');
 end
 if ~has_display
-    error('kiks:display', '%s must open a window, but there is no display here. %s', who, instead);
+    error('kiks:display', '%s must open a window, but there is no display here. %s', name, instead);
 end
 end

@@ -1,7 +1,7 @@
-function need_session(who_asks)
+function need_session(name)
 % need_session  Stop with a message if there is no session.
 
 if ~is_active()
-    error('kiks:session', '%s needs a session, but there is none. Start one with kiks, or with kiks(ARENA).', who_asks);
+    error('kiks:session', '%s needs a session, but there is none. Start one with kiks, or with kiks(ARENA).', name);
 end
 end

@@ -1,5 +1,5 @@
 function preferences = prepare_process()
-% prepare_process  Read the preferences, and tell a process that is not there yet whether to open a window.
+% prepare_process  Read the preferences, and set whether a new process opens a window.
 
 preferences = read_preferences();
 if ~simulator('--is-running', []) && ~isempty(preferences.KIKS_WINDOW)

@@ -36,8 +36,8 @@ preferences = checked(preferences);
 end
 
 function values = constants_of(folder)
-% The script runs in a workspace of its own, as the user's may declare its constants global. It is not called by its
-% name: which file that stands for, Octave looks up only now and then; nor by run, which leaves the current folder.
+% The script runs in its own workspace, as the user's script may declare its constants global. It is not called by its
+% name, as Octave caches which file that is, nor by run, which changes the current folder.
 eval(fileread(fullfile(folder, 'kiks_preferences.m')));
 names = who('KIKS_*');
 values = struct();
@@ -52,7 +52,7 @@ value = eval(name);
 end
 
 function say_idle(name, value, default)
-% Say why a constant that is not as it was has no effect.
+% Say why a changed constant has no effect.
 if isequal(value, default)
     return
 end

@@ -5,13 +5,13 @@ function result = robot_link(what, number, varargin)
 %                                                             from 100 on; handle is another each time
 %   reply = robot_link('ask', number, command, timeout)       sends the command and returns the next line without its
 %                                                             end; '' if none comes within the timeout [s]
-%   robot_link('send', number, command)                       sends it and waits for nothing
-%   text = robot_link('listen', number, silence)              what comes until nothing has come for so long [s]
+%   robot_link('send', number, command)                       sends it and does not wait
+%   text = robot_link('listen', number, silence)              all that arrives until the line is silent that long [s]
 %   robot_link('close', number)                               []: all; no error if it is not open
 %   seconds = robot_link('time', number)                      since it was opened; [] if it is not open
-%   numbers = robot_link('numbers', [])                       those that are open, a row
+%   numbers = robot_link('numbers', [])                       the open ports, as a row
 %
-%   A connection that is lost is closed, with an error.
+%   A lost connection is closed and raises an error.
 
 persistent numbers links openings
 if isempty(numbers)
@@ -56,7 +56,7 @@ switch what
             end
         end
         link = struct('port', robot_port('open', name, baud), 'rest', '', 'owed', 0, 'begin', tic());
-        % The longest reply of a robot has some 270 characters: no silence within one is longer than its time.
+        % The longest reply has about 270 characters; its duration is an upper bound of any silence within a reply.
         link.patience = 0.05 + 11 * 270 / baud;
         numbers(end + 1) = number;
         links{end + 1} = link;
@@ -71,10 +71,10 @@ end
 try
     switch what
         case 'ask'
-            % Whatever is still to come, or has come too late, must not answer this command.
+            % A late reply to an earlier command must not answer this one.
             settle(links{at});
             links{at}.rest = '';
-            % The reply is owed until it is here, even if Ctrl-C ends the wait.
+            % The reply stays outstanding until it arrives, even if Ctrl-C ends the wait.
             owed = replies_to(varargin{1});
             links{at}.owed = owed;
             robot_port('write', links{at}.port, varargin{1});
@@ -110,19 +110,19 @@ end
 end
 
 function count = replies_to(text)
-% As many as lines that are not empty.
+% One reply for each line that is not empty.
 ends = text == 10 | text == 13;
 count = sum(ends & ~[true ends(1:end - 1)]);
 end
 
 function is = is_reply_to(command, line)
-% What the robot prints when it is switched on, say, leaves the reply to come. Only capitals have a reply of known form.
+% The power-on banner, for example, is not the reply. Only commands with capitals have a reply of known form.
 letter = lower(char(command(1)));
 is = letter == command(1) || strncmpi(line, letter, 1) || strncmp(line, 'z,', 2) || strncmp(line, 'Command', 7);
 end
 
 function settle(link)
-% Read away what is owed, unless the robot stays silent, and what is there.
+% Read and drop the outstanding replies, until they are complete or the robot is silent.
 lines_ = sum(link.rest == 10);
 begin = tic();
 while lines_ < link.owed && toc(begin) < 10 * link.patience

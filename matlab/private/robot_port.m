@@ -1,12 +1,12 @@
 function result = robot_port(what, port, varargin)
-% robot_port  The ways to a real robot: a TCP connection, a serial port, or a device file.
+% robot_port  Connections to a real robot: TCP, a serial port, or a device file.
 %
 %   port = robot_port('open', name, baud)       name is 'host:port', with or without socket://, or a serial port
 %   robot_port('write', port, text)
-%   text = robot_port('read', port, seconds)    what there is; waits so long for the first of it, '' if nothing comes
+%   text = robot_port('read', port, seconds)    the characters that have arrived; waits for the first one at most that long
 %   robot_port('close', port)
 %
-%   A port that cannot be opened or is lost is an error, kiks:link. In Octave the package instrument-control does the
+%   A port that cannot be opened, or is lost, raises the error kiks:link. In Octave the package instrument-control does the
 %   work. Without it a serial port is read and written as a file, after stty; setting the environment variable
 %   KIKS_SERIAL to 'file' chooses that way.
 
@@ -28,7 +28,7 @@ try
     end
 catch failure
     if strcmp(what, 'close') || ~isempty(strfind(failure.message, 'Interrupted')) %#ok<STREMP>
-        return  % Ctrl-C has woken us: the interpreter stops the program itself
+        return  % Ctrl-C has interrupted the call; the interpreter stops the program itself
     end
     if strcmp(failure.identifier, 'kiks:link')
         rethrow(failure);
@@ -79,14 +79,14 @@ line.Parity = 'none';
 line.StopBits = 2;
 line.FlowControl = 'none';
 if is_octave()
-    line.Timeout = 0.1;  % the shortest there is
+    line.Timeout = 0.1;  % the shortest possible
 end
 end
 
 function port = opened_file(port)
 port.kind = 'file';
 if is_octave() && isunix()
-    % A link may come to point elsewhere when its maker is started again.
+    % A symbolic link may change its target when the program that made it restarts.
     port.file = canonicalize_file_name(port.name);
 end
 [status, text] = system(sprintf('stty -F ''%s'' %d raw -echo min 0 time 0 cs8 cstopb -parenb -crtscts clocal 2>&1', ...
@@ -94,7 +94,7 @@ end
 if status ~= 0
     error('kiks:link', '%s', strtok(text, char(10)));
 end
-% Two files, as one for both ways reads and writes through the same buffer.
+% Two files, because a single one would read and write through the same buffer.
 [port.from, text] = fopen(port.file, 'r');
 if port.from < 0
     error('kiks:link', '%s', text);
@@ -112,7 +112,7 @@ if strcmp(port.kind, 'file')
 elseif is_octave()
     is_gone = write(port.to, bytes, 'uint8') < numel(bytes);
 else
-    write(port.to, bytes, 'uint8');  % says itself that the connection is lost
+    write(port.to, bytes, 'uint8');  % raises an error if the connection is lost
     is_gone = false;
 end
 if is_gone
@@ -139,7 +139,7 @@ while true
     if left <= 0
         return
     elseif waited > 0.002
-        % At first a look is cheaper than a wait: on this computer the answer is there at once.
+        % At first polling is cheaper than waiting: a robot on this computer answers at once.
         text = wait(port, line, left);
         if ~isempty(text)
             return
@@ -149,12 +149,12 @@ end
 end
 
 function text = wait(port, line, seconds)
-% Waits some time, at most that; may bring the first character.
+% Wait up to a timeout; may return the first character.
 text = '';
 if ~is_octave()
     pause(0.001);
 elseif strcmp(port.kind, 'tcp')
-    % This notices the end of the connection, a look at the count does not.
+    % This call notices the end of the connection; reading the count does not.
     line.Timeout = min(seconds, 0.5);
     text = char(read(line, 1, 'uint8'));
 elseif seconds < 0.1
@@ -172,7 +172,7 @@ function text = received_file(port, seconds)
 begin = tic();
 next_look = 0.2;
 while true
-    % The file has an end wherever there was nothing more to read, until it is told that this is not so.
+    % After reading to the end, the file stays at its end until the end mark is cleared.
     fclear(port.from);
     text = fread(port.from, [1 4096], 'uint8=>char');
     if ~isempty(text)
@@ -198,7 +198,7 @@ error('kiks:link', ['The connection to the robot at %s must stay, but it is lost
 end
 
 function has = has_instrument_control()
-% Looking for the package takes a while, so do it once.
+% Searching for the package is slow, so do it once.
 persistent answer
 if isempty(answer)
     answer = exist('serialport', 'file') > 0;

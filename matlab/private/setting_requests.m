@@ -1,7 +1,7 @@
 function requests = setting_requests(preferences)
-% setting_requests  Turn preferences into requests that hold for the next world: a row of cells.
+% setting_requests  Turn preferences into requests for the settings of the next world: a row of cells.
 %
-%   A value left empty asks for the simulator's own.
+%   An empty value stands for the simulator's default.
 
 p = preferences;
 greys = {p.KIKS_COLOR_BALL, p.KIKS_COLOR_CYLINDER, p.KIKS_COLOR_ROBOT};
@@ -64,7 +64,7 @@ end
 function seconds = latency_s(p)
 seconds = 0;
 if isfield(p, 'is_uncalibrated')
-    return  % the line is being measured
+    return  % kiks_calibrate is measuring the line
 end
 known = calibration();
 seconds = max(0, known.KIKS_KSEND_CONSTANT / known.KIKS_CALIBRATE_BAUD);

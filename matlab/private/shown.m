@@ -1,5 +1,5 @@
 function text = shown(value)
-% shown  Say in a few words what somebody has given, for messages.
+% shown  Describe a value in a few words, for messages.
 
 if ischar(value) && size(value, 1) <= 1
     text = ['''' one_line(value) ''''];

@@ -1,17 +1,17 @@
 function payload = simulator(request, argument)
-% simulator  Ask the simulator's process for something; start it if there is none.
+% simulator  Send a request to the simulator's process; start the process if there is none.
 %
-%   payload = simulator(request) sends a line and returns what is answered. What the simulator refuses is an Octave
+%   payload = simulator(request) sends a line and returns the answer. A refusal of the simulator is an Octave
 %   error.
 %
-%   simulator('--join', number)    takes part in a session that runs on this computer; 0: the newest
-%   simulator('--end', [])             parts from it; no error if there is none
+%   simulator('--join', number)    joins a session that runs on this computer; 0: the newest
+%   simulator('--end', [])             leaves the session; no error if there is none
 %   simulator('--is-running', [])      true if this Octave or MATLAB has one
-%   simulator('--clock', port)     time of a port [s] as the last answer told it; [] if that was another port's, or
+%   simulator('--clock', port)     time of a port [s] from the last answer; [] if that was another port's, or
 %                                  thinking is measured and it was more than a few milliseconds ago
 %
-%   An answer that takes long is preceded by frames that say so, four a second: between two of them Ctrl-C is heard. What
-%   it has kept us from reading is skipped before the next request.
+%   Four frames a second announce a slow answer; between two of them Octave handles Ctrl-C. What
+%   Ctrl-C left unread is skipped before the next request.
 
 persistent link is_pipe to from line_feed answer answered is_behind ending
 if nargin > 1
@@ -20,7 +20,7 @@ if nargin > 1
         case '--clock'
             if ~isempty(answer) && ~is_behind
                 told = sscanf(answer(2:20), '%f');
-                % A negative number says that thinking is measured: then the time soon grows old.
+                % A negative number means that thinking is measured: then the time is soon outdated.
                 if told(1) == argument || (told(1) == -argument && toc(answered) < 0.005)
                     payload = told(2);
                 end
@@ -34,7 +34,7 @@ if nargin > 1
             mlock
             is_pipe = [];
             link = simulator_link('open', {'--join', sprintf('%d', argument)});
-            simulator('version');  % a process that is asked for nothing takes itself for forgotten
+            simulator('version');  % a process without a request would end after a timeout
         case '--end'
             if ~isempty(link)
                 ending = link;
@@ -54,7 +54,7 @@ if isempty(link)
     end
     mlock  % `clear all` in a user's program would lose the process
     if ~isempty(ending)
-        simulator_link('close', ending);  % Ctrl-C came between
+        simulator_link('close', ending);  % Ctrl-C has interrupted an earlier close
         ending = [];
     end
     is_pipe = [];
@@ -74,7 +74,7 @@ line = [request line_feed];
 is_behind = true;
 while true
     if is_pipe
-        % In line here, as this is what a program does thousands of times a second.
+        % Inlined, as programs send thousands of requests a second.
         fputs(to, line);
         fflush(to);
         answer = fread(from, [1 96], '*char');
@@ -102,7 +102,7 @@ while true
         answered = tic();
         error('kiks:simulator', '%s', unescaped(answer(21:end)));
     end
-    % Still at it: we still wait.
+    % The answer is not ready; confirm that this program still waits.
     line = line_feed;
 end
 simulator('--end', []);

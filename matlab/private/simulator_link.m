@@ -1,12 +1,12 @@
 function [result, link] = simulator_link(what, varargin)
-% simulator_link  The way to the simulator's process: two pipes in Octave, a TCP connection in MATLAB.
+% simulator_link  The connection to the simulator's process: two pipes in Octave, TCP in MATLAB.
 %
 %   link = simulator_link('open', options)              starts the process, or joins one
 %   [answer, link] = simulator_link('ask', link, line)  for a connection: sends a line, returns the next answer; ''
 %                                                       if the process is gone
-%   link = simulator_link('catch up', link)             calls off what Ctrl-C has kept us from waiting for, and skips
-%                                                       what is left of it
-%   simulator_link('close', link)                       hangs up; the process ends with the last who does
+%   link = simulator_link('catch up', link)             cancels the request that Ctrl-C has interrupted, and skips
+%                                                       its answer
+%   simulator_link('close', link)                       closes it; the process ends with its last connection
 %
 %   MATLAB has no pipes to a process that it has started, so there the process listens. Setting the environment
 %   variable KIKS_TRANSPORT to 'tcp' lets Octave do the same.
@@ -31,17 +31,17 @@ end
 function link = open_pipes(options)
 persistent unfinished
 if ~isempty(unfinished)
-    % Ctrl-C has ended the start of another one.
+    % Ctrl-C has interrupted the start of another process.
     forgotten = unfinished;
     unfinished = [];
     hang_up(forgotten);
 end
 command = kiks_command();
-% Octave's `true`, which its help leaves out, makes reading wait until something comes.
+% The argument `true`, which Octave's help does not mention, makes reads wait for data.
 [to, from, process] = popen2(command{1}, [command(2:end) {'session'} options], true);
 link = struct('is_pipe', true, 'to', to, 'from', from, 'process', process, 'is_joined', ~isempty(options));
 unfinished = link;
-% Its first words say that it is there, or why not; before them come frames that say that it is still to come.
+% The first answer is the greeting or an error; frames that announce it may precede it.
 first = '~';
 while strcmp(first, '~')
     first = fread(from, [1 96], '*char');
@@ -79,13 +79,13 @@ end
 name = sprintf('127.0.0.1:%d', number);
 link = struct('is_pipe', false, 'to', [], 'from', [], 'port', robot_port('open', name, 9600), 'rest', '');
 robot_port('write', link.port, [token 10]);
-% Every connection begins with who is there.
+% Every connection begins with the greeting.
 [~, link] = ask(link, '');
 end
 
 function first = started(command)
-% The process writes its first line into a file of ours as soon as it listens: in a new folder, so that no other user can
-% lay down another one.
+% The process writes its first line into our file as soon as it listens. The folder is new, so that no other user can
+% put another file there.
 folder = tempname();
 [is_made, why] = mkdir(folder);
 if ~is_made || ~isempty(why)
@@ -151,7 +151,7 @@ try
         if ~isempty(news)
             silence = tic();
         elseif toc(silence) > 60
-            % Even where an answer takes long, something comes four times a second.
+            % Even during a slow answer, four frames a second arrive.
             return
         end
     end
@@ -165,8 +165,8 @@ end
 end
 
 function link = caught_up(link)
-% The answer to char(24) and a character begins with many char(1) and ends with char(2), the only one that there is, and
-% that character: another each time, as Ctrl-C may have come between here, too.
+% The answer to char(24) and a character is many times char(1), then a single char(2) and
+% that character, which changes each time, as Ctrl-C may interrupt this exchange, too.
 persistent number
 number = mod(sum(number), 94) + 1;
 sign = char(32 + number);
@@ -201,7 +201,7 @@ try
     end
     link.rest = link.rest(strfind(link.rest, ending) + 2:end);
 catch failure
-    % That it is gone is found by the request that follows.
+    % The next request detects the end of the process.
     if ~strcmp(failure.identifier, 'kiks:link')
         rethrow(failure);
     end
@@ -225,19 +225,19 @@ if ~link.is_pipe
     try
         robot_port('write', link.port, char([4 10]));
     catch
-        % It is gone already.
+        % The process has already ended.
     end
     robot_port('close', link.port);
     return
 end
-% Good-bye in words, as other processes that Octave has started may keep the pipe open.
+% Send an explicit end, as other processes that Octave has started may keep the pipe open.
 try
     fputs(link.to, char([4 10]));
     fclose(link.to);
 catch
-    % Ctrl-C came between here.
+    % Ctrl-C has interrupted this function.
 end
-% When it has nobody left it ends, and closes its end: so nothing of it is there when we go on.
+% After its last client has left, the process ends and closes the pipe; wait for that.
 last = '';
 news = 'x';
 while ~isempty(news)
@@ -245,7 +245,7 @@ while ~isempty(news)
     last = [last(max(1, end - 95):end) news];
 end
 fclose(link.from);
-% Its last frame says so if it goes on for others.
+% If the session goes on for other programs, the last frame says so.
 if link.is_joined || numel(last) < 96 || last(end - 87) ~= '>'
     waitpid(link.process);
 end

@@ -1,9 +1,9 @@
 function stop_robot(ref)
-% stop_robot  Stop a robot at the end of a program, whatever has ended it.
+% stop_robot  Stop a robot at the end of a program, also after an error or Ctrl-C.
 
 try
     kSetSpeed(ref, 0, 0);
 catch
-    % The connection may be what has failed; its message has been shown already.
+    % The connection itself may have failed; its message was shown already.
 end
 end

@@ -1,5 +1,5 @@
 function [start, seconds] = time_limit(ref, seconds)
-% time_limit  Check how long a demo is to last, [] for endless, and return when it starts, by kiks_ktime.
+% time_limit  Check the duration of a demo ([] for endless), and return its start time by kiks_ktime.
 
 if isempty(seconds)
     seconds = Inf;

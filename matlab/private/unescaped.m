@@ -1,10 +1,10 @@
 function text = unescaped(text)
-% unescaped  Undo what escaped did.
+% unescaped  Undo escaped.
 %
 %   See also escaped.
 
 if any(text == 92)
-    % A character that occurs nowhere else keeps '\\n' from being taken for a backslash and a line feed.
+    % A character that occurs nowhere else keeps '\\n' from being read as a backslash and a line feed.
     text = strrep(text, '\\', char(1));
     text = strrep(strrep(text, '\n', char(10)), '\r', char(13));
     text = strrep(text, char(1), '\');

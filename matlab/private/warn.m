@@ -1,5 +1,5 @@
 function warn(identifier, varargin)
-% warn  Warn without telling through which functions of the toolbox the warning came.
+% warn  Warn without a backtrace through the functions of the toolbox.
 
 before = warning('query', 'backtrace');
 warning('off', 'backtrace');

@@ -1,5 +1,5 @@
 function request = world_request(arena, colormask, preferences)
-% world_request  Turn an arena, as kiks takes it, into a request for a world.
+% world_request  Turn the arena argument of kiks into a request for a world.
 
 if isempty(arena)
     request = 'world default';
@@ -54,6 +54,6 @@ if any(~isfinite(greys(:))) || any(greys(:) < 0) || any(greys(:) > 255)
     error('kiks:argument', ['The colormask''s elements must be from 0 to 255, but they are from %g to %g. ' ...
         '1 is a black wall, 255 a white one.'], min(greys(:)), max(greys(:)));
 end
-% A wall of grey 0 is still a wall: the darkest.
+% A wall of grey 0 counts as the darkest wall.
 greys = max(round(greys), 1) .* (codes == 1);
 end

@@ -1,4 +1,4 @@
-"""Chromium, for all tests that look at pages; they are left out where it is not."""
+"""Chromium for all browser tests, which are skipped if it is missing."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def browser_without_3d(playwright: Playwright) -> Iterator[Browser]:
 
 @pytest.fixture
 def new_page(browser: Browser) -> Iterator[NewPage]:
-    """Open pages; at the end, none of them may have had a fault, nor have said one on its console."""
+    """Open pages; at the end, no page may have had an error or printed one on its console."""
     pages: list[Page] = []
     faults: list[str] = []
 
@@ -86,5 +86,5 @@ def visitor(new_page: NewPage, shown: Shown) -> Iterator[Visitor]:
 
     page = new_page()
     yield Visitor(page, shown)
-    # Before the desk: a page asks for pictures until its line breaks, and finds none of a desk that has gone.
+    # Close pages before the desk: a page asks for pictures until its connection ends.
     page.close()

@@ -1,4 +1,4 @@
-"""Who may come to the desk."""
+"""Access control of the desk."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def come(
     headers: list[tuple[bytes, bytes]] | None = None,
     **named: str,
 ) -> list[dict[str, Any]]:
-    """Return what is answered to a request with these headers."""
+    """Return the answer to a request with these headers."""
     pieces = list(body or [b""])
     sent: list[dict[str, Any]] = []
 
@@ -84,7 +84,7 @@ def page(answers: list[dict[str, Any]]) -> str:
 
 @pytest.mark.parametrize("host", ["127.0.0.1:8123", "localhost:8123", "[::1]:8123", "localhost"])
 @pytest.mark.parametrize("kind", ["http", "websocket"])
-def test_a_browser_with_the_token_may_come(kind: str, host: str) -> None:
+def test_a_browser_with_the_token_is_accepted(kind: str, host: str) -> None:
     welcome = 200 if kind == "http" else 101
     assert status(come(kind=kind, host=host, cookie=COOKIE)) == welcome
     assert status(come(kind=kind, host=host, cookie=COOKIE, origin=f"http://{host}")) == welcome
@@ -92,7 +92,7 @@ def test_a_browser_with_the_token_may_come(kind: str, host: str) -> None:
     assert status(come(kind=kind, host=host, cookie=f'a={{"b": [1; 2]}}; x; =; {COOKIE}; c="')) == welcome
 
 
-def test_only_pages_of_this_computer_may_show_it_within_theirs() -> None:
+def test_only_pages_of_this_computer_may_embed_the_desk() -> None:
     policy = dict(come(cookie=COOKIE)[0]["headers"])[b"content-security-policy"]
     assert policy.startswith(b"frame-ancestors 'self' http://localhost:*")
     assert b" *" not in policy.replace(b":*", b"")
@@ -111,7 +111,7 @@ def test_only_pages_of_this_computer_may_show_it_within_theirs() -> None:
         {"host": ""},
     ],
 )
-def test_a_page_of_another_site_may_not_even_with_the_token(kind: str, headers: dict[str, str]) -> None:
+def test_a_page_of_another_site_is_refused_even_with_the_token(kind: str, headers: dict[str, str]) -> None:
     assert status(come(kind=kind, cookie=COOKIE, **headers)) == 403
     assert status(come(kind=kind, query=b"token=a-secret", **headers)) == 403
 
@@ -122,7 +122,7 @@ def test_a_page_of_another_site_may_not_even_with_the_token(kind: str, headers: 
     "cookie",
     ["", "kiks_token=", "kiks_token=wrong", "other=a-secret", "kiks_token=a-secre", "\x80", "kiks_token=\u20ac"],
 )
-def test_without_the_token_nobody_may(kind: str, cookie: str, is_local: bool) -> None:
+def test_requests_without_the_token_are_refused(kind: str, cookie: str, is_local: bool) -> None:
     headers = {"cookie": cookie} if cookie else {}
     for query in (b"", b"token=", b"token=wrong", b"token=%E2%82%AC", b"ticket=", b"ticket=a-secret"):
         answers = come(kind=kind, query=query, is_local=is_local, **headers)
@@ -131,10 +131,10 @@ def test_without_the_token_nobody_may(kind: str, cookie: str, is_local: bool) ->
     assert status(come(kind="websocket", query=b"token=a-secret", is_local=is_local, **headers)) == 403
 
 
-def test_refused_page_says_what_to_do() -> None:
+def test_refusal_tells_how_to_open_the_desk() -> None:
     answers = come()
     assert "must be opened with its token" in page(answers)
-    assert "Open the whole address that KiKS printed" in page(answers)
+    assert "Open the complete address that KiKS printed" in page(answers)
     assert "<script" not in page(come(path="/<script>alert(1)</script>\x01", host="<script>"))
 
 
@@ -147,7 +147,7 @@ def test_token_becomes_a_cookie_and_leaves_the_address() -> None:
     assert status(come(host="robots.example:8123", cookie="a=b; kiks_token=a-secret", is_local=False)) == 200
 
 
-def test_a_notebook_of_another_site_has_a_cookie_of_its_own() -> None:
+def test_a_notebook_of_another_site_gets_a_partitioned_cookie() -> None:
     within = {"sec_fetch_site": "cross-site", "sec_fetch_dest": "iframe"}
     cookie = dict(come(query=b"token=a-secret", **within)[0]["headers"])[b"set-cookie"]
     assert cookie.endswith(b"HttpOnly; SameSite=None; Secure; Partitioned")
@@ -155,7 +155,7 @@ def test_a_notebook_of_another_site_has_a_cookie_of_its_own() -> None:
 
 
 @given(path=st.text(max_size=30).map(lambda text: f"/{text}"), query=st.binary(max_size=30))
-def test_the_way_to_the_cookie_leads_to_the_desk(path: str, query: bytes) -> None:
+def test_redirect_with_the_cookie_leads_to_the_desk(path: str, query: bytes) -> None:
     answers = come(path=path, query=b"token=a-secret&" + query)
     if status(answers) == 303:
         location = dict(answers[0]["headers"])[b"location"]
@@ -192,7 +192,7 @@ RAW = st.one_of(
     ),
     is_local=st.booleans(),
 )
-def test_whatever_a_stranger_sends_is_answered_and_lets_nobody_in(
+def test_random_requests_without_the_token_are_refused(
     kind: str, path: str, query: bytes, headers: list[tuple[bytes, bytes]], is_local: bool
 ) -> None:
     async def inside(scope: Any, receive: Any, send: Any) -> None:
@@ -203,30 +203,30 @@ def test_whatever_a_stranger_sends_is_answered_and_lets_nobody_in(
 
 
 @pytest.mark.parametrize("origin", ["http://[", "http://[::1", "http://a]b"])
-def test_an_origin_that_is_none_is_a_bad_request(origin: str) -> None:
+def test_a_malformed_origin_is_a_bad_request(origin: str) -> None:
     assert status(come(origin=origin, cookie=COOKIE)) == 400
 
 
-def test_a_path_with_the_end_of_a_line_is_a_bad_request() -> None:
+def test_a_path_with_a_line_end_is_a_bad_request() -> None:
     assert status(come(path="/desk/1\r\nset-cookie: a=b", query=b"token=a-secret")) == 400
 
 
-# ---- too much, and what fails ----
+# ---- size limits and failures ----
 
 
 @pytest.mark.parametrize("length", [str(BODY_LIMIT + 1), "9" * 30, "-1", "x"])
-def test_what_is_announced_too_large_is_refused(length: str) -> None:
+def test_a_request_with_too_large_a_content_length_is_refused(length: str) -> None:
     assert status(come(method="POST", content_length=length, cookie=COOKIE)) == 413
 
 
-def test_what_is_too_large_is_cut_off() -> None:
+def test_a_too_large_body_is_cut_off() -> None:
     piece = b"x" * (1 << 20)
     assert status(come(body=[piece] * (BODY_LIMIT >> 20), cookie=COOKIE)) == 200
     assert status(come(body=[piece] * ((BODY_LIMIT >> 20) + 1), cookie=COOKIE)) == 413
 
 
 @pytest.mark.parametrize("kind", ["http", "websocket"])
-def test_what_fails_inside_is_a_line(kind: str, caplog: pytest.LogCaptureFixture) -> None:
+def test_an_exception_in_the_application_is_logged_in_one_line(kind: str, caplog: pytest.LogCaptureFixture) -> None:
     async def fails(scope: Any, receive: Any, send: Any) -> None:
         await receive()
         raise KeyError("x" * 1000)
@@ -239,7 +239,7 @@ def test_what_fails_inside_is_a_line(kind: str, caplog: pytest.LogCaptureFixture
     assert said.exc_info is None
 
 
-def test_an_upload_that_is_none_is_a_bad_request() -> None:
+def test_a_malformed_upload_is_a_bad_request() -> None:
     async def stumbles(scope: Any, receive: Any, send: Any) -> None:
         await send({"type": "http.response.start", "status": 500, "headers": []})
         raise AttributeError("'str' object has no attribute 'filename'")
@@ -247,7 +247,7 @@ def test_an_upload_that_is_none_is_a_bad_request() -> None:
     assert status(come(method="POST", application=stumbles, cookie=COOKIE)) == 400
 
 
-def test_a_client_that_has_left_is_answered_nothing(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_client_that_has_left_gets_no_answer(caplog: pytest.LogCaptureFixture) -> None:
     async def fails(scope: Any, receive: Any, send: Any) -> None:
         await receive()
         raise RuntimeError("No response returned.")
@@ -279,7 +279,7 @@ def ends(request: pytest.FixtureRequest) -> Any:
         yield client.getsockname()[:2], listener.getsockname()[:2]
 
 
-def test_a_ticket_opens_once_and_to_this_user_alone(ends: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_ticket_is_valid_once_and_for_this_user_only(ends: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     key = Token(TOKEN)
     ticket = key.new_ticket()
     query = f"ticket={ticket}".encode()
@@ -300,7 +300,7 @@ def test_a_ticket_opens_once_and_to_this_user_alone(ends: Any, monkeypatch: pyte
     assert status(come(key=key, ends=ends, cookie=f"kiks_token_{ends[1][1]}=a-secret")) == 200
 
 
-def test_the_user_of_a_connection_is_known(ends: Any) -> None:
+def test_user_of_finds_the_owner_of_a_connection(ends: Any) -> None:
     client, server = ends
     assert user_of(client, server) == os.getuid()
     assert user_of(server, client) is not None

@@ -127,7 +127,7 @@ def test_bodies_and_lamps_are_dragged(
     here.heard("(said) => said.filter((message) => message.kind === 'drop').length === 2")
 
 
-def test_escape_puts_back_what_is_dragged(visit: Callable[..., Visit]) -> None:
+def test_escape_moves_a_dragged_thing_back(visit: Callable[..., Visit]) -> None:
     here = visit()
     here.page.mouse.move(*here.on_page(420, 320))
     here.page.mouse.down()
@@ -138,7 +138,7 @@ def test_escape_puts_back_what_is_dragged(visit: Callable[..., Visit]) -> None:
     assert (last(said, "move")["x_mm"], last(said, "move")["y_mm"]) == (420, 320)
 
 
-def test_keys_choose_move_and_turn(visit: Callable[..., Visit]) -> None:
+def test_keys_select_move_and_turn(visit: Callable[..., Visit]) -> None:
     here = visit()
     here.page.locator("[data-testid=arena-top]").focus()
     here.page.keyboard.press("n")
@@ -175,7 +175,7 @@ def test_tab_leaves_the_view_after_the_last_thing(visit: Callable[..., Visit]) -
     assert here.page.evaluate("document.activeElement.dataset.testid") is None
 
 
-def test_a_click_picks_and_chooses(visit: Callable[..., Visit]) -> None:
+def test_a_click_picks_and_selects(visit: Callable[..., Visit]) -> None:
     here = visit()
     x_mm, y_mm, heading_rad = here.pose(2)
     angle = heading_rad + SENSOR_RAD
@@ -266,13 +266,13 @@ def test_fingers_drag_and_pinch(visit: Callable[..., Visit]) -> None:
     assert here.on_page(600, 520)[0] - here.on_page(500, 520)[0] == pytest.approx(2 * wide, rel=0.02)
 
 
-def test_python_chooses_a_thing(visit: Callable[..., Visit]) -> None:
+def test_select_from_python(visit: Callable[..., Visit]) -> None:
     here = visit()
     here.ask("select")
     here.wait("() => document.querySelector('[aria-live]').textContent.startsWith('cylinder 2 chosen')")
 
 
-def test_a_lost_connection_comes_back_by_itself(visit: Callable[..., Visit]) -> None:
+def test_a_lost_connection_is_restored(visit: Callable[..., Visit]) -> None:
     here = visit()
     here.page.evaluate(
         """import('kiks-desk').then(({ pageFeed }) => {
@@ -287,7 +287,7 @@ def test_a_lost_connection_comes_back_by_itself(visit: Callable[..., Visit]) -> 
     assert here.page.locator("[data-testid=arena-notice]").is_hidden()
 
 
-def test_a_hidden_page_lets_the_server_rest(visit: Callable[..., Visit]) -> None:
+def test_a_hidden_page_gets_no_frames(visit: Callable[..., Visit]) -> None:
     here = visit()
     hide = """(isHidden) => {
         Object.defineProperty(document, 'hidden', { value: isHidden, configurable: true });
@@ -301,7 +301,7 @@ def test_a_hidden_page_lets_the_server_rest(visit: Callable[..., Visit]) -> None
     here.wait("(received) => window.feed._owed <= 1 && window.feed.frames_received > received + 5", received)
 
 
-def test_another_scene_takes_the_place_of_the_first(visit: Callable[..., Visit]) -> None:
+def test_a_new_scene_replaces_the_old_one(visit: Callable[..., Visit]) -> None:
     here = visit("view=both")
     here.wait("() => kiksDesk.isSolid()")
     count, number = here.feed("[feed.scene.robots.length, feed.scene.scene]")
@@ -326,7 +326,7 @@ def test_things_are_dragged_in_three_dimensions_too(visit: Callable[..., Visit])
     assert (moved["x_mm"], moved["y_mm"]) == pytest.approx((x_mm + 50, y_mm + 30), abs=1)
 
 
-def test_without_webgl_the_top_view_goes_on(visit: Callable[..., Visit], browser_without_3d: Browser) -> None:
+def test_without_webgl_the_top_view_works(visit: Callable[..., Visit], browser_without_3d: Browser) -> None:
     here = visit("view=both", by=browser_without_3d)
     here.wait("() => document.querySelector('[data-testid=arena-solid]').textContent.includes('needs WebGL 2')")
     x_mm, y_mm, _ = here.pose(1)

@@ -1,4 +1,4 @@
-"""What comes over the wire to the desk's server: bytes that are no request, too many strangers, sockets misused."""
+"""Abuse of the desk's server: malformed requests, too many connections, misused sockets."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def shown() -> Iterator[Shown]:
 
 @pytest.fixture
 def said(caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]) -> Iterator[list[str]]:
-    """What is told to a person; it must never be a traceback."""
+    """Lines of the log, which must never contain a traceback."""
     lines: list[str] = []
     yield lines
     lines += [record.getMessage() for record in caplog.records if record.levelno >= logging.WARNING]
@@ -43,8 +43,8 @@ def said(caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]) ->
     assert "Traceback" not in capfd.readouterr().err
 
 
-def door_of(shown: Shown) -> tuple[str, int, str]:
-    """Return where the server is, and the header with the token."""
+def address_and_cookie(shown: Shown) -> tuple[str, int, str]:
+    """Return the server's host and port, and the cookie with the token."""
     url = urlsplit(shown.url)
     assert url.hostname is not None
     assert url.port is not None
@@ -52,8 +52,8 @@ def door_of(shown: Shown) -> tuple[str, int, str]:
 
 
 def knock(shown: Shown, data: bytes) -> bytes:
-    """Send bytes and nothing more; return all that is answered."""
-    host, port, _ = door_of(shown)
+    """Send bytes and return the complete answer."""
+    host, port, _ = address_and_cookie(shown)
     with socket.create_connection((host, port), timeout=GUARD_S) as stranger:
         with suppress(OSError):
             stranger.sendall(data)
@@ -66,8 +66,8 @@ def knock(shown: Shown, data: bytes) -> bytes:
 
 
 def ask(shown: Shown, method: str, path: str, body: bytes | None = None, **headers: str) -> tuple[int, bytes]:
-    """Return what a browser with the token is answered: the status and the page."""
-    host, port, cookie = door_of(shown)
+    """Return the answer to a browser with the token: the status and the page."""
+    host, port, cookie = address_and_cookie(shown)
     asking = http.client.HTTPConnection(host, port, timeout=GUARD_S)
     asking.request(method, path, body, {"Cookie": cookie, **headers})
     answer = asking.getresponse()
@@ -77,7 +77,7 @@ def ask(shown: Shown, method: str, path: str, body: bytes | None = None, **heade
 
 
 def is_well(shown: Shown) -> bool:
-    """Say whether a browser with the token gets its page."""
+    """Return whether a browser with the token gets its page."""
     status, page = ask(shown, "GET", urlsplit(shown.url).path)
     return status == 200 and b"KiKS" in page
 
@@ -109,7 +109,7 @@ NO_REQUESTS = [
 ]
 
 
-def test_what_is_no_request_is_refused_and_nothing_else(shown: Shown, said: list[str]) -> None:
+def test_malformed_requests_are_refused(shown: Shown, said: list[str]) -> None:
     chance = random.Random(1)
     whole = b"GET /desk/1?x=1 HTTP/1.1\r\nHost: 127.0.0.1\r\nOrigin: http://127.0.0.1\r\nCookie: a=b\r\n\r\n"
     spoilt = []
@@ -126,15 +126,17 @@ def test_what_is_no_request_is_refused_and_nothing_else(shown: Shown, said: list
     assert not said
 
 
-def test_strangers_who_say_nothing_keep_nobody_out(shown: Shown, said: list[str]) -> None:
-    host, port, _ = door_of(shown)
-    idle = [socket.create_connection((host, port), timeout=GUARD_S) for _ in range(3 * connection_limit.STRANGERS_MAX)]
+def test_silent_connections_do_not_block_others(shown: Shown, said: list[str]) -> None:
+    host, port, _ = address_and_cookie(shown)
+    idle = [
+        socket.create_connection((host, port), timeout=GUARD_S) for _ in range(3 * connection_limit.UNAUTHENTICATED_MAX)
+    ]
     for half in idle[::2]:
         with suppress(OSError):
             half.sendall(b"GET / HTTP/1.1\r\n")
     assert is_well(shown)
-    # The first to come are the first to go.
-    for early in idle[: connection_limit.STRANGERS_MAX]:
+    # The server closes the oldest connections first.
+    for early in idle[: connection_limit.UNAUTHENTICATED_MAX]:
         with suppress(ConnectionError):
             assert early.recv(1) == b""
     for each in idle:
@@ -142,19 +144,20 @@ def test_strangers_who_say_nothing_keep_nobody_out(shown: Shown, said: list[str]
     assert is_well(shown)
 
 
-def test_a_stranger_has_little_time(shown: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(connection_limit, "STRANGER_S", 0.0)
-    host, port, _ = door_of(shown)
+def test_an_unauthenticated_connection_times_out(shown: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connection_limit, "AUTHENTICATION_S", 0.0)
+    host, port, _ = address_and_cookie(shown)
     with socket.create_connection((host, port), timeout=GUARD_S) as stranger, suppress(ConnectionError):
         assert stranger.recv(1) == b""
 
 
-def test_a_browser_that_is_in_may_take_its_time(shown: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
-    host, port, cookie = door_of(shown)
+def test_an_authenticated_connection_does_not_time_out(shown: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
+    host, port, cookie = address_and_cookie(shown)
     path = urlsplit(shown.url).path
     with connect(f"ws://{host}:{port}{path}/feed", additional_headers={"Cookie": cookie}, open_timeout=GUARD_S) as feed:
         idle = [
-            socket.create_connection((host, port), timeout=GUARD_S) for _ in range(2 * connection_limit.STRANGERS_MAX)
+            socket.create_connection((host, port), timeout=GUARD_S)
+            for _ in range(2 * connection_limit.UNAUTHENTICATED_MAX)
         ]
         for _ in range(5):
             while not isinstance(feed.recv(GUARD_S), bytes):
@@ -164,7 +167,7 @@ def test_a_browser_that_is_in_may_take_its_time(shown: Shown, monkeypatch: pytes
             each.close()
 
 
-# ---- a browser that is in, and misbehaves ----
+# ---- an authenticated browser that misbehaves ----
 
 
 @pytest.mark.parametrize(
@@ -185,8 +188,8 @@ def test_a_browser_that_is_in_may_take_its_time(shown: Shown, monkeypatch: pytes
     ],
 )
 @pytest.mark.parametrize("which", ["feed", "socket.io"])
-def test_frames_that_are_none_end_their_socket(shown: Shown, said: list[str], which: str, frames: bytes) -> None:
-    host, port, cookie = door_of(shown)
+def test_malformed_websocket_frames_close_the_socket(shown: Shown, said: list[str], which: str, frames: bytes) -> None:
+    host, port, cookie = address_and_cookie(shown)
     path = f"{urlsplit(shown.url).path}/feed"
     path = path if which == "feed" else "/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
     with connect(f"ws://{host}:{port}{path}", additional_headers={"Cookie": cookie}, open_timeout=GUARD_S) as client:
@@ -232,10 +235,8 @@ def test_frames_that_are_none_end_their_socket(shown: Shown, said: list[str], wh
     ],
     ids=lambda text: text[:40],
 )
-def test_events_that_are_none_hurt_nobody(
-    shown: Shown, caplog: pytest.LogCaptureFixture, message: str, said: Any
-) -> None:
-    host, port, cookie = door_of(shown)
+def test_malformed_events_are_ignored(shown: Shown, caplog: pytest.LogCaptureFixture, message: str, said: Any) -> None:
+    host, port, cookie = address_and_cookie(shown)
     path = "/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
     with connect(f"ws://{host}:{port}{path}", additional_headers={"Cookie": cookie}, open_timeout=GUARD_S) as client:
         client.send("40")
@@ -246,7 +247,7 @@ def test_events_that_are_none_hurt_nobody(
     assert is_well(shown)
 
 
-def test_uploads_that_are_none_are_refused(shown: Shown, said: list[str]) -> None:
+def test_malformed_uploads_are_refused(shown: Shown, said: list[str]) -> None:
     from nicegui import app, ui
 
     @ui.page("/with-an-upload")
@@ -269,8 +270,8 @@ def test_uploads_that_are_none_are_refused(shown: Shown, said: list[str]) -> Non
     assert is_well(shown)
 
 
-def test_a_body_that_is_too_large_is_not_kept(shown: Shown, said: list[str]) -> None:
-    host, port, cookie = door_of(shown)
+def test_a_too_large_body_is_not_stored(shown: Shown, said: list[str]) -> None:
+    host, port, cookie = address_and_cookie(shown)
     for headers, body in (
         ({"Content-Length": str(BODY_LIMIT + 1)}, b""),
         ({"Transfer-Encoding": "chunked"}, b"100000\r\n" + b"x" * 0x100000 + b"\r\n"),
@@ -294,7 +295,7 @@ def test_a_body_that_is_too_large_is_not_kept(shown: Shown, said: list[str]) -> 
 
 
 def test_json_of_the_gateway_never_raises(shown: Shown, said: list[str]) -> None:
-    host, port, cookie = door_of(shown)
+    host, port, cookie = address_and_cookie(shown)
     chance = random.Random(2)
     values: list[Any] = [
         None,

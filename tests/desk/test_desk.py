@@ -1,4 +1,4 @@
-"""The desk in a real browser: time, hands and views. The engine is asked whether what the page shows is so."""
+"""The desk in a real browser: time, drags and views, compared with the state of the engine."""
 
 from __future__ import annotations
 
@@ -61,10 +61,11 @@ def test_run_pause_and_step(visitor: Visitor) -> None:
     visitor.until(lambda: visitor.desk.gate.is_paused)
 
 
-def test_space_on_a_button_presses_that_button_alone(visitor: Visitor) -> None:
+def test_space_on_a_button_presses_only_that_button(visitor: Visitor) -> None:
     visitor.at("step").focus()
     visitor.page.keyboard.press("Space")
-    visitor.until(lambda: visitor.desk.gate.is_paused)
+    gate = visitor.desk.gate
+    visitor.until(lambda: gate.is_paused and visitor.sim.now_ns == gate.pace.now_ns())
     now_ns = visitor.sim.now_ns
     visitor.page.keyboard.press("Space")
     visitor.until(lambda: visitor.sim.now_ns > now_ns)
@@ -75,7 +76,7 @@ def test_space_on_a_button_presses_that_button_alone(visitor: Visitor) -> None:
 def test_speed_changes(visitor: Visitor) -> None:
     visitor.choose("speed", "10 x")
     visitor.until(lambda: visitor.desk.gate.speed == 10)
-    visitor.choose("speed", "as fast as it can")
+    visitor.choose("speed", "full speed")
     visitor.until(lambda: visitor.desk.gate.speed is None)
     visitor.until(lambda: visitor.desk.meter.momentary > 10)
     visitor.picture("as_fast_as_it_can")
@@ -86,7 +87,7 @@ def test_speed_changes(visitor: Visitor) -> None:
 def test_checkpoint_and_reset(visitor: Visitor) -> None:
     visitor.drag((150, 200), (250, 250))
     visitor.at("mark").click()
-    visitor.told("Remembered where everything stands.")
+    visitor.told("Checkpoint taken.")
     there = visitor.sim.pose(1)
     visitor.drag(there[:2], (120, 120))
     assert visitor.sim.pose(1) != there
@@ -206,7 +207,7 @@ def test_robot_is_followed(visitor: Visitor) -> None:
     visitor.sim.place(2, 300, 250, 0)
     visitor.until(is_in_the_middle)
     visitor.picture("followed")
-    visitor.menu("follow", "Nobody")
+    visitor.menu("follow", "No robot")
     visitor.sim.place(2, 450, 300, 0)
     visitor.until(lambda: not is_in_the_middle())
 
@@ -234,7 +235,7 @@ def test_3d_view_shows(visitor: Visitor) -> None:
     visitor.picture("both_views")
 
 
-def test_without_webgl_the_view_from_above_goes_on(
+def test_without_webgl_the_desk_shows_the_top_view(
     new_page: NewPage, shown: Shown, browser_without_3d: Browser
 ) -> None:
     visitor = Visitor(new_page(by=browser_without_3d), shown)
@@ -245,7 +246,7 @@ def test_without_webgl_the_view_from_above_goes_on(
     visitor.picture("without_webgl")
 
 
-def test_page_that_sleeps_comes_back(visitor: Visitor) -> None:
+def test_a_hidden_page_gets_frames_again_when_visible(visitor: Visitor) -> None:
     hide = """(isHidden) => {
         Object.defineProperty(document, 'hidden', { value: isHidden, configurable: true });
         document.dispatchEvent(new Event('visibilitychange'));

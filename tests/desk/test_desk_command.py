@@ -25,7 +25,7 @@ GUARD_S = 60.0
 
 @contextmanager
 def started(*words: str, folder: Path) -> Iterator[tuple[subprocess.Popen[str], IO[str]]]:
-    """Start the command; nothing of it outlives the test."""
+    """Start the command; its processes end with the test."""
     with subprocess.Popen(
         [sys.executable, "-m", "kiks", *words],
         start_new_session=True,
@@ -57,7 +57,7 @@ def url_of(output: IO[str]) -> str:
 
 
 def browser() -> OpenerDirector:
-    """Return what follows addresses and keeps cookies."""
+    """Return an opener that follows redirects and keeps cookies."""
     return build_opener(HTTPCookieProcessor())
 
 
@@ -89,7 +89,7 @@ def test_without_the_token_there_is_no_desk(host: str, tmp_path: Path) -> None:
             assert "token" not in answer.url
 
 
-def test_run_on_a_desk_is_the_run_without(tmp_path: Path) -> None:
+def test_run_with_a_desk_equals_run_without(tmp_path: Path) -> None:
     words = ("--seed", "3", DRIVE, "COM1", "5", "3", "5")
     with started("run", "--desk", "--no-wait", *words, folder=tmp_path) as (_, output):
         url_of(output)
@@ -98,7 +98,7 @@ def test_run_on_a_desk_is_the_run_without(tmp_path: Path) -> None:
 
 
 def show_page(url: str) -> None:
-    """Do what a page does that shows the world: take a frame and say so."""
+    """Receive a frame and acknowledge it, as a page does."""
     from urllib.parse import urlsplit
 
     from websockets.sync.client import connect
@@ -131,7 +131,7 @@ def test_programs_begin_when_a_page_shows_the_world(words: tuple[str, ...], tmp_
         assert process.wait(GUARD_S) == 0
 
 
-def test_mistakes_are_told_before_anybody_waits_for_a_page(tmp_path: Path) -> None:
+def test_errors_are_reported_before_waiting_for_a_page(tmp_path: Path) -> None:
     result = kiks("run", "--desk", "--thinking", "replay:nowhere", DRIVE, DRIVE, cwd=tmp_path)
     assert result.returncode == 2
     assert "replay file 'nowhere.1' must exist" in result.stderr
@@ -139,7 +139,7 @@ def test_mistakes_are_told_before_anybody_waits_for_a_page(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("words", [("run", "--desk"), ("demo", "avoid", "--desk")])
-def test_who_waits_for_a_page_ends_with_ctrl_c(words: tuple[str, ...], tmp_path: Path) -> None:
+def test_ctrl_c_ends_waiting_for_a_page(words: tuple[str, ...], tmp_path: Path) -> None:
     words = (*words, DRIVE, "COM1", "5", "3", "5") if words[0] == "run" else words
     with started(*words, folder=tmp_path) as (process, output):
         assert line_with(output, "It begins when a page shows it")
@@ -194,7 +194,7 @@ def test_served_robots_on_a_desk(thinking: str, tmp_path: Path) -> None:
         (("--host", "no such host"), "the desk must be able to listen"),
     ],
 )
-def test_mistakes_end_in_one_clear_line(words: tuple[str, ...], message: str, tmp_path: Path) -> None:
+def test_errors_are_one_clear_line(words: tuple[str, ...], message: str, tmp_path: Path) -> None:
     result = kiks("desk", "--no-browser", "--port", "0", *words, cwd=tmp_path)
     assert result.returncode == 2
     assert message in result.stderr

@@ -1,4 +1,4 @@
-"""The desk for everybody: by keyboard, by ear, in the dark, on small screens, and for many who come and go."""
+"""Accessibility of the desk: keyboard, screen readers, contrast, small screens, and many pages."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ FOCUS = """() => {
 
 
 def walk(visitor: Visitor) -> Iterator[str]:
-    """Press Tab until the focus has gone round; return where it was."""
+    """Press Tab until the focus returns to the start; return all elements that had it."""
     seen: list[int] = []
     for _ in range(120):
         if seen and visitor.answer("document.activeElement.matches('.cm-content')"):
@@ -113,7 +113,7 @@ def test_tab_reaches_everything(visitor: Visitor, tab: str, inside: tuple[str, .
 
 
 @pytest.mark.parametrize("theme", ["Light", "Dark"])
-def test_all_is_named_and_can_be_read(visitor: Visitor, theme: str) -> None:
+def test_everything_has_a_name_and_enough_contrast(visitor: Visitor, theme: str) -> None:
     visitor.menu("dark", theme)
     expect(visitor.page.locator("body.body--dark")).to_have_count(int(theme == "Dark"))
     for tab in TABS:
@@ -159,7 +159,7 @@ def test_small_windows_stay_usable(new_page: NewPage, shown: Shown, width: int, 
     visitor.pause()
 
 
-def test_visitors_who_leave_are_forgotten(new_page: NewPage, shown: Shown) -> None:
+def test_closed_pages_leave_nothing_behind(new_page: NewPage, shown: Shown) -> None:
     page = new_page()
     for _ in range(4):
         visitor = Visitor(page, shown)
@@ -170,7 +170,7 @@ def test_visitors_who_leave_are_forgotten(new_page: NewPage, shown: Shown) -> No
     visitor.until(lambda: not viewers(shown.desk))
     forget_all()
     visitor.until(lambda: gc.collect() >= 0 and not any(type(each) is Page for each in gc.get_objects()))
-    assert all(wire.log is None for wire in shown.desk.sim.wires), "nobody watches a line"
+    assert all(wire.log is None for wire in shown.desk.sim.wires), "no line is watched"
 
 
 def viewers(desk: Desk) -> list[Viewer]:

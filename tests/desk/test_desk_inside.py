@@ -1,4 +1,4 @@
-"""The desk in a real browser: the tabs beside the arena. The engine is asked whether what the page shows is so."""
+"""The desk in a real browser: the tabs beside the arena, compared with the state of the engine."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def setpoints(visitor: Visitor, robot: int = 1) -> list[int]:
 # ---- Robot ----
 
 
-def test_click_at_a_robot_opens_its_monitor(visitor: Visitor) -> None:
+def test_click_on_a_robot_opens_its_monitor(visitor: Visitor) -> None:
     visitor.tab("wire")
     visitor.page.mouse.click(*visitor.on_page(450, 300))
     expect(visitor.at("monitor-robot")).to_have_value("Robot 2")
@@ -34,7 +34,7 @@ def test_click_at_a_robot_opens_its_monitor(visitor: Visitor) -> None:
     visitor.picture("monitor_by_click")
 
 
-def test_why_a_sensor_reads_what_it_reads(visitor: Visitor) -> None:
+def test_reading_of_a_sensor_is_explained(visitor: Visitor) -> None:
     visitor.drag((150, 200), (45, 200))
     visitor.drag((45 + 25.5, 200), (45, 260))
     visitor.pause()
@@ -48,7 +48,7 @@ def test_why_a_sensor_reads_what_it_reads(visitor: Visitor) -> None:
     visitor.picture("why")
 
 
-def test_click_at_a_sensor_in_the_arena_asks_why(visitor: Visitor) -> None:
+def test_click_on_a_sensor_in_the_arena_explains_its_reading(visitor: Visitor) -> None:
     x_mm, y_mm, heading_rad = visitor.sim.pose(1)
     visitor.page.mouse.click(*visitor.on_page(x_mm, y_mm))
     angle = heading_rad + math.radians(66.4)
@@ -59,7 +59,7 @@ def test_click_at_a_sensor_in_the_arena_asks_why(visitor: Visitor) -> None:
 # ---- Wire ----
 
 
-def test_typed_command_drives_and_its_bytes_are_seen(visitor: Visitor) -> None:
+def test_typed_command_drives_the_robot_and_appears_on_the_wire(visitor: Visitor) -> None:
     visitor.tab("wire")
     visitor.at("console").fill("D,10,15")
     visitor.at("console").press("Enter")
@@ -129,7 +129,7 @@ def test_wall_is_drawn_saved_and_opened_again(visitor: Visitor) -> None:
     visitor.told("Saved as mine.kiks.")
     visitor.at("example-name").scroll_into_view_if_needed()
     visitor.at("open-example").click()
-    visitor.told("This is ")
+    visitor.told("Opened ")
     visitor.until(lambda: visitor.sim.arena.brightness.shape != saved.shape)
     visitor.choose("open-name", "mine.kiks")
     visitor.at("open").click()
@@ -141,7 +141,7 @@ def test_wall_is_drawn_saved_and_opened_again(visitor: Visitor) -> None:
     visitor.picture("opened_again")
 
 
-def test_bad_file_gets_a_clear_word(visitor: Visitor) -> None:
+def test_bad_file_gets_a_clear_message(visitor: Visitor) -> None:
     old = visitor.sim
     visitor.tab("arena")
     visitor.at("upload").locator("input[type=file]").set_input_files(
@@ -155,7 +155,7 @@ def test_bad_file_gets_a_clear_word(visitor: Visitor) -> None:
 # ---- Settings ----
 
 
-def test_settings_make_a_new_world(visitor: Visitor) -> None:
+def test_applying_settings_restarts_the_world(visitor: Visitor) -> None:
     visitor.drag((150, 200), (250, 250))
     old = visitor.sim
     visitor.tab("settings")
@@ -166,7 +166,7 @@ def test_settings_make_a_new_world(visitor: Visitor) -> None:
     visitor.at("add-robot").click()
     visitor.picture("settings")
     visitor.at("apply").click()
-    visitor.told("A new world, with these settings.")
+    visitor.told("Restarted with these settings.")
     assert visitor.sim is not old
     project = visitor.desk.project
     assert (project.seed, project.response, project.baud, project.noise) == (42, "fast", 38400, False)
@@ -175,13 +175,13 @@ def test_settings_make_a_new_world(visitor: Visitor) -> None:
     assert visitor.sim.pose(1)[:2] == pytest.approx((250, 250), abs=1)
     visitor.page.wait_for_function("() => kiksDesk.scene().robots.length === 3 && kiksDesk.pose(2)")
     visitor.at("start-over").click()
-    visitor.told("From the start again.")
+    visitor.told("Started over.")
     assert visitor.sim.robot_count == 3
     expect(visitor.at("seed")).to_have_value("42")
     visitor.picture("another_world")
 
 
-def test_wrong_setting_gets_a_clear_word(visitor: Visitor) -> None:
+def test_wrong_setting_gets_a_clear_message(visitor: Visitor) -> None:
     old = visitor.sim
     visitor.tab("settings")
     visitor.at("seed").fill("1.5")
@@ -191,12 +191,12 @@ def test_wrong_setting_gets_a_clear_word(visitor: Visitor) -> None:
     assert visitor.sim is old
 
 
-def test_start_over_begins_at_the_very_start(visitor: Visitor) -> None:
+def test_start_over_restores_the_initial_state(visitor: Visitor) -> None:
     visitor.drag((150, 200), (250, 250))
     visitor.until(lambda: visitor.sim.now_ns > 500_000_000)
     old = visitor.sim
     visitor.tab("settings")
     visitor.at("start-over").click()
-    visitor.told("From the start again.")
+    visitor.told("Started over.")
     assert visitor.sim is not old
     assert visitor.sim.pose(1) == (150, 200, 0)

@@ -1,4 +1,4 @@
-"""The panel for drawing in a real browser: what is drawn, opened and saved there is so in engine and folder."""
+"""The arena panel in a real browser: edits and files, compared with the engine and the folder."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def tell(page: Page, words: str) -> None:
 
 
 def wait_until(page: Page, fact: Callable[[], object]) -> None:
-    """Wait for a fact of the engine, a picture of the screen at a time."""
+    """Wait for a condition of the engine, one picture of the screen at a time."""
     for _ in range(1200):
         if fact():
             return
@@ -89,7 +89,7 @@ def look(page: Page, name: str) -> None:
     page.screenshot(path=SCREENSHOTS / f"arena_{name}.png")
 
 
-def test_walls_are_drawn_and_taken_back(desk: Desk, page: Page) -> None:
+def test_walls_are_drawn_and_undone(desk: Desk, page: Page) -> None:
     def brightness(x_mm: int, y_mm: int) -> int:
         return int(desk.sim.arena.brightness[y_mm, x_mm])
 
@@ -136,7 +136,7 @@ def test_walls_are_drawn_and_taken_back(desk: Desk, page: Page) -> None:
     wait_until(page, lambda: desk.sim.pose(1)[1] > 170)
 
 
-def test_worlds_are_made_saved_and_opened(desk: Desk, page: Page) -> None:
+def test_worlds_are_created_saved_and_opened(desk: Desk, page: Page) -> None:
     page.get_by_test_id("new-arena").click()
     page.get_by_test_id("box-width").fill("700")
     page.get_by_test_id("box-rounded").fill("80")
@@ -174,7 +174,7 @@ def test_worlds_are_made_saved_and_opened(desk: Desk, page: Page) -> None:
     tell(page, "Saved as mine.kiks")
 
 
-def test_files_come_from_the_browser(desk: Desk, page: Page) -> None:
+def test_files_are_uploaded(desk: Desk, page: Page) -> None:
     picture = io.BytesIO()
     Image.fromarray(np.zeros((300, 400), np.uint8)).save(picture, "PNG")
     chooser = page.locator("[data-testid=upload] input[type=file]")

@@ -1,4 +1,4 @@
-"""The programs that the desk offers do what they say."""
+"""The example programs do what they say."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_avoid_touches_nothing() -> None:
     assert speeds(sim) == [0, 0]
 
 
-def test_follow_wall_goes_round_at_one_distance() -> None:
+def test_follow_wall_keeps_its_distance() -> None:
     sim = Simulation(Arena.box(500, 500), seed=1)
     sim.record_paths(0.5)
     assert run(sim, "follow_wall", 120) is None

@@ -1,4 +1,4 @@
-"""Files of a desk: no name leads out of its folder, and what is no project is refused."""
+"""Files of a desk: no name leads out of its folder, and invalid files are refused."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def home(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("name", BAD_NAMES)
-def test_names_that_lead_elsewhere_are_refused(home, name):
+def test_names_outside_the_folder_are_refused(home, name):
     folder, before = Folder(home), snapshot(home.parent)
     for each in (name, f"{name}/x.kiks"):
         with pytest.raises(KiksError):
@@ -52,7 +52,7 @@ def test_names_that_lead_elsewhere_are_refused(home, name):
 
 @settings(max_examples=200, deadline=None)
 @given(st.text(st.sampled_from("./\\ab~:\0 -"), max_size=12))
-def test_whatever_is_typed_stays_in_the_folder(tmp_path_factory, name):
+def test_random_names_stay_in_the_folder(tmp_path_factory, name):
     base = tmp_path_factory.mktemp("base")
     home = base / "home"
     home.mkdir()
@@ -93,7 +93,7 @@ def test_files_are_kept_and_listed(home):
     assert folder.open("old.KAD").arena.width_mm == 300
     assert folder.has("room")
     assert not folder.has("rooms")
-    with pytest.raises(ParameterError, match="is there"):
+    with pytest.raises(ParameterError, match="exists"):
         folder.save(project, "room")
     folder.save(replace(project, seed=6), "room", may_replace=True)
     assert folder.open("room.kiks").seed == 6
@@ -105,14 +105,14 @@ def test_files_are_kept_and_listed(home):
         folder.save(project, "dir", may_replace=True)
 
 
-def test_many_files_are_cut_short(home):
+def test_long_lists_are_cut(home):
     for number in range(LISTED_MAX + 20):
         (home / f"{number}.kiks").touch()
     assert len(Folder(home).names()) == LISTED_MAX
     assert Folder(home / "none").names() == []
 
 
-def test_files_from_a_browser_become_projects():
+def test_uploads_become_projects():
     picture = io.BytesIO()
     Image.fromarray(np.zeros((120, 150), np.uint8)).save(picture, "PNG")
     arena = replace(Arena.box(300, 200), lamps=(Lamp(50, 50),))
@@ -139,13 +139,13 @@ def test_files_from_a_browser_become_projects():
         *((f"a{ending}", bytes(UPLOAD_BYTES_MAX + 1), "at most") for ending in OPENED),
     ],
 )
-def test_other_files_from_a_browser_are_refused(name, data, words):
+def test_invalid_uploads_are_refused(name, data, words):
     with pytest.raises((ArenaError, ParameterError), match=words):
         decode(name, data)
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_examples_are_worlds(name):
+def test_examples_are_valid_worlds(name):
     project = EXAMPLES[name]()
     sim = simulation_of(Project.from_bytes(project.to_bytes()))
     assert sim.robot_count == len(project.robots)

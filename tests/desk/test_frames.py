@@ -1,4 +1,4 @@
-"""Frames say what the simulation says: read by a slow, obvious reader, number by number."""
+"""Frames contain the state of the simulation, as a slow and obvious parser reads it."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def busy_world(**changes) -> Simulation:
     return sim
 
 
-def test_a_frame_says_what_the_simulation_says():
+def test_a_frame_contains_the_state_of_the_simulation():
     sim = busy_world()
     sim.wires[1].holder = "somebody"
     held = {("robot", 2)}
@@ -141,7 +141,7 @@ def test_bodies_lamps_and_cameras():
     assert [body[2] for body in read_frame(pack_frame(sim, scene=1)).bodies] == [0, 1, 2]
 
 
-def test_a_motor_on_a_voltage_has_no_commanded_speed():
+def test_a_motor_on_pwm_has_no_commanded_speed():
     sim = Simulation(Arena.box(400, 400))
     sim.port(1).write(b"P,30,40\n")
     sim.run(0.2)
@@ -150,7 +150,7 @@ def test_a_motor_on_a_voltage_has_no_commanded_speed():
     assert all(speed > 0 for speed in frame.robots[0].measured)
 
 
-def test_encoders_are_what_the_robot_answers():
+def test_encoders_equal_the_robots_reply():
     sim = busy_world()
     port = sim.port(2)
     port.write(b"D,0,0\n")
@@ -162,20 +162,20 @@ def test_encoders_are_what_the_robot_answers():
     assert heard[0] < -60000
 
 
-def test_counters_wrap_as_the_robots_do():
+def test_counters_wrap_like_the_robots():
     sim = Simulation(Arena.box(400, 400))
     sim.world.state.robots["pulse_count"][0, 0] = (2**31 + 5, -(2**31) - 1)
     assert read_frame(pack_frame(sim, scene=1)).robots[0].encoders == [-(2**31) + 5, 2**31 - 1]
 
 
-def test_speeds_that_are_no_numbers_are_not_shown():
+def test_speeds_that_are_not_finite_are_shown_as_0():
     frame = read_frame(pack_frame(Simulation(Arena.box(200, 200)), scene=1, speed_now=math.inf, is_driven=True))
     assert (frame.speed_now, frame.flags) == (0.0, 2)
 
 
 @pytest.mark.parametrize("response", [None, "fast"])
-def test_looking_changes_nothing(response):
-    """A run that is looked at every 40 ms ends as one that nobody looks at."""
+def test_frames_do_not_change_the_run(response):
+    """A run with a frame every 40 ms ends like a run without frames."""
     hashes = []
     for is_seen in (False, True):
         sim = busy_world(response=response)
@@ -188,7 +188,7 @@ def test_looking_changes_nothing(response):
     assert hashes[0] == hashes[1]
 
 
-def test_the_scene_says_where_sensors_are_and_what_sits_on_robots():
+def test_the_scene_contains_sensors_and_turrets():
     sim = busy_world()
     scene = describe_scene(sim, 3, names=["a", "b", "c", "d"])
     assert (scene["kind"], scene["scene"], scene["arena"]["name"]) == ("scene", 3, "busy")
@@ -203,7 +203,7 @@ def test_the_scene_says_where_sensors_are_and_what_sits_on_robots():
     assert describe_scene(sim, 4)["robots"][2]["name"] == "3"
 
 
-def test_rays_end_where_the_scene_and_a_frame_say():
+def test_rays_from_scene_and_frame_end_on_walls():
     """In a box, a ray from the place and in the direction of the scene ends on a wall."""
     sim = Simulation(Arena.box(300, 300))
     sensors = describe_scene(sim, 1)["robots"][0]["sensors"]

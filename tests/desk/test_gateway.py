@@ -1,4 +1,4 @@
-"""Frames to browsers and hands back, over a real socket."""
+"""Frames to browsers and drags from them, over a real socket."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Browser:
         return heard
 
     def wait_for(self, fact: Any) -> bytes:
-        """Return the first frame of which something is so."""
+        """Return the first frame that satisfies a condition."""
         while not fact(frame := self.frame()):
             pass
         return frame
@@ -95,7 +95,7 @@ def test_scene_comes_before_its_frames(shown: Shown) -> None:
         assert [body["what"] for body in browser.scene["bodies"]] == ["ball"]
 
 
-def test_who_does_not_acknowledge_gets_three_frames_and_hinders_nobody(shown: Shown) -> None:
+def test_a_browser_without_acknowledgements_gets_three_frames(shown: Shown) -> None:
     with browsing(shown) as sleeper, browsing(shown) as other:
         got = []
         while len(got) < IN_FLIGHT:
@@ -109,7 +109,7 @@ def test_who_does_not_acknowledge_gets_three_frames_and_hinders_nobody(shown: Sh
         assert isinstance(sleeper.hear(), bytes)
 
 
-def test_who_does_not_read_is_parted_from() -> None:
+def test_a_browser_that_does_not_read_is_disconnected() -> None:
     async def far_behind() -> Viewer:
         viewer = Viewer("somebody")
         for _ in range(100):
@@ -122,7 +122,7 @@ def test_who_does_not_read_is_parted_from() -> None:
     asyncio.run(far_behind())
 
 
-def test_hands_move_things_in_the_engine(shown: Shown) -> None:
+def test_drags_move_things_in_the_engine(shown: Shown) -> None:
     with browsing(shown) as browser:
         browser.say("grab", what="robot", index=0)
         browser.say("move", x_mm=900, y_mm=200)
@@ -170,7 +170,7 @@ def test_two_browsers_may_drag_at_once(shown: Shown) -> None:
     ],
     ids=lambda text: text[:40],
 )
-def test_nonsense_gets_an_answer(shown: Shown, text: str) -> None:
+def test_malformed_messages_get_an_error(shown: Shown, text: str) -> None:
     with browsing(shown) as browser:
         browser.say("grab", what="robot", index=0)
         browser.socket.send(text)
@@ -186,7 +186,7 @@ def test_nonsense_gets_an_answer(shown: Shown, text: str) -> None:
 @pytest.mark.parametrize(
     "options", [{"origin": "http://evil.example"}, {"additional_headers": {}}, {"additional_headers": {"Cookie": "="}}]
 )
-def test_other_pages_and_strangers_are_refused(shown: Shown, options: dict[str, Any]) -> None:
+def test_requests_of_other_pages_or_without_the_token_are_refused(shown: Shown, options: dict[str, Any]) -> None:
     with pytest.raises(InvalidStatus, match="403"), browsing(shown, **options):
         pass
 
@@ -200,7 +200,7 @@ def course(sim: kiks.Simulation) -> str:
     return sim.state_hash()
 
 
-def test_run_is_the_same_with_a_desk_and_fifty_visitors() -> None:
+def test_fifty_browsers_do_not_change_a_run() -> None:
     alone = course(kiks.Simulation(robots=3, seed=4))
     sim = kiks.Simulation(robots=3, seed=4)
     shown = show(sim, speed=50.0, port=0, browser=False)
@@ -217,14 +217,14 @@ def test_run_is_the_same_with_a_desk_and_fifty_visitors() -> None:
         with browsing(shown) as browser:
             browser.frame()
             gc.collect()
-            # Those who have gone are forgotten; the last one may just be going.
+            # Closed connections are removed; the last one may just be closing.
             assert sum(type(each) is Viewer for each in gc.get_objects()) <= 2
     finally:
         shown.close()
         running.join(GUARD_S)
 
 
-def test_closed_desk_says_so_and_lets_its_world_go() -> None:
+def test_a_closed_desk_tells_its_browsers_and_releases_its_world() -> None:
     sim = kiks.Simulation()
     shown = show(sim, port=0, browser=False, is_alive=True)
     with browsing(shown) as browser:
@@ -238,6 +238,6 @@ def test_closed_desk_says_so_and_lets_its_world_go() -> None:
     assert sim.now_ns == now_ns + 100_000_000_000
 
 
-def test_speed_must_make_sense() -> None:
+def test_an_invalid_speed_is_refused() -> None:
     with pytest.raises(ParameterError, match="speed must be a number from"):
         kiks.Simulation().show(speed=-1, browser=False)

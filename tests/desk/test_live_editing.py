@@ -1,4 +1,4 @@
-"""Drawing in a living world: what is drawn is there at once, what cannot be changes nothing, and all goes back."""
+"""Drawing in a running world: edits act at once, refused edits change nothing, and all edits can be undone."""
 
 from __future__ import annotations
 
@@ -42,14 +42,14 @@ def desk(tmp_path: Path) -> Iterator[Desk]:
     desk = Desk(sim, project=project, folder=tmp_path, owns_world=True, speed=None, new_programs=new_programs)
     yield desk
     desk.close()
-    # Whoever drives a desk closes the hosts of the worlds before; nobody drives this one.
+    # The driver of a desk closes the programs of replaced worlds; this desk has no driver.
     for host in hosts[:-1]:
         host.close()
 
 
 def in_order(desk: Desk, *acts: Callable[[Editing], Awaitable[None]]) -> Editing:
     async def do() -> Editing:
-        editing = desk.editing
+        editing = Editing(desk)
         for act in acts:
             await act(editing)
         return editing
@@ -65,7 +65,7 @@ def counts(desk: Desk) -> tuple[int, int, int]:
     return desk.sim.robot_count, len(desk.sim.bodies()), len(desk.sim.lamps)
 
 
-def test_walls_come_into_the_living_world(desk):
+def test_walls_appear_in_the_running_world(desk):
     sim, scene = desk.sim, desk.scene
     sim.port(1).write(b"D,5,5\n")
     sim.run(1.0)
@@ -79,7 +79,7 @@ def test_walls_come_into_the_living_world(desk):
     assert sim.pose(1)[0] == pytest.approx(197 - 27.5, abs=0.2)
 
 
-def test_steps_go_back_and_forth_in_the_world(desk):
+def test_undo_and_redo_change_the_world(desk):
     sim = desk.sim
     before = sim.arena.brightness.copy()
     editing = in_order(desk, line)
@@ -111,9 +111,9 @@ def test_steps_go_back_and_forth_in_the_world(desk):
     asyncio.run(do())
 
 
-def test_what_cannot_be_changes_nothing(desk):
+def test_refused_edits_change_nothing(desk):
     sim = desk.sim
-    editing = desk.editing
+    editing = Editing(desk)
     before, hash_before = sim.arena, sim.state_hash()
 
     async def refused(act: Awaitable[None], words: str) -> None:
@@ -134,8 +134,8 @@ def test_what_cannot_be_changes_nothing(desk):
     asyncio.run(do())
 
 
-def test_the_world_has_the_last_word(desk, monkeypatch):
-    editing = desk.editing
+def test_an_edit_that_the_world_refuses_is_undone(desk, monkeypatch):
+    editing = Editing(desk)
 
     def refuse(_arena: Arena) -> None:
         raise ParameterError("no room")
@@ -161,7 +161,7 @@ def test_the_world_has_the_last_word(desk, monkeypatch):
 def test_the_sketch_follows_what_moves(desk):
 
     async def do() -> None:
-        editing = desk.editing
+        editing = Editing(desk)
         await line(editing)
         desk.sim.place(1, 400, 300, 0.0)
         desk.sim.move_body(1, 50, 50)
@@ -176,10 +176,10 @@ def test_the_sketch_follows_what_moves(desk):
     asyncio.run(do())
 
 
-def test_somebody_else_may_change_the_world(desk):
+def test_changes_from_outside_are_noticed(desk):
 
     async def do() -> None:
-        editing = desk.editing
+        editing = Editing(desk)
         await line(editing)
         desk.sim.remove_body(1)
         desk.sim.add_lamp(300, 50)
@@ -192,10 +192,10 @@ def test_somebody_else_may_change_the_world(desk):
     asyncio.run(do())
 
 
-def test_resets_go_back_to_what_was_drawn(desk):
+def test_resets_keep_the_drawing(desk):
 
     async def do() -> None:
-        editing = desk.editing
+        editing = Editing(desk)
         desk.sim.place(1, 400, 300, 0.0)
         await editing.draw(lambda sketch: sketch.rectangle(50, 50, 150, 150))
         desk.sim.place(1, 250, 200, 0.0)
@@ -208,11 +208,11 @@ def test_resets_go_back_to_what_was_drawn(desk):
     asyncio.run(do())
 
 
-def test_another_robot_is_another_world(desk):
+def test_adding_a_robot_restarts_the_world(desk):
     first = desk.sim
 
     async def do() -> None:
-        editing = desk.editing
+        editing = Editing(desk)
         await line(editing)
         await editing.place(SketchRobot(400, 300, 1.0, "khepera_ii"))
         assert desk.sim is not first
@@ -236,7 +236,7 @@ def test_another_robot_is_another_world(desk):
 def test_another_arena_keeps_the_robots(desk):
 
     async def do() -> None:
-        editing = desk.editing
+        editing = Editing(desk)
         await editing.begin(Arena.maze(columns=3, rows=3))
         assert desk.sim.arena.name == "maze"
         assert counts(desk) == (1, 0, 1)
@@ -255,7 +255,7 @@ def test_a_world_of_another_program_keeps_its_robots():
     desk = Desk(sim)
 
     async def do() -> None:
-        editing = desk.editing
+        editing = Editing(desk)
         await line(editing)
         assert sim.arena.brightness[100, 200] == 255
         for act in (editing.place(SketchRobot(400, 300)), editing.begin(Arena.box(300, 300))):
@@ -276,7 +276,7 @@ def test_a_world_of_another_program_keeps_its_robots():
 def test_two_people_may_draw_at_once(desk):
 
     async def do() -> None:
-        editing = desk.editing
+        editing = Editing(desk)
         strokes = [
             editing.draw(lambda sketch, y=y: sketch.line([(240, y), (260, y)], width_mm=4, brightness=y))
             for y in range(20, 240, 20)

@@ -77,7 +77,7 @@ def visit(new_page: NewPage, address: str) -> Visit:
     return Visit(new_page(520, 1100), address, "")
 
 
-def test_numbers_at_the_sensors_are_those_of_the_simulation(visit: Visit) -> None:
+def test_readings_on_the_page_equal_the_simulations(visit: Visit) -> None:
     visit.get("/ask/drive")
     visit.page.wait_for_function("() => kiksMonitor.drawn() > 30")
     visit.get("/ask/pause")
@@ -91,7 +91,7 @@ def test_numbers_at_the_sensors_are_those_of_the_simulation(visit: Visit) -> Non
     assert visit.painted(".kiks-monitor-robot canvas") > 20
 
 
-def test_a_click_takes_a_reading_apart(visit: Visit) -> None:
+def test_a_click_explains_a_reading(visit: Visit) -> None:
     visit.get("/ask/pause")
     world = visit.get("/world")
     visit.find("proximity-2").click()
@@ -113,7 +113,7 @@ def test_a_click_takes_a_reading_apart(visit: Visit) -> None:
     expect(answer).to_be_hidden()
 
 
-def test_it_keeps_looking_when_asked_to(visit: Visit) -> None:
+def test_keep_looking_updates_the_explanation(visit: Visit) -> None:
     visit.find("proximity-1").click()
     visit.find("keep-looking").click()
     text = visit.find("explanation-text")
@@ -122,7 +122,7 @@ def test_it_keeps_looking_when_asked_to(visit: Visit) -> None:
     expect(text).not_to_have_text(before)
 
 
-def test_keys_suffice(visit: Visit) -> None:
+def test_the_monitor_works_with_keys_alone(visit: Visit) -> None:
     visit.page.get_by_label("Robot").first.focus()
     for _ in range(6):
         visit.page.keyboard.press("Tab")
@@ -149,7 +149,7 @@ def test_curves_can_be_chosen_and_lines_left_out(visit: Visit) -> None:
     expect(first).to_have_attribute("aria-pressed", "false")
 
 
-def test_another_robot_brings_its_own_turrets(visit: Visit) -> None:
+def test_another_robot_shows_its_own_turrets(visit: Visit) -> None:
     expect(visit.find("camera-strip")).to_be_visible()
     expect(visit.find("turret-words")).to_contain_text("K213 linear vision (turret 2): a picture every 200 ms")
     expect(visit.find("turret-words")).to_contain_text("Radio (turret 4): silent")
@@ -160,7 +160,7 @@ def test_another_robot_brings_its_own_turrets(visit: Visit) -> None:
     assert visit.fact("Turrets") == "Gripper"
 
 
-def test_dark_pages_are_drawn_for_the_dark(new_page: NewPage, address: str) -> None:
+def test_dark_pages_have_dark_colours(new_page: NewPage, address: str) -> None:
     """The same page by day and by night, with pictures for a person to look at."""
     SCREENSHOTS.mkdir(exist_ok=True)
     for name in ("light", "dark"):

@@ -134,7 +134,7 @@ def test_console_has_history_suggestions_and_replies(page: Page, address: str) -
     console.fill("D,3,4")
     console.press("Enter")
     expect(at(page, "console-log")).to_contain_text("→ D,3,4")
-    expect(page.locator(".q-notification")).to_contain_text("Time stands still")
+    expect(page.locator(".q-notification")).to_contain_text("Time is paused")
     expect(at(page, "console-log")).not_to_contain_text("←")
     page.request.get(f"{address}/go-on")
     expect(at(page, "console-log")).to_contain_text("← d")
@@ -176,7 +176,7 @@ def test_wire_is_filtered_held_and_cleared(page: Page) -> None:
     expect(wire).to_have_text("")
 
 
-def test_line_is_watched_only_while_somebody_looks(new_page: NewPage, tmp_path: Path) -> None:
+def test_line_is_watched_only_while_the_panel_is_visible(new_page: NewPage, tmp_path: Path) -> None:
     with served(tmp_path) as address:
         page = new_page()
         page.goto(address)
@@ -188,7 +188,7 @@ def test_line_is_watched_only_while_somebody_looks(new_page: NewPage, tmp_path: 
         page.close()
 
 
-def test_page_of_an_open_desk_starts_nothing(new_page: NewPage, tmp_path: Path) -> None:
+def test_page_of_a_public_desk_starts_no_programs(new_page: NewPage, tmp_path: Path) -> None:
     with served(tmp_path, may="may-not") as address:
         page = new_page()
         page.goto(address)

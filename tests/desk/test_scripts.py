@@ -33,7 +33,7 @@ def test_own_programs_and_examples_are_offered(tmp_path: Path) -> None:
     assert len(offered(tmp_path / "nowhere")) == 6
 
 
-def test_what_is_saved_is_read_again(tmp_path: Path) -> None:
+def test_saved_programs_are_read_again(tmp_path: Path) -> None:
     saved = save_script(tmp_path, " mine ", "print('grün')\n")
     assert saved == Script("mine.py", is_example=False)
     assert read_script(tmp_path, saved) == "print('grün')\n"
@@ -68,7 +68,7 @@ def test_links_do_not_leave_the_folder(tmp_path: Path) -> None:
     assert (tmp_path / "secret.py").read_text() == "secret"
 
 
-def test_what_is_no_program_text_is_told(tmp_path: Path) -> None:
+def test_unreadable_programs_are_refused(tmp_path: Path) -> None:
     (tmp_path / "long.py").write_bytes(b"#" * (SIZE_LIMIT + 1))
     (tmp_path / "odd.py").write_bytes(b"\xff\xfe")
     for name, message in (("long.py", "at most 200000 bytes"), ("odd.py", "readable"), ("none.py", "readable")):
@@ -91,7 +91,7 @@ def test_what_is_no_program_text_is_told(tmp_path: Path) -> None:
         ("(" * 10000, 1),
     ],
 )
-def test_mistakes_are_told_by_their_line(text: str, line: int) -> None:
+def test_syntax_errors_have_their_line(text: str, line: int) -> None:
     mistake = find_mistake(text)
     assert mistake is not None
     assert mistake.line == line

@@ -22,7 +22,7 @@ from kiks.desk.server.show import Shown
 pytestmark = pytest.mark.slow
 
 
-def test_the_token_leaves_the_address_and_stays_with_the_browser(visitor: Visitor) -> None:
+def test_the_token_moves_from_the_address_to_a_cookie(visitor: Visitor) -> None:
     assert "token" not in visitor.page.url
     assert SERVER.key.token not in visitor.page.content()
     assert visitor.answer("document.cookie") == ""
@@ -44,13 +44,13 @@ def test_a_ticket_opens_the_desk_once(new_page: NewPage, browser: Browser, shown
     other.close()
 
 
-def test_without_the_token_a_page_says_what_to_do(browser: Browser, shown: Shown) -> None:
+def test_without_the_token_a_page_tells_how_to_open_the_desk(browser: Browser, shown: Shown) -> None:
     for scheme in ("light", "dark"):
         page = browser.new_page(viewport={"width": 1000, "height": 600}, color_scheme=scheme)
         answer = page.goto(shown.url.split("?")[0])
         assert answer is not None
         assert answer.status == 403
-        assert "Open the whole address that KiKS printed" in page.inner_text("body")
+        assert "Open the complete address that KiKS printed" in page.inner_text("body")
         SCREENSHOTS.mkdir(exist_ok=True)
         page.screenshot(path=SCREENSHOTS / f"refused_{scheme}.png")
         page.close()

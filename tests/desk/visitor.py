@@ -1,4 +1,4 @@
-"""Somebody at the desk: a page of a real desk in the test's own process, so that the engine can be looked at, too.
+"""A page of a real desk in the test's own process, so that tests can read the state of the engine, too.
 
 Nothing sleeps: `until` lets the page draw its next picture, again and again, until a fact is so.
 """
@@ -80,7 +80,7 @@ class Visitor:
         return self.page.get_by_test_id(name)
 
     def until(self, fact: Callable[[], Fact]) -> Fact:
-        """Wait until something is so."""
+        """Wait for a condition."""
         for _ in range(PICTURES_MAX):
             if found := fact():
                 return found
@@ -92,19 +92,19 @@ class Visitor:
         expect(self.at(INSIDE[name])).to_be_visible()
 
     def choose(self, name: str, text: str) -> None:
-        """Choose in a list by its words."""
+        """Choose an entry of a list by its text."""
         self.at(name).click()
         self.page.locator(".q-menu .q-item").get_by_text(text, exact=True).click()
         expect(self.page.locator(".q-menu")).to_have_count(0)
 
     def menu(self, button: str, text: str) -> None:
-        """Choose in a button's menu."""
+        """Choose an entry of a button's menu."""
         self.at(button).click()
         self.page.locator(".q-menu .q-item").get_by_text(text, exact=True).click()
         expect(self.page.locator(".q-menu")).to_have_count(0)
 
     def told(self, text: str) -> None:
-        """Wait until the page tells something."""
+        """Wait for a message of the page."""
         expect(self.page.locator(".q-notification").filter(has_text=text).first).to_be_visible()
 
     def pause(self) -> None:
@@ -112,7 +112,7 @@ class Visitor:
         self.until(lambda: self.desk.gate.is_paused)
 
     def seen(self, robot: int) -> tuple[float, float, float]:
-        """Return where the page sees a robot."""
+        """Return the position of a robot on the page."""
         pose = self.answer("(index) => kiksDesk.pose(index)", robot - 1)
         return pose["x_mm"], pose["y_mm"], pose["heading_rad"]
 
@@ -149,7 +149,7 @@ class Visitor:
         self.page.keyboard.insert_text(text)
 
     def is_free(self, robot: int) -> bool:
-        """Say whether a robot stands where it can stand."""
+        """Return whether a robot stands in a free place."""
         with self.sim.lock:
             x_mm, y_mm, _ = self.sim.pose(robot)
             return bool(self.sim.world.free_space.may_lie(robot - 1)(x_mm, y_mm))

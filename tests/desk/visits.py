@@ -1,4 +1,4 @@
-"""A page of the desk in a real browser, and what a test asks of it: nothing sleeps, all waiting is for a fact."""
+"""A page of the desk in a real browser; tests wait for conditions and never sleep."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ NewPage = Callable[..., Page]
 
 
 class Visit:
-    """A page with the arena on it, and what the server hears of it."""
+    """A page with the arena, and the messages that the server receives from it."""
 
     def __init__(self, page: Page, address: str, query: str) -> None:
         self.page, self.address = page, address
@@ -30,7 +30,7 @@ class Visit:
         return self.page.wait_for_function(fact, arg=argument).json_value()
 
     def heard(self, fact: str) -> list[dict[str, Any]]:
-        """Wait until a fact of all that was said since the visit began is so, and return that."""
+        """Wait for a condition on all messages since the start of the visit, and return them."""
         self.page.evaluate(
             """([mark, fact]) => {
                 window.said = null;

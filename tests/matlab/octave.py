@@ -1,4 +1,4 @@
-"""Programs of Octave as processes: what they print, what they say, and that nothing of them is left.
+"""Programs of Octave as processes: their output, and that they leave nothing behind.
 
 A program says values for Python with say('name', value) and takes the message of an error with caught(@() ...); both
 are in `support`. Each has a folder of its own, for its files and for what tells where its session is found.
@@ -23,7 +23,7 @@ import numpy as np
 import pytest
 
 GUARD_S = 100.0
-"""After so long a program is taken to hang [s]."""
+"""Timeout of a program [s]."""
 
 ROOT = Path(__file__).parents[2]
 TOOLBOX = ROOT / "matlab"
@@ -37,7 +37,7 @@ needs_octave = pytest.mark.skipif(OCTAVE is None, reason="octave-cli is not here
 
 @cache
 def has_tcp() -> bool:
-    """Say whether Octave can open TCP connections."""
+    """Return whether Octave can open TCP connections."""
     assert OCTAVE is not None
     command = [OCTAVE, "-qf", "--eval", "exit(isempty(pkg('list', 'instrument-control')))"]
     return subprocess.run(command, capture_output=True, timeout=GUARD_S, check=False).returncode == 0
@@ -114,7 +114,7 @@ class Octave:
         self.end()
 
     def children(self) -> list[int]:
-        """Return the numbers of the processes that Octave has started and that are there."""
+        """Return the numbers of the running processes that Octave has started."""
         number = self._process.pid
         return [int(word) for word in Path(f"/proc/{number}/task/{number}/children").read_text().split()]
 
@@ -143,7 +143,7 @@ class Octave:
         self._process.kill()
 
     def finish(self, status: int = 0) -> Octave:
-        """Wait until Octave and all that it has started are gone."""
+        """Wait until Octave and all its children have ended."""
         try:
             assert self._process.wait(GUARD_S) == status, self.text
             # Every process that it has started has its output open.
@@ -154,7 +154,7 @@ class Octave:
         return self
 
     def end(self) -> None:
-        """Kill all of it, whatever it does."""
+        """Kill Octave and all its children."""
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait(GUARD_S)
@@ -170,7 +170,7 @@ class Octave:
 
     @property
     def text(self) -> str:
-        """What it has printed, for a person."""
+        """The output, for a person."""
         with self._news:
             return "\n".join(self.lines)
 
@@ -190,7 +190,7 @@ class Octave:
 
 
 def run(program: str, folder: Path, environment: Mapping[str, str] | None = None) -> Octave:
-    """Run a program to its end; it must have no error, and nothing of it may be left."""
+    """Run a program to its end; it must have no error and leave no process."""
     with Octave(program, folder, environment) as octave:
         return octave.finish()
 

@@ -1,4 +1,4 @@
-"""Octave at a terminal, as a person has it: lines are typed, Ctrl-C is pressed, and what is printed is waited for."""
+"""Octave at a terminal: tests type lines, press Ctrl-C and wait for output."""
 
 from __future__ import annotations
 
@@ -63,11 +63,11 @@ class Terminal:
         os.write(self._end, f"{line}\n".encode())
 
     def press_ctrl_c(self) -> None:
-        """Press Ctrl-C: whatever runs at the terminal gets SIGINT."""
+        """Press Ctrl-C: the foreground processes of the terminal get SIGINT."""
         os.write(self._end, CTRL_C)
 
     def wait_for(self, pattern: str, seconds: float = GUARD_S) -> str:
-        """Wait until something has been printed, and return it; what was printed before is forgotten."""
+        """Wait for a printed text and return it; earlier output is dropped."""
         end_s = time.monotonic() + seconds
         while (found := re.search(pattern, self._text)) is None:
             left_s = end_s - time.monotonic()
@@ -86,7 +86,7 @@ class Terminal:
         raise AssertionError(f"it has not answered {expression}:\n{self._text}")
 
     def has_printed(self, text: str) -> bool:
-        """Say whether something has been printed that was not waited for."""
+        """Return whether there is output for which the test has not waited."""
         self._hear(0)
         return text in self._text
 

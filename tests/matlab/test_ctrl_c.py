@@ -1,4 +1,4 @@
-"""Ctrl-C at Octave's prompt: it is heard whatever is waited for, leaves nothing behind, and what follows is in step."""
+"""Ctrl-C at Octave's prompt: it interrupts all waits, leaves nothing behind, and later answers are in step."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ def begin(terminal: Terminal, *lines: str) -> None:
 
 
 def interrupt(terminal: Terminal, line: str) -> None:
-    """Type a line that takes for ever, and press Ctrl-C when the session is at it."""
+    """Type a line that never ends, and press Ctrl-C while the session works on it."""
     (session,) = terminal.sessions()
     terminal.type(f"disp(['begins', ' now']), {line}, disp(['ends', ' now'])")
     terminal.wait_for("begins now")
-    # Ctrl-C shall find Octave waiting.
+    # Press Ctrl-C while Octave waits.
     wait_until(lambda: state(terminal.number) == "S")
     terminal.press_ctrl_c()
     assert terminal.ask("7") == "7", "the prompt is back"
@@ -47,7 +47,7 @@ def interrupt(terminal: Terminal, line: str) -> None:
 
 
 def wait_until(fact: object, seconds: float = GUARD_S) -> None:
-    """Look until something is so."""
+    """Poll a condition until it is true."""
     assert callable(fact)
     end_s = time.monotonic() + seconds
     while not fact():
@@ -70,7 +70,7 @@ def test_an_interrupted_start_leaves_no_process(terminal: Terminal) -> None:
     assert terminal.ask("numel(kProximity(ref))") == "8"
 
 
-def test_a_pause_is_interrupted_and_time_stands_still_then(terminal: Terminal) -> None:
+def test_an_interrupted_pause_stops_time(terminal: Terminal) -> None:
     begin(terminal, "kiks(), ref = kiks_kopen([-1 9600 1]);")
     interrupt(terminal, "kiks_pause(1e6)")
     time_s = float(terminal.ask("kiks_ktime(-1)"))
@@ -98,7 +98,7 @@ def test_answers_of_any_length_stay_in_step(terminal: Terminal) -> None:
         assert terminal.ask("numel(kiks_siminfo_robotpos)") == "3"
 
 
-def test_another_child_of_octave_keeps_no_session_alive(terminal: Terminal) -> None:
+def test_another_child_of_octave_does_not_keep_a_session_alive(terminal: Terminal) -> None:
     """It inherits the ends of the session's pipes: neither kiks_quit nor the end of Octave shows there."""
     begin(terminal, "kiks()")
     (first,) = terminal.sessions()

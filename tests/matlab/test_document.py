@@ -1,4 +1,4 @@
-"""docs/matlab.md tells the truth: its program runs, its functions exist, its constants are preferences."""
+"""docs/matlab.md is correct: its program runs, its functions exist, its constants are preferences."""
 
 from __future__ import annotations
 

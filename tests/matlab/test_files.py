@@ -1,4 +1,4 @@
-"""Arenas in files and matrices: what is written is read, greys are seen, and mazes can be walked through."""
+"""Arenas in files and matrices: files survive a round trip, sensors see greys, and mazes are connected."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ say('wrong', caught(@() kiks_arena(NaN(200))))
 """
 
 
-def test_greys_are_seen_and_codes_mean_what_is_set(tmp_path: Path) -> None:
+def test_greys_are_seen_and_codes_follow_the_preference(tmp_path: Path) -> None:
     done = run(GREYS, tmp_path)
     said = done.said
     assert said["white"] > said["grey"] > said["black"]
@@ -247,7 +247,7 @@ def test_a_hostile_preference_file_is_refused_in_a_line(tmp_path: Path) -> None:
         folder = tmp_path / str(number)
         folder.mkdir()
         (folder / "kiks_preferences.m").write_text(text, encoding="latin-1")
-    # What is set globally counts more than what the file says.
+    # Global variables override the file.
     lines = ["clear -global KIKS_SEED KIKS_THINKING"]
     for number in range(len(HOSTILE)):
         lines += [f"cd('{tmp_path / str(number)}')", f"say('w{number}', caught(@() kiks(zeros(300))))"]

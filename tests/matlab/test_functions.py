@@ -1,4 +1,4 @@
-"""Every function of the toolbox: it is there, has help, and does on a simulated robot what its help says."""
+"""Every function of the toolbox exists, has help, and does on a simulated robot what its help says."""
 
 from __future__ import annotations
 

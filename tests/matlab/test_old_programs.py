@@ -1,4 +1,4 @@
-"""Programs as people wrote them for the Matlab KiKS (kiks-behaviour.md 4.3): their ways run unchanged."""
+"""Programs in the style of those for the Matlab KiKS (kiks-behaviour.md 4.3) run unchanged."""
 
 from __future__ import annotations
 
@@ -279,7 +279,7 @@ def test_turns_end_within_ten_degrees_of_the_compass(tmp_path: Path) -> None:
     assert said["there"][1, 0] >= 500
 
 
-# ---- arenas from pictures, windows with buttons: a session after the other ----
+# ---- arenas from pictures, windows with buttons: one session after the other ----
 
 PICTURES = """
 ARENA = imread('corridors.tif');

@@ -1,4 +1,4 @@
-"""Sessions: nothing gets lost or is left behind, several share one, runs can be repeated, and errors say why."""
+"""Sessions: nothing gets lost or is left behind, programs share one, runs are repeatable, errors have reasons."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ end
         assert list(octave.doors.glob("kiks/session-*")) == []
 
 
-def test_kiks_quit_and_the_end_of_a_program_leave_nothing_behind(tmp_path: Path) -> None:
+def test_kiks_quit_and_the_end_of_a_program_end_the_session(tmp_path: Path) -> None:
     program = """
 ref = kiks_kopen([-1 9600 1]);
 say('session', session_number())
@@ -133,7 +133,7 @@ fread(stdin, 1);
         assert has_ended(another)
 
 
-# ---- several ----
+# ---- several programs ----
 
 
 @pytest.mark.slow
@@ -196,7 +196,7 @@ say('again', caught(@() kiks('--join', {number} + 1)))
     assert re.match(r"kiks:session\|.*session \d+ must run before it is joined", second.said["again"])
 
 
-# ---- the same again ----
+# ---- repeatable runs ----
 
 SAME = """
 global KIKS_THINKING KIKS_SEED
@@ -260,12 +260,12 @@ end
 """
 
 
-def test_how_long_octave_really_takes_changes_nothing(tmp_path: Path) -> None:
+def test_the_speed_of_octave_changes_nothing(tmp_path: Path) -> None:
     quick, slow = (line for line in run(SLOW, tmp_path).lines if re.match(r"[\d.]+ ", line))
     assert quick == slow
 
 
-# ---- what is wrong is said ----
+# ---- errors ----
 
 TAKES_ANYTHING = re.findall(
     r"\w+",
@@ -447,7 +447,7 @@ PREFERENCES = {
 }
 
 
-# What a program forgets, or gives of another kind.
+# Missing arguments and arguments of a wrong kind.
 FORGOTTEN = [
     *(f"{name}()" for name in ONLY_REF),
     *(f"{name}({{1, 2, 3, 4}})" for name in ONLY_REF),
@@ -466,7 +466,7 @@ FORGOTTEN = [
 ]
 
 
-def test_what_is_missing_is_said_by_kiks_itself(tmp_path: Path) -> None:
+def test_missing_arguments_get_messages_of_kiks(tmp_path: Path) -> None:
     lines = ["ref = kiks_kopen([-1 9600 1]);"]
     lines += [f"say('c{number}', caught(@() {call}))" for number, call in enumerate(FORGOTTEN)]
     said = run("\n".join(lines), tmp_path).said
@@ -474,7 +474,7 @@ def test_what_is_missing_is_said_by_kiks_itself(tmp_path: Path) -> None:
     assert {call: words for call, words in answers.items() if not re.match(r"kiks:\w+\|", words)} == {}
 
 
-def test_whatever_is_wrong_is_said_by_kiks_itself(tmp_path: Path) -> None:
+def test_wrong_arguments_get_messages_of_kiks(tmp_path: Path) -> None:
     missing = [name for name in NAMES if not any(call.startswith(f"{name}(") for call in WRONG + WITHOUT_SESSION)]
     assert sorted(set(missing) - set(TAKES_ANYTHING)) == []
     lines = [f"say('w{number}', caught(@() {call}))" for number, call in enumerate(WITHOUT_SESSION)]

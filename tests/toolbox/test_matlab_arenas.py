@@ -1,4 +1,4 @@
-"""Arenas as the Matlab KiKS has them, and matrices as lines."""
+"""Arenas of the Matlab KiKS, and the text format of matrices."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from kiks.toolbox.wire_format import escape, matrices_of, matrix_text, numbers_o
 
 
 @given(arrays(np.int16, st.tuples(st.integers(0, 9), st.integers(0, 9)), elements=st.integers(-3, 3)))
-def test_matrices_come_back_as_they_were(matrix: np.ndarray) -> None:
+def test_matrices_survive_a_round_trip(matrix: np.ndarray) -> None:
     read, again = matrices_of(f"{matrix_text(matrix)} {matrix_text(matrix / 2)}")
     assert np.array_equal(read, matrix)
     assert np.array_equal(again, matrix / 2)
 
 
 @given(st.text())
-def test_texts_come_back_as_they_were_and_are_one_line(text: str) -> None:
+def test_texts_survive_a_round_trip_as_one_line(text: str) -> None:
     assert unescape(escape(text)) == text
     assert "\n" not in escape(text)
     assert "\r" not in escape(text)
 
 
 @given(st.text(max_size=300))
-def test_frames_say_how_long_they_are(text: str) -> None:
+def test_frames_contain_their_length(text: str) -> None:
     sent = frame(text)
     length = int(sent[:8])
     assert len(sent) == max(FRAME_MIN, length + 8)
@@ -42,12 +42,12 @@ def test_frames_say_how_long_they_are(text: str) -> None:
 @pytest.mark.parametrize(
     "words", ["", "2", "2 2", "2 2 1 0", "1 1 2 0", "2 2 5 0", "2 2 0 1 4 1", "-1 2 1 1", "2 2 4 x", "99999 99999 1 1"]
 )
-def test_what_is_no_matrix_is_refused(words: str) -> None:
+def test_malformed_matrices_are_refused(words: str) -> None:
     with pytest.raises(ParameterError, match="a matrix must be"):
         matrices_of(words)
 
 
-def test_numbers_must_be_as_many_as_wanted() -> None:
+def test_a_wrong_count_of_numbers_is_refused() -> None:
     assert numbers_of(["1", "NaN"], 2, "both")[0] == 1
     for words in (["1"], ["1", "x"], ["1", "inf"]):
         with pytest.raises(ParameterError, match="both must be 2 finite numbers"):
@@ -77,7 +77,7 @@ def test_the_most_negative_element_is_the_first_robots() -> None:
     assert starts[0].heading_rad == 0.0
 
 
-def test_things_leave_no_mark_on_the_floor() -> None:
+def test_things_leave_the_floor_empty() -> None:
     codes = np.zeros((300, 400))
     codes[99, 99], codes[99, 199], codes[199, 199] = 2, 3, 4
     arena = arena_of(codes, ball=40, cylinder=90)
@@ -86,7 +86,7 @@ def test_things_leave_no_mark_on_the_floor() -> None:
     assert (arena.balls[0].brightness, arena.cylinders[0].brightness) == (40, 90)
 
 
-def test_a_colour_mask_says_how_bright_walls_are() -> None:
+def test_a_colour_mask_sets_the_brightness_of_walls() -> None:
     codes, greys = np.zeros((200, 200)), np.zeros((200, 200))
     codes[:10], greys[:10, :100], greys[100, 100] = 1, 61, 99
     brightness = arena_of(codes, greys, wall=200).brightness[::-1]
@@ -95,7 +95,7 @@ def test_a_colour_mask_says_how_bright_walls_are() -> None:
     assert brightness[100, 100] == 0, "a grey where there is no wall is none"
 
 
-def test_an_element_that_stands_for_nothing_is_named() -> None:
+def test_an_unknown_element_is_named() -> None:
     codes = np.zeros((200, 200))
     codes[4, 6] = 7
     with pytest.raises(ParameterError, match=r"ARENA\(5,7\) is 7"):
@@ -117,13 +117,13 @@ def test_a_mask_of_another_size_is_refused() -> None:
         *(("sed", "1"), ("x" * 1000, "1"), ("robot", "x" * 1001), ("robot", "a\0b")),
     ],
 )
-def test_settings_that_are_none_are_refused(name: str, value: str) -> None:
+def test_invalid_settings_are_refused(name: str, value: str) -> None:
     with pytest.raises(KiksError, match=r"^kiks_preferences: .* must (be|have known keys)") as caught:
         Settings().changed(name, value)
     assert len(str(caught.value)) < 400
 
 
-def test_an_empty_setting_is_the_usual_one() -> None:
+def test_an_empty_setting_is_the_default() -> None:
     changed = Settings().changed("ball", "40").changed("turrets", "gripper k213")
     assert (changed.ball, changed.turrets) == (40, ("gripper", "k213"))
     assert changed.changed("ball", "").ball is None

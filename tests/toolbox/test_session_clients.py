@@ -1,4 +1,4 @@
-"""Programs of Octave and MATLAB in a session, asked for things as the toolbox does."""
+"""Clients of a session, with requests as the toolbox sends them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import pytest
 from tests.served import GUARD_S
 
 from kiks.model.arena import Arena
-from kiks.ports.local_link import Patient
+from kiks.ports.local_link import AwaitedAnswer
 from kiks.sim.simulation import Simulation
 from kiks.toolbox.requests import REQUESTS, answer
 from kiks.toolbox.session import Session
@@ -23,14 +23,14 @@ from kiks.toolbox.session_client import SessionClient
 from kiks.toolbox.wire_format import matrices_of, matrix_text
 
 HEAD = 20
-"""Sign, port and time come before what was asked for."""
+"""Length of the sign, the port and the time before the result."""
 
 
 class Asker:
-    """Asks, and takes errors for what they are."""
+    """Sends requests and returns answers and errors."""
 
     def __init__(self, session: Session, number: int = 1) -> None:
-        self.visitor = SessionClient(session, number)
+        self.client = SessionClient(session, number)
 
     def __call__(self, request: str) -> str:
         told = self.told(request)
@@ -38,7 +38,7 @@ class Asker:
         return told[HEAD:]
 
     def told(self, request: str) -> str:
-        return answer(self.visitor, request)
+        return answer(self.client, request)
 
     def refused(self, request: str) -> str:
         told = self.told(request)
@@ -51,7 +51,7 @@ class Asker:
 
 @contextmanager
 def running(session: Session) -> Iterator[Session]:
-    """Let the session's own thread go round."""
+    """Run the session's own thread."""
     is_over = threading.Event()
 
     def go_round() -> None:
@@ -84,7 +84,7 @@ def begun(session: Session, *settings: str, world: str = "default") -> Asker:
 
 
 def drive(ask: Asker, port: int = 1, loops: int = 30) -> list[str]:
-    """Drive as a program does; return all that it was told."""
+    """Drive like a program, and return all replies."""
     ask(f"open {port} 9600")
     told = []
     for loop in range(loops):
@@ -94,8 +94,8 @@ def drive(ask: Asker, port: int = 1, loops: int = 30) -> list[str]:
     return told
 
 
-def test_what_is_told_is_what_a_port_in_memory_tells(session: Session) -> None:
-    """The same physics, line and clock, to the bit: a session is another way to ask."""
+def test_a_session_equals_a_port_in_memory(session: Session) -> None:
+    """A session has the same physics, line and clock as a port in memory, to the bit."""
     ask = begun(session, "seed 3", "turrets k213")
     ask("open 1 9600")
     sim = Simulation(seed=3)
@@ -116,7 +116,7 @@ def test_the_same_seed_gives_the_same_run(session: Session) -> None:
     assert runs[0] != runs[2]
 
 
-def test_asking_for_the_time_again_and_again_lets_it_pass(session: Session) -> None:
+def test_polling_the_time_lets_it_pass(session: Session) -> None:
     ask = begun(session)
     ask("open 1 9600")
     ask("ask 1 D,5,5")
@@ -128,7 +128,7 @@ def test_asking_for_the_time_again_and_again_lets_it_pass(session: Session) -> N
     assert ask.numbers("pose 1")[1] < 320, "and the robot drives meanwhile"
 
 
-def test_so_does_looking_at_the_world(session: Session) -> None:
+def test_polling_the_world_lets_time_pass(session: Session) -> None:
     ask = begun(session)
     ask("open 1 9600")
     ask("ask 1 D,5,5")
@@ -138,7 +138,7 @@ def test_so_does_looking_at_the_world(session: Session) -> None:
     assert ask.numbers("pose 1")[1] < y - 10
 
 
-def test_nothing_moves_while_nobody_asks(session: Session) -> None:
+def test_nothing_moves_without_a_request(session: Session) -> None:
     ask = begun(session)
     ask("open 1 9600")
     ask("ask 1 D,5,5")
@@ -149,8 +149,8 @@ def test_nothing_moves_while_nobody_asks(session: Session) -> None:
     assert ask("state") == state
 
 
-def test_who_watches_sees_thinking_pass_as_it_happens(session: Session) -> None:
-    """And it is not charged again: the robot has driven for as long as the program has thought, no longer."""
+def test_thinking_time_passes_live_in_a_window(session: Session) -> None:
+    """Thinking time counts once: the robot drives for exactly as long as the program has thought."""
     ask = Asker(session)
     ask("set thinking live")
     ask("world default")
@@ -165,10 +165,10 @@ def test_who_watches_sees_thinking_pass_as_it_happens(session: Session) -> None:
         if session.world.now_ns >= driven_ns:
             break
         guard.wait(GUARD_S / 200)
-    assert session.world.now_ns >= driven_ns, "time passes although nobody asks"
+    assert session.world.now_ns >= driven_ns, "time passes without a request"
     ask("ask 1 H")
     thought_s = time.monotonic() - begin_s
-    assert (session.world.now_ns - begin_ns) * 1e-9 < thought_s + 0.1, "what has passed is not charged again"
+    assert (session.world.now_ns - begin_ns) * 1e-9 < thought_s + 0.1, "time that has passed counts once"
 
 
 def test_a_pause_lets_simulated_time_pass(session: Session) -> None:
@@ -212,7 +212,7 @@ def test_a_late_reply_answers_nothing_else(session: Session) -> None:
     assert ask("ask 1 E").startswith("e,")
 
 
-def test_replies_of_several_lines_are_heard_to_their_end(session: Session) -> None:
+def test_replies_of_several_lines_are_read_completely(session: Session) -> None:
     ask = begun(session)
     ask("open 1 9600")
     first = ask("ask 1 help")
@@ -222,7 +222,7 @@ def test_replies_of_several_lines_are_heard_to_their_end(session: Session) -> No
     assert ask("ask 1 H").startswith("h,")
 
 
-def test_every_port_has_a_robot_of_its_own_and_keeps_it(session: Session) -> None:
+def test_every_port_has_its_own_robot(session: Session) -> None:
     ask = begun(session)
     for port in (1, 2, 3):
         ask(f"open {port} 9600")
@@ -245,7 +245,7 @@ def test_a_port_is_opened_once(session: Session) -> None:
     assert "must be -1, -2" in ask.refused("open 0 9600")
 
 
-def test_another_world_ends_ports_with_a_word(session: Session) -> None:
+def test_a_new_world_closes_ports_with_an_error(session: Session) -> None:
     ask = begun(session)
     ask("open 1 9600")
     ask("world default")
@@ -259,11 +259,11 @@ def test_another_world_ends_ports_with_a_word(session: Session) -> None:
 
 
 @pytest.mark.parametrize("request_", ["ask 1 N", "pause 5", "time 1", "pose 1", "close 1", "listen 1"])
-def test_what_a_paused_world_keeps_waiting_can_be_called_off(session: Session, request_: str) -> None:
-    awaited = Patient()
+def test_requests_to_a_paused_world_can_be_cancelled(session: Session, request_: str) -> None:
+    awaited = AwaitedAnswer()
     ask = begun(session)
-    ask.visitor.leave()
-    ask.visitor = SessionClient(session, 1, awaited)
+    ask.client.leave()
+    ask.client = SessionClient(session, 1, awaited)
     told: list[str] = []
     is_paused = threading.Event()
 
@@ -273,7 +273,7 @@ def test_what_a_paused_world_keeps_waiting_can_be_called_off(session: Session, r
         session.desk.gate.pause(session.world.now_ns)
         is_paused.set()
         told.append(ask.told(request_))
-        awaited.is_called_off = False
+        awaited.is_cancelled = False
         session.desk.gate.go_on()
         told.append(ask.told("ask 1 N"))
 
@@ -283,8 +283,8 @@ def test_what_a_paused_world_keeps_waiting_can_be_called_off(session: Session, r
     for _ in range(1000):
         if told:
             break
-        awaited.is_called_off = True
-        ask.visitor.call_off()
+        awaited.is_cancelled = True
+        ask.client.cancel()
         thread.join(GUARD_S / 1000)
     thread.join(GUARD_S)
     assert not thread.is_alive()
@@ -292,24 +292,24 @@ def test_what_a_paused_world_keeps_waiting_can_be_called_off(session: Session, r
     assert told[1][HEAD:].startswith("n,") or request_ == "close 1", told
 
 
-def test_waiting_for_others_to_begin_can_be_called_off(session: Session) -> None:
-    awaited = Patient()
+def test_waiting_for_other_programs_can_be_cancelled(session: Session) -> None:
+    awaited = AwaitedAnswer()
     ask = begun(session, "programs 2")
-    ask.visitor.leave()
-    ask.visitor = SessionClient(session, 1, awaited)
+    ask.client.leave()
+    ask.client = SessionClient(session, 1, awaited)
     told: list[str] = []
     thread = threading.Thread(target=lambda: told.append(ask.told("open 1 9600")))
     thread.start()
     for _ in range(1000):
         if told:
             break
-        awaited.is_called_off = True
+        awaited.is_cancelled = True
         thread.join(GUARD_S / 1000)
     assert "the program was interrupted" in told[0]
 
 
 def test_two_programs_drive_two_robots_in_one_world(session: Session) -> None:
-    """Each in a thread of its own, as two Octaves are; what happens does not depend on who is faster."""
+    """Each in its own thread, like two Octaves; the result does not depend on which one is faster."""
     codes = np.zeros((500, 500))
     codes[249, 129], codes[249, 369] = -360, -90
 
@@ -330,7 +330,7 @@ def test_two_programs_drive_two_robots_in_one_world(session: Session) -> None:
         for thread in threads:
             thread.join(GUARD_S)
         for ask in (first, second):
-            ask.visitor.leave()
+            ask.client.leave()
         return told[1], told[2], Asker(session)("state")
 
     runs = [run() for _ in range(3)]
@@ -338,13 +338,13 @@ def test_two_programs_drive_two_robots_in_one_world(session: Session) -> None:
     assert runs[0] == runs[1] == runs[2]
 
 
-def test_who_leaves_frees_the_robot(session: Session) -> None:
+def test_a_client_that_leaves_frees_its_robot(session: Session) -> None:
     first = begun(session)
     first("open 1 9600")
     second = Asker(session, 2)
     second("open 1 9600")
     assert session.world.robot_count == 2
-    first.visitor.leave()
+    first.client.leave()
     third = Asker(session, 3)
     third("open 1 9600")
     assert session.world.robot_count == 2
@@ -370,7 +370,7 @@ def test_objects_are_listed_lights_first_and_can_be_moved(session: Session) -> N
     assert "row must be one of the 3" in ask.refused("set_object 4 1 1 1 1")
 
 
-def test_what_is_spawned_without_a_place_finds_one(session: Session) -> None:
+def test_objects_spawned_without_a_place_get_one(session: Session) -> None:
     ask = begun(session, world=f"matrix {matrix_text(np.zeros((500, 600)))}")
     for _ in range(5):
         ask("spawn 3 NaN NaN")
@@ -382,7 +382,7 @@ def test_what_is_spawned_without_a_place_finds_one(session: Session) -> None:
     assert "type must be" in ask.refused("spawn 4 10 10")
 
 
-def test_a_robot_is_put_where_there_is_room(session: Session) -> None:
+def test_a_robot_is_moved_to_a_free_place(session: Session) -> None:
     ask = begun(session)
     ask("open 1 9600")
     assert ask("set_robot 1 100 200 0.5") == "1"
@@ -393,7 +393,7 @@ def test_a_robot_is_put_where_there_is_room(session: Session) -> None:
     assert ask("ask 1 N").startswith("n,"), "the port stays open"
 
 
-def test_a_reset_puts_everything_back(session: Session) -> None:
+def test_a_reset_restores_everything(session: Session) -> None:
     ask = begun(session)
     ask("spawn 2 100 200")
     ask("open 1 9600")
@@ -436,7 +436,7 @@ def test_settings_hold_for_the_next_world(session: Session) -> None:
     assert session.world is sim, "the old world is still there"
 
 
-def test_what_an_exchange_costs_on_another_computer_is_charged(session: Session) -> None:
+def test_latency_of_a_calibration_is_added(session: Session) -> None:
     ask = begun(session, "latency_s 0.5")
     ask("open 1 9600")
     before = float(ask("time 1"))
@@ -469,14 +469,14 @@ REFUSED: Sequence[str] = (
 
 
 @pytest.mark.parametrize("request_", REFUSED)
-def test_bad_requests_are_refused_with_a_word(session: Session, request_: str) -> None:
+def test_bad_requests_get_an_error(session: Session, request_: str) -> None:
     ask = begun(session)
     assert "KiKS itself has failed" not in ask.refused(request_)
     assert ask("active") == "1"
 
 
 @pytest.mark.parametrize("request_", ["pose 1", "path 1", "objects", "state", "save x.kad", "checkpoint", "reset"])
-def test_without_a_world_one_is_asked_for(session: Session, request_: str) -> None:
+def test_requests_without_a_world_get_an_error(session: Session, request_: str) -> None:
     told = Asker(session).told(request_)
     assert (told[0] == "+" and told[HEAD:] == "") or "there must be a world first" in told
 
@@ -495,10 +495,10 @@ HOSTILE = (
 @pytest.mark.parametrize(
     "name", sorted({*REQUESTS, "nothing", "", "x" * 70_000, "\ufffd", "\0"}), ids=lambda name: name[:20]
 )
-def test_whatever_words_come_an_answer_goes_out(
+def test_random_requests_get_an_answer(
     session: Session, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """No request may end the process or fail inside, and what is refused is refused in a line."""
+    """No request ends the process or fails inside, and each refusal is one line."""
     monkeypatch.chdir(tmp_path)
     ask = begun(session, world=f"matrix {matrix_text(np.zeros((200, 200), np.int16))}")
     ask("spawn 1 50 50")
@@ -537,7 +537,7 @@ def test_whatever_words_come_an_answer_goes_out(
         (" ".join("9" * 3000), "a matrix must be"),
     ],
 )
-def test_no_memory_is_taken_on_the_word_of_a_matrix(session: Session, words: str, why: str) -> None:
+def test_a_huge_matrix_header_allocates_no_memory(session: Session, words: str, why: str) -> None:
     ask = begun(session)
     tracemalloc.start()
     try:
@@ -558,6 +558,6 @@ def test_a_robot_may_be_a_file(session: Session, tmp_path: Path) -> None:
     assert session.world.specs[0].body.pulse_mm == 0.082
     ask("open 1 9600")
     ask("open 2 9600")
-    assert session.world.specs[1].body.pulse_mm == 0.082, "who comes later is of the same kind"
+    assert session.world.specs[1].body.pulse_mm == 0.082, "a robot that is added is of the same kind"
     ask(f"set robot {tmp_path / 'none.toml'}")
     assert "none.toml" in ask.refused("world default")

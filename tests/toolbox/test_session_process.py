@@ -1,4 +1,4 @@
-"""The process of a session: who may come in, and that nothing is left when the last has gone."""
+"""The process of a session: access, and that nothing is left after the last client."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ STARTER = [sys.executable, "-c", "import subprocess, sys; subprocess.run(sys.arg
 
 
 class Session:
-    """A process of a session, and who started it."""
+    """A process of a session, and its parent."""
 
     def __init__(self, *words: str, folder: Path, starter: Sequence[str] = ()) -> None:
         self.process = subprocess.Popen(
@@ -47,7 +47,7 @@ class Session:
         self.greeting = self.hear()
 
     def hear(self, *, confirms: bool = True) -> str:
-        """Return the next answer; confirm that it is waited for where it takes long, if nothing else is said."""
+        """Return the next answer; by default confirm the frames that announce it."""
         while (heard := self.hear_frame()) == "~":
             if confirms:
                 os.write(self.to, b"\n")
@@ -90,7 +90,7 @@ class Session:
 
 
 def ended(*words: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    """Return how a process ends by itself."""
+    """Wait for a process to end and return its exit code."""
     return subprocess.run(
         [*KIKS, "session", *words],
         capture_output=True,
@@ -102,7 +102,7 @@ def ended(*words: str, folder: Path) -> subprocess.CompletedProcess[str]:
 
 
 def wait_until(fact: Callable[[], object]) -> None:
-    """Look until something is so."""
+    """Poll a condition until it is true."""
     end_s = time.monotonic() + 3 * GUARD_S
     while not fact():
         assert time.monotonic() < end_s, "it never was so"
@@ -113,7 +113,7 @@ def started(*words: str, folder: Path, starter: Sequence[str] = ()) -> Iterator[
     session = Session(*words, folder=folder, starter=starter)
     try:
         if session.greeting.startswith("KiKS"):
-            # Only who takes part lets others find the session.
+            # Other programs find the session only after a client takes part.
             session.ask("active")
         yield session
     finally:
@@ -125,7 +125,7 @@ def started(*words: str, folder: Path, starter: Sequence[str] = ()) -> Iterator[
             session.process.stdin.close()  # type: ignore[union-attr]
 
 
-def test_a_session_ends_when_the_last_has_hung_up_and_leaves_nothing(tmp_path: Path) -> None:
+def test_a_session_ends_with_its_last_client_and_leaves_nothing(tmp_path: Path) -> None:
     with started(folder=tmp_path) as session:
         assert session.greeting.startswith("KiKS ")
         session.ask("world default")
@@ -137,7 +137,7 @@ def test_a_session_ends_when_the_last_has_hung_up_and_leaves_nothing(tmp_path: P
         assert not list((tmp_path / "kiks").iterdir())
 
 
-def test_another_program_joins_and_the_session_lives_until_both_have_gone(tmp_path: Path) -> None:
+def test_a_joined_session_ends_when_both_programs_have_left(tmp_path: Path) -> None:
     with started(folder=tmp_path) as first, started("--join", "0", folder=tmp_path) as second:
         first.ask("set thinking none")
         first.ask("world default")
@@ -153,14 +153,14 @@ def test_another_program_joins_and_the_session_lives_until_both_have_gone(tmp_pa
         assert first.wait() == 0
 
 
-def test_who_joins_is_told_that_there_is_no_session(tmp_path: Path) -> None:
+def test_joining_without_a_session_is_an_error(tmp_path: Path) -> None:
     for words, told in ((["--join", "0"], "must run before it is joined"), (["--join", "7"], "session 7 must run")):
         process = ended(*words, folder=tmp_path)
         assert told in process.stdout
         assert process.returncode == 2
 
 
-def test_a_session_that_was_killed_is_forgotten(tmp_path: Path) -> None:
+def test_the_file_of_a_killed_session_is_removed(tmp_path: Path) -> None:
     with started(folder=tmp_path) as session:
         session.process.kill()
         session.wait()
@@ -177,7 +177,7 @@ def test_a_joined_program_notices_that_the_session_was_killed(tmp_path: Path) ->
         assert os.read(second.out, 1) == b""
 
 
-def test_without_the_token_nobody_gets_in(tmp_path: Path) -> None:
+def test_connections_without_the_token_are_refused(tmp_path: Path) -> None:
     with started(folder=tmp_path) as session:
         words = session.greeting.split()
         for token in ("", "x" * 32, words[7][:-1], "y" * 10_000):
@@ -196,7 +196,7 @@ def test_without_the_token_nobody_gets_in(tmp_path: Path) -> None:
             assert b"KiKS" in client.recv(200)
 
 
-def test_ctrl_c_is_meant_for_octave_and_sigterm_ends_it(tmp_path: Path) -> None:
+def test_sigint_is_ignored_and_sigterm_ends_the_session(tmp_path: Path) -> None:
     with started(folder=tmp_path) as session:
         session.process.send_signal(signal.SIGINT)
         assert session.ask("active") == "0"
@@ -205,8 +205,8 @@ def test_ctrl_c_is_meant_for_octave_and_sigterm_ends_it(tmp_path: Path) -> None:
         assert not list((tmp_path / "kiks").iterdir())
 
 
-def test_a_paused_world_does_not_keep_a_session_whose_octave_has_gone(tmp_path: Path) -> None:
-    """The request waits in the world, so nobody reads, and the pipe's end must be noticed all the same."""
+def test_a_paused_world_does_not_keep_a_session_alive(tmp_path: Path) -> None:
+    """The request waits in the world, so no thread reads; the end of the pipe must be noticed anyway."""
     with started("--window", folder=tmp_path) as session:
         session.ask("set thinking none")
         session.ask("world default")
@@ -217,23 +217,23 @@ def test_a_paused_world_does_not_keep_a_session_whose_octave_has_gone(tmp_path: 
         assert session.wait() == 0
 
 
-def test_what_is_printed_never_mixes_with_answers(tmp_path: Path) -> None:
+def test_printed_text_never_mixes_with_answers(tmp_path: Path) -> None:
     with started(folder=tmp_path) as session:
         os.write(session.to, f"world file {tmp_path / 'none.kad'}\n".encode())
         assert session.hear().startswith("-")
         assert session.ask("version")
 
 
-def test_octave_is_told_where_the_toolbox_is() -> None:
+def test_kiks_matlab_prints_the_folder_of_the_toolbox() -> None:
     assert (toolbox_folder() / "kiks.m").is_file()
     told = subprocess.run([*KIKS, "matlab"], capture_output=True, text=True, check=True, timeout=GUARD_S).stdout
     assert str(toolbox_folder()) in told
 
 
-# ---- strangers ----
+# ---- unauthenticated connections ----
 
 
-def test_a_thousand_strangers_keep_nobody_out(tmp_path: Path) -> None:
+def test_a_thousand_unauthenticated_connections_do_not_block_others(tmp_path: Path) -> None:
     with started(folder=tmp_path) as session, ExitStack() as strangers:
         session.ask("world default")
         address = ("127.0.0.1", int(session.greeting.split()[5]))
@@ -264,7 +264,7 @@ def test_running_out_of_descriptors_ends_no_session(tmp_path: Path) -> None:
             assert participant.ask("active") == "1"
 
 
-def test_a_file_of_another_kind_tells_of_no_session(tmp_path: Path) -> None:
+def test_other_files_are_not_read_as_sessions(tmp_path: Path) -> None:
     with started(folder=tmp_path) as session:
         session.ask("active")
         folder = tmp_path / "kiks"
@@ -286,7 +286,7 @@ def test_a_file_of_another_kind_tells_of_no_session(tmp_path: Path) -> None:
         assert "others can write there" in ended("--where", "0", folder=tmp_path).stdout
 
 
-def test_a_session_is_announced_when_somebody_takes_part(tmp_path: Path) -> None:
+def test_a_session_is_announced_when_a_client_takes_part(tmp_path: Path) -> None:
     """Octave may have forgotten it before: Ctrl-C."""
     session = Session(folder=tmp_path)
     assert not list((tmp_path / "kiks").glob("session-*"))
@@ -298,7 +298,7 @@ def test_a_session_is_announced_when_somebody_takes_part(tmp_path: Path) -> None
     session.process.stdout.close()
 
 
-def test_a_file_that_is_there_is_not_written_over(tmp_path: Path) -> None:
+def test_an_existing_file_is_not_replaced(tmp_path: Path) -> None:
     file = tmp_path / "there"
     file.write_text("mine", encoding="ascii")
     done = ended("--listen", str(file), folder=tmp_path)
@@ -310,7 +310,7 @@ def test_a_file_that_is_there_is_not_written_over(tmp_path: Path) -> None:
 # ---- waiting ----
 
 
-def test_an_answer_that_takes_long_is_announced_and_ends_when_it_is_called_off(tmp_path: Path) -> None:
+def test_a_slow_answer_is_announced_and_can_be_cancelled(tmp_path: Path) -> None:
     with started(folder=tmp_path) as session:
         for request in ("set thinking none", "world default", "open 1 9600"):
             session.ask(request)
@@ -326,7 +326,7 @@ def test_an_answer_that_takes_long_is_announced_and_ends_when_it_is_called_off(t
         assert 0 < float(session.hear()[20:]) < 1e6
 
 
-def test_time_stands_still_for_a_program_that_does_not_say_that_it_waits(tmp_path: Path) -> None:
+def test_a_pause_is_held_until_the_program_confirms_that_it_waits(tmp_path: Path) -> None:
     with started(folder=tmp_path) as session:
         for request in ("set thinking none", "world default", "open 1 9600"):
             session.ask(request)
@@ -348,14 +348,14 @@ def test_time_stands_still_for_a_program_that_does_not_say_that_it_waits(tmp_pat
         assert session.hear_frame() == "~", "it goes on"
 
 
-def test_good_bye_is_enough_where_a_pipe_stays_open(tmp_path: Path) -> None:
+def test_the_leave_line_ends_a_session_with_an_open_pipe(tmp_path: Path) -> None:
     with started(folder=tmp_path) as session:
         session.ask("world default")
         session.say("\x04")
         assert session.wait() == 0
 
 
-def test_who_goes_first_is_told_that_the_session_goes_on(tmp_path: Path) -> None:
+def test_a_leaving_client_is_told_that_the_session_goes_on(tmp_path: Path) -> None:
     with started(folder=tmp_path) as first:
         first.ask("world default")
         with started("--join", "0", folder=tmp_path) as second:
@@ -370,8 +370,8 @@ def test_who_goes_first_is_told_that_the_session_goes_on(tmp_path: Path) -> None
         assert first.wait() == 0
 
 
-def test_a_killed_program_that_was_started_ends_a_session_at_any_moment(tmp_path: Path) -> None:
-    """Its parent is gone, although the pipe is held open here."""
+def test_killing_the_program_ends_its_session_at_any_moment(tmp_path: Path) -> None:
+    """Its parent has ended, but the pipe is still open here."""
     with started(folder=tmp_path, starter=STARTER) as session:
         session.ask("world default")
         session.process.kill()
@@ -380,7 +380,7 @@ def test_a_killed_program_that_was_started_ends_a_session_at_any_moment(tmp_path
 
 
 def test_sigterm_ends_a_session_that_was_started_with_signals_blocked(tmp_path: Path) -> None:
-    """As Octave starts it."""
+    """Start it as Octave does."""
     blocked = {signal.SIGTERM, signal.SIGINT, signal.SIGHUP}
     before = signal.pthread_sigmask(signal.SIG_BLOCK, blocked)
     with ExitStack() as after:

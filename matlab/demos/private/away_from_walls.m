@@ -3,7 +3,7 @@ function [speeds, side] = away_from_walls(readings, cruise, side)
 %
 %   [speeds, side] = away_from_walls(readings, cruise, side) is [left; right] for the readings of kProximity, both
 %   cruise if nothing is near, and [0; 0] if the robot has not answered. side is how it turns: 1 to the left, -1 to the
-%   right, 0 not at all. It is passed on from call to call, as who changes it in a corner stays there.
+%   right, 0 not at all. It is passed on from call to call, as changing it in a corner would trap the robot there.
 
 if numel(readings) ~= 8
     speeds = [0; 0];

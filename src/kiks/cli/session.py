@@ -14,7 +14,7 @@ from kiks.cli.engine_start import ready_engine
 from kiks.cli.options import show_log
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import KiksError
-from kiks.toolbox.framing import Exchange, Pulse
+from kiks.toolbox.framing import Exchange, Heartbeat
 
 
 def session(
@@ -46,21 +46,21 @@ def session(
     exchange = Exchange(0, sink, close=lambda: _close(0, sink), parent=os.getppid())
     try:
         if where is not None:
-            from kiks.toolbox.session_files import find_door
+            from kiks.toolbox.session_files import find_session
 
-            os.write(sink, find_door(where).line().encode())
+            os.write(sink, find_session(where).line().encode())
         elif listen is not None:
-            _serve(Pulse(), window, listen=listen)
+            _serve(Heartbeat(), window, listen=listen)
         else:
-            pulse = Pulse()
-            pulse.acts.append(exchange.beat)
+            heartbeat = Heartbeat()
+            heartbeat.acts.append(exchange.beat)
             if join is None:
-                _serve(pulse, window, exchange=exchange)
+                _serve(heartbeat, window, exchange=exchange)
             else:
-                from kiks.toolbox.session_files import find_door
+                from kiks.toolbox.session_files import find_session
                 from kiks.toolbox.session_process import join as take_part
 
-                take_part(find_door(join), exchange, 0, sink)
+                take_part(find_session(join), exchange, 0, sink)
     except KiksError as error:
         text = f"kiks: {error}\n"
         if where is not None:
@@ -70,19 +70,21 @@ def session(
         raise typer.Exit(2) from None
 
 
-def _serve(pulse: Pulse, window: bool | None, *, exchange: Exchange | None = None, listen: Path | None = None) -> None:
+def _serve(
+    heartbeat: Heartbeat, window: bool | None, *, exchange: Exchange | None = None, listen: Path | None = None
+) -> None:
     from kiks.desk.server.show import has_screen
     from kiks.toolbox.session import Session
-    from kiks.toolbox.session_files import write_door
+    from kiks.toolbox.session_files import write_session_file
     from kiks.toolbox.session_process import SessionProcess
 
     end_as_with_ctrl_c()
-    host = SessionProcess(Session(ready=ready_engine, has_window=has_screen() if window is None else window), pulse)
+    host = SessionProcess(Session(ready=ready_engine, has_window=has_screen() if window is None else window), heartbeat)
     try:
         if exchange is not None:
-            host.speak_with(exchange)
+            host.add(exchange)
         if listen is not None:
-            write_door(host.door, listen)
+            write_session_file(host.address, listen)
         host.run()
     except KeyboardInterrupt:
         pass

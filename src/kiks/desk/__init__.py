@@ -1,1 +1,1 @@
-"""The desk: a world in a browser, to see, touch and understand it."""
+"""The desk: a world in a browser."""

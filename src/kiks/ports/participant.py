@@ -356,7 +356,7 @@ class RemoteParticipant(ProgramParticipant):
 
 
 class LocalParticipant(ProgramParticipant):
-    """A program that speaks through a thread of this process; its end is `near.NearConnection`.
+    """A program that speaks through a thread of this process; its end is `LocalConnection`.
 
     Attributes:
         answer: What it was answered last; None until the answer is there.

@@ -1,1 +1,1 @@
-"""The simulator's side of the toolbox for Octave and MATLAB, `matlab/`: a world, and who asks for things in it."""
+"""The simulator's side of the toolbox for Octave and MATLAB (`matlab/`): sessions, their clients and requests."""

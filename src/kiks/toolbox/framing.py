@@ -1,16 +1,15 @@
-"""What a program of Octave or MATLAB and its session say to each other: lines come in, frames go out.
+"""Framing of the messages between a program of Octave or MATLAB and its session: lines come in, frames go out.
 
-A frame is the length of what it says in eight digits, that, and blanks up to 96 characters. Octave cannot read a line
-from a pipe without waiting for what comes after it (its `fgetl` looks one character ahead), but it can read so many
-characters: one read is enough for nearly all answers.
+A frame is the length of its text in eight digits, the text, and blanks up to 96 characters. Octave cannot read a line
+from a pipe without waiting for the next character (its `fgetl` reads one character ahead), but it can read a known
+number of characters: one read is enough for nearly all answers.
 
-While it reads, Ctrl-C has to wait. So an answer that takes long is preceded by frames `~`, four a second, from a thread
-of their own, the pulse: between two of them Octave looks after Ctrl-C. The program confirms each with an empty line.
-That shows that it still waits: without it, what can be held is held until the program says something again. What Ctrl-C
-left unread is skipped by the program's next request: it begins with `CANCEL`, which calls off what is under way and is
-answered by `MARK`.
+Octave ignores Ctrl-C while it reads. So the heartbeat, a thread, sends frames `~` before a slow answer, four a second;
+between two of them Octave handles Ctrl-C. The program confirms each frame with an empty line, which shows that it still
+waits; without it, a pause is held until the program sends something. After Ctrl-C, the next request begins with
+`CANCEL`: it cancels the request under way, and its answer begins with `MARK`, up to which the program skips all input.
 
-This file imports little, so that there is a pulse while all the rest is being loaded.
+This file imports little, so that the heartbeat runs while all other modules are being loaded.
 """
 
 from __future__ import annotations
@@ -24,44 +23,44 @@ from collections import deque
 from collections.abc import Callable, Iterator
 
 LINE_MAX = 1 << 26
-"""Longest request [bytes]: an arena of 64 million cells in which no two neighbours are alike is longer."""
+"""Longest request [bytes]: enough for all arenas except very large ones of noise."""
 
-HEARD_MAX = 1000
-"""So many requests are taken before the first of them has been answered."""
+QUEUED_MAX = 1000
+"""Maximum number of requests that are read ahead."""
 
 FRAME_MIN = 96
 """Shortest frame [bytes]."""
 
 CANCEL = b"\x18"
-"""How a line begins that calls off the request under way; what comes after it is repeated by the answer."""
+"""First byte of a line that cancels the request under way; the answer repeats the byte after it."""
 
 MARK = b"\x01" * (2 * FRAME_MIN - 2)
-"""How that answer begins: a program that is out of step finds its end, whatever it has read before."""
+"""Start of that answer: long enough for a program that is out of step to find its end."""
 
 MARK_END = b"\x02"
-"""What comes then, and nowhere else."""
+"""End of the mark; no other answer contains it."""
 
 LEAVE = b"\x04"
-"""A line that says good-bye: the end of a pipe may be kept from showing by other children of Octave."""
+"""Line with which a program leaves: other children of Octave may keep the pipe open after it has ended."""
 
-PULSE_S = 0.25
-"""Time between two frames that say that an answer is still awaited [s of real time]."""
+HEARTBEAT_S = 0.25
+"""Period of the frames that announce a slow answer [s of real time]."""
 
 HANDSHAKE_S = 20.0
-"""How long the first word of a program is waited for [s of real time]: Ctrl-C may have come between start and talk."""
+"""Timeout of the first request [s of real time]: Ctrl-C may have interrupted the program just after the start."""
 
-LOOK_MS = 1000
-"""How often it is looked whether the program that started this one is there [ms of real time]."""
+POLL_MS = 1000
+"""Period at which the end of the parent process is polled [ms of real time]."""
 
 SPIN_NS = 1_000_000 if len(os.sched_getaffinity(0)) > 1 else 0
-"""How long the next request is waited for without going to sleep [ns of real time]: a program in a loop sends it within
-that, and being woken takes a third of what a whole exchange does. With a single core the program needs it itself."""
+"""Time for which the next request is polled without sleeping [ns of real time]: a program in a loop sends it within
+that time, and a wake-up takes a third of a whole exchange. On a single core the program needs the processor itself."""
 
 _READ_SIZE = 1 << 16
 
 
 def frame(text: str) -> bytes:
-    """Return an answer as it is sent.
+    """Return the frame of a text.
 
     Example:
         >>> frame("+").rstrip()
@@ -71,28 +70,28 @@ def frame(text: str) -> bytes:
     return (b"%8d" % len(data) + data).ljust(FRAME_MIN)
 
 
-STILL = frame("~")
+BUSY = frame("~")
 
-GOES_ON = frame(">")
+SESSION_GOES_ON = frame(">")
 
 
 class Exchange:
-    """A program at the other end of two descriptors. It begins with an answer that is awaited: the greeting.
+    """The connection to a program over two descriptors. At first the program waits for the greeting.
 
-    `lines` and `reply` belong to one thread, `beat` to the pulse.
+    One thread calls `lines` and `reply`; the heartbeat calls `beat`.
 
     Args:
-        source: Where its lines come from.
-        sink: Where frames go.
-        close: Called when it is over.
-        parent: Number of the process that the program is, if it has started this one; 0 if another tells of its end.
-        said: What it has said already.
+        source: Descriptor from which its lines come.
+        sink: Descriptor to which frames go.
+        close: Closes the connection.
+        parent: Process number of the program if it has started this process, else 0.
+        said: The bytes received so far.
 
     Attributes:
-        is_called_off: Whether nobody waits for the answer under way any more.
+        is_cancelled: Whether the program has stopped waiting for the answer under way.
         is_held: Whether the program has not confirmed that it waits.
-        has_left: Whether it has hung up or said good-bye.
-        called_off: Called by the pulse while something is to be ended that is under way.
+        has_left: Whether it has closed the connection or sent `LEAVE`.
+        on_cancel: Called by the heartbeat while a cancelled request is under way.
     """
 
     def __init__(
@@ -106,16 +105,16 @@ class Exchange:
     ) -> None:
         self.source = source
         self._close: Callable[[], None] | None = close
-        self.is_called_off = False
+        self.is_cancelled = False
         self.is_held = False
         self.has_left = False
-        self.called_off: Callable[[], None] = lambda: None
+        self.on_cancel: Callable[[], None] = lambda: None
         self._sink = sink
         self._parent = parent
         self._lock = threading.Lock()
         self._poll = select.poll()
         self._poll.register(source, select.POLLIN)
-        self._heard: deque[bytes] = deque()
+        self._queue: deque[bytes] = deque()
         self._rest = bytearray()
         self._is_awaited = True
         self._since_ns = time.monotonic_ns()
@@ -125,102 +124,101 @@ class Exchange:
     # ---- for the thread that answers ----
 
     def greet(self, text: str) -> bool:
-        """Say who is here, and say whether the program asks for something then."""
+        """Send the greeting and wait for the first request; return False if none comes."""
         self.reply(text)
         deadline_ns = time.monotonic_ns() + int(HANDSHAKE_S * 1e9)
-        while not any(self._heard):
-            self._listen(LOOK_MS)
+        while not any(self._queue):
+            self._receive(POLL_MS)
             if self.has_left or time.monotonic_ns() > deadline_ns:
-                return any(self._heard)
+                return any(self._queue)
         return True
 
     def lines(self) -> Iterator[str]:
-        """Yield the requests, each when the one before has been answered, until the program has gone."""
+        """Yield requests, each after the answer to the one before, until the program leaves."""
         while (line := self._next()) is not None:
             if line.startswith(CANCEL):
                 write_all(self._sink, MARK + MARK_END + line[len(CANCEL) :][:1])
             elif line:
-                self.is_called_off = False
+                self.is_cancelled = False
                 self._since_ns = time.monotonic_ns()
                 self._is_awaited = True
                 yield line.decode("utf-8", errors="replace")
 
     def reply(self, text: str) -> None:
-        """Answer."""
+        """Send an answer."""
         with self._lock:
             self._is_awaited = self._is_unconfirmed = self.is_held = False
         write_all(self._sink, frame(text))
 
     def hand_over(self) -> bytes:
-        """Say and hear nothing more here: another does; return what the program has said."""
+        """Stop receiving and sending here, and return the unprocessed input for another receiver."""
         with self._lock:
             self._is_awaited = False
-            return b"".join(line + b"\n" for line in self._heard) + self._rest
+            return b"".join(line + b"\n" for line in self._queue) + self._rest
 
     @property
     def is_orphaned(self) -> bool:
-        """Say whether the program has gone that has started this process."""
+        """Whether the program that has started this process has ended."""
         return self._parent != 0 and os.getppid() != self._parent
 
-    def part(self) -> None:
-        """Close both ways, once, with a frame that says that the session goes on without this program."""
+    def close(self) -> None:
+        """Close the connection, once, after a frame that says that the session goes on without this program."""
         close, self._close = self._close, None
         if close is not None:
             with contextlib.suppress(OSError):
                 if _has_room(self._sink):
-                    write_all(self._sink, GOES_ON)
+                    write_all(self._sink, SESSION_GOES_ON)
             close()
 
-    # ---- for the pulse ----
+    # ---- for the heartbeat ----
 
     def beat(self) -> None:
-        """Say that the answer is still awaited if it takes long, and hear whether the program waits."""
+        """Announce a slow answer, and check whether the program still waits for it."""
         if not self._takes_long():
             return
         with self._lock:
             if not self._takes_long():
                 return
-            if len(self._heard) < HEARD_MAX:
-                self._listen(0)
+            if len(self._queue) < QUEUED_MAX:
+                self._receive(0)
             self.has_left = self.has_left or self.is_orphaned
-            is_cancelled = any(line.startswith(CANCEL) for line in self._heard)
-            self.is_called_off = self.is_called_off or self.has_left or is_cancelled
+            is_cancelled = any(line.startswith(CANCEL) for line in self._queue)
+            self.is_cancelled = self.is_cancelled or self.has_left or is_cancelled
             self.is_held = self._is_unconfirmed
             if not self._is_unconfirmed and not self.has_left and _has_room(self._sink):
                 with contextlib.suppress(OSError):
-                    write_all(self._sink, STILL)
+                    write_all(self._sink, BUSY)
                 self._is_unconfirmed = True
-        if self.is_called_off:
-            self.called_off()
+        if self.is_cancelled:
+            self.on_cancel()
 
     # ---- inside ----
 
     def _takes_long(self) -> bool:
-        return self._is_awaited and time.monotonic_ns() - self._since_ns >= PULSE_S * 1e9
+        return self._is_awaited and time.monotonic_ns() - self._since_ns >= HEARTBEAT_S * 1e9
 
     def _next(self) -> bytes | None:
-        """Return the next line; None when there will be none."""
+        """Return the next line; None when the program has left."""
         begin_ns = time.perf_counter_ns()
-        while not self._heard:
+        while not self._queue:
             if self.has_left:
                 return None
-            self._listen(0 if time.perf_counter_ns() - begin_ns < SPIN_NS else LOOK_MS)
-        return self._heard.popleft()
+            self._receive(0 if time.perf_counter_ns() - begin_ns < SPIN_NS else POLL_MS)
+        return self._queue.popleft()
 
-    def _listen(self, wait_ms: int) -> None:
-        """Take what the program says, waiting for it at most so long."""
+    def _receive(self, timeout_ms: int) -> None:
+        """Queue the lines that arrive within a timeout."""
         if self.has_left:
             return
-        if not self._poll.poll(wait_ms):
-            # Another child of Octave may hold the pipe open when Octave has gone.
-            self.has_left = wait_ms != 0 and self.is_orphaned
+        if not self._poll.poll(timeout_ms):
+            # Another child of Octave may hold the pipe open after Octave has ended.
+            self.has_left = timeout_ms != 0 and self.is_orphaned
             return
         try:
             piece = os.read(self.source, _READ_SIZE)
         except OSError:
             piece = b""
         self._take(piece)
-        # Nobody can mean a longer line.
         if not piece or len(self._rest) > LINE_MAX:
             self.has_left = True
 
@@ -236,33 +234,29 @@ class Exchange:
             elif not line and self._is_unconfirmed:
                 self._is_unconfirmed = False
             elif not self.has_left:
-                self._heard.append(line)
+                self._queue.append(line)
 
 
-class Pulse:
-    """A thread that does some things again and again.
+class Heartbeat:
+    """A thread that calls functions periodically.
 
     Attributes:
-        acts: What it does, each short and without an exception.
+        acts: The functions; each must be short and raise nothing.
     """
 
     def __init__(self) -> None:
         self.acts: list[Callable[[], None]] = []
-        self._is_over = threading.Event()
-        threading.Thread(target=self._run, name="kiks pulse", daemon=True).start()
-
-    def close(self) -> None:
-        """End it."""
-        self._is_over.set()
+        threading.Thread(target=self._run, name="kiks heartbeat", daemon=True).start()
 
     def _run(self) -> None:
-        while not self._is_over.wait(PULSE_S):
+        while True:
+            time.sleep(HEARTBEAT_S)
             for act in self.acts[:]:
                 act()
 
 
 def write_all(sink: int, data: bytes) -> None:
-    """Write all of something on a descriptor."""
+    """Write all bytes to a descriptor."""
     while data:
         data = data[os.write(sink, data) :]
 

@@ -1,8 +1,8 @@
-"""Arenas as the Matlab KiKS has them: matrices with row 1 on top, an element a millimetre, numbers for what is where.
+"""Arenas of the Matlab KiKS: matrices with row 1 on top, one element per millimetre, and codes for walls and things.
 
-Source: kiks-behaviour.md, sections 0 and 1.1. A user's x is the number of a column, y that of a row, both from 1: the
-middle of column x is x - 0.5 mm from the left edge. Angles are those of KiKS everywhere, as both turn counter-clockwise
-on the screen. Here alone the two are converted.
+Source: kiks-behaviour.md, sections 0 and 1.1. In the user's coordinates x is a column and y a row, both from 1: the
+middle of column x is x - 0.5 mm from the left edge. Angles need no conversion, as both turn counter-clockwise on the
+screen. Only this module converts coordinates.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from kiks.errors import ParameterError
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
 
 WALL, LIGHT, BALL, CYLINDER = 1, 2, 3, 4
-"""What positive elements stand for; negative ones are starts of robots, with the heading in degrees."""
+"""Codes of positive elements; negative ones are starts of robots, with the heading in degrees."""
 
 OBJECTS_MAX = 10_000
-"""Most elements of an arena that are not walls or floor."""
+"""Maximum number of robots, lights, balls and cylinders in an arena."""
 
 
 def place_mm(arena: Arena, x: float, y: float) -> tuple[float, float]:
-    """Return where a user's place is [mm], from the lower left corner."""
+    """Convert the user's coordinates to KiKS's [mm from the lower left corner]."""
     return x - 0.5, arena.height_mm + 0.5 - y
 
 
 def user_place(arena: Arena, x_mm: float, y_mm: float) -> tuple[float, float]:
-    """Return what the user calls a place [mm]."""
+    """Convert KiKS's coordinates [mm] to the user's."""
     return x_mm + 0.5, arena.height_mm + 0.5 - y_mm
 
 
@@ -45,15 +45,16 @@ def arena_of(
     """Return the arena of a matrix.
 
     Args:
-        codes: What is where, [row, column].
-        greys: Brightness of the walls, 1 to 255, in a matrix of the same size; where it has 0 they are as all.
-        wall: Brightness of the walls for which there is no other.
-        ball: Brightness of balls; the usual one if left out.
-        cylinder: Brightness of cylinders; the usual one if left out.
+        codes: Codes of walls, things and starts, [row, column].
+        greys: Brightness of the walls, 1 to 255, in a matrix of the same size; 0 stands for `wall`.
+        wall: Brightness of walls without an own one.
+        ball: Brightness of balls; the default if left out.
+        cylinder: Brightness of cylinders; the default if left out.
 
     Raises:
-        ParameterError: If an element stands for nothing, or the sizes differ.
-        ArenaError: If the arena is too small or too large, or something stands where it cannot.
+        ParameterError: If a code is unknown, a brightness is out of range, there are too many things, or the sizes
+            differ.
+        ArenaError: If the arena is too small or too large, or a thing has no free place.
 
     Example:
         >>> codes = np.zeros((200, 300)); codes[49, 99] = -270; codes[0] = 1
@@ -89,7 +90,7 @@ def arena_of(
     arena = Arena.from_array(picture, name="matrix")
 
     def places(elements: NDArray[np.bool_]) -> list[tuple[float, float]]:
-        """Return where elements are, down the columns, from the left."""
+        """Return the places of elements [mm] in column-major order."""
         columns, rows = np.nonzero(elements.T)
         return [place_mm(arena, x + 1.0, y + 1.0) for x, y in zip(columns.tolist(), rows.tolist(), strict=True)]
 
@@ -98,7 +99,7 @@ def arena_of(
         Pose(x_mm, y_mm, math.radians(-heading_deg % 360))
         for (x_mm, y_mm), heading_deg in zip(places(codes < 0), headings.tolist(), strict=True)
     ]
-    # The most negative element is the first robot's.
+    # The most negative element is the start of robot 1.
     order = np.argsort(headings, kind="stable")
     return replace(
         arena,

@@ -1,4 +1,4 @@
-"""What the user's preferences say of the next world."""
+"""The user's preferences for the next world."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from kiks.model.robot import Brightness, Response
 
 
 def _number(given: object) -> object:
-    """Return the number that a text is, a whole one if it is; anything else as it came."""
+    """Convert a text to an int or float; return anything else unchanged."""
     try:
         number = float(given) if isinstance(given, str) else given
     except ValueError:
@@ -37,22 +37,22 @@ Count = Annotated[Whole, Field(ge=1, le=1000)]
 
 @record
 class Settings:
-    """Preferences, as far as the simulator has to know them.
+    """The preferences that the simulator needs.
 
     Attributes:
         seed: Seed of all random numbers.
-        thinking: What the user's program costs between a reply and its next command.
+        thinking: Policy for the program's thinking time.
         robot: Kind of all robots.
-        robots: How many there are; as many as there are starts if None.
-        response: What makes counts of proximity sensors' rays; what the robot's file says if None.
-        noise: Whether chance has a say in what sensors read.
-        turrets: What each robot carries.
-        wall: Brightness of walls for which there is no other.
-        ball: Brightness of balls; the usual one if None.
-        cylinder: Brightness of cylinders; the usual one if None.
-        brightness: Brightness of robots; that of their file if None.
-        programs: How many programs begin together; with 1 whoever comes begins.
-        latency_s: What each exchange takes on top of all else [s], as a calibration has measured it.
+        robots: Number of robots; None for the number of starts.
+        response: Model of the proximity sensors; None for that of the robot's file.
+        noise: Whether sensors are noisy.
+        turrets: Turrets of each robot.
+        wall: Brightness of walls without an own one.
+        ball: Brightness of balls; None for the default.
+        cylinder: Brightness of cylinders; None for the default.
+        brightness: Brightness of robots; None for that of their file.
+        programs: Number of programs that start together; with 1, each starts as it joins.
+        latency_s: Extra time of each exchange [s], as measured by a calibration.
     """
 
     seed: Annotated[Seed, _NUMBER] = 0
@@ -72,10 +72,10 @@ class Settings:
     latency_s: Annotated[Number, Field(ge=0, le=10), _NUMBER] = 0.0
 
     def changed(self, name: str, value: str) -> Settings:
-        """Return a copy with one value that the user has written; the usual one if that is nothing.
+        """Return a copy with one changed value; an empty text stands for the default.
 
         Raises:
-            ParameterError: If there is no such setting, or the value is none of its kind.
+            ParameterError: If there is no such setting, or the value is invalid.
 
         Example:
             >>> Settings().changed("seed", "7").seed
@@ -86,16 +86,16 @@ class Settings:
 
     @property
     def folder(self) -> Path:
-        """Where the robot's file lies, if it is one."""
+        """The folder of the robot's file."""
         return Path(self.robot).parent
 
     def project_of(self, arena: Arena) -> Project:
-        """Return the world of an arena with these settings; files in it are looked for in `folder`.
+        """Return the project of an arena with these settings; its paths are relative to `folder`.
 
         Raises:
             ParameterError: If a value is out of range.
         """
-        # A world has a robot, even where the first program is to bring one.
+        # A world needs a robot, even if the arena has no start.
         count = max(len(arena.starts) if self.robots is None else self.robots, 1)
         robot = ProjectRobot(kind=Path(self.robot).name, turrets=self.turrets, brightness=self.brightness)
         return Project(

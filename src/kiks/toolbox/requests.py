@@ -1,4 +1,4 @@
-"""What the toolbox may ask for: a table, and what each of its rows does."""
+"""The requests of the toolbox: a table of handlers, and the handlers of sessions and ports."""
 
 from __future__ import annotations
 
@@ -26,31 +26,31 @@ from kiks.toolbox.world_requests import (
 from kiks.version import __version__
 
 WORDS_MAX = 100_000
-"""Longest request other than for a world."""
+"""Longest request, except for a world [characters]."""
 
 ANSWER_MAX = 90_000_000
-"""Longest answer: a frame tells its length in eight digits."""
+"""Longest answer [characters]: a frame has eight digits for its length."""
 
 BAUD_MAX = 1e7
 
 REASON_MAX = 400
-"""Longest reason for a refusal; a longer one is cut in the middle."""
+"""Longest error message [characters]; a longer one is cut in the middle."""
 
 PATH_MAX = 4000
-"""Longest name of a file."""
+"""Longest file name [characters]."""
 
 PAUSE_MAX_S = 1e6
-"""Longest pause: eleven days."""
+"""Longest pause [s]: eleven days."""
 
 _log = logging.getLogger("kiks.toolbox")
 
 Act = Callable[[SessionClient, str], str]
 
 
-def answer(visitor: SessionClient, line: str) -> str:
-    """Return the answer to a line, never an exception."""
+def answer(client: SessionClient, line: str) -> str:
+    """Return the answer to a request line; never raises."""
     name, _, words = line.partition(" ")
-    visitor.asked = 0
+    client.asked = 0
     try:
         act = REQUESTS.get(name)
         if act is None:
@@ -62,13 +62,13 @@ def answer(visitor: SessionClient, line: str) -> str:
             raise ParameterError(
                 f"a request must have at most {WORDS_MAX} characters, but this one, {shown(name)}, has {len(words)}."
             )
-        result = act(visitor, words)
+        result = act(client, words)
         if len(result) > ANSWER_MAX:
             raise ParameterError(
                 f"an answer must have at most {ANSWER_MAX} characters, but this one, to {shown(name)}, has "
                 f"{len(result)}. Ask for less: a path begins anew when the port is opened anew."
             )
-        return f"+{visitor.clock()}{result}"
+        return f"+{client.clock()}{result}"
     except KiksError as error:
         why = str(error)
     except OSError as error:
@@ -80,18 +80,14 @@ def answer(visitor: SessionClient, line: str) -> str:
         why = f"KiKS itself has failed at {shown(name)}: {shown(error)}. Please tell its makers."
     if len(why) > REASON_MAX:
         why = f"{why[: REASON_MAX // 2]} ... {why[-REASON_MAX // 4 :]}"
-    return f"-{visitor.clock()}{escape(why)}"
+    return f"-{client.clock()}{escape(why)}"
 
 
 # ---- worlds ----
 
 
-def _version(visitor: SessionClient, words: str) -> str:
-    return __version__
-
-
 def _path(text: str) -> str:
-    """Return the name of a file that a text is."""
+    """Return the file name in a text."""
     path = unescape(text)
     if "\0" in path or not 0 < len(path) <= PATH_MAX:
         raise ParameterError(
@@ -100,45 +96,37 @@ def _path(text: str) -> str:
     return path
 
 
-def _set(visitor: SessionClient, words: str) -> str:
+def _set(client: SessionClient, words: str) -> str:
     name, _, value = words.partition(" ")
-    visitor.session.settings = visitor.session.settings.changed(name, unescape(value))
+    client.session.settings = client.session.settings.changed(name, unescape(value))
     return ""
 
 
-def _world(visitor: SessionClient, words: str) -> str:
-    session = visitor.session
+def _world(client: SessionClient, words: str) -> str:
+    session = client.session
     kind, _, rest = words.partition(" ")
     if kind == "default":
-        session.begin_default()
+        session.begin_arena(Arena.default())
     elif kind == "file":
         session.begin_file(_path(rest))
     elif kind == "matrix":
-        session.begin_arena(_arena(visitor, rest))
+        session.begin_arena(_arena(client, rest))
     else:
         raise ParameterError(f"a world must be default, file or matrix, but it was {shown(kind)}.")
-    # Its ports were those of the world before; nobody is surprised who has asked for another.
-    visitor.close(0)
+    # They belonged to the old world, and this client asked for a new one: no error.
+    client.close(0)
     return ""
 
 
-def _arena(visitor: SessionClient, text: str) -> Arena:
+def _arena(client: SessionClient, text: str) -> Arena:
     codes, *greys = matrices_of(text)
-    settings = visitor.session.settings
+    settings = client.session.settings
     return arena_of(codes, *greys, wall=settings.wall, ball=settings.ball, cylinder=settings.cylinder)
 
 
-def _active(visitor: SessionClient, words: str) -> str:
-    return str(int(visitor.session.desk is not None))
-
-
-def _desk(visitor: SessionClient, words: str) -> str:
-    return visitor.session.url
-
-
-def _save(visitor: SessionClient, words: str) -> str:
+def _save(client: SessionClient, words: str) -> str:
     path = _path(words)
-    project = visitor.session.present_project()
+    project = client.session.present_project()
     suffix = Path(path).suffix.lower()
     if suffix == ".kiks":
         project.save(path)
@@ -151,108 +139,93 @@ def _save(visitor: SessionClient, words: str) -> str:
     return ""
 
 
-def _read(visitor: SessionClient, words: str) -> str:
-    return matrix_text(Arena.load(_path(words)).brightness[::-1])
-
-
-def _print(visitor: SessionClient, words: str) -> str:
-    if visitor.session.desk is not None:
-        visitor.session.desk.say(unescape(words))
+def _print(client: SessionClient, words: str) -> str:
+    if client.session.desk is not None:
+        client.session.desk.say(unescape(words))
     return ""
 
 
-def _checkpoint(visitor: SessionClient, words: str) -> str:
-    visitor.do(lambda sim: None)
-    visitor.session.mark()
+def _checkpoint(client: SessionClient, words: str) -> str:
+    client.do(lambda sim: None)
+    client.session.mark()
     return ""
 
 
-def _reset(visitor: SessionClient, words: str) -> str:
-    visitor.do(lambda sim: None)
-    visitor.session.reset()
+def _reset(client: SessionClient, words: str) -> str:
+    client.do(lambda sim: None)
+    client.session.reset()
     return ""
-
-
-def _state(visitor: SessionClient, words: str) -> str:
-    return visitor.do(lambda sim: sim.state_hash())
 
 
 # ---- ports ----
 
 
-def _open(visitor: SessionClient, words: str) -> str:
+def _open(client: SessionClient, words: str) -> str:
     number, _, rest = words.partition(" ")
     (baud,) = numbers_of(rest.split(), 1, "baud")
     if not port_of(number) or not 0 < baud <= BAUD_MAX:
         raise ParameterError(
             f"a simulated port must be -1, -2 and so on, and have a speed, but it was {shown(words)}. Open [-1 9600 1]."
         )
-    visitor.open(port_of(number), round(baud))
+    client.open(port_of(number), round(baud))
     return ""
 
 
-def _close(visitor: SessionClient, words: str) -> str:
-    visitor.close(port_of(words))
+def _close(client: SessionClient, words: str) -> str:
+    client.close(port_of(words))
     return ""
 
 
-def _send(visitor: SessionClient, words: str) -> str:
+def _send(client: SessionClient, words: str) -> str:
     number, _, text = words.partition(" ")
-    return escape(visitor.send(port_of(number), unescape(text)))
+    return escape(client.send(port_of(number), unescape(text)))
 
 
-def _ask(visitor: SessionClient, words: str) -> str:
+def _ask(client: SessionClient, words: str) -> str:
+    """Send a command without escape sequences."""
     number, _, text = words.partition(" ")
-    return escape(visitor.send(port_of(number), text + "\n"))
+    return escape(client.send(port_of(number), text + "\n"))
 
 
-def _listen(visitor: SessionClient, words: str) -> str:
-    return escape(visitor.listen(port_of(words)))
-
-
-def _time(visitor: SessionClient, words: str) -> str:
-    time_s = visitor.time_s(port_of(words))
+def _time(client: SessionClient, words: str) -> str:
+    time_s = client.time_s(port_of(words))
     return "" if time_s is None else number_text(time_s)
 
 
-def _pass(visitor: SessionClient, words: str) -> str:
-    visitor.opened(port_of(words)).port.ask_ns()
+def _pass(client: SessionClient, words: str) -> str:
+    client.opened(port_of(words)).port.ask_ns()
     return ""
 
 
-def _pause(visitor: SessionClient, words: str) -> str:
+def _pause(client: SessionClient, words: str) -> str:
     (seconds,) = numbers_of(words.split(), 1, "a pause")
     if not 0 <= seconds <= PAUSE_MAX_S:
         raise ParameterError(f"a pause must be a time from 0 to {PAUSE_MAX_S:g} s, but it was {seconds:g}.")
-    visitor.pause(seconds)
+    client.pause(seconds)
     return ""
 
 
-def _pace(visitor: SessionClient, words: str) -> str:
-    return numbers_text(100.0 * speed for speed in visitor.pace())
-
-
 REQUESTS: dict[str, Act] = {
-    "version": _version,
+    "version": lambda client, words: __version__,
     "set": _set,
     "world": _world,
-    "active": _active,
-    "desk": _desk,
+    "active": lambda client, words: str(int(client.session.desk is not None)),
+    "desk": lambda client, words: client.session.url,
     "save": _save,
-    "read": _read,
+    "read": lambda client, words: matrix_text(Arena.load(_path(words)).brightness[::-1]),
     "print": _print,
     "checkpoint": _checkpoint,
     "reset": _reset,
-    "state": _state,
+    "state": lambda client, words: client.do(lambda sim: sim.state_hash()),
     "open": _open,
     "close": _close,
     "send": _send,
     "ask": _ask,
-    "listen": _listen,
+    "listen": lambda client, words: escape(client.listen(port_of(words))),
     "time": _time,
     "pass": _pass,
     "pause": _pause,
-    "pace": _pace,
+    "pace": lambda client, words: numbers_text(100.0 * speed for speed in client.pace()),
     "pose": ask_pose,
     "path": ask_path,
     "distances": ask_distances,
@@ -261,4 +234,4 @@ REQUESTS: dict[str, Act] = {
     "set_object": ask_set_object,
     "spawn": ask_spawn,
 }
-"""Requests by name."""
+"""Handlers of requests by name."""

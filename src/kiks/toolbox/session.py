@@ -1,4 +1,4 @@
-"""A session: one world at a time, and what all who take part in it share."""
+"""A session: one world at a time, shared by its clients."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Protocol
 from kiks.clock.gate import Gate
 from kiks.errors import LinkError
 from kiks.model.arena import Arena
-from kiks.model.project import Project, ProjectRobot
+from kiks.model.project import Project
 from kiks.ports.program_process import Command
 from kiks.ports.programs import Programs
 from kiks.sim.from_project import simulation_of, spec_of
@@ -25,42 +25,41 @@ if TYPE_CHECKING:
     from kiks.desk.server.show import Shown
 
 WAIT_S = 0.05
-"""Longest time for which the world does not look around [s of real time]."""
+"""Longest wait of one round [s of real time]."""
 
 SLICE_NS = NS_PER_S // 50
-"""Simulated time that passes in one go while a program thinks [ns]."""
+"""Simulated time that passes in one piece while a program thinks [ns]."""
 
 PATH_PERIOD_S = 0.04
 """Time between two points of a path [s]: KiKS moved its robot 25 times a second (kiks-behaviour.md 7.1)."""
 
 
-class Client(Protocol):
-    """What a session asks of a program that takes part in it; see `kiks.toolbox.session_client.SessionClient`."""
+class ThinkingClient(Protocol):
+    """A client whose thinking time can pass as it happens."""
 
-    def live(self, slice_ns: int) -> bool:
-        """Let time pass as the wall clock does, while the program thinks; return whether any has."""
-        ...
+    def live(self, time_ns: int) -> bool:
+        """Let time pass [ns] while the program thinks; return whether it did."""
 
 
 class Session:
-    """A world on a desk, whether there is a browser or not.
+    """A world on a desk, with or without a browser.
 
     Args:
-        ready: Called once, before the first world: gets the engine ready.
+        ready: Prepares the engine; called once, before the first world.
         has_window: Whether the desk is shown in a browser.
 
     Attributes:
-        settings: What is wanted of the next world.
-        desk: The world and all that belongs to it; None before the first.
+        settings: Settings of the next world.
+        desk: The desk of the world; None before the first.
         clients: The programs that take part.
-        owners: Who has which robot as its own, by the robot's number.
-        lock: Held by whoever makes a world or takes a robot.
+        owners: The client that owns each robot, by the robot's number.
+        lock: Held while a client creates a world or takes a robot.
     """
 
     def __init__(self, *, ready: Callable[[], None] = lambda: None, has_window: bool = False) -> None:
         self.settings = Settings()
         self.desk: Desk | None = None
-        self.clients: list[Client] = []
+        self.clients: list[ThinkingClient] = []
         self.owners: dict[int, object] = {}
         self.lock = threading.RLock()
         self._ready = ready
@@ -76,24 +75,22 @@ class Session:
         Raises:
             LinkError: If there is none yet.
         """
-        if self.desk is None:
-            raise LinkError("there must be a world first, but none was begun. Call kiks(ARENA) or kiks_kopen.")
-        return self.desk.sim
+        return self._present_desk().sim
 
     @property
     def url(self) -> str:
-        """Where a browser finds the desk; nothing if it is not shown."""
+        """URL of the desk; an empty text if it is not shown."""
         return "" if self._shown is None else self._shown.url
 
     def begin(self, project: Project, folder: Path) -> None:
-        """Put a world in the place of the one that there is, if any.
+        """Begin a world in place of the present one.
 
         Args:
-            project: The world.
-            folder: Where its files lie.
+            project: The project of the world.
+            folder: The folder of its files.
 
         Raises:
-            KiksError: If it is none.
+            KiksError: If the project is not valid.
         """
         from kiks.desk.server.desk import Desk
 
@@ -104,7 +101,6 @@ class Session:
                 self.desk = Desk(
                     sim,
                     project=project,
-                    # Who looks on wants to see something.
                     speed=1.0 if self._has_window else None,
                     folder=folder,
                     owns_world=True,
@@ -120,22 +116,18 @@ class Session:
             self._has_world.set()
 
     def begin_arena(self, arena: Arena) -> None:
-        """Begin the world of an arena with the settings that there are.
+        """Begin the world of an arena with the present settings.
 
         Raises:
             KiksError: If they do not fit each other.
         """
         self.begin(self.settings.project_of(arena), self.settings.folder)
 
-    def begin_default(self) -> None:
-        """Begin the classic arena with the settings that there are."""
-        self.begin_arena(Arena.default())
-
     def begin_file(self, path: str) -> None:
-        """Begin the world of a file: a project as it is, any other arena with the settings that there are.
+        """Begin the world of a file: a project with its own settings, or an arena with the present ones.
 
         Raises:
-            ArenaError: If the file is none.
+            ArenaError: If the file is neither.
         """
         if path.lower().endswith(".kiks"):
             self.begin(Project.load(path), Path(path).parent)
@@ -143,24 +135,24 @@ class Session:
             self.begin_arena(Arena.load(path))
 
     def trace(self) -> None:
-        """See to it that paths are kept from now on, if they are not."""
+        """Record the paths of all robots in this world from now on."""
         if self._traced is not self.world:
             self._traced = self.world
             self._traced.record_paths(PATH_PERIOD_S)
 
     def take_robot(self, owner: object, wanted: int) -> int:
-        """Return the number of a robot that belongs to somebody from now on: the wanted, a free or a new one.
+        """Assign a robot to a client: the wanted, a free or a new one; return its number.
 
         Args:
-            owner: Who it belongs to.
-            wanted: Number of the robot that would be best.
+            owner: The client.
+            wanted: Number of the preferred robot.
 
         Raises:
-            KiksError: If there is no room for one more.
+            KiksError: If there is no room for another robot.
         """
         with self.lock:
-            sim, desk = self.world, self.desk
-            assert desk is not None
+            desk = self._present_desk()
+            sim = desk.sim
             robots: list[int] = [wanted, *range(1, sim.robot_count + 1)]
             for robot in robots:
                 is_there = robot <= sim.robot_count
@@ -168,58 +160,48 @@ class Session:
                     self.owners[robot] = owner
                     return robot
             plan = desk.project.robots[-1]
-            came = sim.add_robot(spec_of(plan, desk.project, desk.folder))
-            self._equip(came, plan)
-            self.owners[came] = owner
-            return came
+            added = sim.add_robot(spec_of(plan, desk.project, desk.folder))
+            for turret in plan.turrets:
+                sim.fit(added, turret)
+            desk.project = replace(desk.project, robots=(*desk.project.robots, replace(plan, name="", program=None)))
+            desk.tell()
+            self.mark()
+            self.owners[added] = owner
+            return added
 
-    def _equip(self, robot: int, plan: ProjectRobot) -> None:
-        """Give a robot that has come what the others carry, and let it be seen."""
-        desk, sim = self.desk, self.world
-        assert desk is not None
-        for turret in plan.turrets:
-            sim.fit(robot, turret)
-        desk.project = replace(desk.project, robots=(*desk.project.robots, replace(plan, name="", program=None)))
-        desk.tell()
-        self.mark()
-
-    def leave(self, owner: object) -> None:
-        """Let the robots of somebody who goes belong to others."""
+    def release_robots(self, owner: object) -> None:
+        """Let other clients take the robots of a client that leaves."""
         with self.lock:
-            self.owners = {robot: who for robot, who in self.owners.items() if who is not owner}
+            self.owners = {robot: client for robot, client in self.owners.items() if client is not owner}
 
     def mark(self) -> None:
-        """Remember where everything stands."""
+        """Take a checkpoint."""
         if self.desk is not None:
             asyncio.run(self.desk.mark())
 
     def reset(self) -> None:
-        """Put everything back where it stood when that was remembered.
+        """Restore the checkpoint.
 
         Raises:
             LinkError: If there is no world.
         """
-        _ = self.world
-        assert self.desk is not None
-        asyncio.run(self.desk.reset())
+        asyncio.run(self._present_desk().reset())
 
     def present_project(self) -> Project:
-        """Return the project with everything where it is now.
+        """Return the project with the present poses.
 
         Raises:
             LinkError: If there is no world.
         """
-        _ = self.world
-        assert self.desk is not None
-        return asyncio.run(self.desk.present_project())
+        return asyncio.run(self._present_desk().present_project())
 
     # ---- the thread that moves the world ----
 
     def round(self) -> None:
-        """Do what may be done, and listen to those who take part; nothing moves unless one of them lets it.
+        """Move the world as far as its programs let it, and handle their requests.
 
-        At a pace that people see, thinking that is measured passes as it happens: who has let a robot drive sees it
-        drive while the next command is being typed, and does not wait afterwards for that to pass.
+        At real-time speeds, measured thinking time passes as it happens: the robot drives on while a person types the
+        next command, and the command does not wait for that time afterwards.
         """
         if not self._has_world.wait(WAIT_S):
             return
@@ -231,16 +213,21 @@ class Session:
         desk.clear_away()
 
     def let_go(self) -> None:
-        """Let time pass even if the world is paused: nobody is there any more who could want that."""
+        """Let time pass even if the world is paused, when all clients have left."""
         if self.desk is not None:
             self.desk.gate.close()
 
     def close(self) -> None:
-        """End the world, and all programs in it."""
+        """End the world and all programs in it."""
         if self._shown is not None:
             self._shown.close()
         elif self.desk is not None:
             self.desk.close()
+
+    def _present_desk(self) -> Desk:
+        if self.desk is None:
+            raise LinkError("there must be a world first, but none was begun. Call kiks(ARENA) or kiks_kopen.")
+        return self.desk
 
     def _new_programs(self, sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
         return Programs(

@@ -1,15 +1,16 @@
-"""One Octave or MATLAB: the ports that its program has open, and the time in which it lives."""
+"""A client of a session: one Octave or MATLAB with its open ports and its simulated time."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NoReturn, TypeVar
+from typing import TypeVar
 
 from kiks.clock.program_clock import ProgramClock
 from kiks.errors import LinkError
-from kiks.ports.local_link import Awaited, NearConnection, Patient, VisitorLine
+from kiks.model.arena import Arena
+from kiks.ports.local_link import AwaitedAnswer, LocalConnection, PendingAnswer, SharedLine
 from kiks.ports.messages import Kind
 from kiks.sim.port import VirtualPort
 from kiks.sim.simulation import Simulation
@@ -17,29 +18,29 @@ from kiks.toolbox.session import Session
 from kiks.units import s_from_ns
 
 ANSWER_S = 10.0
-"""Longest time that a reply is waited for [s of simulated time]: a picture at 300 baud takes that."""
+"""Timeout of a reply [s of simulated time]: a camera picture at 300 baud takes that."""
 
 SILENCE_S = 0.1
-"""After so long a silence a robot has said everything [s of simulated time]."""
+"""Silence after which all replies have arrived [s of simulated time]."""
 
 Result = TypeVar("Result")
 
 
 @dataclass
 class OpenPort:
-    """A port that is open.
+    """An open port.
 
     Attributes:
         port: The port.
         robot: Number of the robot at its other end, from 1.
-        opened_ns: When it was opened [ns of simulated time].
-        opened_wall_s: The same of real time [s].
-        way_mm: What the robot had driven by then, forwards and backwards [mm].
-        start_mm: Where it stood then [mm].
-        is_clean: Whether every reply that was on its way has been read.
-        unfinished: What was sent since the last terminator.
-        last_ns: When it was last asked how fast time passes [ns of simulated time].
-        last_wall_s: The same of real time [s].
+        opened_ns: Simulated time of its opening [ns].
+        opened_wall_s: Real time of its opening [s].
+        way_mm: Distances that the robot had driven by then, forwards and backwards [mm].
+        start_mm: Place of the robot at that time [mm].
+        last_ns: Simulated time of the last call of `SessionClient.pace` [ns].
+        last_wall_s: Real time of that call [s].
+        is_clean: Whether all expected replies have been read.
+        unfinished: The characters sent since the last terminator.
     """
 
     port: VirtualPort
@@ -57,30 +58,30 @@ class OpenPort:
 class SessionClient:
     """A program in another process that takes part in a session.
 
-    While it has a port open it is one of those whom the world waits for, as programs of `kiks run` are; its thinking is
-    what passes between an answer and its next request.
+    While it has an open port, the world waits for it as for a program of `kiks run`. Its thinking time is the time
+    between an answer and its next request.
 
     Args:
         session: The session.
-        number: Its number, from 1 in the order in which they came.
-        awaited: Whether it still waits for the answer under way; as long as it takes if left out.
+        number: Its number, from 1 in the order of joining.
+        pending: State of the answer under way; if left out, the program waits for every answer.
 
     Attributes:
-        ports: The ports that are open, by number: 1 for port -1.
+        ports: The open ports by number: 1 for port -1.
         openings: The last opening of each port in this world.
-        asked: Number of the port that the present request has to do with; 0 for none.
+        asked: Number of the port that the present request concerns; 0 for none.
     """
 
-    def __init__(self, session: Session, number: int, awaited: Awaited | None = None) -> None:
+    def __init__(self, session: Session, number: int, pending: PendingAnswer | None = None) -> None:
         self.session = session
-        self._awaited = Patient() if awaited is None else awaited
+        self._pending = AwaitedAnswer() if pending is None else pending
         self.number = number
         self.name = f"program {number} (Octave or MATLAB)"
         self.asked = 0
         self.ports: dict[int, OpenPort] = {}
         self.openings: dict[int, OpenPort] = {}
         self._sim: Simulation | None = None
-        self._connection: NearConnection | None = None
+        self._connection: LocalConnection | None = None
         session.clients.append(self)
 
     # ---- ports ----
@@ -90,7 +91,7 @@ class SessionClient:
 
         Raises:
             LinkError: If it is open already.
-            KiksError: If there is no room for its robot, or no such speed.
+            KiksError: If there is no room for its robot, or the baud rate is not valid.
         """
         session = self.session
         if number in self.ports:
@@ -98,17 +99,17 @@ class SessionClient:
                 f"port {-number} must be closed before it is opened, but it is open. Use kiks_kclose([]) first."
             )
         if session.desk is None:
-            session.begin_default()
+            session.begin_arena(Arena.default())
         sim = session.world
         if sim is not self._sim:
             self._lose_world()
             self._sim = sim
         if self._connection is None:
             assert session.desk is not None
-            self._connection = NearConnection(session.desk.programs, self.name, self.number, self._awaited)
+            self._connection = LocalConnection(session.desk.programs, self.name, self.number, self._pending)
         if not self.ports:
             self._connection.wake()
-            # Anew, so that what passed while no port was open is not taken for thinking.
+            # A new clock, so that the time without an open port does not count as thinking.
             assert session.desk is not None
             self._program = ProgramClock(session.desk.project.thinking)
         try:
@@ -117,10 +118,10 @@ class SessionClient:
             self._rest_if_idle()
         self.asked = number
 
-    def _open(self, number: int, baud: int, connection: NearConnection, sim: Simulation) -> OpenPort:
+    def _open(self, number: int, baud: int, connection: LocalConnection, sim: Simulation) -> OpenPort:
         known = self.openings.get(number)
         robot = self.session.take_robot(self, self._usual_robot(number)) if known is None else known.robot
-        port = VirtualPort(VisitorLine(connection, sim, robot), self._program)
+        port = VirtualPort(SharedLine(connection, sim, robot), self._program)
         port.baudrate = baud
         port.claim(f"{self.name}, port {-number}")
         port.timeout = ANSWER_S
@@ -133,7 +134,7 @@ class SessionClient:
         return OpenPort(port, robot, now_ns, now_s, (forwards_mm, backwards_mm), (x_mm, y_mm), now_ns, now_s)
 
     def close(self, number: int) -> None:
-        """Close a port, or all of them if it is 0; no error if it is not open. The robot drives on."""
+        """Close a port, or all ports for number 0; ignore a closed one. The robot drives on."""
         if self.ports and self._sim is not self.session.world:
             self._lose_world()
         for each in list(self.ports) if number == 0 else [number]:
@@ -143,22 +144,22 @@ class SessionClient:
         self._rest_if_idle()
 
     def leave(self) -> None:
-        """Go: what was said is still done, and the robots belong to others."""
+        """Leave the session: earlier requests are still done, and other clients may take the robots."""
         self._lose_world()
-        self.session.leave(self)
+        self.session.release_robots(self)
         self.session.clients.remove(self)
 
-    def call_off(self) -> None:
-        """Let the request end that is under way; any thread may say so."""
+    def cancel(self) -> None:
+        """Cancel the request under way; from any thread."""
         connection = self._connection
         if connection is not None:
-            connection.call_off()
+            connection.cancel()
 
     def opened(self, number: int) -> OpenPort:
-        """Return a port that is open.
+        """Return an open port.
 
         Raises:
-            LinkError: If it is not.
+            LinkError: If it is not open, or its world was replaced.
         """
         opened = self.ports.get(number)
         if opened is None:
@@ -166,14 +167,18 @@ class SessionClient:
                 f"port {-number} must be open, but it is not. Open it: ref = kiks_kopen([{-number} 9600 1])."
             )
         if self._sim is not self.session.world:
-            self._is_over()
+            self._lose_world()
+            raise LinkError(
+                "the port must belong to the present world, but another world has taken its place. Open the port "
+                "again: ref = kiks_kopen([-1 9600 1])."
+            )
         self.asked = number
         return opened
 
-    # ---- what goes over the line ----
+    # ---- the line ----
 
     def send(self, number: int, text: str) -> str:
-        """Send characters and return the reply without its end; nothing if no terminator was among them."""
+        """Send characters and return the first reply without its line end; an empty text without a terminator."""
         opened = self.opened(number)
         port, data = opened.port, text.encode("latin-1", errors="replace")
         if not opened.is_clean:
@@ -183,14 +188,14 @@ class SessionClient:
         if latency_s:
             port.sleep(latency_s)
         port.write(data)
-        # Empty lines are not answered, and of several commands at once the first is what was asked.
+        # The robot does not answer empty lines.
         *commands, opened.unfinished = (opened.unfinished + data).replace(b"\r", b"\n").split(b"\n")
         replies = [port.read_until(b"\n") for command in commands if command]
         opened.is_clean = all(reply.endswith(b"\n") for reply in replies)
         return replies[0].rstrip(b"\r\n").decode("ascii", errors="replace") if replies else ""
 
     def listen(self, number: int) -> str:
-        """Return what else comes, until the line is silent."""
+        """Return all characters that arrive until the line is silent."""
         port = self.opened(number).port
         heard = b""
         port.timeout = SILENCE_S
@@ -204,9 +209,9 @@ class SessionClient:
     # ---- time ----
 
     def clock(self) -> str:
-        """Return which port was asked and the time since it was opened [s], in 19 characters; 0 for none.
+        """Return the port of the request and the time since its opening [s], in 19 characters; 0 for no port.
 
-        The number is negative if thinking is measured: then more time has passed when somebody looks later.
+        The number is negative if thinking is measured: then time passes on between requests.
         """
         opened = self.ports.get(self.asked)
         if opened is None or self._connection is None:
@@ -215,7 +220,7 @@ class SessionClient:
         return f"{number:3d}{s_from_ns(self._connection.now_ns - opened.opened_ns):16.9f}"
 
     def time_s(self, number: int) -> float | None:
-        """Return the simulated time since a port was opened [s]; None if it is not."""
+        """Return the simulated time since a port was opened [s]; None if it is closed."""
         if number not in self.ports:
             return None
         opened = self.opened(number)
@@ -232,12 +237,12 @@ class SessionClient:
         self.opened(next(iter(self.ports))).port.sleep(seconds)
 
     def live(self, time_ns: int) -> bool:
-        """Let time pass [ns] while the program thinks, and say whether it did."""
+        """Let time pass [ns] while the program thinks; return whether it did."""
         connection = self._connection
         return connection is not None and connection.live(time_ns)
 
     def pace(self) -> tuple[float, float]:
-        """Return how fast simulated time has passed, since a port was opened and since this was last asked."""
+        """Return the speed of simulated time since a port was opened and since the last call; 1 is real time."""
         if not self.ports:
             return 1.0, 1.0
         opened = self.opened(next(iter(self.ports)))
@@ -250,21 +255,21 @@ class SessionClient:
     # ---- the world ----
 
     def do(self, act: Callable[[Simulation], Result]) -> Result:
-        """Do something with the world, locked, at the program's own time.
+        """Call a function with the locked world at the program's own time.
 
         Raises:
             LinkError: If there is no world.
         """
         sim = self.session.world
         if self.ports:
-            # Asking and asking lets time pass, so that who waits for something to happen does not wait for ever.
+            # Polling takes simulated time, so that a program that polls the world does not wait for ever.
             self.opened(next(iter(self.ports))).port.ask_ns()
             self._meet()
         with sim.lock:
             return act(sim)
 
     def robot(self, number: int) -> int | None:
-        """Return the number of the robot behind a port, open or not; None if it has none yet."""
+        """Return the number of the robot of an open or closed port; None if it has none yet."""
         if self._sim is self.session.world and number in self.openings:
             return self.openings[number].robot
         robot = self._usual_robot(number)
@@ -274,21 +279,21 @@ class SessionClient:
     # ---- inside ----
 
     def _usual_robot(self, number: int) -> int:
-        """Return which robot a port has if nobody else has it: the first program begins with robot 1, and so on."""
+        """Return the preferred robot of a port: the ports of program 1 begin with robot 1, and so on."""
         return self.number + number - 1
 
     def _meet(self) -> None:
-        """Let the world come to where the program is in time."""
+        """Advance the world to the program's time."""
         connection, sim = self._connection, self._sim
         assert connection is not None
         assert sim is not None
         now_ns = connection.ask(Kind.MEET).now_ns
-        # Everybody else acts later, and what robots do before is done.
+        # All other programs act later.
         with sim.lock:
             sim.advance_to(now_ns)
 
     def _rest_if_idle(self) -> None:
-        """Let the world go on when no port is open: nobody waits for a program that has nothing to do with robots."""
+        """Let the world run without this program while it has no open port."""
         if not self.ports and self._connection is not None:
             self._connection.rest()
 
@@ -298,11 +303,3 @@ class SessionClient:
         if self._connection is not None:
             self._connection.close()
             self._connection = None
-
-    def _is_over(self) -> NoReturn:
-        """Say that the world has gone in which the ports were."""
-        self._lose_world()
-        raise LinkError(
-            "the port must belong to the world that there is, but another world has taken its place. Open the port "
-            "again: ref = kiks_kopen([-1 9600 1])."
-        )

@@ -1,4 +1,4 @@
-"""Where sessions are found: files that this user alone can read and write, each locked while its session lives."""
+"""Session files, by which programs find sessions: readable by this user alone, and locked while the session runs."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from kiks.ports.pty import default_folder
 from kiks.version import __version__
 
 FILE_MAX = 1000
-"""Most bytes of a file that tells of a session."""
+"""Maximum size of a session file [bytes]."""
 
 CONNECT_S = 10.0
-"""How long a session on this computer is waited for that does not let anybody in [s of real time]."""
+"""Timeout of a connection to a session [s of real time]."""
 
 _PREFIX = "session-"
 
 
-class Door(NamedTuple):
-    """Where a session is found.
+class SessionAddress(NamedTuple):
+    """Address of a session on this computer.
 
     Attributes:
-        number: Its number, that of its process.
+        number: Number of the session and of its process.
         port: Its TCP port.
-        token: What has to be said first there.
+        token: The token that a client must send first.
     """
 
     number: int
@@ -37,20 +37,20 @@ class Door(NamedTuple):
     token: str
 
     def line(self) -> str:
-        """Return it as the toolbox reads it."""
+        """Return the line that the toolbox reads."""
         return f"KiKS {__version__} session {self.number} port {self.port} token {self.token}\n"
 
     @staticmethod
-    def parse(line: bytes) -> Door | None:
-        """Return the door that a file tells of; None if it tells of none."""
+    def parse(line: bytes) -> SessionAddress | None:
+        """Parse the line of a session file; return None if it is not valid."""
         try:
             words = line.decode("ascii").split()
-            return Door(int(words[3]), int(words[5]), words[7])
+            return SessionAddress(int(words[3]), int(words[5]), words[7])
         except (ValueError, IndexError):
             return None
 
     def connect(self) -> socket.socket:
-        """Return a connection that is let in.
+        """Connect to the session and send the token.
 
         Raises:
             LinkError: If the session has ended.
@@ -66,68 +66,70 @@ class Door(NamedTuple):
         return connection
 
 
-class DoorFile:
-    """The file that tells of a session of this process, from `open` on until `close` or the end of the process.
+class SessionFile:
+    """The session file of this process; it exists from `open` until `close` or the end of the process.
 
     Args:
-        door: Where the session is found.
+        address: Address of the session.
 
     Raises:
         LinkError: If this user has no folder for it.
     """
 
-    def __init__(self, door: Door) -> None:
-        self._door = door
-        self._path = default_folder() / f"{_PREFIX}{door.number}"
+    def __init__(self, address: SessionAddress) -> None:
+        self._address = address
+        self._path = default_folder() / f"{_PREFIX}{address.number}"
         self._file = -1
 
     def open(self) -> None:
-        """Write it, if it is not there.
+        """Write the file, unless it exists.
 
         Raises:
             LinkError: If it cannot be written.
         """
         if self._file < 0:
-            # What another process of this number has left behind.
+            # An earlier process of this number may have left its file behind.
             self._path.unlink(missing_ok=True)
-            self._file = _create(self._path, self._door)
+            self._file = _create(self._path, self._address)
 
     def close(self) -> None:
-        """Remove it, if it is there."""
+        """Remove the file if it exists."""
         if self._file >= 0:
             self._path.unlink(missing_ok=True)
             os.close(self._file)
             self._file = -1
 
 
-def find_door(number: int) -> Door:
-    """Return where a session of this user runs on this computer.
+def find_session(number: int) -> SessionAddress:
+    """Return the address of a session of this user on this computer.
 
     Args:
-        number: Its number; 0 for the one that was started last.
+        number: Number of the session; 0 for the newest.
 
     Raises:
         LinkError: If there is none.
     """
-    doors = [door for path in _newest_first(default_folder()) if (door := _read(path)) is not None]
-    for door in doors:
-        if number in (0, door.number):
-            return door
-    known = f"those that run are {[door.number for door in doors]}" if doors else "none runs on this computer"
+    sessions = [address for path in _newest_first(default_folder()) if (address := _read(path)) is not None]
+    for address in sessions:
+        if number in (0, address.number):
+            return address
+    known = (
+        f"those that run are {[address.number for address in sessions]}" if sessions else "none runs on this computer"
+    )
     which = "a session" if number == 0 else f"session {number}"
     raise LinkError(f"{which} must run before it is joined, but {known}. Start one with kiks(ARENA) in another Octave.")
 
 
-def write_door(door: Door, path: Path) -> None:
-    """Write where a session is found into a new file that this user alone can read.
+def write_session_file(address: SessionAddress, path: Path) -> None:
+    """Write the address of a session into a new file that this user alone can read.
 
     Raises:
-        LinkError: If the file is there already, or cannot be written.
+        LinkError: If the file exists or cannot be written.
     """
     beside = path.with_name(f".{path.name}-{os.getpid()}")
-    os.close(_create(beside, door))
+    os.close(_create(beside, address))
     try:
-        # A link fails where a file is; so whoever reads the file finds all of it, and finds this one.
+        # A link fails if the file exists, and a reader never sees a part of the file.
         os.link(beside, path)
     except OSError as error:
         raise _not_new(path, error) from None
@@ -135,15 +137,15 @@ def write_door(door: Door, path: Path) -> None:
         beside.unlink(missing_ok=True)
 
 
-def _create(path: Path, door: Door) -> int:
-    """Write a new file and return it, locked."""
+def _create(path: Path, address: SessionAddress) -> int:
+    """Write a new file, lock it and return its descriptor."""
     try:
         file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o600)
     except OSError as error:
         raise _not_new(path, error) from None
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        os.write(file, door.line().encode("ascii"))
+        os.write(file, address.line().encode("ascii"))
     except OSError as error:
         os.close(file)
         path.unlink(missing_ok=True)
@@ -163,8 +165,8 @@ def _newest_first(folder: Path) -> list[Path]:
     return sorted(times, key=times.__getitem__, reverse=True)
 
 
-def _read(path: Path) -> Door | None:
-    """Return the door of a session that lives; the file of one that was killed goes, any other file is left alone."""
+def _read(path: Path) -> SessionAddress | None:
+    """Return the address in a locked session file; delete one without a lock, and ignore any other file."""
     try:
         file = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
     except OSError:
@@ -176,7 +178,7 @@ def _read(path: Path) -> Door | None:
         try:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
         except BlockingIOError:
-            return Door.parse(os.read(file, FILE_MAX))
+            return SessionAddress.parse(os.read(file, FILE_MAX))
         path.unlink(missing_ok=True)
     except OSError:
         return None

@@ -1,8 +1,8 @@
-"""The process of a session: who comes in by pipes or TCP, and when all is over.
+"""The process of a session: it accepts clients by pipes or TCP, and ends with the last of them.
 
-Octave starts it and speaks with it by its standard input and output; another Octave, and MATLAB, which has no pipes,
-come by TCP, on this computer only, and with a token that stands in a file of the user's alone. It ends when the last of
-them has gone, however that was: a crashed Octave leaves nothing behind.
+Octave starts the process and talks to it over its standard input and output. Another Octave, and MATLAB, which has no
+pipes, connect by TCP, on this computer only, with a token from a file that only the user can read. The process ends
+when the last client has gone, even if Octave crashes.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ import threading
 from kiks.errors import LinkError
 from kiks.ports.file_descriptors import opening
 from kiks.ports.pending_connections import PendingConnections
-from kiks.toolbox.framing import LOOK_MS, Exchange, Pulse, write_all
+from kiks.toolbox.framing import POLL_MS, Exchange, Heartbeat, write_all
 from kiks.toolbox.requests import answer
 from kiks.toolbox.session import Session
 from kiks.toolbox.session_client import SessionClient
-from kiks.toolbox.session_files import Door, DoorFile
+from kiks.toolbox.session_files import SessionAddress, SessionFile
 
 FIRST_S = 30.0
-"""How long a process that listens waits for the first who comes [s of real time]."""
+"""Timeout of the first connection to a listening process [s of real time]."""
 
 TOKEN_BYTES = 24
 
@@ -39,114 +39,117 @@ class SessionProcess:
 
     Args:
         session: The session.
-        pulse: What lets those who wait long for an answer know that it is still to come.
+        heartbeat: Announces slow answers to the clients.
+
+    Attributes:
+        address: Where other programs can join the session.
 
     Raises:
         LinkError: If this user's folder for sessions cannot be written.
     """
 
-    def __init__(self, session: Session, pulse: Pulse) -> None:
+    def __init__(self, session: Session, heartbeat: Heartbeat) -> None:
         self._session = session
-        self._pulse = pulse
+        self._heartbeat = heartbeat
         with opening("the port of a session"), contextlib.ExitStack() as undo:
             listener = undo.enter_context(socket.create_server(("127.0.0.1", 0)))
-            self.door = Door(os.getpid(), listener.getsockname()[1], secrets.token_urlsafe(TOKEN_BYTES))
-            self._file = DoorFile(self.door)
-            self._lobby = PendingConnections(listener, self.door.token, self._let_in)
+            self.address = SessionAddress(os.getpid(), listener.getsockname()[1], secrets.token_urlsafe(TOKEN_BYTES))
+            self._file = SessionFile(self.address)
+            self._pending = PendingConnections(listener, self.address.token, self._let_in)
             undo.pop_all()
-        self._there: list[Exchange] = []
+        self._exchanges: list[Exchange] = []
         self._count = 0
         self._lock = threading.Lock()
         self._is_over = threading.Event()
-        threading.Thread(target=self._lobby.run, name="kiks lobby", daemon=True).start()
+        threading.Thread(target=self._pending.run, name="kiks pending connections", daemon=True).start()
 
-    def speak_with(self, exchange: Exchange) -> None:
-        """Let a program take part."""
+    def add(self, exchange: Exchange) -> None:
+        """Add a client and answer its requests in a thread."""
         with self._lock:
             self._count += 1
-            self._there.append(exchange)
-            visitor = SessionClient(self._session, self._count, exchange)
-        exchange.called_off = visitor.call_off
-        if exchange.beat not in self._pulse.acts:
-            self._pulse.acts.append(exchange.beat)
-        threading.Thread(target=self._attend, args=(visitor, exchange), name=visitor.name, daemon=True).start()
+            self._exchanges.append(exchange)
+            client = SessionClient(self._session, self._count, exchange)
+        exchange.on_cancel = client.cancel
+        if exchange.beat not in self._heartbeat.acts:
+            self._heartbeat.acts.append(exchange.beat)
+        threading.Thread(target=self._attend, args=(client, exchange), name=client.name, daemon=True).start()
 
     def run(self) -> None:
-        """Move the world until the last has gone; then `close` is due."""
-        waited = threading.Timer(FIRST_S, self._go_if_alone)
+        """Move the world until the last client has gone; the caller then calls `close`."""
+        waited = threading.Timer(FIRST_S, self._end_if_empty)
         waited.daemon = True
         waited.start()
-        self._pulse.acts.append(self._look_around)
+        self._heartbeat.acts.append(self._check_clients)
         while not self._is_over.is_set():
             self._session.round()
 
     def close(self) -> None:
-        """Let nobody in any more, and end the world."""
+        """Accept no more clients and end the world."""
         with self._lock:
             self._file.close()
-        self._lobby.close()
+        self._pending.close()
         self._session.close()
 
-    # ---- who is there ----
+    # ---- clients ----
 
     def _let_in(self, connection: socket.socket, said: bytes) -> None:
         with contextlib.suppress(OSError):
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         number = connection.fileno()
-        self.speak_with(Exchange(number, number, close=connection.close, said=said))
+        self.add(Exchange(number, number, close=connection.close, said=said))
 
-    def _attend(self, visitor: SessionClient, exchange: Exchange) -> None:
-        """Answer a program line by line until it hangs up."""
+    def _attend(self, client: SessionClient, exchange: Exchange) -> None:
+        """Answer the requests of a client until it leaves."""
         try:
             with contextlib.suppress(OSError):
-                if exchange.greet(self.door.line()):
+                if exchange.greet(self.address.line()):
                     self._announce()
                     for line in exchange.lines():
-                        exchange.reply(answer(visitor, line))
+                        exchange.reply(answer(client, line))
         finally:
-            self._pulse.acts.remove(exchange.beat)
+            self._heartbeat.acts.remove(exchange.beat)
             with self._lock:
-                self._there.remove(exchange)
-            self._part_if_others_stay(exchange)
-            visitor.leave()
-            self._part_if_others_stay(exchange)
-            self._go_if_alone()
+                self._exchanges.remove(exchange)
+            self._close_if_others_stay(exchange)
+            client.leave()
+            self._close_if_others_stay(exchange)
+            self._end_if_empty()
 
     def _announce(self) -> None:
-        """Let others find the session, now that somebody takes part."""
+        """Write the file by which other programs find the session."""
         with self._lock:
             try:
                 self._file.open()
             except LinkError as error:
                 _log.warning("others cannot join this session: %s", error)
 
-    def _part_if_others_stay(self, exchange: Exchange) -> None:
-        """Let a program know that it has left; else the end of this process does."""
-        if self._there:
-            exchange.part()
+    def _close_if_others_stay(self, exchange: Exchange) -> None:
+        """Close a connection if the session goes on; else the end of this process closes it."""
+        if self._exchanges:
+            exchange.close()
 
-    def _go_if_alone(self) -> None:
-        if not self._there:
+    def _end_if_empty(self) -> None:
+        if not self._exchanges:
             self._is_over.set()
 
-    def _look_around(self) -> None:
-        """Let a paused world go on when all have gone: it keeps them from leaving."""
+    def _check_clients(self) -> None:
+        """Resume a paused world when all clients have gone: it would keep them from leaving."""
         with self._lock:
-            there = self._there[:]
-        if all(exchange.has_left for exchange in there):
+            exchanges = self._exchanges[:]
+        if all(exchange.has_left for exchange in exchanges):
             self._session.let_go()
 
 
-def join(door: Door, exchange: Exchange, source: int, sink: int) -> None:
-    """Carry what a program says on two descriptors to a session and back, until one of the two hangs up.
+def join(address: SessionAddress, exchange: Exchange, source: int, sink: int) -> None:
+    """Relay between a program on two descriptors and a session, until one of them closes the connection.
 
     Raises:
         LinkError: If the session has ended.
     """
-    with door.connect() as connection, contextlib.suppress(OSError):
+    with address.connect() as connection, contextlib.suppress(OSError):
         connection.sendall(exchange.hand_over())
         while not exchange.is_orphaned:
-            ready, _, _ = select.select([source, connection.fileno()], [], [], LOOK_MS / 1000)
+            ready, _, _ = select.select([source, connection.fileno()], [], [], POLL_MS / 1000)
             for each in ready:
                 piece = os.read(source, _READ_SIZE) if each == source else connection.recv(_READ_SIZE)
                 if not piece:

@@ -1,8 +1,8 @@
-r"""What the toolbox and the simulator say to each other, word by word; `framing.py` has how it gets there.
+r"""Text format of requests and answers; `framing.py` transports them.
 
-A request is a name and words. The answer is `+` or `-`, the number of the port that was asked and its time in 19
-characters, and what was asked for or why not. Texts of several lines are one line with `\n`, `\r` and `\\`; matrices
-are run lengths down their columns, as MATLAB keeps them: most of an arena is floor.
+A request is a name and words. The answer is `+` or `-`, the number of the port and its time in 19 characters, and the
+result or an error message. Texts have the escape sequences `\n`, `\r` and `\\`. Matrices are run lengths in
+column-major order, as MATLAB stores them: most of an arena is floor.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 from kiks.errors import ParameterError, shown
 
 NUMBER_MAX = 1e9
-"""Largest number of a request: no place, angle, speed or time needs a larger one."""
+"""Largest number in a request."""
 
 CELLS_MAX = 64_000_000
-"""Most elements of a matrix."""
+"""Maximum number of elements of a matrix."""
 
 
 def escape(text: str) -> str:
-    r"""Return a text as a part of a line.
+    r"""Escape backslashes and line ends.
 
     Example:
         >>> escape("a\nb") == r"a\nb" and unescape(escape("\\n\r\n")) == "\\n\r\n"
@@ -40,20 +40,20 @@ def unescape(text: str) -> str:
 
 
 def number_text(value: float) -> str:
-    """Return a number as both sides write it: `NaN` for none, and every digit that it has."""
+    """Return a number with 15 significant digits, or `NaN`."""
     return "NaN" if math.isnan(value) else f"{value:.15g}"
 
 
 def numbers_text(values: Iterable[float]) -> str:
-    """Return numbers with blanks between them."""
+    """Return numbers separated by blanks."""
     return " ".join(map(number_text, values))
 
 
 def numbers_of(words: Sequence[str], count: int, what: str) -> list[float]:
-    """Return as many numbers as words must be: `NaN` where none is given, and none beyond `NUMBER_MAX`.
+    """Convert words to numbers, of which `NaN` stands for a value that is not given.
 
     Raises:
-        ParameterError: If they are others.
+        ParameterError: If there are not `count` of them, or one is not a number or beyond `NUMBER_MAX`.
     """
     try:
         numbers = [float(word) for word in words] if len(words) == count else []
@@ -68,7 +68,7 @@ def numbers_of(words: Sequence[str], count: int, what: str) -> list[float]:
 
 
 def matrix_text(matrix: NDArray[Any]) -> str:
-    """Return a matrix as rows, columns and run lengths.
+    """Return the number of rows, that of columns, and the run lengths of a matrix.
 
     Example:
         >>> matrix_text(np.array([[0, 1], [0, 1]]))
@@ -86,10 +86,10 @@ def matrix_text(matrix: NDArray[Any]) -> str:
 
 
 def matrices_of(text: str) -> list[NDArray[Any]]:
-    """Return the matrices of a text, one or two, each of as small a type as holds it.
+    """Return the one or two matrices of a text, each of int16 or float64.
 
     Raises:
-        ParameterError: If there are others than matrices in it.
+        ParameterError: If the text is anything else.
 
     Example:
         >>> [matrix.tolist() for matrix in matrices_of("2 2 2 0 2 1 1 1 1 -7.5")]
@@ -112,7 +112,7 @@ def matrices_of(text: str) -> list[NDArray[Any]]:
 
 
 def _take_matrix(numbers: NDArray[np.float64]) -> tuple[NDArray[Any] | None, NDArray[np.float64]]:
-    """Return the matrix with which numbers begin, and the numbers behind it; None if there is none."""
+    """Return the first matrix, None if it is not valid, and the numbers after it."""
     sizes, values = numbers[:2], numbers[3::2]
     if len(sizes) < 2 or not _are_whole(sizes, 0) or sizes.prod() > CELLS_MAX:
         return None, numbers
@@ -121,7 +121,7 @@ def _take_matrix(numbers: NDArray[np.float64]) -> tuple[NDArray[Any] | None, NDA
     counts = numbers[2 : 2 + 2 * count : 2]
     if counts.sum() != sizes.prod() or not _are_whole(counts, 1):
         return None, numbers
-    # All of it has been looked at by now: only here is memory asked for.
+    # Allocate memory only after all checks.
     filled = np.repeat(_narrowed(values[:count]), counts.astype(np.int64))
     rows, columns = sizes.astype(np.int64).tolist()
     return filled.reshape((rows, columns), order="F"), numbers[2 + 2 * count :]
@@ -132,7 +132,7 @@ def _are_whole(numbers: NDArray[np.float64], low: int) -> bool:
 
 
 def _all_numbers(text: str) -> NDArray[np.float64]:
-    """Return the numbers of a text, with one blank between two; none if there is anything else, or too large a one."""
+    """Return the numbers of a text, separated by single blanks; none if one is too large or not a number."""
     try:
         numbers = np.fromstring(text if text.isascii() else "", np.float64, sep=" ")
     except (ValueError, DeprecationWarning):

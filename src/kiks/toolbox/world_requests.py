@@ -1,4 +1,4 @@
-"""What the toolbox may ask of the robots and the things in a world: where they are, and to put them elsewhere."""
+"""The requests of the toolbox for robots and objects: their poses, paths and speeds, and how to move and add them."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from kiks.toolbox.session_client import SessionClient
 from kiks.toolbox.wire_format import matrix_text, numbers_of, numbers_text
 
 STREAM_SPAWN = 6
-"""Random stream of what is put at random places, and of headings that nobody has given."""
+"""Random stream of random places and headings."""
 
 LIGHT_ROW, BALL_ROW, CYLINDER_ROW = 1, 2, 3
-"""What an object is in lists, and to kiks_spawn."""
+"""Types of objects in lists and in kiks_spawn."""
 
 ANGLE_MAX = 1e6
-"""Largest angle [rad]: beyond that a number has too few digits left for a heading."""
+"""Largest angle [rad]; a larger number has too few digits left for a heading."""
 
 
 def port_of(word: str) -> int:
-    """Return the number of a port; 1 stands for -1."""
+    """Parse the number of a port; 1 stands for port -1."""
     if not (word.isascii() and word.isdigit() and len(word) < 10):
         raise ParameterError(f"a port must be a whole number, -1, -2 and so on, but it was {shown(word)}.")
     return int(word)
@@ -37,29 +37,29 @@ def port_of(word: str) -> int:
 # ---- robots ----
 
 
-def ask_pose(visitor: SessionClient, words: str) -> str:
-    """Return where the robot of a port is: x, y, heading [rad]; nothing if there is none."""
+def ask_pose(client: SessionClient, words: str) -> str:
+    """Return the x, y and heading [rad] of a port's robot; an empty text if it has none."""
     number = port_of(words)
-    if visitor.session.desk is None:
+    if client.session.desk is None:
         return ""
 
     def pose(sim: Simulation) -> str:
-        robot = visitor.robot(number)
+        robot = client.robot(number)
         if robot is None:
             return ""
         x_mm, y_mm, heading_rad = sim.pose(robot)
         return numbers_text((*user_place(sim.arena, x_mm, y_mm), heading_rad))
 
-    return visitor.do(pose)
+    return client.do(pose)
 
 
-def ask_path(visitor: SessionClient, words: str) -> str:
-    """Return the path of the robot of a port, x in row 1 and y in row 2, since the port was opened."""
+def ask_path(client: SessionClient, words: str) -> str:
+    """Return the path of a port's robot since the port was opened, x in row 1 and y in row 2."""
     number = port_of(words)
-    opened = visitor.openings.get(number)
+    opened = client.openings.get(number)
 
     def path(sim: Simulation) -> str:
-        robot = visitor.robot(number)
+        robot = client.robot(number)
         if robot is None:
             return "2 0"
         paths = sim.paths()
@@ -69,20 +69,20 @@ def ask_path(visitor: SessionClient, words: str) -> str:
             points = points[points[:, 0] >= opened.opened_ns * 1e-9 - 1e-9]
         points = points[~np.isnan(points[:, 1])]
         x, y = user_place(sim.arena, points[:, 1], points[:, 2])
-        # A micrometre is more than anybody wants to know; it keeps the line short.
+        # A resolution of a micrometre keeps the line short.
         return matrix_text(np.round(np.vstack([x, y]), 3))
 
-    visitor.session.trace()
-    return visitor.do(path)
+    client.session.trace()
+    return client.do(path)
 
 
-def ask_distances(visitor: SessionClient, words: str) -> str:
-    """Return how far the robot of a port has driven forwards, backwards, and is from where it began [mm]."""
+def ask_distances(client: SessionClient, words: str) -> str:
+    """Return how far a port's robot has driven forwards and backwards, and its distance from the start [mm]."""
     number = port_of(words)
-    opened = visitor.openings.get(number)
+    opened = client.openings.get(number)
 
     def distances(sim: Simulation) -> str:
-        robot = visitor.robot(number)
+        robot = client.robot(number)
         if robot is None:
             return "0 0 0"
         forwards_mm, backwards_mm, straight_mm = sim.distances_mm()[robot - 1].tolist()
@@ -92,32 +92,32 @@ def ask_distances(visitor: SessionClient, words: str) -> str:
             straight_mm = math.hypot(x_mm - opened.start_mm[0], y_mm - opened.start_mm[1])
         return numbers_text((forwards_mm, backwards_mm, straight_mm))
 
-    return visitor.do(distances)
+    return client.do(distances)
 
 
-def ask_set_robot(visitor: SessionClient, words: str) -> str:
-    """Put the robot of a port somewhere; return 1, or 0 if there is no room."""
+def ask_set_robot(client: SessionClient, words: str) -> str:
+    """Move a port's robot to a place; return 1, or 0 if the place is not free."""
     word, _, rest = words.partition(" ")
     number = port_of(word)
     x, y, angle = numbers_of(rest.split(), 3, "x, y and angle")
     _check_angle(angle)
 
     def set_robot(sim: Simulation) -> str:
-        robot = visitor.robot(number)
+        robot = client.robot(number)
         if robot is None:
             raise ParameterError(f"port {-number} must have a robot, but it has none. Open it with kiks_kopen.")
         turn = uniform(sim.seed, 0, 0, STREAM_SPAWN, sim.now_ns, 0)
         heading_rad = 2 * math.pi * turn if math.isnan(angle) else angle
         return _is_done(lambda: sim.place(robot, *place_mm(sim.arena, x, y), heading_rad))
 
-    return visitor.do(set_robot)
+    return client.do(set_robot)
 
 
 # ---- objects ----
 
 
-def ask_objects(visitor: SessionClient, words: str) -> str:
-    """Return all lamps, balls and cylinders, a row each: type, x, y, speed, angle."""
+def ask_objects(client: SessionClient, words: str) -> str:
+    """Return a row for each lamp, ball and cylinder: type, x, y, speed, angle."""
 
     def objects(sim: Simulation) -> str:
         rows = [(LIGHT_ROW, *user_place(sim.arena, *lamp[:2]), 0.0, 0.0) for lamp in sim.lamps.tolist()]
@@ -128,11 +128,11 @@ def ask_objects(visitor: SessionClient, words: str) -> str:
             rows.append((BALL_ROW if body["what"] == BALL else CYLINDER_ROW, x, y, math.hypot(*velocity), angle))
         return matrix_text(np.array(rows, np.float64).reshape(-1, 5))
 
-    return visitor.do(objects)
+    return client.do(objects)
 
 
-def ask_set_object(visitor: SessionClient, words: str) -> str:
-    """Put an object somewhere, with a speed; return 1, or 0 if there is no room."""
+def ask_set_object(client: SessionClient, words: str) -> str:
+    """Move an object to a place and set its speed; return 1, or 0 if the place is not free."""
     number, x, y, speed, angle = numbers_of(words.split(), 5, "row, x, y, speed and angle")
     _check_angle(angle)
 
@@ -163,15 +163,15 @@ def ask_set_object(visitor: SessionClient, words: str) -> str:
 
         is_moved = _is_done(lambda: roll_from(there))
         if is_moved == "0":
-            # Speed and angle count wherever it is (kiks-behaviour.md 1.4).
+            # Speed and angle are set even if the place is not free (kiks-behaviour.md 1.4).
             _is_done(lambda: roll_from(here))
         return is_moved
 
-    return visitor.do(set_object)
+    return client.do(set_object)
 
 
-def ask_spawn(visitor: SessionClient, words: str) -> str:
-    """Put one more object into the world."""
+def ask_spawn(client: SessionClient, words: str) -> str:
+    """Add an object to the world."""
     kind, x, y = numbers_of(words.split(), 3, "type, x and y")
     if kind not in (LIGHT_ROW, BALL_ROW, CYLINDER_ROW):
         raise ParameterError(f"type must be 1 (light), 2 (ball) or 3 (cylinder), but it was {kind:g}.")
@@ -182,7 +182,7 @@ def ask_spawn(visitor: SessionClient, words: str) -> str:
         greys = {}
         if kind != LIGHT_ROW:
             add = sim.add_ball if kind == BALL_ROW else sim.add_cylinder
-            settings = visitor.session.settings
+            settings = client.session.settings
             brightness = settings.ball if kind == BALL_ROW else settings.cylinder
             greys = {} if brightness is None else {"brightness": brightness}
         place_given = None
@@ -201,27 +201,27 @@ def ask_spawn(visitor: SessionClient, words: str) -> str:
         for attempt in range(ATTEMPTS):
             shares = [uniform(sim.seed, 0, there, STREAM_SPAWN, attempt, axis) for axis in (1, 2)]
             place = shares[0] * arena.width_mm, shares[1] * arena.height_mm
-            # A lamp may hang anywhere; it is of use over the floor.
+            # A lamp may hang anywhere, but is useful over the floor only.
             is_good = kind != LIGHT_ROW or arena.clearance_at_mm(*place) > 0
             if is_good and _is_done(lambda place=place: add(*place, **greys)) == "1":  # type: ignore[misc]
                 return
         raise ParameterError("there must be room for one more object, but none was found. Take something away.")
 
-    visitor.do(spawn)
-    if visitor.session.desk is not None:
-        visitor.session.desk.tell()
-    visitor.session.mark()
+    client.do(spawn)
+    if client.session.desk is not None:
+        client.session.desk.tell()
+    client.session.mark()
     return ""
 
 
-def _kept(wanted: tuple[float, float], there: Any) -> tuple[float, float]:
-    """Return a place of which what nobody has given stays as it is."""
-    x_mm, y_mm = (old if math.isnan(new) else new for new, old in zip(wanted, there, strict=True))
+def _kept(wanted: tuple[float, float], present: Any) -> tuple[float, float]:
+    """Return the wanted place, with the present coordinate for each that is NaN."""
+    x_mm, y_mm = (old if math.isnan(new) else new for new, old in zip(wanted, present, strict=True))
     return float(x_mm), float(y_mm)
 
 
 def _is_done(act: Callable[[], object]) -> str:
-    """Do something and say 1, or 0 if the place for it is not free."""
+    """Call a function; return 1, or 0 if a place is not free."""
     try:
         act()
     except ParameterError:

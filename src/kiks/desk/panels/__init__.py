@@ -1,1 +1,1 @@
-"""The page of the desk: its panels, as NiceGUI elements."""
+"""The panels of the desk's page, made of NiceGUI elements."""

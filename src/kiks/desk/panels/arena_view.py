@@ -1,6 +1,6 @@
-"""The arena on a page: an element that shows robots, walls and light from above and in 3-D, and lets hands at them.
+"""The arena element: it shows robots, walls and light from above or in 3-D, and people can drag things in it.
 
-What it draws comes over the page's own WebSocket, not through this element; see `web/stage.js`.
+Its data arrive over the page's own WebSocket, not through this element; see `web/stage.js`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ SHOWN = {
     "ruler": True,
     "names": True,
 }
-"""What the views can show, and whether they do at first."""
+"""The layers of the views, and whether each is visible at first."""
 
 _WEB = Path(__file__).parents[1] / "web"
 _THREE = Path(nicegui.__file__).parent / "elements" / "scene" / "dist"
@@ -40,12 +40,12 @@ _THREE = Path(nicegui.__file__).parent / "elements" / "scene" / "dist"
 
 @dataclass(frozen=True)
 class Pick:
-    """What a click met.
+    """The thing that a click hit.
 
     Attributes:
-        what: 'robot', 'sensor' (of the chosen robot), 'body', 'lamp' or 'floor'.
-        index: Which one, in the order of frames, from 0; -1 for the floor.
-        sensor: Which sensor, from 0; -1 for anything else.
+        what: 'robot', 'sensor' (of the selected robot), 'body', 'lamp' or 'floor'.
+        index: Index of the thing in frames, from 0; -1 for the floor.
+        sensor: Index of the sensor, from 0; -1 for any other thing.
         x_mm: Place of the click.
         y_mm: Place of the click.
     """
@@ -59,11 +59,11 @@ class Pick:
 
 @dataclass(frozen=True)
 class Stroke:
-    """What was drawn with a tool.
+    """A stroke of a tool.
 
     Attributes:
-        kind: 'rectangle' and 'line' (two points each), 'freehand' or 'point' (one).
-        points: Places on the arena [mm], snapped and within it.
+        kind: 'rectangle' or 'line' (two points each), 'freehand', or 'point' (one point).
+        points: Places in the arena [mm], snapped to the grid.
     """
 
     kind: str
@@ -72,13 +72,13 @@ class Stroke:
 
 @dataclass(frozen=True)
 class Tool:
-    """What the pointer does on the arena.
+    """The tool of the pointer.
 
     Attributes:
-        kind: 'hand' (drag and pick) or what it draws.
-        brush_mm: Width of a line or of a freehand stroke, size of a point.
-        snap_mm: Grid to which points snap; 0 for none.
-        label: What is written beside the pointer.
+        kind: 'hand' (drag and pick) or the kind of its strokes.
+        brush_mm: Width of a line or freehand stroke, size of a point.
+        snap_mm: Period of the grid to which points snap; 0 for none.
+        label: Text beside the pointer.
     """
 
     kind: Literal["hand", "rectangle", "line", "freehand", "point"] = "hand"
@@ -92,13 +92,13 @@ class ArenaView(
     component=_WEB / "arena_view.js",
     esm={"kiks-desk": str(_WEB), "nicegui-scene": str(_THREE)},
 ):
-    """The arena, from above or in 3-D, or both; it fills the element it is in.
+    """The arena from above, in 3-D, or both; it fills its parent element.
 
     Args:
         feed: Path of the WebSocket that frames come from; all components of a page share one.
-        view: What is seen at first.
-        on_pick: Told of each click that is no drag.
-        on_draw: Told of each stroke of a tool.
+        view: The first view.
+        on_pick: Called with each click that is not a drag.
+        on_draw: Called with each stroke of a tool.
 
     Raises:
         ParameterError: If there is no such view.
@@ -137,14 +137,14 @@ class ArenaView(
         self.update()
 
     def set_show(self, shown: Mapping[str, bool]) -> None:
-        """Show or hide parts of the picture; those not named stay as they are.
+        """Show or hide layers; other layers stay as they are.
 
         Raises:
-            ParameterError: If there is no such part.
+            ParameterError: If there is no such layer.
         """
         for name in shown:
             if name not in SHOWN:
-                raise ParameterError(f"what to show must be among {list(SHOWN)}, but it was {name!r}.")
+                raise ParameterError(f"a layer must be one of {list(SHOWN)}, but it was {name!r}.")
         self._props["show"] = {**self._props["show"], **shown}
         self.update()
 
@@ -154,12 +154,12 @@ class ArenaView(
         self.update()
 
     def set_follow(self, robot: int) -> None:
-        """Keep a robot in the middle, by its index from 0; -1 follows none."""
+        """Keep a robot in the middle, by its index from 0; -1 for no robot."""
         self._props["follow"] = robot
         self.update()
 
     def set_dark(self, is_dark: bool | None) -> None:
-        """Draw for a dark page, or for a light one; None follows the page."""
+        """Use dark or light colours; None follows the page."""
         self._props["dark"] = is_dark
         self.update()
 
@@ -168,20 +168,18 @@ class ArenaView(
         self.run_method("fit")
 
     def clear_trails(self) -> None:
-        """Forget where robots have been."""
+        """Delete the trails of the robots."""
         self.run_method("clear_trails")
 
     def select(self, what: Literal["robot", "body", "lamp"], index: int) -> None:
-        """Choose a thing as a click does, by its index from 0; -1 chooses nothing."""
+        """Select a thing as a click does, by its index from 0; -1 deselects."""
         self.run_method("select", what, index)
 
 
 def _pick(event: GenericEventArguments) -> Pick:
-    """Return what the browser said of a click."""
-    said = event.args
-    return Pick(str(said["what"]), int(said["index"]), int(said["sensor"]), float(said["x_mm"]), float(said["y_mm"]))
+    args = event.args
+    return Pick(str(args["what"]), int(args["index"]), int(args["sensor"]), float(args["x_mm"]), float(args["y_mm"]))
 
 
 def _stroke(event: GenericEventArguments) -> Stroke:
-    """Return what the browser said of a stroke."""
     return Stroke(str(event.args["kind"]), tuple((float(x), float(y)) for x, y in event.args["points"]))

@@ -1,32 +1,29 @@
-"""The console: a person types commands to a robot."""
+"""The console, in which a person types commands to a robot."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from nicegui import ui
 
-from kiks.desk.panels.feedback import told
+from kiks.desk.panels.widgets import icon_button, told
+from kiks.desk.server.desk import Desk
 from kiks.firmware.commands import COMMANDS
 from kiks.firmware.commands import Command as RobotCommand
 from kiks.sim.console import Typed, type_lines
 
-if TYPE_CHECKING:
-    from kiks.desk.server.desk import Desk
-
 ROWS = 100
-"""Lines in the page."""
+"""Maximum number of lines in the page."""
 
 HISTORY_LIMIT = 100
-"""Commands that are remembered for the arrow keys."""
+"""Number of commands kept for the arrow keys."""
 
 SUGGESTIONS = 6
-"""Commands that are suggested at once."""
+"""Maximum number of suggested commands."""
 
 
 class History:
-    """What was typed before, to be called back.
+    """The commands typed before, for the arrow keys.
 
     Example:
         >>> history = History()
@@ -41,30 +38,30 @@ class History:
         self._unsent = ""
 
     def add(self, line: str) -> None:
-        """Remember what was sent."""
+        """Add a line that was sent."""
         if self._lines[-1:] != [line]:
             self._lines = [*self._lines, line][-HISTORY_LIMIT:]
         self._place = len(self._lines)
 
     def back(self, now: str) -> str:
-        """Return the line before; `now` is what stands there unsent, to come back to."""
+        """Return the previous line; `now` is the unsent line, which `forth` returns at the end."""
         if self._place == len(self._lines):
             self._unsent = now
         self._place = max(self._place - 1, 0)
         return self._lines[self._place] if self._lines else now
 
     def forth(self) -> str:
-        """Return the line after, and at last what was not sent."""
+        """Return the next line, or the unsent line at the end."""
         self._place = min(self._place + 1, len(self._lines))
         return self._lines[self._place] if self._place < len(self._lines) else self._unsent
 
 
 class ConsolePanel:
-    """A line to type in, what was typed, and the replies.
+    """An input line and a log of commands and replies.
 
     Args:
         desk: The desk.
-        robot: Returns the number of the robot to whom one types.
+        robot: Returns the number of the robot that gets the commands.
     """
 
     def __init__(self, desk: Desk, robot: Callable[[], int]) -> None:
@@ -89,20 +86,14 @@ class ConsolePanel:
                 .on("keydown.enter", self._send)
                 .on("keydown.up.prevent", self._back)
                 .on("keydown.down.prevent", self._forth)
+                .tooltip("A command for the robot, such as D,5,5 to drive; arrow keys bring earlier ones back")
             )
-            with self._line:
-                ui.tooltip("A command for the robot, such as D,5,5 to drive; arrow keys bring earlier ones back")
-            with (
-                ui.button(icon="send", on_click=self._send)
-                .props('flat round dense aria-label="Send" data-testid="console-send"')
-                .mark("console-send")
-            ):
-                ui.tooltip("Send the command on the robot's line")
+            icon_button("send", "Send", "console-send", self._send).tooltip("Send the command on the robot's line")
         self._hints = ui.column().classes("w-full gap-0").mark("hints").props('data-testid="hints"')
         self._suggest()
 
     def refresh(self) -> None:
-        """Show the replies that have come."""
+        """Show new replies."""
         while self._waiting and self._waiting[0].reply is not None:
             typed = self._waiting.pop(0)
             for line in (typed.reply or "(no reply)").split("\n"):
@@ -118,7 +109,7 @@ class ConsolePanel:
         for typed in sent:
             self._rows.push(f"{typed.time_s:8.3f} → {typed.text}", classes="wire-row wire-sent")
         if desk.gate.is_paused:
-            ui.notify("Time stands still: let it run (space), and the robot answers.")
+            ui.notify("Time is paused. Press space to run it; then the robot answers.")
 
     def _back(self) -> None:
         self._line.value = self._history.back(self._line.value or "")
@@ -127,7 +118,7 @@ class ConsolePanel:
         self._line.value = self._history.forth()
 
     def _suggest(self) -> None:
-        """Show which commands begin like what is typed."""
+        """Show the commands that match the input."""
         self._hints.clear()
         with self._hints:
             for command in suggested(self._line.value or "")[:SUGGESTIONS]:
@@ -139,13 +130,13 @@ class ConsolePanel:
                     ui.label(help_of(command)).classes("text-left")
 
     def _take(self, command: RobotCommand) -> None:
-        """Put a command into the line, to be completed."""
+        """Put a command into the input line for completion."""
         self._line.value = command.letter + ("," if command.parameters else "")
         self._line.run_method("focus")
 
 
 def suggested(text: str) -> list[RobotCommand]:
-    """Return the commands that a text may become, or is; those of which one begins, if there is no text.
+    """Return the commands that match a text; without a text, some for the start.
 
     Example:
         >>> [command.letter for command in suggested("d,5")], [command.letter for command in suggested("speed")]
@@ -161,7 +152,7 @@ def suggested(text: str) -> list[RobotCommand]:
 
 
 def help_of(command: RobotCommand) -> str:
-    """Return a command's form and help in one line.
+    """Return the syntax and help of a command in one line.
 
     Example:
         >>> help_of(COMMANDS[3])

@@ -1,4 +1,4 @@
-"""The panel with which people draw: tools, brush and brightness, the way back, new arenas, and files."""
+"""The arena panel: drawing tools, brush, brightness, undo, new arenas and files."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ from nicegui import ui
 from nicegui.events import KeyEventArguments
 
 from kiks.desk.panels.arena_view import ArenaView, Stroke, Tool
-from kiks.desk.panels.feedback import told
 from kiks.desk.panels.files import FilesPanel
 from kiks.desk.panels.new_arena import ask_for_box, ask_for_maze
+from kiks.desk.panels.widgets import text_button, told
 from kiks.desk.server.desk import Desk
+from kiks.desk.server.live_editing import Editing
 from kiks.errors import ParameterError
 from kiks.model.arena_objects import Ball, Cylinder, Lamp
 from kiks.model.materials import REFLECTANCES, brightness_of
@@ -23,12 +24,12 @@ from kiks.model.sketch_things import SketchRobot
 BRUSH_MAX_MM = 100
 SNAPS: dict[float, str] = {0.0: "off", 1.0: "1 mm", 5.0: "5 mm", 10.0: "10 mm", 50.0: "50 mm"}
 REFRESH_S = 0.5
-"""How often it is shown whether there is a way back [s]: somebody else may have drawn."""
+"""Period at which the undo and redo buttons are updated [s]; another browser may have drawn."""
 
 
 @dataclass(frozen=True)
 class _ToolButton:
-    """A tool as people see it, and what the pointer does with it."""
+    """A tool for the page, and the kind of its pointer."""
 
     word: str
     icon: str
@@ -42,28 +43,29 @@ TOOLS = {
     ),
     "rectangle": _ToolButton("Rectangle", "rectangle", "Draw a block of wall from corner to corner", "rectangle"),
     "line": _ToolButton("Line", "horizontal_rule", "Draw a straight wall as wide as the brush", "line"),
-    "freehand": _ToolButton("Freehand", "gesture", "Draw a wall along your way, as wide as the brush", "freehand"),
-    "erase": _ToolButton("Erase", "cleaning_services", "Wipe walls away with the brush", "freehand"),
-    "erase-box": _ToolButton("Erase a box", "crop_free", "Wipe away all walls in a rectangle", "rectangle"),
-    "robot": _ToolButton("Robot", "smart_toy", "Put another robot down; the world begins anew", "point"),
-    "ball": _ToolButton("Ball", "sports_soccer", "Put a ball down", "point"),
-    "cylinder": _ToolButton("Cylinder", "album", "Put a cylinder down", "point"),
-    "lamp": _ToolButton("Lamp", "lightbulb", "Hang up a lamp of 1 W", "point"),
-    "remove": _ToolButton("Take away", "delete", "Take away the robot, ball, cylinder or lamp clicked at", "point"),
+    "freehand": _ToolButton("Freehand", "gesture", "Draw a freehand wall as wide as the brush", "freehand"),
+    "erase": _ToolButton("Erase", "cleaning_services", "Erase walls with the brush", "freehand"),
+    "erase-box": _ToolButton("Erase a box", "crop_free", "Erase all walls in a rectangle", "rectangle"),
+    "robot": _ToolButton("Robot", "smart_toy", "Add a robot; this restarts the world", "point"),
+    "ball": _ToolButton("Ball", "sports_soccer", "Add a ball", "point"),
+    "cylinder": _ToolButton("Cylinder", "album", "Add a cylinder", "point"),
+    "lamp": _ToolButton("Lamp", "lightbulb", "Add a lamp of 1 W", "point"),
+    "remove": _ToolButton("Remove", "delete", "Remove the robot, ball, cylinder or lamp that you click", "point"),
 }
-"""What can be done with the pointer."""
+"""The tools by name."""
 
 
 class EditorPanel:
-    """The controls with which a world is drawn, opened and saved.
+    """The controls for drawing, opening and saving a world.
 
     Args:
         desk: The desk.
-        view: Where people draw.
+        editing: Edits its world.
+        view: The view in which people draw.
     """
 
-    def __init__(self, desk: Desk, view: ArenaView) -> None:
-        self._desk, self._view = desk, view
+    def __init__(self, desk: Desk, editing: Editing, view: ArenaView) -> None:
+        self._editing, self._view = editing, view
         self._tool = "hand"
         self._buttons: dict[str, ui.button] = {}
         with ui.column().classes("w-full q-pa-md gap-3"):
@@ -71,7 +73,7 @@ class EditorPanel:
             self._build_brush()
             self._build_steps()
             self._build_arenas()
-            FilesPanel(desk)
+            FilesPanel(desk, editing)
         ui.keyboard(on_key=self._press, ignore=["input", "select", "textarea"])
         ui.timer(REFRESH_S, self._refresh)
         self._choose("hand")
@@ -103,33 +105,33 @@ class EditorPanel:
             self._swatch = ui.element("div").props("aria-hidden=true data-testid=swatch")
             self._swatch.style("width: 4rem; height: 1.5rem; border: 1px solid currentColor; border-radius: 4px")
         with ui.row().classes("w-full items-center no-wrap"):
-            choices = {"": "a grey of its own"} | {name: name for name in REFLECTANCES}
+            choices = {"": "other grey"} | {name: name for name in REFLECTANCES}
             self._material = ui.select(choices, label="Material", value="white", on_change=self._take_material)
             self._material.props("dense options-dense data-testid=material").classes("col")
-            self._material.tooltip("How much of a sensor's light the wall sends back, as real materials do")
+            self._material.tooltip("Sets the brightness of the wall to that of a real material")
             self._snap = ui.select(SNAPS, label="Snap to a grid", value=0.0, on_change=self._apply_tool)
             self._snap.props("dense options-dense data-testid=snap").classes("col")
-            self._snap.tooltip("Corners and ends of walls go to whole steps of this size")
+            self._snap.tooltip("Corners and ends of walls snap to a grid of this size")
             self._kind = ui.select(robot_names(), label="Kind of robot", value="khepera")
             self._kind.props("dense options-dense data-testid=robot-kind").classes("col")
-            self._kind.tooltip("What the robot tool puts down")
+            self._kind.tooltip("The kind of robot that the robot tool adds")
         self._show_brightness()
 
     def _build_steps(self) -> None:
         with ui.row().classes("w-full gap-1"):
-            self._undo = _button("Undo", "undo", "undo", "Take the last step back (Ctrl-Z)", self._step_back)
-            self._redo = _button("Redo", "redo", "redo", "Do it again (Ctrl-Y)", self._step_forth)
-            _button("Clear", "layers_clear", "clear", "Take all walls away; what stands there stays", self._clear)
+            self._undo = text_button("Undo", "undo", "undo", "Undo the last step (Ctrl-Z)", self._step_back)
+            self._redo = text_button("Redo", "redo", "redo", "Redo the step (Ctrl-Y)", self._step_forth)
+            text_button("Clear", "layers_clear", "clear", "Erase all walls; robots and things stay", self._clear)
 
     def _build_arenas(self) -> None:
         with ui.row().classes("w-full gap-1"):
-            _button("New arena", "add_box", "new-arena", "An empty box of any size", self._new_box)
-            _button("Maze", "grid_4x4", "new-maze", "A random maze with a lamp in its exit", self._new_maze)
+            text_button("New arena", "add_box", "new-arena", "An empty box of any size", self._new_box)
+            text_button("Maze", "grid_4x4", "new-maze", "A random maze with a lamp at its exit", self._new_maze)
 
     # ---- tools ----
 
     def put_down(self) -> None:
-        """Take the hand in place of a tool, for people who turn to something else."""
+        """Select the hand tool, for a person who leaves the panel."""
         self._choose("hand")
 
     def _choose(self, name: str) -> None:
@@ -161,12 +163,12 @@ class EditorPanel:
 
     @told
     async def draw(self, stroke: Stroke) -> None:
-        """Do what a stroke of the chosen tool means, unless it cannot be done: then the person is told why."""
+        """Apply a stroke of the selected tool; a person sees an error if that is not possible."""
         await self._drawn(stroke)
         self._refresh()
 
     def _drawn(self, stroke: Stroke) -> Awaitable[None]:
-        editing, tool, points = self._desk.editing, self._tool, stroke.points
+        editing, tool, points = self._editing, self._tool, stroke.points
         if not points:
             raise ParameterError("A stroke must have a point, but it had none. Draw again.")
         grey = 0 if tool.startswith("erase") else int(self._brightness.value)
@@ -185,28 +187,28 @@ class EditorPanel:
 
     @told
     async def _step_back(self) -> None:
-        await self._desk.editing.undo()
+        await self._editing.undo()
         self._refresh()
 
     @told
     async def _step_forth(self) -> None:
-        await self._desk.editing.redo()
+        await self._editing.redo()
         self._refresh()
 
     @told
     async def _clear(self) -> None:
-        await self._desk.editing.draw(lambda sketch: sketch.clear())
+        await self._editing.draw(lambda sketch: sketch.clear())
         self._refresh()
 
     @told
     async def _new_box(self) -> None:
         if (arena := await ask_for_box()) is not None:
-            await self._desk.editing.begin(arena)
+            await self._editing.begin(arena)
 
     @told
     async def _new_maze(self) -> None:
         if (arena := await ask_for_maze()) is not None:
-            await self._desk.editing.begin(arena)
+            await self._editing.begin(arena)
 
     async def _press(self, event: KeyEventArguments) -> None:
         if not event.action.keydown or not (event.modifiers.ctrl or event.modifiers.meta):
@@ -218,13 +220,5 @@ class EditorPanel:
             await self._step_forth()
 
     def _refresh(self) -> None:
-        self._undo.set_enabled(self._desk.editing.can_undo)
-        self._redo.set_enabled(self._desk.editing.can_redo)
-
-
-def _button(word: str, icon: str, name: str, hint: str, act: object) -> ui.button:
-    button = ui.button(word, icon=icon, on_click=act)  # type: ignore[arg-type]
-    button.props(f"dense no-caps outline padding='4px 10px' data-testid={name}").mark(name)
-    with button:
-        ui.tooltip(hint)
-    return button
+        self._undo.set_enabled(self._editing.can_undo)
+        self._redo.set_enabled(self._editing.can_redo)

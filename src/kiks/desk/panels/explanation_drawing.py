@@ -1,4 +1,4 @@
-"""A sensor's seven rays as a small drawing: how far each goes, what it meets, and how much it matters."""
+"""A drawing of a sensor's seven rays: their lengths, what they hit, and their contributions to the reading."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _THIN, _THICK = 1.5, 6.0
 
 
 def draw_rays(why: Explanation) -> str:
-    """Return an SVG of the rays of an explanation, the sensor's axis upwards; it takes the page's own text colour."""
+    """Return an SVG of the rays, with the sensor's axis upwards, in the text colour of the page."""
     axis_deg = why.rays[len(why.rays) // 2].angle_deg
     most = max((abs(ray.contribution_counts) for ray in why.rays), default=0.0)
     reach_mm = _range_mm(why)
@@ -27,7 +27,7 @@ def draw_rays(why: Explanation) -> str:
     x, y = _EYE
     parts.append(f'<rect x="{x - 12}" y="{y}" width="24" height="12" rx="2" fill="currentColor"/>')
     parts.append(_words(x, y + 26, f"sensor {why.sensor}", size=12))
-    label = escape(f"Rays of sensor {why.sensor}: " + "; ".join(_said(ray) for ray in why.rays), quote=True)
+    label = escape(f"Rays of sensor {why.sensor}: " + "; ".join(_describe(ray) for ray in why.rays), quote=True)
     return (
         f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{label}" '
         f'style="width: 100%; max-width: 460px; display: block; margin: 0 auto">{"".join(parts)}</svg>'
@@ -35,7 +35,7 @@ def draw_rays(why: Explanation) -> str:
 
 
 def _range_mm(why: Explanation) -> float:
-    """Return how far the drawing goes: all of the sensor's reach, or what is needed if all rays end near by."""
+    """Return the range of the drawing: the sensor's reach, or less if all rays end nearer."""
     longest_mm = max(ray.length_mm for ray in why.rays)
     if math.isinf(longest_mm):
         return why.reach_mm
@@ -46,12 +46,12 @@ def _turn_deg(angle_deg: float) -> float:
     return (angle_deg + 180.0) % 360.0 - 180.0
 
 
-def _said(ray: SeenRay) -> str:
+def _describe(ray: SeenRay) -> str:
     return "nothing" if math.isinf(ray.length_mm) else f"{ray.met} at {ray.length_mm:.1f} mm"
 
 
 def _point(turn_deg: float, way: float) -> tuple[float, float]:
-    """Return the place on the drawing at a way along a ray; a turn to the left goes to the left."""
+    """Return the point of the drawing at the distance `way` along a ray; a positive turn is to the left."""
     turn = math.radians(turn_deg)
     return _EYE[0] - way * math.sin(turn), _EYE[1] - way * math.cos(turn)
 
@@ -81,7 +81,7 @@ def _ray(number: int, ray: SeenRay, turn_deg: float, reach_mm: float, share: flo
 
 
 def _surface(ray: SeenRay, turn_deg: float, x: float, y: float, colour: str) -> str:
-    """Return the sign of what a ray met: a bar for a wall, a ring for a robot, a disc for a ball or cylinder."""
+    """Return the symbol of what a ray hit: a bar for a wall, a ring for a robot, a disc for a ball or cylinder."""
     if ray.met == "wall":
         fill = f"rgb({ray.brightness},{ray.brightness},{ray.brightness})"
         turn = f'transform="rotate({-turn_deg:.1f} {x:.1f} {y:.1f})"'

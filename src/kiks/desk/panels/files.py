@@ -1,4 +1,4 @@
-"""Opening and saving: files of the desk's folder, examples, and files that go from and to the browser."""
+"""Opening and saving: files of the desk's folder, examples, uploads and downloads."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from pathlib import PurePosixPath
 from nicegui import ui
 from nicegui.events import UploadEventArguments
 
-from kiks.desk.panels.feedback import told
+from kiks.desk.panels.widgets import text_button, told
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.example_worlds import EXAMPLES
 from kiks.desk.server.folder import OPENED, PICTURES, UPLOAD_BYTES_MAX, Folder, decode, encode
+from kiks.desk.server.live_editing import Editing
 from kiks.errors import ArenaError, ParameterError
 from kiks.model.arena import Arena
 from kiks.model.picture import decode_picture
@@ -23,12 +24,14 @@ class FilesPanel:
 
     Args:
         desk: The desk.
+        editing: Edits its world.
     """
 
-    def __init__(self, desk: Desk) -> None:
-        # Files are taken at once: there is never a list of those that wait.
+    def __init__(self, desk: Desk, editing: Editing) -> None:
+        # Uploads start at once, so the list of waiting files is always empty.
         ui.add_css(".kiks-upload .q-uploader__list { display: none }")
         self._desk = desk
+        self._editing = editing
         self._folder = Folder(desk.folder)
         ui.separator()
         self._build_open()
@@ -41,24 +44,25 @@ class FilesPanel:
             self._choice.props("dense options-dense data-testid=open-name").classes("col").mark("open-name")
             self._choice.tooltip(f"Projects, arenas and pictures in {self._desk.folder}")
             self._choice.on("focus", self._list)
-            _small("Open", "folder_open", "open", "Begin with the world of this file", self._open)
+            text_button("Open", "folder_open", "open", "Begin with the world of this file", self._open)
         with ui.row().classes("w-full items-end no-wrap gap-1"):
             self._example = ui.select([*EXAMPLES], label="Or an example", value=next(iter(EXAMPLES)))
             self._example.props("dense options-dense data-testid=example-name").classes("col").mark("example-name")
-            _small("Open", "folder_open", "open-example", "Begin with the world of this example", self._open_example)
+            tip = "Begin with the world of this example"
+            text_button("Open", "folder_open", "open-example", tip, self._open_example)
         self._list()
 
     def _build_save(self) -> None:
         with ui.row().classes("w-full items-end no-wrap gap-1"):
             self._name = ui.input("Save as").props("dense data-testid=save-name").classes("col").mark("save-name")
-            self._name.tooltip("Name in the folder; ends in .kiks, or in .kad for the walls alone, as the old KiKS had")
-            _small("Save", "save", "save", "Save the world with everything where it is now", self._save)
-            _small("", "download", "download", "Download it instead, under this name", self._download)
+            self._name.tooltip("Name in the folder; .kiks saves the world, .kad an arena for the Matlab KiKS")
+            text_button("Save", "save", "save", "Save the world with everything where it is now", self._save)
+            text_button("", "download", "download", "Download the world under this name instead", self._download)
 
     def _build_upload(self) -> None:
         with ui.row().classes("w-full items-center no-wrap gap-1"):
             self._upload = ui.upload(
-                label="Bring a file: project, .kad, picture",
+                label="Upload a project, .kad or picture",
                 auto_upload=True,
                 max_file_size=UPLOAD_BYTES_MAX,
                 on_upload=self._take,
@@ -73,7 +77,7 @@ class FilesPanel:
             self._upload.mark("upload")
             self._mm_per_pixel = ui.number("mm per pixel", value=1.0, min=0.1, max=100, step=0.1)
             self._mm_per_pixel.props("dense data-testid=mm-per-pixel").classes("w-28")
-            self._mm_per_pixel.tooltip("How large a pixel of a picture is")
+            self._mm_per_pixel.tooltip("Size of a pixel of an uploaded picture")
 
     def _list(self) -> None:
         names = self._folder.names()
@@ -94,13 +98,13 @@ class FilesPanel:
 
     async def _begin(self, project: Project) -> None:
         await self._desk.replace(project)
-        ui.notify(f"This is {project.arena.name}.")
+        ui.notify(f"Opened {project.arena.name}.")
 
     @told
     async def _save(self) -> None:
         name = str(self._name.value or "")
         may_replace = self._folder.has(name)
-        if may_replace and not await _agrees(f"{self._folder.full_name(name)} is there. Replace it?"):
+        if may_replace and not await _agrees(f"{self._folder.full_name(name)} exists. Replace it?"):
             return
         project = await self._desk.present_project()
         saved = await asyncio.to_thread(self._folder.save, project, name, may_replace=may_replace)
@@ -127,7 +131,7 @@ class FilesPanel:
             mm_per_pixel = self._mm_per_pixel.value
             raster = await asyncio.to_thread(decode_picture, data, mm_per_pixel)
             arena = Arena.from_array(raster, mm_per_pixel=mm_per_pixel, name=PurePosixPath(name).stem[:100])
-            await self._desk.editing.begin(arena)
+            await self._editing.begin(arena)
         else:
             await self._begin(await asyncio.to_thread(decode, name, data))
 
@@ -141,10 +145,3 @@ async def _agrees(question: str) -> bool:
     answer = await dialog
     dialog.delete()
     return bool(answer)
-
-
-def _small(word: str, icon: str, name: str, hint: str, act: object) -> None:
-    button = ui.button(word, icon=icon, on_click=act)  # type: ignore[arg-type]
-    button.props(f'dense no-caps outline padding="4px 10px" aria-label="{word or hint}" data-testid={name}').mark(name)
-    with button:
-        ui.tooltip(hint)

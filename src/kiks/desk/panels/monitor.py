@@ -1,4 +1,4 @@
-"""The monitor's panel: which robot is watched, its monitor, and why a reading is what it is."""
+"""The robot panel: the monitor of one robot, the state of its turrets, and explanations of its readings."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import Any
 from nicegui import ui
 
 from kiks.desk.panels.explanation_drawing import draw_rays
-from kiks.desk.panels.monitor_view import Asked, MonitorView
+from kiks.desk.panels.monitor_view import MonitorView, Reading
+from kiks.desk.panels.widgets import icon_button, told
 from kiks.desk.server.desk import Desk
-from kiks.errors import KiksError
 from kiks.firmware.battle import Battle
 from kiks.firmware.general_io import GeneralIO
 from kiks.firmware.gripper import Gripper
@@ -23,12 +23,9 @@ from kiks.units import s_from_ns
 
 
 def describe_turret(turret: Turret) -> str:
-    """Return a line about a turret; the simulation's lock is held."""
-    return (
-        f"{turret.name} (turret {turret.number}): {_state_of(turret)}"
-        if turret.number >= 0
-        else (f"{turret.name}: {_state_of(turret)}")
-    )
+    """Return a one-line status of a turret; the caller holds the simulation's lock."""
+    number = f" (turret {turret.number})" if turret.number >= 0 else ""
+    return f"{turret.name}{number}: {_state_of(turret)}"
 
 
 def _state_of(turret: Turret) -> str:
@@ -36,7 +33,7 @@ def _state_of(turret: Turret) -> str:
         return _radio(turret)
     if isinstance(turret, Battle):
         hits = int(turret.site.record["battle_hits"])
-        return f"energy {turret.energy:.1f} of {turret.most:g} points, hit {hits} times since it was asked last"
+        return f"energy {turret.energy:.1f} of {turret.most:g} points, hit {hits} times since the last query"
     if isinstance(turret, Gripper):
         body = turret.site.held_body()
         return "holds nothing" if body is None else f"holds body {body['number']}, or has it between its jaws"
@@ -47,7 +44,7 @@ def _state_of(turret: Turret) -> str:
             f"a picture every {1000 * s_from_ns(turret.period_ns):g} ms, the last one at "
             f"{s_from_ns(turret.taken_ns):.3f} s, light level {turret.light}"
         )
-    return "its own kind"
+    return "of a user's own class"
 
 
 def _radio(radio: Radio) -> str:
@@ -66,15 +63,15 @@ def _radio(radio: Radio) -> str:
 
 
 AGAIN_S = 0.5
-"""How often the explanation and the words about turrets are renewed [s]."""
+"""Refresh period of the explanation and the status of turrets [s]."""
 
 _RAY_COLUMNS = ("Ray", "Length [mm]", "Met", "Bright", "Angle [°]", "Counts")
-_LAMP_COLUMNS = ("Lamp", "Distance [mm]", "Angle [°]", "Power [W]", "What it is", "Counts")
-_WORDS = ("Met", "What it is")
+_LAMP_COLUMNS = ("Lamp", "Distance [mm]", "Angle [°]", "Power [W]", "State", "Counts")
+_TEXT_COLUMNS = ("Met", "State")
 
 
 class MonitorPanel:
-    """One robot's monitor, with the answer to "why does it read 437?".
+    """The monitor of one robot, with explanations of its readings.
 
     Args:
         desk: The desk.
@@ -84,7 +81,7 @@ class MonitorPanel:
     def __init__(self, desk: Desk, feed: str = "/desk/feed") -> None:
         self._desk = desk
         self._index = 0
-        self._asked: Asked | None = None
+        self._reading: Reading | None = None
         self._is_seen = False
         with ui.column().classes("w-full gap-2 q-pa-sm"):
             self._choice = (
@@ -92,7 +89,7 @@ class MonitorPanel:
                 .classes("w-full")
                 .props('dense outlined data-testid="monitor-robot"')
                 .mark("monitor-robot")
-                .tooltip("Which robot is watched here")
+                .tooltip("The robot shown here")
             )
             with MonitorView(feed, on_explain=self._explain, on_seen=self._see).classes("w-full") as self._view:
                 self._build_answer()
@@ -100,20 +97,19 @@ class MonitorPanel:
         ui.timer(AGAIN_S, self._renew)
 
     def _build_answer(self) -> None:
-        """Build what says why a reading is what it is; it is there once somebody has asked."""
+        """Build the explanation of a reading, hidden until a person asks for one."""
         with ui.column().classes("kiks-answer w-full gap-2").props('data-testid="explanation"') as self._answer:
             with ui.row().classes("w-full items-center justify-between no-wrap"):
                 self._title = ui.label().classes("text-h6").props('role="heading" aria-level="2" aria-live="polite"')
-                ui.button(icon="close", on_click=self._forget).props(
-                    'flat round dense aria-label="Close the explanation" data-testid="close-explanation"'
-                ).tooltip("Close the explanation")
+                tip = "Close the explanation"
+                icon_button("close", tip, "close-explanation", self._forget).tooltip(tip)
             self._drawing = ui.html(sanitize=False).classes("w-full").props('data-testid="explanation-drawing"')
             self._words = ui.label().style("white-space: pre-line").props('data-testid="explanation-text"')
             self._keeps = (
                 ui.switch("Keep looking")
                 .props('dense data-testid="keep-looking"')
                 .mark("keep-looking")
-                .tooltip("Take the reading apart anew twice a second")
+                .tooltip("Update the explanation twice a second")
             )
             self._table = (
                 ui.table(rows=[], columns=[], row_key="0")
@@ -124,17 +120,17 @@ class MonitorPanel:
             self._note = ui.label().classes("text-caption")
         self._answer.set_visibility(False)
 
-    # ---- what is watched ----
+    # ---- the robot ----
 
     def show_robot(self, index: int) -> None:
-        """Watch another robot, by its index from 0; one that is not there changes nothing."""
+        """Show another robot by its index from 0; an unknown index changes nothing."""
         if 0 <= index < self._desk.sim.robot_count:
             self._choice.set_options(self._names(), value=index)
 
     async def show_sensor(self, index: int, sensor: int) -> None:
-        """Watch a robot, and say why one of its proximity sensors reads what it reads; both count from 0."""
+        """Show a robot and explain the reading of one of its proximity sensors, by their indices from 0."""
         self.show_robot(index)
-        await self._explain(Asked(sensor, "proximity"))
+        await self._explain(Reading(sensor, "proximity"))
 
     def _names(self) -> dict[int, str]:
         return {index: f"Robot {name}" for index, name in enumerate(self._desk.names())}
@@ -145,14 +141,14 @@ class MonitorPanel:
         self._forget()
 
     def _forget(self) -> None:
-        self._asked = None
+        self._reading = None
         self._view.set_chosen(None)
         self._answer.set_visibility(False)
 
     def _see(self, is_seen: bool) -> None:
         self._is_seen = is_seen
 
-    # ---- what is said of it ----
+    # ---- turrets and explanations ----
 
     async def _renew(self) -> None:
         if not self._is_seen:
@@ -160,25 +156,22 @@ class MonitorPanel:
         if self._choice.options != (names := self._names()):
             self._choice.set_options(names, value=min(self._index, len(names) - 1))
         number = self._index + 1
-        self._turrets.set_text(await self._desk.do(lambda sim: _turret_words(sim, number)))
-        if self._keeps.value and self._asked is not None:
-            await self._explain(self._asked)
+        self._turrets.set_text(await self._desk.do(lambda sim: _describe_turrets(sim, number)))
+        if self._keeps.value and self._reading is not None:
+            await self._explain(self._reading)
 
-    async def _explain(self, asked: Asked) -> None:
+    @told
+    async def _explain(self, reading: Reading) -> None:
         number = self._index + 1
 
-        def ask(sim: Simulation) -> Explanation | LightExplanation:
-            explain = sim.explain if asked.which == "proximity" else sim.explain_light
-            return explain(number, asked.sensor)
+        def explained(sim: Simulation) -> Explanation | LightExplanation:
+            explain = sim.explain if reading.kind == "proximity" else sim.explain_light
+            return explain(number, reading.sensor)
 
-        try:
-            why = await self._desk.do(ask)
-        except KiksError as error:
-            ui.notify(str(error), type="negative")
-            return
-        if asked != self._asked:
-            self._asked = asked
-            self._view.set_chosen(asked)
+        why = await self._desk.do(explained)
+        if reading != self._reading:
+            self._reading = reading
+            self._view.set_chosen(reading)
         self._answer.set_visibility(True)
         self._title.set_text(f"Why does it read {why.count}?")
         self._words.set_text(why.text())
@@ -197,8 +190,8 @@ class MonitorPanel:
         ]  # fmt: skip
         self._fill(_RAY_COLUMNS, rows)
         self._note.set_text(
-            "Ray 1 is the leftmost. Bright: 1 is black, 255 white. Angle: 0 where a ray meets a surface squarely. "
-            "Counts: what the reading would lose without this ray."
+            "Ray 1 is the leftmost. Bright: 1 is black, 255 is white. Angle: between the ray and the normal of the "
+            "surface. Counts: by how much the reading would drop without this ray."
         )
 
     def _show_lamps(self, why: LightExplanation) -> None:
@@ -210,12 +203,12 @@ class MonitorPanel:
         ]  # fmt: skip
         self._fill(_LAMP_COLUMNS, rows)
         self._note.set_text(
-            "Angle: off the sensor's axis. Counts: what the lamp changes; light makes readings smaller."
+            "Angle: from the sensor's axis. Counts: the change by this lamp; light makes readings smaller."
         )
 
     def _fill(self, names: tuple[str, ...], rows: list[tuple[Any, ...]]) -> None:
         columns = [
-            {"name": str(k), "field": str(k), "label": name, "align": "left" if name in _WORDS else "right"}
+            {"name": str(k), "field": str(k), "label": name, "align": "left" if name in _TEXT_COLUMNS else "right"}
             for k, name in enumerate(names)
         ]
         if self._table.columns != columns:
@@ -231,5 +224,5 @@ def _signed(value: float) -> str:
     return f"{value:+.1f}" if abs(value) >= 0.05 else "0"
 
 
-def _turret_words(sim: Simulation, number: int) -> str:
+def _describe_turrets(sim: Simulation, number: int) -> str:
     return "\n".join(describe_turret(turret) for turret in sim.turrets(number)) if number <= sim.robot_count else ""

@@ -1,6 +1,6 @@
-"""One robot's monitor on a page: an element that shows its readings live, and tells which one somebody asks about.
+"""The monitor element: it shows the readings of one robot live, and reports clicks on them.
 
-What it draws comes over the page's own WebSocket, not through this element; see `web/monitor.js`.
+Its data arrive over the page's own WebSocket, not through this element; see `web/monitor.js`.
 """
 
 from __future__ import annotations
@@ -14,24 +14,20 @@ from nicegui import ui
 from nicegui.element import Element
 from nicegui.events import GenericEventArguments
 
-__all__ = ["Asked", "MonitorView", "Which"]
-
-Which = Literal["proximity", "ambient"]
-
 _WEB = Path(__file__).parents[1] / "web"
 
 
 @dataclass(frozen=True)
-class Asked:
-    """A reading that somebody asks about.
+class Reading:
+    """A reading of a robot.
 
     Attributes:
         sensor: Index of the sensor, from 0.
-        which: 'proximity' or 'ambient'.
+        kind: 'proximity' or 'ambient'.
     """
 
     sensor: int
-    which: Which
+    kind: Literal["proximity", "ambient"]
 
 
 class MonitorView(Element, component=_WEB / "monitor_view.js", esm={"kiks-desk": str(_WEB)}):
@@ -39,15 +35,15 @@ class MonitorView(Element, component=_WEB / "monitor_view.js", esm={"kiks-desk":
 
     Args:
         feed: Path of the WebSocket that frames come from; all components of a page share one.
-        on_explain: Told of a reading that was clicked.
-        on_seen: Told whether it can be seen.
+        on_explain: Called with a reading that was clicked.
+        on_seen: Called with whether the element is visible.
     """
 
     def __init__(
         self,
         feed: str = "/desk/feed",
         *,
-        on_explain: Callable[[Asked], Any] | None = None,
+        on_explain: Callable[[Reading], Any] | None = None,
         on_seen: Callable[[bool], Any] | None = None,
     ) -> None:
         super().__init__()
@@ -55,7 +51,7 @@ class MonitorView(Element, component=_WEB / "monitor_view.js", esm={"kiks-desk":
         self._props["feed"] = feed
         self.set_robot(0)
         if on_explain is not None:
-            self.on("explain", lambda event: on_explain(_asked(event)))
+            self.on("explain", lambda event: on_explain(_reading(event)))
         if on_seen is not None:
             self.on("seen", lambda event: on_seen(bool(event.args)))
 
@@ -64,12 +60,11 @@ class MonitorView(Element, component=_WEB / "monitor_view.js", esm={"kiks-desk":
         self._props["robot"] = index
         self.update()
 
-    def set_chosen(self, asked: Asked | None) -> None:
-        """Mark a reading as the one that is explained, or none."""
-        self._props["chosen"] = None if asked is None else {"sensor": asked.sensor, "which": asked.which}
+    def set_chosen(self, reading: Reading | None) -> None:
+        """Mark the reading that is explained; None marks none."""
+        self._props["chosen"] = None if reading is None else {"sensor": reading.sensor, "which": reading.kind}
         self.update()
 
 
-def _asked(event: GenericEventArguments) -> Asked:
-    """Return what the browser said of a click."""
-    return Asked(int(event.args["sensor"]), "ambient" if event.args["which"] == "ambient" else "proximity")
+def _reading(event: GenericEventArguments) -> Reading:
+    return Reading(int(event.args["sensor"]), "ambient" if event.args["which"] == "ambient" else "proximity")

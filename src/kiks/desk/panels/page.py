@@ -1,4 +1,4 @@
-"""The page: the arena on the left, time above it, and beside it what there is to be looked at and done."""
+"""The page: the arena on the left, the time controls above it, and tabs with panels on the right."""
 
 from __future__ import annotations
 
@@ -16,12 +16,13 @@ from kiks.desk.panels.time_controls import TimePanel
 from kiks.desk.panels.view import ViewPanel
 from kiks.desk.panels.wire import WirePanel
 from kiks.desk.server.desk import Desk
+from kiks.desk.server.live_editing import Editing
 
 STYLE = Path(__file__).parents[1] / "web" / "page.css"
 
 PRIMARY, ACCENT, POSITIVE = "#174a63", "#b85c00", "#1b7a34"
-"""Colours that can be read with white on them, by all and on a wall: contrasts of 9.4, 4.7 and 5.4 to 1. On dark pages,
-words of these colours are lighter: see `STYLE`."""
+"""Background colours for white text, with contrasts of 9.4, 4.7 and 5.4 to 1. On dark pages, text in these colours is
+lighter: see `STYLE`."""
 
 HINT = "Drag a robot to move it, its rim to turn it. Click it to look inside."
 
@@ -32,11 +33,11 @@ try {
   Object.defineProperty(window, "sessionStorage", { value: {} });
 }
 </script>"""
-"""Stands in for what NiceGUI remembers a tab by: within a notebook's page of another name, such as localhost for
-127.0.0.1, Chromium refuses even to look at it, and all buttons would be dead."""
+"""Replacement for the session storage in which NiceGUI keeps a tab's id: in a notebook that has another host name, such
+as localhost for 127.0.0.1, Chromium denies access to it, and no button would work."""
 
 NEWS_S = 0.5
-"""How often people are told what is new [s]."""
+"""Period at which new messages are shown [s]."""
 
 
 class Page:
@@ -44,11 +45,13 @@ class Page:
 
     Args:
         desk: The desk.
+        editing: Edits its world.
         number: Its number in this process.
     """
 
-    def __init__(self, desk: Desk, number: int) -> None:
+    def __init__(self, desk: Desk, editing: Editing, number: int) -> None:
         self._desk = desk
+        self._editing = editing
         self._told = desk.news.count
         feed = f"/desk/{number}/feed"
         ui.colors(primary=PRIMARY, accent=ACCENT, positive=POSITIVE)
@@ -70,7 +73,7 @@ class Page:
         ui.timer(NEWS_S, self._tell_news)
 
     def _build_tabs(self, feed: str) -> None:
-        """Build the tabs beside the arena; what is in one when it is first looked at."""
+        """Build the tabs beside the arena; the content of each is built when it is first opened."""
         desk = self._desk
         self._unbuilt: dict[str, Callable[[], object]] = {}
         self._monitor: MonitorPanel | None = None
@@ -108,17 +111,17 @@ class Page:
             sleeper.set_visible(own == name)
 
     def _build_sleeper(self, name: str, kind: type[WirePanel | ProgramsPanel]) -> None:
-        """Build a panel that does nothing while it is not seen."""
+        """Build a panel that is inactive while it is hidden."""
         self._sleepers[name] = kind(self._desk)
 
     def _build_monitor(self, feed: str) -> None:
         self._monitor = MonitorPanel(self._desk, feed)
 
     def _build_editor(self) -> None:
-        self._editor = EditorPanel(self._desk, self._view)
+        self._editor = EditorPanel(self._desk, self._editing, self._view)
 
     async def _pick(self, pick: Pick) -> None:
-        """Show the robot or the sensor that was clicked at."""
+        """Show the robot or sensor that was clicked."""
         if pick.what in ("robot", "sensor"):
             self._panels.value = "robot"
             if self._monitor is not None and pick.what == "robot":
@@ -127,7 +130,7 @@ class Page:
                 await self._monitor.show_sensor(pick.index, pick.sensor)
 
     async def _draw(self, stroke: Stroke) -> None:
-        """Give a stroke to whoever has handed out the tool."""
+        """Pass a stroke to the editor."""
         if self._editor is not None:
             await self._editor.draw(stroke)
 

@@ -1,13 +1,13 @@
-"""Programs: which run, on which robots, what they print; and an editor to write one and run it."""
+"""The programs panel: the programs with their robots, states and output, and an editor to write and run one."""
 
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING
 
 from nicegui import ui
 
-from kiks.desk.panels.feedback import told
+from kiks.desk.panels.widgets import icon_button, told
+from kiks.desk.server.desk import Desk
 from kiks.desk.server.scripts import (
     NEW,
     Script,
@@ -21,31 +21,28 @@ from kiks.desk.server.scripts import (
 from kiks.ports.program_process import Command
 from kiks.ports.programs import Handle
 
-if TYPE_CHECKING:
-    from kiks.desk.server.desk import Desk
-
 REFRESH_S = 0.3
-"""How often the list and the output are shown anew [s]."""
+"""Refresh period of the list and the output [s]."""
 
 SHOWN_LINES = 500
-"""Lines of output in the page."""
+"""Maximum number of lines of output in the page."""
 
 NEWEST_LINES = 100
-"""Most lines of output that come into the page in one go."""
+"""Maximum number of lines of output that one refresh adds."""
 
-LOOK_S = 0.02
-"""How often it is looked whether a program has ended [s]."""
+POLL_S = 0.02
+"""Period at which the end of a program is polled [s]."""
 
 MAY_NOT = (
-    "Programs cannot be started from this page, because this desk is open to other computers: whoever sees it could "
+    "Programs cannot be started from this page, because this desk is open to other computers, and any visitor could "
     "run anything here. Start them where the desk was started, or open it for this computer alone."
 )
-"""Why there is no editor: its programs would not start (`kiks.ports.program_process`)."""
+"""Shown in place of the editor, whose programs would not start (`kiks.ports.program_process`)."""
 
 CSS = ".program-error { color: #b00020 } .body--dark .program-error { color: #ff9a90 }"
 
 ICONS = {"running": "play_circle", "stopping": "hourglass_top", "stopped": "stop_circle", "silenced": "volume_off"}
-"""What stands before a program, by its state; the rest has ended."""
+"""Icons of programs by state; all other states are ends."""
 
 
 class ProgramsPanel:
@@ -81,13 +78,13 @@ class ProgramsPanel:
         self.refresh()
 
     def set_visible(self, is_visible: bool) -> None:
-        """Show what is new only while somebody sees it."""
+        """Refresh the panel only while it is visible."""
         self._timer.active = is_visible
 
-    # ---- the list, and what they print ----
+    # ---- the list and the output ----
 
     def refresh(self) -> None:
-        """Show how things stand."""
+        """Show the present state."""
         desk = self._desk
         handles = list(desk.programs.handles)
         if self._shown not in handles:
@@ -123,22 +120,15 @@ class ProgramsPanel:
                 self._draw_act(handle)
 
     def _draw_act(self, handle: Handle) -> None:
-        """Put the button behind a program that ends it, or starts it once more."""
-        name = handle.command.program.name
+        """Add the button that stops a program or starts it again."""
+        program = handle.command.program.name
         if handle.is_running:
-            icon, word, act = "stop", "Stop", self._stop
-            tip = "End this program, as Ctrl-C would; its robot stops. A second press ends it at once"
+            button = icon_button("stop", f"Stop: {program}", "stop", lambda: self._stop(handle))
+            button.mark(f"stop-{handle.number}")
+            button.tooltip("End this program, as Ctrl-C would; its robot stops. A second press ends it at once")
         elif self._desk.may_run_programs:
-            icon, word, act = "replay", "Start again", self._again
-            tip = "Start this program again, with the same arguments"
-        else:
-            return
-        with (
-            ui.button(icon=icon, on_click=lambda: act(handle))
-            .props(f'flat round dense aria-label="{word}: {name}" data-testid="{word.lower().replace(" ", "-")}"')
-            .mark(f"{word.lower().replace(' ', '-')}-{handle.number}")
-        ):
-            ui.tooltip(tip)
+            button = icon_button("replay", f"Start again: {program}", "start-again", lambda: self._again(handle))
+            button.mark(f"start-again-{handle.number}").tooltip("Start this program again, with the same arguments")
 
     def _choose(self, handle: Handle) -> None:
         self._show(handle)
@@ -151,7 +141,7 @@ class ProgramsPanel:
         self._log.clear()
 
     def _add_output(self) -> None:
-        """Show what has been printed since the last time."""
+        """Show the output since the last refresh."""
         if self._shown is None or self._shown.output is None:
             return
         first, lines = self._shown.output.since(self._next_line)
@@ -180,33 +170,18 @@ class ProgramsPanel:
                 .classes("col")
                 .props('dense options-dense data-testid="script"')
                 .mark("script")
+                .tooltip("Your programs in the desk's folder, and examples that come with KiKS")
             )
-            with self._choice:
-                ui.tooltip("Your programs in the desk's folder, and examples that come with KiKS")
-            with (
-                ui.button(icon="note_add", on_click=self._new)
-                .props('flat round dense aria-label="New program" data-testid="new-program"')
-                .mark("new-program")
-            ):
-                ui.tooltip("Begin a new program")
+            icon_button("note_add", "New program", "new-program", self._new).tooltip("Begin a new program")
         with ui.row().classes("w-full items-end no-wrap gap-2"):
-            self._robot = (
-                ui.select({1: "robot 1"}, value=1, label="Runs on").props('dense data-testid="robot"').mark("robot")
-            )
-            with self._robot:
-                ui.tooltip("The robot that answers on whatever port the program opens")
-            self._arguments = (
-                ui.input("Arguments").classes("col").props('dense data-testid="arguments"').mark("arguments")
-            )
-            with self._arguments:
-                ui.tooltip("Words that the program finds in sys.argv; usually none")
-            with (
-                ui.button("Run", icon="play_arrow", on_click=self._run)
-                .props('unelevated no-caps color=primary data-testid="run-program"')
-                .mark("run-program")
-            ):
-                ui.tooltip("Save and run this program (Ctrl-Enter); one that runs on this robot is ended first")
-        # The page's own keys (space, .) are letters here.
+            self._robot = ui.select({1: "robot 1"}, value=1, label="Runs on").props('dense data-testid="robot"')
+            self._robot.mark("robot").tooltip("The robot that answers on every port that the program opens")
+            self._arguments = ui.input("Arguments").classes("col").props('dense data-testid="arguments"')
+            self._arguments.mark("arguments").tooltip("Words that the program finds in sys.argv; usually none")
+            run = ui.button("Run", icon="play_arrow", on_click=self._run).mark("run-program")
+            run.props('unelevated no-caps color=primary data-testid="run-program"')
+            run.tooltip("Save and run this program (Ctrl-Enter); first stops a program that runs on this robot")
+        # Here, the page's shortcut keys (space, .) are text.
         with ui.element("div").classes("w-full").on("keydown", js_handler="(event) => event.stopPropagation()"):
             self._editor = (
                 ui.codemirror(
@@ -225,17 +200,12 @@ class ProgramsPanel:
             ui.label().classes("program-error text-body2").props('role="alert" data-testid="mistake"').mark("mistake")
         )
         with ui.row().classes("w-full items-end no-wrap gap-2"):
-            self._name = (
-                ui.input("Saved as", value="mine.py").classes("col").props('dense data-testid="name"').mark("name")
+            self._name = ui.input("Saved as", value="mine.py").classes("col").props('dense data-testid="name"')
+            self._name.mark("name").tooltip(
+                "The file in the desk's folder in which the program is saved before it runs"
             )
-            with self._name:
-                ui.tooltip("The file in the desk's folder that the program is saved in before it runs")
-            with (
-                ui.button("Save", on_click=self._save)
-                .props('flat no-caps data-testid="save-program"')
-                .mark("save-program")
-            ):
-                ui.tooltip("Save the program in the desk's folder")
+            save = ui.button("Save", on_click=self._save).props('flat no-caps data-testid="save-program"')
+            save.mark("save-program").tooltip("Save the program in the desk's folder")
         self._offer()
         example = next(script for script in offered(self._desk.folder) if script.is_example)
         self._choice.value = next((s for s in self._choice.options if s.name == "first_steps.py"), example)
@@ -243,7 +213,7 @@ class ProgramsPanel:
         ui.on("desk-dark", lambda event: self._set_theme(bool(event.args)))
 
     def _dress_editor(self) -> None:
-        """Give the editor a name, and the page's own colours, now and when they change."""
+        """Set the accessible name of the editor, and make its theme follow the page's."""
         ui.run_javascript("""
             const tell = () => emitEvent("desk-dark", document.body.classList.contains("body--dark"));
             new MutationObserver(tell).observe(document.body, { attributeFilter: ["class"] });
@@ -260,12 +230,12 @@ class ProgramsPanel:
         self._editor.theme = "vscodeDark" if is_dark else "basicLight"
 
     def _offer(self) -> None:
-        """List the programs there are."""
+        """Update the list of programs."""
         self._choice.set_options({script: script.label for script in offered(self._desk.folder)})
 
     @told
     async def _open(self) -> None:
-        """Show the chosen program, with what was changed and not saved."""
+        """Show the selected program with its unsaved changes."""
         script = self._choice.value
         if script is None or script == self._script:
             return
@@ -288,10 +258,10 @@ class ProgramsPanel:
         self._mistake.text = ""
 
     def _store(self) -> Script:
-        """Save the program under its name, and return what it is now.
+        """Save the program under its name and return its script; an unchanged example needs no saving.
 
         Raises:
-            ParameterError: If the name leads out of the folder, or names a file that was not opened here.
+            ParameterError: If the name leads out of the folder, or is that of a file that was not opened here.
         """
         text = self._editor.value or ""
         script, folder = self._script, self._desk.folder
@@ -323,7 +293,7 @@ class ProgramsPanel:
         await self._start(command, self._robot.value or 1)
 
     async def _start(self, command: Command, robot: int) -> None:
-        """Start a program on a robot; one that runs there is ended first.
+        """Start a program on a robot after stopping the one that runs there.
 
         Raises:
             KiksError: If it cannot start.
@@ -333,9 +303,9 @@ class ProgramsPanel:
             if handle.robot == robot and handle.is_running:
                 programs.stop(handle)
                 while handle.is_running:
-                    await asyncio.sleep(LOOK_S)
+                    await asyncio.sleep(POLL_S)
         handle = await desk.do(lambda _: programs.start(command, robot))
         self._show(handle)
         self.refresh()
         if desk.gate.is_paused:
-            ui.notify("Time stands still: let it run (space), and the program goes on.")
+            ui.notify("Time is paused. Press space to run it; then the program goes on.")

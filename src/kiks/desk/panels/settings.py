@@ -1,4 +1,4 @@
-"""The settings of a world: seed, thinking, line, sensors and robots, each with a sentence of its own."""
+"""The settings panel: seed, thinking time, baud rate, sensors and robots."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from nicegui import ui
 
-from kiks.desk.panels.feedback import told
+from kiks.desk.panels.widgets import told
 from kiks.desk.server.desk import Desk
 from kiks.errors import ParameterError
 from kiks.model.project import TURRETS, ProjectRobot
@@ -15,10 +15,10 @@ from kiks.model.robot import robot_names
 from kiks.model.thinking_policy import split_thinking
 
 POLICIES = {
-    "none": "none: computing costs no time",
-    "fixed": "fixed: so many milliseconds before each command",
-    "live": "live: as long as it really takes, times a factor",
-    "replay": "replay: as recorded in a file",
+    "none": "none: computing takes no time",
+    "fixed": "fixed: a constant time before each command",
+    "live": "live: the measured time, times a factor",
+    "replay": "replay: the times recorded in a file",
 }
 
 MODELS = {
@@ -27,22 +27,22 @@ MODELS = {
     "thesis": "thesis: the networks of the thesis of 2001",
     "fast": "fast: a table of those networks",
     "curve": "curve: a measured curve of one colour",
-    "standin": "stand-in: a plain formula",
+    "standin": "stand-in: a simple formula",
 }
 
 BAUDS = [9600, 19200, 38400, 57600, 115200]
 
 OF_OLD = """
-**Where the settings of the Matlab KiKS have gone.**
-*Time mode* and *CPU*: thinking `live` with a factor, here above. *Time acceleration*: the speed above the arena.
-*Movement limit* and *interpolation limit*: no more needed, motion is exact at any speed. *Fast sensors*: sensor
+**The settings of the Matlab KiKS.**
+*Time mode* and *CPU*: thinking `live` with a factor, above. *Time acceleration*: the speed above the arena.
+*Movement limit* and *interpolation limit*: not needed, motion is exact at any speed. *Fast sensors*: sensor
 model `fast`. *Grid*, *redraw* and *visualization*: the layers button above the arena. *KiKSnet*: several robots in one
-world, each with its own program, and `kiks serve` for programs elsewhere.
+world, each with its own program, and `kiks serve` for programs on other computers.
 """
 
 
 class SettingsPanel:
-    """The controls of a world's settings. Applied, they begin the world anew, with everything where it stands.
+    """The settings of a world. Applying them restarts the world with everything where it stands.
 
     Args:
         desk: The desk.
@@ -60,14 +60,12 @@ class SettingsPanel:
             )
             with ui.row().classes("w-full"):
                 apply = ui.button("Apply", icon="check", on_click=self._apply).props("no-caps data-testid=apply")
+                apply.tooltip("Restart at time 0 with these settings, everything where it stands")
                 over = ui.button("Start over", icon="replay", on_click=self._start_over)
                 over.props("no-caps outline data-testid=start-over")
-                with apply:
-                    ui.tooltip("Begin anew at time 0 with these settings, everything where it stands now")
-                with over:
-                    ui.tooltip("Begin anew at time 0 from the very start: the same seed, programs and places")
+                over.tooltip("Restart at time 0 with the same seed, programs and initial places")
             if not desk.owns_world:
-                ui.label("A program outside holds this world: change its settings there.").classes("text-caption")
+                ui.label("A program outside holds this world. Change its settings there.").classes("text-caption")
                 for element in (apply, over):
                     element.disable()
             ui.markdown(OF_OLD).classes("text-body2")
@@ -76,7 +74,7 @@ class SettingsPanel:
     def _build_settings(self) -> None:
         self._seed = _number("Seed", "Whole number. The same seed gives the same run, to the bit.", "seed", minimum=0)
         self._policy = _choice(
-            "Thinking", POLICIES, "What the program's own computing costs in simulated time.", "thinking"
+            "Thinking", POLICIES, "How much simulated time the program's computing takes.", "thinking"
         )
         self._amount = _number("", "", "thinking-amount", minimum=0).bind_visibility_from(
             self._policy, "value", lambda policy: policy in ("fixed", "live")
@@ -88,19 +86,16 @@ class SettingsPanel:
             .classes("w-full")
             .bind_visibility_from(self._policy, "value", lambda policy: policy == "replay")
         )
-        self._baud = _choice(
-            "Baud rate", BAUDS, "How fast characters go over the line; programs may set another.", "baud"
-        )
-        self._model = _choice("Sensor model", MODELS, "What makes a count of what a sensor's rays meet.", "model")
+        self._baud = _choice("Baud rate", BAUDS, "Speed of the serial line; programs may set another one.", "baud")
+        self._model = _choice("Sensor model", MODELS, "How a proximity sensor responds to what it sees.", "model")
         self._noise = ui.switch("Noise").props("data-testid=noise")
-        with self._noise:
-            ui.tooltip("Real sensors never read the same twice; without noise they do, which helps to find mistakes.")
+        self._noise.tooltip("Real sensors are noisy; without noise it is easier to find mistakes in programs.")
 
     def _name_amount(self) -> None:
         label, hint = (
             ("Milliseconds", "Before each command.")
             if self._policy.value == "fixed"
-            else ("CPU factor", "1: this computer; 2: one that is half as fast.")
+            else ("CPU factor", "1: this computer; 2: a computer half as fast.")
         )
         self._amount.props(f'label="{label}" hint="{hint}"')
 
@@ -130,7 +125,7 @@ class SettingsPanel:
             self._rows.append(_RobotRow(robot, len(self._rows) + 1, self._remove))
 
     def _remove(self, row: _RobotRow) -> None:
-        """Take a robot away; one stays."""
+        """Remove a robot, unless it is the only one."""
         if len(self._rows) > 1:
             self._rows.remove(row)
             row.element.delete()
@@ -158,13 +153,13 @@ class SettingsPanel:
                 robots=tuple(row.robot() for row in self._rows),
             )
         )
-        ui.notify("A new world, with these settings.")
+        ui.notify("Restarted with these settings.")
 
     @told
     async def _start_over(self) -> None:
         await self._desk.start_over()
         self._show()
-        ui.notify("From the start again.")
+        ui.notify("Started over.")
 
 
 class _RobotRow:
@@ -186,7 +181,7 @@ class _RobotRow:
             ui.button(icon="close", on_click=lambda: remove(self)).props('flat round dense size=sm aria-label="Remove"')
 
     def robot(self) -> ProjectRobot:
-        """Return what the line says."""
+        """Return the robot as edited."""
         return replace(
             self._given, name=self._name.value or "", kind=self._kind.value, turrets=tuple(self._turrets.value)
         )

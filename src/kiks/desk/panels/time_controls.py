@@ -1,4 +1,4 @@
-"""Time: run, pause, step, how fast, what the clock says, and back to where it was."""
+"""The time controls: run, pause, step, speed, clock, checkpoint and reset."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from nicegui import ui
 from nicegui.element import Element
 from nicegui.events import KeyEventArguments
 
-from kiks.desk.panels.feedback import told
+from kiks.desk.panels.widgets import BAR, icon_button, told
 from kiks.desk.server.desk import Desk
 
 _WEB = Path(__file__).parents[1] / "web"
 
 
 class ClockView(Element, component=_WEB / "clock_view.js", esm={"kiks-desk": str(_WEB)}):
-    """The simulated clock, and how fast it goes.
+    """The simulated clock and its speed.
 
     Args:
         feed: Path of the WebSocket that frames come from; all components of a page share one.
@@ -36,12 +36,12 @@ SPEEDS: dict[float, str] = {
     5.0: "5 x",
     10.0: "10 x",
     50.0: "50 x",
-    0.0: "as fast as it can",
+    0.0: "full speed",
 }
-"""How fast time may pass, with 0 for no limit."""
+"""Speeds [simulated seconds per real second]; 0 stands for no limit."""
 
 STEPS: dict[float, str] = {0.01: "10 ms", 0.1: "100 ms", 1.0: "1 s", 10.0: "10 s"}
-"""How much a step is [s]."""
+"""Sizes of a step [s]."""
 
 LEAVE = """(event) => {
     if (![" ", "."].includes(event.key) || event.target.ariaExpanded === "true") return;
@@ -49,11 +49,11 @@ LEAVE = """(event) => {
     event.preventDefault();
     event.target.blur();
 }"""
-"""Lets a closed list leave the keys of time to the page: who has just chosen a speed and presses space wants to pause,
-not to open the list again. Quasar skips events so marked, and the page's keys are heard when no list has the focus."""
+"""Makes a closed list pass the keys space and . on to the page: after choosing a speed, space pauses and does not open
+the list again. Quasar skips events with this mark, and the page handles keys while no list has the focus."""
 
 REFRESH_S = 0.5
-"""How often it is shown what others have changed [s]."""
+"""Period at which changes by other browsers are shown [s]."""
 
 
 class TimePanel:
@@ -69,18 +69,18 @@ class TimePanel:
         self._run = ui.button(on_click=self._toggle).props("round unelevated color=accent data-testid=run")
         with self._run:
             self._run_tip = ui.tooltip("")
-        with _flat("skip_next", "Step", "step", self._step):
-            self._step_tip = ui.tooltip("Let some time pass, then stand still (key: .)")
-        self._step_s = _select(STEPS, 0.01, "How much a step is", "step-size", "5rem")
-        self._speed = _select(SPEEDS, self._shown_speed(), "How fast time passes", "speed", "8.5rem")
+        icon_button("skip_next", "Step", "step", self._step, look=BAR).tooltip("Run for one step, then pause (key: .)")
+        self._step_s = _select(STEPS, 0.01, "Size of a step", "step-size", "5rem")
+        self._speed = _select(SPEEDS, self._shown_speed(), "Speed of time", "speed", "8.5rem")
         self._speed.on_value_change(self._set_speed)
-        with self._speed:
-            ui.tooltip("How much simulated time passes in real time; it never changes what robots do")
+        self._speed.tooltip("Simulated time per real time; it never changes what robots do")
         ClockView(feed)
-        with _flat("bookmark_add", "Checkpoint", "mark", self._mark):
-            ui.tooltip("Checkpoint: remember where everything stands")
-        with _flat("settings_backup_restore", "Reset", "reset", self._reset):
-            ui.tooltip("Reset: put everything back where it stood at the checkpoint, or at the start; time goes on")
+        icon_button("bookmark_add", "Checkpoint", "mark", self._mark, look=BAR).tooltip(
+            "Checkpoint: remember where everything stands"
+        )
+        icon_button("settings_backup_restore", "Reset", "reset", self._reset, look=BAR).tooltip(
+            "Reset: move everything back to where it stood at the checkpoint, or at the start; time goes on"
+        )
         ui.timer(REFRESH_S, self._refresh)
         ui.keyboard(on_key=self._press)
         self._refresh()
@@ -90,7 +90,7 @@ class TimePanel:
         return 0.0 if speed is None else min((each for each in SPEEDS if each), key=lambda each: abs(each - speed))
 
     def _refresh(self) -> None:
-        """Show how time stands; somebody else may have changed it."""
+        """Show the present state, which another browser may have changed."""
         desk = self._desk
         word, icon = ("Run", "play_arrow") if desk.gate.is_paused else ("Pause", "pause")
         if self._run.props.get("aria-label") != word:
@@ -117,7 +117,7 @@ class TimePanel:
     @told
     async def _mark(self) -> None:
         await self._desk.mark()
-        ui.notify("Remembered where everything stands.")
+        ui.notify("Checkpoint taken.")
 
     @told
     async def _reset(self) -> None:
@@ -131,12 +131,6 @@ class TimePanel:
             await self._toggle()
         elif event.key == ".":
             await self._step()
-
-
-def _flat(icon: str, word: str, name: str, act: object) -> ui.button:
-    return ui.button(icon=icon, on_click=act).props(  # type: ignore[arg-type]
-        f'round dense flat color=white aria-label="{word}" data-testid={name}'
-    )
 
 
 def _select(choices: dict[float, str], value: float, word: str, name: str, width: str) -> ui.select:

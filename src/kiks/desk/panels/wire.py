@@ -1,35 +1,32 @@
-"""The wire: what goes over a robot's line, where the time goes, and a console to type commands."""
+"""The wire panel: the traffic on a robot's serial line, the shares of time, and a console."""
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
 
 from nicegui import ui
 
 from kiks.desk.panels.console import ConsolePanel
+from kiks.desk.panels.widgets import icon_button
+from kiks.desk.server.desk import Desk
 from kiks.sim.wire import Wire
 from kiks.sim.wire_log import Piece, TimeShares
 from kiks.units import NS_PER_S, s_from_ns
 
-if TYPE_CHECKING:
-    from kiks.desk.server.desk import Desk
-
 REFRESH_S = 0.2
-"""How often what is new is shown [s]."""
+"""Refresh period [s]."""
 
 ROWS = 200
-"""Pieces in the page."""
+"""Maximum number of rows in the page."""
 
 WINDOWS: dict[int, str] = {1: "the last second", 10: "the last 10 s", 60: "the last minute"}
-"""Simulated times over which the shares are taken [s]."""
+"""Windows of the time shares [s of simulated time]."""
 
 PARTS = {
-    "link": ("Link", "Characters were on the line, in either direction: a faster line makes this smaller"),
+    "link": ("Link", "Characters were on the line, in either direction: a higher baud rate makes this smaller"),
     "robot": ("Robot", "The robot had a command and had not answered yet"),
-    "thinking": ("Thinking", "The program thought between a reply and its next command"),
-    "waiting": ("Waiting", "The program waited on purpose (sleep, pause, a time-out), or nobody wanted anything"),
+    "thinking": ("Thinking", "The program computed between a reply and its next command"),
+    "waiting": ("Waiting", "The program waited on purpose (sleep, pause, a timeout), or no program used the line"),
 }
-"""The parts of the bar, in their order: their names, and what they are."""
+"""The parts of the bar in order: their names and meanings."""
 
 CSS = """
     .wire-row { white-space: pre-wrap; font-family: monospace }
@@ -48,7 +45,7 @@ CSS = """
 
 
 class WirePanel:
-    """The line of a robot.
+    """The traffic on the line of a robot.
 
     Args:
         desk: The desk.
@@ -68,27 +65,26 @@ class WirePanel:
                     .classes("col")
                     .props('dense options-dense data-testid="wire-robot"')
                     .mark("wire-robot")
+                    .tooltip("The robot whose line is shown, and that gets your commands")
                 )
-                with self._robot:
-                    ui.tooltip("Whose line is shown, and to whom you type")
                 self._filter = (
                     ui.input("Only with", on_change=self._show_again)
                     .classes("col")
                     .props('dense clearable debounce=300 data-testid="wire-filter"')
                     .mark("wire-filter")
+                    .tooltip("Show only rows that contain this text, such as N or z,")
                 )
-                with self._filter:
-                    ui.tooltip("Show only what contains this text, such as N or z,")
-                self._hold = self._flat("pause", "Hold the list", "wire-hold", self._toggle_hold)
+                self._hold = icon_button("pause", "Hold the list", "wire-hold", self._toggle_hold)
                 with self._hold:
-                    self._hold_tip = ui.tooltip("Hold the list, to read it; nothing is lost")
-                with self._flat("delete_sweep", "Clear the list", "wire-clear", self._clear):
-                    ui.tooltip("Clear the list; robot and program do not notice")
+                    self._hold_tip = ui.tooltip("Hold the list to read it; nothing is lost")
+                icon_button("delete_sweep", "Clear the list", "wire-clear", self._clear).tooltip(
+                    "Clear the list; the robot and the program do not notice"
+                )
             self._rows = (
                 ui.log(max_lines=ROWS)
                 .classes("w-full text-caption")
                 .style("height: 16rem")
-                .props('data-testid="wire" aria-label="What goes over the line"')
+                .props('data-testid="wire" aria-label="Traffic on the line"')
                 .mark("wire")
             )
             self._build_bar()
@@ -96,22 +92,14 @@ class WirePanel:
         self._timer = ui.timer(REFRESH_S, self.refresh)
         ui.context.client.on_delete(self._let_go)
 
-    @staticmethod
-    def _flat(icon: str, word: str, name: str, act: object) -> ui.button:
-        return (
-            ui.button(icon=icon, on_click=act)  # type: ignore[arg-type]
-            .props(f'flat round dense aria-label="{word}" data-testid="{name}"')
-            .mark(name)
-        )
-
     def _build_bar(self) -> None:
         with ui.row().classes("w-full items-center no-wrap"):
             ui.label("Where the milliseconds went in").classes("text-subtitle2")
-            self._window = ui.select(WINDOWS, value=1).props(
-                'dense options-dense borderless aria-label="Which time" data-testid="wire-window"'
+            self._window = (
+                ui.select(WINDOWS, value=1)
+                .props('dense options-dense borderless aria-label="Window of time" data-testid="wire-window"')
+                .tooltip("How far back the bar looks, in simulated time")
             )
-            with self._window:
-                ui.tooltip("How far back the bar looks, in simulated time")
         self._parts: dict[str, tuple[ui.element, ui.label, ui.label]] = {}
         bars: dict[str, tuple[ui.element, ui.label]] = {}
         labels: dict[str, ui.label] = {}
@@ -134,21 +122,21 @@ class WirePanel:
             self._parts[name] = *bars[name], labels[name]
 
     def set_visible(self, is_visible: bool) -> None:
-        """Show what is new only while somebody sees it."""
+        """Refresh the panel only while it is visible."""
         self._timer.active = is_visible
         if not is_visible:
             self._let_go()
 
     def _let_go(self) -> None:
-        """Watch the line no longer: that would cost the world time."""
+        """Stop watching the line, which slows the world down."""
         if self._watched is not None:
             self._watched.unwatch()
         self._watched = None
 
-    # ---- what is shown ----
+    # ---- display ----
 
     def refresh(self) -> None:
-        """Show what is new."""
+        """Show new traffic."""
         sim = self._desk.sim
         if sim is not self._sim:
             self._sim = sim
@@ -176,7 +164,7 @@ class WirePanel:
         self._next_piece = first + len(pieces)
         text = self._filter.value or ""
         if left_out and not text:
-            self._rows.push(f"... {left_out} are left out ...", classes="wire-row text-italic")
+            self._rows.push(f"... {left_out} rows are left out ...", classes="wire-row text-italic")
         for piece in pieces[-ROWS:]:
             row = row_text(piece)
             if text in row:
@@ -197,10 +185,10 @@ class WirePanel:
         if self._bar.props.get("aria-label") != ", ".join(told):
             self._bar.props["aria-label"] = ", ".join(told)
 
-    # ---- what a person does ----
+    # ---- actions of a person ----
 
     def _show_again(self) -> None:
-        """Show the newest of what is remembered anew."""
+        """Rebuild the list from the newest rows of the log."""
         self._rows.clear()
         log = None if self._watched is None else self._watched.log
         if log is not None:
@@ -222,7 +210,7 @@ class WirePanel:
 
 
 def visible(data: bytes) -> str:
-    r"""Return characters for a person, those that cannot be seen as Python writes them.
+    r"""Return bytes as readable text; other characters are escaped as in Python.
 
     Example:
         >>> visible(b"D,5,5\r\n\xff")
@@ -232,7 +220,7 @@ def visible(data: bytes) -> str:
 
 
 def row_text(piece: Piece) -> str:
-    """Return a piece for a person: when its first character set out [s], which way it went, and what it is.
+    """Return a row of the list: send time of the first character [s], direction, and text.
 
     Example:
         >>> row_text(Piece(True, b"N", 1_234_567_890, 1_235_000_000, None))

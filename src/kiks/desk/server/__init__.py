@@ -1,1 +1,1 @@
-"""The web server of the desk: access, frames for browsers, files, and the world they share."""
+"""The web server of the desk: access control, frames, files, programs and the world."""

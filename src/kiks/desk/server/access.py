@@ -1,4 +1,4 @@
-"""The guard at the door: who may see the page, open its sockets, and send files, and how much."""
+"""Access control: which requests reach the desk, and how large they may be."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import parse_qsl, quote, urlencode, urlsplit
 
-from kiks.desk.server.connection_limit import DOOR
+from kiks.desk.server.connection_limit import CONNECTION_KEY
 from kiks.desk.server.server_log import note
 from kiks.desk.server.token import Token
 
@@ -20,31 +20,32 @@ Send = Callable[[Message], Awaitable[None]]
 Application = Callable[[Message, Receive, Send], Awaitable[None]]
 
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
-"""Names of this computer as it calls itself."""
+"""Host names of this computer."""
 
 HEADERS = [
-    # Whose pages may show this one within theirs: notebooks of this computer. Others could trick people into clicks.
+    # Only notebooks of this computer may embed the page: other pages could trick people into clicks.
     (b"content-security-policy", b"frame-ancestors 'self' http://localhost:* http://127.0.0.1:* vscode-webview:"),
     (b"referrer-policy", b"same-origin"),
     (b"x-content-type-options", b"nosniff"),
 ]
-"""What goes with each answer."""
+"""Headers of every answer."""
 
 BODY_LIMIT = 64 << 20
-"""Most bytes of a request: a project of 64 million cells, compressed."""
+"""Maximum size of a request's body [bytes]: a compressed project of 64 million cells."""
+TOO_LARGE = f"A request must have at most {BODY_LIMIT >> 20} MiB"
 
 REFUSED = (Path(__file__).parents[1] / "web" / "refused.html").read_text(encoding="utf-8")
-"""The page for a browser that may not come in."""
+"""The page of a refusal."""
 
-NO_TOKEN = "The desk must be opened with its token, but it was asked for without, or with another one"
+NO_TOKEN = "The desk must be opened with its token, but the address has none or another one"
 
 
 class Refusal(NamedTuple):
-    """Why a request is refused.
+    """Answer to a request that is refused.
 
     Attributes:
-        status: As HTTP has it.
-        reason: For a person.
+        status: HTTP status.
+        reason: The reason, for a person.
     """
 
     status: int
@@ -52,19 +53,18 @@ class Refusal(NamedTuple):
 
 
 class AccessControl:
-    """Stands before an ASGI application and lets in who may come.
+    """ASGI middleware that checks each request before it reaches the application.
 
-    * Everything needs the token, in a cookie; `?token=...` in an address sets the cookie, and so does a ticket.
-    * A page of another site gets nothing: whoever names an `Origin` must come from the page itself.
-    * Only pages of this computer may show it within theirs.
-    * A desk for this computer alone must be asked for by a name of it, lest a foreign name that was made to mean it
-      gets in.
+    * Each request needs the token in a cookie; `?token=...` or `?ticket=...` in an address sets the cookie.
+    * A request with an `Origin` header must come from the desk's own page.
+    * Only pages of this computer may embed the page.
+    * A desk for this computer alone accepts only host names of this computer, against DNS rebinding.
     * No request is larger than `BODY_LIMIT`.
-    * What the application fails at is a line in the log.
+    * An exception in the application is logged in one line.
 
     Args:
         app: The application.
-        key: What a browser must know.
+        key: The token that browsers must know.
         is_local: Whether the desk is for this computer alone.
     """
 
@@ -74,7 +74,7 @@ class AccessControl:
         self._is_local = is_local
 
     async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
-        """Let a request through or answer it with a refusal."""
+        """Pass a request to the application, or refuse it."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
@@ -89,16 +89,16 @@ class AccessControl:
         if refusal is not None:
             await _refuse(scope, send, refusal)
             return
-        door = scope.get("state", {}).get(DOOR)
-        if door is not None:
-            door.let_in()
+        connection = scope.get("state", {}).get(CONNECTION_KEY)
+        if connection is not None:
+            connection.note_token()
         await self._pass_on(scope, receive, send)
 
     def _refusal(self, scope: Message, headers: dict[str, str]) -> Refusal | None:
-        """Say why a request is not from the desk's own page, None if it is."""
+        """Return a refusal if a request is not from the desk's own page or is too large, else None."""
         host, origin, length = headers.get("host", ""), headers.get("origin"), headers.get("content-length", "0")
         if not scope["path"].isprintable():
-            return Refusal(400, "A path must be of printable characters, but this one was not")
+            return Refusal(400, "A path must have printable characters only, but this one has others")
         try:
             name = urlsplit(f"//{host}").hostname or ""
             came_from = None if origin is None else urlsplit(origin).netloc
@@ -109,14 +109,14 @@ class AccessControl:
         if came_from is not None and came_from != host:
             return Refusal(403, f"Requests must come from the desk's own page, but this one came from {_short(origin)}")
         if self._is_local and name not in LOOPBACK:
-            return Refusal(403, f"The desk must be asked for by the name of this computer, but it was {_short(host)}")
+            return Refusal(403, f"The desk's host must be a name of this computer, but it was {_short(host)}")
         if not re.fullmatch("[0-9]{1,18}", length) or int(length) > BODY_LIMIT:
-            return Refusal(413, f"A request must have at most {BODY_LIMIT >> 20} MiB, but this one has more")
+            return Refusal(413, f"{TOO_LARGE}, but this one has more")
         return None
 
     def _knows_token(self, scope: Message, headers: dict[str, str]) -> bool:
         name = self._key.cookie_name(scope.get("server"))
-        # By hand: the library's parser gives up at the first cookie of another program that it does not understand.
+        # The library's parser stops at the first cookie that it cannot parse, and other programs set such cookies.
         pairs = (pair.strip().partition("=") for pair in headers.get("cookie", "").split(";"))
         return any(each == name and self._key.fits(value) for each, _, value in pairs)
 
@@ -124,9 +124,9 @@ class AccessControl:
         return self._key.fits(token) or self._key.take(ticket, scope.get("client"), scope.get("server"))
 
     def _cookie(self, scope: Message, headers: dict[str, str]) -> str:
-        """Return the cookie with the token. Pages of other sites never send it: but a notebook is another site.
+        """Return the cookie with the token; pages of other sites never send it.
 
-        There it is bound to that notebook's page.
+        A notebook is another site: there the cookie is bound to the page of the notebook.
         """
         is_within = headers.get("sec-fetch-site") == "cross-site" and headers.get("sec-fetch-dest") in (
             "iframe",
@@ -136,26 +136,26 @@ class AccessControl:
         return f"{self._key.cookie_name(scope.get('server'))}={self._key.token}; Path=/; HttpOnly; {rule}"
 
     async def _pass_on(self, scope: Message, receive: Receive, send: Send) -> None:
-        """Let the application answer; whatever goes wrong there, the client gets an answer and nobody a traceback."""
+        """Call the application; after any failure the client gets an answer, and the log one line."""
         limited, answer = _Limited(receive, BODY_LIMIT), _Answer(send, scope)
         try:
             await self._app(scope, limited, answer)
         except Exception as error:
-            # When a client has left, or its request was cut off, that is what it fails at.
+            # A failure after the client has left, or its request was cut off, is no fault of the application.
             if not limited.has_left and not limited.is_too_large:
                 note(f"It could not answer {_short(scope['path'])}", error)
         if limited.is_too_large and not answer.has_begun:
-            await _refuse(scope, send, Refusal(413, f"A request must have at most {BODY_LIMIT >> 20} MiB"))
+            await _refuse(scope, send, Refusal(413, TOO_LARGE))
         elif not answer.has_begun and not limited.has_left:
-            await _refuse(scope, answer, Refusal(500, "The desk could not answer this"))
+            await _refuse(scope, answer, Refusal(500, "The desk could not answer this request"))
 
 
 class _Limited:
-    """Passes on what a client sends, and ends a request that is too large.
+    """Receives a request, and cuts it off at the size limit.
 
     Attributes:
-        has_left: Whether the client has gone.
-        is_too_large: Whether it has sent too much.
+        has_left: Whether the client has closed the connection.
+        is_too_large: Whether the request was cut off.
     """
 
     def __init__(self, receive: Receive, limit: int) -> None:
@@ -176,10 +176,10 @@ class _Limited:
 
 
 class _Answer:
-    """Passes on what an application answers, with what goes with each answer.
+    """Sends the answer of the application with `HEADERS`.
 
     Attributes:
-        has_begun: Whether it has answered anything.
+        has_begun: Whether a part of the answer was sent.
     """
 
     def __init__(self, send: Send, scope: Message) -> None:
@@ -192,19 +192,19 @@ class _Answer:
         if message["type"] == "http.response.start":
             message = {**message, "headers": [*message.get("headers", ()), *HEADERS]}
             if self._is_upload and message["status"] == 500:
-                # Only files are sent so: what the application stumbles over is a body that is none.
+                # Only uploads are POST requests: the application fails because the body is malformed.
                 message["status"] = 400
         await self._send(message)
 
 
 def _short(text: str | None) -> str:
-    """Return a text from outside as it may be shown."""
+    """Return a text of a client, escaped and shortened for display."""
     return ascii(text)[:80]
 
 
 async def _redirect(send: Send, path: str, query: dict[str, str], cookie: str) -> None:
-    """Send a browser to the same page without the token in its address, and the token in a cookie."""
-    # Two strokes would begin the name of another computer.
+    """Redirect a browser to the same page without the token in its address, and set the cookie."""
+    # Two slashes would begin the name of another computer.
     location = "/" + quote(path.lstrip("/")) + (f"?{urlencode(query)}" if query else "")
     headers = [(b"location", location.encode()), (b"set-cookie", cookie.encode()), (b"cache-control", b"no-store")]
     await send({"type": "http.response.start", "status": 303, "headers": [*headers, *HEADERS]})

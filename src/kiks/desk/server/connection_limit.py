@@ -1,8 +1,7 @@
-"""The door of the desk's server: connections that have not shown the token are few, and do not stay.
+"""A limit on unauthenticated connections: without it, silent clients could use up all file descriptors.
 
-Need: whoever reaches the port may open connections and say nothing, until the process has no descriptors left.
-Method: a connection is a stranger until `AccessControl` has accepted a request of it. Strangers have some seconds for
-their request. When there are too many, the server closes the oldest one, so the next one always gets in.
+A connection is unauthenticated until `AccessControl` has accepted a request of it. The server closes it after some
+seconds, and closes the oldest one when there are too many, so a new connection always gets in.
 """
 
 from __future__ import annotations
@@ -14,17 +13,17 @@ from uvicorn.config import Config
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.server import ServerState
 
-STRANGERS_MAX = 64
+UNAUTHENTICATED_MAX = 64
 """Most connections that have not shown the token."""
 
-STRANGER_S = 10.0
-"""How long one may take for that [s]."""
+AUTHENTICATION_S = 10.0
+"""Time that a connection has to show the token [s]."""
 
-DOOR = "kiks_door"
-"""What a request's state calls the door that it came by."""
+CONNECTION_KEY = "kiks_connection"
+"""Key of the connection in a request's state."""
 
 
-class Door(H11Protocol):
+class LimitedConnection(H11Protocol):
     """One connection. h11 bounds what comes before a request's body to 64 KiB, which httptools does not."""
 
     def __init__(
@@ -34,31 +33,33 @@ class Door(H11Protocol):
         app_state: dict[str, Any],
         _loop: asyncio.AbstractEventLoop | None = None,
     ) -> None:
-        super().__init__(config, server_state, {**app_state, DOOR: self}, _loop)
+        super().__init__(config, server_state, {**app_state, CONNECTION_KEY: self}, _loop)
         self._is_known = False
         self._came_s = self.loop.time()
         self._timer: asyncio.TimerHandle | None = None
 
-    def let_in(self) -> None:
-        """Note that it has shown the token."""
+    def note_token(self) -> None:
+        """Note that the client has shown the token."""
         self._is_known = True
         self._stop_timer()
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Begin."""
+        """Start the timer of a new connection and enforce the limit."""
         super().connection_made(transport)
-        self._timer = self.loop.call_later(STRANGER_S, transport.abort)
-        strangers = [each for each in self.connections if isinstance(each, Door) and each._is_stranger]
-        if len(strangers) > STRANGERS_MAX:
-            min(strangers, key=lambda each: each._came_s).transport.abort()
+        self._timer = self.loop.call_later(AUTHENTICATION_S, transport.abort)
+        unauthenticated = [
+            each for each in self.connections if isinstance(each, LimitedConnection) and each._is_unauthenticated
+        ]
+        if len(unauthenticated) > UNAUTHENTICATED_MAX:
+            min(unauthenticated, key=lambda each: each._came_s).transport.abort()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """End."""
+        """Cancel the timer."""
         self._stop_timer()
         super().connection_lost(exc)
 
     @property
-    def _is_stranger(self) -> bool:
+    def _is_unauthenticated(self) -> bool:
         return not self._is_known and not self.transport.is_closing()
 
     def _stop_timer(self) -> None:

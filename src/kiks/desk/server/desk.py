@@ -1,4 +1,4 @@
-"""The desk: one world, and all that the people at its browsers share."""
+"""The desk: one world and the state that all its browsers share."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import TypeVar
 
 from kiks.clock.gate import Gate
-from kiks.desk.server.live_editing import Editing
 from kiks.desk.server.scripts import EXAMPLES
 from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.model.project import Project, ProjectRobot
@@ -27,18 +26,18 @@ from kiks.sim.simulation import Simulation
 from kiks.sim.turret_host import name_of
 
 WINDOW_NS = 1_000_000_000
-"""What 'at this moment' is [ns of real time]."""
+"""Window of the momentary speed [ns of real time]."""
 
 
 class Speedometer:
-    """Looks at both clocks again and again.
+    """Measures how fast simulated time passes, from samples of both clocks.
 
     Args:
-        wall_ns: A clock that only goes forwards [ns]; a test hands in its own.
+        wall_ns: Monotonic clock [ns]; tests pass their own.
 
     Attributes:
-        average: Simulated seconds in a real one since the beginning; pauses do not count.
-        momentary: The same over the last second.
+        average: Simulated seconds per real second since the start, without pauses.
+        momentary: Simulated seconds per real second over the last second.
 
     Example:
         >>> wall = [0]
@@ -59,12 +58,12 @@ class Speedometer:
         self._recent: deque[tuple[int, int]] = deque()
 
     def note(self, now_ns: int, *, is_paused: bool) -> None:
-        """Look: simulated time is now at `now_ns` [ns]."""
+        """Take a sample at the simulated time `now_ns` [ns]."""
         wall_ns = self._wall_ns()
         if self._last is not None:
             last_wall_ns, last_ns = self._last
             self._passed_ns += now_ns - last_ns
-            # A step in a pause takes no time to speak of.
+            # A single step during a pause takes hardly any real time.
             self._running_ns += 0 if is_paused else wall_ns - last_wall_ns
         self._last = wall_ns, now_ns
         self._recent.append(self._last)
@@ -75,11 +74,11 @@ class Speedometer:
         self.average = self._passed_ns / self._running_ns if self._running_ns else 0.0
 
 
-LOOK_S = 0.003
-"""How often it is looked whether somebody has done what was asked for [s]."""
+RETRY_S = 0.02
+"""Period at which a request is offered again while no thread moves the world [s]."""
 
 NEWS_LIMIT = 200
-"""How many of the last words to people are kept."""
+"""Number of messages to people that are kept."""
 
 Done = TypeVar("Done")
 
@@ -89,31 +88,30 @@ NewPrograms = Callable[[Simulation, Sequence[Command | None], Gate], Programs]
 class Desk:
     """A world on a desk.
 
-    Nobody here waits for the world, and the world waits for nobody here: what is to be done with it is done between two
-    of its events, by whoever moves it, or at once if nobody does.
+    Requests to the world run between two of its events: in the thread that moves the world, or at once if no thread
+    moves it. So the server never blocks on the world, and the world never waits for the server.
 
     Args:
         sim: The world.
-        project: What it was built from; what can be told of it is found out if left out.
-        speed: Simulated seconds in a real one; None for as fast as possible.
+        project: The project it was built from; derived from the world if left out.
+        speed: Simulated seconds per real second; None for full speed.
         folder: Where files are opened and saved.
-        owns_world: Whether it may be replaced by another one; False if a program outside holds it.
-        may_run_programs: Whether others than `commands` may be started, from a browser or by a project.
-        commands: Programs that begin with the world, the first for robot 1 and so on; they may always be started.
-        new_programs: Makes the host of a world's programs, for who wants other settings than the project's.
-        is_held: Whether programs begin with `begin` only; else at once.
+        owns_world: Whether the world may be replaced; False if a program outside holds it.
+        may_run_programs: Whether a browser or a project may start programs other than `commands`.
+        commands: Programs that start with the world, the first for robot 1 and so on; they are always permitted.
+        new_programs: Factory of a world's program host; the default takes the project's settings.
+        is_held: Whether programs wait for `begin`; else they start at once.
 
     Attributes:
         sim: The world.
-        project: What it was built from.
+        project: The project it was built from.
         gate: Where its time passes.
-        hands: What is held in it.
-        editing: What people draw in it.
+        hands: The things that people hold.
         programs: The programs in it.
         is_seen: Set when a page has shown it for the first time.
-        meter: How fast its time passes.
-        scene: Number of what there is to be seen; another one whenever something has come, gone or changed its looks.
-        news: What people are told, the newest last.
+        meter: Measures how fast its time passes.
+        scene: Counts up whenever a thing appears, disappears or changes its looks.
+        news: Messages to people, the newest last.
     """
 
     def __init__(
@@ -140,12 +138,11 @@ class Desk:
         self._new_programs = new_programs or self._usual_programs
         self._retired: list[Programs] = []
         self.project = foreign_project(sim) if project is None else project
-        self.editing = Editing(self)
         self._take(sim, speed)
 
     def _take(self, sim: Simulation, speed: float | None) -> None:
         gate = Gate(sim.lock, speed=speed)
-        # First, because it may fail: then the world that was there stays.
+        # First, because it may fail: then the old world stays.
         programs = self._new_programs(sim, self._commands, gate)
         programs.permission = self._permission()
         if self._has_begun:
@@ -159,11 +156,11 @@ class Desk:
 
     @property
     def has_beginners(self) -> bool:
-        """Say whether there are programs that begin with the world."""
+        """Whether programs start with the world."""
         return any(command is not None for command in self._commands)
 
     def begin(self) -> None:
-        """Let the programs begin that begin with the world, and with each one that replaces it.
+        """Start the programs of this world; those of later worlds start with them.
 
         Raises:
             KiksError: If one of them cannot start.
@@ -180,7 +177,7 @@ class Desk:
         return Permission(self._granted, folders=(self.folder, EXAMPLES), may_start_others=self.may_run_programs)
 
     def _permitted(self, commands: Sequence[Command | None]) -> list[Command | None]:
-        """Return the programs that may start; people are told of the others."""
+        """Return the programs with None for each that may not start; people get a message about those."""
         permission = self._permission()
 
         def permitted(command: Command | None) -> Command | None:
@@ -195,47 +192,51 @@ class Desk:
         return [permitted(command) for command in commands]
 
     def names(self) -> list[str]:
-        """Return what people call the robots: their numbers, if nothing else."""
+        """Return the names of the robots; a robot without a name has its number."""
         given = [robot.name for robot in self.project.robots]
         given += [""] * (self.sim.robot_count - len(given))
         return [name or str(number) for number, name in enumerate(given[: self.sim.robot_count], 1)]
 
     def tell(self) -> None:
-        """Let all browsers see that something has come, gone, or looks different."""
+        """Make all browsers load the scene again: a thing has appeared, disappeared or changed its looks."""
         self.scene += 1
 
     def say(self, text: str) -> None:
-        """Tell all people something; from any thread."""
+        """Show a message in all browsers; from any thread."""
         self.news.add([text])
 
     async def do(self, act: Callable[[Simulation], Done]) -> Done:
-        """Do something with the world, locked, between two events; what it returns or raises comes out here.
+        """Run a function with the locked world between two events, and return or raise its outcome.
 
-        It must not let time pass.
+        The function must not let time pass.
         """
         sim, gate = self.sim, self.gate
         future = gate.ask(lambda: act(sim))
-        while not future.done():
-            await asyncio.sleep(LOOK_S)
+        if future.done():
+            return future.result()
+        # The thread that moves the world serves the request, unless it has just stopped.
+        served = asyncio.wrap_future(future)
+        while not (await asyncio.wait([served], timeout=RETRY_S))[0]:
             gate.serve()
-        return future.result()
+        return served.result()
 
     # ---- another world ----
 
     async def replace(self, project: Project) -> None:
-        """Put the world of a project on the desk, with those of its programs that may start; the old one ends.
+        """Replace the world by that of a project, with the permitted ones of its programs; the old world ends.
 
         Raises:
-            ParameterError: If the world cannot be replaced, the project is none, or a program of it is none.
-            ArenaError: If something has no free place.
+            LinkError: If the world cannot be replaced.
+            ParameterError: If the project or one of its programs is not valid.
+            ArenaError: If a thing has no free place.
         """
         await self._put(project, commands_of(project, self.folder))
 
     async def start_over(self) -> None:
-        """Begin again: the same world, seed and programs.
+        """Begin again with the same world, seed and programs.
 
         Raises:
-            ParameterError: If the world cannot be replaced.
+            LinkError: If the world cannot be replaced.
         """
         await self._put(self.project, self._commands)
 
@@ -254,22 +255,22 @@ class Desk:
         except KiksError:
             self.project, self._commands = before
             raise
-        # Only now: whoever moves the world ends them at once, and must have the new ones to turn to.
+        # Last: the thread that moves the world ends them at once, and then needs the new ones.
         self._retired.append(programs)
         if is_paused:
             self.gate.pause(sim.now_ns)
         old.close()
 
     def clear_away(self) -> None:
-        """End the programs of worlds that lay here before; for the thread that moves the world."""
+        """End the programs of replaced worlds; called by the thread that moves the world."""
         while self._retired:
             self._retired.pop().close()
 
     async def present_project(self) -> Project:
-        """Return the project with everything where it is now.
+        """Return the project with the present poses.
 
         Raises:
-            ArenaError: If there is no room for what a gripper holds up.
+            ArenaError: If there is no room for a thing that a gripper holds up.
         """
         sim, project = self.sim, self.project
         return replace(await self.do(lambda _: project_of(sim, project)), speed=self.gate.speed)
@@ -277,15 +278,15 @@ class Desk:
     # ---- time ----
 
     async def pause(self) -> None:
-        """Let time stand still."""
+        """Pause simulated time."""
         await self.do(lambda sim: self.gate.pause(sim.now_ns))
 
     async def go_on(self) -> None:
-        """Let it pass again."""
+        """Resume simulated time."""
         await self.do(lambda sim: self.gate.go_on())
 
     async def step(self, seconds: float) -> None:
-        """Let so much time pass [s], then let it stand still."""
+        """Let `seconds` of simulated time pass, then pause."""
 
         def begin(sim: Simulation) -> None:
             self.gate.pause(sim.now_ns)
@@ -294,33 +295,33 @@ class Desk:
         await self.do(begin)
 
     async def set_speed(self, speed: float | None) -> None:
-        """Let time pass at another speed; None for as fast as possible.
+        """Set the speed [simulated seconds per real second]; None for full speed.
 
         Raises:
             ParameterError: If it is out of range.
         """
         await self.do(lambda sim: self.gate.set_speed(speed, sim.now_ns))
 
-    # ---- back to where it was ----
+    # ---- checkpoints ----
 
     async def mark(self) -> None:
-        """Remember where everything stands, for `reset`."""
+        """Take a checkpoint for `reset`."""
         self._mark = await self.do(lambda sim: sim.checkpoint())
 
     async def reset(self) -> None:
-        """Put everything back where it stood when it was remembered, or at the beginning; time and programs go on."""
+        """Restore the last checkpoint, or the initial state; time and programs go on."""
 
-        def put_back(sim: Simulation) -> None:
+        def restore(sim: Simulation) -> None:
             self.hands.drop_all()
             self._leave_if_empty()
             sim.reset(self._mark)
 
-        await self.do(put_back)
+        await self.do(restore)
 
     # ---- hands ----
 
     async def grab(self, owner: str, what: str, index: int) -> None:
-        """Take a thing in somebody's hand.
+        """Let the hand of `owner` take a thing.
 
         Raises:
             ParameterError: If there is no such thing, or another hand has it.
@@ -337,7 +338,7 @@ class Desk:
         await self.do(take)
 
     async def drop(self, owner: str) -> None:
-        """Let go of what somebody's hand holds."""
+        """Let the hand of `owner` drop what it holds."""
 
         def let_go(_sim: Simulation) -> None:
             if not self.hands.are_empty:
@@ -347,12 +348,12 @@ class Desk:
         await self.do(let_go)
 
     def _leave_if_empty(self) -> None:
-        """Stop holding things in their places when nobody holds any."""
+        """Remove the keeper from the gate when all hands are empty."""
         if self.hands.are_empty:
             self.gate.leave(self.hands.keep)
 
     def close(self) -> None:
-        """End its programs, and let the world go its way."""
+        """End the programs and release the world."""
         self.gate.close()
         self.clear_away()
         self.programs.close()
@@ -360,7 +361,7 @@ class Desk:
 
 
 class NewsHandler(logging.Handler):
-    """Tells the people at a desk what the log says.
+    """Log handler that shows warnings in the browsers of a desk.
 
     Args:
         desk: The desk.
@@ -371,14 +372,14 @@ class NewsHandler(logging.Handler):
         self._desk = desk
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Tell it."""
+        """Show a log record."""
         self._desk.say(self.format(record))
 
 
 def foreign_project(sim: Simulation) -> Project:
-    """Return what can be told of a world that was not built from a project.
+    """Return a project that describes a world built without one.
 
-    Robots of another kind than KiKS has become Kheperas, and turrets of a user's own are left out.
+    Robots of an unknown kind become Kheperas; turrets of unknown classes are left out.
     """
     known = {RobotSpec.load(kind): kind for kind in robot_names()}
     robots = tuple(

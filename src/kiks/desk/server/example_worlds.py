@@ -1,4 +1,4 @@
-"""Worlds to begin with."""
+"""Example worlds."""
 
 from __future__ import annotations
 
@@ -49,4 +49,4 @@ EXAMPLES: dict[str, Callable[[], Project]] = {
     ),
     "Twenty robots": _swarm,
 }
-"""What each makes is new each time it is called."""
+"""Factories of the examples by name."""

@@ -1,4 +1,4 @@
-"""The files of a desk: opened and saved in one folder only, whatever name a person types or a browser sends."""
+"""The files of a desk. It opens and saves files in one folder only, whatever name a person or browser gives."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from kiks.model.picture import decode_picture
 from kiks.model.project import Project
 
 UPLOAD_BYTES_MAX = 32 << 20
-"""Most bytes of a file that a browser sends."""
+"""Maximum size of an upload [bytes]."""
 
 PICTURES = (".png", ".tif", ".tiff", ".pgm", ".pbm", ".ppm", ".bmp")
 """Endings of pictures."""
 
 OPENED = (".kiks", ".toml", ".kad", *PICTURES)
-"""Endings of what can be opened or sent."""
+"""Endings of files that can be opened or uploaded."""
 
 SAVED = (".kiks", ".kad")
-"""Endings of what can be saved; without one it is the first."""
+"""Endings of files that can be saved; the first one is the default."""
 
 LISTED_MAX = 500
-"""Most files that are listed."""
+"""Maximum number of files in the list."""
 
-_DEEPEST = 3
+_DEPTH_MAX = 3
 _NAME_MAX = 120
 _RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{number}" for port in ("com", "lpt") for number in range(1, 10))}
 
@@ -43,7 +43,7 @@ class Folder:
         self.path = Path(path)
 
     def names(self) -> list[str]:
-        """Return the files that can be opened, those of folders in it too, in the order of their names."""
+        """Return the names of the files that can be opened, including subfolders, in alphabetical order."""
         found: list[str] = []
         waiting = [(self.path, 0)]
         while waiting and len(found) < LISTED_MAX:
@@ -56,7 +56,7 @@ class Folder:
                 name = entry.relative_to(self.path).as_posix()
                 if entry.name.startswith(".") or not self._is_inside(name):
                     continue
-                if entry.is_dir() and not entry.is_symlink() and depth < _DEEPEST:
+                if entry.is_dir() and not entry.is_symlink() and depth < _DEPTH_MAX:
                     waiting.append((entry, depth + 1))
                 elif entry.suffix.lower() in OPENED and entry.is_file():
                     found.append(name)
@@ -67,7 +67,7 @@ class Folder:
 
         Raises:
             ParameterError: If the name leads out of the folder.
-            ArenaError: If the file is missing, damaged, or none of these.
+            ArenaError: If the file is missing, damaged, or of another kind.
         """
         return Project.load(self._path(name, OPENED))
 
@@ -77,34 +77,30 @@ class Folder:
         Args:
             project: The project.
             name: Name of the file, .kiks if it has no ending.
-            may_replace: Whether an earlier file of that name may be replaced.
+            may_replace: Whether to replace an existing file.
 
         Raises:
-            ParameterError: If the name leads out of the folder, cannot be one, or is taken, or the file cannot be
+            ParameterError: If the name leads out of the folder, is not valid or is taken, or the file cannot be
                 written.
             ArenaError: If the arena does not fit into the file.
         """
         full = self.full_name(name)
         path = self._path(full, SAVED)
         if path.exists() and not may_replace:
-            raise ParameterError(f"The name must be new, but {full!r} is there. Choose another one, or replace it.")
+            raise ParameterError(f"The name must be new, but {full!r} exists. Choose another one, or replace it.")
         replace_file(path, encode(project, full), "a project")
         return full
 
     def has(self, name: str) -> bool:
-        """Tell whether saving under a name would replace a file.
+        """Return whether saving under a name would replace a file.
 
         Raises:
-            ParameterError: If the name leads out of the folder or cannot be one.
+            ParameterError: If the name leads out of the folder or is not valid.
         """
         return self._path(self.full_name(name), SAVED).exists()
 
     def full_name(self, name: str) -> str:
-        """Return a name that a person has typed, with an ending.
-
-        Raises:
-            ParameterError: If it cannot be one.
-        """
+        """Add the default ending to a name without a known ending."""
         typed = name.strip()
         return typed if PurePosixPath(typed).suffix.lower() in OPENED else f"{typed}{SAVED[0]}"
 
@@ -124,14 +120,14 @@ class Folder:
 
 
 def check_name(name: str, endings: tuple[str, ...]) -> None:
-    """Check that a file may have a name, on any computer.
+    """Check that a name is valid on any operating system.
 
     Args:
         name: The name, with / between folders.
-        endings: Endings that it may have.
+        endings: Permitted endings.
 
     Raises:
-        ParameterError: If it may not.
+        ParameterError: If it is not.
     """
     check_relative(name, "The name")
     for part in name.split("/"):
@@ -139,15 +135,15 @@ def check_name(name: str, endings: tuple[str, ...]) -> None:
         is_odd = part.startswith((".", " ", "-", "~")) or part.endswith((".", " ")) or stem in _RESERVED
         if is_odd or len(part.encode()) > _NAME_MAX:
             raise ParameterError(
-                f"The name must begin with a letter or digit, have at most {_NAME_MAX} characters and mean no device, "
-                f"but it was {name!r}. Choose another one."
+                f"The name must begin with a letter or digit, have at most {_NAME_MAX} characters and not be that of a "
+                f"device, but it was {name!r}. Choose another one."
             )
     if PurePosixPath(name).suffix.lower() not in endings:
         raise ParameterError(f"The name must end in one of {', '.join(endings)}, but it was {name!r}.")
 
 
 def encode(project: Project, name: str) -> bytes:
-    """Return the bytes of a file: of a project, or of its arena alone if the name ends in .kad.
+    """Encode a project, or its arena alone if the name ends in .kad.
 
     Raises:
         ArenaError: If the arena does not fit into a .kad file.
@@ -156,15 +152,15 @@ def encode(project: Project, name: str) -> bytes:
 
 
 def decode(name: str, data: bytes) -> Project:
-    """Return the project of a file that a browser sends: of a project, an arena without a picture, or a picture.
+    """Decode an uploaded project, arena without a picture file, or picture.
 
     Args:
-        name: What the browser calls the file; only its ending counts, and its stem as a name of the arena.
+        name: Name of the file. Its ending tells the format; its stem becomes the name of the arena.
         data: The bytes of the file.
 
     Raises:
         ParameterError: If the name has another ending.
-        ArenaError: If the file is too large, damaged, or none of these.
+        ArenaError: If the file is too large, damaged, or of another kind.
     """
     path = PurePosixPath(name.replace("\\", "/"))
     ending, stem = path.suffix.lower(), path.stem[:_NAME_MAX] or "arena"

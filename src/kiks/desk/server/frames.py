@@ -1,10 +1,10 @@
-"""What browsers see of a world: frames of what moves, the scene of what stays, and a picture of the walls.
+"""The data for browsers: binary frames of the state, the scene with all constant data, and a picture of the walls.
 
-A frame is packed by arrays, without a loop over robots. Its layout, little endian, is that of `HEAD`, then a record of
-`ROBOT` for each robot, three numbers for each ball or cylinder, four for each lamp, a record of `CAMERA` for each
-camera, and the lengths of all rays; `web/frame.js` reads it.
+A frame is packed from arrays, without a loop over robots. It is little endian: `HEAD`, one `ROBOT` for each robot,
+three numbers for each ball or cylinder, four for each lamp, one `CAMERA` for each camera, and the lengths of all rays;
+`web/frame.js` parses it.
 
-All functions look only; they are called with the simulation's lock held.
+No function changes the world. The caller holds the simulation's lock.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from kiks.model.robot import SENSOR_COUNT
 from kiks.sim.simulation import Simulation
 
 VERSION, KIND = 1, 1
-"""Of the frames."""
+"""Of frames."""
 
 PAUSED, PROGRAM_DRIVES = 1, 2
 """Flags of a frame."""
@@ -35,13 +35,13 @@ TOUCHING, LED_0, LED_1, HELD, LINE_IN_USE = 1, 2, 4, 8, 16
 """Flags of a robot."""
 
 GRIPPED, LIFTED = 1.0, 2.0
-"""What a gripper does with a ball or cylinder."""
+"""State of a ball or cylinder in a gripper."""
 
 NO_HIT = 65535
-"""Length of a ray that meets nothing."""
+"""Length of a ray that hits nothing."""
 
 RAY_UNIT_MM = 0.01
-"""Unit of the other lengths [mm]."""
+"""Unit of all other lengths of rays [mm]."""
 
 HEAD = np.dtype(
     [
@@ -63,13 +63,13 @@ ROBOT = np.dtype(
     [
         ("pose", "<f4", (3,)),  # x_mm, y_mm, heading_rad
         ("measured_speed", "<f4", (2,)),  # left, right [pulses/10 ms]
-        ("commanded_speed", "<f4", (2,)),  # no number where a motor is given a voltage (PWM)
+        ("commanded_speed", "<f4", (2,)),  # NaN for a motor on PWM
         ("flags", "<u4"),
         ("arm", "<f4"),
         ("jaws", "<f4"),
         ("contact_count", "<u4"),
         ("encoders", "<i4", (2,)),  # left, right [pulses]
-        ("distances_mm", "<f4", (3,)),  # forwards, backwards, straight from where it was put
+        ("distances_mm", "<f4", (3,)),  # driven forwards, driven backwards, from the start
         ("proximity", "<f4", (SENSOR_COUNT,)),
         ("ambient", "<f4", (SENSOR_COUNT,)),
     ]
@@ -88,16 +88,16 @@ def pack_frame(
     speed_average: float = 0.0,
     is_held: Callable[[str, int], bool] | None = None,
 ) -> bytes:
-    """Return a frame of a world as it stands.
+    """Return a frame of the present state.
 
     Args:
-        sim: The world, its lock held.
+        sim: The world.
         scene: Number of the scene that the frame belongs to.
-        is_paused: Whether its time stands still.
-        is_driven: Whether a program lets its time pass.
-        speed_now: Simulated seconds in a real one, of late.
-        speed_average: The same since the beginning.
-        is_held: Says of "robot" and an index whether a hand holds it; nobody does if left out.
+        is_paused: Whether time is paused.
+        is_driven: Whether programs move the world.
+        speed_now: Momentary speed [simulated seconds per real second].
+        speed_average: Average speed since the start [simulated seconds per real second].
+        is_held: Returns for "robot" and an index whether a hand holds it; if left out, no hand holds a robot.
     """
     seen = sim.look()
     records: Any = sim.world.state.robots[0]
@@ -113,7 +113,7 @@ def pack_frame(
             robots["flags"][index] |= HELD
     robots["arm"], robots["jaws"] = records["arm"], records["jaws"]
     robots["contact_count"] = records["contact_count"]
-    # The robot's own counters wrap as 32 bits do, and so does this.
+    # The robot's own counters wrap at 32 bits, too.
     robots["encoders"] = (records["pulse_count"] + records["counter_offset"]).astype(np.int32)
     robots["distances_mm"] = sim.distances_mm()
     robots["proximity"], robots["ambient"] = seen.proximity, seen.ambient
@@ -122,7 +122,7 @@ def pack_frame(
     head["version"], head["kind"] = VERSION, KIND
     head["flags"] = PAUSED * is_paused + PROGRAM_DRIVES * is_driven
     head["scene"], head["time_s"] = scene, sim.time_s
-    # A world that stands still for nobody may be infinitely fast: what has no figure is shown as 0.
+    # A speed may be infinite or NaN; then 0 is shown.
     head["speed_now"], head["speed_average"] = (
         speed if math.isfinite(speed) else 0.0 for speed in (speed_now, speed_average)
     )
@@ -133,7 +133,7 @@ def pack_frame(
 
 
 def _commanded(records: Any) -> NDArray[np.float64]:
-    """Return the speeds that controllers are given [pulses/10 ms], [robot, 2]; no number for a motor on PWM."""
+    """Return the set points of the speed controllers [pulses/10 ms], [robot, 2]; NaN for a motor on PWM."""
     mode = records["motor_mode"]
     planned = np.where(mode == MODE_POSITION, records["trajectory_speed"], np.nan)
     speeds: NDArray[np.float64] = np.where(mode == MODE_SPEED, records["speed_setpoint"], planned)
@@ -149,25 +149,25 @@ def _pack_bodies(sim: Simulation, places: NDArray[np.float64]) -> NDArray[np.flo
 
 
 def _pack_cameras(sim: Simulation) -> NDArray[np.void]:
-    who = [
+    robots = [
         index for index, wire in enumerate(sim.wires) if any(isinstance(each, K213) for each in wire.firmware.fitted)
     ]
-    records: Any = sim.world.state.robots[0, who]
-    cameras: Any = np.zeros(len(who), CAMERA)
-    cameras["robot"], cameras["light"], cameras["pixels"] = who, records["camera_light"], records["camera_pixels"]
+    records: Any = sim.world.state.robots[0, robots]
+    cameras: Any = np.zeros(len(robots), CAMERA)
+    cameras["robot"], cameras["light"], cameras["pixels"] = robots, records["camera_light"], records["camera_pixels"]
     packed: NDArray[np.void] = cameras
     return packed
 
 
 def describe_scene(sim: Simulation, scene: int, names: Sequence[str] | None = None) -> dict[str, Any]:
-    """Return what frames take for known, as a message to browsers.
+    """Return the message to browsers with all data that frames leave out.
 
-    Positions of sensors, directions of rays and shapes are as the robot sees them, x ahead and y to the left.
+    Positions of sensors, directions of rays and shapes are in the robot's frame, x ahead and y to the left.
 
     Args:
-        sim: The world, its lock held.
-        scene: A number that no other scene has.
-        names: Of the robots; their numbers if left out.
+        sim: The world.
+        scene: Number of the scene.
+        names: Names of the robots; their numbers if left out.
     """
     arena = sim.arena
     return {
@@ -178,7 +178,6 @@ def describe_scene(sim: Simulation, scene: int, names: Sequence[str] | None = No
             "width_mm": float(arena.width_mm),
             "height_mm": float(arena.height_mm),
             "mm_per_cell": float(arena.mm_per_cell),
-            "picture": f"/desk/arena/{scene}.png",
         },
         "robots": [
             _describe_robot(sim, index, str(index + 1) if names is None else names[index])
@@ -199,7 +198,7 @@ def describe_scene(sim: Simulation, scene: int, names: Sequence[str] | None = No
 def _describe_robot(sim: Simulation, index: int, name: str) -> dict[str, Any]:
     spec, turrets = sim.specs[index], sim.turrets(index + 1)
     parameters = sim.world.scene[2][int(sim.world.state.robots["kind"][0, index])]
-    # A thousandth of a millimetre and of a radian's hundredth: more digits would only make the message longer.
+    # More than 0.001 mm and 1e-5 rad would only make the message longer.
     angles_rad = np.arctan2(parameters["ray_sin"], parameters["ray_cos"])[:, :RAY_COUNT].round(5).tolist()
     x_mm, y_mm = (parameters[name].round(3).tolist() for name in ("ray_x_mm", "ray_y_mm"))
     return {
@@ -224,12 +223,12 @@ def _describe_robot(sim: Simulation, index: int, name: str) -> dict[str, Any]:
 
 
 def describe_shapes(sim: Simulation) -> dict[str, Any]:
-    """Return what turrets look like now, as a message to browsers, for when that has changed."""
+    """Return the message to browsers with the present shapes of turrets."""
     return {"kind": "shapes", "robots": [_shapes(sim, index) for index in range(sim.robot_count)]}
 
 
 def _shapes(sim: Simulation, index: int) -> list[dict[str, Any]]:
-    """Return what to draw of a robot's turrets; a gripper's arm and jaws are in the frames."""
+    """Return the shapes of a robot's turrets; frames contain those of a gripper."""
     return [
         {"points": [list(point) for point in shape.points], "colour": shape.colour, "radius_mm": shape.radius_mm}
         for turret in sim.turrets(index + 1)
@@ -239,10 +238,10 @@ def _shapes(sim: Simulation, index: int) -> list[dict[str, Any]]:
 
 
 def arena_picture(arena: Arena) -> bytes:
-    """Return the walls of an arena as a PNG: a pixel a cell, the top row first; greys are brightnesses, 0 is floor."""
+    """Return the walls of an arena as a PNG with one pixel per cell, its grey the brightness; 0 is floor."""
     from PIL import Image
 
     with io.BytesIO() as file:
-        # A few large areas: the least effort makes a small file of them, too.
+        # Large uniform areas compress well even at a low level.
         Image.fromarray(np.flipud(arena.surface[PAD:-PAD, PAD:-PAD])).save(file, "PNG", compress_level=3)
         return file.getvalue()

@@ -1,7 +1,7 @@
-"""The gateway: what there is to be seen goes to the browsers, what their hands do comes back.
+"""The gateway: sends frames to the browsers of a desk and receives drags from them.
 
-Flow control: a browser has at most `IN_FLIGHT` frames that it has not acknowledged. The newest frame wins; none queues.
-So a slow browser, or a page that sleeps, gets fewer frames, and costs neither memory nor anybody else's time.
+Flow control: a browser has at most `IN_FLIGHT` unacknowledged frames. Frames do not queue; the newest one replaces the
+one that waits. So a slow browser or a sleeping page gets fewer frames, and costs no memory and no time of the others.
 """
 
 from __future__ import annotations
@@ -19,34 +19,34 @@ from kiks.errors import KiksError, ParameterError
 from kiks.sim.simulation import Simulation
 
 FRAME_S = 0.04
-"""Time between two frames [s]."""
+"""Frame period [s]."""
 
 DRAG_FRAME_S = 0.015
-"""The same while somebody moves something [s]."""
+"""Frame period during a drag [s]."""
 
 SHAPES_FRAMES = 10
-"""After how many frames it is looked whether turrets have changed their looks."""
+"""Number of frames between two checks of the turrets' shapes."""
 
 IN_FLIGHT = 3
-"""Most frames on their way to one browser."""
+"""Maximum number of unacknowledged frames of one browser."""
 
 NUMBER_MAX = 1e6
-"""Largest number of a message, a place in millimetres or an angle in radians."""
+"""Largest number in a message: a coordinate [mm] or an angle [rad]."""
 
 TEXTS = 16
-"""Most other messages that wait for one browser: who is that far behind is parted from, and comes back."""
+"""Maximum number of text messages that wait for one browser; beyond it the gateway closes the connection."""
 
 
 class Viewer:
-    """One browser.
+    """The connection to one browser.
 
     Attributes:
-        name: Whose hand it is.
-        in_flight: Frames that it has not acknowledged.
-        scene: Number of the scene that it has been told of.
-        shapes: What it has been told of turrets' looks.
-        newest: The frame that it gets next.
-        texts: Messages that it gets before that.
+        name: Owner of the browser's hand.
+        in_flight: Number of unacknowledged frames.
+        scene: Number of the last scene sent.
+        shapes: The last shapes sent.
+        newest: The next frame to send.
+        texts: Messages to send before that frame.
     """
 
     def __init__(self, name: str) -> None:
@@ -56,28 +56,28 @@ class Viewer:
         self.shapes: dict[str, Any] = {}
         self.newest: bytes | None = None
         self.texts: list[str] = []
-        self._news = asyncio.Event()
+        self._wake = asyncio.Event()
 
     @property
     def is_ready(self) -> bool:
-        """Whether it can use another frame."""
+        """Whether the browser may get another frame."""
         return self.in_flight < IN_FLIGHT
 
     def show(self, frame: bytes) -> None:
-        """Let this be what it sees next."""
+        """Make this the next frame."""
         self.newest = frame
-        self._news.set()
+        self._wake.set()
 
     def tell(self, message: dict[str, Any]) -> None:
-        """Send it a message."""
+        """Queue a text message."""
         self.texts.append(json.dumps(message))
-        self._news.set()
+        self._wake.set()
 
     async def send_all(self, socket: WebSocket) -> None:
-        """Send what there is, for ever."""
+        """Send messages and frames until too many messages wait."""
         while len(self.texts) <= TEXTS:
-            await self._news.wait()
-            self._news.clear()
+            await self._wake.wait()
+            self._wake.clear()
             while self.texts:
                 await socket.send_text(self.texts.pop(0))
             if self.newest is not None and self.is_ready:
@@ -108,10 +108,10 @@ class Gateway:
         self._shapes: dict[str, Any] = {}
         self._frame_count = 0
 
-    # ---- out ----
+    # ---- sending ----
 
     async def run(self) -> None:
-        """Take a picture of the world again and again and show it to all who can use one, until it is closed."""
+        """Send frames to all browsers that are ready, until the gateway is closed."""
         loop = asyncio.get_running_loop()
         due_s = loop.time()
         while not self._is_closed:
@@ -165,19 +165,19 @@ class Gateway:
                 viewer.show(frame)
 
     def close(self) -> None:
-        """Tell the browsers that there is nothing more to see."""
+        """Tell the browsers that the desk is closed."""
         self._is_closed = True
         for viewer in self._viewers:
             viewer.tell({"kind": "gone"})
 
     def picture(self) -> bytes:
-        """Return the walls of the arena, a PNG."""
+        """Return the walls of the arena as a PNG."""
         return self._picture[1]
 
-    # ---- in ----
+    # ---- receiving ----
 
     async def serve(self, socket: WebSocket) -> None:
-        """Serve a browser until it goes."""
+        """Serve a browser until it closes the connection."""
         await socket.accept()
         self._count += 1
         viewer = Viewer(f"browser {self._count}")
@@ -205,10 +205,10 @@ class Gateway:
                     viewer.tell({"kind": "error", "text": str(error)})
 
     async def _obey(self, viewer: Viewer, text: str) -> None:
-        """Do what a message says.
+        """Execute a message.
 
         Raises:
-            ParameterError: If it says nothing that can be done.
+            ParameterError: If it is not valid, or its thing cannot be taken.
         """
         message = _parse(text)
         kind = message["kind"]
@@ -220,12 +220,7 @@ class Gateway:
             return
         desk, name = self._desk, viewer.name
         if kind == "grab":
-            what, index = message.get("what"), message.get("index", -1)
-            await desk.grab(
-                name,
-                what[:80] if isinstance(what, str) else "",
-                index if isinstance(index, int) and index < NUMBER_MAX else -1,
-            )
+            await desk.grab(name, message.get("what", ""), message.get("index", -1))
         elif kind == "move":
             x_mm, y_mm = _number(message, "x_mm"), _number(message, "y_mm")
             await desk.do(lambda sim: desk.hands.move(name, x_mm, y_mm))
@@ -236,8 +231,7 @@ class Gateway:
             await desk.drop(name)
         else:
             raise ParameterError(
-                f"a message must be one of ack, grab, move, turn and drop, but it was {kind[:80]!r}. Load the page "
-                "anew."
+                f"a message must be one of ack, grab, move, turn and drop, but it was {kind[:80]!r}. Reload the page."
             )
         self._has_moved = True
         self._wake.set()
@@ -249,9 +243,7 @@ def _parse(text: str) -> dict[str, Any]:
     except (ValueError, RecursionError):
         message = None
     if not isinstance(message, dict) or not isinstance(message.get("kind"), str):
-        raise ParameterError(
-            f"a message must be a JSON object with a kind, but it was {text[:80]!r}. Load the page anew."
-        )
+        raise ParameterError(f"a message must be a JSON object with a kind, but it was {text[:80]!r}. Reload the page.")
     return message
 
 
@@ -259,6 +251,6 @@ def _number(message: dict[str, Any], name: str) -> float:
     value = message.get(name)
     if not isinstance(value, int | float) or not abs(value) <= NUMBER_MAX:
         raise ParameterError(
-            f"{name} must be a number of at most {NUMBER_MAX:g}, but it was {repr(value)[:80]}. Load the page anew."
+            f"{name} must be a number of at most {NUMBER_MAX:g}, but it was {repr(value)[:80]}. Reload the page."
         )
     return float(value)

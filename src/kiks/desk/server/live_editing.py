@@ -1,4 +1,4 @@
-"""Drawing in a living world: a sketch that follows it, and what is drawn applied to it at once."""
+"""Drawing in a running world: a sketch follows the world, and each edit of the sketch is applied to the world."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ import asyncio
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
+from kiks.desk.server.desk import Desk
 from kiks.engine.state import BALL
 from kiks.errors import KiksError, ParameterError
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp
 from kiks.model.atomic_files import inside
-from kiks.model.project import Project, ProjectRobot
+from kiks.model.project import ProjectRobot
 from kiks.model.sketch import Sketch
 from kiks.model.sketch_things import SketchRobot, Thing, radius_of
 from kiks.sim.simulation import Simulation
@@ -23,83 +23,58 @@ from kiks.sim.simulation import Simulation
 Done = TypeVar("Done")
 
 LAMP_REACH_MM = 20.0
-"""How far from a lamp it can still be pointed at [mm]."""
+"""Distance within which a click hits a lamp [mm]."""
 
 _LARGE_CELLS = 4_000_000
 
 
-class EditedDesk(Protocol):
-    """What drawing needs of a desk; see `kiks.desk.server.desk.Desk`."""
-
-    sim: Simulation
-    project: Project
-    folder: Path
-
-    async def present_project(self) -> Project:
-        """Return the project with everything where it is now."""
-        ...
-
-    async def replace(self, project: Project) -> None:
-        """Put another world on the desk."""
-
-    async def do(self, act: Callable[[Simulation], Done]) -> Done:
-        """Do something in the world between two events."""
-        ...
-
-    async def mark(self) -> None:
-        """Let resets go back to how everything stands now."""
-
-    def tell(self) -> None:
-        """Tell the browsers that the scene is another one."""
-
-
 class Editing:
-    """What people draw in the world of a desk; one a desk, shared by all of its browsers, as is the way back.
+    """Edits the world of a desk; all browsers of the desk share it and its undo history.
 
-    The world moves on while people draw, so the sketch follows it before each step, and takes a step back that the
-    world refuses. Walls, bodies and lamps change in the living world; another number of robots, or another arena, is
-    another world, which begins anew. What is drawn is a new beginning, to which resets go back.
+    The world moves on while people draw, so the sketch follows it before each step, and undoes a step that the world
+    refuses. Walls, bodies and lamps change in the running world; a different number of robots or another arena starts a
+    new world. Each edit takes a checkpoint for resets.
 
     Args:
         desk: The desk.
     """
 
-    def __init__(self, desk: EditedDesk) -> None:
+    def __init__(self, desk: Desk) -> None:
         self._desk = desk
         self._lock = asyncio.Lock()
         self._sim: Simulation | None = None
         self._sketch = Sketch(Arena.box(100, 100), kinds=())
-        self._bodies: dict[int, int] = {}  # numbers of bodies in the world, by those in the sketch
-        self._lamps: list[int] = []  # numbers of lamps in the sketch, in the world's order
-        self._robots: dict[int, ProjectRobot] = {}  # what each robot of the sketch is
-        self._arena_number = -1  # of the arena of the sketch that the world has
+        self._bodies: dict[int, int] = {}  # body numbers in the world by numbers in the sketch
+        self._lamps: list[int] = []  # lamp numbers in the sketch, in the world's order
+        self._robots: dict[int, ProjectRobot] = {}  # project robots by numbers in the sketch
+        self._arena_number = -1  # of the sketch's arena when the world was built
 
     @property
     def can_undo(self) -> bool:
-        """Whether there is a step to take back in this world."""
+        """Whether this world has a step to undo."""
         return self._sim is self._desk.sim and self._sketch.can_undo
 
     @property
     def can_redo(self) -> bool:
-        """Whether there is a step to do again in this world."""
+        """Whether this world has a step to redo."""
         return self._sim is self._desk.sim and self._sketch.can_redo
 
     # ---- steps ----
 
     async def draw(self, act: Callable[[Sketch], object]) -> None:
-        """Do something with the sketch, and the same with the world.
+        """Edit the sketch and the world.
 
         Args:
             act: At most one step of the sketch.
 
         Raises:
-            ParameterError: If a number is out of range, or the world has no room for it.
+            ParameterError: If a number is out of range, or the world has no room for the change.
             ArenaError: If the sketch has no room for it.
         """
         await self._do(act, Sketch.take_back)
 
     async def undo(self) -> None:
-        """Take the last step back.
+        """Undo the last step.
 
         Raises:
             ParameterError: If the world has no room for what was there.
@@ -108,7 +83,7 @@ class Editing:
         await self._do(Sketch.undo, Sketch.redo)
 
     async def redo(self) -> None:
-        """Do again what was taken back last.
+        """Redo the step that was undone last.
 
         Raises:
             ParameterError: If the world has no room for it.
@@ -121,23 +96,23 @@ class Editing:
 
         Raises:
             ParameterError: If a number is out of range.
-            ArenaError: If something is in the way.
+            ArenaError: If its place is not free.
         """
         await self.draw(lambda sketch: sketch.add(thing))
 
     async def remove(self, x_mm: float, y_mm: float) -> None:
-        """Take away what is at a place.
+        """Remove the thing at a place.
 
         Raises:
-            ParameterError: If nothing is there, or the only robot.
+            ParameterError: If no thing is there, or it is the only robot.
         """
         await self.draw(lambda sketch: sketch.remove(_thing_at(sketch, x_mm, y_mm)))
 
     async def begin(self, arena: Arena) -> None:
-        """Begin with another arena and the same robots, as a step that can be taken back.
+        """Begin with another arena and the same robots, as a step that can be undone.
 
         Raises:
-            ParameterError: If the world cannot be replaced.
+            LinkError: If the world cannot be replaced.
             ArenaError: If there is no room for the robots.
         """
         await self.draw(lambda sketch: sketch.begin(arena))
@@ -158,29 +133,29 @@ class Editing:
                 raise
 
     async def _apply(self, before: Arena, things: dict[int, Thing]) -> None:
-        """Do to the world what was done to the sketch."""
+        """Apply the change of the sketch to the world."""
         sketch, desk = self._sketch, self._desk
         arena = sketch.arena()
         robots = sketch.of(SketchRobot)
-        are_others = robots.keys() != {number for number, thing in things.items() if isinstance(thing, SketchRobot)}
-        if are_others or sketch.arena_number != self._arena_number:
+        have_changed = robots.keys() != {number for number, thing in things.items() if isinstance(thing, SketchRobot)}
+        if have_changed or sketch.arena_number != self._arena_number:
             for number, robot in robots.items():
                 self._robots.setdefault(number, ProjectRobot(robot.kind))
             project = await desk.present_project()
             await desk.replace(replace(project, arena=arena, robots=tuple(self._robots[number] for number in robots)))
             self._meet()
             return
-        # What follows from walls takes a while, and is kept with the arena: found before the world has to wait.
+        # The arena caches its wall faces, which take a while: compute them before locking the world.
         if not np.array_equal(arena.brightness, before.brightness):
             await asyncio.to_thread(lambda: arena.faces)
         await desk.do(lambda sim: self._change(sim, before, arena, things))
-        # Who goes back or begins again comes back to here: where things stood before may be a wall now.
+        # Resets return to here: the places of the old checkpoint may be walls by now.
         await desk.mark()
         desk.project = await desk.present_project()
         desk.tell()
 
     def _change(self, sim: Simulation, before: Arena, arena: Arena, things: dict[int, Thing]) -> None:
-        """Change what is different in the world, which at most one step is."""
+        """Apply the difference of one step to the world."""
         now = self._sketch.things
         for number, thing in things.items():
             if number in now:
@@ -223,7 +198,7 @@ class Editing:
     # ---- following the world ----
 
     async def _follow(self) -> None:
-        """Let the sketch be what the world is now: everything has moved, and somebody may have changed it."""
+        """Update the sketch from the world, in which things have moved and may have been changed from outside."""
         if not await self._desk.do(self._note):
             project = await self._desk.present_project()
             kinds = [self._file(robot.kind) for robot in project.robots]
@@ -233,7 +208,7 @@ class Editing:
             self._meet()
 
     def _note(self, sim: Simulation) -> bool:
-        """Note where everything has gone; return whether it is still what was drawn here."""
+        """Copy the present places into the sketch; return False if the world has other things or walls."""
         if sim is not self._sim or sim is not self._desk.sim:
             return False
         bodies = {int(body["number"]): body for body in sim.bodies()}
@@ -253,7 +228,7 @@ class Editing:
         return True
 
     def _meet(self) -> None:
-        """Find each thing of the sketch in a world that was just built from it."""
+        """Match the things of the sketch with those of a world that was just built from it."""
         self._sim = self._desk.sim
         self._arena_number = self._sketch.arena_number
         bodies = self._sim.bodies()
@@ -275,12 +250,12 @@ def _thing_at(sketch: Sketch, x_mm: float, y_mm: float) -> int:
     number = min(sketch.things, key=lambda number: gap_mm(sketch.things[number]), default=0)
     if number == 0 or gap_mm(sketch.things[number]) > 0:
         raise ParameterError(
-            f"There must be something to take away, but at ({x_mm:.0f}, {y_mm:.0f}) mm is nothing. Click on a robot, "
+            f"A thing must be at the place of a click, but nothing is at ({x_mm:.0f}, {y_mm:.0f}) mm. Click a robot, "
             "a ball, a cylinder or a lamp."
         )
     return number
 
 
 async def _aside(what: Arena | Sketch, act: Callable[[], Done]) -> Done:
-    """Do what may take long in a thread, so that other browsers need not wait; what is short at once."""
+    """Run a slow action (a large arena) in a thread, so that other browsers need not wait; any other at once."""
     return await asyncio.to_thread(act) if what.brightness.size > _LARGE_CELLS else act()

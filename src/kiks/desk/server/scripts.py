@@ -1,4 +1,4 @@
-"""Python files that the desk offers, opens, saves and checks before it runs them."""
+"""The Python programs of a desk: listed, opened, saved, and checked before they run."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from kiks.errors import ParameterError, shown
 from kiks.model.atomic_files import inside, program_in, replace_file
 
 SIZE_LIMIT = 200_000
-"""Longest program that is edited in the page [bytes]."""
+"""Maximum size of a program in the editor [bytes]."""
 
 COUNT_LIMIT = 200
-"""Most files of the folder that are offered."""
+"""Maximum number of listed files of the folder."""
 
 EXAMPLES = Path(__file__).parents[1] / "example_programs"
-"""Programs that come with KiKS."""
+"""Folder of the example programs."""
 
 NEW = '''"""My program."""
 
@@ -28,16 +28,16 @@ with serial.Serial("/dev/ttyUSB0", 9600, timeout=1) as port:
     port.write(b"D,5,5\\n")
     print(port.readline())
 '''
-"""What a new program begins with."""
+"""Text of a new program."""
 
 
 @dataclass(frozen=True)
 class Script:
-    """A program that is offered.
+    """A program in the list.
 
     Attributes:
-        name: Its path in the folder, or that of an example alone.
-        is_example: Whether it comes with KiKS.
+        name: Its file name in the desk's folder or that of the examples.
+        is_example: Whether it is an example.
     """
 
     name: str
@@ -45,12 +45,12 @@ class Script:
 
     @property
     def label(self) -> str:
-        """What a person chooses it by."""
+        """Its entry in the list."""
         return f"example: {self.name.removesuffix('.py').replace('_', ' ')}" if self.is_example else self.name
 
 
 def offered(folder: Path) -> list[Script]:
-    """Return the programs of a folder, and the examples."""
+    """Return the programs of a folder and the examples."""
     try:
         files = [path for path in sorted(folder.glob("*.py")) if path.is_file() and not path.name.startswith(".")]
     except OSError:
@@ -60,10 +60,10 @@ def offered(folder: Path) -> list[Script]:
 
 
 def path_of(folder: Path, script: Script) -> Path:
-    """Return where a program is.
+    """Return the path of a program.
 
     Raises:
-        ParameterError: If its name leads out of the folder, or is none of a program.
+        ParameterError: If its name leads out of the folder or is not that of a program.
     """
     return program_in(EXAMPLES if script.is_example else folder, script.name)
 
@@ -72,7 +72,7 @@ def read_script(folder: Path, script: Script) -> str:
     """Return the text of a program.
 
     Raises:
-        ParameterError: If its name leads out of the folder, or it is no text of usual length.
+        ParameterError: If its name leads out of the folder, or the file is too long or not a readable text.
     """
     path = path_of(folder, script)
     try:
@@ -83,7 +83,7 @@ def read_script(folder: Path, script: Script) -> str:
             )
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise ParameterError(f"a program must be a readable text, but {shown(script.name)} is none: {error}.") from None
+        raise ParameterError(f"a program must be readable text, but {shown(script.name)} is not: {error}.") from None
 
 
 def save_script(folder: Path, name: str, text: str, *, may_replace: Script | None = None) -> Script:
@@ -91,9 +91,9 @@ def save_script(folder: Path, name: str, text: str, *, may_replace: Script | Non
 
     Args:
         folder: The folder.
-        name: Its name there; .py is put behind it if it is not.
+        name: Its file name; .py is appended if it is missing.
         text: The program.
-        may_replace: The file that it was read from; another one of that name is not written over.
+        may_replace: The script that it was read from; no other file is replaced.
 
     Raises:
         ParameterError: If the name leads out of the folder or is taken, the text is too long, or it cannot be written.
@@ -103,8 +103,7 @@ def save_script(folder: Path, name: str, text: str, *, may_replace: Script | Non
     check_name(name, (".py",))
     if "/" in name:
         raise ParameterError(
-            f"a program's name must be one without folders, but it was {shown(name)}. Take letters and digits: "
-            "square.py."
+            f"a program's name must have no folder, but it was {shown(name)}. Take letters and digits: square.py."
         )
     data = text.encode("utf-8", errors="replace")
     if len(data) > SIZE_LIMIT:
@@ -113,8 +112,7 @@ def save_script(folder: Path, name: str, text: str, *, may_replace: Script | Non
     if path.exists() and script != may_replace:
         raise ParameterError(
             f"a program must have a name that is free, but there is a {shown(name)} already. Take another name, or "
-            "open "
-            "that one and change it."
+            "open that one and change it."
         )
     replace_file(path, data, "a program")
     return script
@@ -122,11 +120,11 @@ def save_script(folder: Path, name: str, text: str, *, may_replace: Script | Non
 
 @dataclass(frozen=True)
 class Mistake:
-    """What Python does not understand.
+    """A syntax error.
 
     Attributes:
-        line: Where it is, from 1.
-        message: What Python says.
+        line: Number of the line, from 1.
+        message: Python's message.
         text: The line.
     """
 
@@ -140,7 +138,7 @@ class Mistake:
 
 
 def find_mistake(text: str) -> Mistake | None:
-    r"""Return the first mistake that keeps a program from running at all.
+    r"""Return the first syntax error of a program; None if it has none.
 
     Example:
         >>> print(find_mistake("x = 1\nif x = 2:\n    pass\n"))
@@ -160,7 +158,7 @@ def find_mistake(text: str) -> Mistake | None:
 
 
 def split_arguments(text: str) -> list[str]:
-    """Return the words of a line, as a shell would.
+    """Split a line into words as a shell does.
 
     Raises:
         ParameterError: If a quote is not closed.

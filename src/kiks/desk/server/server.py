@@ -1,4 +1,4 @@
-"""The server of this process's desks: a web server in a thread of its own, which the first desk starts."""
+"""The web server of this process's desks; it runs in its own thread, which the first desk starts."""
 
 from __future__ import annotations
 
@@ -17,28 +17,29 @@ from starlette.responses import RedirectResponse
 
 from kiks.desk.panels.page import Page
 from kiks.desk.server.access import LOOPBACK, AccessControl
-from kiks.desk.server.connection_limit import Door
+from kiks.desk.server.connection_limit import LimitedConnection
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.gateway import Gateway
-from kiks.desk.server.server_log import note_fault, speak_plainly
+from kiks.desk.server.live_editing import Editing
+from kiks.desk.server.server_log import log_plainly, note_fault
 from kiks.desk.server.token import Token
 from kiks.errors import LinkError, ParameterError
 from kiks.ports.file_descriptors import SHORTAGES, opening, shortage
 
 PORT = 8123
-"""Where the desk is found, if nobody else is there."""
+"""Default TCP port."""
 
 START_S = 30.0
-"""How long the server may take to begin [s]; a computer that is very busy needs seconds."""
+"""Timeout of the server's start [s]; a busy computer needs seconds."""
 
 MESSAGE_LIMIT = 1 << 20
-"""Largest message on a socket [bytes]: a program that is edited in the page comes in one."""
+"""Largest WebSocket message [bytes]: a program edited in the page is one message."""
 
 BACKLOG = 128
-"""Most connections that wait to be accepted."""
+"""Maximum number of connections that wait to be accepted."""
 
 EVERY_ADDRESS = ("0.0.0.0", "::")
-"""What stands for all addresses of this computer; no browser finds it by that."""
+"""Wildcard addresses; a URL for a browser must not contain them."""
 
 CLOSED = "KiKS: this desk is closed. Open it again where it was opened."
 
@@ -49,11 +50,13 @@ class Served:
 
     Attributes:
         desk: The desk.
-        gateway: Who sends its frames.
+        editing: Edits its world.
+        gateway: Sends its frames.
         number: Its number in this process.
     """
 
     desk: Desk
+    editing: Editing
     gateway: Gateway
     number: int
 
@@ -61,11 +64,11 @@ class Served:
 class DeskServer:
     """Serves desks to browsers.
 
-    NiceGUI is one application a process, so there is one of these a process, `SERVER`.
+    NiceGUI has one application per process, so there is one server per process: `SERVER`.
 
     Attributes:
-        desks: What is served, by number.
-        key: What browsers must know.
+        desks: The open desks by number.
+        key: The token that browsers must know.
     """
 
     def __init__(self) -> None:
@@ -78,15 +81,15 @@ class DeskServer:
         self._lock = threading.Lock()
 
     def start(self, *, host: str = "127.0.0.1", port: int | None = None) -> None:
-        """Begin to serve, unless that is so already.
+        """Start the server unless it runs already.
 
         Args:
             host: Address to listen at.
-            port: TCP port, 0 for a free one; `PORT`, or a free one if that is taken, if left out.
+            port: TCP port, 0 for a free one; if left out, `PORT`, or a free one if that is taken.
 
         Raises:
             LinkError: If it cannot listen there.
-            ParameterError: If it serves already, somewhere else.
+            ParameterError: If it already listens at another port.
         """
         with self._lock:
             if self._socket is not None:
@@ -108,28 +111,28 @@ class DeskServer:
                 )
 
     def open(self, desk: Desk) -> Served:
-        """Show a desk to browsers; `start` must have been called."""
+        """Make a desk available to browsers; `start` must have been called."""
         with self._lock:
             self._count += 1
-            served = Served(desk, Gateway(desk, self._count), self._count)
+            served = Served(desk, Editing(desk), Gateway(desk, self._count), self._count)
             self.desks[self._count] = served
             assert self._loop is not None
             asyncio.run_coroutine_threadsafe(served.gateway.run(), self._loop)
         return served
 
     def close(self, served: Served) -> None:
-        """Show it no longer, and let its world go its way."""
+        """Remove a desk from the server and close it."""
         self.desks.pop(served.number, None)
         assert self._loop is not None
         self._loop.call_soon_threadsafe(served.gateway.close)
         served.desk.close()
 
     def url(self, number: int | None = None) -> str:
-        """Return where a browser finds a desk, or the newest one, with the token."""
+        """Return the URL of a desk, or of the newest one, with the token."""
         return f"{self._address(number)}?token={self.key.token}"
 
     def url_for_once(self, number: int) -> str:
-        """Return where a browser of this user finds a desk, once: others may see this address."""
+        """Return a URL of a desk that works once, for a browser of this user: other users may see it."""
         return f"{self._address(number)}?ticket={self.key.new_ticket()}"
 
     # ---- inside ----
@@ -142,7 +145,7 @@ class DeskServer:
         return f"http://{host}:{port}/" + ("" if number is None else f"desk/{number}")
 
     def _serve(self, begun: threading.Event) -> None:
-        """Run the web server, in a thread of its own."""
+        """Run the web server in its own thread."""
         app = FastAPI(openapi_url=None)
         self._add_routes(app)
         ui.run_with(app, title="KiKS", dark=None, show_welcome_message=False, reconnect_timeout=10.0)
@@ -155,7 +158,7 @@ class DeskServer:
         nicegui_app.on_startup(begin)
         config = uvicorn.Config(
             AccessControl(app, self.key, is_local=self._is_local),
-            http=Door,
+            http=LimitedConnection,
             # uvloop ends the process when there is no file descriptor for its loop.
             loop="asyncio",
             backlog=BACKLOG,
@@ -169,7 +172,7 @@ class DeskServer:
             ws_per_message_deflate=False,
             timeout_graceful_shutdown=1,
         )
-        speak_plainly()
+        log_plainly()
         assert self._socket is not None
         try:
             uvicorn.Server(config).run(sockets=[self._socket])
@@ -181,8 +184,6 @@ class DeskServer:
             begun.set()
 
     def _add_routes(self, app: FastAPI) -> None:
-        """Say what is found where."""
-
         @app.get("/")
         def newest() -> Response:
             number = max(self.desks, default=None)
@@ -211,12 +212,12 @@ class DeskServer:
             if served is None:
                 ui.label(CLOSED)
             else:
-                Page(served.desk, number)
+                Page(served.desk, served.editing, number)
 
 
 def _own_address(family: socket.AddressFamily) -> str:
-    """Return the address by which other computers find this one; its name if it has none."""
-    # Of documentation: nothing is sent, but the system says from where it would be.
+    """Return the address under which other computers reach this one; its name if it has none."""
+    # An address reserved for documentation: connecting sends nothing, but picks the local address.
     far = "2001:db8::1" if family == socket.AF_INET6 else "192.0.2.1"
     with suppress(OSError), socket.socket(family, socket.SOCK_DGRAM) as asking:
         asking.connect((far, 9))

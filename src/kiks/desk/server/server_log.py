@@ -1,4 +1,4 @@
-"""What the libraries of the web server log, as lines for a person: no traceback, and none that a client lengthens."""
+"""The log of the web server's libraries: one line of limited length for each error, without a traceback."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from typing import Any
 from kiks.ports.file_descriptors import SHORTAGES, shortage
 
 LIBRARIES = ("uvicorn", "uvicorn.error", "nicegui", "engineio.server", "socketio.server")
-"""Their logs."""
+"""Loggers of the libraries."""
 
-WORDS_MAX = 200
-"""Longest line [characters]."""
+LINE_MAX = 200
+"""Maximum length of a line [characters]."""
 
 _log = logging.getLogger("kiks.desk")
 
 
 class Plain(logging.Handler):
-    """Says in a line what has failed; what clients get wrong is their own affair, and is not said."""
+    """Log handler that reports an error in one line, unless a client has caused it."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Say it."""
+        """Report an error."""
         note(record.getMessage(), record.exc_info[1] if record.exc_info else None)
 
 
-def speak_plainly() -> None:
-    """Let them say errors in a line each."""
+def log_plainly() -> None:
+    """Make the libraries report each error in one line."""
     for name in LIBRARIES:
         log = logging.getLogger(name)
         log.handlers = [Plain(logging.ERROR)]
@@ -35,33 +35,28 @@ def speak_plainly() -> None:
 
 
 def note_fault(_loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-    """Say in a line what has failed in a loop, where nothing waits for it."""
+    """Report an exception in an event loop that no task waits for."""
     note(str(context.get("message", "")), context.get("exception"))
 
 
 def note(text: str, fault: BaseException | None) -> None:
-    """Say in a line what has failed, and its traceback at the level of debugging.
+    """Log a failure in one line, and its traceback at debug level.
 
     Args:
-        text: What was to be done.
-        fault: Why it was not.
+        text: What has failed.
+        fault: The exception.
     """
     if isinstance(fault, UnicodeError | ConnectionError):
         return
     why = "" if fault is None else f": {fault!r}"
     if isinstance(fault, OSError) and fault.errno in SHORTAGES:
-        if _SHORT.is_said:
+        if _reported_shortage:
             return
-        _SHORT.is_said = True
+        _reported_shortage.append(fault.errno)
         text, why = "It needs a file descriptor", f": {shortage()}"
-    _log.error("The desk: %s", ascii(text.strip().rstrip(".") + why)[1:-1][:WORDS_MAX])
+    _log.error("The desk: %s", ascii(text.strip().rstrip(".") + why)[1:-1][:LINE_MAX])
     _log.debug("It failed here.", exc_info=fault)
 
 
-class _Short:
-    """Whether it was said that descriptors are short."""
-
-    is_said = False
-
-
-_SHORT = _Short()
+_reported_shortage: list[int] = []
+"""Error number of the reported shortage of file descriptors, which is reported once."""

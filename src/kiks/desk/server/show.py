@@ -1,4 +1,4 @@
-"""A desk that browsers can see, and a world that lives in a program on it: `sim.show()`."""
+"""Showing a desk in browsers: `sim.show()`, its driver thread and its display in notebooks."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from kiks.sim.simulation import Simulation
 from kiks.units import NS_PER_S
 
 SLICE_NS = NS_PER_S // 50
-"""Simulated time that passes in one go while no program moves it [ns]; the gate says when."""
+"""Simulated time that passes in one piece while no program moves the world [ns]; the gate controls the pace."""
 
 ROUND_S = 0.05
-"""Longest time that a word of a program is waited for [s of real time]: a desk that is closed is noticed within it."""
+"""Longest wait for a request of a program [s of real time]; a closed desk is noticed after it."""
 
 
 class Driver:
-    """Moves the world of a desk: whatever was set going goes on.
+    """Moves the world of a desk.
 
     Args:
         desk: The desk.
-        programs_ended: Called with the world, locked, when the programs that moved it have all ended.
+        programs_ended: Called with the locked world when all programs that moved it have ended.
     """
 
     def __init__(self, desk: Desk, programs_ended: Callable[[Simulation], None] = lambda sim: None) -> None:
@@ -39,7 +39,7 @@ class Driver:
         self._is_over = threading.Event()
 
     def run(self) -> None:
-        """Let time pass as programs and the gate allow, until `stop`."""
+        """Let time pass, as programs and the gate allow, until `stop`."""
         while not self._is_over.is_set():
             programs = self._desk.programs
             had_programs = programs.drive
@@ -53,39 +53,37 @@ class Driver:
             self._desk.clear_away()
 
     def stop(self) -> None:
-        """End it; from any thread."""
+        """End `run`; from any thread."""
         self._is_over.set()
         self._desk.gate.close()
 
 
 def has_screen() -> bool:
-    """Say whether there is one."""
+    """Return whether this computer has a screen for this process."""
     return sys.platform in ("win32", "darwin") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 _log = logging.getLogger("kiks.desk")
 
 STOP_S = 10.0
-"""How long the world's thread may take to stop [s]."""
+"""Timeout of the end of the world's thread [s]."""
 
 
 class Shown:
-    """A desk that browsers can see.
-
-    In a notebook, who names it in a cell sees it below.
+    """A desk that browsers can see; as the value of a notebook's cell it appears below the cell.
 
     Args:
         desk: The desk.
         host: Address to listen at.
-        port: TCP port, 0 for a free one; 8123, or a free one if that is taken, if left out.
+        port: TCP port, 0 for a free one; if left out, 8123, or a free one if that is taken.
 
     Attributes:
         desk: The desk.
-        url: Where a browser finds it, with the token that it needs.
+        url: URL of the desk, with its token.
 
     Raises:
         LinkError: If it cannot listen there.
-        ParameterError: If another port is served already.
+        ParameterError: If the server already listens at another port.
     """
 
     def __init__(self, desk: Desk, *, host: str = "127.0.0.1", port: int | None = None) -> None:
@@ -93,7 +91,7 @@ class Shown:
         if not is_compiled():
             _log.warning("Compiling the engine for this computer: once, a minute or so ...")
         with desk.sim.lock:
-            # What browsers need of the engine is compiled before the first of them waits for it.
+            # Compile the code for frames before the first browser waits for it.
             pack_frame(desk.sim, scene=0)
         SERVER.start(host=host, port=port)
         self._served = SERVER.open(desk)
@@ -105,23 +103,23 @@ class Shown:
         logging.getLogger("kiks").addHandler(self._news)
 
     def drive(self) -> None:
-        """Let the world go on by itself from now on, in a thread."""
+        """Start a thread that moves the world."""
         if self._driver is None:
             self._driver = Driver(self.desk)
             self._thread = threading.Thread(target=self._driver.run, name="kiks driver", daemon=True)
             self._thread.start()
 
     def browse(self) -> None:
-        """Open it in a browser, where there is a screen."""
+        """Open the desk in a browser if there is a screen."""
         if has_screen():
-            # Other users see with which address a browser is started: not with the token.
+            # Other users can see the URL that a browser is started with, so it must not contain the token.
             webbrowser.open(SERVER.url_for_once(self._served.number))
 
     def present(self, *, browser: bool) -> None:
-        """Show it to who calls: below the cell of a notebook; elsewhere its address is printed, and a browser opened.
+        """Show the desk below the cell of a notebook; elsewhere print its URL and open a browser.
 
         Args:
-            browser: False for its address alone.
+            browser: False to print the URL only.
         """
         ipython = _ipython()
         if browser and hasattr(ipython, "kernel"):
@@ -134,12 +132,12 @@ class Shown:
             self.browse()
 
     def close(self) -> None:
-        """Show it no longer; the world goes its way."""
+        """Close the desk and release the world."""
         logging.getLogger("kiks").removeHandler(self._news)
         if self._driver is not None:
             self._driver.stop()
         if self._thread is not None:
-            # It may be in a long step; as a daemon it holds up no end.
+            # It may be in a long step; as a daemon thread it does not block the end of the process.
             self._thread.join(STOP_S)
         SERVER.close(self._served)
 
@@ -147,7 +145,7 @@ class Shown:
         return f"<KiKS desk at {self.url}>"
 
     def _ipython_display_(self) -> None:
-        """Show it below the cell of a notebook, its address in a terminal; once a cell, which may name it again."""
+        """Show the desk below the cell of a notebook, or its URL in a terminal, once per cell."""
         ipython = _ipython()
         if ipython.execution_count != self._cell:
             self._cell = ipython.execution_count
@@ -169,7 +167,7 @@ def show(
 
     Raises:
         LinkError: If the desk cannot listen there.
-        ParameterError: If the speed is out of range, or another port is served already.
+        ParameterError: If the speed is out of range, or the server already listens at another port.
     """
     shown = Shown(Desk(sim, speed=speed, may_run_programs=is_alive), port=port)
     if is_alive:
@@ -179,6 +177,6 @@ def show(
 
 
 def _ipython() -> Any:
-    """Return the IPython that this program runs in, which has a `kernel` in a notebook; None in plain Python."""
-    there = sys.modules.get("IPython")
-    return None if there is None else there.get_ipython()
+    """Return the running IPython, which has a `kernel` in a notebook; None in plain Python."""
+    module = sys.modules.get("IPython")
+    return None if module is None else module.get_ipython()

@@ -1,4 +1,4 @@
-/* The arena as a component of the page: the view from above, the 3-D view, or both (see stage.js).
+/* The Vue component of the arena: the view from above, the 3-D view, or both (see stage.js).
    It is served from another address than the modules beside it, so it imports them by the name "kiks-desk" only. */
 
 import { KEYS_HELP, Stage } from "kiks-desk";
@@ -20,7 +20,7 @@ export default {
     show: { type: Object, default: () => ({}) },
     view: { type: String, default: "top" },
     follow: { type: Number, default: -1 },
-    /** null: as the page is. */
+    /** null follows the page. */
     dark: { type: Boolean, default: null },
   },
   emits: ["pick", "draw"],

@@ -1,9 +1,9 @@
-/* What a camera sees: its 64 pixels as a strip, and their greys as a curve above it. */
+/* The picture of a camera: its 64 pixels as a strip, with a curve of their greys above it. */
 
 const STRIP_SHARE = 0.36;
 const GAP_PX = 4;
 
-/** Draw a camera's picture; `context` takes CSS pixels. */
+/** Draw the picture of a camera; `context` takes CSS pixels. */
 export function paintCameraStrip(context, width, height, camera, isDark) {
   const ink = isDark ? "#e8edf2" : "#1d2329", top = height * (1 - STRIP_SHARE), column = width / camera.pixels.length;
   context.clearRect(0, 0, width, height);

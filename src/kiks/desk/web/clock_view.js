@@ -1,4 +1,4 @@
-/* The clock above the arena: simulated time and how fast it passes, straight from frames, at the browser's own rate. */
+/* The clock above the arena: simulated time and its speed, taken from frames at the browser's own rate. */
 
 import { clockText, pageFeed } from "kiks-desk";
 

@@ -1,4 +1,4 @@
-/* All colours of both views, in light and dark. Robots have a hue of their own, so that many can be told apart. */
+/* All colours of both views, light and dark. Each robot has its own hue, so that people can tell many robots apart. */
 
 const LIGHT = {
   outside: "#c9ced6", floor: [226, 222, 211], floorEdge: "#6f6a60", wallEdge: [92, 88, 80], shade: 0.16,

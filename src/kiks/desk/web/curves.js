@@ -14,12 +14,12 @@ export const CURVES = {
   speeds: { label: "Speeds", names: ["left", "right", "left set", "right set"], note: "pulses in 10 ms" },
 };
 
-/** The colour of a curve; wheels have the same one for what is measured and what is commanded. */
+/** The colour of a curve; the measured and the commanded speed of a wheel have the same one. */
 export function lineColour(kind, line, isDark) {
   return (isDark ? DARK : LIGHT)[kind === "speeds" ? line % 2 : line];
 }
 
-/** Whether a curve is dashed, so that it can be told from others without colours. */
+/** Whether a curve is dashed, so that people can identify it without colours. */
 export function isDashed(kind, line) {
   return kind === "speeds" ? line >= 2 : line >= 4;
 }

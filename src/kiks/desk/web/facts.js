@@ -1,4 +1,4 @@
-/* A robot's numbers in words, as rows of a list: [what, value]. */
+/* The data of a robot as rows of a list: [name, value]. */
 
 import { clockText } from "./clock.js";
 

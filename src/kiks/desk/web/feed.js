@@ -1,4 +1,4 @@
-/* The feed: one WebSocket a page, shared by all its components.
+/* The feed: one WebSocket per page, shared by all its components.
 
        import { pageFeed } from "kiks-desk";
        const feed = pageFeed();
@@ -6,22 +6,22 @@
 
    feed.scene       the newest scene message (arena, robots, bodies) or null
    feed.frame       the newest frame (see frame.js) or null; it always belongs to feed.scene
-   feed.connection  "connecting", "open", "lost" (it tries again by itself) or "gone" (the server has ended)
-   feed.on(what, callback) tells of "scene", "shapes", "frame", "connection" and "error" (what the server objects to, in
-                    words), and returns a function that ends that.
-   feed.send(object) sends a message, and says whether there was a connection to send it on.
+   feed.connection  "connecting", "open", "lost" (it reconnects by itself) or "gone" (the desk is closed)
+   feed.on(what, callback) subscribes to "scene", "shapes", "frame", "connection" or "error" (a message of the server)
+                    and returns a function that unsubscribes.
+   feed.send(object) sends a message and returns whether there was a connection.
 
-   A hidden page does not acknowledge: the server then rests, and the newest frame comes when the page is looked at
+   A hidden page does not acknowledge frames: the server pauses, and sends the newest frame when the page is visible
    again. */
 
 import { Frame } from "./frame.js";
 
 const HAPPENINGS = ["scene", "shapes", "frame", "connection", "error"];
-/** Fewer than may be on their way: each message costs the server a tenth of a frame. */
+/** Number of frames for one acknowledgement, which costs the server a tenth of a frame. */
 const ACKNOWLEDGED_TOGETHER = 2;
 const FIRST_PAUSE_MS = 250;
 const LONGEST_PAUSE_MS = 5000;
-/** Longest way between two frames that is stretched on the screen: beyond it, things would seem to lag. */
+/** Longest period between two frames that is interpolated; beyond it, things would seem to lag. */
 const LONGEST_INTERVAL_MS = 120;
 
 export class Feed {
@@ -73,7 +73,7 @@ export class Feed {
     const message = JSON.parse(text);
     if (message.kind === "scene") {
       this.scene = message;
-      // Where nothing has come or gone, what was seen last is still so: it would flicker otherwise.
+      // If no thing has appeared or disappeared, keep the last frame, to avoid flicker.
       const { robot_count, body_count } = this.frame ?? {};
       if (robot_count !== message.robots.length || body_count !== message.bodies.length) this.frame = null;
       this._tell("scene", message);

@@ -1,4 +1,4 @@
-/* What stands still in the top view: floor, light, walls and grid. The same picture is the floor of the 3-D view. */
+/* The static parts of the top view: floor, light, walls and grid. The 3-D view uses the same picture as its floor. */
 
 import { LAMPLIGHT, rgba, wallGrey } from "./colours.js";
 import { lightMap } from "./light_map.js";
@@ -21,7 +21,7 @@ export class Floor {
     this._light_key = "";
   }
 
-  /** Learn where lamps are; says whether the light has changed. */
+  /** Take the places of lamps; return whether the light has changed. */
   setLamps(lamps, isDark) {
     const key = isDark + lamps.map((lamp) => `${lamp.x_mm},${lamp.y_mm},${lamp.power_w},${lamp.isOn}`).join(";");
     if (!this.raster || key === this._light_key) return false;

@@ -1,9 +1,8 @@
-/* One frame of the feed: what moves, as typed views into the bytes that came. Nothing is copied and nothing is drawn
-   here.
+/* One frame of the feed: typed views of the received bytes. This module copies nothing and draws nothing.
 
-   The layout is that of kiks/desk/frames.py: a head of 32 bytes, then 32 words for each robot, 3 for each body, 4
-   for each lamp, 68 bytes for each camera and 56 ray lengths for each robot. Little endian, as every browser's own
-   arrays are. */
+   The layout is that of kiks/desk/server/frames.py: a head of 32 bytes, then 32 words for each robot, 3 for each body,
+   4 for each lamp, 68 bytes for each camera and 56 ray lengths for each robot. It is little endian, like the arrays of
+   all browsers. */
 
 const HEAD_BYTES = 32;
 const ROBOT_WORDS = 32;
@@ -15,7 +14,7 @@ const PIXELS = 64;
 export const SENSORS = 8;
 export const RAYS_PER_SENSOR = 7;
 export const RAYS_PER_ROBOT = SENSORS * RAYS_PER_SENSOR;
-/** The length of a ray that met nothing. */
+/** The length of a ray that hit nothing. */
 export const NO_HIT = 65535;
 export const RAY_UNIT_MM = 0.01;
 
@@ -51,14 +50,14 @@ export class Robot {
   get forwards_mm() { return this._floats[13]; }
   get backwards_mm() { return this._floats[14]; }
   get straight_mm() { return this._floats[15]; }
-  /** Eight counts as the command N would return them. */
+  /** Eight counts, as the command N returns them. */
   get proximity() { return this._floats.subarray(16, 24); }
-  /** Eight counts as the command O would return them. */
+  /** Eight counts, as the command O returns them. */
   get ambient() { return this._floats.subarray(24, 32); }
 }
 
 export class Frame {
-  /** Lay views over the bytes of a frame. Throws a RangeError when they are no frame of this version. */
+  /** Create the views of a frame's bytes. Throws a RangeError if they are not a frame of this version. */
   constructor(buffer, now_ms) {
     const head = new DataView(buffer);
     if (buffer.byteLength < HEAD_BYTES || head.getUint8(0) !== 1 || head.getUint8(1) !== 1)
@@ -90,9 +89,9 @@ export class Frame {
     this._cameras_at = at;
     at += this.camera_count * CAMERA_BYTES;
     this._rays = new Uint16Array(buffer, at, this.robot_count * RAYS_PER_ROBOT);
-    /** The frame before this one; the feed forgets it as soon as there is a newer frame. */
+    /** The previous frame; the feed drops it when a newer frame arrives. */
     this.previous = null;
-    /** How long the way from the frame before to this one is stretched on the screen [ms]. */
+    /** Duration of the interpolation from the previous frame to this one [ms]. */
     this.interval_ms = 0;
     this._views = [];
   }
@@ -106,7 +105,7 @@ export class Frame {
     return this._views[index];
   }
 
-  /** Where a ball or cylinder is; isGripped and isLifted say what a gripper does with it. */
+  /** Place of a ball or cylinder, and whether a gripper holds (isGripped) or lifts (isLifted) it. */
   body(index) {
     const at = index * BODY_WORDS, [x_mm, y_mm] = this._between("_bodies", at);
     const flags = this._bodies[at + 2];
@@ -118,7 +117,7 @@ export class Frame {
     return { x_mm, y_mm, power_w, isOn: is_on !== 0 };
   }
 
-  /** Lengths of a robot's 56 rays [0.01 mm], sensor by sensor, 7 each; NO_HIT where nothing was met. */
+  /** Lengths of a robot's 56 rays [0.01 mm], sensor by sensor, 7 each; NO_HIT for a ray that hit nothing. */
   rays(index) {
     return this._rays.subarray(index * RAYS_PER_ROBOT, (index + 1) * RAYS_PER_ROBOT);
   }
@@ -132,13 +131,13 @@ export class Frame {
     return null;
   }
 
-  /** How far the screen has come on its way from the frame before (0) to this one (1). */
+  /** Progress of the interpolation from the previous frame (0) to this one (1). */
   share(now_ms = performance.now()) {
     if (!this.previous || this.interval_ms <= 0) return 1;
     return Math.min(1, Math.max(0, (now_ms - this.arrived_ms) / this.interval_ms));
   }
 
-  /** The pose of a robot for the screen: on the way between the last two frames. */
+  /** The pose of a robot on the screen, interpolated between the last two frames. */
   pose(index, now_ms) {
     const at = index * ROBOT_WORDS, [x_mm, y_mm] = this._between("_robots", at, now_ms);
     let heading_rad = this._robots[at + 2];

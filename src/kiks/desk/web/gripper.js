@@ -1,4 +1,4 @@
-/* Where a gripper's arm and jaws are, of what frames say. Lengths in mm in the robot's own frame, x ahead, y left;
+/* The geometry of a gripper's arm and jaws, from frames. Lengths in mm in the robot's own frame, x ahead, y left;
    the constants are those of kiks/firmware/gripper.py and kiks/engine/gripper.py. */
 
 export const PIVOT_MM = -15;
@@ -9,7 +9,7 @@ const JAW_WIDTH_MM = 4;
 const GAP_MM = 0.5;
 const GAP_PER_STEP_MM = 27 / 200;
 
-/** Half the way between the jaws, and how far along the arm they begin and end. */
+/** Half the distance between the jaws, and where along the arm they begin and end. */
 export function jawsOf(robot, radius_mm) {
   return {
     gap_mm: GAP_MM + GAP_PER_STEP_MM * robot.jaws,
@@ -19,12 +19,12 @@ export function jawsOf(robot, radius_mm) {
   };
 }
 
-/** How steep the arm is: 0 down in front, pi down behind [rad]. */
+/** Elevation of the arm: 0 down in front, pi down behind [rad]. */
 export function armAngle(robot) {
   return Math.PI - (START_RAD + (SWING_RAD * robot.arm) / 255);
 }
 
-/** How far ahead of the robot's middle a place on the arm is, seen from above [mm]. */
+/** Distance of a point of the arm ahead of the robot's middle, seen from above [mm]. */
 export function aheadOf(along_mm, robot) {
   return PIVOT_MM + along_mm * Math.cos(armAngle(robot));
 }

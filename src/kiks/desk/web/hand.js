@@ -1,12 +1,12 @@
-/* The hand: what is chosen, what is held, and the messages that say so. Pointer and keyboard both work through it.
+/* The hand: the selected thing, the held thing, and the messages for dragging. Pointer and keyboard both use it.
 
-   The engine decides where a held thing really is; the hand only says where it ought to be, at most once a picture. */
+   The engine decides where a held thing is; the hand only sends where it should go, at most once per picture. */
 
 import { countOf, placeOf, radiusOf, isSame } from "./things.js";
 
-/** Presses of keys within this time add up, though frames have not yet shown the last one. */
+/** Key presses within this time add up, even if no frame shows the last one yet. */
 const KEY_MEMORY_MS = 400;
-/** Farthest that keys may be ahead of what frames show. */
+/** Largest distance of the keyboard's target from the place in frames. */
 const KEY_LEAD_MM = 60;
 
 export class Hand {
@@ -16,7 +16,7 @@ export class Hand {
     this.hovered = null;
     this.holding = null;
     this.ghost = null;
-    /** Counts changes, for those who draw. */
+    /** Counts changes, so that the views know when to draw. */
     this.changes = 0;
     this.onSelect = () => {};
     this._pending = null;
@@ -39,7 +39,7 @@ export class Hand {
     this.changes++;
   }
 
-  /** Take hold of a thing at a place, to move it or to turn it. */
+  /** Grab a thing at a place, to move or turn it. */
   grab({ what, index }, isTurning, x_mm, y_mm) {
     const start = { ...placeOf(this.feed.frame, what, index) }, radius_mm = radiusOf(this.feed.scene, what, index);
     if (!this.feed.send({ kind: "grab", what, index })) return;
@@ -65,7 +65,7 @@ export class Hand {
     this.changes++;
   }
 
-  /** Send what the pointer said last; called once a picture. */
+  /** Send the last position of the pointer; called once per picture. */
   flush() {
     if (this._pending) this.feed.send(this._pending);
     this._pending = null;
@@ -78,7 +78,7 @@ export class Hand {
     this._release();
   }
 
-  /** Put what is held back to where it was taken. */
+  /** Move the held thing back to where it was grabbed. */
   cancel() {
     if (!this.holding) return;
     const { start, isTurning } = this.holding;
@@ -87,7 +87,7 @@ export class Hand {
     this.drop();
   }
 
-  /** The connection or the scene has gone, and what was held with it. */
+  /** Forget the held thing, after the connection or the scene has changed. */
   forget() {
     this._release();
     this._key = null;
@@ -100,7 +100,7 @@ export class Hand {
     this.changes++;
   }
 
-  /** Move and turn what is chosen by a step, as keys do. */
+  /** Move and turn the selected thing by a step of the keyboard. */
   step(x_mm, y_mm, turn_rad) {
     if (!this.selected || this.holding) return false;
     const { what, index } = this.selected, now_ms = performance.now();

@@ -1,12 +1,12 @@
-/* What a robot's readings were: the last samples of a few hundred, in a ring, spread over simulated time. */
+/* The history of a robot's readings: a ring buffer of a few hundred samples, spread over simulated time. */
 
-/** Least time covered [s]; a simulation that runs fast covers more, so that there is always a curve to be seen. */
+/** Shortest time covered [s]; a fast simulation covers more, so that curves have enough samples. */
 export const SPAN_S = 20;
 const ROOM = 640;
 const SPACING_S = SPAN_S / (ROOM - 15);
 const LEAST_SAMPLES = 100;
 
-/** Where each kind of value begins in a sample, and how many there are. */
+/** Start and number of each kind of value in a sample. */
 export const KINDS = {
   proximity: { first: 0, count: 8 },
   ambient: { first: 8, count: 8 },
@@ -26,10 +26,10 @@ export class History {
     this._next = 0;
   }
 
-  /** Note the readings of a robot; `robot` is that of a frame. */
+  /** Add the readings of a robot; `robot` is that of a frame. */
   note(time_s, robot) {
     if (this.count && time_s < this.time(0)) this.clear();
-    // Samples that come closer than can be kept replace the newest one.
+    // A sample that follows too closely replaces the newest one.
     const isClose = this.count > 1 && time_s - this.time(1) < SPACING_S;
     if (isClose || (this.count && time_s === this.time(0))) {
       this._next = (this._next + ROOM - 1) % ROOM;
@@ -50,12 +50,12 @@ export class History {
     return this._times_s[(this._next - 1 - back + 2 * ROOM) % ROOM];
   }
 
-  /** One of its values. */
+  /** One value of that sample. */
   value(back, column) {
     return this._values[((this._next - 1 - back + 2 * ROOM) % ROOM) * WIDTH + column];
   }
 
-  /** How much time the curves show [s]. */
+  /** The time that the curves cover [s]. */
   get span_s() {
     const last = Math.min(this.count, LEAST_SAMPLES) - 1;
     return last < 1 ? SPAN_S : Math.max(SPAN_S, this.time(0) - this.time(last));

@@ -1,5 +1,5 @@
-/* What the components of the desk share. They import it by the name "kiks-desk", so that a page has one feed.
-   The 3-D view is not here: it brings three.js, and is loaded when it is first shown ("kiks-desk/solid_view.js"). */
+/* The modules that the desk's components share. They import it by the name "kiks-desk", so that a page has one feed.
+   The 3-D view is not here: it needs three.js, and is loaded when it is first shown ("kiks-desk/solid_view.js"). */
 
 export { Feed, pageFeed } from "./feed.js";
 export { Frame, NO_HIT, RAY_UNIT_MM, RAYS_PER_ROBOT, RAYS_PER_SENSOR, Robot, SENSORS } from "./frame.js";

@@ -1,4 +1,4 @@
-/* The keyboard: Tab or n goes through all things, arrows move the chosen one (or the view), q and e turn it, + and -
+/* The keyboard: Tab or n selects the next thing, arrows move it (or the view), q and e turn it, + and -
    zoom. */
 
 import { allThings, isSame } from "./things.js";
@@ -12,10 +12,10 @@ const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowD
 const TURNS = { q: 1, "<": 1, e: -1, ">": -1 };
 
 export const KEYS_HELP =
-  "Tab chooses the next thing, arrow keys move it by 10 mm (with Shift 1 mm), q and e turn it, Escape lets go; " +
+  "Tab selects the next thing, arrow keys move it by 10 mm (with Shift 1 mm), q and e turn it, Escape deselects; " +
   "plus and minus zoom, 0 shows everything.";
 
-/** Act on a key; says whether it was one of ours. `tell` is that of the pointer. */
+/** Handle a key; return whether it was a shortcut. `tell` is that of the pointer. */
 export function pressKey(event, feed, hand, drawing, viewport, tell) {
   if (event.ctrlKey || event.altKey || event.metaKey) return false;
   const { key } = event;
@@ -46,7 +46,7 @@ export function pressKey(event, feed, hand, drawing, viewport, tell) {
   return false;
 }
 
-/** Choose the thing after the chosen one. Tab leaves the view after the last one, so that nobody is caught in it. */
+/** Select the next thing. After the last one, Tab leaves the view, so that it does not trap the focus. */
 function choose(feed, hand, way, isRound) {
   const things = allThings(feed), at = things.findIndex((thing) => isSame(thing, hand.selected));
   let next = at < 0 && way < 0 ? things.length - 1 : at + way;

@@ -1,7 +1,7 @@
 /* The light of all lamps on the floor, with the shadows of walls: a small picture to be stretched over the arena.
 
-   Method: for each lamp, rays in all directions say how far its light gets; a cell is lit when it is nearer than that.
-   It is a picture for the eye, soft and coarse; what sensors measure is the engine's business. */
+   Method: for each lamp, rays in all directions find the range of its light; a cell is lit if it is nearer than that.
+   It is a soft and coarse picture for people; the engine computes what sensors measure. */
 
 const LONGEST_SIDE = 240;
 const DIRECTIONS = 720;
@@ -31,7 +31,7 @@ export function lightMap(raster, lamps, rgb, strongest) {
   return canvas;
 }
 
-/** Return the mean of each cell and those around it: shadows get soft edges. */
+/** Return the mean of each cell and its neighbours, for shadows with soft edges. */
 function blurred(light, columns, rows) {
   const soft = new Float32Array(light.length);
   for (let row = 0, k = 0; row < rows; row++)

@@ -1,5 +1,5 @@
-/* The monitor: one robot's readings, drawn from the page's feed as the screen asks for pictures.
-   It knows nothing of Vue; monitor_view.js is its component. */
+/* The monitor: one robot's readings, drawn from the page's feed for each picture of the screen.
+   It does not depend on Vue; monitor_view.js is its component. */
 
 import { READING_COLOURS, readingBucket } from "./colours.js";
 import { paintCameraStrip } from "./camera_strip.js";
@@ -12,7 +12,7 @@ import { paintLargeRobot } from "./robot_drawing.js";
 import { RobotLook } from "./top_robots.js";
 
 const FACTS_MS = 100;
-/** Full scale of the wheels' bars [pulses/10 ms]; the bars grow with what is faster. */
+/** Full scale of the wheels' bars [pulses/10 ms]; a faster wheel extends it. */
 const SPEED_SCALE = 20;
 const DARK_COUNTS = 450;
 const IDLE = { light: [226, 230, 235], dark: [58, 66, 76] };
@@ -145,7 +145,7 @@ function lightColour(counts) {
   return [40 + 215 * share, 52 + 162 * share, 78 + 18 * share].map(Math.round);
 }
 
-/** Write a number on its button, and its colour behind it: black on bright ones, white on dark ones. */
+/** Write a number on its button, and set its background: the text is black on bright colours, white on dark ones. */
 function write(button, counts, [red, green, blue]) {
   const text = String(Math.round(counts));
   if (button.firstChild.data !== text) button.firstChild.data = text;
@@ -153,7 +153,7 @@ function write(button, counts, [red, green, blue]) {
   button.style.color = 0.3 * red + 0.59 * green + 0.11 * blue > 110 ? "#000000" : "#ffffff";
 }
 
-/** Draw on a canvas in CSS pixels, as sharp as the screen is; one without a size is left alone. */
+/** Draw on a canvas in CSS pixels at the resolution of the screen; skip a canvas without a size. */
 function onCanvas(canvas, paint) {
   const width = canvas?.clientWidth ?? 0, height = canvas?.clientHeight ?? 0, ratio = window.devicePixelRatio || 1;
   if (!width || !height) return;

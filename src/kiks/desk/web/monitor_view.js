@@ -1,4 +1,4 @@
-/* One robot's monitor as a component of the page (see monitor.js). A click on a number asks why it is what it is. */
+/* The Vue component of the monitor (see monitor.js). A click on a number asks for its explanation. */
 
 import { CURVES, isDashed, lineColour, Monitor, placeOfNumber } from "kiks-desk";
 
@@ -9,7 +9,7 @@ export default {
     <div ref="root" class="kiks-monitor" data-testid="monitor">
       <div v-if="!known" class="kiks-monitor-empty" role="status">Waiting for the robot …</div>
       <div v-show="known">
-        <div class="kiks-monitor-robot" role="group" aria-label="Sensors around the robot: choose one to see why it reads so">
+        <div class="kiks-monitor-robot" role="group" aria-label="Sensors around the robot: choose one for an explanation">
           <canvas ref="robot" aria-hidden="true"></canvas>
           <div v-for="(name, k) in names" :key="k" class="kiks-chip" :style="chipStyle(k)">
             <span class="kiks-chip-name" aria-hidden="true">{{ k }}</span>
@@ -50,7 +50,7 @@ export default {
 
         <div v-show="hasCamera">
           <div class="kiks-monitor-title">Camera: 64 pixels from the left</div>
-          <canvas ref="camera" class="kiks-camera" data-testid="camera-strip" role="img" aria-label="What the camera sees"></canvas>
+          <canvas ref="camera" class="kiks-camera" data-testid="camera-strip" role="img" aria-label="Picture of the camera"></canvas>
         </div>
 
         <dl class="kiks-facts" data-testid="facts">

@@ -1,8 +1,8 @@
-/* Mouse, pen and fingers: drags things, turns robots by their rim, pans, pinches, draws with a tool, and picks.
+/* Mouse, pen and fingers: drag things, turn robots by their rim, pan, pinch, draw with a tool, and pick.
 
-   It works on a surface: {element, toArena(clientX, clientY) -> [x_mm, y_mm] or null, scale (pixels/mm), viewport or
-   null, claim(isClaimed)}. The top view has a viewport to pan and zoom; the 3-D view moves its camera by itself
-   while the pointer is not claimed. */
+   The pointer works on a surface: {element, toArena(clientX, clientY) -> [x_mm, y_mm] or null, scale (pixels/mm),
+   viewport or null, claim(isClaimed)}. The top view has a viewport to pan and zoom; the 3-D view moves its camera by
+   itself while the pointer is not claimed. */
 
 import { thingAt } from "./things.js";
 
@@ -106,7 +106,7 @@ export class Pointer {
     }
   }
 
-  /** The system took the pointer away: what was held stays where it is. */
+  /** The system has cancelled the pointer; the held thing stays where it is. */
   _lose(event) {
     if (!this._fingers.delete(event.pointerId)) return;
     if (!this._fingers.size) this._pinch = null;
@@ -183,7 +183,7 @@ export class Pointer {
   }
 }
 
-/** A pointer that has gone meanwhile cannot be captured; then nothing is lost either. */
+/** Capture a pointer, and ignore the error if it has already gone. */
 function capture(element, pointer) {
   try {
     element.setPointerCapture(pointer);

@@ -1,15 +1,15 @@
-/* One robot from above, large, looking up the screen: its rays as seen, and lines from its sensors to their numbers. */
+/* One robot from above, large, with its front upwards: its rays, and lines from its sensors to their numbers. */
 
 import { readingBucket, READING_COLOURS, rgba } from "./colours.js";
 import { NO_HIT, RAY_UNIT_MM, RAYS_PER_SENSOR } from "./frame.js";
 import { paintRobot } from "./top_robots.js";
 
-/** Directions in which the numbers of the eight sensors stand around a robot, whatever way it looks [rad]. */
+/** Directions of the numbers of the eight sensors around a robot, independent of its heading [rad]. */
 const PLACES_RAD = [83, 49, 17, -17, -49, -83, -153, 153].map((degrees) => (degrees * Math.PI) / 180);
 const ASIDE_SHARE = 0.42, ALONG_SHARE = 0.43;
 const HIT_PX = 2.6;
 
-/** Where the number of a sensor stands, in shares of the picture's width and height. */
+/** Place of a sensor's number, as fractions of the picture's width and height. */
 export function placeOfNumber(sensor) {
   const angle = PLACES_RAD[sensor];
   return [0.5 - ASIDE_SHARE * Math.sin(angle), 0.5 - ALONG_SHARE * Math.cos(angle)];
@@ -39,7 +39,7 @@ export function paintLargeRobot(context, width, height, ratio, look, scene, fram
   paintCompass(context, robot.heading_rad, isDark);
 }
 
-/** Rings at each 20 mm from the robot's rim. */
+/** Rings every 20 mm from the robot's rim. */
 function paintRings(context, middle, known, scale, isDark) {
   context.strokeStyle = isDark ? "rgba(230,238,246,.15)" : "rgba(30,40,50,.13)";
   context.lineWidth = 1;
@@ -95,7 +95,7 @@ function paintLeaders(context, at, width, height, known, isDark) {
   context.setLineDash([]);
 }
 
-/** A dial in the corner: where the robot looks on the arena, whose x axis goes to the right. */
+/** A dial in the corner with the robot's heading in the arena, whose x axis points to the right. */
 function paintCompass(context, heading_rad, isDark) {
   const ink = isDark ? "#e8edf2" : "#1d2329", x = 24, y = 24, radius = 17;
   context.strokeStyle = ink;

@@ -4,7 +4,7 @@ export const RULER_PX = 26;
 const STEPS_MM = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000];
 const LABEL_EVERY_PX = 56;
 
-/** Draw both rulers over all that is there; `context` takes CSS pixels. */
+/** Draw both rulers on top of the picture; `context` takes CSS pixels. */
 export function paintRulers(context, viewport, colours) {
   const { width_px, height_px, scale } = viewport, bottom = height_px - RULER_PX;
   const step_mm = STEPS_MM.find((step) => step * scale >= LABEL_EVERY_PX) ?? 10000;

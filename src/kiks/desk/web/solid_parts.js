@@ -1,8 +1,8 @@
-/* Small things that the 3-D view is built of: merged geometry with colours at its corners, and giving memory back. */
+/* Helpers of the 3-D view: merged geometry with vertex colours, and releasing memory. */
 
 import { THREE } from "nicegui-scene";
 
-// Colours are mixed as they are on the screen: turning each dot of it to light and back is what costs most without a
+// Colours are blended in screen space: converting each pixel to linear light and back is the largest cost without a
 // graphics card.
 THREE.ColorManagement.enabled = false;
 
@@ -39,7 +39,7 @@ export function column(radius, height, sides = 20) {
   return new THREE.CylinderGeometry(radius, radius, height, sides).rotateX(Math.PI / 2);
 }
 
-/** A round board as parts for `merge`: a rim and a top; nobody sees it from below. */
+/** A round board as parts for `merge`: a rim and a top, as the bottom is never visible. */
 export function board(radius, height, colour, z, sides = 20) {
   const rim = new THREE.CylinderGeometry(radius, radius, height, sides, 1, true).rotateX(Math.PI / 2);
   return [[rim, colour, [0, 0, z]], [new THREE.CircleGeometry(radius, sides), colour, [0, 0, z + height / 2]]];
@@ -51,7 +51,7 @@ export function plate(points, height) {
   return new THREE.ExtrudeGeometry(outline, { depth: height, bevelEnabled: false });
 }
 
-/** Take everything out of a group and give its memory on the graphics card back. */
+/** Empty a group and release its memory on the graphics card. */
 export function empty(group) {
   group.traverse((thing) => {
     thing.geometry?.dispose();

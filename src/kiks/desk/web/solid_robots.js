@@ -1,5 +1,5 @@
 /* Kheperas in three dimensions: a base with two wheels, two round boards, eight sensors, lamps, turrets and a gripper.
-   What all robots of a kind share is one geometry, drawn for all of them at once. */
+   All robots of a kind share one geometry, drawn for all of them at once. */
 
 import { THREE } from "nicegui-scene";
 import { board, box, column, empty, merge, plate } from "./solid_parts.js";
@@ -54,7 +54,7 @@ export class SolidRobots {
     return mesh;
   }
 
-  /** What a robot alone has: turrets and a name. */
+  /** The parts of a single robot: turrets and a name. */
   _top(robot, index) {
     const top = new THREE.Group(), turrets = new THREE.Mesh(new THREE.BufferGeometry(), this._material);
     const name = nameSprite(robot.name, index);
@@ -80,7 +80,7 @@ export class SolidRobots {
     return arm;
   }
 
-  /** Put everything where a frame has it. */
+  /** Move everything to its pose in a frame. */
   update(frame, poses, show) {
     if (!this._robots?.length) return;
     for (const mesh of [this._bodies, this._caps]) mesh.count = poses.length;
@@ -155,13 +155,13 @@ function bodyGeometry(robot) {
   return merge(parts);
 }
 
-/** A white arrow on a board: where the robot's front is. */
+/** A white arrow on a board, which marks the robot's front. */
 function noseOf({ radius_mm }, height) {
   const outline = [[radius_mm - 3, 0], [radius_mm - 11, 6], [radius_mm - 9, 0], [radius_mm - 11, -6]];
   return [plate(outline, 1), "#ffffff", [0, 0, height]];
 }
 
-/** Boards of the turrets, and on the topmost one what their shapes say. */
+/** Boards of the turrets, with their shapes on the topmost one. */
 function turretGeometry(robot) {
   const top = topOf(robot), parts = robot.turrets.length ? [noseOf(robot, top)] : [];
   for (let z = UPPER_BOARD + BOARD + TURRET_STEP; z <= top + 0.1; z += TURRET_STEP) {

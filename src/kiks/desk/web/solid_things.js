@@ -9,7 +9,7 @@ const CYLINDER_MM = 34;
 const LIFT_MM = 32;
 const LAMP_MM = 85;
 const RAY_MM = 12;
-/** Real lights cost the graphics card; the glow of the others is painted. */
+/** Maximum number of real lights, which are expensive; the glow of all others is painted. */
 const MOST_LIGHTS = 3;
 
 export class SolidThings {

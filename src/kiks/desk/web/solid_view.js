@@ -1,6 +1,6 @@
 /* The arena in three dimensions, with three.js. It orbits, pans, zooms and follows a robot from behind; no shadows,
-   few triangles: it has to run without a graphics card too. Making one throws an Error that says why there is no 3-D
-   here. */
+   few triangles: it must run without a graphics card, too. The constructor throws an Error with the reason if 3-D is not
+   possible. */
 
 import { OrbitControls, THREE } from "nicegui-scene";
 import { palette } from "./colours.js";
@@ -32,7 +32,7 @@ export class SolidView {
     this.follow = -1;
     this.show = {};
     this.viewport = null;
-    /** Counts how often the camera has moved, for those who draw. */
+    /** Counts movements of the camera, so that the stage knows when to draw. */
     this.changes = 0;
     this._renderer = new THREE.WebGLRenderer({ canvas, context });
     this._renderer.setPixelRatio(1);
@@ -54,7 +54,7 @@ export class SolidView {
     this.setDark(isDark);
   }
 
-  /** Let the pointer move the camera. Whoever listens to the canvas before may claim the pointer. */
+  /** Let the pointer move the camera. An earlier listener of the canvas may claim the pointer. */
   control() {
     this._controls = new OrbitControls(this._camera, this.canvas);
     this._controls.maxPolarAngle = 0.49 * Math.PI;
@@ -64,7 +64,7 @@ export class SolidView {
     this.fit();
   }
 
-  /** How many shapes and pictures the graphics card keeps for this view. */
+  /** Number of geometries and textures on the graphics card for this view. */
   get parts() {
     const { geometries, textures } = this._renderer.info.memory;
     return geometries + textures;
@@ -87,7 +87,7 @@ export class SolidView {
     return hit ? [hit.x, hit.y] : null;
   }
 
-  /** Where a place of the arena, at the height where the pointer holds things, is on the page. */
+  /** Position on the page of a place in the arena, at the height at which the pointer holds things. */
   toClient(x_mm, y_mm) {
     const { left, top, width, height } = this.canvas.getBoundingClientRect();
     const { x, y } = new THREE.Vector3(x_mm, y_mm, GRIP_MM).project(this._camera);
@@ -142,7 +142,7 @@ export class SolidView {
     if (!this._isMoved) this.fit();
   }
 
-  /** Look at all of the arena from the south and above. */
+  /** Show all of the arena from the south and above. */
   fit() {
     const arena = this.feed.scene?.arena;
     if (!arena || !this._controls) return;
@@ -208,7 +208,7 @@ export class SolidView {
     ring.scale.setScalar(place.radius_mm + 4);
   }
 
-  /** Go with a robot, and turn with it slowly. What the pointer does to the camera stays. */
+  /** Follow a robot and turn with it slowly. The camera keeps the changes made with the pointer. */
   _chase(pose) {
     const { target } = this._controls, { position } = this._camera;
     if (!pose) {
@@ -232,7 +232,7 @@ export class SolidView {
     this._controls.update();
   }
 
-  /** Give all memory on the graphics card back. */
+  /** Release all memory on the graphics card. */
   dispose() {
     this._controls?.dispose();
     empty(this._scene);
@@ -247,7 +247,7 @@ function ringMesh() {
   return ring;
 }
 
-/** Without a graphics card, smooth edges cost more than all the rest. */
+/** Without a graphics card, antialiasing costs more than everything else. */
 function isSoftware() {
   const context = document.createElement("canvas").getContext("webgl2");
   const names = context?.getExtension("WEBGL_debug_renderer_info");

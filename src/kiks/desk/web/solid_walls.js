@@ -7,14 +7,14 @@ import { THREE } from "nicegui-scene";
 import { wallGrey } from "./colours.js";
 
 export const WALL_HEIGHT_MM = 40;
-/** Brightnesses that look alike are one: pictures of drawn or photographed walls would else fall to pieces. */
+/** Similar brightnesses count as one; else pictures of drawn or photographed walls would need too many faces. */
 const LEVELS = 16;
 const MOST_FACES = 40000;
-/** How much light a side gets at least, and more the more it faces south and a little east. */
+/** Minimum light of a side; it grows the more the side faces south and a little east. */
 const DIM = 0.56, LIT = 0.2, TOWARDS = [0.35, -0.94];
-/** What is looked at around a side's middle [cells]. */
+/** Radius around a side's middle in which its direction is estimated [cells]. */
 const AROUND = 3;
-/** Tops reach a little under each other, or the sides below would glint through where they meet [cells]. */
+/** Overlap of neighbouring tops, without which the sides below would show through [cells]. */
 const OVERLAP = 0.04;
 const TOP = 0, SIDE = 1;
 
@@ -85,7 +85,7 @@ function facesOf({ levels, columns, rows }) {
   }
 }
 
-/** Return the shade of a side: the wall's cells around its middle say which way it faces. */
+/** Return the shade of a side; the wall's cells around its middle tell its direction. */
 function shadeOf({ levels, columns, rows }, column, row) {
   let east = 0, north = 0;
   for (let y = Math.ceil(row - AROUND - 0.5); y < row + AROUND; y++)

@@ -1,5 +1,5 @@
-/* The stage: both views of the arena in one element, with pointer and keyboard, drawn as the screen asks for pictures.
-   It knows nothing of Vue; arena_view.js is its component. */
+/* The stage: both views of the arena in one element, with pointer and keyboard, drawn for each picture of the screen.
+   It does not depend on Vue; arena_view.js is its component. */
 
 import { pageFeed } from "./feed.js";
 import { Hand } from "./hand.js";
@@ -14,7 +14,7 @@ const OBJECTION_MS = 5000;
 const SAY = {
   connecting: "Connecting to KiKS …",
   lost: "No connection to KiKS. Trying again …",
-  gone: "KiKS has ended. Start it again, and this page goes on.",
+  gone: "KiKS has ended. This page reconnects when you start it again.",
 };
 
 export class Stage {
@@ -117,7 +117,7 @@ export class Stage {
     };
   }
 
-  /** Where a place of the arena is on the page: from above, unless the 3-D view is alone. */
+  /** Position on the page of a place in the arena: in the top view, unless only the 3-D view is visible. */
   toClient(x_mm, y_mm) {
     if (this.view === "solid" && this.solidView) return this.solidView.toClient(x_mm, y_mm);
     const { left, top } = this.top.getBoundingClientRect(), [x, y] = this.topView.viewport.toScreen(x_mm, y_mm);
@@ -212,7 +212,7 @@ export class Stage {
   _loseSolid() {
     if (this._isOver) return;
     this.solidView = null;
-    this._tellSolid("The graphics card has lost the 3-D view. Reload the page to have it back.");
+    this._tellSolid("The graphics card has lost the 3-D view. Reload the page to restore it.");
   }
 
   _tellSolid(text) {
@@ -233,13 +233,13 @@ export class Stage {
     this._isWanted = true;
   }
 
-  /** Say whether two views show the arena larger beside each other than below. */
+  /** Return whether the arena is larger with the views side by side than one above the other. */
   _isRoomierBeside(width, height) {
     const { width_mm, height_mm } = this.feed.scene?.arena ?? { width_mm: 1, height_mm: 1 };
     return Math.min(width / 2 / width_mm, height / height_mm) >= Math.min(width / width_mm, height / 2 / height_mm);
   }
 
-  /** One picture of the screen: send what the hand has done, and draw what has changed. */
+  /** For each picture of the screen: send the hand's messages and draw what has changed. */
   _tick(now_ms) {
     this._beat = requestAnimationFrame((next_ms) => this._tick(next_ms));
     this.hand.flush();
@@ -258,14 +258,14 @@ export class Stage {
     if (this._times_ms.length > 60) this._times_ms.shift();
   }
 
-  /** What the hand adds to both views. */
+  /** The marks of the hand in both views. */
   _marks() {
     const { selected, hovered, ghost } = this.hand;
     const isFocused = this.root.classList.contains("kiks-keys") && this.root.contains(document.activeElement);
     return { selected, hovered, ghost, preview: this.drawing.preview, isFocused };
   }
 
-  /** Say whether there is anything new to see; a world that stands still costs nothing. */
+  /** Return whether anything has changed; a paused world costs nothing. */
   _hasChanged(now_ms) {
     const { frame } = this.feed;
     const counts = [this.hand, this.drawing, this.topView.viewport, this.solidView].map((part) => part?.changes);
@@ -282,7 +282,7 @@ export class Stage {
 
   _say(connection) { this._notice(SAY[connection] ?? ""); }
 
-  /** Show for a while what the server objects to. */
+  /** Show an error of the server for a while. */
   _object(text) {
     this._notice(text);
     setTimeout(() => {

@@ -1,5 +1,5 @@
-/* What can be picked, dragged and turned: robots, bodies, lamps and the sensors of the chosen robot, and where they
-   are. */
+/* The things that can be picked, dragged and turned, and their places: robots, bodies, lamps, and the sensors of the
+   selected robot. */
 
 /** Radius of the mark of a lamp [mm]. */
 export const LAMP_RADIUS_MM = 11;
@@ -15,7 +15,7 @@ export function radiusOf(scene, what, index) {
   return what === "body" ? scene.bodies[index].radius_mm : LAMP_RADIUS_MM;
 }
 
-/** How many of a kind are both in the scene and in the frame. */
+/** The number of things of a kind that are both in the scene and in the frame. */
 export function countOf(feed, what) {
   if (!feed.frame) return 0;
   if (what === "lamp") return feed.frame.lamp_count;
@@ -23,7 +23,7 @@ export function countOf(feed, what) {
   return Math.min(feed.frame.body_count, feed.scene.bodies.length);
 }
 
-/** Where a thing is on the screen: {x_mm, y_mm, heading_rad of a robot}. */
+/** The pose of a thing on the screen: {x_mm, y_mm, heading_rad of a robot}. */
 export function placeOf(frame, what, index) {
   if (what === "robot") return frame.pose(index);
   return what === "body" ? frame.body(index) : frame.lamp(index);
@@ -45,13 +45,13 @@ export function isSame(one, other) {
   return Boolean(one && other) && one.what === other.what && one.index === other.index;
 }
 
-/** Where the handle for turning a robot is, ahead of it. */
+/** The place of the handle for turning a robot, ahead of it. */
 export function handleOf(pose, radius_mm, scale) {
   const way_mm = radius_mm + Math.max(0.25 * radius_mm, 12 / scale);
   return [pose.x_mm + way_mm * Math.cos(pose.heading_rad), pose.y_mm + way_mm * Math.sin(pose.heading_rad)];
 }
 
-/** Find what is at a place: {what, index, sensor, isRim}, the floor when nothing else is there.
+/** Find the thing at a place: {what, index, sensor, isRim}, or the floor.
     `scale` (pixels/mm) lets small things be hit by a finger; a handle counts on the thing that shows one. */
 export function thingAt(feed, x_mm, y_mm, scale, withHandle) {
   const { frame, scene } = feed, floor = { what: "floor", index: -1, sensor: -1, isRim: false };

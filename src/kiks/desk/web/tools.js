@@ -9,7 +9,7 @@ export class Drawing {
     this.tool = { kind: "hand" };
     this.points = [];
     this.isDrawing = false;
-    /** Counts changes, for those who draw. */
+    /** Counts changes, so that the stage knows when to draw. */
     this.changes = 0;
   }
 
@@ -34,7 +34,7 @@ export class Drawing {
     else if (Math.hypot(point[0] - x_last, point[1] - y_last) >= LEAST_STEP_MM) this.points.push(point);
   }
 
-  /** End the stroke and return it: {kind, points}; null when none was begun. */
+  /** End the stroke and return it: {kind, points}; null if none was begun. */
   end() {
     if (!this.isDrawing) return null;
     const { kind } = this.tool;
@@ -50,7 +50,7 @@ export class Drawing {
     this.changes++;
   }
 
-  /** What to show: see top_marks.js; null when the pointer is elsewhere. */
+  /** The preview for top_marks.js; null if the pointer is elsewhere. */
   get preview() {
     if (!this.isActive || !this.points.length) return null;
     const { kind, brush_mm = 1, label } = this.tool, [x, y] = this.points.at(-1), text = label ? [label] : [];

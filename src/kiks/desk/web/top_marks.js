@@ -1,4 +1,4 @@
-/* What the pointer and the keyboard add to the top view: what is chosen, handles, ghosts, and previews of the tools. */
+/* The marks of pointer and keyboard in the top view: selection, handles, ghosts, and previews of the tools. */
 
 import { countOf, handleOf, placeOf, radiusOf } from "./things.js";
 
@@ -39,7 +39,7 @@ function paintRing(context, viewport, feed, thing, colours, isSelected, isFocuse
   context.stroke();
 }
 
-/** A thin outline where the pointer holds a thing; the thing itself is where frames say. */
+/** A thin outline where the pointer holds a thing; the thing itself is drawn at its place in the frame. */
 function paintGhost(context, viewport, { x_mm, y_mm, heading_rad, radius_mm }, colours) {
   const [x, y] = viewport.toScreen(x_mm, y_mm), radius = radius_mm * viewport.scale;
   context.beginPath();

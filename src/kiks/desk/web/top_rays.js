@@ -4,7 +4,7 @@
 import { NO_HIT, RAY_UNIT_MM, RAYS_PER_SENSOR, SENSORS } from "./frame.js";
 import { READING_COLOURS, readingBucket, rgba } from "./colours.js";
 
-/** Half of a camera's field of view, and how far it is drawn. */
+/** Half of a camera's field of view, and the range in which it is drawn. */
 const HALF_VIEW_RAD = (18 * Math.PI) / 180;
 const VIEW_MM = 260;
 
@@ -45,7 +45,7 @@ export function paintRays(context, viewport, scene, frame, poses, colours) {
   });
 }
 
-/** Draw what a robot's camera can see of the floor ahead; `context` takes CSS pixels. */
+/** Draw the field of view of a robot's camera; `context` takes CSS pixels. */
 export function paintView(context, viewport, pose, colours) {
   const [x, y] = viewport.toScreen(pose.x_mm, pose.y_mm), reach = VIEW_MM * viewport.scale;
   const fade = context.createRadialGradient(x, y, 0, x, y, reach);

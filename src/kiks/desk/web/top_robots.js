@@ -167,7 +167,7 @@ export function paintName(context, name, index, x, y, radius_px, colours) {
 const strip = document.createElement("canvas");
 [strip.width, strip.height] = [STRIP_PX[0], 1];
 
-/** Draw what a robot's camera sees as a strip beside it; `context` takes CSS pixels. */
+/** Draw the camera picture of a robot as a strip beside it; `context` takes CSS pixels. */
 export function paintCamera(context, camera, x, y, radius_px, colours) {
   const pixels = strip.getContext("2d"), picture = pixels.createImageData(STRIP_PX[0], 1);
   camera.pixels.forEach((grey, k) => picture.data.set([grey, grey, grey, 255], 4 * k));

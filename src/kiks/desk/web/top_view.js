@@ -1,4 +1,4 @@
-/* The arena from above on a canvas. What stands still (floor, walls, grid, trails) is drawn ahead, off screen, and
+/* The arena from above on a canvas. Static parts (floor, walls, grid, trails) are drawn off screen, and
    again only when the view, the scene or the light changes; each picture then draws what moves over it. */
 
 import { bodyColour, LAMPLIGHT, palette, rgba, robotColour } from "./colours.js";
@@ -77,10 +77,10 @@ export class TopView {
     this._isMoved = false;
   }
 
-  /** What a finger or a key has moved stays as it was put, until all of the arena is asked for. */
+  /** Keep the view that a finger or a key has moved, until the person asks for all of the arena. */
   keepView() { this._isMoved = true; }
 
-  /** Draw a picture. `marks` is what the pointer adds: {selected, hovered, ghost, preview}. */
+  /** Draw a picture. `marks` are those of the pointer: {selected, hovered, ghost, preview}. */
   draw(marks, now_ms) {
     const { frame, scene } = this.feed, context = this._context, { viewport } = this;
     const poses = Array.from({ length: countOf(this.feed, "robot") }, (_, index) => frame.pose(index, now_ms));

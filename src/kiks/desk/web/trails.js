@@ -1,8 +1,8 @@
-/* Where robots have been: kept in the browser from the frames it saw, thinned and bounded. */
+/* The trails of robots: kept in the browser from the received frames, thinned and bounded. */
 
 const THIN_MM = 4;
 const MOST_POINTS = 1500;
-/** A robot that is farther from one frame to the next was put there by a hand or a reset: its trail begins anew. */
+/** A hand or a reset has moved a robot that jumps farther between two frames: its trail is cut. */
 const LEAP_MM = 250;
 
 export class Trails {
@@ -11,13 +11,13 @@ export class Trails {
   }
 
   clear() {
-    /** For each robot [x_mm, y_mm, x_mm, ...]; NaN, NaN parts two ways. */
+    /** For each robot [x_mm, y_mm, x_mm, ...]; NaN, NaN cuts a trail. */
     this.ways = [];
-    /** Counts what makes all that was drawn wrong. */
+    /** Counts changes after which all trails must be drawn again. */
     this.changes = (this.changes ?? 0) + 1;
   }
 
-  /** Note the places of a frame. */
+  /** Add the places of a frame. */
   add(frame) {
     for (let index = 0; index < frame.robot_count; index++) {
       const way = (this.ways[index] ??= []), { x_mm, y_mm } = frame.robot(index), end = way.length;
@@ -33,11 +33,11 @@ export class Trails {
     }
   }
 
-  /** Draw the ways from the given points on, and return how far they are drawn now. */
+  /** Draw the trails from the given points on, and return the new end points. */
   paint(context, viewport, drawn, colourOf) {
     context.lineWidth = Math.min(4, Math.max(1.5, 3 * viewport.scale));
     context.lineJoin = "round";
-    context.lineCap = "butt"; // strokes that go on where the last one ended must not lie over it
+    context.lineCap = "butt"; // consecutive strokes must not overlap
     return this.ways.map((way, index) => {
       const from = Math.max(0, (drawn[index] ?? 0) - 2);
       if (way.length - from < 4) return drawn[index] ?? 0;

@@ -7,12 +7,12 @@ export class Viewport {
   constructor() {
     this.width_px = 1;
     this.height_px = 1;
-    /** The place in the middle of the screen. */
+    /** The place at the middle of the screen. */
     this.x_mm = 0;
     this.y_mm = 0;
-    /** Pixels for a millimetre. */
+    /** Pixels per millimetre. */
     this.scale = 1;
-    /** Counts changes, for those who draw ahead. */
+    /** Counts changes, so that static parts are drawn again. */
     this.changes = 0;
   }
 
@@ -47,7 +47,7 @@ export class Viewport {
     this.centreOn(this.x_mm - x_px / this.scale, this.y_mm + y_px / this.scale);
   }
 
-  /** Zoom so that what is under a point of the screen stays there. */
+  /** Zoom and keep the place under a point of the screen. */
   zoomAbout(x_px, y_px, factor) {
     const [x_mm, y_mm] = this.toArena(x_px, y_px);
     this.scale = Math.min(MOST_SCALE, Math.max(LEAST_SCALE, this.scale * factor));

@@ -1,0 +1,42 @@
+"""What several panels share: buttons, and error messages for the person who acts."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Awaitable, Callable
+from typing import Any, ParamSpec
+
+from nicegui import ui
+
+from kiks.errors import KiksError
+
+Given = ParamSpec("Given")
+
+BAR = "flat round dense color=white"
+"""Look of an icon button in the bar above the arena."""
+
+
+def told(act: Callable[Given, Awaitable[None]]) -> Callable[Given, Awaitable[None]]:
+    """Show a `KiksError` of an action to the person who has caused it."""
+
+    @functools.wraps(act)
+    async def acted(*args: Given.args, **kwargs: Given.kwargs) -> None:
+        try:
+            await act(*args, **kwargs)
+        except KiksError as error:
+            ui.notify(str(error), type="negative", multi_line=True, close_button="OK", timeout=10_000)
+
+    return acted
+
+
+def icon_button(
+    icon: str, label: str, name: str, act: Callable[..., Any] | None = None, *, look: str = "flat round dense"
+) -> ui.button:
+    """Build a button with an icon alone; `label` is its accessible name."""
+    return ui.button(icon=icon, on_click=act).props(f'{look} aria-label="{label}" data-testid="{name}"').mark(name)
+
+
+def text_button(text: str, icon: str, name: str, tip: str, act: Callable[..., Any]) -> ui.button:
+    """Build a button with an icon, a text (possibly empty) and a tooltip."""
+    button = ui.button(text, icon=icon, on_click=act).props('dense no-caps outline padding="4px 10px"')
+    return button.props(f'aria-label="{text or tip}" data-testid="{name}"').mark(name).tooltip(tip)
