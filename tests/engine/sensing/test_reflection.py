@@ -216,10 +216,10 @@ def test_posts_and_corners_are_less_than_a_wall_that_is_as_near(cell_mm: float) 
 def test_nothing_jumps_while_a_robot_turns_past_a_post(cell_mm: float, largest: float) -> None:
     """Half a degree at a time past a post with a radius of 12 mm: found are 149 and 293 counts, next to it."""
     sim = world(disc(12.0), cell_mm)
-    for gap_mm, share in ((1.0, 1.0), (2.0, 1.0), (5.0, 0.85), (12.0, 0.7), (20.0, 0.4)):
+    for gap_mm, part in ((1.0, 1.0), (2.0, 1.0), (5.0, 0.85), (12.0, 0.7), (20.0, 0.4)):
         turns = np.radians(np.arange(0.0, 360.5, 0.5))
         counts = np.array([read(sim, -12.0 - RADIUS_MM - gap_mm - cell_mm, 0.0, turn) for turn in turns])
-        assert np.abs(np.diff(counts, axis=0)).max() < share * largest
+        assert np.abs(np.diff(counts, axis=0)).max() < part * largest
         assert counts.max() > 400
 
 
