@@ -3,16 +3,16 @@
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV   := .venv
 BIN    := $(VENV)/bin
-# Many tests wait for processes of their own: one worker more than there are processors keeps these busy.
+# Many tests wait for processes that they start. One worker more than processors keeps all processors busy.
 WORKERS = $(shell $(BIN)/python -c 'import os; print(os.cpu_count() + 1)')
 PYTEST = $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
-.PHONY: demo test quick checked setup system lint types docs benchmarks clean
+.PHONY: demo test quick nightly checked setup system lint types docs benchmarks clean
 
 demo: setup
 	$(BIN)/kiks demo follow --arena examples/arenas/office.toml --seconds 300 --picture kiks-demo.png
 
-# Tests have a time limit each, and compiling is none of theirs.
+# Each test has a time limit, which does not include compiling the engine.
 test: setup system
 	$(BIN)/kiks warmup
 	$(PYTEST)
@@ -21,7 +21,12 @@ quick: setup system
 	$(BIN)/kiks warmup
 	$(PYTEST) -m "not slow"
 
-# The tests of kernels once more, in code that checks every index: some minutes, as all is compiled anew.
+# All tests with all their examples: `make test` runs a share of the longest (tests/at_length.py).
+nightly: setup system
+	$(BIN)/kiks warmup
+	KIKS_AT_LENGTH=1 $(PYTEST)
+
+# The tests of the kernels in code that checks every index. It takes some minutes, as it compiles everything again.
 checked: setup
 	NUMBA_BOUNDSCHECK=1 $(PYTEST) -m "not slow" tests/engine tests/batch
 

@@ -18,6 +18,7 @@ from kiks.ports.server import Server
 from kiks.sim.simulation import Simulation
 
 GUARD_S = 20.0
+BOX = Arena.box(600, 600)
 PROGRAMS = Path(__file__).parent / "programs"
 
 
@@ -79,7 +80,7 @@ def served(
 
 def fresh(robots: int = 1, *, thinking: str = "none") -> Simulation:
     """Return a world that is always the same."""
-    return Simulation(Arena.box(600, 600), robots=robots, seed=7, thinking=thinking)
+    return Simulation(BOX, robots=robots, seed=7, thinking=thinking)
 
 
 def open_plain(path: str) -> int:

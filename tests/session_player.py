@@ -31,6 +31,8 @@ FOLDER = Path(__file__).parent / "sessions"
 
 LAST_QUESTION, LAST_ANSWER = b"I,5\n", b"i,0\r\n"
 
+FLOOR = Arena.box(1000, 1000)
+
 MARKS = "! > < ~ @ = #"
 
 SETTINGS = ("robot", "quiet", "baud", "turrets")
@@ -120,7 +122,7 @@ def simulation(session: Session) -> Simulation:
             "proximity__noise_large": 0.0,
             "ambient__noise_counts": 0.0,
         }
-    sim = Simulation(Arena.box(1000, 1000), robot=spec.with_changes(**changes))
+    sim = Simulation(FLOOR, robot=spec.with_changes(**changes))
     for name in session.settings.get("turrets", "").split():
         sim.fit(1, name)
     return sim

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from tests import forked
 
 from kiks.cli import app
 
@@ -31,13 +30,13 @@ PROGRAMS = [(page.name, code) for page in PAGES for code in blocks(page, "python
 
 @pytest.mark.parametrize(("page", "code"), PROGRAMS, ids=lambda value: value[:20].replace("\n", " "))
 def test_programs_run(page: str, code: str) -> None:
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False)
+    result = forked.run(code=code, cwd=ROOT)
     assert result.returncode == 0, f"{page}: {result.stderr}"
 
 
 def test_the_first_program_keeps_clear_of_the_walls() -> None:
     code = blocks(ROOT / "README.md", "python")[0]
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True)
+    result = forked.run(code=code, cwd=ROOT)
     found = re.fullmatch(r"(\d+) mm, (\d+) contacts, state [0-9a-f]{16}\n", result.stdout)
     assert found
     assert int(found[1]) > 1000

@@ -1,4 +1,4 @@
-"""The campaign against KiKS: a share of each part with fixed seeds, and that it notices what is planted."""
+"""The torture campaigns: a few cases of each with fixed seeds; and they notice faults that are planted."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.at_length import nightly, share
 
 TOOL = Path(__file__).parents[1] / "tools" / "torture.py"
 
@@ -88,28 +89,27 @@ def test_a_few_hostile_bytes() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(470)  # a campaign of many cases, in processes of its own
-@pytest.mark.parametrize("group", ["files", "calls", "messages"])
-def test_a_share_of_hostile_cases(group: str) -> None:
-    check("--only", group, "--cases", "4", "--seed", "12")
+@pytest.mark.timeout(470)  # campaigns of many cases, in processes of their own
+def test_hostile_cases() -> None:
+    check("--only", "files", "--only", "calls", "--only", "messages", "--cases", share("1", "4"), "--seed", "12")
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(470)  # a campaign of many cases, in processes of its own
-@pytest.mark.parametrize("scene", ["kill_writer", "fill_disk", "no_descriptors"])
-def test_files_are_whole(scene: str) -> None:
-    check("--only", f"faults.{scene}", "--cases", "4", "--seed", "13")
+@pytest.mark.timeout(470)  # campaigns of many cases, in processes of their own
+def test_files_are_whole() -> None:
+    scenes = (f"--only=faults.{scene}" for scene in ("kill_writer", "fill_disk", "no_descriptors"))
+    check(*scenes, "--cases", "4", "--seed", "13")
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(470)  # a campaign of many cases, in processes of its own
-@pytest.mark.parametrize("scene", ["server", "desk"])
-def test_who_is_killed_takes_nothing_along(scene: str) -> None:
+@pytest.mark.timeout(470)  # a campaign in processes of its own
+@pytest.mark.parametrize("scene", ["server", pytest.param("desk", marks=nightly)])
+def test_another_process_takes_the_place_of_a_killed_one(scene: str) -> None:
     check("--only", f"faults.kill_{scene}", "--cases", "1", "--seed", "14")
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(470)  # a campaign of many cases, in processes of its own
-@pytest.mark.parametrize("door", ["serve", "session"])
-def test_a_crowd_keeps_nobody_out(door: str) -> None:
-    check("--only", f"crowd.{door}", "--cases", "1", "--seed", "15")
+@pytest.mark.timeout(470)  # a campaign in processes of its own
+@pytest.mark.parametrize("group", ["serve", pytest.param("session", marks=nightly)])
+def test_robots_answer_while_many_clients_connect(group: str) -> None:
+    check("--only", f"crowd.{group}", "--cases", "1", "--seed", "15")

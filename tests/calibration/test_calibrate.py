@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import typer
 from benchmarks.calibration_errors import half_distances_mm, hidden_robot
+from tests.at_length import nightly
 from typer.testing import CliRunner
 
 import kiks
@@ -57,7 +58,9 @@ def measured(hidden: kiks.RobotSpec, base: kiks.RobotSpec = BASE, seed: int = 0,
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("base", "seed"), [(BASE, 2), (KHEPERA_II, 3)], ids=["khepera", "khepera_ii"])
+@pytest.mark.parametrize(
+    ("base", "seed"), [pytest.param(BASE, 2, marks=nightly), (KHEPERA_II, 3)], ids=["khepera", "khepera_ii"]
+)
 def test_any_hidden_parameters_are_found(base: kiks.RobotSpec, seed: int) -> None:
     hidden = hidden_robot(seed, base)
     found = measured(hidden, base, seed=seed, skew_rad=math.radians(6 * (-1) ** seed))
@@ -67,7 +70,7 @@ def test_any_hidden_parameters_are_found(base: kiks.RobotSpec, seed: int) -> Non
     assert error[16:].max() < 0.005
 
 
-@pytest.mark.slow
+@nightly
 def test_a_robot_like_its_kind_reads_zero_as_often() -> None:
     zero_share = idle(measured(BASE).spec)[1]
     assert zero_share == pytest.approx(idle(BASE)[1], abs=0.05)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import get_args, get_type_hints
 
 import pytest
+from tests import forked
 
 from kiks.cli import app
 from kiks.errors import ParameterError
@@ -24,18 +25,9 @@ WANDER = str(ROOT / "tests" / "programs" / "wander.py")
 KIKS = [sys.executable, "-m", "kiks"]
 
 
-def kiks(
-    *arguments: str, cwd: Path | None = None, env: dict[str, str] | None = None
-) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [*KIKS, *arguments],
-        capture_output=True,
-        text=True,
-        cwd=cwd,
-        env={**os.environ, **(env or {})},
-        timeout=470,
-        check=False,
-    )
+def kiks(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """Run the command in a process of its own, from its very start."""
+    return subprocess.run([*KIKS, *arguments], capture_output=True, text=True, cwd=cwd, timeout=470, check=False)
 
 
 def state_of(text: str) -> str:
@@ -68,7 +60,7 @@ def test_help_and_version_need_no_engine() -> None:
 @pytest.mark.parametrize("behaviour", ["avoid", "follow"])
 def test_a_demo_is_the_same_in_two_processes(behaviour: str, tmp_path: Path) -> None:
     arguments = ("demo", behaviour, "--seconds", "30", "--arena", ARENA, "--seed", "4")
-    first = kiks(*arguments, "--picture", "run.png", cwd=tmp_path)
+    first = forked.run(*arguments, "--picture", "run.png", cwd=tmp_path)
     assert first.returncode == 0, first.stderr
     assert (tmp_path / "run.png").stat().st_size > 5000
     assert re.search(r"30\.\d s .* x real time .* m .* contacts", first.stdout)
@@ -95,7 +87,7 @@ def test_a_warm_start_compiles_nothing() -> None:
 
 
 def test_a_program_runs_unchanged_in_simulated_time() -> None:
-    result = kiks("run", "--seed", "3", WANDER)
+    result = forked.run("run", "--seed", "3", WANDER)
     assert result.returncode == 0, result.stderr
     version, counters = result.stdout.splitlines()
     assert version == "b,5.02,5.01"
@@ -103,7 +95,7 @@ def test_a_program_runs_unchanged_in_simulated_time() -> None:
     assert re.search(r"kiks: 2[01]\.\d{3} s simulated, seed 3, state", result.stderr)
     again = kiks("run", "--seed", "3", "--map", "/dev/ttyUSB0=1", WANDER)
     assert (again.stdout, state_of(again.stderr)) == (result.stdout, state_of(result.stderr))
-    other = kiks("run", "--seed", "3", "--thinking", "fixed:20", WANDER)
+    other = forked.run("run", "--seed", "3", "--thinking", "fixed:20", WANDER)
     assert state_of(other.stderr) != state_of(result.stderr)
 
 
@@ -118,7 +110,7 @@ def test_turrets_and_kinds_of_robots_from_the_command_line(tmp_path: Path) -> No
         "        print(port.readline())\n"
     )
     options = ("--robot", "khepera", "--robot", "khepera_ii", "--turret", "radio", "--turret", "gripper=2")
-    result = kiks("run", *options, str(program))
+    result = forked.run("run", *options, str(program))
     assert result.stdout.splitlines() == [
         "b'b,5.02,5.01\\r\\n'",
         "b'z,Turret order not supported\\r\\n'",
@@ -131,7 +123,7 @@ def test_turrets_and_kinds_of_robots_from_the_command_line(tmp_path: Path) -> No
 
 @pytest.mark.slow
 def test_a_programs_exit_code_and_errors_are_its_own(tmp_path: Path) -> None:
-    assert kiks("run", WANDER, "7").returncode == 7
+    assert forked.run("run", WANDER, "7").returncode == 7
     program = tmp_path / "wrong.py"
     program.write_text("import serial\nserial.Serial('COM1', timeout=1)\nprint(1 / 0)\n")
     result = kiks("run", str(program))
@@ -140,17 +132,17 @@ def test_a_programs_exit_code_and_errors_are_its_own(tmp_path: Path) -> None:
     assert "runpy" not in result.stderr
     assert f'File "{program}", line 3' in result.stderr
     program.write_text("import serial\nserial.Serial('COM1')\nserial.Serial('COM2')\n")
-    assert "is one more than there are" in kiks("run", str(program)).stderr
-    assert kiks("run", "--robots", "2", str(program)).returncode == 0
+    assert "is one more than there are" in forked.run("run", str(program)).stderr
+    assert forked.run("run", "--robots", "2", str(program)).returncode == 0
     program.write_text("import serial\nserial.Serial('COM1').read(1)\n")
-    assert "the read would never end" in kiks("run", str(program)).stderr
+    assert "the read would never end" in forked.run("run", str(program)).stderr
 
 
 def test_live_thinking_is_recorded_and_replayed(tmp_path: Path) -> None:
     times = tmp_path / "times.txt"
-    live = kiks("run", "--thinking", "live", "--save-thinking", str(times), WANDER)
+    live = forked.run("run", "--thinking", "live", "--save-thinking", str(times), WANDER)
     assert "not repeatable" in live.stderr
-    replays = [kiks("run", "--thinking", f"replay:{times}", WANDER) for _ in range(2)]
+    replays = [forked.run("run", "--thinking", f"replay:{times}", WANDER) for _ in range(2)]
     assert replays[0].stdout == replays[1].stdout == live.stdout
     assert state_of(replays[0].stderr) == state_of(replays[1].stderr)
 
@@ -175,7 +167,7 @@ def test_live_thinking_is_recorded_and_replayed(tmp_path: Path) -> None:
     ],
 )
 def test_mistakes_end_in_one_clear_line(arguments: tuple[str, ...], words: str, tmp_path: Path) -> None:
-    result = kiks(*arguments, cwd=tmp_path)
+    result = forked.run(*arguments, cwd=tmp_path)
     assert result.returncode == 2, result.stdout + result.stderr
     assert words in result.stderr
     assert "Traceback" not in result.stderr

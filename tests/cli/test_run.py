@@ -12,7 +12,8 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from tests.cli.test_cli import KIKS, kiks, state_of
+from tests import forked
+from tests.cli.test_cli import KIKS, state_of
 from tests.served import GUARD_S, PROGRAMS, fresh
 
 from kiks.cli.record import COLUMNS, recorded, tell_run
@@ -71,7 +72,7 @@ def folder(tmp_path: Path) -> Path:
 
 @pytest.mark.slow
 def test_a_project_starts_its_programs(folder: Path) -> None:
-    result = kiks("run", "exercise.kiks", "--csv", "rows.csv", cwd=folder)
+    result = forked.run("run", "exercise.kiks", "--csv", "rows.csv", cwd=folder)
     assert result.returncode == 0, result.stderr
     assert result.stdout.splitlines() == [
         "teacher b,6.01,6.01",
@@ -89,7 +90,7 @@ def test_a_project_starts_its_programs(folder: Path) -> None:
 
 @pytest.mark.slow
 def test_programs_behind_a_project_take_the_place_of_its_own_from_robot_1_on(folder: Path) -> None:
-    both = kiks("run", "exercise.kiks", "--seed", "6", "student.py", "--fast", cwd=folder)
+    both = forked.run("run", "exercise.kiks", "--seed", "6", "student.py", "--fast", cwd=folder)
     assert sorted(both.stdout.splitlines()) == [
         "1 student.py | --fast b,5.02,5.01",
         "1 student.py | --fast d",
@@ -99,16 +100,16 @@ def test_programs_behind_a_project_take_the_place_of_its_own_from_robot_1_on(fol
         "2 teacher.py | teacher z,Turret order not supported",
     ], both.stderr
     assert "seed 6, state" in both.stderr
-    before = kiks("run", "--seed", "6", "exercise.kiks", "student.py", "--fast", cwd=folder)
+    before = forked.run("run", "--seed", "6", "exercise.kiks", "student.py", "--fast", cwd=folder)
     assert state_of(before.stderr) == state_of(both.stderr)
-    one = kiks("run", "exercise.kiks", "--robots", "1", "student.py", cwd=folder)
+    one = forked.run("run", "exercise.kiks", "--robots", "1", "student.py", cwd=folder)
     assert one.stdout.splitlines() == ["b,5.02,5.01", "t,1,b,1,0", "d"]
     assert "robot 2" not in one.stderr
 
 
 @pytest.mark.slow
 def test_a_project_as_an_arena_brings_its_robots_and_says_that_its_programs_stay_behind(folder: Path) -> None:
-    result = kiks("run", "--arena", "exercise.kiks", "--turret", "gripper", "student.py", cwd=folder)
+    result = forked.run("run", "--arena", "exercise.kiks", "--turret", "gripper", "student.py", cwd=folder)
     assert result.stdout.splitlines() == ["b,5.02,5.01", "t,1,b,1,0", "d"]
     left_out = "kiks: the programs of exercise.kiks are left out. kiks run exercise.kiks starts them, too."
     assert left_out in result.stderr
@@ -119,7 +120,7 @@ def test_a_project_as_an_arena_brings_its_robots_and_says_that_its_programs_stay
 @pytest.mark.slow
 def test_an_arena_in_place_of_the_project_s(folder: Path) -> None:
     (folder / "wide.toml").write_text("size_mm = [900, 900]\nwall_mm = 10\n[[start]]\nat_mm = [800, 800]\n")
-    result = kiks("run", "exercise.kiks", "--arena", "wide.toml", "--csv", "rows.csv", cwd=folder)
+    result = forked.run("run", "exercise.kiks", "--arena", "wide.toml", "--csv", "rows.csv", cwd=folder)
     assert "teacher b,6.01,6.01" in result.stdout, result.stderr
     assert "\n0.00,1,800.000,800.000," in (folder / "rows.csv").read_text()
 
@@ -140,7 +141,7 @@ def test_an_arena_in_place_of_the_project_s(folder: Path) -> None:
 )
 @pytest.mark.slow
 def test_mistakes_end_in_one_clear_line(words: tuple[str, ...], message: str, folder: Path) -> None:
-    result = kiks("run", *words, cwd=folder)
+    result = forked.run("run", *words, cwd=folder)
     assert result.returncode == 2
     assert message in result.stderr
     assert "Traceback" not in result.stderr
@@ -153,8 +154,8 @@ def test_mistakes_end_in_one_clear_line(words: tuple[str, ...], message: str, fo
 @pytest.mark.parametrize("count", [1, 2])
 def test_recording_changes_nothing(count: int, tmp_path: Path) -> None:
     programs = [DRIVE, "COM1", "40", "7", "6"] * count
-    plain = kiks("run", *programs)
-    kept = kiks("run", "--picture", "run.png", "--csv", "run.csv", *programs, cwd=tmp_path)
+    plain = forked.run("run", *programs)
+    kept = forked.run("run", "--picture", "run.png", "--csv", "run.csv", *programs, cwd=tmp_path)
     assert kept.returncode == 0, kept.stderr
     assert state_of(kept.stderr) == state_of(plain.stderr)
     assert {path.name for path in tmp_path.iterdir()} == {"run.png", "run.csv"}
@@ -162,7 +163,7 @@ def test_recording_changes_nothing(count: int, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_last_lines_are_one_for_each_robot_and_that_of_the_state() -> None:
-    result = kiks("run", "--robots", "2", DRIVE, "COM1", "40", "7", "6")
+    result = forked.run("run", "--robots", "2", DRIVE, "COM1", "40", "7", "6")
     *_, first, second, last = result.stderr.splitlines()
     assert re.fullmatch(r"kiks: robot 1: 0\.\d\d m driven, 0 contacts, \d+\.\d{3} s", first)
     assert re.fullmatch(r"kiks: robot 2: 0\.00 m driven, 0 contacts, \d+\.\d{3} s", second)

@@ -1,4 +1,4 @@
-"""The demonstrations: what they achieve on ten seeds, that they repeat, and that a real robot could run them."""
+"""The demonstrations: what they achieve on several seeds, that they repeat, and that a real robot could run them."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests import forked
+from tests.at_length import share
 
 from kiks import Arena, ArenaError
 from kiks.demos import scenes
@@ -22,7 +24,7 @@ from kiks.demos.swarm import Swarm
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[2]
-SEEDS = range(10)
+SEEDS = range(share(4, 10))
 
 # The state after the first twenty seconds with seed 1. To renew: python tests/demos/test_demos.py
 HASHES = {
@@ -66,7 +68,7 @@ def test_cylinders_are_pushed_to_the_walls() -> None:
         scene.run()
     # By chance a sixth is there at the start.
     assert mean(scene.tidy_at_start for scene in runs) < 4
-    assert sum(scene.tidy_count() >= 9 for scene in runs) >= 8
+    assert sum(scene.tidy_count() >= 9 for scene in runs) >= 0.8 * len(runs)
     assert mean(scene.tidy_count() for scene in runs) > 11
 
 
@@ -75,7 +77,7 @@ def test_random_mazes_are_left() -> None:
     runs = [scenes.MazeScene(seed=seed) for seed in SEEDS]
     for scene in runs:
         scene.run()
-    assert sum(scene.is_over and scene.lamp_mm() < 60 for scene in runs) >= 9
+    assert sum(scene.is_over and scene.lamp_mm() < 60 for scene in runs) >= 0.9 * len(runs)
 
 
 def test_the_ball_stays_in_the_picture() -> None:
@@ -99,7 +101,7 @@ def test_the_race_is_fast_and_touches_nothing() -> None:
 
 @pytest.mark.slow
 def test_the_swarm_spreads_out_and_nobody_touches_anybody() -> None:
-    runs = [scenes.SwarmScene(seed=seed) for seed in range(5)]
+    runs = [scenes.SwarmScene(seed=seed) for seed in range(share(2, 5))]
     for scene in runs:
         scene.run()
     assert mean(scene.apart_mm() for scene in runs) > 1.6 * runs[0].apart_at_start_mm
@@ -195,8 +197,7 @@ def test_a_scene_takes_another_arena_if_there_is_room() -> None:
     ],
 )
 def test_the_command_prints_a_result_and_leaves_a_picture(name: str, words: str, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "kiks", "demo", name, "--seconds", "3"]
-    result = subprocess.run(command, capture_output=True, text=True, timeout=100, check=False, cwd=tmp_path)
+    result = forked.run("demo", name, "--seconds", "3", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     line, picture, *_ = result.stdout.strip().splitlines()
     assert re.fullmatch(rf"{name}: 3\.\d s +\d+ x real time   ({words}).*", line), line

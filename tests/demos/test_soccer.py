@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-import subprocess
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
+from tests import forked
+from tests.at_length import nightly
+from tests.busy import busy_computer
 
 from kiks import Arena, Khepera, ParameterError
 from kiks.cli.match import player
@@ -44,23 +43,13 @@ def test_a_match_is_the_same_on_every_computer() -> None:
     assert hashes() == HASHES
 
 
-def test_a_match_is_the_same_while_the_computer_is_busy() -> None:
-    with busy():
+@nightly
+def test_a_match_is_the_same_on_a_busy_computer() -> None:
+    with busy_computer(3):
         assert run(Match(20, 1)).state_hash() == HASHES["own"]
 
 
-@contextmanager
-def busy() -> Iterator[None]:
-    others = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(3)]
-    try:
-        yield
-    finally:
-        for other in others:
-            other.kill()
-            other.wait()
-
-
-@pytest.mark.slow
+@nightly
 def test_goals_fall_on_both_sides() -> None:
     scores = np.array([run(Match(300, seed)).report.score() for seed in (0, 1)])
     assert scores.sum(axis=1).min() >= 2
@@ -313,12 +302,8 @@ def test_the_picture_has_a_row_for_four_goals() -> None:
     assert (width, height > without[1]) == (without[0], True)
 
 
-def kiks(*words: str, at: Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-m", "kiks", *words], cwd=at, capture_output=True, text=True, check=False)
-
-
 def test_the_command_tells_score_speed_seed_and_state(tmp_path: Path) -> None:
-    result = kiks("demo", "soccer", "--seconds", "20", "--seed", "1", at=tmp_path)
+    result = forked.run("demo", "soccer", "--seconds", "20", "--seed", "1", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     *goals, score, state = result.stdout.splitlines()
     assert all(re.fullmatch(r" *\d+\.\d s   \d:\d   (left|right)", line) for line in goals)
@@ -341,7 +326,7 @@ def test_the_command_tells_score_speed_seed_and_state(tmp_path: Path) -> None:
     ],
 )
 def test_wrong_words_are_explained(words: tuple[str, ...], said: str, tmp_path: Path) -> None:
-    result = kiks("demo", *words, at=tmp_path)
+    result = forked.run("demo", *words, cwd=tmp_path)
     assert result.returncode == 2
     assert said in result.stderr
 

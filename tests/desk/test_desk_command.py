@@ -15,7 +15,8 @@ from urllib.error import HTTPError
 from urllib.request import HTTPCookieProcessor, OpenerDirector, Request, build_opener, urlopen
 
 import pytest
-from tests.cli.test_cli import kiks, state_of
+from tests import forked
+from tests.cli.test_cli import state_of
 from tests.served import PROGRAMS
 
 pytestmark = pytest.mark.slow
@@ -94,7 +95,7 @@ def test_run_with_a_desk_equals_run_without(tmp_path: Path) -> None:
     with started("run", "--desk", "--no-wait", *words, folder=tmp_path) as (_, output):
         url_of(output)
         shown = state_of(line_with(output, "s simulated"))
-    assert shown == state_of(kiks("run", *words).stderr)
+    assert shown == state_of(forked.run("run", *words).stderr)
 
 
 def show_page(url: str) -> None:
@@ -132,7 +133,7 @@ def test_programs_begin_when_a_page_shows_the_world(words: tuple[str, ...], tmp_
 
 
 def test_errors_are_reported_before_waiting_for_a_page(tmp_path: Path) -> None:
-    result = kiks("run", "--desk", "--thinking", "replay:nowhere", DRIVE, DRIVE, cwd=tmp_path)
+    result = forked.run("run", "--desk", "--thinking", "replay:nowhere", DRIVE, DRIVE, cwd=tmp_path)
     assert result.returncode == 2
     assert "replay file 'nowhere.1' must exist" in result.stderr
     assert "http://" not in result.stdout
@@ -195,7 +196,7 @@ def test_served_robots_on_a_desk(thinking: str, tmp_path: Path) -> None:
     ],
 )
 def test_errors_are_one_clear_line(words: tuple[str, ...], message: str, tmp_path: Path) -> None:
-    result = kiks("desk", "--no-browser", "--port", "0", *words, cwd=tmp_path)
+    result = forked.run("desk", "--no-browser", "--port", "0", *words, cwd=tmp_path)
     assert result.returncode == 2
     assert message in result.stderr
     assert "Traceback" not in result.stderr

@@ -1,4 +1,4 @@
-"""No kernel reads outside its arrays, and none depends on the processor: worlds of all kinds in processes."""
+"""No kernel reads outside its arrays, and none depends on the processor or on the build."""
 
 from __future__ import annotations
 
@@ -9,18 +9,20 @@ from pathlib import Path
 
 import numba
 import pytest
+from tests.at_length import nightly
+from tests.engine.test_determinism import record_of_process, run_record
 
 from kiks.engine import code_cache
 
 ROOT = Path(__file__).parent.parent.parent
 
 PLAIN_AND_CHECKED = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "NUMBA_BOUNDSCHECK": "1"}
-"""For a processor without wide vectors, and with every index checked. Compiling this takes minutes, so one process
-runs all that needs it."""
+"""Compile for a processor without wide vectors, and check every index. That takes minutes, so that one process runs all
+tests that need it."""
 
 
 def said_by_process(**environment: str) -> str:
-    """Run the worlds in a process whose kernels are compiled as its environment says."""
+    """Run all worlds in a process whose kernels are compiled as its environment says."""
     command = [sys.executable, "-X", "faulthandler", "-m", "tests.engine.checked_worlds"]
     done = subprocess.run(command, cwd=ROOT, env=os.environ | environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-3000:]
@@ -29,8 +31,15 @@ def said_by_process(**environment: str) -> str:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(470)  # it compiles the engine
+def test_no_index_leaves_its_array_and_no_bit_depends_on_the_build_in_a_world_of_two_robots() -> None:
+    """Without LLVM's slowest optimisations, which take two thirds of the time."""
+    assert record_of_process(**PLAIN_AND_CHECKED, NUMBA_OPT="1") == run_record()
+
+
+@nightly
 @pytest.mark.timeout(470)  # it compiles engine and batch, with the checks for the first time
-def test_every_index_is_within_its_array_and_no_bit_depends_on_the_build() -> None:
+def test_no_index_leaves_its_array_and_no_bit_depends_on_the_build_in_any_world() -> None:
     """An index outside its array is an IndexError with the checks; without them the process may end."""
     assert said_by_process(**PLAIN_AND_CHECKED) == said_by_process()
 

@@ -6,6 +6,7 @@ from itertools import pairwise
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.at_length import share
 from tests.reply_grammar import LETTERS, ORDERS, allowed, at_most, first_violation
 from tests.session_player import TURRETS
 
@@ -68,7 +69,7 @@ def answers(kind: str, data: bytes, cuts: list[int]) -> bytes:
     return bytes(output)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=share(60, 150), deadline=None)
 @given(
     kind=st.sampled_from(["khepera", "khepera_ii"]),
     pairs=st.lists(st.tuples(LINES, ENDS), min_size=1, max_size=12),

@@ -14,8 +14,11 @@ from pathlib import Path
 from typing import IO, Any
 
 import pytest
-from tests.cli.test_cli import kiks, state_of
-from tests.ports.test_lockstep import busy_computer, said
+from tests import forked
+from tests.at_length import nightly, share
+from tests.busy import busy_computer
+from tests.cli.test_cli import state_of
+from tests.ports.test_lockstep import said
 from tests.served import GUARD_S, PROGRAMS, fresh
 
 import kiks as package
@@ -120,15 +123,14 @@ def run_and_read(commands: Sequence[Sequence[str]], folder: Path, **options: Any
     return end[:3], end[4], *(file.read_text() for file in files)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("thinking", ["none", "fixed:3.5"])
+@pytest.mark.parametrize("thinking", ["none", pytest.param("fixed:3.5", marks=nightly)])
 def test_programs_do_the_same_again_on_a_busy_computer(thinking: str, tmp_path: Path) -> None:
     with busy_computer():
-        assert len({run_and_read(FOUR, tmp_path, thinking=thinking) for _ in range(4)}) == 1
+        assert len({run_and_read(FOUR, tmp_path, thinking=thinking) for _ in range(share(2, 4))}) == 1
 
 
 def test_two_programs_do_the_same_again(tmp_path: Path) -> None:
-    assert len({run_and_read(FOUR[1:3], tmp_path) for _ in range(3)}) == 1
+    assert len({run_and_read(FOUR[1:3], tmp_path) for _ in range(2)}) == 1
 
 
 def test_live_thinking_of_each_is_recorded_and_replayed(tmp_path: Path) -> None:
@@ -313,7 +315,9 @@ def test_words_are_programs_and_arguments(tmp_path: Path) -> None:
 
 
 def test_command_runs_two_programs() -> None:
-    results = [kiks("run", "--seed", "3", DRIVE, "COM1", "9", "3", "5", DRIVE, "COM1", "5", "7", "5") for _ in range(2)]
+    results = [
+        forked.run("run", "--seed", "3", DRIVE, "COM1", "9", "3", "5", DRIVE, "COM1", "5", "7", "5") for _ in range(2)
+    ]
     for result in results:
         assert result.returncode == 0, result.stderr
         assert result.stdout.count("n,") == 14
@@ -332,7 +336,7 @@ def test_command_runs_two_programs() -> None:
     ],
 )
 def test_mistakes_end_in_one_clear_line(words: tuple[str, ...], message: str) -> None:
-    result = kiks("run", *words, WATCHER, "1", WATCHER, "1")
+    result = forked.run("run", *words, WATCHER, "1", WATCHER, "1")
     assert result.returncode == 2
     assert message in result.stderr
     assert "Traceback" not in result.stderr

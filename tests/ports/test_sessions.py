@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 import serial
-from tests.cli.test_cli import kiks
+from tests import forked
 from tests.served import GUARD_S, PROGRAMS, fresh, run_python, served
 from tests.session_player import Pieces, Session, play, sessions, simulation
 
@@ -66,7 +66,7 @@ def test_session(session: Session, way: Callable[..., Any], pieces: Pieces, tmp_
 def test_the_course_is_the_same_under_kiks_run_and_through_a_serial_port(tmp_path: Path) -> None:
     (tmp_path / "box.toml").write_text("size_mm = [600, 600]\n")
     course = PROGRAMS / "course.py"
-    here = kiks("run", "--arena", str(tmp_path / "box.toml"), "--seed", "7", str(course), "/dev/ttyUSB0")
+    here = forked.run("run", "--arena", str(tmp_path / "box.toml"), "--seed", "7", str(course), "/dev/ttyUSB0")
     assert here.returncode == 0, here.stderr
     with served([PtyEndpoint(tmp_path / "khepera")], sim=fresh()) as run:
         through_pty = run_python(course, str(tmp_path / "khepera"))

@@ -7,6 +7,7 @@ from typing import Any
 
 import hypothesis.strategies as st
 from hypothesis import HealthCheck, given, settings
+from tests.at_length import share
 from tests.script import seen
 from tests.script.oracle import Oracle, Trace
 
@@ -45,7 +46,7 @@ def run_threads(program: list[Any]) -> tuple[Trace, str]:
 
 
 @given(PROGRAMS)
-@settings(max_examples=200, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=share(60, 200), deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 def test_threads_do_what_a_plain_simulation_says(program: list[Any]) -> None:
     oracle = Oracle(world(), program)
     assert run_threads(program) == (oracle.trace, oracle.sim.state_hash())

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.engine.same_walls import with_things
 from tests.piles import DEEPEST_MM, SHOVED_MM, Pile, calm, rush
 
 from kiks.engine.physics import motor
@@ -33,7 +33,7 @@ class Company:
 
     def __init__(self, robots=((1900.0, 1900.0, 0.0),), balls=(), cylinders=(), arena=None, **changes):
         self.sim = Simulation(
-            replace(
+            with_things(
                 arena or FLOOR,
                 starts=tuple(Pose(*robot) for robot in robots),
                 balls=tuple(Ball(*ball) for ball in balls),
@@ -137,17 +137,20 @@ def test_off_a_wall_a_quarter_of_the_speed_across_comes_back(angle_deg, speed):
 # ---- nothing tunnels ----
 
 
-def thin_walls(count=1):
-    """Return a floor of 600 x 400 mm with an upright wall of one cell, as long as the floor, and a post of one cell."""
+def thin_wall():
+    """Return a floor of 600 x 400 mm with an upright wall of one cell, as long as the floor."""
     picture = np.zeros((800, 1200), np.uint8)
-    picture[:, 600 : 600 + count] = 255
+    picture[:, 600] = 255
     return Arena.from_array(picture, mm_per_pixel=0.5)
+
+
+THIN_WALL = thin_wall()
 
 
 @pytest.mark.parametrize("offset", np.linspace(0.0, 20.0, 9).tolist())
 @pytest.mark.parametrize("angle_deg", [0, 30, 80])
 def test_a_ball_does_not_get_through_a_wall_of_one_cell(offset, angle_deg):
-    company = Company(robots=[(500.0, 100.0, 0.0)], balls=[(200.0 + offset, 70.0, 10.0, 0.0)], arena=thin_walls())
+    company = Company(robots=[(500.0, 100.0, 0.0)], balls=[(200.0 + offset, 70.0, 10.0, 0.0)], arena=THIN_WALL)
     company.roll(1, 1000.0 * math.cos(math.radians(angle_deg)), 1000.0 * math.sin(math.radians(angle_deg)))
     for _ in company.tick(100):
         assert company.places[0, 0] <= 290.0 + DEEPEST_MM

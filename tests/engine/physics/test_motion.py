@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
+from tests.at_length import share
 
 from kiks.engine.physics.motion import move, pose_between, remember_pose
 from kiks.model.arena import PAD, Arena
@@ -48,7 +49,7 @@ def arc(pose, left, right):
     )
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(share(1, 4)))
 def test_thousands_of_ticks_follow_the_closed_form(make_world, seed):
     """Within 1e-6 mm and 1e-9 rad."""
     rng = np.random.default_rng(seed)
@@ -83,7 +84,7 @@ def test_power_follows_the_closed_form_of_the_lag(make_world):
         assert world.pose[2] == pytest.approx((path[1] - path[0]) * PULSE / BASE, abs=1e-9)
 
 
-@settings(derandomize=True, deadline=None, max_examples=200)
+@settings(derandomize=True, deadline=None, max_examples=share(100, 200))
 @given(left=PATHS, right=PATHS, heading=st.floats(-50.0, 50.0))
 def test_there_and_back_again(make_world, left, right, heading):
     world = make_world(FLOOR).place(2000.0, 2000.0, heading)
@@ -91,7 +92,7 @@ def test_there_and_back_again(make_world, left, right, heading):
     assert world.pose == pytest.approx((2000.0, 2000.0, heading), rel=0, abs=1e-9)
 
 
-@settings(derandomize=True, deadline=None, max_examples=200)
+@settings(derandomize=True, deadline=None, max_examples=share(100, 200))
 @given(left=PATHS, right=PATHS, heading=st.floats(-50.0, 50.0), share=st.floats(0.0, 1.0))
 def test_a_moment_within_a_tick_is_where_a_part_of_the_paths_leads(make_world, left, right, heading, share):
     whole = make_world(FLOOR).place(2000.0, 2000.0, heading)

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.at_length import share
+from tests.engine.same_walls import with_things
 
 from kiks.engine.sensing.disc_rays import meet_disc, meet_discs_all
 from kiks.engine.simd.f64x8 import LANES
@@ -19,6 +21,7 @@ from kiks.sim.simulation import Simulation
 from kiks.units import SENSOR_SLOT_NS, TICK_NS
 
 ROBOT_MM, REACH_MM = 27.5, 60.0
+HALF_MM_FLOOR = Arena.from_array(np.zeros((1000, 1000), np.uint8), mm_per_pixel=0.5)
 EXACT = RobotSpec.load("khepera").with_changes(
     proximity__noise_small=0.0, proximity__noise_large=0.0, proximity__jitter_counts=(0.0, 0.0)
 )
@@ -76,17 +79,16 @@ def drawn(arena: Arena, discs) -> Arena:
 @pytest.mark.parametrize("gap_mm", [2.0, 8.0, 20.0])
 def test_a_disc_reads_like_the_same_disc_drawn_as_a_wall(radius_mm, gap_mm):
     """Counts within 5 % and 15: what drawing in cells of half a millimetre costs, a thin disc most."""
-    floor = Arena.from_array(np.zeros((1000, 1000), np.uint8), mm_per_pixel=0.5)
-    for angle in np.linspace(-3, 3, 9):
+    for angle in np.linspace(-3, 3, share(2, 9)):
         far = ROBOT_MM + gap_mm + radius_mm
         x, y = 250.0 + far * math.cos(angle), 250.0 + far * math.sin(angle)
         start = (Pose(250.0, 250.0, 0.4),)
-        with_ball = Simulation(replace(floor, starts=start, balls=(Ball(x, y, radius_mm),)))
-        with_wall = Simulation(replace(drawn(floor, [(x, y, radius_mm, 255)]), starts=start))
+        with_ball = Simulation(with_things(HALF_MM_FLOOR, starts=start, balls=(Ball(x, y, radius_mm),)))
+        with_wall = Simulation(replace(drawn(HALF_MM_FLOOR, [(x, y, radius_mm, 255)]), starts=start))
         assert with_ball.proximity(1) == pytest.approx(with_wall.proximity(1), rel=0.05, abs=15)
 
 
-@settings(derandomize=True, deadline=None, max_examples=20)
+@settings(derandomize=True, deadline=None, max_examples=share(8, 20))
 @given(draw=st.integers(0, 2**32))
 def test_a_camera_sees_discs_as_it_sees_walls(draw):
     rng = np.random.default_rng(draw)

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from tests.at_length import share
 from tests.engine.by_eights import read_after
 
 from kiks.batch.kernel_args import AMBIENT, PROXIMITY
@@ -95,7 +96,7 @@ def assert_equal_readings(arena, kinds, networks, count, rng):
 def test_eight_read_what_each_reads_alone(make_random_arena, response):
     kinds, networks = kinds_of(response)
     rng = np.random.default_rng(RESPONSES.index(response))
-    for number in range(12):
+    for number in range(share(3, 12)):
         readings = assert_equal_readings(make_random_arena(number), kinds, networks, 43, rng)
         assert readings.max() > 100
 

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from tests.at_length import share
 from tests.symmetry import mirrored, symmetric
 
 import kiks
@@ -40,7 +41,7 @@ def test_nothing_near_reads_nothing() -> None:
 
 
 def test_nearer_is_more_and_the_front_sees_it() -> None:
-    rows = np.array([sim.proximity(1) for sim in map(at_wall, np.linspace(60, 0, 61))])
+    rows = np.array([sim.proximity(1) for sim in map(at_wall, np.linspace(60, 0, share(16, 61)))])
     assert np.all(np.diff(rows[:, 1:5], axis=0) >= -1e-9)
     assert np.all(rows[0] == 0)
     assert np.all(rows[-1, 2:4] > 900)

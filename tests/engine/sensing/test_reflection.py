@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.at_length import share
 
 import kiks
 from kiks.fit.reflection import predict
@@ -144,7 +145,7 @@ def test_straight_towards_a_post_too(cell_mm: float, radius_mm: float) -> None:
 
 
 def test_a_brighter_surface_never_reads_less() -> None:
-    for seed in range(4):
+    for seed in range(share(1, 4)):
         worlds = [random_world(np.random.default_rng(seed), brightness=shade) for shade in (1, 40, 100, 180, 255)]
         poses = free_poses(worlds[0], np.random.default_rng(seed), 100, 0.5)
         rows = []
@@ -163,7 +164,7 @@ def test_a_post_that_grows_never_reads_less(cell_mm: float, tolerance: float) ->
     rng = np.random.default_rng(5)
     before = np.zeros((30, 8))
     poses = [(-60.0 + x, y, turn) for x, y, turn in rng.uniform((-4, -8, -math.pi), (4, 8, math.pi), (30, 3))]
-    for radius_mm in np.arange(2.0, 27.0, 1.0):
+    for radius_mm in np.arange(2.0, 27.0, share(4.0, 1.0)):
         sim = world(disc(radius_mm), cell_mm)
         now = np.array([read(sim, *pose) for pose in poses])
         assert np.min(now - before) >= -tolerance
@@ -200,7 +201,7 @@ def test_posts_and_corners_are_less_than_a_wall_that_is_as_near(cell_mm: float) 
         things.append((disc(radius_mm), lambda x, y, radius_mm=radius_mm: np.hypot(x, y) - radius_mm))
     for inside, distance in things:
         sim, active = world(inside, cell_mm), 0
-        for x, y, heading in rng.uniform((-70, -70, -math.pi), (70, 70, math.pi), (2500, 3)):
+        for x, y, heading in rng.uniform((-70, -70, -math.pi), (70, 70, math.pi), (share(600, 2500), 3)):
             if distance(x, y) > RADIUS_MM + 1.5 * cell_mm:
                 counts = read(sim, x, y, heading)
                 at = 26.5 * np.cos(places + heading) + x, 26.5 * np.sin(places + heading) + y
@@ -215,10 +216,10 @@ def test_posts_and_corners_are_less_than_a_wall_that_is_as_near(cell_mm: float) 
 def test_nothing_jumps_while_a_robot_turns_past_a_post(cell_mm: float, largest: float) -> None:
     """Half a degree at a time past a post with a radius of 12 mm: found are 149 and 293 counts, next to it."""
     sim = world(disc(12.0), cell_mm)
-    for gap_mm, share in ((1.0, 1.0), (2.0, 1.0), (5.0, 0.85), (12.0, 0.7), (20.0, 0.4)):
+    for gap_mm, part in ((1.0, 1.0), (2.0, 1.0), (5.0, 0.85), (12.0, 0.7), (20.0, 0.4)):
         turns = np.radians(np.arange(0.0, 360.5, 0.5))
         counts = np.array([read(sim, -12.0 - RADIUS_MM - gap_mm - cell_mm, 0.0, turn) for turn in turns])
-        assert np.abs(np.diff(counts, axis=0)).max() < share * largest
+        assert np.abs(np.diff(counts, axis=0)).max() < part * largest
         assert counts.max() > 400
 
 
@@ -246,7 +247,7 @@ def test_readings_are_those_of_geometry_however_cells_lie(
     samples = Samples("object", radius_mm, gaps_mm, np.broadcast_to(angles_deg, shape), np.zeros((*shape, 8), int))
     exact = predict(KHEPERA, samples)
     errors = []
-    for _ in range(5):
+    for _ in range(share(2, 5)):
         (x, y), turn = rng.uniform(-cell_mm, cell_mm, 2), rng.uniform(-math.pi, math.pi)
         ahead, aside = math.cos(turn), math.sin(turn)
         is_wall, behind_mm = math.isinf(radius_mm), 0.0 if math.isinf(radius_mm) else radius_mm
@@ -256,7 +257,7 @@ def test_readings_are_those_of_geometry_however_cells_lie(
             for j, angle in enumerate(angles_deg):
                 counts = read(sim, x - away_mm * ahead, y - away_mm * aside, turn + math.radians(angle))
                 errors.append(counts - exact[i, j])
-    both = np.array(errors), np.tile(exact.reshape(-1, 8), (5, 1))
+    both = np.array(errors), np.tile(exact.reshape(-1, 8), (share(2, 5), 1))
     active = (both[1] > 20) & (both[1] < 1000)
     assert active.sum() > 200
     assert np.abs(both[0]).max() < largest

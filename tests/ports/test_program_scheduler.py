@@ -1,0 +1,188 @@
+"""The scheduler: what happens in simulated time does not depend on the order in which programs are heard."""
+
+from __future__ import annotations
+
+import heapq
+import logging
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.at_length import share
+
+from kiks.clock.patience import Patience
+from kiks.ports import program_scheduler
+from kiks.ports.program_scheduler import Participant, ProgramScheduler
+
+Steps = Sequence[tuple[int, int]]
+"""Commands of a program: the time that each takes to be answered, and the thinking time after the answer [ns]."""
+
+Log = list[tuple[Any, ...]]
+Choose = Callable[[int], int]
+"""Returns a number from 0 up to below another one: what the operating system does next."""
+
+
+ANSWER_NS = 4
+"""How long an answer is on its way when the program already knows that it comes [ns]."""
+
+
+class FakeWorld:
+    """A world in which nothing happens but answers, some time after their commands."""
+
+    def __init__(self) -> None:
+        self.now_ns = 0
+        self.wires = ()
+        self.log: Log = []
+        self.answered: set[int] = set()
+        self._events: list[tuple[int, int]] = []
+
+    def answer_at(self, time_ns: int, rank: int) -> None:
+        heapq.heappush(self._events, (time_ns, rank))
+
+    def next_event_ns(self) -> int | None:
+        return self._events[0][0] if self._events else None
+
+    def advance_to(self, time_ns: int) -> None:
+        while self._events and self._events[0][0] <= time_ns:
+            event_ns, rank = heapq.heappop(self._events)
+            assert event_ns >= self.now_ns
+            self.now_ns = event_ns
+            self.answered.add(rank)
+            self.log.append(("answer", event_ns, rank))
+        self.now_ns = max(self.now_ns, time_ns)
+
+
+class FakeProgram(Participant):
+    """A program that sends commands, waits for each answer, thinks, and leaves.
+
+    How long it thinks depends on all that has happened before, as far as it could see it.
+    """
+
+    def __init__(self, rank: int, steps: Steps, world: FakeWorld, scheduler: ProgramScheduler) -> None:
+        super().__init__(f"program {rank}", rank)
+        self.is_here = False
+        self.is_heard = False
+        self._steps = list(steps)
+        self._think_ns = 0
+        self._world, self._scheduler = world, scheduler
+
+    @property
+    def may_speak(self) -> bool:
+        return not (self.is_heard or self.waits or self.has_left)
+
+    def speak(self) -> None:
+        """Let the scheduler hear what the program does next."""
+        self.is_here = self.is_heard = True
+
+    def next_ns(self) -> int | None:
+        return max(self.acts_from_ns, self._world.now_ns) if self.is_heard else None
+
+    def act(self) -> None:
+        world = self._world
+        at_ns = max(self.acts_from_ns, world.now_ns)
+        world.advance_to(at_ns)
+        self.is_heard = False
+        if not self._steps:
+            world.log.append(("leave", at_ns, self.rank))
+            self.has_left = True
+            return
+        world.log.append(("command", at_ns, self.rank))
+        answer_ns, self._think_ns = self._steps.pop(0)
+        world.answer_at(at_ns + answer_ns, self.rank)
+        self.waits = True
+
+    def look(self) -> None:
+        if self.rank in self._world.answered:
+            self._world.answered.remove(self.rank)
+            self.waits = False
+            end_ns = self._world.now_ns + ANSWER_NS
+            self._scheduler.see(end_ns)
+            self.acts_from_ns = end_ns + self._think_ns + len(self._world.log) % 3
+
+    def drop(self) -> None:
+        raise AssertionError("the world has all the time it needs")
+
+
+@pytest.fixture(autouse=True)
+def _one_step_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let programs be heard between any two things that the scheduler does."""
+    monkeypatch.setattr(program_scheduler, "STEPS", 1)
+
+
+def run(programs: Sequence[Steps], choose: Choose) -> Log:
+    """Run programs; return all that happens, and when the world ends."""
+    world: Any = FakeWorld()
+    scheduler = ProgramScheduler(
+        world,
+        expected=len(programs),
+        missing=lambda: "",
+        log=logging.getLogger("kiks.test"),
+        when_silent="wait",
+        new_patience=partial(Patience, wall_ns=lambda: 0),
+    )
+    fakes = [FakeProgram(rank, steps, world, scheduler) for rank, steps in enumerate(programs, 1)]
+    for fake in fakes:
+        scheduler.join(fake)
+    may_advance = True
+    while thinking := [fake for fake in fakes if fake.may_speak] + [None] * may_advance:
+        chosen = thinking[choose(len(thinking))]
+        if chosen is None:
+            may_advance = scheduler.advance() == 0.0
+        else:
+            chosen.speak()
+            may_advance = True
+    assert all(fake.has_left for fake in fakes)
+    assert scheduler.is_repeatable
+    return [*world.log, ("end", world.now_ns)]
+
+
+def in_every_order(programs: Sequence[Steps]) -> Iterator[Log]:
+    """Run programs in each order in which the operating system can let them be heard."""
+    path: list[int] = []
+    while True:
+        taken: list[tuple[int, int]] = []
+
+        def choose(count: int, path: list[int] = path, taken: list[tuple[int, int]] = taken) -> int:
+            taken.append((path[len(taken)] if len(taken) < len(path) else 0, count))
+            return taken[-1][0]
+
+        yield run(programs, choose)
+        while taken and taken[-1][0] + 1 == taken[-1][1]:
+            taken.pop()
+        if not taken:
+            return
+        path = [choice for choice, _ in taken]
+        path[-1] += 1
+
+
+@pytest.mark.parametrize(
+    "programs",
+    [
+        [[(5, 0)], [(5, 0)]],
+        [[(3, 2), (0, 0)], [(4, 1)]],
+        [[(1, 0)], [(7, 3)], []],
+        [[(0, 0)], [(0, 0)], [(2, 1)]],
+    ],
+    ids=["at the same instant", "one does more", "one leaves at once", "answers that take no time"],
+)
+def test_every_order_gives_the_same_run(programs: Sequence[Steps]) -> None:
+    runs = [tuple(log) for log in in_every_order(programs)]
+    assert len(runs) > 10
+    assert len(set(runs)) == 1
+
+
+TIMES_NS = st.integers(0, 12)
+PROGRAMS = st.lists(st.lists(st.tuples(TIMES_NS, TIMES_NS), max_size=6), min_size=1, max_size=5)
+
+
+@settings(max_examples=share(300, 3000), deadline=None)
+@given(programs=PROGRAMS, orders=st.lists(st.randoms(use_true_random=False), min_size=2, max_size=6))
+def test_any_order_gives_the_same_run(programs: Sequence[Steps], orders: Sequence[Any]) -> None:
+    first, *others = (run(programs, order.randrange) for order in orders)
+    assert all(other == first for other in others)
+    times_ns = [entry[1] for entry in first]
+    assert times_ns == sorted(times_ns)
+    assert sum(entry[0] == "command" for entry in first) == sum(len(steps) for steps in programs)
