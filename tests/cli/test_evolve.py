@@ -68,7 +68,6 @@ def test_the_tasks_are_listed() -> None:
     ("words", "said"),
     [
         (("evolve", "avoyd"), "Did you mean 'avoid'"),
-        (("evolve", "avoid", "--workers", "2", "--ray", "auto"), "--workers must be left out with --ray"),
         (("demo", "folow"), "Did you mean 'follow'"),
         (("run", "nowhere.toml"), "Champion's file 'nowhere.toml' must exist"),
         (("drive", "nowhere.toml", "--port", "kiks://1"), "Champion's file 'nowhere.toml' must exist"),

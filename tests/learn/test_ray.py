@@ -1,10 +1,14 @@
-"""A Ray cluster of two nodes on this computer: the same values, whoever is lost on the way."""
+"""A Ray cluster of two nodes on this computer: the same values, even if workers or nodes are lost."""
 
 from __future__ import annotations
 
 import os
+import signal
 import socket
+import subprocess
+import sys
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,12 +22,13 @@ from kiks.learn.executors import executor_for
 pytestmark = pytest.mark.slow
 
 GUARD_S = 20.0
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
 def ray():
     with pytest.MonkeyPatch.context() as patch:
-        # Not the user's own token, and none left in the home folder.
+        # A token of the test's own, and none in the home folder.
         patch.setenv("RAY_AUTH_MODE", "token")
         patch.setenv("RAY_AUTH_TOKEN", os.urandom(32).hex())
         patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
@@ -55,7 +60,7 @@ def test_values_are_the_same_and_a_lost_worker_costs_its_chunk_only(cluster, ray
     assert not ray.is_initialized()
 
 
-def test_a_connection_of_the_program_is_used_and_kept(cluster, ray):
+def test_a_connection_of_the_program_is_used_and_stays_open(cluster, ray):
     candidates, seeds = works.candidates(40), works.seeds(40)
     ray.init(cluster.address)
     try:
@@ -68,6 +73,11 @@ def test_a_connection_of_the_program_is_used_and_kept(cluster, ray):
             with pytest.raises(WorkError, match="raised ZeroDivisionError: a wheel came off"):
                 executor.evaluate(works.candidates(5, marked=3), works.seeds(5))
             assert len(executor.evaluate(candidates, seeds)) == 40
+        with (
+            pytest.raises(WorkError, match=r"prepare\(\) raised FileNotFoundError: no arena"),
+            executor_for("ray", works.Unprepared()) as executor,
+        ):
+            executor.evaluate(works.candidates(5), works.seeds(5))
         with pytest.raises(ParameterError, match=r"must use one cluster at a time.*asked for 127\.0\.0\.1:1\."):
             executor_for("ray:127.0.0.1:1", works.Sums()).__enter__()
         assert ray.is_initialized()
@@ -83,23 +93,23 @@ def test_a_lost_node_costs_its_chunks_only(cluster, tmp_path):
     os.mkfifo(tmp_path / "gate")
     gate = os.open(tmp_path / "gate", os.O_RDWR)
 
-    def take_node_away():
+    def remove_node():
         with (tmp_path / "pipe").open() as pipe:
             assert pipe.readline() == "here\n"
         cluster.remove_node(cluster.second, allow_graceful=False)
         os.write(gate, bytes(100))
 
-    thief = threading.Thread(target=take_node_away, daemon=True)
-    thief.start()
+    remover = threading.Thread(target=remove_node, daemon=True)
+    remover.start()
     work = works.StuckOnANode(tmp_path / "pipe", tmp_path / "gate", cluster.second.node_id)
     with executor_for(f"ray:{cluster.address}", work) as executor:
         for _ in range(2):
             assert np.array_equal(executor.evaluate(candidates, seeds), expected(candidates, seeds))
-    thief.join()
+    remover.join()
     os.close(gate)
 
 
-def test_a_cluster_of_its_own_listens_to_this_computer_alone(ray, caplog):
+def test_a_cluster_that_is_started_here_listens_on_loopback_alone(ray, caplog):
     candidates, seeds = works.candidates(40), works.seeds(40)
     with executor_for("ray", works.Sums()) as executor:
         assert ray.get_runtime_context().gcs_address.startswith("127.0.0.1:")
@@ -118,11 +128,75 @@ def test_connecting_has_a_time_limit(ray, monkeypatch):
         with pytest.raises(ParameterError, match=r"was \(no answer within 0\.01 s\)\. Start one with"):
             executor_for(f"ray:{address}", works.Sums()).__enter__()
     assert not left.is_set()
-    # What connects after all is let go.
+    # A connection that comes too late is closed.
     is_over.set()
     assert left.wait(GUARD_S)
 
 
-def test_an_address_where_nobody_listens(ray):
+def test_an_address_where_no_server_listens(ray):
     with pytest.raises(ParameterError, match=r"must be reached, but at 127\.0\.0\.1:1 none was.*ray start --head"):
         executor_for("ray:127.0.0.1:1", works.Sums()).__enter__()
+
+
+def test_candidates_that_always_kill_their_worker_are_named(cluster):
+    with (
+        executor_for(f"ray:{cluster.address}", works.Deadly()) as executor,
+        pytest.raises(WorkError, match="3 in a row were lost with candidates 0 to 4; the last one went"),
+    ):
+        executor.evaluate(works.candidates(5, marked=3), works.seeds(5))
+
+
+def test_workers_that_die_in_prepare_are_an_error(cluster):
+    with (
+        executor_for(f"ray:{cluster.address}", works.DeadAtStart()) as executor,
+        pytest.raises(WorkError, match="3 in a row did not; the last one went"),
+    ):
+        executor.evaluate(works.candidates(5), works.seeds(5))
+
+
+def test_work_that_cannot_be_pickled_is_an_error(ray):
+    work = works.Sums()
+    work.lock = threading.Lock()
+    with pytest.raises(ParameterError, match="must be picklable to run on a cluster, but Sums is not"):
+        executor_for("ray", work).__enter__()
+
+
+def start_program(tmp_path: Path, work: str, rest: str) -> subprocess.Popen[str]:
+    """Start a program that evaluates on a cluster of its own, in a process group of its own."""
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "program.py").write_text(
+        "import os, pathlib, signal, sys\n"
+        f"sys.path.insert(0, {str(ROOT)!r})\n"
+        "from kiks.learn.executors import executor_for\n"
+        "from tests.learn import works\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        f"with executor_for('ray', works.{work}(pathlib.Path({str(tmp_path / 'pipe')!r}))) as executor:\n"
+        f"    {rest}\n"
+    )
+    return subprocess.Popen(
+        [sys.executable, str(tmp_path / "program.py")],
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+
+
+def test_ctrl_c_ends_all_workers(ray, tmp_path):
+    running = start_program(tmp_path, "Stuck", "executor.evaluate(works.candidates(100, marked=0), works.seeds(100))")
+    with (tmp_path / "pipe").open() as pipe:
+        assert pipe.readline() == "here\n"
+        os.killpg(running.pid, signal.SIGINT)
+        # The pipe closes when the worker has ended.
+        assert pipe.read() == ""
+    _, errors = running.communicate(timeout=60)
+    assert running.returncode == -signal.SIGINT
+    assert "KeyboardInterrupt" in errors
+
+
+def test_workers_end_with_a_program_that_is_killed(ray, tmp_path):
+    rest = "executor.evaluate(works.candidates(1), works.seeds(1)); os.kill(os.getpid(), signal.SIGKILL)"
+    running = start_program(tmp_path, "Lasting", rest)
+    assert (tmp_path / "pipe").read_text() == ""
+    running.communicate(timeout=60)
+    assert running.returncode == -signal.SIGKILL

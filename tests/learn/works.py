@@ -1,4 +1,4 @@
-"""Small works for tests of executors: in a module of their own, for workers import it."""
+"""Small evaluations for tests of executors, in a module that workers can import."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 MARK = 0.125
-"""What candidates begin with that something happens to."""
+"""First parameter of marked candidates, to which an evaluation reacts."""
 
 
 def candidates(count: int, *, marked: int | None = None) -> np.ndarray:
@@ -26,7 +26,7 @@ def seeds(count: int) -> np.ndarray:
 
 
 class Sums:
-    """Two values that hang on all bits of parameters and seed; it spoils what it was given, as a work may."""
+    """Two values that depend on all bits of parameters and seed; it overwrites its arguments, as an evaluation may."""
 
     is_prepared = False
 
@@ -45,7 +45,7 @@ class Sums:
 
 @dataclass
 class Deadly(Sums):
-    """Kills its process when it meets a marked candidate; only once, if it is given where to remember it."""
+    """Kills its process at a marked candidate; only once, if it has a file to remember that in."""
 
     memory: Path | None = None
 
@@ -69,7 +69,7 @@ class Unprepared(Sums):
         raise FileNotFoundError("no arena")
 
 
-class Stillborn(Sums):
+class DeadAtStart(Sums):
     def prepare(self):
         os.kill(os.getpid(), signal.SIGKILL)
 
@@ -81,7 +81,7 @@ class Shapeless(Sums):
 
 @dataclass
 class Whereabouts(Sums):
-    """Returns the process, how often it was prepared, and its threads."""
+    """Returns the process, how often it was prepared, and the number of threads."""
 
     prepare_count: int = 0
 
@@ -90,21 +90,6 @@ class Whereabouts(Sums):
 
     def evaluate(self, candidates, seeds, threads):
         return np.full((len(candidates), 3), [os.getpid(), self.prepare_count, threads], dtype=np.float64)
-
-
-@dataclass
-class Waiting(Sums):
-    """With the marked candidate, waits until the last one is evaluated elsewhere (a named pipe says so)."""
-
-    pipe: Path
-    last: float
-
-    def evaluate(self, candidates, seeds, threads):
-        if MARK in candidates[:, 0]:
-            self.pipe.read_bytes()
-        if self.last in candidates[:, 0]:
-            self.pipe.write_bytes(b"done")
-        return super().evaluate(candidates, seeds, threads)
 
 
 @dataclass

@@ -11,7 +11,6 @@ import typer
 from kiks.cli.engine_start import ready_batch
 from kiks.cli.options import Seed, written_folder
 from kiks.ending import end_as_with_ctrl_c
-from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
     from kiks.control.controller import Controller
@@ -61,10 +60,10 @@ def evolve(
         ControllerKind | None, typer.Option(help="What is evolved; the task's own if left out.")
     ] = None,
     seed: Seed = 0,
-    workers: Annotated[
-        int | None, typer.Option(help="Processes that evaluate; threads on all cores if left out.", min=1)
+    ray: Annotated[
+        str | None,
+        typer.Option(help="Evaluate on a Ray cluster: its address, auto, or local; on all cores here if left out."),
     ] = None,
-    ray: Annotated[str | None, typer.Option(help="Evaluate on a Ray cluster: its address, auto, or local.")] = None,
     list_: Annotated[bool, typer.Option("--list", help="List the tasks that come with KiKS.")] = False,
 ) -> None:
     """Evolve a controller for a task, and leave champion.toml, log.parquet and fitness.png.
@@ -79,10 +78,6 @@ def evolve(
         for name in tasks.TASKS:
             typer.echo(f"{name:10} {tasks.load(name).about}")
         return
-    if workers is not None and ray is not None:
-        raise ParameterError(
-            f"--workers must be left out with --ray, but it was {workers}. Ray has workers of its own."
-        )
     ready_batch()
     chosen = tasks.load(task)
     if controller is not None:
@@ -95,7 +90,7 @@ def evolve(
     if evolution.generations:
         typer.echo(f"Going on after generation {len(evolution.generations)} in {folder}.")
     until = GENERATIONS if generations is None and seconds is None else generations
-    where = f"processes:{workers}" if workers else "threads" if ray is None else _ray(ray)
+    where = "threads" if ray is None else _ray(ray)
     end_as_with_ctrl_c()
     stopped = _run(evolution, until, seconds, where)
     if evolution.generations:

@@ -1,11 +1,11 @@
-"""What is evaluated, and what a worker does with it: the same in a thread, in a process and on another computer."""
+"""The interface of evaluations, and a worker that runs them: the same in this process and on another computer."""
 
 from __future__ import annotations
 
-import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
+from traceback import format_exception
 from typing import Any, Protocol
 
 import numpy as np
@@ -18,17 +18,17 @@ Integers = NDArray[np.int64]
 
 
 class Evaluation(Protocol):
-    """What an evolution wants of its candidates: an object that can be pickled, with two methods.
+    """Evaluates candidates: an object with two methods, which a cluster must be able to pickle.
 
     The values of a candidate must follow from its parameters and its seed alone, not from its neighbours in the call
     nor from the count of threads: then an evolution has the same bits wherever it runs.
     """
 
     def prepare(self) -> None:
-        """Do what is costly and needed once a worker: compile kernels, build arenas."""
+        """Do costly work that each worker needs once: compile kernels, build arenas."""
 
     def evaluate(self, candidates: Floats, seeds: Integers, threads: int) -> Floats:
-        """Return what the candidates are worth.
+        """Return the values of candidates.
 
         Args:
             candidates: Parameters [candidate, parameter]; a copy, of at least one candidate.
@@ -42,7 +42,7 @@ class Evaluation(Protocol):
 
 
 def check_candidates(candidates: object, seeds: object) -> tuple[Floats, Integers]:
-    """Return what is evaluated, as arrays.
+    """Return candidates and seeds as arrays, checked.
 
     Args:
         candidates: Parameters, float64 [candidate, parameter].
@@ -74,12 +74,12 @@ def _array(values: object) -> NDArray[Any]:
 
 @dataclass(frozen=True)
 class Ready:
-    """A worker's answer: give me candidates."""
+    """A worker's answer: it is ready for candidates."""
 
 
 @dataclass(frozen=True)
 class Values:
-    """A worker's answer: what its candidates are worth.
+    """A worker's answer: the values of its candidates.
 
     Attributes:
         values: [candidate, value].
@@ -96,24 +96,24 @@ class Raised:
 
     Attributes:
         what: Type and message of the exception.
-        story: Its traceback, as text.
+        traceback: Its traceback, as text.
     """
 
     what: str
-    story: str
+    traceback: str
 
     @classmethod
     def of(cls, error: BaseException) -> Raised:
-        """Return what is told of an exception."""
-        return cls(f"{type(error).__name__}: {error}", "".join(traceback.format_exception(error)))
+        """Return an exception as an answer."""
+        return cls(f"{type(error).__name__}: {error}", "".join(format_exception(error)))
 
 
 @dataclass(frozen=True)
 class Lost:
-    """In place of an answer: the worker is no more.
+    """Stands for an answer: the worker has ended.
 
     Attributes:
-        how: How it ended, as a sentence goes on after "the worker".
+        how: How it ended; continues a sentence that begins with "the worker".
     """
 
     how: str
@@ -123,11 +123,11 @@ Answer = Ready | Values | Raised | Lost
 
 
 class Worker:
-    """A prepared work, and what is asked of it.
+    """Prepares an evaluation once, then evaluates chunks.
 
     Args:
-        load: Returns the work; it is called once.
-        threads: How many threads an evaluation may use.
+        load: Returns the evaluation; called once.
+        threads: Number of threads that an evaluation may use.
     """
 
     def __init__(self, load: Callable[[], Evaluation], *, threads: int) -> None:
@@ -135,7 +135,7 @@ class Worker:
         self._threads = threads
 
     def prepare(self) -> Ready | Raised:
-        """Load and prepare the work."""
+        """Load and prepare the evaluation."""
         try:
             self._work = self._load()
             self._work.prepare()
@@ -146,7 +146,7 @@ class Worker:
     def evaluate(self, candidates: Floats, seeds: Integers) -> Values | Raised:
         """Evaluate a chunk: candidates [candidate, parameter] with their seeds [candidate].
 
-        What came by shared memory must not be written to; work gets a copy, and may do with it what it likes.
+        The evaluation gets copies, because Ray's shared memory must not be written to.
         """
         try:
             start_s = perf_counter()

@@ -1,4 +1,4 @@
-"""What every executor of evaluations does, and the one that runs on threads."""
+"""The base class of executors, and the executor that runs on threads."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Executor(ABC):
 
         Raises:
             ParameterError: If the work cannot be sent to workers, or these cannot be reached.
-            WorkError: If the work raises when it is prepared; workers elsewhere say so at the first evaluation.
+            WorkError: If the work raises when it is prepared; on a cluster the first evaluation raises this.
         """
         self._open()
         self._is_open = True
@@ -33,7 +33,7 @@ class Executor(ABC):
         self._close()
 
     def evaluate(self, candidates: Floats, seeds: Integers) -> Floats:
-        """Return what the candidates are worth.
+        """Return the values of candidates.
 
         Args:
             candidates: Parameters [candidate, parameter].
@@ -44,7 +44,7 @@ class Executor(ABC):
 
         Raises:
             ParameterError: If candidates and seeds have not these shapes and types.
-            WorkError: If the work raises, its workers are lost again and again, or the executor is not open.
+            WorkError: If the work raises, too many workers are lost, or the executor is not open.
         """
         if not self._is_open:
             raise WorkError(
@@ -64,11 +64,11 @@ class Executor(ABC):
 
 
 class ThreadsExecutor(Executor):
-    """Evaluates here; the work itself shares a generation among threads.
+    """Evaluates in this process; the work itself shares a generation among threads.
 
     Args:
-        work: What evaluates candidates.
-        thread_count: How many threads it may use.
+        work: Evaluates candidates.
+        thread_count: Number of threads that it may use.
     """
 
     def __init__(self, work: Evaluation, *, thread_count: int) -> None:
@@ -93,5 +93,5 @@ class ThreadsExecutor(Executor):
 def work_error(where: str, raised: Raised) -> WorkError:
     """Return the error for work that raised in `where`, with the worker's traceback as a note."""
     error = WorkError(f"Evaluation must not raise, but its {where} raised {raised.what}")
-    error.add_note(f"In the worker:\n{raised.story}")
+    error.add_note(f"In the worker:\n{raised.traceback}")
     return error

@@ -1,4 +1,4 @@
-"""Where evaluations run: on threads here, in processes here, on a Ray cluster; with the same values to the bit."""
+"""Choose where evaluations run: on threads here, or on a Ray cluster. The values are the same to the bit."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from kiks.learn.evaluation import Evaluation
 from kiks.learn.executor import Executor, ThreadsExecutor
 from kiks.model.checks import check_kind
 
-KINDS = ("threads", "processes", "ray")
+KINDS = ("threads", "ray")
 
 
 def executor_for(where: str, work: Evaluation) -> Executor:
     """Return an executor for one work, to be used in a `with` statement.
 
     Args:
-        where: "threads" or "processes", with a count ("processes:4") or as many as this program may use cores; "ray"
-            for the Ray cluster that this program is connected to, else for one of its own on this computer;
-            "ray:ADDRESS" for a running one, "ray:auto" for the one that this computer belongs to.
-        work: What evaluates candidates.
+        where: "threads" for one per core, "threads:4" for four; "ray" for the Ray cluster that this program is
+            connected to, else for one of its own on this computer; "ray:ADDRESS" for a running cluster, "ray:auto" for
+            the one that this computer belongs to.
+        work: Evaluates candidates.
 
     Raises:
-        ParameterError: If there is no such place, the work cannot be pickled, or Ray is not installed.
+        ParameterError: If `where` is unknown, or the work has no method `evaluate`.
 
     Example:
         >>> class Squares:
@@ -42,24 +42,19 @@ def executor_for(where: str, work: Evaluation) -> Executor:
     kind, colon, detail = where.partition(":")
     if kind not in KINDS or (colon and not detail):
         raise ParameterError(
-            "Evaluations must run on 'threads[:COUNT]', 'processes[:COUNT]', 'ray' or 'ray:ADDRESS', but it was"
-            f" {shown(where)}.{nearest(kind, KINDS)}"
+            f"Evaluations must run on 'threads[:COUNT]', 'ray' or 'ray:ADDRESS', but it was {shown(where)}."
+            f"{nearest(kind, KINDS)}"
         )
     if kind == "threads":
         return ThreadsExecutor(work, thread_count=_count(where, detail))
-    from kiks.learn.worker_pool import CrewExecutor
+    from kiks.learn.ray_executor import RayPool
+    from kiks.learn.worker_pool import PoolExecutor
 
-    if kind == "processes":
-        from kiks.learn.processes import ProcessCrew
-
-        return CrewExecutor(ProcessCrew(work, worker_count=_count(where, detail)))
-    from kiks.learn.ray_executor import RayCrew
-
-    return CrewExecutor(RayCrew(work, address=detail or None))
+    return PoolExecutor(RayPool(work, address=detail or None))
 
 
 def _count(where: str, detail: str) -> int:
-    """Return how many threads or processes are wanted."""
+    """Return the number of threads that `where` asks for."""
     if not detail:
         return len(os.sched_getaffinity(0))
     if not detail.isdecimal() or int(detail) < 1:

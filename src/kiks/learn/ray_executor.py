@@ -1,10 +1,11 @@
 """Workers that are actors of a Ray cluster, one a core, on this computer or on many.
 
-Need: whoever reaches a Ray cluster can have it run any code. A cluster that is started here therefore listens on the
-loopback address alone, without Ray's dashboard; one of several computers belongs on a private network
+A Ray cluster runs any code for any client that reaches it. So a cluster that is started here listens on the loopback
+address alone, without Ray's dashboard; a cluster of several computers belongs on a private network
 (docs/distributed.md).
-Need: Ray could start lost actors and repeat lost calls by itself, but then nobody would see that a chunk kills one
-worker after the other. So actors live once, and `CrewExecutor` has done again what was lost.
+
+Ray could restart lost actors and repeat lost calls by itself, but then no error would show that a chunk kills one worker
+after the other. So actors are not restarted, and `PoolExecutor` sends lost chunks again.
 """
 
 from __future__ import annotations
@@ -26,20 +27,20 @@ _log = logging.getLogger("kiks.learn")
 
 LOOPBACK = "127.0.0.1"
 
-PATIENCE_S = 10.0
-"""After how long without an answer it is looked whether there are other workers to be had [s]."""
+ANSWER_TIMEOUT_S = 10.0
+"""Time without an answer after which the pool looks for new workers [s]."""
 
 CONNECT_S = 60.0
-"""How long connecting to a cluster may take [s]: a second or so, but more on a busy computer."""
+"""Timeout for connecting to a cluster [s]; it takes a second or so, and more on a busy computer."""
 
 
-class RayCrew:
-    """A crew of actors (`WorkerPool`).
+class RayPool:
+    """A pool of actors (`WorkerPool`).
 
     Args:
         work: What evaluates candidates.
         address: Of a running cluster, "auto" for the one that this computer belongs to; None for the one that this
-            program is connected to, else for one of its own on this computer, for as long as the crew is open.
+            program is connected to, else for one of its own on this computer, for as long as the pool is open.
     """
 
     def __init__(self, work: Evaluation, *, address: str | None) -> None:
@@ -54,7 +55,7 @@ class RayCrew:
         self._shipped: Any = None
 
     def open(self) -> None:
-        """Connect to the cluster, lay the work in its store, once for all workers, and start these.
+        """Connect to the cluster, put the work into its store, once for all workers, and start the workers.
 
         Raises:
             ParameterError: If Ray is not installed, no cluster is reached, or the work cannot be pickled.
@@ -70,7 +71,7 @@ class RayCrew:
         self._connect()
         try:
             self._shipped = ray.put(pickled)
-            self.muster()
+            self.refill()
         except BaseException:
             self.close()
             raise
@@ -94,7 +95,7 @@ class RayCrew:
                 # Ray gives up by itself when what it starts does not answer.
                 ray.init("local", num_cpus=core_count, include_dashboard=False, _node_ip_address=LOOPBACK)
             else:
-                _knock(self._address)
+                _check_listens(self._address)
                 _connect_to(ray, self._address)
         except (OSError, RuntimeError, ValueError, ray.exceptions.RayError) as error:
             raise ParameterError(
@@ -105,14 +106,15 @@ class RayCrew:
         there = ray.get_runtime_context().gcs_address
         if self._address is None and not there.startswith(f"{LOOPBACK}:"):
             _log.warning(
-                "Ray listens on %s: whoever reaches it can run code here. Import ray after the executor was opened.",
+                "Ray listens on %s: all programs that reach it can run code here. Open the executor before you import"
+                " ray.",
                 there,
             )
 
     def close(self) -> None:
         """End all actors, and the connection if there was none before."""
         while self._actors:
-            self.dismiss(next(iter(self._actors)))
+            self.end(next(iter(self._actors)))
         self._shipped = None
         if self._has_connected:
             self._has_connected = False
@@ -120,10 +122,10 @@ class RayCrew:
             if self._sigterm_before is not None:
                 signal.signal(signal.SIGTERM, self._sigterm_before)
 
-    def muster(self) -> int:
-        """Ask all that have nothing to do whether they are there, start one on each core that is free; return how many.
+    def refill(self) -> int:
+        """Ping idle workers, start one per core of the cluster, return the number of cores.
 
-        Who finds no core free waits for one: that of another program, or of a computer that joins.
+        A worker that finds no free core waits for one: that of another program, or of a computer that joins.
         """
         busy = set(self._owed.values())
         for number, actor in self._actors.items():
@@ -137,13 +139,13 @@ class RayCrew:
             self._next_number += 1
         return worker_count
 
-    def hand(self, worker: int, candidates: Floats, seeds: Integers) -> None:
-        """Give a chunk to a worker that is ready."""
+    def send(self, worker: int, candidates: Floats, seeds: Integers) -> None:
+        """Send a chunk to a worker that is ready."""
         self._owed[self._actors[worker].evaluate.remote(candidates, seeds)] = worker
 
     def wait(self) -> list[tuple[int, Answer]]:
-        """Return who answered what, as soon as somebody has; nothing if nobody has for a while."""
-        answered, _ = self._ray.wait(list(self._owed), num_returns=1, timeout=PATIENCE_S)
+        """Wait for answers and return them with their workers; an empty list after a while without any."""
+        answered, _ = self._ray.wait(list(self._owed), num_returns=1, timeout=ANSWER_TIMEOUT_S)
         return [(self._owed[reference], self._answer(reference)) for reference in answered]
 
     def _answer(self, reference: Any) -> Answer:
@@ -151,15 +153,15 @@ class RayCrew:
         try:
             answer: Answer = self._ray.get(reference)
         except self._ray.exceptions.RayTaskError as error:
-            # The work catches what it raises: this is Ray, that could not build a worker or read what was sent.
+            # `Worker` catches what the work raises. Here Ray could not build a worker, or not read what was sent.
             return Raised.of(error)
         except self._ray.exceptions.RayError as error:
-            self.dismiss(number)
+            self.end(number)
             return Lost(f"went ({' '.join(str(error).split())[:200]})")
         return answer
 
-    def dismiss(self, worker: int) -> None:
-        """End a worker, whatever it does."""
+    def end(self, worker: int) -> None:
+        """End a worker, even a busy one."""
         actor = self._actors.pop(worker, None)
         self._owed = {reference: number for reference, number in self._owed.items() if number != worker}
         if actor is not None:
@@ -171,7 +173,7 @@ class RayWorker:
     """An actor: the work in a process of the cluster, with one thread."""
 
     def prepare(self, pickled: bytes, version: str) -> Ready | Raised:
-        """Take the work and prepare it, if this is the same KiKS as that of the program which sends it."""
+        """Receive the work and prepare it; refuse the work of a program with another version of KiKS."""
         import pickle
 
         if version != __version__:
@@ -184,7 +186,7 @@ class RayWorker:
         return self._worker.prepare()
 
     def answer(self) -> Ready:
-        """Say that it is there."""
+        """Answer a ping."""
         return Ready()
 
     def evaluate(self, candidates: Floats, seeds: Integers) -> Values | Raised:
@@ -193,10 +195,10 @@ class RayWorker:
 
 
 def _connect_to(ray: Any, address: str) -> None:
-    """Connect, in a thread: Ray goes on asking a port that does not answer for minutes, and cannot be told to stop.
+    """Connect, in a thread: Ray asks a port that does not answer for minutes, and has no way to stop that.
 
-    It logs that it sets no handler of signals in a thread. What it starts would end with that thread, but to connect it
-    starts nothing.
+    In a thread Ray sets no signal handlers, and logs that. Processes that it starts would end with the thread, but it
+    starts none to connect.
 
     Raises:
         TimeoutError: If it takes too long.
@@ -205,14 +207,14 @@ def _connect_to(ray: Any, address: str) -> None:
     done: Future[None] = Future()
 
     def connect() -> None:
-        trouble: Exception | None = None
+        failure: Exception | None = None
         try:
             ray.init(address, logging_level=logging.ERROR)
         except Exception as error:
-            trouble = error
+            failure = error
         if done.set_running_or_notify_cancel():
-            done.set_exception(trouble) if trouble else done.set_result(None)
-        elif trouble is None:
+            done.set_exception(failure) if failure else done.set_result(None)
+        elif failure is None:
             ray.shutdown()
 
     threading.Thread(target=connect, name="kiks ray", daemon=True).start()
@@ -224,23 +226,23 @@ def _connect_to(ray: Any, address: str) -> None:
         raise TimeoutError(f"no answer within {CONNECT_S:g} s") from None
 
 
-def _knock(address: str) -> None:
-    """See whether anybody listens at HOST:PORT, for Ray would go on asking for minutes.
+def _check_listens(address: str) -> None:
+    """Check that a server listens at HOST:PORT; Ray would ask for minutes.
 
     Raises:
-        OSError: If nobody does.
+        OSError: If none does.
     """
     host, _, port = address.rpartition(":")
     if port.isdecimal() and "://" not in address:
-        socket.create_connection((host, int(port)), timeout=PATIENCE_S).close()
+        socket.create_connection((host, int(port)), timeout=ANSWER_TIMEOUT_S).close()
 
 
 def _import_ray(*, loopback_only: bool) -> Any:
-    """Return the module, with the variables set that it reads when it is imported.
+    """Return the module Ray. It reads environment variables when it is imported; these are set here.
 
     Args:
-        loopback_only: Whether it will start a cluster for this computer alone. Else, whatever address it is given, Ray
-            takes that which this computer has in the network, and some of its parts listen on all.
+        loopback_only: Whether it will start a cluster for this computer alone. Otherwise Ray listens at the address
+            that this computer has in the network, whatever address it is given, and some of its parts listen on all.
 
     Raises:
         ParameterError: If it is not installed.
@@ -252,6 +254,6 @@ def _import_ray(*, loopback_only: bool) -> Any:
         import ray
     except ImportError as error:
         raise ParameterError(
-            f"Evaluations on 'ray' need Ray, but it is not installed. {installing('ray')}, or use 'processes'."
+            f"Evaluations on 'ray' need Ray, but it is not installed. {installing('ray')}, or use 'threads'."
         ) from error
     return ray
