@@ -194,7 +194,7 @@ class Player:
     def _aim(ball: Point) -> Point:
         """Return the direction in which the ball should go.
 
-        That is into the nearest part of the goal, along a wall that it touches, or away from the player's own goal line.
+        That is into the nearest part of the goal, along a wall that it touches, or away from its own goal line.
         """
         to_x, to_y = LENGTH_MM / 2 + 80.0 - ball.x, _within(ball.y, GOAL_MM / 2 - 70.0) - ball.y
         if ball.x < 90.0 - LENGTH_MM / 2:

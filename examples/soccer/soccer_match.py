@@ -1,8 +1,8 @@
 """A soccer match: two programs, each in a process of its own, in one world with a referee.
 
-The programs know only what their robots tell them. The referee sees everything. It counts the goals, and after each goal
-drops the ball near the middle mark; it does the same when the ball has not moved for long. It never moves a robot and
-tells the players nothing: a player notices that the ball is gone, as a real one would.
+The programs know only what their robots tell them. The referee sees everything. It counts the goals, and after each
+goal drops the ball near the middle mark; it does the same when the ball has not moved for long. It never moves a robot
+and tells the players nothing: a player notices that the ball is gone, as a real one would.
 """
 
 from __future__ import annotations
