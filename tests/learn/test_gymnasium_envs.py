@@ -16,15 +16,15 @@ from pettingzoo.test import parallel_api_test
 import kiks
 import kiks.learn.gymnasium_envs
 from kiks.errors import ParameterError
-from kiks.learn.env_specs import LESSONS, EnvSpec
+from kiks.learn.env_specs import ENV_SPECS, EnvSpec
 from kiks.learn.gymnasium_envs import KheperaEnv, KheperaVectorEnv
 from kiks.learn.pettingzoo_env import KheperaTeam
 
-IDS = [f"kiks/{name}-v0" for name in LESSONS]
+IDS = [f"kiks/{name}-v0" for name in ENV_SPECS]
 
 
-def lesson(**changes: Any) -> EnvSpec:
-    """Return a small lesson that ends when the robot has gone 40 mm."""
+def small_spec(**changes: Any) -> EnvSpec:
+    """Return a small environment that ends when the robot has gone 40 mm."""
 
     @kiks.measure
     def arrived(moment: Any, notes: Any) -> None:
@@ -121,7 +121,7 @@ def test_lanes_differ_and_seeds_may_be_given_for_each() -> None:
 
 @pytest.mark.parametrize("mode", list(AutoresetMode))
 def test_each_way_to_begin_anew(mode: AutoresetMode) -> None:
-    envs = KheperaVectorEnv(2, lesson(), autoreset_mode=mode)
+    envs = KheperaVectorEnv(2, small_spec(), autoreset_mode=mode)
     assert envs.metadata["autoreset_mode"] is mode
     envs.reset(seed=1)
     actions = np.array([[1, 1], [0, 0]], np.float32)
@@ -257,7 +257,7 @@ def test_a_team_of_one_is_the_single_environment() -> None:
 
 
 def test_an_episode_of_a_team_ends_for_all_at_once() -> None:
-    team = KheperaTeam(lesson(), robots=2)
+    team = KheperaTeam(small_spec(), robots=2)
     team.reset(seed=1)
     actions = {"robot_1": np.ones(2, np.float32), "robot_2": np.zeros(2, np.float32)}
     for _ in range(20):

@@ -219,8 +219,8 @@ def test_missing_program_is_named_and_then_done_without(caplog: pytest.LogCaptur
         wall.pass_s(9)
         assert one.lines.readline() == b"h,0,0\r\n"
         assert said(caplog)[1:] == [
-            "the world has begun without that of robot 2 or 3, which did not come within 10 s. Who comes now acts from "
-            "now on, and the run is not repeatable."
+            "the world has begun without that of robot 2 or 3, which did not come within 10 s. A program that "
+            "comes now acts from now on, and the run is not repeatable."
         ]
         late = Client(ways[3][0])
         late.send(b"H\n")

@@ -120,8 +120,8 @@ def test_a_page_in_a_browser_drives_no_robot(
             with connect(endpoint) as client:
                 assert ask(client, b"H\n") == b"h,0,0\r\n"
     assert warnings(caplog) == [
-        f"a client of {endpoint.name} must speak as to a serial port, but one spoke HTTP and was hung up on: a page in "
-        "a browser may have tried to drive the robot. Do not open this port in a browser."
+        f"a client of {endpoint.name} must speak as to a serial port, but one spoke HTTP and was disconnected: a page "
+        "in a browser may have tried to drive the robot. Do not open this port in a browser."
     ]
 
 
@@ -229,7 +229,7 @@ def test_lockstep_tells_how_long_the_next_one_waits(caplog: pytest.LogCaptureFix
         other.close()
     (said,) = [text for text in warnings(caplog) if "left" in text]
     assert said.startswith("the client of robot 1 has gone and left 99")
-    assert "the next one is let in after that, at most" in said
+    assert "the next client may come after that, at most" in said
 
 
 # ---- descriptors ----

@@ -192,7 +192,7 @@ def test_simulation_that_falls_behind_says_so_once(caplog: pytest.LogCaptureFixt
         pace.report(2_000_000_000)
     assert [record.getMessage() for record in caplog.records] == [
         "the simulation must keep up with 4 times real time, but it is 0.5 s behind. Ask for a lower speed; "
-        "the robots do the same as ever, only later."
+        "the robots do the same, only later."
     ]
 
 

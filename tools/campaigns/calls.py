@@ -350,7 +350,7 @@ def _environments(rng: random.Random) -> Subject:
     )}  # fmt: skip
     calls["KheperaEnv"] = (
         KheperaEnv,
-        {"lesson": "Avoid", "render_mode": None, "arenas": (_box(),), "timing": kiks.Timing(), "robot": "khepera"},
+        {"spec": "Avoid", "render_mode": None, "arenas": (_box(),), "timing": kiks.Timing(), "robot": "khepera"},
     )
 
     def go_on() -> None:

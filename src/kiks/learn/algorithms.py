@@ -1,7 +1,7 @@
-"""The algorithms: what proposes candidates, and learns from what they were worth.
+"""The algorithms: they propose candidates and learn from their fitness.
 
-Each draws its random numbers from the seed it was given and from nowhere else, and depends on nothing but what it is
-told: the same seed and the same values give the same candidates again. So a run is resumed by telling it all again.
+An algorithm draws all random numbers from its seed, and depends on nothing but the values that it is told: the same
+seed and values give the same candidates. So an evolution resumes by telling all generations again.
 """
 
 from __future__ import annotations
@@ -19,31 +19,31 @@ from kiks.learn.task import Axis
 Floats = NDArray[np.float64]
 
 SPREAD = 3.0
-"""Standard deviation of each parameter at the beginning: three times what controllers are made for, so that some of the
-first react sharply to what they see."""
+"""Standard deviation of each parameter at the beginning: three times the usual scale of controllers, so that some of
+the first candidates react sharply."""
 
 
 class Algorithm(Protocol):
-    """What proposes candidates. `ask` and `tell` take turns."""
+    """Proposes candidates. `ask` and `tell` alternate."""
 
     def ask(self) -> Floats:
         """Return the next generation, float64 [candidate, parameter]."""
         ...
 
     def tell(self, fitness: Floats, behaviours: Floats) -> None:
-        """Take what they were worth, float64 [candidate], and how they behaved, float64 [candidate, axis]."""
+        """Take their fitness, float64 [candidate], and their behaviours, float64 [candidate, axis]."""
 
     def favourite(self) -> Floats:
-        """Return the parameters that are now thought best, float64 [parameter]."""
+        """Return the best parameters according to the algorithm, float64 [parameter]."""
         ...
 
 
 class Cma:
-    """CMA-ES: a normal distribution that moves, stretches and turns towards what succeeds.
+    """CMA-ES: a normal distribution whose mean and covariance adapt to the successful candidates.
 
     Args:
-        parameter_count: How many parameters a candidate has.
-        population: How many candidates a generation has.
+        parameter_count: Number of parameters of a candidate.
+        population: Number of candidates in a generation.
         seed: Seed of its random numbers.
     """
 
@@ -66,11 +66,11 @@ class Cma:
         return np.array(self._candidates)
 
     def tell(self, fitness: Floats, behaviours: Floats) -> None:
-        """Take what they were worth."""
+        """Take their fitness."""
         self._strategy.tell(self._candidates, (-fitness).tolist())
 
     def favourite(self) -> Floats:
-        """Return the middle of the distribution: what all successful candidates have in common."""
+        """Return the mean of the distribution."""
         return np.array(self._strategy.mean)
 
 
@@ -78,16 +78,16 @@ class Ga:
     """A genetic algorithm: tournaments of three, each parameter from either parent, normal mutations, one elite.
 
     Args:
-        parameter_count: How many parameters a candidate has.
-        population: How many candidates a generation has.
+        parameter_count: Number of parameters of a candidate.
+        population: Number of candidates in a generation.
         seed: Seed of its random numbers.
     """
 
     MUTATION = 0.07
-    """Standard deviation of a mutation, in that of the first generation."""
+    """Standard deviation of a mutation, relative to that of the first generation."""
 
     RIVALS = 3
-    """How many take part in a tournament."""
+    """Number of candidates in a tournament."""
 
     def __init__(self, parameter_count: int, population: int, seed: int, axes: Sequence[Axis] = ()) -> None:
         self._rng = np.random.default_rng(seed)
@@ -99,7 +99,7 @@ class Ga:
         return self._candidates.copy()
 
     def tell(self, fitness: Floats, behaviours: Floats) -> None:
-        """Let the fitter have children."""
+        """Breed the next generation."""
         rng, (population, parameter_count) = self._rng, self._candidates.shape
         self._favourite = self._candidates[np.argmax(fitness)].copy()
         rivals = rng.integers(population, size=(2, population, self.RIVALS))
@@ -117,27 +117,27 @@ class Ga:
 
 
 class MapElites:
-    """MAP-Elites: for each cell of a map of behaviours the best that behaves so, all of them parents.
+    """MAP-Elites: keeps the best candidate for each cell of a map of behaviours; all of them are parents.
 
-    New candidates lie near an elite, moved along the line to another one (Vassiliades and Mouret 2018).
+    A new candidate lies near an elite, moved along the line to another one (Vassiliades and Mouret 2018).
 
     Args:
-        parameter_count: How many parameters a candidate has.
-        population: How many candidates a generation has.
+        parameter_count: Number of parameters of a candidate.
+        population: Number of candidates in a generation.
         seed: Seed of its random numbers.
-        axes: Of the map.
+        axes: Axes of the map.
 
     Raises:
         ParameterError: If there are no axes.
     """
 
     NEAR, ALONG = 0.1, 0.2
-    """How far a child is from its parent in all directions, and along the line (standard deviations)."""
+    """Standard deviation of a child's distance from its parent in all directions, and along the line."""
 
     def __init__(self, parameter_count: int, population: int, seed: int, axes: Sequence[Axis] = ()) -> None:
         if not axes:
             raise ParameterError(
-                "map-elites must be told how behaviours differ, but this task has no axes. Give it some."
+                "map-elites must have axes along which behaviours differ, but this task has none. Give it some."
             )
         archives, emitters = library("ribs.archives"), library("ribs.emitters")
         schedulers = library("ribs.schedulers")
@@ -163,15 +163,15 @@ class MapElites:
         return np.array(self._scheduler.ask())
 
     def tell(self, fitness: Floats, behaviours: Floats) -> None:
-        """Put those on the map that are better than who is there."""
+        """Put candidates on the map that are better than the elites of their cells."""
         self._scheduler.tell(fitness, behaviours)
 
     def favourite(self) -> Floats:
-        """Return the best on the map."""
+        """Return the best elite of the map."""
         return np.array(self.archive.best_elite["solution"])
 
     def heat_map(self) -> Floats:
-        """Return the fitness in each cell, not a number where there is none, float64 [cell of axis 0, ...]."""
+        """Return the fitness in each cell, NaN in empty ones, float64 [cell of axis 0, ...]."""
         heat: Floats = np.full(self.archive.dims, np.nan)
         elites = self.archive.data(["index", "objective"], return_type="dict")
         heat[np.unravel_index(elites["index"], self.archive.dims)] = elites["objective"]
@@ -186,7 +186,7 @@ def make_algorithm(name: str, parameter_count: int, population: int, seed: int, 
     """Return an algorithm.
 
     Raises:
-        ParameterError: If there is none of that name, or its library is not installed.
+        ParameterError: If the name is unknown, or its library is not installed.
     """
     if name not in ALGORITHMS:
         raise ParameterError(
@@ -207,5 +207,5 @@ def library(name: str) -> Any:
     except ImportError as error:
         package = name.partition(".")[0]
         raise ParameterError(
-            f"This must be done with {package}, but it cannot be imported ({error}). {installing('learn')}."
+            f"This needs {package}, but it cannot be imported ({error}). {installing('learn')}."
         ) from None

@@ -1,4 +1,4 @@
-"""A champion: a controller with its parameters, and how to make it drive, in a file that people can read."""
+"""A champion: an evolved controller with its parameters, robot and timing, in a readable file."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ Seed = Annotated[Whole, Field(ge=0, lt=2**63)]
 
 @record
 class _FileTiming(Timing):
-    """The pace of its loop; without a baud rate there is no line."""
+    """The timing of its control loop; without a baud rate there is no line."""
 
     baud: Baud | None = None
 
 
 @record
 class _ChampionFile:
-    """What a champion's file holds."""
+    """The content of a champion's file."""
 
     champion: Annotated[Literal[1], Field(description="It is the version of the format.")]
     parameters: Parameters
@@ -70,14 +70,14 @@ class Champion:
     Attributes:
         controller: The controller.
         parameters: Its parameters.
-        task: Name of the task that it was evolved for.
-        fitness: What it is worth there.
-        measures: What was measured there, on average.
-        generation: In which generation it was found.
-        algorithm: By which algorithm.
+        task: Name of the task for which it was evolved.
+        fitness: Its fitness there.
+        measures: Mean values of the measures there.
+        generation: The generation that found it.
+        algorithm: The algorithm that found it.
         seed: Seed of its evolution.
         robot: The kind of robot that it drives.
-        timing: The pace of its loop.
+        timing: Timing of its control loop.
         kiks: Version of KiKS that found it.
     """
 
@@ -93,7 +93,7 @@ class Champion:
     timing: Timing = field(default_factory=Timing)
     kiks: Text = __version__
 
-    # Functions cannot be compared: a champion equals itself alone.
+    # Functions cannot be compared: a champion equals itself only.
     __eq__ = object.__eq__
     __hash__ = object.__hash__
 
@@ -101,10 +101,10 @@ class Champion:
         self.controller.check_parameters(self.parameters)
 
     def drive(self, port: str | Port | Sequence[str | Port], *, seconds: float) -> int:
-        """Let it drive one or more robots, simulated or real; see `kiks.drive`.
+        """Drive one or more robots, simulated or real; see `kiks.drive`.
 
         Returns:
-            How many loops there were.
+            Number of loops.
 
         Raises:
             ParameterError: If seconds are out of range.
@@ -114,7 +114,7 @@ class Champion:
         return drive(port, self.controller, self.parameters, seconds=seconds, period_s=period_s, baud=self.baud)
 
     def driver(self, port: str | Port | Sequence[str | Port]) -> Driver:
-        """Return what lets it drive one or more robots loop by loop.
+        """Return a driver of one or more robots, to call loop by loop.
 
         Raises:
             LinkError: If a port cannot be opened.
@@ -123,15 +123,15 @@ class Champion:
 
     @property
     def baud(self) -> int:
-        """Speed of its lines [bit/s]: the fastest of a Khepera if it was evolved without a line."""
+        """Speed of its lines [bit/s]: the highest of a Khepera if it was evolved without a line."""
         return self.timing.baud or 57600
 
     def simulation(self, arena: Arena, *, robots: int = 1, seed: int = 0) -> tuple[Simulation, list[Port]]:
-        """Return a world of its robots and pace, and the ports of the robots.
+        """Return a simulation with its kind of robot and its timing, and the ports of the robots.
 
         Raises:
             ParameterError: If an argument is out of range.
-            ArenaError: If there is no free place for a robot.
+            ArenaError: If the arena has no free place for a robot.
         """
         think_s = self.timing.think_s
         thinking = f"fixed:{think_s * 1e3:g}" if think_s else "none"
@@ -146,10 +146,10 @@ class Champion:
     # ---- files ----
 
     def save(self, path: str | Path) -> None:
-        """Write it into a file that `load` reads; a user's file with its controller goes beside it.
+        """Write a file that `load` reads; the user's file with the controller is copied beside it.
 
         Raises:
-            ParameterError: If the file cannot be written, or the controller stands in no file.
+            ParameterError: If the file cannot be written, or the controller is not defined in a file.
         """
         target = path_of(path)
         recipe = recipe_for(self.controller, target.parent)
@@ -179,10 +179,10 @@ class Champion:
 
     @classmethod
     def load(cls, path: str | Path) -> Champion:
-        """Read a champion's file. If its controller is a user's, the file or module of that is run.
+        """Read a champion's file. A controller of the user's is imported: its file or module runs.
 
         Raises:
-            ParameterError: If it is none.
+            ParameterError: If the file is no champion's.
         """
         path = path_of(path)
         what = f"Champion's file {str(path)!r}"
@@ -194,12 +194,12 @@ class Champion:
 
 
 def _key(name: str) -> str:
-    """Return a name as TOML has keys: a measure may be called what Python allows."""
+    """Return a name as a TOML key; names of measures may have letters that bare keys do not allow."""
     return name if name.isascii() and name.isidentifier() else quoted(name)
 
 
 def _word(value: Any) -> str:
-    """Return a value as TOML has it."""
+    """Return a value in TOML."""
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(_word, value))}]"
     return quoted(value) if isinstance(value, str) else repr(value).lower()

@@ -1,4 +1,4 @@
-"""The lessons that come with KiKS: what `kiks/Avoid-v0` and the other environments are about."""
+"""Specifications of environments, and those of `kiks/Avoid-v0` and the others that come with KiKS."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ _Watch = Annotated[Measure, Field(description="Write @kiks.measure over the func
 
 @record
 class EnvSpec:
-    """What environments of all kinds are made of: a place, what is sensed there, what is good and when it is over.
+    """The specification of an environment: arenas, senses, reward and goal.
 
     Args:
-        name: What it is called.
-        arenas: Where it takes place; of several, world k has the one of number k modulo their count.
-        reward: A measure whose first note adds up: what it gains in a step is the reward of that step.
-        goal: A measure: an episode is over (terminated) once its first note is above zero, for one robot of the world
-            at least. None for lessons that have no end of their own.
-        senses: What robots sense, of 'proximity' and 'ambient'.
-        starts: 'random' for free places anywhere, another for each episode; 'arena' for where the arena puts robots.
-        speed_limit: What an action of 1 means [pulses/10 ms].
-        timing: The pace of the loop; that of a program on a line of 9600 baud if left out.
+        name: Its name.
+        arenas: The arenas; world k has the one of number k modulo their count.
+        reward: A measure whose first note accumulates; its gain in a step is the reward of that step.
+        goal: A measure: an episode terminates once its first note is above zero for at least one robot of the world.
+            None for environments that never terminate.
+        senses: The robots' senses, of 'proximity' and 'ambient'.
+        starts: 'random' for new free places in each episode; 'arena' for the starts of the arena.
+        speed_limit: Wheel speed of action 1 [pulses/10 ms].
+        timing: Timing of the control loop; that of a program on a line of 9600 baud if left out.
 
     Raises:
         ParameterError: If an argument is out of range.
@@ -52,31 +52,31 @@ class EnvSpec:
     speed_limit: Annotated[Number, Field(gt=0, le=SPEED_MAX)] = 10.0
     timing: Timing = field(default_factory=Timing)
 
-    # Functions cannot be compared: a lesson equals itself alone.
+    # Functions cannot be compared: a specification equals itself only.
     __eq__ = object.__eq__
     __hash__ = object.__hash__
 
     @property
     def sensor_count(self) -> int:
-        """How many counts a robot senses."""
+        """Number of readings of a robot."""
         return SENSOR_COUNT * len(self.senses)
 
     def with_changes(self, **changes: Any) -> EnvSpec:
-        """Return the same lesson with other arguments.
+        """Return a copy with some arguments changed.
 
         Raises:
-            ParameterError: If one of them is unknown or out of range.
+            ParameterError: If an argument is unknown or out of range.
         """
         return replace(self, **changes)
 
 
 ARRIVED_MM = 60.0
-"""How near to a lamp a robot has arrived [mm]: a lamp's light then comes from above more than from aside."""
+"""Distance to a lamp at which a robot has arrived [mm]: the light then comes more from above than from the side."""
 
 
 @measure(notes=2)
 def nearer_to_light(moment: Any, notes: Any) -> None:
-    """How much nearer to a lamp that burns it has come since its first step [0.1 m], and 1 once it has arrived."""
+    """Distance by which it has come nearer to a burning lamp since its first step [0.1 m], plus 1 once it arrives."""
     distance_mm = nearest_lamp_mm(moment)
     if notes[1] > 0.0:
         notes[0] += (notes[1] - distance_mm) / 100.0
@@ -86,7 +86,7 @@ def nearer_to_light(moment: Any, notes: Any) -> None:
 
 @measure(notes=2)
 def drawn_together(moment: Any, notes: Any) -> None:
-    """How much smaller the distances between all pairs of bodies have become since its first step, in all [0.1 m]."""
+    """Decrease of the sum of distances between all pairs of bodies since its first step [0.1 m]."""
     total_mm = 0.0
     for one in range(moment.bodies.shape[0]):
         for other in range(one):
@@ -122,38 +122,38 @@ def gather() -> EnvSpec:
 
 
 def maze() -> EnvSpec:
-    """Find the way out of a maze, in whose exit a lamp hangs."""
+    """Find the way out of a maze with a lamp at its exit."""
     arena = Arena.maze(columns=3, rows=3, seed=1)
     senses = ("proximity", "ambient")
     return EnvSpec("Maze", (arena,), nearer_to_light, near_light_share(ARRIVED_MM), senses, starts="arena")
 
 
-LESSONS: dict[str, Callable[[], EnvSpec]] = {
+ENV_SPECS: dict[str, Callable[[], EnvSpec]] = {
     "Avoid": avoid,
     "FollowWall": follow_wall,
     "Light": light,
     "Gather": gather,
     "Maze": maze,
 }
-"""What makes them, by the names of their environments."""
+"""Functions that return the specifications, by the names of the environments."""
 
 
 @functools.lru_cache(maxsize=16)
 def _named(name: str) -> EnvSpec:
-    return LESSONS[name]()
+    return ENV_SPECS[name]()
 
 
-def lesson_of(lesson: str | EnvSpec) -> EnvSpec:
-    """Return a lesson, given or by its name.
+def env_spec_of(spec: str | EnvSpec) -> EnvSpec:
+    """Return a specification, given or by its name.
 
     Raises:
-        ParameterError: If there is none of that name.
+        ParameterError: If the name is unknown.
     """
-    if isinstance(lesson, EnvSpec):
-        return lesson
-    if not isinstance(lesson, str) or lesson not in LESSONS:
+    if isinstance(spec, EnvSpec):
+        return spec
+    if not isinstance(spec, str) or spec not in ENV_SPECS:
         raise ParameterError(
-            f"lesson must be a EnvSpec or one of {', '.join(LESSONS)}, but it was {shown(lesson)}."
-            f"{nearest(shown(lesson), tuple(LESSONS))}"
+            f"spec must be an EnvSpec or one of {', '.join(ENV_SPECS)}, but it was {shown(spec)}."
+            f"{nearest(shown(spec), tuple(ENV_SPECS))}"
         )
-    return _named(lesson)
+    return _named(spec)

@@ -1,4 +1,4 @@
-"""Many episodes of a lesson at once, one a world: what environments for one robot, for many and for teams share."""
+"""Many episodes at once, one per world: the common part of single, vector and multi-agent environments."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from kiks.learn.env_specs import EnvSpec
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
 
 PLACES = 1000
-"""Free places in an arena from which those of episodes are drawn."""
+"""Free places in an arena from which starts are drawn."""
 
 APART_MM = 5.0
-"""How far robots that start at random are from each other and from all else at least [mm]."""
+"""Smallest gap between a random start and anything else [mm]."""
 
 SEED_LIMIT = 2**63 - 1
 
@@ -31,18 +31,18 @@ PICTURE_SIDE = 480
 
 
 class Episodes:
-    """Worlds in which robots act step by step, and are told what they sense and what it was worth.
+    """Worlds in which robots act step by step and get observations and rewards.
 
-    An episode is determined by the random generator with which it begins, whatever its world's number: two worlds
-    with equal generators and equal arenas go the same way to the bit, as long as they do the same.
+    An episode depends on the random generator with which it begins, not on its world's number: two worlds with equal
+    generators, arenas and actions give the same episode, to the bit.
 
     Args:
-        lesson: What is to be learnt.
-        worlds: How many worlds.
-        robots: How many robots are in each.
+        spec: The environment.
+        worlds: Number of worlds.
+        robots: Number of robots in each.
         robot: Kind of robot: a name, a robot file or a `kiks.RobotSpec`.
         response: Response of the proximity sensors, if not that of the robot's file.
-        threads: How many threads; as many as the computer has cores if left out.
+        threads: Number of threads; the number of cores if left out.
 
     Raises:
         ParameterError: If an argument is out of range, or there is no room to start.
@@ -50,7 +50,7 @@ class Episodes:
 
     def __init__(
         self,
-        lesson: EnvSpec,
+        spec: EnvSpec,
         worlds: int = 1,
         *,
         robots: int = 1,
@@ -58,36 +58,36 @@ class Episodes:
         response: str | None = None,
         threads: int | None = None,
     ) -> None:
-        self.lesson = lesson
-        goals = () if lesson.goal is None else (lesson.goal,)
+        self.spec = spec
+        goals = () if spec.goal is None else (spec.goal,)
         self.batch = Batch(
-            lesson.arenas,
+            spec.arenas,
             worlds,
             robot=robot,
             robots=robots,
-            senses=lesson.senses,
-            timing=lesson.timing,
+            senses=spec.senses,
+            timing=spec.timing,
             response=response,
             threads=threads,
-            measures=(lesson.reward, path_mm, contacts, *goals),
+            measures=(spec.reward, path_mm, contacts, *goals),
         )
-        self._goal_note = lesson.reward.note_count + 2 if goals else None
+        self._goal_note = spec.reward.note_count + 2 if goals else None
         self._radius_mm = self.batch.specs[0].body.radius_mm
-        self._places = [self._free_places(arena) for arena in self.batch.arenas] if lesson.starts == "random" else []
-        self._sensors = np.zeros((worlds, robots, SENSOR_COUNT * len(lesson.senses)))
+        self._places = [self._free_places(arena) for arena in self.batch.arenas] if spec.starts == "random" else []
+        self._sensors = np.zeros((worlds, robots, SENSOR_COUNT * len(spec.senses)))
         self._scores = np.zeros((worlds, robots))
 
     @property
     def shape(self) -> tuple[int, int]:
-        """How many worlds, and robots in each."""
+        """Number of worlds, and of robots in each."""
         return self.batch.world_count, self.batch.robot_count
 
     def begin(self, worlds: ArrayLike, chances: Sequence[np.random.Generator]) -> None:
-        """Let new episodes begin in some worlds; the first time in all of them.
+        """Begin new episodes in some worlds; the first call must name all worlds.
 
         Args:
             worlds: Their numbers, int64 [world].
-            chances: A generator for each, from which its seed and its start are drawn.
+            chances: A generator for each world; its seed and its start are drawn from it.
         """
         chosen = np.asarray(worlds, np.int64)
         seeds = np.array([chance.integers(SEED_LIMIT) for chance in chances], np.int64)
@@ -100,14 +100,14 @@ class Episodes:
         self._scores[chosen] = 0.0
 
     def step(self, actions: ArrayLike) -> NDArray[np.float64]:
-        """Let all robots of all worlds act, and sense again.
+        """Let all robots act, then read their sensors.
 
         Args:
-            actions: Speeds of the left and right wheels, shares of the speed limit, [world, robot, 2]; or
-                [world, 2] of robots that are alone.
+            actions: Speeds of the left and right wheels as shares of the speed limit, [world, robot, 2]; or [world, 2]
+                with one robot per world.
 
         Returns:
-            Their rewards, float64 [world, robot].
+            Rewards, float64 [world, robot].
 
         Raises:
             ParameterError: If the shape is another, or a number is not from -1 to 1.
@@ -128,24 +128,24 @@ class Episodes:
                 f"actions must be from -1 to 1, but among them was {given[~(np.abs(given) <= 1)][0]}. Cut them off "
                 "before, as gymnasium.wrappers.ClipAction does."
             )
-        self._sensors = self.batch.step(given * self.lesson.speed_limit)
+        self._sensors = self.batch.step(given * self.spec.speed_limit)
         before, self._scores = self._scores, self.batch.notes[:, :, 0].copy()
         return self._scores - before
 
     def observations(self) -> NDArray[np.float32]:
-        """Return what robots sensed last, as shares of the greatest count, float32 [world, robot, sensor]."""
+        """Return the last readings as shares of the largest count, float32 [world, robot, sensor]."""
         return (self._sensors / COUNT_MAX).astype(np.float32)
 
     def are_over(self) -> NDArray[np.bool_]:
-        """Say in which worlds a robot has reached the goal, bool [world]."""
+        """Return in which worlds a robot has reached the goal, bool [world]."""
         if self._goal_note is None:
             return np.zeros(self.batch.world_count, np.bool_)
         reached: NDArray[np.bool_] = np.any(self.batch.notes[:, :, self._goal_note] > 0, axis=1)
         return reached
 
     def facts(self) -> dict[str, NDArray[np.float64]]:
-        """Return what else there is to say of robots, float64 [world, robot]: time_s, path_mm and contacts."""
-        first = self.lesson.reward.note_count
+        """Return further figures, float64 [world, robot]: time_s, path_mm and contacts."""
+        first = self.spec.reward.note_count
         paths_mm, contact_counts = (self.batch.notes[:, :, first + k].copy() for k in range(2))
         times_s = np.repeat(self.batch.times_s[:, None], self.batch.robot_count, axis=1)
         return {"time_s": times_s, "path_mm": paths_mm, "contacts": contact_counts}
@@ -165,10 +165,10 @@ class Episodes:
         return random_starts(arena, PLACES, seed=0, radius_mm=self._radius_mm, clear_mm=APART_MM)
 
     def _draw_starts(self, world: int, chance: np.random.Generator) -> list[list[float]]:
-        """Return start poses of a world's robots that are apart from each other.
+        """Return start poses of a world's robots that do not overlap.
 
         Raises:
-            ParameterError: If there is hardly room for so many.
+            ParameterError: If the arena has not enough room.
         """
         places = self._places[self.batch.arena_indices[world]]
         least_mm = 2 * self._radius_mm + APART_MM

@@ -1,8 +1,8 @@
-"""An evolution: it asks for the worth of candidates, learns from the answer, and keeps the best: its champion.
+"""An evolution: it evaluates generations of candidates and keeps the best one, the champion.
 
-Each generation drives in worlds of its own, so the best of a generation may have been lucky. So what an algorithm
-thinks best after a generation is put on trial together with the next one, in worlds that stay the same for the whole
-evolution and that nobody is bred in. Who does best there is the champion.
+Each generation drives in worlds of its own, so its best candidate may have been lucky. So the candidate that the
+algorithm considers best, the rival, is tried together with the next generation, in trial worlds that stay the same for
+the whole evolution and that no generation trains in. The best rival there is the champion.
 """
 
 from __future__ import annotations
@@ -29,33 +29,33 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 POPULATION = 40
-"""Candidates of a generation if nobody says otherwise."""
+"""Default number of candidates in a generation."""
 
 TRIALS = 8
-"""How often a rival is tried, each time in as many worlds as a candidate of the population."""
+"""Trials of a rival, each in as many worlds as a candidate of the population gets."""
 
 LOG_EVERY_S = 10.0
-"""How often the log is written [s]: it is written whole."""
+"""Time between two writes of the log [s]; each writes the whole log."""
 
 _OF_ALGORITHM, _OF_WORLDS, _OF_TRIALS = range(3)
-"""What seeds are for."""
+"""Purposes of seeds."""
 
 
 class Evolution:
     """An evolution.
 
     Args:
-        task: What for.
+        task: The task.
         algorithm: 'cma' (CMA-ES), 'ga' (a genetic algorithm) or 'map-elites' (many different behaviours).
-        seed: Seed of everything: the same seed, the same evolution, however many workers there are.
-        population: How many candidates a generation has.
-        folder: Where it is kept: its generations, its champion and its log. If the folder holds some generations of the
-            same evolution, it goes on after them, as if it had never stopped. Left out, nothing is written.
+        seed: Seed of all random numbers: the same seed gives the same evolution, with any number of workers.
+        population: Number of candidates in a generation.
+        folder: Folder of its generations, its champion and its log. If it holds generations of the same evolution, the
+            evolution continues after them, as if it had never stopped. Left out, nothing is written.
 
     Attributes:
         task: The task.
-        algorithm: The algorithm's state: 'map-elites' has its map there.
-        generations: What the generations were worth, in their order.
+        algorithm: The state of the algorithm; 'map-elites' has its map there.
+        generations: The generations with their values, in order.
 
     Raises:
         ParameterError: If an argument is out of range, or the folder holds another evolution.
@@ -101,7 +101,7 @@ class Evolution:
     def ask(self) -> Floats:
         """Return the candidates of the next generation, float64 [candidate, parameter]; the same until `tell`.
 
-        After the population come the trials of the rival that the generation before has brought forth, if any.
+        After the population come the trials of the last generation's rival, if there is one.
         """
         if self._asked is None:
             asked = self.algorithm.ask()
@@ -114,20 +114,20 @@ class Evolution:
     def seeds(self) -> Integers:
         """Seeds of the worlds of the candidates that `ask` returns, int64 [candidate].
 
-        All of a population drive in the same worlds, so that they can be compared.
+        All candidates of a population drive in the same worlds, so their fitness can be compared.
         """
         seeds = [self._seed_for(_OF_WORLDS, len(self.generations))] * self.population
         return np.array(seeds + ([] if self._rival is None else self._trial_seeds), np.int64)
 
     def tell(self, values: ArrayLike) -> None:
-        """Take what the candidates of `ask` were worth.
+        """Take the values of the candidates of `ask`.
 
         Args:
             values: Fitness, then the measures, float64 [candidate, 1 + measure], as `Task.evaluate` returns them; or
                 fitness alone, float64 [candidate]. More is better.
 
         Raises:
-            ParameterError: If the shape is another or a number is not finite, or nobody has asked.
+            ParameterError: If the shape is wrong, a number is not finite, or `ask` was not called.
         """
         self._tell(values, self._earlier_s + perf_counter() - self._start_s)
         if self._folder is not None:
@@ -157,7 +157,7 @@ class Evolution:
         self.generations.append(generation)
         self._rival, self._asked = self.algorithm.favourite(), None
 
-    # ---- all at once ----
+    # ---- run ----
 
     def run(
         self,
@@ -170,10 +170,10 @@ class Evolution:
         """Evolve.
 
         Args:
-            generations: Until there are so many, those counted that were there before.
+            generations: Total number of generations, including earlier ones.
             seconds: No generation begins later than this [s of the wall clock].
-            executor: What evaluates candidates, or where it is done: see `kiks.learn.executors.executor_for`.
-            each: Is called after each generation.
+            executor: An executor, or the place to evaluate: see `kiks.learn.executors.executor_for`.
+            each: Called after each generation.
 
         Returns:
             The champion.
@@ -183,12 +183,12 @@ class Evolution:
             WorkError: If the task cannot be evaluated.
         """
         if generations is None and seconds is None:
-            raise ParameterError("generations or seconds must be given, or it would never end, but neither was.")
+            raise ParameterError("generations or seconds must be given, but neither was: the run would never end.")
         for name, value in (("generations", generations), ("seconds", seconds)):
             if value is not None:
                 check_number(name, value, 0)
         if not isinstance(executor, Executor | str):
-            raise ParameterError(f"executor must be one, or a place such as 'threads', but it was {shown(executor)}.")
+            raise ParameterError(f"executor must be one or a place such as 'threads', but it was {shown(executor)}.")
         if isinstance(executor, str):
             with executor_for(executor, self.task) as opened:
                 return self.run(generations=generations, seconds=seconds, executor=opened, each=each)
@@ -217,19 +217,19 @@ class Evolution:
             self._folder.save_log(self.generations, self.task.value_names)
             self._logged_s = perf_counter()
 
-    # ---- what came of it ----
+    # ---- results ----
 
     @property
     def champion(self) -> Champion:
-        """The best so far: of those that were on trial, or of the first generation while none has been.
+        """The best rival so far; before the first trial, the best candidate of the first generation.
 
         Raises:
-            ParameterError: If there was no generation yet.
+            ParameterError: Before the first generation.
         """
         if self._best is not None:
             return self._best
         if not self.generations:
-            raise ParameterError("a generation must have been told before there is a champion, but none was.")
+            raise ParameterError("tell() must be called for a generation before there is a champion, but it was not.")
         first = self.generations[-1]
         winner = int(first.fitness.argmax())
         return self._champion(first.candidates[winner], first.values[winner], len(self.generations))
@@ -252,12 +252,12 @@ class Evolution:
     # ---- inside ----
 
     def _seed_for(self, what: int, number: int = 0) -> int:
-        """Return a seed that follows from that of the evolution."""
+        """Return a seed derived from that of the evolution."""
         sequence = np.random.SeedSequence(self.seed, spawn_key=(what, number))
         return int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(2))
 
     def _resume(self, folder: Folder) -> None:
-        """Take what the folder holds.
+        """Take the generations of the folder.
 
         Raises:
             ParameterError: If it holds another evolution.
@@ -270,9 +270,9 @@ class Evolution:
         while (saved := folder.generation(len(self.generations), self.ask().shape, most)) is not None:
             if not np.array_equal(self.ask(), saved["candidates"]):
                 raise ParameterError(
-                    f"the evolution in {str(folder.path)!r} must go on to the bit, but generation "
-                    f"{len(self.generations) + 1} would have other candidates here: the libraries or the computer are "
-                    "others. Go on where it began, or take a new folder."
+                    f"the evolution in {str(folder.path)!r} must continue to the bit, but generation "
+                    f"{len(self.generations) + 1} would have other candidates here: the libraries or the computer have "
+                    "changed. Continue where it began, or take a new folder."
                 )
             self._tell(saved["values"], float(saved["seconds"]))
         self._earlier_s = self.generations[-1].seconds if self.generations else 0.0

@@ -1,8 +1,8 @@
-"""What an evolution leaves on the disk: its generations, from which it can go on, and a log for people and programs.
+"""The files of an evolution: its generations, from which it can resume, and a log for people and programs.
 
-Need: whatever happens to the process, all generations but the current one are safe, and the log can be read.
-Method: each generation is a small file of its own; files appear whole, in one step, after their bytes are on the disk.
-The log is made of all generations, anew each time.
+If the process is killed, all generations but the current one are safe, and the log is readable: each generation is a
+small file of its own, and files appear complete, in one step, after their bytes are on the disk. The log is rewritten
+from all generations each time.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _ADVICE = "Remove the file, and those after it."
 
 @record
 class Identity:
-    """By what an evolution is told from others."""
+    """The properties that identify an evolution."""
 
     task: Text
     algorithm: Text
@@ -47,14 +47,14 @@ class Identity:
 
 @dataclass(frozen=True)
 class Generation:
-    """What a generation was worth.
+    """A generation with its values.
 
     Attributes:
-        candidates: All that were evaluated, float64 [candidate, parameter]: the population, then a rival on trial.
-        values: What they were worth, float64 [candidate, value]: fitness, then measures.
-        population: How many of them are the population.
-        champion_fitness: That of the best rival so far; not a number before there was one.
-        seconds: When it was over [s of the wall clock, since the evolution began].
+        candidates: All evaluated candidates, float64 [candidate, parameter]: the population, then trials of a rival.
+        values: Their values, float64 [candidate, value]: fitness, then measures.
+        population: Size of the population.
+        champion_fitness: Fitness of the best rival so far; NaN before the first.
+        seconds: Time of its end [s of the wall clock, since the evolution began].
     """
 
     candidates: Floats
@@ -73,10 +73,10 @@ class Folder:
     """The folder of an evolution.
 
     Args:
-        path: Where it is; it is made if it is not there.
+        path: The folder; created if it does not exist.
 
     Raises:
-        ParameterError: If it cannot be made.
+        ParameterError: If it cannot be created.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -84,10 +84,10 @@ class Folder:
         make_folder(self.path / GENERATIONS, "an evolution")
 
     def check_identity(self, identity: Identity) -> None:
-        """Make the folder that of an evolution.
+        """Write the identity of an evolution into the folder, or compare it with the one there.
 
         Raises:
-            ParameterError: If it is that of another one.
+            ParameterError: If the folder belongs to another evolution.
         """
         file = self.path / IDENTITY
         if not file.exists():
@@ -103,15 +103,15 @@ class Folder:
                 )
 
     def generation(self, number: int, shape: tuple[int, int], value_count: int) -> dict[str, NDArray[Any]] | None:
-        """Return candidates, values and seconds of a generation as they were saved; None if it was not.
+        """Return candidates, values and seconds of a saved generation; None if there is none.
 
         Args:
-            number: Which, from 0.
-            shape: How many candidates it must have, and parameters of each.
-            value_count: How many values a candidate has at most.
+            number: Number of the generation, from 0.
+            shape: Number of candidates that it must have, and of parameters of each.
+            value_count: Largest number of values of a candidate.
 
         Raises:
-            ParameterError: If its file is broken, or that of another evolution.
+            ParameterError: If its file is broken, or belongs to another evolution.
         """
         file = self._file(number)
         if not file.exists():
@@ -136,7 +136,7 @@ class Folder:
         replace_file(self._file(number), buffer.getvalue(), "a generation")
 
     def save_log(self, generations: Sequence[Generation], value_names: Sequence[str]) -> None:
-        """Write the log of all generations, a row for each candidate of each population.
+        """Write the log of all generations, one row per candidate of each population.
 
         Raises:
             ParameterError: If it cannot be written, or pyarrow is not installed.

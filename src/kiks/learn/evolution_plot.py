@@ -1,4 +1,4 @@
-"""The picture of an evolution: how fitness grew, and the map of behaviours if there is one. Needs Matplotlib."""
+"""The picture of an evolution: its fitness over the generations, and its map of behaviours. Needs Matplotlib."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def _draw_fitness(axes: Any, evolution: Evolution) -> None:
 def _draw_map(figure: Any, axes: Any, evolution: Evolution, algorithm: MapElites) -> None:
     heat, (across, *others) = algorithm.heat_map(), evolution.task.axes
     filled = int(np.isfinite(heat).sum())
-    while heat.ndim > 2:  # of more than two axes the best along the others is shown
+    while heat.ndim > 2:  # with more than two axes, show the best along the others
         heat = np.fmax.reduce(heat, axis=-1)
     up = others[0] if others else None
     extent = (across.low, across.high, *((up.low, up.high) if up else (0.0, 1.0)))

@@ -6,8 +6,8 @@
     env = gymnasium.make("kiks/Avoid-v0")
     envs = gymnasium.make_vec("kiks/Avoid-v0", num_envs=1000)
 
-`kiks.learn.env_specs` defines them. All kinds of environment are made of `kiks.learn.episode_batch`: with the same
-seed, a robot alone and one of a thousand have the same episodes, to the bit.
+`kiks.learn.env_specs` defines the environments. All kinds use `kiks.learn.episode_batch`: with the same seed, a single
+environment and one of a thousand have the same episodes, to the bit.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from kiks.batch.initial_state import WORLDS_LIMIT
 from kiks.errors import ParameterError, installing, shown
-from kiks.learn.env_specs import LESSONS, EnvSpec, lesson_of
+from kiks.learn.env_specs import ENV_SPECS, EnvSpec, env_spec_of
 from kiks.learn.episode_batch import SEED_LIMIT, Episodes
 from kiks.model.checks import check_count
 
@@ -42,18 +42,18 @@ STEP_LIMIT = 600
 """Steps after which a registered environment is truncated: a minute, as each takes 0.1 s."""
 
 
-def spaces_of(lesson: EnvSpec) -> tuple[Any, Any]:
-    """Return what one robot observes and how it may act, two `gymnasium.spaces.Box`."""
-    return Box(0.0, 1.0, (lesson.sensor_count,), np.float32), Box(-1.0, 1.0, (2,), np.float32)
+def spaces_of(spec: EnvSpec) -> tuple[Any, Any]:
+    """Return the observation space and the action space of one robot, two `gymnasium.spaces.Box`."""
+    return Box(0.0, 1.0, (spec.sensor_count,), np.float32), Box(-1.0, 1.0, (2,), np.float32)
 
 
 class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
     """One robot.
 
     Args:
-        lesson: What is to be learnt: a `EnvSpec` or the name of one.
+        spec: The environment: an `EnvSpec` or the name of one.
         render_mode: 'rgb_array' for pictures from above, None for none.
-        **changes: What of the lesson is to be otherwise, such as `arenas` or `timing`; and `robot` and `response` as
+        **changes: Changed arguments of the specification, such as `arenas` or `timing`; and `robot` and `response` as
             for `Episodes`.
 
     Raises:
@@ -62,10 +62,10 @@ class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012  (as Gymnasium has it)
 
-    def __init__(self, lesson: str | EnvSpec, *, render_mode: str | None = None, **changes: Any) -> None:
+    def __init__(self, spec: str | EnvSpec, *, render_mode: str | None = None, **changes: Any) -> None:
         self.render_mode = checked_mode(render_mode)
-        self.episodes = episodes_of(lesson, 1, changes | {"threads": 1})
-        self.observation_space, self.action_space = spaces_of(self.episodes.lesson)
+        self.episodes = episodes_of(spec, 1, changes | {"threads": 1})
+        self.observation_space, self.action_space = spaces_of(self.episodes.spec)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -101,14 +101,14 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
     """Many worlds with one robot each, in one batch.
 
     Args:
-        num_envs: How many.
-        lesson: What is to be learnt: a `EnvSpec` or the name of one.
-        max_episode_steps: After how many steps an episode is truncated; never if None.
-        autoreset_mode: When a world that has come to an end begins anew: in the next step, whose action it ignores; in
-            the same one, which then returns the first observation of the new episode; or by `reset` alone, with the
-            option 'reset_mask', bool [world].
+        num_envs: Number of worlds.
+        spec: The environment: an `EnvSpec` or the name of one.
+        max_episode_steps: Number of steps after which an episode is truncated; None for no limit.
+        autoreset_mode: When a world begins a new episode: in the next step, whose action it ignores; in the same step,
+            which then returns the first observation of the new episode; or only by `reset`, with the option
+            'reset_mask', bool [world].
         render_mode: 'rgb_array' for pictures from above, None for none.
-        threads: How many threads; as many as the computer has cores if left out. Results do not depend on it.
+        threads: Number of threads; the number of cores if left out. Results do not depend on it.
         **changes: As for `KheperaEnv`.
 
     Raises:
@@ -120,7 +120,7 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
     def __init__(
         self,
         num_envs: int,
-        lesson: str | EnvSpec,
+        spec: str | EnvSpec,
         *,
         max_episode_steps: int | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
@@ -139,8 +139,8 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
             ) from None
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.max_episode_steps = checked_limit("max_episode_steps", max_episode_steps)
-        self.episodes = episodes_of(lesson, num_envs, changes | {"threads": threads})
-        self.single_observation_space, self.single_action_space = spaces_of(self.episodes.lesson)
+        self.episodes = episodes_of(spec, num_envs, changes | {"threads": threads})
+        self.single_observation_space, self.single_action_space = spaces_of(self.episodes.spec)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._chances: list[np.random.Generator] = []
@@ -153,12 +153,12 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
         """Begin episodes: in all worlds, or in those of `options["reset_mask"]`.
 
         Args:
-            seed: That of the first world, the next ones count up; or one for each. Without, each world goes on with its
-                own random numbers.
+            seed: The seed of the first world, and the others count up; or a seed for each. Without one, each world
+                continues its random numbers.
             options: See above.
 
         Raises:
-            ParameterError: If there are not as many seeds as worlds, or the mask is none.
+            ParameterError: If there are not as many seeds as worlds, or the mask is invalid.
         """
         mask = options.get("reset_mask") if isinstance(options, dict) else None
         if mask is not None and not (
@@ -179,15 +179,15 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
         return self.episodes.observations()[:, 0], self._infos()
 
     def step(self, actions: Floats32) -> tuple[Floats32, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
-        """Let all robots act and sense again; worlds that came to an end begin anew as the autoreset mode says.
+        """Let all robots act and read their sensors; ended worlds begin anew according to the autoreset mode.
 
         Raises:
-            ParameterError: If the actions are not two numbers from -1 to 1 for each robot, or a world has come to an
-                end that does not begin anew by itself.
+            ParameterError: If the actions are not two numbers from -1 to 1 for each robot, or an ended world does not
+                begin anew by itself.
         """
         if self.autoreset_mode is AutoresetMode.DISABLED and self._are_done.any():
             raise ParameterError(
-                "worlds that have come to an end must begin anew before the next step, but "
+                "worlds that have ended must begin anew before the next step, but "
                 f"{np.count_nonzero(self._are_done)} have not. Call reset(options={{'reset_mask': mask}})."
             )
         rewards = self.episodes.step(actions)[:, 0]
@@ -213,7 +213,7 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
     # ---- inside ----
 
     def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None] | None:
-        """Return a seed for each world, or None for none at all."""
+        """Return a seed for each world, or None without seeds."""
         if seed is None:
             return None
         given: Any = seed
@@ -238,7 +238,7 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
         return infos
 
     def _final(self) -> dict[str, Any]:
-        """Return what worlds that are done saw last, as Gymnasium hands it on from a step that begins them anew."""
+        """Return the last observations of ended worlds in the form that Gymnasium defines for the same-step mode."""
         done = self._are_done.copy()
         seen = np.full(self.num_envs, None, object)
         for k in np.flatnonzero(done).tolist():
@@ -247,37 +247,37 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
         return {"final_obs": seen, "_final_obs": done, "final_info": infos, "_final_info": done.copy()}
 
 
-def episodes_of(lesson: str | EnvSpec, worlds: int, changes: dict[str, Any]) -> Episodes:
-    """Return episodes of a lesson with changes, some of which are of the episodes and the others of the lesson.
+def episodes_of(spec: str | EnvSpec, worlds: int, changes: dict[str, Any]) -> Episodes:
+    """Return episodes; changes are arguments of `Episodes` or of the specification.
 
     Raises:
         ParameterError: If an argument is unknown or out of range.
     """
     of_episodes = {name: changes[name] for name in ("robot", "robots", "response", "threads") if name in changes}
-    of_lesson = {name: value for name, value in changes.items() if name not in of_episodes}
-    return Episodes(lesson_of(lesson).with_changes(**of_lesson), worlds, **of_episodes)
+    of_spec = {name: value for name, value in changes.items() if name not in of_episodes}
+    return Episodes(env_spec_of(spec).with_changes(**of_spec), worlds, **of_episodes)
 
 
 def checked_seed(seed: int | None) -> int | None:
-    """Return a seed, or None for none.
+    """Return a checked seed, or None.
 
     Raises:
-        ParameterError: If it is neither.
+        ParameterError: If it is invalid.
     """
     return None if seed is None else check_count("seed", seed, 0, SEED_LIMIT)
 
 
 def checked_limit(name: str, steps: int | None) -> int | None:
-    """Return a number of steps, or None for no limit.
+    """Return a checked number of steps, or None for no limit.
 
     Raises:
-        ParameterError: If it is neither.
+        ParameterError: If it is invalid.
     """
     return None if steps is None else check_count(name, steps, 1, SEED_LIMIT)
 
 
 def checked_mode(render_mode: str | None) -> str | None:
-    """Return a render mode.
+    """Return a checked render mode.
 
     Raises:
         ParameterError: If it is unknown.
@@ -287,11 +287,11 @@ def checked_mode(render_mode: str | None) -> str | None:
     return render_mode
 
 
-for _name in LESSONS:
+for _name in ENV_SPECS:
     gymnasium.register(
         f"kiks/{_name}-v0",
         entry_point="kiks.learn.gymnasium_envs:KheperaEnv",
         vector_entry_point="kiks.learn.gymnasium_envs:KheperaVectorEnv",
         max_episode_steps=STEP_LIMIT,
-        kwargs={"lesson": _name},
+        kwargs={"spec": _name},
     )

@@ -1,4 +1,4 @@
-"""A PettingZoo environment: several robots in one world, each an agent of its own."""
+"""A PettingZoo environment: several robots in one world, each an agent."""
 
 from __future__ import annotations
 
@@ -25,26 +25,24 @@ Floats32 = NDArray[np.float32]
 
 
 class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, unused-ignore]
-    """Robots that act at the same time; each is rewarded by what its own measure of the lesson gains.
-
-    An episode is over for all at once.
+    """Robots that act at the same time; each gets the reward of its own measure. An episode ends for all at once.
 
     Args:
-        lesson: What is to be learnt: a `EnvSpec` or the name of one.
-        robots: How many robots.
-        max_cycles: After how many steps an episode is truncated.
+        spec: The environment: an `EnvSpec` or the name of one.
+        robots: Number of robots.
+        max_cycles: Number of steps after which an episode is truncated.
         render_mode: 'rgb_array' for pictures from above, None for none.
         **changes: As for `kiks.learn.gymnasium_envs.KheperaEnv`.
 
     Raises:
-        ParameterError: If an argument is out of range, or there is no room for so many.
+        ParameterError: If an argument is out of range, or the arena has not enough room.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"name": "kiks_team_v0", "render_modes": ["rgb_array"], "render_fps": 10}
 
     def __init__(
         self,
-        lesson: str | EnvSpec = "Gather",
+        spec: str | EnvSpec = "Gather",
         *,
         robots: int = 3,
         max_cycles: int = STEP_LIMIT,
@@ -53,21 +51,21 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
     ) -> None:
         self.render_mode = checked_mode(render_mode)
         self.max_cycles = check_count("max_cycles", max_cycles, 1, SEED_LIMIT)
-        self.episodes = episodes_of(lesson, 1, changes | {"threads": 1, "robots": robots})
+        self.episodes = episodes_of(spec, 1, changes | {"threads": 1, "robots": robots})
         self.possible_agents = [f"robot_{number + 1}" for number in range(robots)]
         self.agents: list[str] = []
-        spaces = {agent: spaces_of(self.episodes.lesson) for agent in self.possible_agents}
+        spaces = {agent: spaces_of(self.episodes.spec) for agent in self.possible_agents}
         self.observation_spaces = {agent: observed for agent, (observed, _) in spaces.items()}
         self.action_spaces = {agent: done for agent, (_, done) in spaces.items()}
         self._chance: np.random.Generator | None = None
         self._step_count = 0
 
     def observation_space(self, agent: str) -> Any:
-        """Return what a robot observes."""
+        """Return the observation space of a robot."""
         return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> Any:
-        """Return how a robot may act."""
+        """Return the action space of a robot."""
         return self.action_spaces[agent]
 
     def reset(
@@ -88,14 +86,14 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
     def step(
         self, actions: dict[str, Floats32]
     ) -> tuple[dict[str, Floats32], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
-        """Let all robots act and sense again.
+        """Let all robots act, then read their sensors.
 
         Raises:
-            ParameterError: If an action is not two numbers from -1 to 1, or there is not one for each robot.
+            ParameterError: If an action is not two numbers from -1 to 1, or a robot has none.
         """
         if not self.agents or not isinstance(actions, dict) or set(actions) != set(self.agents):
             raise ParameterError(
-                f"actions must be given for {', '.join(self.agents) or 'nobody: the episode is over, reset() it'}, "
+                f"actions must be given for {', '.join(self.agents) or 'no robot: the episode is over, reset() it'}, "
                 f"but they were for {shown(list(actions) if isinstance(actions, dict) else actions)}."
             )
         rewards = self.episodes.step([[actions[agent] for agent in self.agents]])[0]

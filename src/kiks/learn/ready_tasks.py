@@ -22,14 +22,14 @@ SPEED_LIMIT = 8.0
 """Highest speed of the ready-made tasks [pulses/10 ms]: 64 mm/s."""
 
 CONTACT_COST = 3.0
-"""By how much more than once each contact a world divides fitness, where contacts are to vanish."""
+"""Fitness is divided by 1 plus this times the mean number of contacts per world."""
 
 CONTACTS_COUNTED = 3.0
-"""Most contacts of a world that count: a robot that is stuck has hundreds, and is no worse."""
+"""Largest number of contacts of a world that counts: a robot that is stuck has hundreds."""
 
 
 def without_contacts(fitness: Floats, values: Values) -> Floats:
-    """Return a fitness that contacts make less, but never less than nothing: who drives and bumps beats who stands."""
+    """Return fitness reduced by contacts, but not below zero: driving with contacts beats standing still."""
     contacts = np.minimum(values["contacts"], CONTACTS_COUNTED).mean(axis=1)
     reduced: Floats = fitness / (1 + CONTACT_COST * contacts)
     return reduced
@@ -39,7 +39,7 @@ def without_contacts(fitness: Floats, values: Values) -> Floats:
 
 
 def avoid_fitness(values: Values) -> Floats:
-    """Return the fitness of `avoid`: the paper's, for a robot that gets somewhere."""
+    """Return the fitness of `avoid`: that of the paper times `roaming`."""
     return without_contacts(cautious_mean(values["avoidance"] * values["roaming"]), values)
 
 
@@ -47,7 +47,7 @@ def avoid(controller: Controller | None = None, **changes: Any) -> Task:
     """Return the task to drive fast, straight and about, and touch nothing (after Floreano and Mondada 1994).
 
     Args:
-        controller: What is evolved; a linear one if left out.
+        controller: The controller to evolve; a linear one if left out.
         changes: Other arguments of `Task`.
     """
     task = Task(
@@ -77,7 +77,7 @@ def follow(controller: Controller | None = None, **changes: Any) -> Task:
     """Return the task to follow walls on the left.
 
     Args:
-        controller: What is evolved; a network with three hidden units if left out.
+        controller: The controller to evolve; a network with four hidden units if left out.
         changes: Other arguments of `Task`.
     """
     task = Task(
@@ -107,7 +107,7 @@ def light(controller: Controller | None = None, **changes: Any) -> Task:
     """Return the task to go to the lamp and stay there.
 
     Args:
-        controller: What is evolved; a network of both senses with four hidden units if left out.
+        controller: The controller to evolve; a network of both senses with four hidden units if left out.
         changes: Other arguments of `Task`.
     """
     usual = controllers.mlp(hidden=(4,), senses=("proximity", "ambient"), speed_limit=SPEED_LIMIT)
@@ -147,7 +147,7 @@ def gather(controller: Controller | None = None, **changes: Any) -> Task:
     """Return the task to push cylinders to the middle of a room.
 
     Args:
-        controller: What is evolved; gated recurrent units if left out, which remember what they do.
+        controller: The controller to evolve; gated recurrent units, which have a memory, if left out.
         changes: Other arguments of `Task`.
     """
     task = Task(
@@ -166,7 +166,7 @@ def gather(controller: Controller | None = None, **changes: Any) -> Task:
 
 
 def _with_cylinders(number: int) -> Arena:
-    """Return a room with six cylinders around its middle, otherwise for each number."""
+    """Return an arena with six cylinders around its middle, placed differently for each number."""
     angles = np.arange(6) * np.pi / 3 + number * 0.4
     away_mm = 170.0 + 15.0 * ((np.arange(6) + number) % 3)
     places = zip(300 + away_mm * np.cos(angles), 300 + away_mm * np.sin(angles), strict=True)
@@ -186,10 +186,10 @@ def maze_fitness(values: Values) -> Floats:
 
 
 def maze(controller: Controller | None = None, **changes: Any) -> Task:
-    """Return the task to end near the goal of Kheperax's maze, for which the way there leads astray.
+    """Return the task to end near the goal of Kheperax's maze; the direct way there is a dead end.
 
     Args:
-        controller: What is evolved; a network with eight hidden units if left out.
+        controller: The controller to evolve; a network with eight hidden units if left out.
         changes: Other arguments of `Task`.
     """
     task = Task(
@@ -213,23 +213,23 @@ def maze(controller: Controller | None = None, **changes: Any) -> Task:
 
 
 def maze_qd_fitness(values: Values) -> Floats:
-    """Return the fitness of `maze-qd`: minus what the wheels have turned, in thousands of pulses."""
+    """Return the fitness of `maze-qd`: minus the turns of the wheels, in thousands of pulses."""
     fitness: Floats = -values["turned_pulses"].mean(axis=1) / 1000
     return fitness
 
 
 def maze_qd(controller: Controller | None = None, **changes: Any) -> Task:
-    """Return the task to find ways to everywhere in Kheperax's maze, and short ones.
+    """Return the task to find short ways to every place in Kheperax's maze.
 
     Args:
-        controller: What is evolved; a network with eight hidden units if left out.
+        controller: The controller to evolve; a network with eight hidden units if left out.
         changes: Other arguments of `Task`.
     """
     given = {"name": "maze-qd", "fitness": maze_qd_fitness, "worlds": 1}
     return maze(controller, **given | {"about": "reach every place in the Kheperax maze, by short ways"} | changes)
 
 
-# ---- all of them, by name ----
+# ---- tasks by name ----
 
 TASKS: dict[str, Callable[..., Task]] = {
     "avoid": avoid,

@@ -1,4 +1,4 @@
-"""A task: what a controller is evolved for, and how what it did becomes one number, its fitness."""
+"""A task: the worlds, measures and fitness for which a controller is evolved."""
 
 from __future__ import annotations
 
@@ -27,28 +27,28 @@ from kiks.model.robot import RobotSpec
 Fitness = Callable[[Mapping[str, Floats]], Floats]
 
 WORLDS_AT_ONCE = 20_000
-"""Most worlds of one batch: more of them would need more memory and run no faster."""
+"""Most worlds of one batch: more would need more memory and run no faster."""
 
 
 CLEAR_MM = 8.0
-"""How far from everything robots start at least [mm]."""
+"""Smallest gap between a start and anything else [mm]."""
 
 
 WORLDS_MAX, ROBOTS_MAX, MEASURES_MAX = 100_000, 1000, 100
-"""Most worlds of a candidate, most robots in each, and most that is measured there."""
+"""Most worlds of a candidate, robots in each world, and measures."""
 
 Seconds = Annotated[Number, Field(ge=1e-3, le=1e6)]
 
 
 @record
 class Axis:
-    """A direction in which behaviours differ, cut into cells.
+    """An axis of a map of behaviours, divided into cells.
 
     Args:
-        measure: Name of the measure that says where on it a behaviour is.
+        measure: Name of the measure along the axis.
         low: Its lower end.
-        high: Its upper end; who is beyond an end counts to the last cell.
-        cells: How many cells.
+        high: Its upper end; values beyond an end belong to the last cell.
+        cells: Number of cells.
 
     Raises:
         ParameterError: If an argument is out of range.
@@ -66,28 +66,28 @@ class Axis:
 
 @record
 class Task:
-    """A task that controllers are evolved for: a `kiks.learn.evaluation.Work`.
+    """A task for which controllers are evolved: a `kiks.learn.evaluation.Evaluation`.
 
-    A candidate, that is a controller's parameters, drives in `worlds` worlds, which the arenas share evenly. What is
-    measured there, on average over a world's robots, becomes one number, its fitness.
+    A candidate is the parameters of a controller. It drives in `worlds` worlds, which the arenas share evenly. The
+    measures, averaged over a world's robots, become one number, its fitness.
 
     Args:
-        name: What it is called.
-        arenas: Where it trains.
-        controller: What is evolved; it must say how many parameters it has.
-        measures: What is measured, each with a name of its own.
-        fitness: From the measures, by name float64 [candidate, world], to the fitness, float64 [candidate]; more is
+        name: Its name.
+        arenas: Arenas for training.
+        controller: The controller to evolve; it must state the number of its parameters.
+        measures: The measures, each with a different name.
+        fitness: Maps the measures, by name float64 [candidate, world], to the fitness, float64 [candidate]; more is
             better. Left out, it is `cautious_mean` of the first measure.
-        seconds: How long a candidate drives in each world [s].
-        worlds: In how many worlds; a multiple of the number of arenas.
-        axes: In what behaviours differ, for algorithms that look for many of them.
+        seconds: Time for which a candidate drives in each world [s].
+        worlds: Number of worlds; a multiple of the number of arenas.
+        axes: Axes along which behaviours differ, for algorithms that look for many of them.
         robot: Kind of robot: a name or a robot file.
-        robots: How many robots there are in each world, all with the same controller.
-        timing: The pace of the loop; as of a program on a line of 9600 baud if left out.
-        starts: 'random' for free places anywhere, or 'arena' for where the arena puts robots.
-        exam: An arena where it does not train: champions show there what they can.
-        about: What it is about, in a line.
-        file: The file that it comes from, if it is a user's.
+        robots: Number of robots in each world, all with the same controller.
+        timing: Timing of the control loop; that of a program on a line of 9600 baud if left out.
+        starts: 'random' for free places anywhere, or 'arena' for the starts of the arena.
+        exam: An arena that is not used for training, in which champions are shown.
+        about: A description in one line.
+        file: The user's file that defines it.
 
     Raises:
         ParameterError: If an argument is out of range.
@@ -119,14 +119,14 @@ class Task:
     about: Text = ""
     file: str = ""
 
-    # Functions cannot be compared: a task equals itself alone.
+    # Functions cannot be compared: a task equals itself only.
     __eq__ = object.__eq__
     __hash__ = object.__hash__
 
     def __post_init__(self) -> None:
         if not self.controller.parameter_count:
             raise ParameterError(
-                f"the controller of a task must have parameters, and say how many, but {shown(self.controller)} does "
+                f"the controller of a task must state the number of its parameters, but {shown(self.controller)} does "
                 "not. Write @kiks.controller(parameters=COUNT) over the function."
             )
         if self.worlds % len(self.arenas):
@@ -137,7 +137,7 @@ class Task:
             raise ParameterError("starts must be 'arena' with several robots, but it was 'random'.")
         names = self.measure_names
         if len(set(names)) != len(names):
-            raise ParameterError(f"measures must have a name of their own each, but they were called {shown(names)}.")
+            raise ParameterError(f"measures must have different names, but they were {shown(names)}.")
         for axis in self.axes:
             if axis.measure not in names:
                 raise ParameterError(
@@ -145,7 +145,7 @@ class Task:
                 )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # Functions go by value: a worker elsewhere has no file of the user's.
+        # Functions go by value: a worker on another computer does not have the user's file.
         from numba import cloudpickle
 
         dumps: Any = cloudpickle.dumps
@@ -153,35 +153,35 @@ class Task:
         return _task_of, (dumps(values),)
 
     def with_changes(self, **changes: Any) -> Task:
-        """Return the same task with other arguments.
+        """Return a copy with some arguments changed.
 
         Raises:
-            ParameterError: If one of them is out of range.
+            ParameterError: If an argument is out of range.
         """
         return replace(self, **changes)
 
     @property
     def measure_names(self) -> tuple[str, ...]:
-        """What the measures are called."""
+        """Names of the measures."""
         return tuple(each.name for each in self.measures)
 
     @property
     def value_names(self) -> tuple[str, ...]:
-        """What the values of a candidate are called: fitness, then the measures."""
+        """Names of the values of a candidate: fitness, then the measures."""
         return ("fitness", *self.measure_names)
 
     @property
     def parameter_count(self) -> int:
-        """How many parameters a candidate has."""
+        """Number of parameters of a candidate."""
         return self.controller.parameter_count or 0
 
     @property
     def driven_s(self) -> float:
-        """How long the robots of a candidate drive, all in all [s]."""
+        """Total time for which the robots of a candidate drive [s]."""
         return self.worlds * self.robots * self.seconds
 
     def digest(self) -> str:
-        """Return 16 hexadecimal digits that differ for tasks whose evolution would."""
+        """Return 16 hexadecimal digits that differ between tasks whose evolutions differ."""
         said = hashlib.sha256()
         for each in self.arenas:
             said.update(each.brightness.tobytes())
@@ -193,27 +193,27 @@ class Task:
             said.update(read_file(Path(self.file), "the task's file"))
         return said.hexdigest()[:16]
 
-    # ---- work ----
+    # ---- evaluation ----
 
     def prepare(self) -> None:
         """Compile the controller and the measures."""
         self.evaluate(np.zeros((1, self.parameter_count)), np.zeros(1, np.int64), 1, seconds=self.timing.period_s)
 
     def evaluate(self, candidates: Floats, seeds: Integers, threads: int, seconds: float | None = None) -> Floats:
-        """Return what candidates are worth.
+        """Return the values of candidates.
 
         Args:
             candidates: Parameters [candidate, parameter].
-            seeds: A seed for each [candidate]: of its worlds, and of where they start.
-            threads: How many threads are used.
-            seconds: How long they drive [s], if not as long as the task says.
+            seeds: A seed for each [candidate]: of its worlds and its starts.
+            threads: Number of threads.
+            seconds: Time for which they drive [s], if not that of the task.
 
         Returns:
             Fitness, then the mean of each measure, float64 [candidate, 1 + measure].
 
         Raises:
-            ParameterError: If candidates or seeds have another shape, a measure or the fitness is no finite number, or
-                the fitness has another shape.
+            ParameterError: If candidates, seeds or fitness have the wrong shape, or a measure or the fitness is not
+                finite.
         """
         candidates, seeds = check_candidates(candidates, seeds)
         if not len(candidates):
@@ -244,14 +244,14 @@ class Task:
         values = values.mean(axis=1).reshape(count, self.worlds, len(self.measures))
         for number, name in enumerate(self.measure_names):
             if not np.isfinite(values[:, :, number]).all():
-                raise ParameterError(f"measures must be finite, but {shown(name)} was not. Look at what it divides by.")
+                raise ParameterError(f"measures must be finite, but {shown(name)} was not. Check its divisions.")
         named = {name: values[:, :, number] for number, name in enumerate(self.measure_names)}
         made = cautious_mean(values[:, :, 0]) if self.fitness is None else self.fitness(named)
         fitness = np.asarray(made, np.float64)
         if fitness.shape != (count,) or not np.isfinite(fitness).all():
             raise ParameterError(
                 f"fitness must return a finite number for each of {count} candidates, but returned {shown(made)}. The "
-                "measures it gets are [candidate, world]: take a mean over axis 1."
+                "measures have the shape [candidate, world]: take a mean over axis 1."
             )
         return np.column_stack([fitness, values.mean(axis=1)])
 
@@ -271,15 +271,15 @@ class Task:
 
 
 def _task_of(pickled: bytes) -> Task:
-    """Return the task that was pickled."""
+    """Return a pickled task."""
     return Task(**pickle.loads(pickled))
 
 
 def cautious_mean(scores: Floats, caution: float = 0.5) -> Floats:
-    """Return one number for the scores of several worlds: their mean, drawn towards the mean of the worse half.
+    """Return the mean of scores over worlds, weighted with the mean of the worse half.
 
-    The worse half says what a controller is worth in worlds that do not suit it. Accidents count there, but no single
-    one decides, as the worst world would.
+    The worse half shows how a controller does in worlds that do not suit it. Accidents count there, but no single one
+    decides, as it would in the worst world.
 
     Args:
         scores: [candidate, world].

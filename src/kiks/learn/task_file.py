@@ -1,4 +1,4 @@
-"""Task files: a ready-made task and what is to be otherwise, in a few lines of TOML (docs/evolution.md)."""
+"""Task files: a ready-made task with changes, in a few lines of TOML (docs/evolution.md)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from kiks.model.robot import robot_names
 
 Name = Annotated[
     Text,
-    Field(pattern=r"^\w[\w .-]{0,59}$", description="The folder of its evolution is called by it."),
+    Field(pattern=r"^\w[\w .-]{0,59}$", description="The folder of its evolution has this name."),
     Rule("a text of 1 to 60 letters, digits, blanks, dots, - and _"),
 ]
 ArenaPath = Annotated[Text, Field(min_length=1, description="An arena file in the folder of this file or below it.")]
@@ -31,13 +31,13 @@ ArenaPath = Annotated[Text, Field(min_length=1, description="An arena file in th
 
 @record
 class TaskFile:
-    """A task for KiKS to evolve controllers for: a ready-made one, with changes."""
+    """A task for `kiks evolve`: a ready-made task with changes."""
 
     task: Annotated[Literal[1], Field(description="Version of the format.")]
     base: Annotated[str, OneOf(tuple(TASKS)), Field(description="The ready-made task: what is measured, and fitness.")]
     name: Name | None = None
-    about: Annotated[Text, Field(description="What it is about, in a line.")] | None = None
-    seconds: Annotated[Seconds, Field(description="How long a candidate drives in each world.")] | None = None
+    about: Annotated[Text, Field(description="A description in one line.")] | None = None
+    seconds: Annotated[Seconds, Field(description="Time for which a candidate drives in each world.")] | None = None
     worlds: (
         Annotated[Whole, Field(ge=1, le=WORLDS_MAX, description="Worlds of a candidate, a multiple of the arenas.")]
         | None
@@ -52,24 +52,24 @@ class TaskFile:
     ) = None
     robots: Annotated[Whole, Field(ge=1, le=ROBOTS_MAX, description="Robots in each world.")] | None = None
     starts: (
-        Annotated[Starts, Field(description="'random' places, or those of the 'arena'; for several robots 'arena'.")]
+        Annotated[Starts, Field(description="'random' places, or those of the 'arena'; 'arena' for several robots.")]
         | None
     ) = None
-    period_ms: Annotated[Milliseconds, Field(description="From one loop to the next.")] | None = None
-    think_ms: Annotated[Milliseconds, Field(description="What the program needs before each command.")] | None = None
-    baud: Annotated[Whole, Field(ge=0, le=10_000_000, description="Bits a second; 0 for no line.")] | None = None
-    controller: Annotated[Recipe, Field(description="What is evolved.")] | None = None
+    period_ms: Annotated[Milliseconds, Field(description="Period of the control loop.")] | None = None
+    think_ms: Annotated[Milliseconds, Field(description="Thinking time before each command.")] | None = None
+    baud: Annotated[Whole, Field(ge=0, le=10_000_000, description="Bits per second; 0 for no line.")] | None = None
+    controller: Annotated[Recipe, Field(description="The controller to evolve.")] | None = None
 
 
 def load_task_file(path: Path, controller: Controller | None = None) -> Task:
-    """Return the task of a file. If its controller is a user's, the Python file or module of that is run.
+    """Return the task of a file. A controller of the user's is imported: its file or module runs.
 
     Args:
-        path: The file; what it names lies in its folder or below.
-        controller: What is evolved in place of the file's.
+        path: The file; files that it names lie in its folder or below.
+        controller: Replaces the file's controller.
 
     Raises:
-        ParameterError: If it is no task's file, or something that it names is none.
+        ParameterError: If it is no task file, or a file that it names is invalid.
     """
     what = f"Task file {str(path)!r}"
     given = check(TaskFile, parse_toml(read_file(path, what), what), what)

@@ -1,4 +1,4 @@
-"""Tasks by name: those that come with KiKS, and those of a user's files."""
+"""Tasks by name: those that come with KiKS, and those in files of the user."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ __all__ = ["TASKS", "avoid", "follow", "gather", "light", "load", "maze", "maze_
 
 
 def load(name: str | Path, controller: Controller | None = None) -> Task:
-    """Return a task: by its name, or that of a file.
+    """Return a task by its name or its file.
 
-    A task file (.toml) may name a user's own controller, whose file is run. A Python file (.py) is run, and must hold a
+    A task file (.toml) may name a controller of the user's, whose file runs. A Python file (.py) runs, and must define
     `task`.
 
     Args:
-        name: A name of `TASKS`, or a path that ends in .toml or .py.
-        controller: What is evolved in place of the task's own.
+        name: A key of `TASKS`, or a path that ends in .toml or .py.
+        controller: Replaces the task's own controller.
 
     Raises:
-        ParameterError: If there is no such task, or the file does not hold one.
+        ParameterError: If the task is unknown, or the file does not hold one.
     """
     name = str(path_of(name, "the name of a task"))
     if name in TASKS:

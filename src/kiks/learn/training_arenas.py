@@ -1,4 +1,4 @@
-"""Rooms to train in and to be examined in, drawn as strokes: walls are long ones, pillars short and thick ones."""
+"""Arenas for training and for the exam, drawn as strokes: long ones are walls, short and thick ones pillars."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ WALL_MM = 10.0
 
 @dataclass(frozen=True)
 class Stroke:
-    """A wall from one point to another, round at its ends, or a pillar where both are one.
+    """A wall from one point to another with round ends; a pillar if both points are equal.
 
     Args:
         begin_mm: x and y of its beginning.
         end_mm: x and y of its end.
         thickness_mm: Its thickness.
-        brightness: From 1, black, to 255, white.
+        brightness: From 1 (black) to 255 (white).
     """
 
     begin_mm: tuple[float, float]
@@ -38,12 +38,12 @@ def pillar(x_mm: float, y_mm: float, diameter_mm: float, brightness: int = 255) 
 
 
 def wall(*places_mm: tuple[float, float], brightness: int = 255) -> list[Stroke]:
-    """Return a wall from place to place."""
+    """Return a wall through some points."""
     return [Stroke(begin, end, brightness=brightness) for begin, end in pairwise(places_mm)]
 
 
 def draw(width_mm: int, height_mm: int, strokes: Sequence[Stroke], name: str, brightness: int = 255) -> Arena:
-    """Return a room with a wall of a brightness around it, and strokes in it."""
+    """Return an arena with a wall around it and strokes inside."""
     cells = np.zeros((height_mm, width_mm), np.uint8)
     edge = int(WALL_MM)
     cells[:edge] = cells[-edge:] = cells[:, :edge] = cells[:, -edge:] = brightness
@@ -61,7 +61,7 @@ def draw(width_mm: int, height_mm: int, strokes: Sequence[Stroke], name: str, br
 
 
 def pillars() -> Arena:
-    """Return a room with pillars, thick and thin, bright and not so bright."""
+    """Return an arena with thick and thin, bright and dark pillars."""
     return draw(
         600,
         600,
@@ -78,7 +78,7 @@ def pillars() -> Arena:
 
 
 def corridors() -> Arena:
-    """Return a room of corridors with right-angled corners and a dead end."""
+    """Return an arena of corridors with right-angled corners and a dead end."""
     walls = [
         *wall((130, 130), (130, 470), (330, 470)),
         *wall((130, 130), (470, 130), (470, 600)),
@@ -89,7 +89,7 @@ def corridors() -> Arena:
 
 
 def wedges() -> Arena:
-    """Return a room whose walls meet at acute and obtuse angles, with walls that end in it."""
+    """Return an arena whose walls meet at acute and obtuse angles, with walls that end inside."""
     walls = [
         *wall((0, 500), (100, 600)),
         *wall((600, 110), (490, 0), brightness=140),
@@ -101,7 +101,7 @@ def wedges() -> Arena:
 
 
 def unseen() -> Arena:
-    """Return a room where nobody trains: slanted walls, pillars, a passage and a dead end."""
+    """Return an arena for the exam: slanted walls, pillars, a passage and a dead end."""
     walls = [
         *wall((0, 520), (240, 600)),
         *wall((250, 0), (250, 240), (120, 330)),
@@ -117,7 +117,7 @@ def unseen() -> Arena:
 
 
 def follow_box() -> Arena:
-    """Return a room with a corner cut off and a block in its middle."""
+    """Return an arena with a corner cut off and a block in its middle."""
     walls = [*wall((0, 440), (160, 600)), pillar(330, 270, 130, 180)]
     return draw(600, 600, walls, "box with a block")
 
@@ -126,7 +126,7 @@ SIDE_MM = 27.5 / 0.015
 """Side of the maze [mm]."""
 
 GOAL_MM = (0.15 * SIDE_MM, 0.9 * SIDE_MM)
-"""Where the robot is to go."""
+"""The goal: x and y."""
 
 _SEGMENTS = (
     ((0.25, 0.25), (0.25, 0.75)),
@@ -139,10 +139,10 @@ _SEGMENTS = (
     ((0.0, 0.8), (0.0, 1.0)),
     ((0.355, 0.0), (1.0, 0.0)),
 )
-"""Walls within, in sides of the maze."""
+"""Inner walls, in units of the maze's side."""
 
 _START = (0.15, 0.15, math.pi / 2)
-"""x and y, in sides of the maze, and heading [rad]."""
+"""x and y in units of the maze's side, and heading [rad]."""
 
 
 def kheperax() -> Arena:
