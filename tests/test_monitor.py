@@ -127,7 +127,7 @@ def test_the_command_prints_lines_and_logs_where_there_is_no_terminal(tmp_path: 
     assert "BIOS 5.02" in lines[0]
     assert len(lines) == 5
     assert "N 8 0 0 0 5 0 6 7" in lines[1]
-    assert lines[-1].startswith("3 samples, 5.0 a second of late, in ")
+    assert lines[-1].startswith("3 samples, 5.0 per second at the end, in ")
     assert len(path.read_text().splitlines()) == 4
     again = CliRunner().invoke(app, arguments)
     assert isinstance(again.exception, kiks.ParameterError)

@@ -71,7 +71,7 @@ def test_files_that_are_there_stay_without_force(tmp_path, there, command):
     with pytest.raises(KiksError) as error:
         kiks_arena(*command, tmp_path / "x.toml")
     assert str(error.value) == (
-        f"The arena's files must be new, but {str(tmp_path / there)!r} is there. Choose another name or add --force."
+        f"The arena's files must be new, but {str(tmp_path / there)!r} exists. Choose another name or add --force."
     )
     assert [path.name for path in tmp_path.iterdir()] == [there]
     assert (tmp_path / there).read_text() == "precious"

@@ -41,7 +41,7 @@ def test_a_run_leaves_its_files_and_goes_on(folder: Path) -> None:
     assert {"champion.toml", "log.parquet", "fitness.png", "generations", "evolution.json"} <= names
     task = folder.parent / "quick.py"
     said = kiks("evolve", task, "--seed", 1, "--population", 8, "--generations", 4, "--out", folder).output
-    assert "Going on after generation 3" in said
+    assert "Continuing after generation 3" in said
     assert "Exam on a line of 9600 baud in 'unseen'" in said
     with pytest.raises(KiksError, match="must hold the same evolution, but its seed is 1, not 2"):
         kiks("evolve", task, "--seed", 2, "--population", 8, "--generations", 4, "--out", folder)

@@ -111,7 +111,7 @@ def test_programs_behind_a_project_take_the_place_of_its_own_from_robot_1_on(fol
 def test_a_project_as_an_arena_brings_its_robots_and_says_that_its_programs_stay_behind(folder: Path) -> None:
     result = forked.run("run", "--arena", "exercise.kiks", "--turret", "gripper", "student.py", cwd=folder)
     assert result.stdout.splitlines() == ["b,5.02,5.01", "t,1,b,1,0", "d"]
-    left_out = "kiks: the programs of exercise.kiks are left out. kiks run exercise.kiks starts them, too."
+    left_out = "kiks: the programs of exercise.kiks do not start here. kiks run exercise.kiks starts them, too."
     assert left_out in result.stderr
     assert "kiks: robot 2: 0.00 m driven" in result.stderr
     assert "seed 5, state" in result.stderr
@@ -130,13 +130,13 @@ def test_an_arena_in_place_of_the_project_s(folder: Path) -> None:
     [
         (
             ("exercise.kiks", "--robots", "1"),
-            "a project must name a program for a robot to be run, but",
+            "a project must name a program for a robot, but",
         ),
         (("nowhere.kiks",), "Project file 'nowhere.kiks' must exist"),
         (("exercise.kiks", "nowhere.py"), "PROGRAM must be a Python file, but there is no file 'nowhere.py'"),
         (("exercise.kiks", "--robot", "kephera"), "Did you mean 'khepera'"),
         (("exercise.kiks", "--picture", "run.doc"), "Let it end in .png, .svg or .pdf."),
-        (("champion.toml", "student.py"), "a champion must drive all robots alone, but 'student.py' stands behind it"),
+        (("champion.toml", "student.py"), "a champion must drive all robots alone, but 'student.py' follows it"),
     ],
 )
 @pytest.mark.slow

@@ -120,7 +120,7 @@ def test_programs_begin_when_a_page_shows_the_world(words: tuple[str, ...], tmp_
     (tmp_path / "tells.py").write_text("open('begun', 'w').close()\nimport time\ntime.sleep(1)\n")
     with started(*words, "tells.py", folder=tmp_path) as (process, output):
         url = url_of(output)
-        assert line_with(output, "It begins when a page shows it")
+        assert line_with(output, "The run begins when a page shows it")
         assert not (tmp_path / "begun").exists()
         show_page(url)
         if words[0] == "run":
@@ -143,7 +143,7 @@ def test_errors_are_reported_before_waiting_for_a_page(tmp_path: Path) -> None:
 def test_ctrl_c_ends_waiting_for_a_page(words: tuple[str, ...], tmp_path: Path) -> None:
     words = (*words, DRIVE, "COM1", "5", "3", "5") if words[0] == "run" else words
     with started(*words, folder=tmp_path) as (process, output):
-        assert line_with(output, "It begins when a page shows it")
+        assert line_with(output, "The run begins when a page shows it")
         process.send_signal(signal.SIGINT)
         assert line_with(output, "Stopped after 0.0 s")
         assert process.wait(GUARD_S) == 0

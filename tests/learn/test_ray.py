@@ -141,7 +141,7 @@ def test_an_address_where_no_server_listens(ray):
 def test_candidates_that_always_kill_their_worker_are_named(cluster):
     with (
         executor_for(f"ray:{cluster.address}", works.Deadly()) as executor,
-        pytest.raises(WorkError, match="3 in a row were lost with candidates 0 to 4; the last one went"),
+        pytest.raises(WorkError, match=r"3 in a row were lost with candidates \d to \d; the last one went"),
     ):
         executor.evaluate(works.candidates(5, marked=3), works.seeds(5))
 

@@ -64,7 +64,7 @@ def _options(
 
 
 def main() -> None:
-    """Run the command; what a user did wrong ends in one clear message."""
+    """Run the command; a mistake of the user ends in one clear message."""
     raise_limit()
     try:
         app()

@@ -1,4 +1,4 @@
-"""`kiks arena`: makes arena files and tells what is in one."""
+"""`kiks arena`: creates arena files and describes their contents."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ Out = Annotated[
         metavar="OUT.toml", help="The arena file; its picture goes beside it as .png.", callback=written_file
     ),
 ]
-Force = Annotated[bool, typer.Option("--force", help="Replace files that are there.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace existing files.")]
 
-arena = typer.Typer(help="Make arenas, and tell what is in one.", no_args_is_help=True, rich_markup_mode=None)
+arena = typer.Typer(help="Create arenas, or describe one.", no_args_is_help=True, rich_markup_mode=None)
 
 
 @arena.command()
@@ -34,7 +34,7 @@ def maze(
     seed: Annotated[int, typer.Option(help="Seed: the same seed, the same maze.", min=0)] = 0,
     force: Force = False,
 ) -> None:
-    """Make a random maze: a robot starts in the entrance, upper left, and a lamp hangs in the exit, lower right.
+    """Create a random maze: a robot starts at the entrance, upper left, and a lamp hangs at the exit, lower right.
 
     Example: kiks arena maze maze.toml --columns 6 --rows 5 --seed 3
     """
@@ -53,7 +53,7 @@ def new(
     brightness: Annotated[str, typer.Option(help="Brightness of the wall, 1 to 255, or a material: wood.")] = "255",
     force: Force = False,
 ) -> None:
-    """Make an empty box whose picture, one pixel per millimetre, is ready to draw in.
+    """Create an empty box whose picture, one pixel per millimetre, is ready to draw in.
 
     Example: kiks arena new room.toml --width-mm 800 --height-mm 600 --brightness wood
     """
@@ -66,7 +66,7 @@ def new(
 
 @arena.command()
 def info(file: Annotated[Path, typer.Argument(metavar="ARENA", help="Arena file (.toml) or picture.")]) -> None:
-    """Tell how large an arena is, what stands in it, and whether a Khepera has room where it starts.
+    """Print an arena's size and contents, and whether a Khepera fits at the starts.
 
     Example: kiks arena info examples/arenas/maze.toml
     """
@@ -77,7 +77,7 @@ def info(file: Annotated[Path, typer.Argument(metavar="ARENA", help="Arena file 
 
     place = Arena.load(file)
     robot_mm = RobotSpec.load("khepera").body.diameter_mm
-    # Clearance is counted between the centres of cells, so half a cell of it is wall.
+    # Clearance is measured between centres of cells, so half a cell of it is wall.
     widest_mm = 2 * float(place.clearance.max()) - place.mm_per_cell
     walls = f"{100 * (place.brightness > 0).mean():.0f} % of it wall"
     typer.echo(f"{place.name}: {place.width_mm:g} x {place.height_mm:g} mm, cells of {place.mm_per_cell:g} mm, {walls}")
@@ -110,7 +110,7 @@ def _at(x_mm: float, y_mm: float) -> str:
 
 
 def _save(made: Arena, out: Path, *, force: bool) -> None:
-    """Write an arena under the file's name; `save_arena` refuses other endings than .toml itself."""
+    """Write an arena, named after its file; `save_arena` refuses other suffixes than .toml."""
     from dataclasses import replace
 
     from kiks.model.arena_file import save_arena
@@ -119,7 +119,7 @@ def _save(made: Arena, out: Path, *, force: bool) -> None:
         for file in (out, out.with_suffix(".png")):
             if file.exists():
                 raise ParameterError(
-                    f"The arena's files must be new, but {str(file)!r} is there. Choose another name or add --force."
+                    f"The arena's files must be new, but {str(file)!r} exists. Choose another name or add --force."
                 )
     save_arena(replace(made, name=out.stem), out)
     typer.echo(f"Arena: {out}   Picture: {out.with_suffix('.png')}")

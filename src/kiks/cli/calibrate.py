@@ -30,12 +30,12 @@ def calibrate(
         str | None, typer.Option(help="Marks [mm] from the wall at which the robot spins: 5,15,25.")
     ] = None,
     run_up: Annotated[float, typer.Option(help="Mark [mm] from which it drives towards the wall.")] = 500.0,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file if it is there.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing file.")] = False,
     yes: Annotated[bool, typer.Option("--yes", help="Take every default: for simulated robots.")] = False,
 ) -> None:
-    """Measure a robot in front of a white wall and write a robot file, so that the simulated one is like it.
+    """Measure a robot in front of a white wall and write a robot file for a simulated robot like it.
 
-    It says where the robot has to be put and waits. A simulated robot (kiks://1) is put there by itself.
+    The command says where to put the robot, and waits. It moves a simulated robot (kiks://1) by itself.
 
     Example: kiks calibrate --port /dev/ttyUSB0 --out mine.toml
     """
@@ -47,13 +47,13 @@ def calibrate(
     kind = RobotSpec.load(base)
     marks = None if gaps is None else parse_gaps(gaps)
     if out.exists() and not overwrite:
-        raise ParameterError(f"--out must name a new file, but {str(out)!r} is there. Add --overwrite to replace it.")
+        raise ParameterError(f"--out must name a new file, but {str(out)!r} exists. Add --overwrite to replace it.")
     end_as_with_ctrl_c()
     with Khepera(port, baud=baud) as robot:
         placements = TerminalPlacements(hand_of(robot), asks=not yes)
         found = measure(robot, placements, kind, baud=baud, gaps_mm=marks, run_up_mm=run_up, say=typer.echo)
     comment = [
-        f"Measured by 'kiks calibrate' on {port}; what is not named here is that of {kind.name!r}.",
+        f"Measured by 'kiks calibrate' on {port}; other constants are those of {kind.name!r}.",
         *found.lines(),
     ]
     save_robot(found.spec, out, comment="\n".join(comment))
@@ -62,10 +62,10 @@ def calibrate(
 
 
 class TerminalPlacements:
-    """A person at the terminal who puts the robot where it has to be.
+    """Asks the person at the terminal to put the robot in place.
 
     Args:
-        hand: What moves the robot if it is a simulated one.
+        hand: Moves a simulated robot; None for a real one.
         asks: False to take every default.
     """
 
@@ -75,7 +75,7 @@ class TerminalPlacements:
         self.count = 0
 
     def place(self, instruction: Instruction) -> float:
-        """Say what is to be done and wait; return the gap that the person gives, the marked one by default [mm]."""
+        """Print an instruction and wait; return the gap that the person enters, by default the marked one [mm]."""
         from dataclasses import replace
 
         from kiks.calibration.placements import Place
@@ -93,7 +93,7 @@ class TerminalPlacements:
         return gap_mm
 
     def wants_repeat(self, finding: str, *, is_good: bool) -> bool:
-        """Show what was found and ask whether to do it again: no by default if it was good, yes if not."""
+        """Show a result and ask whether to measure again; the default is no for a good result."""
         typer.echo(f"   {finding}")
         if not self.asks:
             return False
@@ -109,7 +109,7 @@ def _ask_gap(question: str, default_mm: float) -> float:
 
 
 def hand_of(robot: Khepera) -> Placements | None:
-    """Return what can move the robot: nothing but a person, unless it is simulated in this very process."""
+    """Return the object that can move the robot: None unless it is simulated in this process."""
     from kiks.calibration.placements import SimPlacements
     from kiks.sim.simulation import SimPort
 
@@ -121,7 +121,7 @@ def parse_gaps(text: str) -> list[float]:
     """Return the numbers of '5,15,25' [mm].
 
     Raises:
-        ParameterError: If there is something else.
+        ParameterError: If a part is no number.
 
     Example:
         >>> parse_gaps("5,15,25.5")

@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from kiks.demos.scene import Scene
 
 REPORT_S = 2.0
-"""Simulated time between two updates of the display [s]: more of them would cost more than the simulation."""
+"""Simulated time between two updates of the display [s]: more updates would cost more than the simulation."""
 
 
 class Behaviour(enum.StrEnum):
-    """The demonstrations there are."""
+    """The demonstrations."""
 
     AVOID = "avoid"
     FOLLOW = "follow"
@@ -39,7 +39,7 @@ class Behaviour(enum.StrEnum):
 
 def demo(
     behaviour: Annotated[
-        str, typer.Argument(help=f"What is shown: {', '.join(Behaviour)}, or a champion's file.", metavar="[BEHAVIOUR]")
+        str, typer.Argument(help=f"The demo: {', '.join(Behaviour)}, or a champion's file.", metavar="[BEHAVIOUR]")
     ] = Behaviour.AVOID,
     seconds: Annotated[
         float | None, typer.Option(help="Simulated time [s]; each demonstration's own if left out.", min=1, max=86400)
@@ -52,19 +52,19 @@ def demo(
         int | None,
         typer.Option(help="Speed of the simulated serial line [bit/s]; each demonstration's own if left out."),
     ] = None,
-    picture: Annotated[Path | None, typer.Option(help="Where the picture goes; kiks-NAME.png if left out.")] = None,
+    picture: Annotated[Path | None, typer.Option(help="File of the picture; kiks-NAME.png if left out.")] = None,
     left: Annotated[
-        str | None, typer.Option(help="soccer: the Python program of the left side; its arguments behind it in quotes.")
+        str | None, typer.Option(help="soccer: the Python program of the left side; with its arguments, in quotes.")
     ] = None,
-    right: Annotated[str | None, typer.Option(help="soccer: that of the right side.")] = None,
+    right: Annotated[str | None, typer.Option(help="soccer: the program of the right side.")] = None,
     desk: WithDesk = False,
     no_wait: NoWait = False,
 ) -> None:
-    """Show robots at work, as fast as this computer can, and leave a picture of it.
+    """Run a demonstration at full speed and draw a picture of it.
 
-    avoid: wander about and touch nothing. follow: along the walls. clean: push cylinders to the walls. maze: find the
-    way out. camera: watch a moving ball. race: round a track. swarm: twenty robots spread out.
-    soccer: a match of two programs. A file that `kiks evolve` has left shows the champion.
+    avoid: wander and touch nothing. follow: follow walls. clean: push cylinders to the walls. maze: find the way out.
+    camera: watch a moving ball. race: drive round a track. swarm: twenty robots spread out.
+    soccer: a match of two programs. A champion's file of `kiks evolve`: the champion drives.
 
     Example: kiks demo follow --arena examples/arenas/office.toml --seconds 300
     """
@@ -77,7 +77,7 @@ def demo(
     for name, value in (("--arena", arena), ("--baud", baud)) if is_soccer else (("--left", left), ("--right", right)):
         if value is not None:
             raise ParameterError(
-                f"{name} must be left out with {behaviour}, but it was {shown(value)}. It is for others."
+                f"{name} must be left out with {behaviour}, but it was {shown(value)}. Other demos take it."
             )
     from kiks.drawing import check_picture
 
@@ -111,7 +111,7 @@ def demo(
 
 
 def _run(scene: Scene, behaviour: str, total_s: float, picture: Path) -> None:
-    """Run a demonstration to its end, say how it went, and draw it."""
+    """Run a demonstration to its end, print the result, and draw it."""
     from time import perf_counter
 
     from rich.console import Console

@@ -1,4 +1,4 @@
-"""`kiks desk`, and what `--desk` means for other commands."""
+"""`kiks desk`, and `--desk` of other commands."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from kiks.model.project import Project, ProjectRobot
     from kiks.sim.simulation import Simulation
 
-WithDesk = Annotated[bool, typer.Option("--desk", help="Show it in a browser, at real speed to begin with.")]
-NoWait = Annotated[bool, typer.Option("--no-wait", help="Begin at once, and not when the first page shows the world.")]
+WithDesk = Annotated[bool, typer.Option("--desk", help="Show the world in a browser, at first in real time.")]
+NoWait = Annotated[bool, typer.Option("--no-wait", help="Begin at once, without waiting for the first page.")]
 
 
 def desk(
@@ -43,11 +43,9 @@ def desk(
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed: the same seed, the same run.", min=0)] = None,
     thinking: Annotated[
-        str | None, typer.Option(help="What programs' computing costs: none, fixed:MS, live, live:FACTOR.")
+        str | None, typer.Option(help="Thinking time of programs: none, fixed:MS, live, live:FACTOR.")
     ] = None,
-    speed: Annotated[
-        float | None, typer.Option(help="Simulated seconds in a real one; 0 for as fast as possible.")
-    ] = None,
+    speed: Annotated[float | None, typer.Option(help="Simulated seconds per real second; 0 for no limit.")] = None,
     folder: Annotated[
         Path | None,
         typer.Option(help="Folder of projects and programs; no file outside it is opened or saved."),
@@ -56,7 +54,7 @@ def desk(
         int | None, typer.Option(help="TCP port of the page, 0 for a free one; 8123 if left out.", min=0, max=65535)
     ] = None,
     host: Annotated[
-        str, typer.Option(help="Address to serve the page at. Any but this computer's own needs a token.")
+        str, typer.Option(help="Address of the page. All but this computer's own need a token.")
     ] = "127.0.0.1",
     run_programs: Annotated[
         bool, typer.Option("--run-programs", help="Let browsers on other computers start programs, too.")
@@ -64,10 +62,10 @@ def desk(
     browser: Annotated[bool, typer.Option(help="Open a browser.")] = True,
     no_wait: NoWait = False,
 ) -> None:
-    """Open the desk: a world in the browser, to watch, to touch and to understand.
+    """Open the desk: a world in the browser.
 
-    Drag robots, watch their sensors and their lines, type commands, draw arenas, write programs and let them run.
-    Ctrl-C ends it.
+    Drag robots, watch their sensors and their lines, type commands, draw arenas, write and run programs. Ctrl-C ends
+    the desk.
 
     Example: kiks desk --arena examples/arenas/maze.toml
     """
@@ -82,7 +80,7 @@ def desk(
     project = Project() if arena is None else Project.load(arena)
     home = folder or (Path(arena).parent if arena is not None and is_project(arena) else Path())
     if not home.is_dir():
-        raise ParameterError(f"--folder must be a folder, but {str(home)!r} is none. Make it first.")
+        raise ParameterError(f"--folder must be a folder, but {str(home)!r} is none. Create it first.")
     begin = parse_words(program) if program else []
     project = replace(
         project,
@@ -114,7 +112,7 @@ def desk(
 def _robots(
     project: Project, count: int | None, kinds: list[str], turrets: list[str], least: int
 ) -> tuple[ProjectRobot, ...]:
-    """Return a project's robots with what the command line says of them."""
+    """Return a project's robots with the changes of the command line."""
     robots = list(with_robots(project, count, max(len(kinds), least)).robots)
     count = len(robots)
     if kinds and len(kinds) not in (1, count):
@@ -147,12 +145,12 @@ def open_desk(
 
     Args:
         desk: The desk.
-        host: Address to serve the page at.
+        host: Address of the page.
         port: TCP port of the page.
-        browser: Whether a browser is opened.
-        waits: Whether programs and work begin when the first page shows the world; else at once.
-        work: What moves the world at first.
-        goes_on: Whether the world goes on by itself after that; else it stands still.
+        browser: Whether to open a browser.
+        waits: Whether programs and work begin when the first page shows the world; otherwise at once.
+        work: Moves the world first.
+        goes_on: Whether time passes by itself after that.
         programs_ended: Called with the world, locked, when its programs have ended.
     """
     from kiks.desk.server.show import Driver, Shown
@@ -164,7 +162,7 @@ def open_desk(
         if browser:
             shown.browse()
         if waits and (desk.has_beginners or work is not None):
-            typer.echo("It begins when a page shows it; with --no-wait it begins at once.")
+            typer.echo("The run begins when a page shows it; with --no-wait it begins at once.")
             desk.is_seen.wait()
         desk.begin()
         if work is not None:

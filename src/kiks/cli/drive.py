@@ -14,13 +14,13 @@ from kiks.ending import end_as_with_ctrl_c
 
 
 def drive(
-    champion: Annotated[Path, typer.Argument(help="A champion's file, as `kiks evolve` leaves it.")],
+    champion: Annotated[Path, typer.Argument(help="A champion's file, written by `kiks evolve`.")],
     port: Annotated[
-        list[str], typer.Option(help="Port of a robot: /dev/ttyUSB0, socket://HOST:PORT, ...; once for each robot.")
+        list[str], typer.Option(help="Port of a robot: /dev/ttyUSB0, socket://HOST:PORT, ...; once per robot.")
     ],
     seconds: Annotated[float, typer.Option(help="How long it drives [s].", min=0)] = 60.0,
 ) -> None:
-    """Let a champion drive real robots, or any that answer on a port, and stop them at the end, also with Ctrl-C.
+    """Let a champion drive real robots, or any that answer on a port, and stop them at the end or at Ctrl-C.
 
     Example: kiks drive champion.toml --port /dev/ttyUSB0 --seconds 180
     """
@@ -44,10 +44,10 @@ def run_champion(
     on_desk: bool,
     waits: bool,
 ) -> None:
-    """Let a champion drive all robots of a simulation, and say how it went.
+    """Let a champion drive all robots of a simulation, and print the result.
 
     Raises:
-        ParameterError: If the file is none of a champion, or a result cannot be written.
+        ParameterError: If the file is no champion's, or a result cannot be written.
     """
     from kiks.learn.champion import Champion
 

@@ -1,4 +1,4 @@
-"""The word to the person who waits: the first start compiles the engine."""
+"""Compiles the engine at the first start, and tells the user who waits for it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import typer
 
 
 def ready_engine() -> None:
-    """Compile the engine if it is not in the cache, and say so on the terminal before the wait begins."""
+    """Compile the engine if it is not in the cache, and print a line before that."""
     from kiks.engine.compiling import is_compiled
 
     if not is_compiled():
@@ -15,7 +15,7 @@ def ready_engine() -> None:
 
 
 def ready_batch() -> None:
-    """Compile the engine, and say so if the batch, which is compiled when it first runs, is not in the cache."""
+    """Compile the engine, and print a line if the batch, which is compiled at its first run, is not in the cache."""
     from kiks.engine.compiling import is_compiled
 
     ready_engine()
@@ -24,7 +24,7 @@ def ready_batch() -> None:
 
 
 def compile_batch() -> None:
-    """Let a batch run and step, with lone robots and with some that may meet something."""
+    """Run and step a batch, with lone robots and with robots that may collide."""
     from kiks.batch.batch import Batch
     from kiks.control.controllers import linear
     from kiks.model.arena import Arena
@@ -37,7 +37,7 @@ def compile_batch() -> None:
 
 
 def compile_everything() -> None:
-    """Call every compiled function once, by way of what users call."""
+    """Call every compiled function once, through the public functions."""
     from kiks.client.khepera import Khepera
     from kiks.model.arena import Arena
     from kiks.sim.simulation import Simulation

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class AlgorithmName(enum.StrEnum):
-    """The algorithms there are."""
+    """The algorithms."""
 
     CMA = "cma"
     GA = "ga"
@@ -36,10 +36,10 @@ class ControllerKind(enum.StrEnum):
 
 
 GENERATIONS = 60
-"""How many generations there are if nobody says otherwise."""
+"""Default number of generations."""
 
 EXAM_S = 180.0
-"""How long a champion drives in its exam [s]."""
+"""Time for which a champion drives in its exam [s]."""
 
 
 def evolve(
@@ -51,13 +51,13 @@ def evolve(
         ),
     ] = None,
     generations: Annotated[
-        int | None, typer.Option(help=f"How many; {GENERATIONS} if neither this nor --seconds is given.", min=1)
+        int | None, typer.Option(help=f"Generations; {GENERATIONS} if neither this nor --seconds is given.", min=1)
     ] = None,
     seconds: Annotated[float | None, typer.Option(help="Begin no generation later than this [s].", min=0)] = None,
-    population: Annotated[int | None, typer.Option(help="Candidates of a generation.", min=4)] = None,
+    population: Annotated[int | None, typer.Option(help="Candidates in a generation.", min=4)] = None,
     algorithm: Annotated[AlgorithmName | None, typer.Option(help="cma if left out; map-elites for maze-qd.")] = None,
     controller: Annotated[
-        ControllerKind | None, typer.Option(help="What is evolved; the task's own if left out.")
+        ControllerKind | None, typer.Option(help="The controller to evolve; the task's own if left out.")
     ] = None,
     seed: Seed = 0,
     ray: Annotated[
@@ -66,9 +66,9 @@ def evolve(
     ] = None,
     list_: Annotated[bool, typer.Option("--list", help="List the tasks that come with KiKS.")] = False,
 ) -> None:
-    """Evolve a controller for a task, and leave champion.toml, log.parquet and fitness.png.
+    """Evolve a controller for a task, and write champion.toml, log.parquet and fitness.png.
 
-    Stopped with Ctrl-C or killed, it goes on where it was when the same command is given again.
+    After Ctrl-C or a kill, the same command continues the evolution.
 
     Example: kiks evolve avoid --seed 1 --out runs/avoid
     """
@@ -88,7 +88,7 @@ def evolve(
 
     evolution = Evolution(chosen, str(name), seed=seed, population=population, folder=folder)
     if evolution.generations:
-        typer.echo(f"Going on after generation {len(evolution.generations)} in {folder}.")
+        typer.echo(f"Continuing after generation {len(evolution.generations)} in {folder}.")
     until = GENERATIONS if generations is None and seconds is None else generations
     where = "threads" if ray is None else _ray(ray)
     end_as_with_ctrl_c()
@@ -102,7 +102,7 @@ def evolve(
 
 
 def _run(evolution: Evolution, generations: int | None, seconds: float | None, where: str) -> bool:
-    """Run an evolution and show how far it is; return whether it was stopped from outside."""
+    """Run an evolution and show its progress; return whether it was interrupted."""
     from kiks.cli.evolution_progress import progress_of
 
     try:
@@ -114,7 +114,7 @@ def _run(evolution: Evolution, generations: int | None, seconds: float | None, w
 
 
 def _finish(evolution: Evolution, folder: Path, *, stopped: bool) -> None:
-    """Save the picture, and say what came of it."""
+    """Save the picture, and print the result."""
     from kiks.learn.evolution_plot import save_plot
 
     champion = evolution.champion
@@ -122,14 +122,14 @@ def _finish(evolution: Evolution, folder: Path, *, stopped: bool) -> None:
     figures = ", ".join(f"{name} {value:.4g}" for name, value in champion.measures.items())
     typer.echo(f"Champion of generation {champion.generation}: fitness {champion.fitness:.4f}   {figures}")
     if stopped:
-        typer.echo(f"Stopped after generation {len(evolution.generations)}; the same command goes on.")
+        typer.echo(f"Stopped after generation {len(evolution.generations)}; the same command continues.")
     elif evolution.task.exam is not None:
         typer.echo(_exam(evolution))
     typer.echo(f"Folder: {folder}   See it drive: kiks demo {folder / 'champion.toml'}")
 
 
 def _exam(evolution: Evolution) -> str:
-    """Let the champion drive on a serial line where it has never been, and say how it went."""
+    """Let the champion drive on a serial line in an unseen arena, and return the result as text."""
     task, champion = evolution.task, evolution.champion
     assert task.exam is not None
     sim, ports = champion.simulation(task.exam, robots=task.robots, seed=evolution.seed)

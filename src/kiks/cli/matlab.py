@@ -8,7 +8,7 @@ from kiks.cli.options import shipped_folder
 
 
 def matlab() -> None:
-    """Print the line that lets Octave and MATLAB find the toolbox; type it there, or put it into your startup file.
+    """Print the line that adds the toolbox to the path of Octave and MATLAB: type it there, or put it into startup.m.
 
     Example: octave --eval "$(kiks matlab) kiks; follow"
     """

@@ -30,11 +30,11 @@ _MODES = {0: "speed", 1: "position", 2: "PWM"}
 def monitor(
     port: Annotated[str, typer.Option(help="Port of the robot: /dev/ttyUSB0, COM3, socket://host:port, kiks://1.")],
     baud: Annotated[int, typer.Option(help="Line speed [bit/s].", min=75, max=4_000_000)] = 9600,
-    rate: Annotated[float, typer.Option(help="Samples a second; the line may allow fewer.")] = 10.0,
-    csv: Annotated[Path | None, typer.Option(help="Log everything to this new file.", callback=new_file)] = None,
-    seconds: Annotated[float | None, typer.Option(help="End after so many seconds; else Ctrl-C ends.")] = None,
+    rate: Annotated[float, typer.Option(help="Samples per second; the line may allow fewer.")] = 10.0,
+    csv: Annotated[Path | None, typer.Option(help="Log all readings to this new file.", callback=new_file)] = None,
+    seconds: Annotated[float | None, typer.Option(help="End after this time [s]; otherwise Ctrl-C ends.")] = None,
 ) -> None:
-    """Show all readings of a real or simulated robot as they come, and log them.
+    """Show and log all readings of a real or simulated robot.
 
     Example: kiks monitor --port /dev/ttyUSB0 --baud 38400 --csv today.csv
     """
@@ -67,11 +67,11 @@ def monitor(
         finally:
             if log is not None:
                 log.close()
-    typer.echo(f"{count} samples, {rate_hz:.1f} a second of late{'' if csv is None else f', in {csv}'}")
+    typer.echo(f"{count} samples, {rate_hz:.1f} per second at the end{'' if csv is None else f', in {csv}'}")
 
 
 def _pacer(robot: object) -> Callable[[], None]:
-    """Return what holds a simulated robot to real time; a real one needs nothing of the kind."""
+    """Return a function that keeps a simulated robot at real time; for a real robot it does nothing."""
     import time
 
     from kiks.client.khepera import Khepera
@@ -88,7 +88,7 @@ def _pacer(robot: object) -> Callable[[], None]:
 
 @contextmanager
 def _display(console: Console, title: str) -> Iterator[Callable[[Sample, float], None]]:
-    """Give a function that shows a sample: a picture on a terminal, a line each where there is none."""
+    """Yield a function that shows a sample: as a picture on a terminal, otherwise as a line."""
     if not console.is_terminal:
         typer.echo(title)
         yield lambda sample, rate_hz: typer.echo(line(sample, rate_hz))
@@ -109,7 +109,7 @@ def line(sample: Sample, rate_hz: float) -> str:
 
 
 def bar(count: float, width: int = BAR_WIDTH) -> str:
-    """Return a reading as a bar of so many characters and a number, always of the same width.
+    """Return a reading as a bar and a number, always of the same width.
 
     Example:
         >>> bar(512)
@@ -125,8 +125,8 @@ def picture(sample: Sample, rate_hz: float, title: str, width: int = 80) -> Tabl
 
     Args:
         sample: The readings.
-        rate_hz: Samples a second of late.
-        title: What stands above.
+        rate_hz: Recent samples per second.
+        title: The title.
         width: Characters of a line, at least 60.
     """
     from rich import box
@@ -140,7 +140,7 @@ def picture(sample: Sample, rate_hz: float, title: str, width: int = 80) -> Tabl
         colour = "green" if count < FULL_COUNTS / 3 else "yellow" if count < FULL_COUNTS * 2 / 3 else "red"
         return Text(f"{sensor} ", "dim").append(bar(count, bar_width), colour)
 
-    # Four stand side by side, each with its number before and its reading behind, and two blanks between them.
+    # A row has four sensors, each with its number, bar and reading, and two blanks between them.
     bar_width = min(BAR_WIDTH, (width - 3 * 2) // 4 - len("0 ") - len(" 1023"))
     around = Table.grid(padding=(0, 2))
     for row in ((None, 2, 3, None), (1, None, None, 4), (0, None, None, 5), (None, 7, 6, None)):
@@ -161,7 +161,7 @@ def picture(sample: Sample, rate_hz: float, title: str, width: int = 80) -> Tabl
         wheels.add_row(side, str(counter), str(speed), mode, on_target, str(motor.error))
     whole = Table.grid()
     whole.add_row(Text(title, "bold"))
-    whole.add_row(f"{sample.time_s:.2f} s   {rate_hz:.1f} samples a second   Ctrl-C ends")
+    whole.add_row(f"{sample.time_s:.2f} s   {rate_hz:.1f} samples per second   Ctrl-C ends")
     for part in ("", around, light, wheels):
         whole.add_row(part)
     return whole

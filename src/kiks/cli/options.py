@@ -1,4 +1,4 @@
-"""Options that several commands have, in one wording."""
+"""Options and helpers that several commands share."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ WhenSilent = Annotated[
     str,
     typer.Option(help="A program that is silent while others wait: wait for it, drop it, or ignore: go on without it."),
 ]
-PatienceS = Annotated[float, typer.Option("--patience", help="How long it may be silent, in real seconds.")]
+PatienceS = Annotated[float, typer.Option("--patience", help="Time for which it may be silent [s of real time].")]
 Seed = Annotated[int, typer.Option(help="Seed: the same seed, the same run.", min=0)]
 SeedOrOwn = Annotated[
     int | None, typer.Option(help="Seed: the same seed, the same run; a project's own, else 0, if left out.", min=0)
@@ -102,7 +102,7 @@ def load_arena(file: str | None) -> Arena:
 
 
 def is_project(file: str | Path) -> bool:
-    """Say whether a file's name is that of a project."""
+    """Return whether a file's name is that of a project."""
     return str(file).lower().endswith(".kiks")
 
 
@@ -120,12 +120,12 @@ def load_world(file: str | None) -> tuple[Project, Path]:
 
 
 def with_robots(project: Project, count: int | None, least: int) -> Project:
-    """Return a project with as many robots as the command line says; those that come are of the kind of the last.
+    """Return a project with the number of robots that the command line names; new robots are of the kind of the last.
 
     Args:
         project: The project.
-        count: How many there are to be; as many as it has if None.
-        least: At least so many, whatever is said.
+        count: Number of robots; None for the project's.
+        least: Smallest number of robots.
     """
     from kiks.model.project import ProjectRobot
 
@@ -136,15 +136,15 @@ def with_robots(project: Project, count: int | None, least: int) -> Project:
 
 
 def say(text: str) -> None:
-    """Tell the person at the terminal something, on a line of its own that is not among the results."""
+    """Print a message for the user on the error output, apart from the results."""
     typer.echo(f"kiks: {text}", err=True)
 
 
 def fit_turrets(sim: Simulation, entries: list[str] | None) -> None:
-    """Put turrets on robots that have not got them.
+    """Fit turrets to robots that do not have them.
 
     Raises:
-        ParameterError: If an entry is no turret, or names no robot.
+        ParameterError: If an entry names no turret or no robot.
     """
     from kiks.sim.turret_host import name_of
 
@@ -159,7 +159,7 @@ def parse_turret(entry: str, robot_count: int) -> tuple[str, int | None]:
     """Return the turret and the robot's number of 'gripper=2'; no number for all robots.
 
     Raises:
-        ParameterError: If it has another form, or there is no such robot.
+        ParameterError: If it has another form, or the robot does not exist.
 
     Example:
         >>> parse_turret("gripper=2", 2), parse_turret("k213", 1)
@@ -177,24 +177,24 @@ def parse_turret(entry: str, robot_count: int) -> tuple[str, int | None]:
 
 
 class _Lines(logging.Handler):
-    """A line on the error output for each entry."""
+    """Prints a line on the error output for each log entry."""
 
     def emit(self, record: logging.LogRecord) -> None:
         typer.echo(f"kiks: {self.format(record)}", err=True)
 
 
 def show_log(*, is_quiet: bool = False) -> None:
-    """Show who comes and goes, and what goes wrong; if quiet, what goes wrong alone."""
+    """Show the log; if quiet, only warnings and errors."""
     log = logging.getLogger("kiks")
     log.handlers = [_Lines()]
     log.setLevel(logging.WARNING if is_quiet else logging.INFO)
 
 
 def parse_words(words: list[str]) -> list[Command]:
-    """Return the programs that the words of a command line name, each with its arguments.
+    """Return the programs that a command line names, each with its arguments.
 
-    A word that names a file ending in .py begins a program. A word with blanks that is no file is split as a shell
-    does; if it begins with such a file, it is a program with all its arguments, which may then be .py files themselves.
+    A word that names a .py file begins a program. A word with blanks that is no file is split like in a shell; if it
+    begins with a .py file, it is a program with all its arguments, which may be .py files themselves.
 
     Raises:
         ParameterError: If the first word is no file.
@@ -217,7 +217,7 @@ def parse_words(words: list[str]) -> list[Command]:
 
 
 def _split(word: str) -> list[str]:
-    """Return the words of a quoted word; none if its quotes are not closed."""
+    """Return the parts of a quoted word; none if its quotes are not closed."""
     try:
         return shlex.split(word)
     except ValueError:

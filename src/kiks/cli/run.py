@@ -43,12 +43,12 @@ if TYPE_CHECKING:
 
 
 class RunCommand(TyperCommand):
-    """Takes options behind a project or a champion, too: such a file has no arguments of its own, as programs have."""
+    """Also takes options after a project or a champion, which have no arguments of their own, unlike programs."""
 
-    allow_interspersed_args = False  # a program's own options, and whatever stands behind its name, belong to it
+    allow_interspersed_args = False  # all words after a program's name belong to the program
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Put the options behind such a file before it."""
+        """Move options after such a file before it."""
         before, words = self._split(ctx, args)
         if words and words[0].lower().endswith((".kiks", ".toml")):
             behind, others = self._split(ctx, words[1:])
@@ -56,7 +56,7 @@ class RunCommand(TyperCommand):
         return super().parse_args(ctx, args)
 
     def _split(self, ctx: Any, args: list[str]) -> tuple[list[str], list[str]]:
-        """Return the options at the beginning, and the words behind them."""
+        """Return the options at the beginning, and the words after them."""
         found, _, _ = self.make_parser(ctx).parse_args(list(args))
         count = int(found.get("program") is not None) + len(found.get("arguments") or ())
         return args[: len(args) - count], args[len(args) - count :]
@@ -71,7 +71,7 @@ def run(
     ],
     arguments: Annotated[
         list[str] | None,
-        typer.Argument(help="What the program finds in sys.argv; each .py file among it begins one more program."),
+        typer.Argument(help="The program's arguments; each .py file among them begins another program."),
     ] = None,
     arena: ArenaFile = None,
     robots: Robots = None,
@@ -81,13 +81,13 @@ def run(
     thinking: Annotated[
         str | None,
         typer.Option(
-            help="What the program's computing costs: none, fixed:MS, live, live:FACTOR, replay:FILE; a project's own, "
-            "else none, if left out."
+            help="Thinking time of the program: none, fixed:MS, live, live:FACTOR, replay:FILE; a project's own, else "
+            "none, if left out."
         ),
     ] = None,
     map_: Annotated[
         list[str] | None,
-        typer.Option("--map", help="Port name and robot, like /dev/ttyS0=1; else in the order of opening."),
+        typer.Option("--map", help="Port name and robot, like /dev/ttyS0=1; otherwise in the order of opening."),
     ] = None,
     save_thinking: Annotated[
         Path | None,
@@ -95,19 +95,21 @@ def run(
     ] = None,
     when_silent: WhenSilent = "ignore",
     patience: PatienceS = 2.0,
-    seconds: Annotated[float, typer.Option(help="How long a champion drives [s]; programs end by themselves.")] = 60.0,
+    seconds: Annotated[
+        float, typer.Option(help="Time for which a champion drives [s]; programs end by themselves.")
+    ] = 60.0,
     picture: Picture = None,
     csv: Table = None,
     desk: WithDesk = False,
     no_wait: NoWait = False,
 ) -> None:
-    """Run a program for a real robot on a simulated one, unchanged; its waits and sleeps cost no time.
+    """Run a program for a real robot on a simulated one, unchanged; its waits and sleeps take no real time.
 
-    Its serial ports become simulated robots, and its time.sleep, time.time and time.monotonic simulated time. Several
-    programs share a world, each in a process of its own: the first drives robot 1, the second robot 2, and so on.
+    Its serial ports lead to simulated robots, and its clocks show simulated time. Several programs share a world, each
+    in a process of its own: the first drives robot 1, the second robot 2, and so on.
 
-    A project (.kiks) brings its world, robots and programs; programs behind it take the place of its own, from robot 1
-    on. A file that `kiks evolve` has left lets its champion drive all robots.
+    A project (.kiks) has its own world, robots and programs; programs after it replace its own, from robot 1 on. With a
+    file of `kiks evolve`, its champion drives all robots.
 
     Example: kiks run --arena examples/arenas/maze.toml --map /dev/ttyUSB0=1 wander.py
     """
@@ -118,7 +120,7 @@ def run(
 
         if arguments:
             raise ParameterError(
-                f"a champion must drive all robots alone, but {shown(arguments[0])} stands behind it. Leave it out."
+                f"a champion must drive all robots alone, but {shown(arguments[0])} follows it. Leave it out."
             )
         run_champion(
             program, arena, robots or 1, turret, seed or 0, seconds, picture, csv, on_desk=desk, waits=not no_wait
@@ -142,15 +144,15 @@ def run(
         commands.pop()
     if not commands:
         raise ParameterError(
-            f"a project must name a program for a robot to be run, but {str(program)!r} names none. Name one behind "
-            f"it: kiks run {program} my_program.py."
+            f"a project must name a program for a robot, but {str(program)!r} names none. Name one after it: "
+            f"kiks run {program} my_program.py."
         )
     if any(own) and not is_project(program):
-        say(f"the programs of {arena} are left out. kiks run {arena} starts them, too.")
+        say(f"the programs of {arena} do not start here. kiks run {arena} starts them, too.")
     mapping = dict(parse_map(entry) for entry in map_ or [])
     check_policy(when_silent, patience)
     thinking = thinking_of(project, home) if thinking is None else thinking
-    # A program may go to another folder.
+    # A program may change the working folder.
     record = None if save_thinking is None else save_thinking.absolute()
     sim = simulation_of(project, home, kinds=kinds, thinking=thinking if len(commands) == 1 else "none")
     fit_turrets(sim, turret)
@@ -168,7 +170,7 @@ def run(
     )
     if desk:
         with recorded(sim, picture, csv):
-            # What the command line changed of its robots the desk finds out.
+            # If the command line has changed the robots, the desk derives the project from the simulation.
             told = None if kinds or turret else project
             _run_on_desk(
                 sim, commands, host, thinking, waits=not no_wait, project=told, speed=project.speed, folder=home
@@ -193,7 +195,7 @@ def run(
 
 
 def _tell(sim: Simulation, thinking: str, doubt: str) -> None:
-    """Say how the run has ended, and whether it is repeatable."""
+    """Print the end of the run, and whether it is repeatable."""
     tell_run(sim, "thinking was live" if thinking.startswith("live") else doubt)
 
 
@@ -206,7 +208,7 @@ def _run_on_desk(
     waits: bool,
     **options: Any,
 ) -> None:
-    """Run programs in processes of their own in a world that browsers see, until Ctrl-C; `Desk` has the options."""
+    """Run programs in processes of their own in a world on the desk, until Ctrl-C; options are those of `Desk`."""
     from kiks.desk.server.desk import Desk
 
     def host_at(sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
@@ -215,7 +217,7 @@ def _run_on_desk(
     desk = Desk(sim, commands=commands, new_programs=host_at, is_held=waits, **options)
 
     def end(sim: Simulation) -> None:
-        # The page keeps the last state, until a person lets the world go on.
+        # The page shows the last state until a person lets time pass.
         desk.gate.pause(sim.now_ns)
         _tell(sim, thinking, desk.programs.doubt)
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class FileKind(enum.StrEnum):
-    """Files that people write."""
+    """Files that users write."""
 
     ROBOT = "robot"
     ARENA = "arena"
@@ -22,7 +22,7 @@ class FileKind(enum.StrEnum):
 
 
 def schema(kind: Annotated[FileKind, typer.Argument(help="The kind of file.")]) -> None:
-    """Print the JSON schema of a kind of file, by which an editor completes and checks it.
+    """Print the JSON schema of a kind of file, with which an editor can complete and check it.
 
     Example: kiks schema robot > robot.schema.json
     """
@@ -30,7 +30,7 @@ def schema(kind: Annotated[FileKind, typer.Argument(help="The kind of file.")]) 
 
 
 def schema_of(kind: FileKind) -> JsonSchemaValue:
-    """Return the JSON schema, 2020-12, of a kind of file: of the very model that reading checks it by."""
+    """Return the JSON schema, 2020-12, of a kind of file: that of the model which checks it when it is read."""
     from pydantic.json_schema import GenerateJsonSchema
 
     from kiks.learn.task_file import TaskFile

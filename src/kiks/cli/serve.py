@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from kiks.sim.simulation import Simulation
 
 TCP_PORT = 10020
-"""TCP port of robot 1, that of the next one for robot 2 and so on (khepera-protocol.md 3.3)."""
+"""TCP port of robot 1; robot 2 has the next one, and so on (khepera-protocol.md 3.3)."""
 
 
 def serve(
@@ -42,13 +42,13 @@ def serve(
     robot: RobotKinds = None,
     turret: Turrets = None,
     seed: SeedOrOwn = None,
-    speed: Annotated[float, typer.Option(help="Simulated seconds in a real one, for thinking live.")] = 1.0,
+    speed: Annotated[float, typer.Option(help="Simulated seconds per real second, for thinking live.")] = 1.0,
     thinking: Annotated[
         str, typer.Option(help="live: the world runs all the time; none or fixed:MS: it waits for each command.")
     ] = "live",
     programs: Annotated[
         int | None,
-        typer.Option(help="How many programs begin together if the world waits for them; one a robot if left out."),
+        typer.Option(help="Programs that begin together if the world waits for them; one per robot if left out."),
     ] = None,
     when_silent: WhenSilent = "ignore",
     patience: PatienceS = 2.0,
@@ -78,7 +78,7 @@ def serve(
 ) -> None:
     """Put simulated robots on real serial and TCP ports, for programs in any language.
 
-    The program opens the port that is printed, in place of that of a real robot. Ctrl-C ends.
+    The program opens the printed port in place of that of a real robot. Ctrl-C ends the server.
 
     Example: kiks serve --arena examples/arenas/maze.toml --link /tmp/khepera
     """
@@ -94,34 +94,24 @@ def serve(
     kinds = robot or []
     project, home = load_world(arena)
     if any(each.program for each in project.robots):
-        say(f"The programs of {arena} are left out: those take part that connect. kiks run {arena} starts them.")
+        say(f"The programs of {arena} do not start here; other programs may connect. kiks run {arena} starts them.")
     project = with_robots(project, robots, len(kinds))
     project = replace(project, seed=project.seed if seed is None else seed, baud=project.baud if baud is None else baud)
     sim = simulation_of(project, home, kinds=kinds, thinking="none")
-    robots = sim.robot_count
     fit_turrets(sim, turret)
     if not quiet:
         ready_engine()
-    compile_everything()  # or load it: before the first program waits for it
-    ways: dict[int, list[Endpoint]] = {number: [] for number in range(1, robots + 1)}
+    compile_everything()  # or load it, so that the first program does not wait for it
+    ports = _Ports(sim, pty, link, tcp, rfc2217, host, say)
     server = None
     shown = _show(sim, speed) if desk else None
     gate = None if shown is None else shown.desk.gate
     end_as_with_ctrl_c()  # so that the links are removed
     try:
-        for number, endpoints in ways.items():
-            say(f"Robot {number}")
-            if pty:
-                endpoints.append(_open_pty(number, robots, link, sim.wires[number - 1].line.baud))
-                say(f"  serial port  {endpoints[-1].name}")
-            endpoints.append(_open_tcp(number, tcp, host, say))
-            say(f"  TCP          socket://{endpoints[-1].name}")
-            if rfc2217 is not None:
-                endpoints.append(_open_rfc2217(number, rfc2217, host))
-                say(f"  RFC 2217     rfc2217://{endpoints[-1].name}")
+        ports.open()
         server = Server(
             sim,
-            ways,
+            ports.endpoints,
             speed=speed,
             thinking=thinking,
             programs=programs,
@@ -130,7 +120,7 @@ def serve(
             pace=None if gate is None else gate.pace,
             new_patience=Patience if gate is None else gate.patience,
         )
-        say(_what_is_repeatable(thinking, speed, robots if programs is None else programs))
+        say(_what_is_repeatable(thinking, speed, sim.robot_count if programs is None else programs))
         server.serve()
     except KeyboardInterrupt:
         state = "" if thinking == "live" else f" State {sim.state_hash()}."
@@ -138,16 +128,86 @@ def serve(
     finally:
         if shown is not None:
             shown.close()
-        if server is not None:
-            server.close()
-        else:
-            for endpoints in ways.values():
-                for endpoint in endpoints:
-                    endpoint.close()
+        (ports if server is None else server).close()
+
+
+@dataclass
+class _Ports:
+    """The ports of all robots.
+
+    Args:
+        sim: The simulation.
+        has_pty: Whether each robot gets a serial port.
+        link: Name of the serial port; None for the default.
+        tcp: TCP port of robot 1, 0 for free ones; None for the default.
+        rfc2217: The same for RFC 2217; None for no such ports.
+        host: Address at which the TCP ports listen.
+        say: Prints a line.
+
+    Attributes:
+        endpoints: The open ports by the robot's number.
+    """
+
+    sim: Simulation
+    has_pty: bool
+    link: Path | None
+    tcp: int | None
+    rfc2217: int | None
+    host: str
+    say: Callable[[str], None]
+    endpoints: dict[int, list[Endpoint]] = field(default_factory=dict)
+
+    def open(self) -> None:
+        """Open the ports and print their names."""
+        from kiks.ports.rfc2217 import Rfc2217Endpoint
+
+        for number in range(1, self.sim.robot_count + 1):
+            endpoints = self.endpoints[number] = []
+            self.say(f"Robot {number}")
+            if self.has_pty:
+                endpoints.append(self._open_pty(number))
+                self.say(f"  serial port  {endpoints[-1].name}")
+            endpoints.append(self._open_tcp(number))
+            self.say(f"  TCP          socket://{endpoints[-1].name}")
+            if self.rfc2217 is not None:
+                endpoints.append(Rfc2217Endpoint(_of_robot(self.rfc2217, number), host=self.host))
+                self.say(f"  RFC 2217     rfc2217://{endpoints[-1].name}")
+
+    def close(self) -> None:
+        """Close the ports that are open."""
+        for endpoints in self.endpoints.values():
+            for endpoint in endpoints:
+                endpoint.close()
+
+    def _open_pty(self, number: int) -> Endpoint:
+        from kiks.ports.pty import PtyEndpoint, default_folder
+
+        baud = self.sim.wires[number - 1].line.baud
+        if self.link is None:
+            return PtyEndpoint(default_folder() / str(number), baud=baud)
+        return PtyEndpoint(self.link if self.sim.robot_count == 1 else f"{self.link}{number}", baud=baud)
+
+    def _open_tcp(self, number: int) -> Endpoint:
+        from kiks.ports.tcp import TcpEndpoint
+
+        if self.tcp is not None:
+            return TcpEndpoint(_of_robot(self.tcp, number), host=self.host)
+        try:
+            return TcpEndpoint(_of_robot(TCP_PORT, number), host=self.host)
+        except LinkError:
+            # The user did not ask for this number, so a free one will do. An invalid host fails again.
+            endpoint = TcpEndpoint(0, host=self.host)
+            self.say(f"  TCP port {_of_robot(TCP_PORT, number)} is busy; a free one takes its place.")
+            return endpoint
+
+
+def _of_robot(first: int, number: int) -> int:
+    """Return the TCP port of a robot, given that of robot 1; 0 stays 0."""
+    return first + number - 1 if first else 0
 
 
 def _show(sim: Simulation, speed: float) -> Shown:
-    """Show the world in a browser; time passes there as people want it."""
+    """Show the world in a browser, where people may pause it or change its speed."""
     from kiks.desk.server.desk import Desk
     from kiks.desk.server.show import Shown
 
@@ -157,39 +217,11 @@ def _show(sim: Simulation, speed: float) -> Shown:
     return shown
 
 
-def _open_pty(number: int, robots: int, link: Path | None, baud: int) -> Endpoint:
-    from kiks.ports.pty import PtyEndpoint, default_folder
-
-    if link is None:
-        return PtyEndpoint(default_folder() / str(number), baud=baud)
-    return PtyEndpoint(link if robots == 1 else f"{link}{number}", baud=baud)
-
-
-def _open_tcp(number: int, first: int | None, host: str, say: Callable[[str], None]) -> Endpoint:
-    from kiks.ports.tcp import TcpEndpoint
-
-    if first is not None:
-        return TcpEndpoint(first + number - 1 if first else 0, host=host)
-    try:
-        return TcpEndpoint(TCP_PORT + number - 1, host=host)
-    except LinkError:
-        # Nobody asked for that number: a host that is refused is refused again, a busy port is replaced.
-        endpoint = TcpEndpoint(0, host=host)
-        say(f"  TCP port {TCP_PORT + number - 1} is busy; a free one takes its place.")
-        return endpoint
-
-
-def _open_rfc2217(number: int, first: int, host: str) -> Endpoint:
-    from kiks.ports.rfc2217 import Rfc2217Endpoint
-
-    return Rfc2217Endpoint(first + number - 1 if first else 0, host=host)
-
-
 def _what_is_repeatable(thinking: str, speed: float, programs: int) -> str:
     if thinking == "live":
         return (
-            f"The world runs at {speed:g} times real time. Not repeatable: when a program's bytes come depends on this "
-            "computer; --thinking none makes it so."
+            f"The world runs at {speed:g} times real time. Not repeatable, because the time of a program's bytes "
+            "depends on this computer; --thinking none makes it repeatable."
         )
     if programs == 1:
         return (

@@ -21,9 +21,9 @@ def session(
     join: Annotated[
         int | None, typer.Option(help="Take part in the session of this number; 0: the one started last.")
     ] = None,
-    where: Annotated[int | None, typer.Option(help="Only say where that session is found.")] = None,
+    where: Annotated[int | None, typer.Option(help="Only print the address of this session.")] = None,
     listen: Annotated[
-        Path | None, typer.Option(help="Speak with nobody here; write into this new file where the session is found.")
+        Path | None, typer.Option(help="Serve TCP clients only; write the address of the session into this new file.")
     ] = None,
     window: Annotated[
         bool | None,
@@ -32,14 +32,14 @@ def session(
         ),
     ] = None,
 ) -> None:
-    """Be the simulator of the toolbox for Octave and MATLAB, which starts this by itself.
+    """Serve the toolbox for Octave and MATLAB, which starts this command by itself.
 
-    It is asked line by line on its standard input, and ends when the last program that takes part has gone.
+    It takes requests, one per line, on its standard input, and ends when the last client has gone.
     """
-    # What is written there is an answer: whatever else prints shall not come in between.
+    # Only answers go to the standard output: other output goes to the error output.
     sink = os.dup(1)
     os.dup2(2, 1)
-    # Ctrl-C in Octave is meant for the program there. Octave keeps its children from all signals.
+    # Ctrl-C in Octave is meant for the program there. Octave blocks all signals in its children.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_SETMASK, ())
     show_log(is_quiet=True)
@@ -90,13 +90,13 @@ def _serve(
         pass
     finally:
         host.close()
-    # Threads that still read are of no use any more.
+    # Threads that still read are not needed any more.
     sys.stdout.flush()
     os._exit(0)
 
 
 def _close(*descriptors: int) -> None:
-    """Let nothing go to descriptors any more. They stay open, lest another file takes their numbers."""
+    """Redirect descriptors to /dev/null. They stay open so that no other file gets their numbers."""
     nothing = os.open(os.devnull, os.O_RDWR)
     for descriptor in descriptors:
         os.dup2(nothing, descriptor)
