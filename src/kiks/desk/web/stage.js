@@ -301,6 +301,6 @@ export class Stage {
       return;
     }
     const { x_mm, y_mm } = placeOf(this.feed.frame, thing.what, thing.index);
-    this.live.textContent = `${nameOf(this.feed.scene, thing)} chosen, at ${Math.round(x_mm)}, ${Math.round(y_mm)} mm`;
+    this.live.textContent = `${nameOf(this.feed.scene, thing)} selected, at ${Math.round(x_mm)}, ${Math.round(y_mm)} mm`;
   }
 }
