@@ -297,7 +297,7 @@ export class Stage {
 
   _announce(thing) {
     if (!thing || !this.feed.frame) {
-      this.live.textContent = "Nothing chosen";
+      this.live.textContent = "Nothing selected";
       return;
     }
     const { x_mm, y_mm } = placeOf(this.feed.frame, thing.what, thing.index);
