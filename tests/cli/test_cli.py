@@ -36,9 +36,7 @@ def state_of(text: str) -> str:
     return found[1]
 
 
-@pytest.mark.parametrize(
-    "command", ["desk", "demo", "run", "serve", "monitor", "calibrate", "accuracy", "fit", "warmup"]
-)
+@pytest.mark.parametrize("command", ["desk", "demo", "run", "serve", "monitor", "calibrate", "fit", "warmup"])
 def test_every_command_has_help_with_an_example(command: str) -> None:
     result = kiks(command, "--help")
     assert result.returncode == 0
@@ -175,8 +173,6 @@ def test_mistakes_end_in_one_clear_line(arguments: tuple[str, ...], words: str, 
 
 NO_RESULTS = {
     ("run", "program"),
-    ("accuracy", "data"),
-    ("fit", "data"),
     ("desk", "folder"),
     ("drive", "champion"),
     ("info", "file"),
@@ -190,11 +186,7 @@ RESULTS = {
     ("run", "save_thinking"): ("run", "--save-thinking", "PLACE", WANDER),
     ("run", "picture"): ("run", "--picture", "PLACE", WANDER),
     ("run", "csv"): ("run", "--csv", "PLACE", WANDER),
-    ("accuracy", "page"): ("accuracy", "--page", "PLACE"),
-    ("accuracy", "plots"): ("accuracy", "--plots", "PLACE"),
-    ("fit", "robot"): ("fit", "--robot", "PLACE"),
-    ("fit", "out"): ("fit", "--out", "PLACE"),
-    ("fit", "plots"): ("fit", "--plots", "PLACE"),
+    ("fit", "robot"): ("fit", "wall.sam", "--robot", "PLACE"),
     ("calibrate", "out"): ("calibrate", "--port", "kiks://1", "--out", "PLACE"),
     ("monitor", "csv"): ("monitor", "--port", "kiks://1", "--csv", "PLACE"),
     ("evolve", "out"): ("evolve", "--out", "PLACE"),
@@ -222,7 +214,7 @@ def test_a_result_s_place_is_checked_before_the_run(words: tuple[str, ...], monk
     def begin() -> None:
         raise AssertionError("the run has begun")
 
-    for name in ("run", "demo", "accuracy", "calibrate", "monitor", "evolve", "engine_start"):
+    for name in ("run", "demo", "calibrate", "monitor", "evolve", "engine_start"):
         for word in ("ready_engine", "ready_batch"):
             monkeypatch.setattr(sys.modules[f"kiks.cli.{name}"], word, begin, raising=False)
     for place in ("/proc/none/x.png", "/dev/null/x.png"):

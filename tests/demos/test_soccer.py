@@ -8,17 +8,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import sight
+from player import BAUD, Player
+from soccer_command import player
+from soccer_match import FullTime, Match, play, scorer
+from soccer_picture import draw_match
 from tests import forked
 from tests.at_length import nightly
 from tests.busy import busy_computer
+from whereabouts import Whereabouts
 
 from kiks import Arena, Khepera, ParameterError
-from kiks.cli.match import player
-from kiks.cli.match_picture import draw_match
-from kiks.demos import pitch, sight
-from kiks.demos.match import FullTime, Match, play, scorer
-from kiks.demos.soccer import BAUD, Player
-from kiks.demos.whereabouts import Whereabouts
+from kiks.demos import pitch
 
 # Whole matches.
 pytestmark = pytest.mark.slow

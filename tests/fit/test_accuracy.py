@@ -10,13 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import typer
-from typer.testing import CliRunner
-
-from kiks.cli.accuracy import accuracy
-from kiks.cli.fit import fit, parse_file
-from kiks.errors import ParameterError
-from kiks.fit import models
-from kiks.fit.accuracy import (
+from tools.accuracy import accuracy
+from tools.sensors import models
+from tools.sensors.card import (
     FOUND,
     HALVES,
     TOLD,
@@ -27,8 +23,12 @@ from kiks.fit.accuracy import (
     make_card,
     page,
 )
+from typer.testing import CliRunner
+
+from kiks.cli.fit import fit, parse_file
+from kiks.errors import ParameterError
 from kiks.fit.reflection import active_pairs, fit_reflection
-from kiks.fit.samples import Samples
+from kiks.fit.samples import RIG_OFFSET_DEG, Samples
 from kiks.model.robot import RobotSpec
 
 PAGE = Path(__file__).parents[2] / "docs" / "accuracy.md"
@@ -51,9 +51,11 @@ def card():
 @needs_data
 def test_the_page_tells_the_truth(card):
     written, found = PAGE.read_text(encoding="utf-8"), page(card)
-    assert NUMBER.sub("#", written) == NUMBER.sub("#", found), "run kiks accuracy --page docs/accuracy.md"
+    assert NUMBER.sub("#", written) == NUMBER.sub("#", found), "run python tools/accuracy.py --page docs/accuracy.md"
     for old, new in zip(NUMBER.findall(written), NUMBER.findall(found), strict=True):
-        assert float(new) == pytest.approx(float(old), abs=TOLERANCE), "run kiks accuracy --page docs/accuracy.md"
+        assert float(new) == pytest.approx(float(old), abs=TOLERANCE), (
+            "run python tools/accuracy.py --page docs/accuracy.md"
+        )
 
 
 @needs_data
@@ -164,14 +166,28 @@ def made_up():
     return Samples("wall", math.inf, gaps, angles, counts)
 
 
-def test_fit_reads_files_and_writes_networks(tmp_path):
+def test_fit_reads_files_and_writes_a_robot(tmp_path):
     samples = made_up()
     rows = ["8 18 7 5 6"]
     for distance, block in enumerate(samples.counts):
         rows += [f"TURN {distance}", *(" ".join(map(str, row)) for row in block)]
     (tmp_path / "wall.sam").write_text("\n".join(rows))
+    result = run(fit, str(tmp_path / "wall.sam"), "--robot", str(tmp_path / "mine.toml"))
+    assert result.exit_code == 0, result.output
+    median, mean, maximum = (float(word) for word in re.findall(r"(?:median|mean|maximum) (\d+\.\d)", result.output))
+    assert median < mean < maximum
+    assert RobotSpec.load(tmp_path / "mine.toml").reflection != RobotSpec.load("khepera").reflection
+
+
+def test_networks_are_trained_and_written(tmp_path):
+    samples = made_up()
+    folder = tmp_path / "samples"
+    folder.mkdir()
+    for name in ("wall", "cylinder"):
+        angles = samples.angle_deg[0] + RIG_OFFSET_DEG
+        np.savez(folder / f"{name}.npz", values=samples.counts, gap_mm=samples.gap_mm, object_angle_deg_cw=angles)
     out = tmp_path / "mine.json"
-    result = run(fit, str(tmp_path / "wall.sam"), "--out", str(out), "--starts", "1")
+    result = run(accuracy, "--data", str(folder), "--networks", str(out), "--starts", "1")
     assert result.exit_code == 0, result.output
     assert "13 tanh + 7 linear" in result.output
     assert models.thesis(samples, models.NetworkResponse.load(out)).shape == samples.counts.shape

@@ -7,6 +7,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from tools.sensors.train_networks import PLACES
 
 from kiks.engine.sensing.rays import cast_ray, sight_of
 from kiks.errors import ParameterError
@@ -21,7 +22,6 @@ from kiks.fit.samples import (
     meet,
     nearnesses,
 )
-from kiks.fit.train_networks import PLACES
 from kiks.model.arena import Arena
 
 ROW = "0 1 2 3 4 5 6 1023"

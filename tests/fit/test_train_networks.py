@@ -8,11 +8,11 @@ import math
 
 import numpy as np
 import pytest
+from tools.sensors import train_networks
 
 from kiks.engine.numbers import tanh
 from kiks.engine.sensing import thesis_networks as kernels
 from kiks.errors import ParameterError
-from kiks.fit import train_networks
 from kiks.fit.samples import Samples
 from kiks.model.thesis_networks import THESIS, NetworkResponse
 
@@ -156,7 +156,7 @@ def test_kernels_against_numpy():
     [
         ("", "must be JSON in UTF-8"),
         ("[" * 100_000, "nested too deeply"),
-        ("[]", "must be a table, but it was []. `kiks fit"),
+        ("[]", "must be a table, but it was []. `python tools/accuracy.py"),
         ("{}", "mount_angle_deg must be given, but it is missing"),
         (None, "there is no such file"),
     ],

@@ -355,7 +355,7 @@ def test_silent_program_is_dropped(caplog: pytest.LogCaptureFixture) -> None:
         assert mute.lines.readline() == b""
         assert one.ask(b"H\n") == b"h,0,0\r\n"
         assert said(caplog) == [
-            "the client of robot 2 must act within 2 s while others wait, but it did not: the world parts from it. "
+            "the client of robot 2 must act within 2 s while others wait, but it did not: it is disconnected. "
             "--patience gives it more time."
         ]
         run.wait_free(2)

@@ -16,7 +16,7 @@ from tests.served import GUARD_S
 from kiks.clock.patience import Patience
 from kiks.ports import pending_connections
 from kiks.ports.file_descriptors import Reserve
-from kiks.ports.pending_connections import PATIENCE_S, STRANGERS_MAX, PendingConnections
+from kiks.ports.pending_connections import PATIENCE_S, PENDING_MAX, PendingConnections
 
 TOKEN = "a-Token_of-32-characters-or-so--"
 
@@ -107,9 +107,9 @@ def test_who_says_nothing_is_parted_from_after_a_while(served: Served) -> None:
         served.wait_for(lambda: is_over(silent))
 
 
-def test_strangers_are_few_and_the_first_goes(served: Served) -> None:
-    clients = [served.come() for _ in range(STRANGERS_MAX)]
-    for _ in range(3 * STRANGERS_MAX):
+def test_pending_connections_are_limited_and_the_oldest_is_closed(served: Served) -> None:
+    clients = [served.come() for _ in range(PENDING_MAX)]
+    for _ in range(3 * PENDING_MAX):
         served.lobby.round(0.01)
     assert not any(map(is_over, clients))
     clients.append(served.come())

@@ -216,7 +216,7 @@ def test_hanging_program_is_dropped(tmp_path: Path, caplog: pytest.LogCaptureFix
     assert ends == ["program 1 (hangs.py) has ended by signal 9.", "program 2 (drive.py) has ended with exit code 0."]
     assert doubt
     assert silences(caplog) == [
-        "program 1 (hangs.py) must act within 1 s while others wait, but it did not: the world parts from it. "
+        "program 1 (hangs.py) must act within 1 s while others wait, but it did not: it is disconnected. "
         "--patience gives it more time."
     ]
 

@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 from tests.served import GUARD_S
 
-from kiks.cli.matlab import toolbox_folder
+from kiks.cli.options import shipped_folder
 
 pytestmark = pytest.mark.slow
 
@@ -225,9 +225,9 @@ def test_printed_text_never_mixes_with_answers(tmp_path: Path) -> None:
 
 
 def test_kiks_matlab_prints_the_folder_of_the_toolbox() -> None:
-    assert (toolbox_folder() / "kiks.m").is_file()
+    assert (shipped_folder("matlab", "kiks.m") / "kiks.m").is_file()
     told = subprocess.run([*KIKS, "matlab"], capture_output=True, text=True, check=True, timeout=GUARD_S).stdout
-    assert str(toolbox_folder()) in told
+    assert str(shipped_folder("matlab", "kiks.m")) in told
 
 
 # ---- unauthenticated connections ----

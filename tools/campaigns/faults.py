@@ -45,7 +45,7 @@ from kiks.model.thesis_networks import NetworkResponse
 from kiks.ports.pty import PtyEndpoint
 from kiks.ports.tcp import TcpEndpoint
 from kiks.sim.simulation import Simulation
-from kiks.toolbox.framing import Pulse
+from kiks.toolbox.framing import Heartbeat
 from kiks.toolbox.session import Session
 from kiks.toolbox.session_process import SessionProcess
 
@@ -190,7 +190,7 @@ def _no_descriptors(rng: random.Random) -> None:
         lambda folder: Project.load(folder / "own.kiks"),
         lambda folder: PtyEndpoint(folder / "link").close(),
         lambda folder: TcpEndpoint(0).close(),
-        lambda folder: SessionProcess(Session(), Pulse()).close(),
+        lambda folder: SessionProcess(Session(), Heartbeat()).close(),
         lambda folder: show(sim, port=0, browser=False).close(),
     ]
     with tempfile.TemporaryDirectory(prefix="kiks-torture-") as folder:

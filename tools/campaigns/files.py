@@ -18,11 +18,11 @@ import numpy as np
 from tools.campaigns.hostile import BYTES_MAX, mutated, mutated_text
 from tools.campaigns.runner import SECRET, Campaign, Play
 from tools.campaigns.strange import bomb, strange_kad, strange_mat, strange_netpbm, strange_npz, strange_png
+from tools.sensors.models import thesis
 
 import kiks
 from kiks.clock.thinking import parse_thinking
 from kiks.desk.server.folder import decode
-from kiks.fit.models import thesis
 from kiks.fit.samples import load_samples, nearnesses
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
 from kiks.model.arena_file import save_arena
@@ -32,7 +32,7 @@ from kiks.model.thesis_networks import THESIS, NetworkResponse
 from kiks.ports.pty import default_folder
 from kiks.sim.from_project import simulation_of
 from kiks.sim.simulation import Simulation
-from kiks.toolbox.session_files import Door, find_door
+from kiks.toolbox.session_files import SessionAddress, find_session
 
 CASES = 10_000
 """Mutations of each kind of file."""
@@ -172,7 +172,7 @@ def _door(path: Path) -> None:
     door.chmod(0o600)
     with door.open() as file:
         fcntl.flock(file, fcntl.LOCK_EX)
-        find_door(0)
+        find_session(0)
 
 
 # ---- sound files ----
@@ -337,7 +337,7 @@ def _kinds() -> Iterator[Kind]:
     yield Kind("samples_table", "own.npz", [_npz(**table)], _samples, strange=(partial(strange_npz, table),))
     yield Kind("samples_text", "own.sam", [_TEXT_SAMPLES], _samples, "toml")
     yield Kind("replay", "own.txt", [b"".join(b"%d\n" % (n * 1000) for n in range(40))], _replay, "toml")
-    yield Kind("door", "session-1", [Door(1, 4711, SECRET).line().encode()], _door, "toml")
+    yield Kind("door", "session-1", [SessionAddress(1, 4711, SECRET).line().encode()], _door, "toml")
 
 
 def _project_of(png: bytes, rng: random.Random) -> bytes:
@@ -366,8 +366,9 @@ def _warm() -> None:
     global _FAN
     if _FAN is not None:
         return
+    from tools.sensors.train_networks import PLACES
+
     from kiks.fit.samples import Fan
-    from kiks.fit.train_networks import PLACES
 
     drive(Simulation(_arena(), robots=2, seed=1))
     drive(simulation_of(Project(_arena(), robots=(ProjectRobot(turrets=("k213", "gripper")),), response="thesis")))

@@ -6,7 +6,6 @@ import sys
 
 import typer
 
-from kiks.cli.accuracy import accuracy
 from kiks.cli.arena import arena
 from kiks.cli.calibrate import calibrate
 from kiks.cli.demo import demo
@@ -43,7 +42,6 @@ for _command in (
     session,
     monitor,
     calibrate,
-    accuracy,
     fit,
     schema,
     warmup,

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import enum
+import importlib
+import sys
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,8 +13,7 @@ import typer
 
 from kiks.cli.desk import NoWait, WithDesk, open_desk
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.match import show_match
-from kiks.cli.options import Seed, load_arena
+from kiks.cli.options import Seed, load_arena, shipped_folder
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, nearest, shown
 
@@ -85,7 +86,10 @@ def demo(
     check_picture(picture)
     ready_engine()
     if is_soccer:
-        show_match(seconds, seed, picture, left, right, on_desk=desk, waits=not no_wait)
+        sys.path.append(str(shipped_folder("examples/soccer", "player.py")))
+        importlib.import_module("soccer_command").show_match(
+            seconds, seed, picture, left, right, on_desk=desk, waits=not no_wait
+        )
         return
     given = None if arena is None else load_arena(arena)
     if behaviour in list(Behaviour):

@@ -1,10 +1,10 @@
-"""The gate: where simulated time passes while somebody watches, who may hold it, let it through, or reach in.
+"""The gate: pauses or slows simulated time while a person watches, and lets other threads act between two events.
 
-Need: a person pauses a world, slows it down, or takes a robot in the hand, whoever moves that world: a program in this
-process, programs in others, a server, or nobody. None of it may change what happens otherwise.
-Method: all time passes in one place, `Simulation.advance_to`, with the simulation's lock held. While the gate is up it
-asks `admit` how far it may go. PollCost there releases the lock, so that others may look; what they want done with the
-world is done in between, by whoever holds the lock.
+A person may pause a world, slow it down, or drag a robot, no matter what moves the world: a program in this process,
+programs in others, a server, or nothing. None of that may change the run otherwise. All time passes in one place,
+`EventLoop.advance_to`, with the simulation's lock held. While the gate is up, the loop asks `admit` how far it may go.
+Waiting there releases the lock, so other threads may read the world. Their requests are done in between, by the thread
+that holds the lock.
 """
 
 from __future__ import annotations
@@ -21,32 +21,32 @@ from kiks.clock.patience import Patience
 from kiks.units import NS_PER_S, TICK_NS
 
 SLICE_NS = NS_PER_S // 50
-"""Real time that passes in one go, if the pace is bound to it [ns]."""
+"""Longest slice of real time, if the pace is bound to it [ns]."""
 
 HELD_SLICE_NS = TICK_NS
-"""Simulated time that passes in one go while a hand holds something [ns]."""
+"""Longest slice of simulated time while something is dragged [ns]."""
 
 LAG_NS = NS_PER_S // 10
-"""How far the world may lie behind its pace and still catch up [ns of real time]: a program that thinks for longer, or
-a computer that is too slow, makes it lose the time instead."""
+"""Largest lag that the world catches up [ns of real time]. If a program thinks for longer, or the computer is too slow,
+the world skips the time instead."""
 
-LOOK_S = 0.05
-"""How often a world that stands still looks whether it still must [s]."""
+CHECK_S = 0.05
+"""Longest time between two checks of a waiting world [s]."""
 
 Done = TypeVar("Done")
 
 
 class Gate:
-    """Lets simulated time through.
+    """Decides how far simulated time may go.
 
     Args:
-        lock: The simulation's.
-        speed: Simulated seconds in a real one; None for as fast as possible.
-        wall_ns: A clock that only goes forwards [ns]; a test hands in its own.
+        lock: The lock of the simulation.
+        speed: Simulated seconds per real second; None for no limit.
+        wall_ns: A monotonic clock [ns]; tests pass their own.
 
     Attributes:
-        is_up: Whether `admit` has to be asked. False while time passes freely: then the gate costs nothing.
-        pace: How fast time passes, and whether it stands still.
+        is_up: Whether the event loop must call `admit`. False while time passes freely: then the gate costs nothing.
+        pace: The speed of time, and whether it stands still.
 
     Raises:
         ParameterError: If the speed is out of range.
@@ -77,7 +77,7 @@ class Gate:
         self.pace = Pace(speed, wall_ns=wall_ns)
         self._settle()
 
-    # ---- for those who watch; at any time, from any thread ----
+    # ---- for watchers; at any time, from any thread ----
 
     @property
     def is_paused(self) -> bool:
@@ -86,11 +86,11 @@ class Gate:
 
     @property
     def speed(self) -> float | None:
-        """Simulated seconds in a real one; None for as fast as possible."""
+        """Simulated seconds per real second; None for no limit."""
         return self.pace.speed
 
     def set_speed(self, speed: float | None, now_ns: int) -> None:
-        """Let time pass at another speed from now on, a simulated time [ns].
+        """Change the speed from a simulated time [ns] on.
 
         Raises:
             ParameterError: If it is out of range.
@@ -99,29 +99,29 @@ class Gate:
         self._settle()
 
     def pause(self, now_ns: int) -> None:
-        """Let time stand still, now, at a simulated time [ns]."""
+        """Stop time at a simulated time [ns]."""
         self.pace.hold(now_ns)
         self._settle()
 
     def go_on(self) -> None:
-        """Let it pass again."""
+        """Let time pass again."""
         self.pace.go_on()
         self._settle()
 
     def step(self, seconds: float) -> None:
-        """Let so much pass [s], and then stand still again."""
+        """Let some time pass [s], then stop again."""
         self.pace.hold(self.pace.now_ns() + round(seconds * NS_PER_S))
         self._settle()
 
     def ask(self, act: Callable[[], Done]) -> Future[Done]:
-        """Have something done with the world as soon as possible, between two events; `serve` if nobody moves it."""
+        """Call a function as soon as possible between two events; return its future result."""
         future: Future[Done] = Future()
         self._requests.append((act, future))
         self.serve()
         return future
 
     def serve(self) -> None:
-        """Do what was asked for, unless somebody moves the world at this moment, who does it."""
+        """Do the requests, unless a thread moves the world at this moment, which does them."""
         if not self._requests:
             return
         self.is_up = True
@@ -132,25 +132,25 @@ class Gate:
                 self._changed.release()
 
     def keep(self, keeper: Callable[[], None]) -> None:
-        """Have something done again after each slice of time, until `leave`: a hand that holds a robot in its place."""
+        """Call a function after each slice of time, until `leave`; a drag holds a robot so."""
         self._keepers.append(keeper)
         self._settle()
 
     def leave(self, keeper: Callable[[], None]) -> None:
-        """Have it done no longer, if it is."""
+        """Stop calling a function of `keep`."""
         if keeper in self._keepers:
             self._keepers.remove(keeper)
         self._settle()
 
     def close(self) -> None:
-        """Let everything through from now on, and do what was asked for."""
+        """Let time pass freely from now on, and do the requests."""
         self._is_closed = True
         self._keepers.clear()
         self._settle()
         self.serve()
 
     def wall_ns(self) -> int:
-        """Return real time less what was spent waiting here [ns]."""
+        """Return real time without the time that was spent waiting here [ns]."""
         return self._wall_ns() - self._held_ns
 
     def patience(self, seconds: float) -> Patience:
@@ -164,9 +164,9 @@ class Gate:
     # ---- for the simulation ----
 
     def admit(self, now_ns: int, until_ns: int) -> int:
-        """Wait until time may pass, and return how far it may go: `until_ns`, or less, and then ask again.
+        """Wait until time may pass; return how far it may go: `until_ns`, or less, and then ask again.
 
-        The lock is held by the caller, and released while this waits.
+        The caller holds the lock; waiting releases it.
         """
         with self._changed:
             while True:
@@ -188,7 +188,7 @@ class Gate:
                     return most_ns
                 if pace.is_held and due_ns > now_ns:
                     return due_ns
-                self._wait(min(pace.wall_wait_s(most_ns), LOOK_S))
+                self._wait(min(pace.wall_wait_s(most_ns), CHECK_S))
 
     # ---- inside ----
 

@@ -1,4 +1,4 @@
-"""Pace: simulated time held to a multiple of real time by waiting, never by changing what happens."""
+"""Pace: keeps simulated time at a multiple of real time by waiting, so the run stays the same."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SPEED_MIN = 1e-3
 SPEED_MAX = 1e3
 
 LAG_LIMIT_NS = NS_PER_S // 4
-"""How far behind the simulation must be for a warning [ns of the wall clock]; a busy computer often is for a moment."""
+"""Lag of the simulation at which a warning is logged [ns of real time]; a busy computer often lags for a moment."""
 
 ALWAYS_NS = 2**62
 """Later than any simulated time [ns]."""
@@ -23,14 +23,14 @@ _log = logging.getLogger("kiks.serve")
 
 
 class Pace:
-    """What simulated time it ought to be now.
+    """Maps real time to the simulated time that is due.
 
     Args:
-        speed: Simulated seconds in a real one; None for as many as can be done.
-        wall_ns: A clock that only goes forwards [ns]; a test hands in its own.
+        speed: Simulated seconds per real second; None for no limit.
+        wall_ns: A monotonic clock [ns]; tests pass their own.
 
     Attributes:
-        speed: The same; `set_speed` changes it.
+        speed: Simulated seconds per real second; `set_speed` changes it.
         is_held: Whether simulated time stands still.
 
     Raises:
@@ -59,12 +59,12 @@ class Pace:
         self.start(0)
 
     def start(self, time_ns: int) -> None:
-        """Let simulated time be `time_ns` at this moment; if it stands still, there."""
+        """Bind a simulated time [ns] to the present moment."""
         self._wall_start_ns = self._wall_ns()
         self._start_ns = time_ns
 
     def set_speed(self, speed: float | None, time_ns: int) -> None:
-        """Go on at another speed from a simulated time [ns].
+        """Change the speed from a simulated time [ns] on.
 
         Raises:
             ParameterError: If it is out of range.
@@ -73,17 +73,17 @@ class Pace:
         self.start(time_ns)
 
     def hold(self, time_ns: int) -> None:
-        """Let simulated time stand still from `time_ns` on, until `go_on`."""
+        """Stop simulated time at `time_ns`, until `go_on`."""
         self.is_held = True
         self.start(time_ns)
 
     def go_on(self) -> None:
-        """Let it pass again, from where it stands still."""
+        """Let simulated time pass again."""
         self.is_held = False
         self.start(self._start_ns)
 
     def now_ns(self) -> int:
-        """Return the simulated time that the wall clock stands for [ns]."""
+        """Return the simulated time that is due now [ns]."""
         if self.is_held:
             return self._start_ns
         if self.speed is None:
@@ -91,14 +91,14 @@ class Pace:
         return self._start_ns + round((self._wall_ns() - self._wall_start_ns) * self.speed)
 
     def wall_wait_s(self, time_ns: int) -> float:
-        """Return how long it really takes until a simulated time [s]; 0 if it is over."""
+        """Return the real time until a simulated time [s]; 0 if that has passed."""
         left_s = s_from_ns(time_ns - self.now_ns())
         if left_s <= 0 or self.speed is None:
             return 0.0 if left_s <= 0 else math.inf
         return math.inf if self.is_held else left_s / self.speed
 
     def report(self, time_ns: int) -> None:
-        """Note how far the simulation has got [ns]; say so, once, if that is far behind."""
+        """Compare the simulation's time [ns] with the due time; log a large lag, once."""
         if self._has_warned or self.speed is None:
             return
         lag_ns = (self.now_ns() - time_ns) / self.speed
@@ -106,7 +106,7 @@ class Pace:
             self._has_warned = True
             _log.warning(
                 "the simulation must keep up with %g times real time, but it is %.1f s behind. Ask for a lower speed; "
-                "the robots do the same as ever, only later.",
+                "the robots do the same, only later.",
                 self.speed,
                 lag_ns / NS_PER_S,
             )
@@ -118,6 +118,6 @@ def _check_speed(speed: float | None) -> float | None:
     ):
         raise ParameterError(
             f"speed must be a number from {SPEED_MIN:g} to {SPEED_MAX:g}, but it was {shown(speed)}. "
-            "1 is real time; a program that waits for its replies runs as fast as it can with thinking 'none'."
+            "1 is real time; a program that waits for its replies runs at full speed with thinking 'none'."
         )
     return speed

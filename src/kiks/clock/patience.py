@@ -1,4 +1,4 @@
-"""Patience: how long, in real time, somebody has been waited for."""
+"""Patience: a timeout in real time that can be renewed."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ LONGEST_S = 86_400.0
 
 
 class Patience:
-    """A stop-watch with an end.
+    """A timeout.
 
     Args:
-        seconds: How long it runs [s of real time].
-        wall_ns: A clock that only goes forwards [ns]; a test hands in its own.
+        seconds: Its length [s of real time].
+        wall_ns: A monotonic clock [ns]; tests pass their own.
 
     Raises:
         ParameterError: If the time is out of range.
@@ -46,16 +46,16 @@ class Patience:
         self._begin_ns: int | None = None
 
     def left_s(self, *, share: float = 1.0) -> float:
-        """Return how much is left of it, or of a share of it [s]; the first call starts it."""
+        """Return the time left of it, or of a share of it [s]; the first call starts it."""
         now_ns = self._wall_ns()
         if self._begin_ns is None:
             self._begin_ns = now_ns
         return max(self.seconds * share - s_from_ns(now_ns - self._begin_ns), 0.0)
 
     def waited_s(self) -> float:
-        """Return how long it has been running [s]."""
+        """Return the time since its start [s]."""
         return 0.0 if self._begin_ns is None else s_from_ns(self._wall_ns() - self._begin_ns)
 
     def renew(self) -> None:
-        """Stop it and wind it up again."""
+        """Reset it; the next call of `left_s` starts it again."""
         self._begin_ns = None

@@ -1,4 +1,4 @@
-"""The user's program, as the clock sees it: what its thinking and its waiting cost."""
+"""The clock of the user's program: the cost of its thinking and of its polling."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ FIRST_POLL_NS = 1_000
 LONGEST_POLL_NS = 1_000_000
 
 FREE_POLLS = 100
-"""Questions about locks and the like, in a row, that cost nothing."""
+"""Consecutive polls of locks and the like that cost nothing."""
 
 
 class PollCost:
-    """The length of a run of questions without an answer (is a byte there? what time is it?).
+    """The cost of consecutive polls (is a byte there? what time is it?).
 
-    The first question is free, so a program that looks at the clock once a loop is not slowed. Who asks again without
-    doing anything in between is waiting: each further question lets twice as much time pass, up to 1 ms.
+    Polling takes no time by itself, so a program that polls in a loop would spin while time stands still. So each
+    consecutive poll costs twice the last, from 1 us up to 1 ms. The first is free: a program that reads the clock once
+    per loop is not slowed.
 
     Example:
         >>> waiting = PollCost()
@@ -31,43 +32,43 @@ class PollCost:
         self._poll_count = 0
 
     def ask(self) -> int:
-        """Return the time that this question takes [ns]."""
+        """Return the cost of this poll [ns]."""
         cost_ns = self._next_ns
         self._next_ns = min(cost_ns * 2, LONGEST_POLL_NS) if cost_ns else FIRST_POLL_NS
         return cost_ns
 
     def poll(self) -> int:
-        """Return the time that a question takes [ns] to which other threads know the answer: is the lock free?
+        """Return the cost of a poll [ns] that other threads answer: is the lock free?
 
-        The first hundred in a row are free: a program may look at a few locks without losing its time.
+        The first hundred in a row are free: a program may look at some locks without losing time.
         """
         self._poll_count += 1
         return self.ask() if self._poll_count > FREE_POLLS else 0
 
     def act(self) -> None:
-        """Note that the program did something else."""
+        """Note that the program has done something else."""
         self._next_ns = 0
         self._poll_count = 0
 
 
 EPOCH_S = 946_684_800
-"""What a program's calendar says when a simulation starts [s since 1970]: 1 January 2000, so that runs repeat."""
+"""Calendar time at the start of a simulation [s since 1970]: 1 January 2000, so that runs repeat."""
 
 
 class ProgramClock:
-    """One program, with one thinking policy for all the ports and clocks that it uses.
+    """The clock of one program, with one thinking policy for all its ports and clocks.
 
     Args:
         thinking: A policy that `parse_thinking` knows.
 
     Attributes:
-        thinks: Whether its thinking costs time.
-        measures: Whether that is as long as it really takes.
-        waiting: What the questions of the thread cost that runs.
-        act_count: How often it has called a port or a clock.
+        thinks: Whether thinking costs time.
+        measures: Whether thinking costs as long as it really takes.
+        waiting: The cost of polls of the running thread.
+        act_count: Number of calls of ports and clocks.
 
     Raises:
-        ParameterError: If it knows none of that name.
+        ParameterError: If the policy is unknown.
     """
 
     def __init__(self, thinking: str) -> None:
@@ -79,25 +80,25 @@ class ProgramClock:
         self.act_count = 0
 
     def enter(self, *, is_command: bool) -> int:
-        """Return what the program has to pay as it calls [ns]; see `Thinking.enter`."""
+        """Return the thinking time to charge at a call [ns]; see `Thinking.enter`."""
         return self._policy.enter(is_command=is_command) if self._policy is not None else 0
 
     def ask(self) -> int:
-        """Return the time that a question takes [ns], more and more while nothing else is done."""
+        """Return the cost of a poll [ns], which grows while the program does nothing else."""
         return self.waiting.ask()
 
     def poll(self) -> int:
-        """Return the time that a question takes [ns] which is none about time or bytes; see `PollCost.poll`."""
+        """Return the cost of a poll [ns] of a lock or the like; see `PollCost.poll`."""
         self.act_count += 1
         return self.waiting.poll()
 
     def go_on(self) -> None:
-        """Note that another thread of it thinks now."""
+        """Note that another thread of the program thinks now."""
         if self._policy is not None:
             self._policy.leave()
 
     def leave(self, *, has_acted: bool) -> None:
-        """Note that the program goes on now, after it has done something or has only asked."""
+        """Note that the program goes on now, after an action or a poll."""
         self.act_count += 1
         if has_acted:
             self.waiting.act()
@@ -106,7 +107,7 @@ class ProgramClock:
 
     @property
     def measured_ns(self) -> list[int]:
-        """What thinking 'live' has measured so far [ns]; `save_thinking` keeps it for 'replay'."""
+        """Times that thinking 'live' has measured so far [ns]; `save_thinking` stores them for 'replay'."""
         return self._policy.measured_ns if isinstance(self._policy, ThinkingLive) else []
 
 

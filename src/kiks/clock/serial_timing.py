@@ -1,4 +1,4 @@
-"""A serial line in simulated time: when each character of a command has arrived, and each of a reply.
+"""A serial line in simulated time: the arrival of each character of commands and replies.
 
 A character takes 11 bit times and the next one waits for it; both directions work at once (khepera-protocol.md 2.1).
 """
@@ -10,19 +10,19 @@ from collections import deque
 from kiks.units import character_ns
 
 BACKLOG_LIMIT = 4096
-"""Characters on the way to the robot beyond which a sender has to wait [bytes]: a serial driver's buffer."""
+"""Characters on the way to the robot beyond which a sender must wait: the size of a serial driver's buffer."""
 
 OUTPUT_LIMIT = 1 << 20
-"""Characters that wait for a reader [bytes]; what the robot says beyond them is lost, as in any serial driver."""
+"""Most characters that wait for a reader; further replies are lost, as in any serial driver."""
 
 
 class SerialTiming:
     """Both directions of one robot's line.
 
     Attributes:
-        waiting: Characters for the host that nobody has read, arrived or not.
+        waiting: Unread characters for the host, arrived or not.
         sending_until_ns: When the last character for the robot will have arrived [ns].
-        lost_count: Characters that were dropped because nobody read for too long.
+        lost_count: Characters that were dropped because the host did not read.
     """
 
     def __init__(self, baud: int) -> None:
@@ -32,33 +32,33 @@ class SerialTiming:
         self.lost_count = 0
         self._answering_until_ns = 0
         self.waiting = bytearray()
-        # Pieces of `waiting`, oldest first: when the first character set out [ns], time of one [ns], their count.
+        # Pieces of `waiting`, oldest first: start of the first character [ns], time of one [ns], their count.
         self._pieces: deque[list[int]] = deque()
 
     def set_baud(self, baud: int) -> None:
-        """Change the speed for everything that sets out from now on."""
+        """Change the speed for all later characters."""
         self.baud = baud
         self.character_ns = character_ns(baud)
 
     @property
     def room_ns(self) -> int:
-        """When a sender that is held back may go on [ns]."""
+        """When a waiting sender may go on [ns]."""
         return self.sending_until_ns - BACKLOG_LIMIT * self.character_ns
 
     def send(self, count: int, at_ns: int) -> int:
-        """Put characters on the way to the robot; return when the first one sets out [ns]."""
+        """Send characters to the robot; return when the first one starts [ns]."""
         start_ns = max(at_ns, self.sending_until_ns)
         self.sending_until_ns = start_ns + count * self.character_ns
         return start_ns
 
     def carry(self, count: int, at_ns: int) -> int:
-        """Put characters that somebody else keeps on the way to the host; return when the first sets out [ns]."""
+        """Send characters to the host that another object keeps; return when the first one starts [ns]."""
         start_ns = max(at_ns, self._answering_until_ns)
         self._answering_until_ns = start_ns + count * self.character_ns
         return start_ns
 
     def answer(self, data: bytes, at_ns: int) -> int | None:
-        """Put a reply on the way to the host; return when it sets out [ns], None if it is empty or lost."""
+        """Send a reply to the host; return when it starts [ns], None if it is empty or lost."""
         if not data:
             return None
         if len(self.waiting) + len(data) > OUTPUT_LIMIT:
@@ -70,7 +70,7 @@ class SerialTiming:
         return start_ns
 
     def arrived_count(self, now_ns: int) -> int:
-        """Return how many of the waiting characters have arrived."""
+        """Return the number of waiting characters that have arrived."""
         count = 0
         for start_ns, character, length in self._pieces:
             if start_ns + length * character <= now_ns:
@@ -80,7 +80,7 @@ class SerialTiming:
         return count
 
     def arrival_ns(self, count: int) -> int | None:
-        """Return when the first `count` waiting characters have all arrived [ns], None if they were never sent."""
+        """Return when the first `count` waiting characters have arrived [ns]; None if there are not as many."""
         for start_ns, character, length in self._pieces:
             if count <= length:
                 return start_ns + count * character
@@ -108,11 +108,11 @@ class SerialTiming:
         return taken
 
     def cut_short(self, until_ns: int, now_ns: int) -> None:
-        """Take off the line what would reach the robot later than `until_ns`, and what would reach the host [ns]."""
+        """Remove characters that would reach the robot later than `until_ns` [ns], and all for the host."""
         self.sending_until_ns = min(self.sending_until_ns, until_ns)
         self._answering_until_ns = min(self._answering_until_ns, now_ns)
 
     def forget(self) -> None:
-        """Drop every character that nobody has read."""
+        """Drop all unread characters."""
         self.waiting.clear()
         self._pieces.clear()

@@ -1,4 +1,4 @@
-"""Thinking time: how long the user's program needs between a reply and its next command, and who says so.
+"""Thinking time: the time that the user's program needs between a reply and its next command.
 
 `none` and `fixed` are repeatable; `live` measures the program on this computer and is not; `replay` repeats, to the
 nanosecond, what an earlier `live` run measured.
@@ -21,19 +21,19 @@ FILE_BYTES_MAX = 64 << 20
 """Most bytes of a replay file."""
 
 DIGITS_MAX = 13
-"""Most digits of a time [ns]: nobody thinks for three hours, and a simulation of years would seem to hang."""
+"""Most digits of a time [ns]: no program thinks for three hours, and a simulation of years would seem to hang."""
 
 
 class Thinking(Protocol):
-    """A policy: asked whenever the program calls the port, told whenever the port gives control back."""
+    """A policy: `enter` is called when the program calls a port, `leave` when the port returns."""
 
     is_repeatable: bool
 
     def enter(self, *, is_command: bool) -> int:
-        """Return the time to charge [ns] as a port is called; `is_command`: to send, first since a reply."""
+        """Return the time to charge at a call [ns]; `is_command`: the call sends, the first since a reply."""
 
     def leave(self) -> None:
-        """Note that the program goes on now."""
+        """Note that the program goes on."""
 
 
 class ThinkingFixed:
@@ -45,7 +45,7 @@ class ThinkingFixed:
         self.time_ns = time_ns
 
     def enter(self, *, is_command: bool) -> int:
-        """Return the fixed time before a command, nothing otherwise."""
+        """Return the fixed time before a command, 0 otherwise."""
         return self.time_ns if is_command else 0
 
     def leave(self) -> None:
@@ -53,7 +53,7 @@ class ThinkingFixed:
 
 
 class ThinkingLive:
-    """The time that really passed, times a factor that stands for another computer (2: half as fast as this one)."""
+    """The measured time times a factor for another computer (2: half as fast as this one)."""
 
     is_repeatable = False
 
@@ -63,18 +63,18 @@ class ThinkingLive:
         self._left_ns: int | None = None
 
     def enter(self, *, is_command: bool) -> int:
-        """Return the time since control was given back."""
+        """Return the time since the port returned."""
         passed_ns = 0 if self._left_ns is None else round((perf_counter_ns() - self._left_ns) * self.factor)
         self.measured_ns.append(passed_ns)
         return passed_ns
 
     def leave(self) -> None:
-        """Start the stop-watch."""
+        """Start to measure."""
         self._left_ns = perf_counter_ns()
 
 
 class ThinkingReplay:
-    """The times of an earlier run, in their order; nothing when they are used up."""
+    """The times of an earlier run, in their order; 0 after the last."""
 
     is_repeatable = True
 
@@ -123,7 +123,7 @@ def _read_times(path: Path) -> list[int]:
     lines = read_file(path, what, bytes_max=FILE_BYTES_MAX).splitlines()
     for number, line in enumerate(lines, 1):
         if not line.isdigit() or len(line) > DIGITS_MAX:
-            # What the line says is left out: whatever file was named by mistake, its content stays there.
+            # The message leaves the line out, because the user may have named a private file by mistake.
             raise ParameterError(
                 f"{what}, line {number}, must be a whole number of ns of at most {DIGITS_MAX} digits, but it is "
                 "something else. Record a run again with thinking 'live'."

@@ -4,8 +4,8 @@ A Ray cluster runs any code for any client that reaches it. So a cluster that is
 address alone, without Ray's dashboard; a cluster of several computers belongs on a private network
 (docs/distributed.md).
 
-Ray could restart lost actors and repeat lost calls by itself, but then no error would show that a chunk kills one worker
-after the other. So actors are not restarted, and `PoolExecutor` sends lost chunks again.
+Ray could restart lost actors and repeat lost calls by itself, but then no error would show that a chunk kills one
+worker after the other. So actors are not restarted, and `PoolExecutor` sends lost chunks again.
 """
 
 from __future__ import annotations

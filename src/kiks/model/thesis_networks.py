@@ -1,7 +1,7 @@
 """The thesis's response: one small neural network for each sensor, and the fans of rays they were trained on.
 
 Source: thesis section 3.3, "7 input neurons, 13+7 neurons in 2 hidden layers, 1 linear output neuron". The weights of
-the file that comes with KiKS were trained by `kiks fit`; `responses/SOURCE.md` says on which data.
+the file that comes with KiKS were trained by `tools/accuracy.py`; `responses/SOURCE.md` says on which data.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ class NetworkResponse:
         replace_file(file, "{\n" + ",\n".join(parts) + "\n}\n", "networks")
 
 
-_ADVICE = "`kiks fit --out FILE` writes one."
+_ADVICE = "`python tools/accuracy.py --networks FILE` in a checkout of KiKS writes one."
 
 
 def _written(value: Any) -> str:

@@ -1,4 +1,4 @@
-"""What all real ports have in common: an endpoint is a way in to one robot, a channel is the client that came in by it.
+"""The base classes of real ports: an endpoint accepts the clients of one robot, a channel is the connection to one.
 
 Both know bytes and file descriptors, and nothing of the simulation. Nothing here blocks.
 """
@@ -11,17 +11,17 @@ from abc import ABC, abstractmethod
 from kiks.clock.serial_timing import OUTPUT_LIMIT
 
 READ_SIZE = 4096
-"""Most characters taken from a client at once [bytes]."""
+"""Most bytes read from a client at once."""
 
 _log = logging.getLogger("kiks.serve")
 
 
 class Channel(ABC):
-    """A client's end of a robot's line.
+    """The connection to a client.
 
     Attributes:
-        name: Where the client came in.
-        baud: The speed that the client has set its port to [bit/s], None if it cannot say.
+        name: Name of its endpoint.
+        baud: The speed to which the client has set its port [bit/s]; None if the connection does not carry it.
     """
 
     baud: int | None = None
@@ -33,36 +33,36 @@ class Channel(ABC):
 
     @abstractmethod
     def fileno(self) -> int:
-        """Return the descriptor to wait on."""
+        """Return the descriptor for the selector."""
 
     @abstractmethod
     def read(self) -> bytes | None:
-        """Return what the client has sent, perhaps nothing; None when it has gone."""
+        """Return the bytes that the client has sent, perhaps none; None when it has gone."""
 
     @abstractmethod
     def _put(self, data: bytes | bytearray) -> int:
-        """Hand characters to the operating system; return how many it took, all of them if nobody is there to read."""
+        """Write bytes; return how many the operating system took, all of them if the client has gone."""
 
     @abstractmethod
     def close(self) -> None:
-        """Part from the client and forget what it did not read."""
+        """Disconnect the client and drop unread bytes."""
 
     @property
     def has_ahead(self) -> bool:
-        """Say whether characters of the client were read ahead and not yet taken."""
+        """Whether bytes of the client were read ahead and not yet taken."""
         return False
 
     def find_end(self) -> bool:
-        """Read ahead and keep what comes; say whether the client has gone."""
+        """Read ahead and keep the bytes; return whether the client has gone."""
         return False
 
     @property
     def has_unsent(self) -> bool:
-        """Say whether characters wait because the client does not read; `flush` when the descriptor is writable."""
+        """Whether bytes wait because the client does not read; call `flush` when the descriptor is writable."""
         return bool(self._unsent)
 
     def write(self, data: bytes) -> None:
-        """Send characters to the client; what it does not take waits, up to a limit."""
+        """Send bytes to the client; bytes that it does not take wait, up to a limit."""
         if not self._unsent:
             data = data[self._put(data) :]
         if len(self._unsent) + len(data) <= OUTPUT_LIMIT:
@@ -74,38 +74,38 @@ class Channel(ABC):
             )
 
     def warn(self, text: str) -> None:
-        """Tell a person what the client does wrong: once, for one thing mostly comes of the other."""
+        """Log a mistake of the client: once, because one mistake mostly causes the next."""
         if not self._has_warned:
             self._has_warned = True
             _log.warning("%s", text)
 
     def flush(self) -> None:
-        """Send what waits, as far as the client takes it."""
+        """Send waiting bytes, as many as the client takes."""
         if self._unsent:
             del self._unsent[: self._put(self._unsent)]
 
 
 class Endpoint(ABC):
-    """One way in to one robot.
+    """Accepts clients of one robot.
 
     Attributes:
-        name: What a user opens: a path, or host:port.
+        name: The name that a user opens: a path, or host:port.
     """
 
     name: str
 
     @abstractmethod
     def fileno(self) -> int:
-        """Return the descriptor that is readable when a client wants to come in."""
+        """Return the descriptor that is readable when a client wants to connect."""
 
     @abstractmethod
     def accept(self) -> Channel | None:
-        """Let the client in; None if it has gone again. Its channel may have the same descriptor as the endpoint."""
+        """Accept the client; None if it has gone again. Its channel may have the same descriptor as the endpoint."""
 
     @abstractmethod
-    def turn_away(self) -> None:
-        """Refuse the client, because the robot has another one."""
+    def reject(self) -> None:
+        """Reject a client, because the robot has another one."""
 
     @abstractmethod
     def close(self) -> None:
-        """Close the way in and leave nothing behind."""
+        """Close the endpoint and remove its files."""

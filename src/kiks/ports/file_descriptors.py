@@ -1,9 +1,9 @@
-"""File descriptors: a server that has run out of them says so in one line, and goes on.
+"""File descriptors: a server that has run out of them logs one line and goes on.
 
-Need: each connection and each pseudo-terminal takes descriptors, and a process may have only so many. A listener that
-cannot accept stays readable: a loop that only tries again spins, one that lets the error out ends.
-Method: one descriptor is held in reserve. When there is no other, it is given up for the client that waits to come in,
-which is accepted and hung up on; then it is taken back. So the queue is always emptied.
+Each connection and each pseudo-terminal takes descriptors, and their number is limited. A listener that cannot accept
+stays readable: a loop that tries again spins, and a loop that raises ends. So one descriptor is held in reserve. When
+there is no other, the reserve is closed, the waiting client is accepted and disconnected, and the reserve is opened
+again. So the queue always empties.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from collections.abc import Iterator
 from kiks.errors import LinkError
 
 WANTED = 1 << 14
-"""Descriptors that a process asks for at its start, if it may: a thousand robots with three ports and a client each."""
+"""Descriptors that a process asks for at its start: enough for a thousand robots with three ports and a client each."""
 
 SHORTAGES = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
-"""The errors that mean that there are no more: of this process, of the computer, no memory for one."""
+"""Errors that mean that there are none left: of this process, of the computer, no memory for one."""
 
 _log = logging.getLogger("kiks.ports")
 
 
 def raise_limit() -> None:
-    """Let this process have as many descriptors as it may, up to `WANTED`."""
+    """Raise the limit of this process to as many descriptors as it may have, up to `WANTED`."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = WANTED if hard == resource.RLIM_INFINITY else min(WANTED, hard)
     if soft != resource.RLIM_INFINITY and soft < wanted:
@@ -38,20 +38,20 @@ def raise_limit() -> None:
 
 
 def shortage() -> str:
-    """Return the limit that was reached and the way out, for a person."""
+    """Return the limit that was reached and how to raise it, as text."""
     limit, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     return f"this process may have {limit}, and all are in use. Allow more: ulimit -n {max(4 * limit, 4096)}."
 
 
 @contextlib.contextmanager
 def opening(what: str) -> Iterator[None]:
-    """Say in a line why something could not be opened.
+    """Turn an error of the operating system into one clear line.
 
     Args:
-        what: What is opened, as the subject of a sentence.
+        what: The subject of the message.
 
     Raises:
-        LinkError: If the computer does not let it be opened.
+        LinkError: If the operating system does not open it.
     """
     try:
         yield
@@ -67,7 +67,7 @@ def opening(what: str) -> Iterator[None]:
 
 
 class Reserve:
-    """A descriptor for a client that must be turned away because there is no other; `RESERVE` is the process's."""
+    """A descriptor for rejecting a client when there is no other; `RESERVE` is the process's."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -75,14 +75,14 @@ class Reserve:
         self._has_warned = False
 
     def hold(self) -> None:
-        """Take the descriptor, if there is one; to be called when a listener opens."""
+        """Open the reserve, if a descriptor is free; called when a listener opens."""
         with self._lock:
             if self._spare < 0:
                 with contextlib.suppress(OSError):
                     self._spare = os.open(os.devnull, os.O_RDONLY | os.O_CLOEXEC)
 
     def accept(self, listener: socket.socket) -> socket.socket | None:
-        """Return the next connection; None if there is none, or no descriptor for it: then it is hung up on.
+        """Return the next connection; None if there is none, or no descriptor for it: then it is disconnected.
 
         Raises:
             OSError: If the listener is closed.
@@ -95,16 +95,14 @@ class Reserve:
         except OSError as error:
             if error.errno not in SHORTAGES:
                 raise
-            self._turn_away(listener)
+            self._reject(listener)
             return None
         return connection
 
-    def _turn_away(self, listener: socket.socket) -> None:
+    def _reject(self, listener: socket.socket) -> None:
         if not self._has_warned:
             self._has_warned = True
-            _log.warning(
-                "a client needs a file descriptor: %s Clients are turned away until some are free.", shortage()
-            )
+            _log.warning("a client needs a file descriptor: %s Clients are rejected until some are free.", shortage())
         with self._lock:
             if self._spare >= 0:
                 os.close(self._spare)
@@ -121,4 +119,4 @@ class Reserve:
 
 
 RESERVE = Reserve()
-"""The process's."""
+"""The reserve of this process."""

@@ -1,6 +1,6 @@
-"""How time passes while real programs are connected: live, or in lockstep with them.
+"""The two ways in which time passes while real programs are connected.
 
-Live: the world runs at a multiple of real time, whoever is there, and bytes are sent when they come.
+Live: the world runs at a multiple of real time, with or without clients, and bytes are sent when they come.
 Lockstep (`lockstep.py`): the world waits for each command, and then runs to the end of the reply.
 """
 
@@ -18,17 +18,17 @@ from kiks.sim.wire import Wire
 from kiks.units import NS_PER_S
 
 IDLE_S = 0.05
-"""Longest sleep [s]: a request to stop is noticed within it."""
+"""Longest sleep [s]: the server notices a request to stop within this time."""
 
 COALESCE_S = 0.002
-"""How long the characters of a reply that is under way are collected before they are handed over [s]."""
+"""Time for which the server collects characters of a reply before it hands them over [s]."""
 
 SLICE_NS = NS_PER_S
-"""Most simulated time that passes before the ports are looked at again [ns]."""
+"""Most simulated time between two checks of the ports [ns]."""
 
 LEFT_BEHIND_NS = 2 * NS_PER_S
-"""How long the commands of a client that has gone still act [ns]. Without an end, a client that is killed in the middle
-of a flood would keep the next one waiting for minutes."""
+"""Time for which commands of a client that has gone still act [ns]. Without a limit, a client that is killed in the
+middle of a flood would keep the next one waiting for minutes."""
 
 _log = logging.getLogger("kiks.serve")
 
@@ -41,10 +41,10 @@ class Link:
         robot: Number of the robot, from 1.
         wire: Its line in the simulation.
         channel: The client; None while there is none.
-        is_leaving: Whether the client has gone, and what it left behind is still being done.
-        is_dropped: Whether the client is to be hung up on.
-        events: What the channel's descriptor is being waited for.
-        refused: Endpoints at which somebody was turned away since the client came.
+        is_leaving: Whether the client has gone, and its commands still act.
+        is_dropped: Whether the server must disconnect the client.
+        events: The events that the selector reports of the channel's descriptor.
+        refused: Endpoints at which another client was rejected since this one came.
     """
 
     robot: int
@@ -56,18 +56,17 @@ class Link:
     refused: set[str] = field(default_factory=set)
 
     def clear(self) -> None:
-        """Forget what a client has left behind; the robot drives on."""
+        """Forget everything about the last client; the robot drives on."""
         self.is_leaving = self.is_dropped = False
         self.refused.clear()
         self.wire.hang_up()
 
 
 class TimePolicy(Protocol):
-    """One of the two ways. All of it is called with the simulation's lock held.
+    """One of the two ways. The server calls it with the simulation's lock held.
 
     Attributes:
-        forgets: Whether commands of a client that has gone may be dropped. Which were read then is a matter of real
-            time.
+        forgets: Whether commands of a client that has gone may be dropped; which ones then depends on real time.
     """
 
     forgets: bool
@@ -76,22 +75,22 @@ class TimePolicy(Protocol):
         """Begin now."""
 
     def enter(self, link: Link) -> None:
-        """Let a client take part."""
+        """Add a client."""
 
     def leave(self, link: Link) -> None:
-        """Let the commands that a client has left behind act."""
+        """Let the remaining commands of a client that has gone act."""
 
     def has_left(self, link: Link) -> bool:
-        """Say whether they have, as far as somebody must wait for that."""
+        """Return whether the next client may come."""
 
     def advance(self, links: Iterable[Link]) -> float:
-        """Let pass the time that is due, hand over what has arrived, and return how long nothing will happen [s]."""
+        """Let due time pass, hand over characters that have arrived, return the time until the next event [s]."""
 
     def receive(self, link: Link, data: bytes) -> None:
-        """Take characters from a client."""
+        """Take characters of a client."""
 
     def is_full(self, link: Link) -> bool:
-        """Say whether the client has to wait until the line has carried what it sent."""
+        """Return whether the client must wait until the line has carried its characters."""
 
 
 class Live:
@@ -104,14 +103,14 @@ class Live:
         self._pace = pace
 
     def start(self) -> None:
-        """Bind the simulated time of now to the wall clock of now."""
+        """Bind the present simulated time to the present wall clock."""
         self._pace.start(self._sim.now_ns)
 
     def enter(self, link: Link) -> None:
-        """Do nothing: the world runs anyway."""
+        """Do nothing: the world runs with or without clients."""
 
     def leave(self, link: Link) -> None:
-        """Let what is on the line act, unless that takes too long."""
+        """Let the commands on the line act, unless that takes too long."""
         now_ns = self._sim.now_ns
         if link.wire.drop_after(now_ns + LEFT_BEHIND_NS, now_ns):
             _log.warning(
@@ -122,11 +121,11 @@ class Live:
             )
 
     def has_left(self, link: Link) -> bool:
-        """Say yes: the next client's commands follow on the line."""
+        """Return True: the next client's commands follow on the line."""
         return True
 
     def _catch_up(self) -> bool:
-        """Let time pass up to now, a slice at most; say whether that was all."""
+        """Let time pass up to now, at most one slice; return whether that was all."""
         sim, due_ns = self._sim, self._pace.now_ns()
         until_ns = min(due_ns, sim.now_ns + SLICE_NS)
         sim.advance_to(until_ns)
@@ -134,7 +133,7 @@ class Live:
         return until_ns == due_ns
 
     def advance(self, links: Iterable[Link]) -> float:
-        """Run up to the wall clock and deliver the characters that have arrived."""
+        """Run up to the wall clock and deliver characters that have arrived."""
         sim, pace = self._sim, self._pace
         has_caught_up = self._catch_up()
         pace.report(sim.now_ns)
@@ -159,5 +158,5 @@ class Live:
         link.wire.send(data, self._sim.now_ns)
 
     def is_full(self, link: Link) -> bool:
-        """Say whether as many characters are on the line as a serial driver holds."""
+        """Return whether the line holds as many characters as a serial driver."""
         return link.wire.line.room_ns > self._sim.now_ns

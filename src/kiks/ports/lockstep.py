@@ -1,8 +1,8 @@
 """Lockstep: real programs on real ports, each of which the world waits for.
 
-A command acts the thinking time after the reply before it, and the program waits until its own reply is there. How the
-operating system cuts the bytes, and how long a program really took, has no influence; how several programs share the
-world stands in `program_scheduler.py`.
+A command acts one thinking time after the previous reply, and the program waits for its own reply. Neither the way in
+which the operating system splits the bytes nor the real time that a program takes has an influence.
+`program_scheduler.py` tells how several programs share the world.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from kiks.units import NS_PER_S
 TERMINATORS = (b"\r", b"\n")
 
 LEFT_BEHIND_COUNT = 50
-"""When a client leaves more commands behind, the next one waits for so long that a person is told."""
+"""If a client leaves more commands behind, the next one waits so long that the log says so."""
 
 REPLY_LENGTH = 64
 """Longest usual reply [characters]."""
@@ -36,15 +36,15 @@ class Lockstep:
 
     Args:
         sim: The world.
-        thinking_ns: What a program needs before each command [ns].
-        programs: How many begin together.
-        missing: Returns who of them is not there yet, in words for a person.
+        thinking_ns: Thinking time before each command [ns].
+        programs: Number of programs that begin together.
+        missing: Returns the names of the missing programs, for the log.
         when_silent: What happens to a program that is silent while others wait: 'wait', 'drop' or 'ignore'.
-        patience_s: How long it may be [s of real time].
+        patience_s: How long a program may be silent [s of real time].
         new_patience: For tests: makes patiences with their own wall clock.
 
     Raises:
-        ParameterError: If there is no such policy, or the patience is out of range.
+        ParameterError: If the policy is unknown, or the patience is out of range.
     """
 
     forgets = False
@@ -77,34 +77,34 @@ class Lockstep:
         """Do nothing: time passes with the first command."""
 
     def enter(self, link: Link) -> None:
-        """Let a client take part from now on."""
+        """Add a client."""
         client = self._clients[link.robot] = Client(link, self._sim, self._scheduler, self._thinking_ns)
         self._scheduler.join(client)
 
     def leave(self, link: Link) -> None:
-        """Let the commands that a client has left behind act; `has_left` when they have."""
+        """Let the remaining commands of a client that has gone act; `has_left` when they have."""
         self._clients[link.robot].leave()
 
     def has_left(self, link: Link) -> bool:
-        """Say whether everything that a client has left behind is done."""
+        """Return whether all commands of a client that has gone have acted."""
         return self._clients[link.robot].has_left
 
     def advance(self, links: Iterable[Link]) -> float:
-        """Carry out the commands whose turn it is, and hand over their replies."""
+        """Send the commands that are due, and hand over their replies."""
         wait_s = self._scheduler.advance()
         return IDLE_S if wait_s is None else min(wait_s, IDLE_S)
 
     def receive(self, link: Link, data: bytes) -> None:
-        """Keep characters until their turn."""
+        """Store characters until their turn."""
         self._clients[link.robot].receive(data)
 
     def is_full(self, link: Link) -> bool:
-        """Say whether the client is that far ahead of the robot."""
+        """Return whether the client is too far ahead of the robot."""
         return self._clients[link.robot].is_full
 
 
 class Client(Participant):
-    """The client of a link, as one that takes its turn."""
+    """The client of a link, as the scheduler sees it."""
 
     def __init__(self, link: Link, sim: Simulation, scheduler: ProgramScheduler, thinking_ns: int) -> None:
         super().__init__(f"the client of robot {link.robot}", link.robot)
@@ -120,40 +120,40 @@ class Client(Participant):
 
     @property
     def is_full(self) -> bool:
-        """Say whether as much as a line holds waits for its turn."""
+        """Whether as many characters wait as a line holds."""
         return len(self._kept) >= BACKLOG_LIMIT
 
     def receive(self, data: bytes) -> None:
-        """Keep characters until their turn."""
+        """Store characters until their turn."""
         self._kept += data
         self.patience.renew()
         self._cut()
 
     def leave(self) -> None:
-        """Let what came whole still act, and forget the rest."""
+        """Let complete commands act, and drop the rest."""
         self._is_leaving = True
-        self._look_around()
+        self._update_has_left()
         count = len(_TERMINATOR.findall(self._kept))
         if count > LEFT_BEHIND_COUNT:
-            # None is dropped: which were left when it was noticed that the client has gone is a matter of real time.
+            # No command is dropped: which ones had come when the server noticed the end depends on real time.
             most_ns = (len(self._kept) + count * REPLY_LENGTH) * self._link.wire.line.character_ns
             _log.warning(
-                "%s has gone and left %d commands behind, which still act: the next one is let in after that, at most "
-                "%.0f s of simulated time from now.",
+                "%s has gone and left %d commands behind, which still act: the next client may come after that, at "
+                "most %.0f s of simulated time from now.",
                 self.name,
                 count,
                 most_ns / NS_PER_S,
             )
 
     def drop(self) -> None:
-        """Hang up on the client."""
+        """Disconnect the client."""
         self._link.is_dropped = True
         self.is_waited_for = False
 
-    # ---- its turn ----
+    # ---- events ----
 
     def next_ns(self) -> int | None:
-        """Return when the next command is sent [ns], if it has come whole."""
+        """Return when the next complete command is sent [ns]; None without one."""
         return max(self.acts_from_ns, self._sim.now_ns) if self._next else None
 
     def act(self) -> None:
@@ -165,8 +165,8 @@ class Client(Participant):
         self._cut()
         self.acts_from_ns = at_ns
         if piece in TERMINATORS and last in TERMINATORS and not wire.firmware.spec.quirks.answer_empty_lines:
-            # The robot is silent about an empty line, so nobody thinks before it or waits after it. The LF of CR LF
-            # left right behind the CR.
+            # The robot does not answer an empty line, so it costs no thinking time and no wait. The LF of CR LF left
+            # right behind the CR.
             wire.send(piece, line.sending_until_ns if last + piece == b"\r\n" else self._free_ns)
             self._go_on(self._free_ns)
         else:
@@ -179,7 +179,7 @@ class Client(Participant):
         wire, line = self._link.wire, self._link.wire.line
         if wire.pending:
             return
-        # The world stands at the instant at which the command has acted, or where it was sent if it was none.
+        # The world stands at the instant at which the command has acted, or was sent if it was no command.
         end_ns = max(self.acts_from_ns, self._sim.now_ns)
         count = len(line.waiting)
         if count:
@@ -198,13 +198,13 @@ class Client(Participant):
         line = self._link.wire.line
         self._free_ns = max(time_ns, line.room_ns)
         self.acts_from_ns = self._free_ns + self._thinking_ns
-        self._look_around()
+        self._update_has_left()
 
-    def _look_around(self) -> None:
+    def _update_has_left(self) -> None:
         self.has_left = self._is_leaving and not self._next and not self.waits
 
     def _cut(self) -> None:
-        """Take the next command from what is kept, if it is whole."""
+        """Take the next command from the stored characters, if it is complete."""
         if self._next:
             return
         kept = self._kept
@@ -212,7 +212,7 @@ class Client(Participant):
         if match is not None:
             end = match.end()
         elif len(kept) >= BACKLOG_LIMIT:
-            # No command is as long as that: the robot may drop it, so that it is not kept for ever.
+            # No command is this long: send it for the robot to drop.
             end = BACKLOG_LIMIT
         else:
             return

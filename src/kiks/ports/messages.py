@@ -1,7 +1,8 @@
-"""What a program in a process of its own and the process that runs the world say to each other.
+"""The messages between a program's process and the process that runs the world.
 
-A request is sent by the program, stamped with its own time. Those that tell are not answered, so the program goes on at
-once; those that ask are answered with the program's new time. Both have a head of fixed length, and characters behind.
+A program sends requests, stamped with its own time. Some requests only tell and get no answer, so the program goes on
+at once. The others ask, and the answer carries the program's new time. Both have a header of fixed length, followed by
+bytes.
 """
 
 from __future__ import annotations
@@ -14,10 +15,10 @@ from typing import NamedTuple
 from kiks.sim.read_completion import Read
 
 RECEIVE_SIZE = 1 << 16
-"""Most bytes taken from the connection at once."""
+"""Most bytes read from the connection at once."""
 
 WINDOW = 64
-"""Requests that a program may send without an answer: nobody runs farther ahead of the world than that."""
+"""Requests that a program may send without an answer: it limits how far a program runs ahead of the world."""
 
 _REQUEST = struct.Struct("<BHqIqqqqI")
 _ANSWER = struct.Struct("<I?qqqI")
@@ -25,53 +26,53 @@ _READ = struct.Struct("<HqB")
 
 
 class Kind(IntEnum):
-    """What a request wants; the numbers that it carries."""
+    """The kind of a request, and the fields that it uses."""
 
     REACHED = 1
-    """Tells that the program does nothing earlier."""
+    """Tells that the program does nothing before its time."""
     MEET = 2
-    """Asks to be answered when the world is there, too."""
+    """Asks for an answer when the world has reached the program's time."""
     FIND = 3
-    """Asks for the number of the robot behind the port name that follows."""
+    """Asks for the number of the robot behind the port name in `data`."""
     CLAIM = 4
-    """Asks for a robot's line; who wants it follows."""
+    """Asks for a robot's line exclusively; `data` names the program."""
     HANG_UP = 5
-    """Gives a line back, if `first` is 1, and forgets what nobody read."""
+    """Releases a line, if `first` is 1, and drops unread characters."""
     SEND = 6
-    """Tells what is sent; the characters follow."""
+    """Sends the characters in `data`."""
     SEND_AND_MEET = 7
-    """The same, and asks to be answered when the line has taken it."""
+    """The same, and asks for an answer when the line has taken them."""
     READ = 8
-    """Asks for `first` characters (-1: any number) or up to the terminator that follows; `second`: time-out [ns], -1
-    for none; `third`: what a read in vain costs [ns]."""
+    """Asks for `first` characters (-1: any number) or up to the terminator in `data`; `second`: timeout [ns], -1 for
+    none; `third`: cost of a read without result [ns]."""
     COUNT = 9
-    """Asks how many characters have arrived."""
+    """Asks for the number of characters that have arrived."""
     DROP = 10
-    """Tells to forget these."""
+    """Drops these."""
     SENT = 11
-    """Asks when everything will have been sent [ns]."""
+    """Asks when all characters will have been sent [ns]."""
     SET_BAUD = 12
-    """Tells the speed, `first`."""
+    """Sets the speed to `first`."""
     BAUD = 13
     """Asks for the speed."""
     ROOM = 14
-    """Asks when the line takes more [ns]."""
+    """Asks when the line has room [ns]."""
     WAIT = 15
-    """Asks to be answered when one of the reads that follow is complete, or at `second` [ns]; -1: at no time."""
+    """Asks for an answer when one of the reads in `data` is complete, or at `second` [ns]; -1: without a limit."""
     END = 16
-    """Never sent: what the end of the connection stands for."""
+    """Never sent: stands for the end of the connection."""
 
 
 ASKING = frozenset(Kind) - {Kind.REACHED, Kind.HANG_UP, Kind.SEND, Kind.DROP, Kind.SET_BAUD, Kind.END}
-"""The kinds that are answered."""
+"""The kinds that get an answer."""
 
 
 class Request(NamedTuple):
-    """What a program says; `robot` is 0 where it does not matter, and the answer has the same ticket.
+    """A request of a program; `robot` is 0 where it does not matter, and the answer has the same ticket.
 
     Attributes:
         at_ns: The program's time [ns].
-        thought_ns: How much of it the program has thought since the last request [ns].
+        thought_ns: Thinking time since the last request [ns].
     """
 
     kind: Kind
@@ -90,15 +91,15 @@ class Request(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """What it is answered.
+    """An answer to a request.
 
     Attributes:
-        ticket: The request's.
+        ticket: Ticket of the request.
         is_good: False: `data` is the text of an error.
-        now_ns: The program's time from now on [ns].
-        number: What was asked for.
-        ahead_count: Characters that are still on the way to the robot.
-        data: The characters that were read.
+        now_ns: The program's new time [ns].
+        number: The number asked for.
+        ahead_count: Characters on the way to the robot.
+        data: Characters that were read.
     """
 
     ticket: int
@@ -114,7 +115,7 @@ class Answer(NamedTuple):
 
 
 def take_request(buffer: bytearray) -> Request | None:
-    """Remove and return the first request of a buffer, None while it is not complete."""
+    """Remove and return the first request of a buffer; None while it is incomplete."""
     if len(buffer) < _REQUEST.size:
         return None
     kind, robot, at_ns, ticket, first, second, third, thought_ns, length = _REQUEST.unpack_from(buffer)
@@ -127,7 +128,7 @@ def take_request(buffer: bytearray) -> Request | None:
 
 
 def take_answer(buffer: bytearray) -> Answer | None:
-    """Remove and return the first answer of a buffer, None while it is not complete."""
+    """Remove and return the first answer of a buffer; None while it is incomplete."""
     if len(buffer) < _ANSWER.size:
         return None
     ticket, is_good, now_ns, number, ahead_count, length = _ANSWER.unpack_from(buffer)
@@ -140,7 +141,7 @@ def take_answer(buffer: bytearray) -> Answer | None:
 
 
 def pack_reads(reads: Sequence[Read]) -> bytes:
-    """Return what WAIT carries."""
+    """Return the data of a WAIT."""
     packed = b""
     for robot, size, terminator in reads:
         end = terminator or b""
@@ -149,7 +150,7 @@ def pack_reads(reads: Sequence[Read]) -> bytes:
 
 
 def unpack_reads(data: bytes) -> list[Read]:
-    """Return what `pack_reads` has packed."""
+    """Return the reads that `pack_reads` has packed."""
     reads, start = [], 0
     while start < len(data):
         robot, size, length = _READ.unpack_from(data, start)

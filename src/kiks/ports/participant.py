@@ -1,4 +1,4 @@
-"""A program that keeps its own time, as the scheduler sees it; `remote_link.py` is the other end of its connection."""
+"""Programs that keep their own time, as the scheduler sees them; `remote_link.py` is the other end of their line."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ _log = logging.getLogger("kiks.run")
 
 
 class ProgramParticipant(Participant):
-    """A program.
+    """A program that sends requests, each with the simulated time at which it is made.
 
     Args:
-        name: Who it is, for a person.
+        name: Its name in messages.
         rank: Its number, from 1.
-        robot: Number of the robot that is its own; 0 if it has none until it claims one.
+        robot: Number of its own robot; 0 if it has none until it claims one.
         sim: The world.
         scheduler: Decides when it acts.
         names: Which robot answers on which port name.
 
     Attributes:
-        is_silenced: Whether the world has parted from it because it was silent.
-        is_stopped: Whether a person has stopped it: then its robots stop, too, when it has gone.
+        is_silenced: Whether it was disconnected because it was silent.
+        is_stopped: Whether a person has stopped it: then its robots stop, too, when it has left.
     """
 
     def __init__(
@@ -60,16 +60,16 @@ class ProgramParticipant(Participant):
 
     @abstractmethod
     def tell(self, answer: Answer) -> None:
-        """Let the program have an answer."""
+        """Send an answer to the program."""
 
-    # ---- what it says ----
+    # ---- requests ----
 
     def leave(self) -> None:
-        """Let what the program has said still be done, then part from it."""
+        """Disconnect the program after its requests are done."""
         self.hear(Request(Kind.END, 0, self.acts_from_ns))
 
-    def part(self) -> None:
-        """Part from it at once: what it has said and is not done yet is forgotten."""
+    def disconnect(self) -> None:
+        """Disconnect the program at once, and drop its requests that are not done yet."""
         if self.has_left:
             return
         self._requests.clear()
@@ -79,7 +79,7 @@ class ProgramParticipant(Participant):
         self.has_left = True
 
     def hear(self, request: Request) -> None:
-        """Take something that the program says."""
+        """Take a request of the program."""
         if self.has_left:
             return
         if not self.is_here:
@@ -94,25 +94,25 @@ class ProgramParticipant(Participant):
             self._requests.append(request)
 
     def drop(self) -> None:
-        """Part from the program."""
+        """Disconnect the program."""
         self.is_silenced = True
         self.is_waited_for = False
 
-    # ---- its turn ----
+    # ---- events ----
 
     def next_ns(self) -> int | None:
-        """Return when the next thing that it has said is done [ns]."""
+        """Return when its next request is done [ns]."""
         if not self._requests:
             return None
         return max(self._requests[0].at_ns, self.acts_from_ns, self._sim.now_ns)
 
     @property
     def is_held_up(self) -> bool:
-        """Say whether it waits for an answer: it does whenever it has asked for one."""
+        """Whether it waits for an answer: it does whenever it has asked for one."""
         return self.waits or bool(self._requests and self._requests[-1].kind in ASKING)
 
     def act(self) -> None:
-        """Do it."""
+        """Do its next request."""
         at_ns = self.next_ns()
         assert at_ns is not None
         request = self._requests[0]
@@ -168,7 +168,7 @@ class ProgramParticipant(Participant):
         self._answer(now_ns, data=bytes(is_complete(wires[read.robot - 1], read, now_ns) for read in reads))
 
     def _has_room(self, robot: int) -> bool:
-        """Say whether the line can take more; if not, try again when it can."""
+        """Return whether the line has room; if not, try again when it has."""
         room_ns = self._sim.wires[robot - 1].line.room_ns
         if room_ns <= self.acts_from_ns or self._has_made_room:
             return True
@@ -178,7 +178,7 @@ class ProgramParticipant(Participant):
         return False
 
     def _warn_of_flood(self, robot: int) -> None:
-        """Tell a person that the program sends faster than the line carries."""
+        """Log that the program sends faster than the line carries."""
         if not self._has_been_warned:
             self._has_been_warned = True
             _log.warning(
@@ -190,14 +190,14 @@ class ProgramParticipant(Participant):
             )
 
     def _note_thinking(self, request: Request) -> None:
-        """Let those who watch its robots know how long it has thought."""
+        """Record the thinking time on the wires of its robots."""
         if request.thought_ns:
             until_ns = min(self.acts_from_ns + request.thought_ns, request.at_ns)
             for robot in self._robots:
                 self._sim.wires[robot - 1].think(self.acts_from_ns, until_ns)
 
     def _do(self, request: Request) -> None:
-        """Do what the program has said, at the instant at which it acts."""
+        """Do a request, at the instant at which the program acts."""
         at_ns, kind, robot = self.acts_from_ns, request.kind, request.robot
         if kind is Kind.END:
             self._end()
@@ -213,7 +213,7 @@ class ProgramParticipant(Participant):
             self._use(request, robot, at_ns)
 
     def _use(self, request: Request, robot: int, at_ns: int) -> None:
-        """Do what concerns a robot's line."""
+        """Do a request that concerns a robot's line."""
         wire, kind = self._sim.wires[robot - 1], request.kind
         line = wire.line
         if kind is Kind.SEND or kind is Kind.SEND_AND_MEET:
@@ -250,14 +250,14 @@ class ProgramParticipant(Participant):
             wire.hang_up()
 
     def _end(self) -> None:
-        """Hang up for the program, which has gone."""
+        """Hang up for the program, which has left."""
         self._free_robots()
         self._scheduler.see(self.acts_from_ns)
         self.close()
         self.has_left = True
 
     def _free_robots(self) -> None:
-        """Let others have its robots; they drive on, unless a person has stopped the program."""
+        """Release its robots; they drive on, unless a person has stopped the program."""
         wires = self._sim.wires
         for robot in self._robots:
             wires[robot - 1].holder = None
@@ -269,7 +269,7 @@ class ProgramParticipant(Participant):
                     wires[robot - 1].halt(self._sim.now_ns)
 
     def _answer(self, now_ns: int, *, robot: int = 0, number: int = 0, is_good: bool = True, data: bytes = b"") -> None:
-        """Let the program go on."""
+        """Answer a request: the program goes on."""
         ahead_count = 0
         if robot:
             line = self._sim.wires[robot - 1].line
@@ -282,16 +282,16 @@ class RemoteParticipant(ProgramParticipant):
     """A program in a process of its own.
 
     Args:
-        here: The socket at whose other end it is.
-        name: Who it is, for a person.
+        here: This end of the socket to it.
+        name: Its name in messages.
         rank: Its number, from 1.
-        robot: Number of the robot that is its own.
+        robot: Number of its own robot.
         sim: The world.
         scheduler: Decides when it acts.
         names: Which robot answers on which port name.
 
     Attributes:
-        has_hung_up: Whether nothing more is to be heard from it.
+        has_hung_up: Whether it has closed its end.
     """
 
     def __init__(
@@ -316,11 +316,11 @@ class RemoteParticipant(ProgramParticipant):
         self._here.close()
 
     def fileno(self) -> int:
-        """Return the socket, to wait on."""
+        """Return the socket's descriptor."""
         return self._here.fileno()
 
     def receive(self) -> bool:
-        """Take what the program says; return False when it has hung up."""
+        """Take requests that have come; return False when the program has hung up."""
         try:
             received = self._here.recv(RECEIVE_SIZE)
         except BlockingIOError:
@@ -336,17 +336,17 @@ class RemoteParticipant(ProgramParticipant):
         return True
 
     def tell(self, answer: Answer) -> None:
-        """Send an answer; what the program does not take waits."""
+        """Send an answer; bytes that the program does not take yet wait."""
         self._unsent += answer.pack()
         self.flush()
 
     @property
     def has_unsent(self) -> bool:
-        """Say whether an answer waits until the program takes it; `flush` when the socket is writable."""
+        """Whether bytes of an answer wait; call `flush` when the socket is writable."""
         return bool(self._unsent)
 
     def flush(self) -> None:
-        """Send what waits, as far as the program takes it."""
+        """Send waiting bytes, as many as the program takes."""
         try:
             del self._unsent[: self._here.send(self._unsent)]
         except BlockingIOError:
@@ -356,10 +356,10 @@ class RemoteParticipant(ProgramParticipant):
 
 
 class LocalParticipant(ProgramParticipant):
-    """A program that speaks through a thread of this process; its end is `LocalConnection`.
+    """A program in a thread of this process; its end is `LocalConnection`.
 
     Attributes:
-        answer: What it was answered last; None until the answer is there.
+        answer: The last answer; None until it is there.
         is_closed: Whether the world has ended.
     """
 
@@ -371,9 +371,9 @@ class LocalParticipant(ProgramParticipant):
         self.is_closed = False
 
     def close(self) -> None:
-        """Let it know that the world has ended, or that it has left."""
+        """Mark the connection as closed."""
         self.is_closed = True
 
     def tell(self, answer: Answer) -> None:
-        """Lay the answer down."""
+        """Store the answer."""
         self.answer = answer

@@ -1,4 +1,4 @@
-"""The lobby: connections that have not said yet what lets them in. They are few, and not for long."""
+"""Connections that have not shown the token yet. Their number and their time are limited."""
 
 from __future__ import annotations
 
@@ -12,32 +12,32 @@ from dataclasses import dataclass, field
 from kiks.clock.patience import Patience
 from kiks.ports.file_descriptors import RESERVE
 
-STRANGERS_MAX = 16
-"""Most connections that have not said the token; when one more comes, the one that came first goes."""
+PENDING_MAX = 16
+"""Most pending connections; when one more comes, the oldest is closed."""
 
 PATIENCE_S = 5.0
-"""How long each of them may take [s of real time]."""
+"""Time within which a connection must show the token [s of real time]."""
 
-LOOK_S = 0.25
-"""How often it is looked whether one has taken too long [s of real time]."""
+CHECK_S = 0.25
+"""Longest time between two checks of these times [s of real time]."""
 
 
 @dataclass
-class _Stranger:
+class _Pending:
     connection: socket.socket
     patience: Patience
-    said: bytearray = field(default_factory=bytearray)
+    received: bytearray = field(default_factory=bytearray)
 
 
 class PendingConnections:
-    """Lets in who knows a token, and parts from all others.
+    """Accepts connections that begin with the token, and closes all others.
 
-    The first line has to be the token. Whatever else is said first, such as HTTP, ends the connection.
+    The first line must be the token. Anything else, such as HTTP, ends the connection.
 
     Args:
-        listener: The socket that they come to.
-        token: What they have to say: letters, digits, `-` and `_`.
-        let_in: Takes the connection of one who has said it, and what came after the token.
+        listener: The listening socket.
+        token: The token: letters, digits, `-` and `_`.
+        let_in: Called with a connection that has shown the token, and the bytes after it.
         new_patience: For tests: makes patiences with their own wall clock.
     """
 
@@ -55,7 +55,7 @@ class PendingConnections:
         self._token = token.encode("ascii")
         self._let_in = let_in
         self._new_patience = new_patience
-        self._strangers: dict[int, _Stranger] = {}
+        self._pending: dict[int, _Pending] = {}
         self._selector = selectors.DefaultSelector()
         self._selector.register(listener, selectors.EVENT_READ)
         self._is_closed = False
@@ -63,61 +63,61 @@ class PendingConnections:
     def run(self) -> None:
         """Serve until `close`."""
         while not self._is_closed:
-            self.round(LOOK_S)
-        for number in list(self._strangers):
-            self._part(number)
+            self.round(CHECK_S)
+        for number in list(self._pending):
+            self._close(number)
         self._selector.close()
         self._listener.close()
 
     def close(self) -> None:
-        """Let nobody in any more; any thread may say so."""
+        """Stop accepting connections; from any thread."""
         self._is_closed = True
 
     def round(self, wait_s: float) -> None:
-        """Hear what is said, waiting for it at most so long [s], and part from those who have taken too long."""
+        """Accept and read, for at most `wait_s` [s], and close connections that have taken too long."""
         for key, _ in self._selector.select(wait_s):
             if key.fileobj is self._listener:
-                self._meet()
-            elif key.fd in self._strangers:
-                self._hear(key.fd)
-        for number, stranger in list(self._strangers.items()):
-            if stranger.patience.left_s() == 0:
-                self._part(number)
+                self._accept()
+            elif key.fd in self._pending:
+                self._read(key.fd)
+        for number, pending in list(self._pending.items()):
+            if pending.patience.left_s() == 0:
+                self._close(number)
 
-    def _meet(self) -> None:
+    def _accept(self) -> None:
         connection = None
-        # A newcomer that has gone again is no reason to end.
+        # The client may have gone again.
         with contextlib.suppress(OSError):
             connection = RESERVE.accept(self._listener)
         if connection is None:
             return
-        if len(self._strangers) >= STRANGERS_MAX:
-            self._part(next(iter(self._strangers)))
+        if len(self._pending) >= PENDING_MAX:
+            self._close(next(iter(self._pending)))
         connection.setblocking(False)
-        stranger = _Stranger(connection, self._new_patience(PATIENCE_S))
-        stranger.patience.left_s()
-        self._strangers[connection.fileno()] = stranger
+        pending = _Pending(connection, self._new_patience(PATIENCE_S))
+        pending.patience.left_s()
+        self._pending[connection.fileno()] = pending
         self._selector.register(connection.fileno(), selectors.EVENT_READ)
 
-    def _hear(self, number: int) -> None:
-        stranger = self._strangers[number]
+    def _read(self, number: int) -> None:
+        pending = self._pending[number]
         try:
-            piece = stranger.connection.recv(1 + len(self._token))
+            piece = pending.connection.recv(1 + len(self._token))
         except BlockingIOError:
             return
         except OSError:
             piece = b""
-        stranger.said += piece
-        line, end, rest = bytes(stranger.said).partition(b"\n")
+        pending.received += piece
+        line, end, rest = bytes(pending.received).partition(b"\n")
         if end and hmac.compare_digest(line.rstrip(b"\r"), self._token):
-            del self._strangers[number]
+            del self._pending[number]
             self._selector.unregister(number)
-            stranger.connection.setblocking(True)
-            self._let_in(stranger.connection, rest)
+            pending.connection.setblocking(True)
+            self._let_in(pending.connection, rest)
         elif end or not piece or len(line) > len(self._token) + 1 or b" " in line:
-            self._part(number)
+            self._close(number)
 
-    def _part(self, number: int) -> None:
+    def _close(self, number: int) -> None:
         self._selector.unregister(number)
         with contextlib.suppress(OSError):
-            self._strangers.pop(number).connection.close()
+            self._pending.pop(number).connection.close()

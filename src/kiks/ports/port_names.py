@@ -1,4 +1,4 @@
-"""Which robot answers on which port name."""
+"""Assigns robots to the port names that programs open."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from kiks.sim.simulation import Simulation
 
 
 class PortNames:
-    """Robots by port name: as told, and otherwise in the order in which new names are opened.
+    """Robots by port name: as told, and otherwise in the order in which programs open new names.
 
-    Each program has a robot of its own first; what is left belongs to whoever opens one more name.
+    The first new name of a program gets its own robot. Further names get robots that belong to no program.
 
     Args:
         sim: The simulation.
-        told: Robots by port name, for every program.
-        programs: How many programs there are; the first has robot 1, and so on.
+        told: Robots by port name, for all programs.
+        programs: Number of programs; the first owns robot 1, and so on.
 
     Raises:
-        ParameterError: If `told` names a robot that is not there.
+        ParameterError: If `told` names a robot that does not exist.
     """
 
     def __init__(self, sim: Simulation, told: dict[str, int], programs: int = 1) -> None:
@@ -29,17 +29,17 @@ class PortNames:
         self._found: dict[tuple[int, str], int] = {}
 
     def offered(self) -> list[str]:
-        """Return the port names that a program finds which looks for ports: for its robot, and those left over."""
+        """Return the port names for a program that lists ports: one for its robot, and one for each free robot."""
         count = 1 + sum(robot not in self._own for robot in range(1, self._sim.robot_count + 1))
         return [*self._told, *(f"/dev/ttyUSB{number}" for number in range(count))][:count]
 
     def own(self, robot: int) -> None:
-        """Give a robot to a program that comes, as its own; nothing is left of the one that had it."""
+        """Give a robot to a new program as its own, and forget the names of the program that had it."""
         self._own.add(robot)
-        self._found = {(who, name): found for (who, name), found in self._found.items() if who != robot}
+        self._found = {(program, name): found for (program, name), found in self._found.items() if program != robot}
 
     def disown(self, robot: int) -> None:
-        """Let a program's robots belong to others again: it has gone."""
+        """Free the robot of a program that has ended."""
         self.own(robot)
         self._own.discard(robot)
 
@@ -51,7 +51,7 @@ class PortNames:
             program: The program, by the number of its own robot.
 
         Raises:
-            LinkError: If every robot has a name already, or there is no such robot.
+            LinkError: If every robot has a name already, or the robot does not exist.
         """
         if name.startswith("kiks:"):
             return self._of_url(name)
@@ -62,9 +62,9 @@ class PortNames:
             others = (robot for robot in range(1, self._sim.robot_count + 1) if robot not in self._own)
             free = [robot for robot in (program, *others) if robot not in taken]
             if not free:
-                known = self._told | {found: robot for (who, found), robot in self._found.items() if who == program}
+                known = self._told | {found: robot for (of, found), robot in self._found.items() if of == program}
                 raise LinkError(
-                    f"a port must belong to a robot, but {shown(name)} is one more than there are: {known}. "
+                    f"a port must belong to a robot, but {shown(name)} is one more than there are robots: {known}. "
                     f"Run it with --robots {self._sim.robot_count + 1}, or map two names to one robot with --map."
                 )
             self._found[program, name] = free[0]

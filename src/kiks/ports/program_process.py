@@ -1,4 +1,4 @@
-"""A program's process: how it is started, what it prints, and how it ends."""
+"""A program's process: its start, its output, its end, and the permission to start."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ from kiks.model.project import Project
 from kiks.sim.ring_buffer import RingBuffer
 
 LATE, PUNCTUAL = "late", "punctual"
-"""When a program was started: after the world had begun, or before."""
+"""Whether a program was started after the world had begun, or before."""
 
 OUTPUT_LIMIT = 1000
-"""Lines of a program's output that are kept."""
+"""Number of lines of a program's output that a handle keeps."""
 
 LINE_LIMIT = 2000
-"""Longest line of it [bytes]; a longer one is cut."""
+"""Longest line of output [bytes]; a longer one is cut."""
 
 ENDING_S = 10.0
-"""How long the end of a process that was killed is waited for [s of real time]."""
+"""Longest wait for the end of a killed process [s of real time]."""
 
 LAST_WORDS_S = 1.0
-"""How long the last output of a process that has ended is waited for [s of real time]: others may hold its pipes."""
+"""Longest wait for the last output of an ended process [s of real time]: other processes may hold its pipes."""
 
 QUESTION_S = 0.2
-"""After what silence the beginning of a line is shown on a terminal [s of real time]: it may be a question."""
+"""Pause after which a terminal shows an unfinished line [s of real time]: it may be a question."""
 
 _PIECE = 1 << 16
 _STREAMS = {False: 1, True: 2}
@@ -46,16 +46,16 @@ _COLOURS = (36, 33, 35, 32, 34, 31)
 
 @dataclass(frozen=True)
 class Command:
-    """A program and what it finds in `sys.argv` after its name."""
+    """A program and its arguments in `sys.argv`."""
 
     program: Path
     arguments: list[str] = field(default_factory=list)
 
     def check_file(self) -> None:
-        """Check that the program is there.
+        """Check that the program's file exists.
 
         Raises:
-            ParameterError: If it is not.
+            ParameterError: If it does not.
         """
         if not self.program.is_file():
             raise ParameterError(
@@ -64,10 +64,10 @@ class Command:
 
 
 def commands_of(project: Project, folder: Path) -> list[Command | None]:
-    """Return the program of each robot of a project in a folder; None for a robot that has none.
+    """Return the program of each robot of a project in a folder; None for a robot without one.
 
     Raises:
-        ParameterError: If one lies elsewhere, or is no program.
+        ParameterError: If a program lies elsewhere, or is no Python file.
     """
     return [
         None if robot.program is None else Command(program_in(folder, robot.program), list(robot.arguments))
@@ -76,32 +76,32 @@ def commands_of(project: Project, folder: Path) -> list[Command | None]:
 
 
 class OutputLine(NamedTuple):
-    """A line that a program has printed, and whether it was one of its errors."""
+    """A line of output, and whether it came from standard error."""
 
     text: str
     is_error: bool
 
 
 class Process:
-    """A program that runs by itself, at the other end of a socket.
+    """The process of a program, at the other end of a socket.
 
     A thread of its own starts it and waits for its end: Linux ends a child with the thread that started it
-    (`child_main.py`), so it must be one that lives as long.
+    (`child_main.py`), so that thread must live as long.
 
     Args:
-        words: What `kiks.script.child_main` is told before the program.
+        words: Arguments of `kiks.script.child_main` before the program.
         command: The program.
         there: Its end of the socket.
-        is_heard: Whether its output is kept. Such a program has nobody at its keyboard, and a group of its own: what
-            it starts ends with it. Otherwise it has the terminal.
-        voice: What writes its output on the terminal, if it is not kept; it does so itself if None.
-        ended: Called when it has ended, by that thread.
+        is_heard: Whether to keep its output. Such a program has no keyboard and a process group of its own: processes
+            that it starts end with it. Otherwise it has the terminal.
+        voice: Writes its output on the terminal, if it is not kept; None: the program writes itself.
+        ended: Called by that thread after the end.
 
     Attributes:
-        output: What it has printed; None if it is not heard.
+        output: Its output; None if it is not kept.
 
     Raises:
-        KiksError: If the computer does not let it start.
+        KiksError: If the operating system does not start it.
     """
 
     def __init__(
@@ -121,7 +121,7 @@ class Process:
         self._is_over = threading.Event()
         has_started = threading.Event()
         failures: list[OSError] = []
-        # -P: the folder in which KiKS was started is none of the program's.
+        # -P: the program must not import from the folder in which KiKS was started.
         line = [sys.executable, "-P", "-m", "kiks.script.child_main", str(there.fileno()), *words]
         line += [str(command.program), *command.arguments]
 
@@ -145,19 +145,19 @@ class Process:
 
     @property
     def code(self) -> int | None:
-        """How it has ended: its exit code, or minus the number of the signal that ended it; None while it runs."""
+        """Its exit code, or minus the number of the signal that ended it; None while it runs."""
         return self._popen.returncode if self._popen is not None and self._is_over.is_set() else None
 
     def interrupt(self) -> None:
-        """Do what Ctrl-C does."""
+        """Interrupt it, as Ctrl-C does."""
         self._signal(signal.SIGINT)
 
     def kill(self) -> None:
-        """End it at once."""
+        """Kill it."""
         self._signal(signal.SIGKILL)
 
     def wait(self) -> None:
-        """Wait until it has ended and has been heard to its last word; no longer than a killed one takes for that."""
+        """Wait until it has ended and its output has been read, at most `ENDING_S`."""
         self._is_over.wait(ENDING_S)
 
     # ---- inside ----
@@ -165,7 +165,7 @@ class Process:
     def _start(self, line: list[str], there: socket.socket) -> subprocess.Popen[bytes]:
         if self._voice is None:
             return subprocess.Popen(line, pass_fds=[there.fileno()])
-        # What it prints comes at once, and not when some thousand characters have gathered.
+        # Unbuffered: each line of output comes at once.
         environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
         is_kept = self.output is not None
         if is_kept:
@@ -209,11 +209,11 @@ class Process:
 
 
 class Voice(Protocol):
-    """Who takes what a program prints, line by line.
+    """Takes the output of a program, line by line.
 
     Attributes:
-        longest: Longest line [bytes]; of one that becomes longer what there is of it is taken.
-        pause_s: After what silence `ask` is called [s of real time]; None for never.
+        longest: Longest line [bytes]; a longer one is split.
+        pause_s: Pause after which `ask` is called [s of real time]; None for never.
     """
 
     longest: int
@@ -223,15 +223,15 @@ class Voice(Protocol):
         """Take lines.
 
         Raises:
-            OSError: If nobody reads them any more.
+            OSError: If the reader has gone.
         """
 
     def ask(self, begun: bytes, is_error: bool) -> bool:
-        """Take the beginning of a line after which nothing came, as after a question; say whether it was taken."""
+        """Take an unfinished line after a pause, such as a question; return whether it was taken."""
 
 
 class _Keeper:
-    """Keeps the newest lines, as a `Voice`; it never waits for anybody who reads them."""
+    """Keeps the newest lines, as a `Voice`; it never waits for readers."""
 
     longest = LINE_LIMIT
     pause_s: float | None = None
@@ -248,13 +248,13 @@ class _Keeper:
 
 
 class Labels:
-    """Lets several programs print where this process prints, line by line, each with its program before it.
+    """Prints the output of several programs, line by line, each line with a label of its program.
 
-    Labels are coloured on a terminal, unless NO_COLOR is set. There the beginning of a line, such as a question, is
-    shown after a moment; elsewhere a line comes when it is whole.
+    Labels are coloured on a terminal, unless NO_COLOR is set. A terminal also shows an unfinished line, such as a
+    question, after a pause; elsewhere only complete lines are printed.
 
     Args:
-        names: What the programs are called, the first one first; their labels are of one width.
+        names: Names of the programs, the first one first; all labels have one width.
     """
 
     def __init__(self, names: Sequence[str]) -> None:
@@ -264,11 +264,11 @@ class Labels:
         self.are_terminals = {is_error: os.isatty(stream) for is_error, stream in _STREAMS.items()}
 
     def voice(self, number: int, name: str) -> Voice:
-        """Return who writes what a program prints."""
+        """Return the writer for a program's output."""
         return _Labelled(self, number, _label(number, name).ljust(self._width))
 
     def say(self, text: str) -> None:
-        """Write a line of KiKS among them."""
+        """Write a line of KiKS between theirs."""
         with contextlib.suppress(OSError):
             self.write(f"kiks: {text}\n".encode(errors="replace"), is_error=True)
 
@@ -276,7 +276,7 @@ class Labels:
         """Write lines, or the beginning of one.
 
         Raises:
-            OSError: If nobody reads them any more.
+            OSError: If the reader has gone.
         """
         with self._lock:
             data = b"\n" * self._is_begun + data
@@ -290,7 +290,7 @@ class Labels:
 
 
 class _Labelled:
-    """Writes what one program prints, as a `Voice`."""
+    """Writes the output of one program, as a `Voice`."""
 
     longest = 1 << 16
 
@@ -319,7 +319,7 @@ def _label(number: int, name: str) -> str:
 
 
 def _listen(pipes: dict[IO[bytes], bool], voice: Voice) -> None:
-    """Take what a process prints until it has said everything."""
+    """Read the output of a process up to its end."""
     with selectors.DefaultSelector() as selector:
         rests = {}
         for pipe, is_error in pipes.items():
@@ -341,7 +341,7 @@ def _listen(pipes: dict[IO[bytes], bool], voice: Voice) -> None:
                 try:
                     voice.take(lines, is_error)
                 except OSError:
-                    # Nobody reads it any more, which the program is to learn as if it wrote there itself.
+                    # The reader has gone. Closing the pipe tells the program so.
                     piece = b""
                 if not piece:
                     selector.unregister(key.fileobj)
@@ -353,15 +353,15 @@ def _line(line: bytes, is_error: bool) -> OutputLine:
 
 
 class Permission:
-    """What programs may start.
+    """Decides which programs may start.
 
-    The person at the terminal may start anything. What a browser or a file names must be a Python program in one of
-    some folders, and starts only where that was allowed.
+    The person at the terminal may start anything. A program that a browser or a file names must be a Python program in
+    one of the folders, and starts only if that is allowed.
 
     Args:
-        granted: What the person at the terminal has named.
-        folders: Where other programs may lie, there or below.
-        may_start_others: Whether they may start at all.
+        granted: Programs that the person at the terminal has named.
+        folders: Folders of other programs, with all below.
+        may_start_others: Whether other programs may start.
     """
 
     def __init__(
@@ -375,7 +375,7 @@ class Permission:
         """Check that a program may start.
 
         Raises:
-            ParameterError: If it may not.
+            ParameterError: If it may not start.
         """
         if command in self._granted:
             return
@@ -383,7 +383,7 @@ class Permission:
         if not self.may_start_others:
             raise ParameterError(
                 f"{name!r} must be started at the terminal of this desk, but a page or a file asked for it. kiks desk "
-                "--run-programs allows that: then everybody who sees the page can run anything on that computer."
+                "--run-programs allows that: then every user of the page can run anything on that computer."
             )
         path = command.program.resolve()
         for folder in self._folders:
@@ -394,7 +394,7 @@ class Permission:
 
 
 class Anything(Permission):
-    """The permission of a person at a terminal, and of a program that uses KiKS."""
+    """The permission of the person at the terminal, and of a program that uses KiKS."""
 
     def check(self, command: Command) -> None:
         """Let it start."""

@@ -1,28 +1,25 @@
-"""Several programs in one world, in true time: who may act next, and how far the world may run.
+"""The scheduler of several programs in one world: which acts next, and how far the world may run.
 
-Need: what happens must not depend on the order in which the operating system runs the programs, on how it cuts their
-bytes, or on how fast they are.
-Method: the conservative rule. A program that thinks is known to act no earlier than a certain simulated time: the end
-of the reply that it has been given, plus its thinking time. The earliest of these times is the horizon, and nothing is
-done beyond it. What may be done is done in the order of simulated time: at one instant first what the robots do, then
-what the programs do, in the order of their ranks.
+The run must not depend on the order in which the operating system runs the programs, on how it splits their bytes, or
+on how fast they are. So the scheduler is a conservative discrete-event scheduler. A program that thinks acts no earlier
+than a known simulated time: the end of its last reply plus its thinking time. The earliest of these times is the
+horizon. Events up to the horizon are done in the order of simulated time; at one instant, first those of the robots,
+then those of the programs by rank.
 
+Why that is repeatable: list all events that are done, each with its instant and rank. An event is done only when it is
+the earliest that is known, and when every program that thinks has a later instant and rank. So the list is in order,
+whatever came first in real time. What a program does is a function of the answers that it gets, and the answers are a
+function of the list so far. So the initial state determines the list. Only the real time of an event varies.
 
-Why that is repeatable: think of the list of all that is done, each thing with its instant and rank. A thing is done
-only when it is the first of all that are known, and when every program that thinks stands behind it with its own
-instant and rank. So the list is in order, whatever came first in real time. What a program does is a function of what
-it has been told; what it is told is a function of the list so far; so the whole list is one function of the beginning.
-Only the real time at which a thing is done varies.
+Why there is no deadlock: of all known events and all thinking programs one is the earliest. If it is an event, it is
+done. If it is a program, it will act, or it is silent, and then a policy decides.
 
-Why it goes on: of all things known and all programs that think one is the first. If it is a thing, it is done. If it is
-a program, it will act; or it is silent, and there is a policy for that.
+Why the end is repeatable: the world advances for a program that waits, and then up to the latest instant that a program
+has seen, as far as the horizon allows. When the last program has left, commands under way still act, and the world
+stops at the latest instant that any program has seen. That does not depend on which program left first.
 
-Why the end is repeatable: the world is advanced for somebody who waits, and then up to the latest instant that a
-program has been told, as far as the horizon allows. When the last program has gone, commands under way still act,
-and the world stops at the latest instant that any of them has lived to see: that does not depend on who went first.
-
-A program that is not waited for acts when its command comes, no earlier than now. With nobody to hold the world time
-stands still until a command comes, and runs to the end of its reply: as one program alone sees it.
+A program for which the world does not wait acts when its command comes, no earlier than now. If the world waits for no
+program, time stands still until a command comes, and runs to the end of its reply, as with one program alone.
 """
 
 from __future__ import annotations
@@ -37,43 +34,43 @@ from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.simulation import Simulation
 
 START_WORD_S = 1.0
-"""How long the beginning is waited for before a word is said [s of real time]."""
+"""Wait for the start after which the log names missing programs [s of real time]."""
 
 START_PATIENCE_S = 10.0
-"""How long the world waits for programs that do not come [s of real time]."""
+"""Longest wait for programs that do not come [s of real time]."""
 
 VISIT_PATIENCE_S = 60.0
-"""How long the beginning is waited for if programs come that a person starts elsewhere [s of real time]."""
+"""Longest wait for programs that a person starts elsewhere [s of real time]."""
 
 PATIENCE_S = 2.0
-"""How long the world waits for a silent program [s of real time], if nothing else is said."""
+"""Default wait for a silent program [s of real time]."""
 
 IMPATIENT_SHARE = 0.1
-"""Share of the patience for a program that holds up one which is not waited for: both may be the same program, which
-holds several ports and talks to them in turn."""
+"""Share of the patience for a program that holds up one for which the world does not wait. Both may be one program,
+which holds several ports and uses them in turn."""
 
 POLICIES = ("wait", "drop", "ignore")
-"""What may be done about a program that is silent while others wait."""
+"""Policies for a program that is silent while others wait."""
 
 STEPS = 64
-"""Most things that are done before the ports are looked at again."""
+"""Most events between two checks of the ports."""
 
 
 class Participant(ABC):
-    """A program, as one that takes its turn in the world. It acts, waits for the world, or thinks.
+    """A program as the scheduler sees it. It acts, waits for the world, or thinks.
 
     Args:
-        name: Who it is, for a person.
-        rank: Its place among those who act at the same instant.
+        name: Its name in messages.
+        rank: Its place in the order of programs that act at the same instant.
 
     Attributes:
-        acts_from_ns: While it thinks: the earliest simulated time at which it may do something [ns].
+        acts_from_ns: While it thinks: the earliest simulated time at which it may act [ns].
         waits: Whether it waits for the world.
-        is_here: Whether it has taken part yet.
+        is_here: Whether it has joined the run.
         is_waited_for: Whether the world waits for it while it thinks.
-        has_left: Whether it has gone and everything that it left behind is done.
-        has_been_named: Whether a person has been told that the world waits for it.
-        patience: How long it has been holding up others in real time; `ProgramScheduler.join` puts it there.
+        has_left: Whether it has gone and all its requests are done.
+        has_been_named: Whether the log has said that the world waits for it.
+        patience: Measures for how long it holds up others in real time; set by `ProgramScheduler.join`.
     """
 
     patience: Patience
@@ -90,48 +87,48 @@ class Participant(ABC):
 
     @abstractmethod
     def next_ns(self) -> int | None:
-        """Return when it does the next thing that is known [ns]; None if it has yet to say what that is."""
+        """Return the time of its next known event [ns]; None if it has none."""
 
     @property
     def is_held_up(self) -> bool:
-        """Say whether it can do nothing in real time before the world has gone on."""
+        """Whether it cannot go on in real time until the world does."""
         return self.waits or self.next_ns() is not None
 
     @abstractmethod
     def act(self) -> None:
-        """Do that thing: the world has got there."""
+        """Do its next event; the world has reached its time."""
 
     @abstractmethod
     def look(self) -> None:
-        """Go on if what it waits for has happened."""
+        """Go on if the event that it waits for has happened."""
 
     @abstractmethod
     def drop(self) -> None:
-        """Part from the program, because it was silent for too long."""
+        """Disconnect the program, because it was silent for too long."""
 
 
 class ProgramScheduler:
-    """Who may act next.
+    """Decides which program acts next and how far the world may run.
 
     Args:
         sim: The world.
-        expected: How many programs begin together; 0: the world has begun already.
-        missing: Returns who of them is not there yet, in words for a person.
-        log: Where a person is told.
-        is_once: Whether those who come after them act from when they come; else as many begin together again.
+        expected: Number of programs that begin together; 0: the world has begun already.
+        missing: Returns the names of the missing programs, for the log.
+        log: The log.
+        is_once: Whether later programs act as soon as they come; otherwise as many begin together again.
         when_silent: What happens to a program that is silent while others wait: 'wait', 'drop' or 'ignore'.
-        patience_s: How long it may be [s of real time].
+        patience_s: How long a program may be silent [s of real time].
         new_patience: For tests: makes patiences with their own wall clock.
-        start_patience_s: How long the world waits for those with whom it begins [s of real time], unless it is told to
-            wait for all that are silent.
+        start_patience_s: How long the world waits for the programs with which it begins [s of real time]; without a
+            limit if `when_silent` is 'wait'.
 
     Raises:
-        ParameterError: If there is no such policy, or the patience is out of range.
+        ParameterError: If the policy is unknown, or the patience is out of range.
 
     Attributes:
-        participants: Those who take part, in the order in which they have come.
+        participants: The programs, in the order in which they have come.
         has_begun: Whether the world has begun.
-        is_repeatable: Whether the world has waited for everybody so far.
+        is_repeatable: Whether the world has waited for all programs so far.
     """
 
     def __init__(
@@ -165,26 +162,29 @@ class ProgramScheduler:
         self._seen_ns = 0
 
     def join(self, participant: Participant) -> None:
-        """Let a program take part from now on."""
+        """Add a program."""
         participant.patience = self._new_patience(self._patience_s)
         self.participants.append(participant)
 
     @property
     def drive(self) -> bool:
-        """Say whether the world's time is moved here: some program holds it, or waits for it."""
+        """Whether the scheduler moves the world's time: some program holds it, or waits for it."""
         return any(
             not participant.has_left and (participant.is_waited_for or participant.is_held_up)
             for participant in self.participants
         )
 
     def see(self, time_ns: int) -> None:
-        """Note that a program has been told of an instant [ns]."""
+        """Note that a program has seen an instant [ns]."""
         self._seen_ns = max(self._seen_ns, time_ns)
 
     def advance(self) -> float | None:
-        """Do what may be done, some of it at least; return for how long nothing more will happen [s], None: for ever.
+        """Do some of the events that may be done.
 
-        Call it again when a program has been heard.
+        Call it again when a program has sent a request.
+
+        Returns:
+            Time for which nothing more will happen [s]; None if nothing happens until a request comes.
         """
         if not self.has_begun:
             wait_s = self._wait_for_all()
@@ -199,26 +199,30 @@ class ProgramScheduler:
         if self.participants:
             horizon_ns = min((participant.acts_from_ns for participant in self._thinking()), default=NEVER_NS)
             self._sim.advance_to(min(self._seen_ns, horizon_ns))
-        return self._bear_with(holders)
+        return self._check_patience(holders)
 
     def finish(self) -> None:
-        """Bring the world to its end, when the last program has gone: commands under way still act."""
+        """Advance the world to its end after the last program has left: commands under way still act."""
         sim = self._sim
         while any(wire.pending for wire in sim.wires):
             sim.advance_to(sim.next_event_ns() or 0)
         sim.advance_to(self._seen_ns)
 
-    # ---- one thing after the other ----
+    # ---- events ----
 
     def _step(self) -> tuple[bool, list[Participant]]:
-        """Do the first of all things if it may be done; else say so, and who might still act before it."""
+        """Do the earliest event if it may be done.
+
+        Returns:
+            Whether it may not, and then the programs that might still act before it.
+        """
         sim = self._sim
         actor: Participant | None = None
         first = horizon = (NEVER_NS, 0)
         is_waited = False
         for participant in self.participants:
             if participant.has_left:
-                self._let_go(participant)
+                self._remove(participant)
                 return False, []
             if participant.waits:
                 is_waited = True
@@ -260,18 +264,18 @@ class ProgramScheduler:
             and participant.next_ns() is None
         ]
 
-    def _let_go(self, participant: Participant) -> None:
-        """Take out a program that has gone."""
+    def _remove(self, participant: Participant) -> None:
+        """Remove a program that has left."""
         self.participants.remove(participant)
         if not self.participants:
             self.finish()
             # The next programs begin together, too, unless one alone may begin.
             self.has_begun = self._is_once or self._expected <= 1
 
-    # ---- those who keep others waiting ----
+    # ---- programs that keep others waiting ----
 
     def _wait_for_all(self) -> float | None:
-        """Begin when all are there, or have been waited for; return how long nothing will happen [s]."""
+        """Begin when all programs are there or the wait is over; return the time in which nothing will happen [s]."""
         self.participants = [participant for participant in self.participants if not participant.has_left]
         if not self.participants:
             self._start.renew()
@@ -297,8 +301,8 @@ class ProgramScheduler:
                 )
             return None if waits_on else left_s
         self._log.warning(
-            "the world has begun without %s, which did not come within %g s. Who comes now acts from now on, and the "
-            "run is not repeatable.",
+            "the world has begun without %s, which did not come within %g s. A program that comes now acts from now "
+            "on, and the run is not repeatable.",
             self._missing(),
             self._start_patience_s,
         )
@@ -309,8 +313,8 @@ class ProgramScheduler:
         self.has_begun = True
         return 0.0
 
-    def _bear_with(self, holders: list[Participant]) -> float | None:
-        """Lose patience with those who have kept others waiting for too long; return how long it still lasts [s]."""
+    def _check_patience(self, holders: list[Participant]) -> float | None:
+        """Give up programs that have kept others waiting for too long; return when the next may be given up [s]."""
         held_up = [participant for participant in self.participants if participant.is_held_up]
         if not held_up:
             holders = []
@@ -340,7 +344,7 @@ class ProgramScheduler:
         self.is_repeatable = False
         if self._when_silent == "drop":
             self._log.warning(
-                "%s must act within %g s while others wait, but it did not: the world parts from it. "
+                "%s must act within %g s while others wait, but it did not: it is disconnected. "
                 "--patience gives it more time.",
                 participant.name,
                 self._patience_s,
@@ -357,10 +361,10 @@ class ProgramScheduler:
 
 
 def check_policy(when_silent: str, patience_s: float) -> None:
-    """Check what is to happen to a silent program, and when.
+    """Check the policy for silent programs.
 
     Raises:
-        ParameterError: If there is no such policy, or the patience is out of range.
+        ParameterError: If the policy is unknown, or the patience is out of range.
     """
     if when_silent not in POLICIES:
         raise ParameterError(

@@ -1,4 +1,4 @@
-"""Programs in one world: unchanged Python programs, each in a process of its own, and visitors. They come and go."""
+"""Programs that share a world: Python programs, each in a process of its own, and threads of this process."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from kiks.sim.simulation import Simulation
 
 
 class Handle:
-    """A program that was started.
+    """A started program.
 
     Attributes:
-        command: What was started.
-        number: Its number, from 1 in the order in which they were started.
-        robot: Number of the robot that is its own.
-        name: Who it is, for a person.
+        command: The command that started it.
+        number: Its number, from 1, in the order of starts.
+        robot: Number of its own robot.
+        name: Its name in messages.
     """
 
     def __init__(self, command: Command, participant: RemoteParticipant) -> None:
@@ -45,23 +45,23 @@ class Handle:
 
     @property
     def is_running(self) -> bool:
-        """Whether it still runs; when not, its output is complete, and its robots are free if it was stopped."""
+        """Whether it still runs. After its end its output is complete, and its robots are free if it was stopped."""
         return not self.has_ended.is_set()
 
     @property
     def code(self) -> int | None:
-        """The exit code with which it has ended, 128 and its number after a signal; None while it runs."""
+        """Its exit code, 128 plus the number of the signal that ended it; None while it runs."""
         code = None if self.is_running else self.process.code
         return code if code is None or code >= 0 else 128 - code
 
     @property
     def output(self) -> RingBuffer[OutputLine] | None:
-        """What it has printed; None if the terminal has it."""
+        """Its output; None if the terminal shows that."""
         return self.process.output
 
     @property
     def state(self) -> str:
-        """What it does, in a word or two: 'running', 'stopping', 'stopped', 'silenced', or how it has ended."""
+        """Its state: 'running', 'stopping', 'stopped', 'silenced', or how it has ended."""
         if self.is_running:
             return "stopping" if self.participant.is_stopped else "running"
         if self.participant.is_stopped:
@@ -70,7 +70,7 @@ class Handle:
 
     @property
     def how(self) -> str:
-        """How it has ended, in words; nothing while it runs."""
+        """How it has ended; empty while it runs."""
         code = self.process.code
         if code is None:
             return ""
@@ -81,7 +81,7 @@ IDLE_S = 0.05
 """Longest sleep [s]: a second Ctrl-C is noticed within it."""
 
 GRACE_S = 1.0
-"""How long a program may tidy up after Ctrl-C [s of real time]."""
+"""Time that a program has to end after Ctrl-C [s of real time]."""
 
 _log = logging.getLogger("kiks.run")
 
@@ -89,30 +89,30 @@ _log = logging.getLogger("kiks.run")
 class Programs:
     """Programs that share a world.
 
-    `round` moves the world for them; who calls it again and again is the driver, in one thread. `start` and `stop` may
-    be called by other threads at any time, and with the simulation's lock held.
+    `round` moves the world for them; one thread, the driver, calls it again and again. Other threads may call `start`
+    and `stop` at any time, and with the simulation's lock held.
 
     Args:
         sim: The world.
         commands: Programs that begin together, with `begin` or `run`; the first one drives robot 1, whatever port it
             opens, and so on. None where a robot has none.
-        told: Robots by port name, for whichever program opens it.
-        thinking: What the computing of each costs: 'none', 'fixed:MS', 'live', 'live:FACTOR', or 'replay:FILE'; where
-            several begin together, with the number of the program appended: FILE.1.
+        told: Robots by port name, for all programs.
+        thinking: Thinking time of each: 'none', 'fixed:MS', 'live', 'live:FACTOR', or 'replay:FILE'; if several begin
+            together, with the number of the program appended: FILE.1.
         record: File for the thinking times of live runs, with the same numbers appended.
         when_silent: What happens to a program that is silent while others wait: 'wait', 'drop' (its process is ended)
             or 'ignore'.
-        patience_s: How long it may be [s of real time].
-        say: Where a person is told how each program ended.
-        is_heard: Whether what they print is kept, in their handles; else it goes where that of this process goes. What
-            a heard program starts ends with it.
+        patience_s: How long a program may be silent [s of real time].
+        say: Called with a line of text about each program that has ended.
+        is_heard: Whether the handles keep the output; otherwise it goes to the output of this process. Processes that
+            such a program has started end with it.
         new_patience: Makes patiences with another wall clock: one that stands still while the world does.
-        visitors: How many programs that were started elsewhere begin together with these; see `admit`.
-        labels: What writes where this process prints what they print, if it is not kept; they do so themselves if None.
+        visitors: Number of programs in threads of this process that begin together with these; see `admit`.
+        labels: Prints the output with labels, if the handles do not keep it; None: the programs print themselves.
 
     Attributes:
-        handles: The programs; of those that have ended the last one of each robot.
-        permission: What may start; anything if nobody says otherwise.
+        handles: The programs; of ended ones, the last one of each robot.
+        permission: Which programs may start; all by default.
 
     Raises:
         ParameterError: If a value is out of range or unknown.
@@ -163,14 +163,14 @@ class Programs:
         for robot, _ in self._beginners:
             self._names.own(robot)
         with opening("the programs of a world"):
-            self._bell, self._bell_rope = socket.socketpair()
+            self._wake_receiver, self._wake_sender = socket.socketpair()
             self._selector = selectors.DefaultSelector()
-        self._bell.setblocking(False)
-        self._bell_rope.setblocking(False)
-        self._selector.register(self._bell, selectors.EVENT_READ)
+        self._wake_receiver.setblocking(False)
+        self._wake_sender.setblocking(False)
+        self._selector.register(self._wake_receiver, selectors.EVENT_READ)
 
     def begin(self) -> None:
-        """Start the programs that begin together, unless they have been.
+        """Start the programs that begin together; does nothing if they have been started.
 
         Raises:
             KiksError: If the computer does not let one start.
@@ -186,29 +186,29 @@ class Programs:
 
     @property
     def drive(self) -> bool:
-        """Say whether programs move the world's time: then nobody else may."""
+        """Whether programs move the world's time; then nothing else may."""
         return self._scheduler.drive
 
     @property
     def doubt(self) -> str:
-        """Say why the same programs might not do the same again; nothing if they would, but for live thinking."""
+        """Why the run might not repeat; empty if it does, apart from live thinking."""
         if self._signals:
             return "it was interrupted"
         if self._was_touched:
             return "a program was started or stopped while the world was there"
         return "" if self._scheduler.is_repeatable else "the world did not wait for every program"
 
-    # ---- they come and go ----
+    # ---- programs come and go ----
 
     def start(self, command: Command, robot: int = 1) -> Handle:
-        """Start a program; it takes part from the simulated time on at which its first word comes.
+        """Start a program; it takes part from the simulated time at which its first request comes.
 
         Args:
             command: The program.
-            robot: Number of the robot that is its own, whatever port it opens.
+            robot: Number of its own robot, whatever port it opens.
 
         Raises:
-            ParameterError: If it may not start, there is no such file or robot, or another program has that robot.
+            ParameterError: If it may not start, the file or the robot does not exist, or another program has the robot.
             KiksError: If the computer does not let it start.
         """
         command.check_file()
@@ -222,7 +222,7 @@ class Programs:
                         f"robot {robot} must be free for another program, but {handle.name} has it. Stop that one "
                         "first, or take another robot."
                     )
-                handle.participant.part()
+                handle.participant.disconnect()
             parse_thinking(self._policy(self._count + 1))
             for each in self.handles:
                 if not each.is_running:
@@ -231,15 +231,15 @@ class Programs:
             handle = self._add(command, robot)
             self.handles = [each for each in self.handles if each not in there or not each.has_been_noticed]
             self._was_touched = True
-        self._ring()
+        self._wake()
         return handle
 
     def admit(self, name: str, rank: int) -> LocalParticipant:
-        """Let a program take part, from its first word on, that was started elsewhere: a thread here speaks for it.
+        """Add a program in a thread of this process; it takes part from its first request on.
 
         Args:
-            name: Who it is, for a person.
-            rank: Its place among those who act at the same instant.
+            name: Its name in messages.
+            rank: Its place in the order of programs that act at the same instant.
 
         Raises:
             KiksError: If the world has ended.
@@ -255,12 +255,12 @@ class Programs:
 
     @property
     def is_shared(self) -> bool:
-        """Say whether more than one program takes part, or is waited for to begin."""
+        """Whether more than one program takes part, or the world waits for programs to begin."""
         return len(self._scheduler.participants) > 1 or not self._scheduler.has_begun
 
     def move(self) -> float | None:
-        """Do what may be done now, unless another thread is at it; see `ProgramScheduler.advance`. Needs the lock."""
-        # The gate may make a thread wait in the middle, and then lets others look at the world.
+        """Call `ProgramScheduler.advance`, unless another thread is in it. Needs the lock."""
+        # The gate may make a thread wait in the middle, and then releases the lock for others.
         if self._is_moving:
             return None
         self._is_moving = True
@@ -271,13 +271,13 @@ class Programs:
             self._moved.notify_all()
 
     def wait(self, seconds: float | None) -> None:
-        """Wait until somebody has moved the world, or for some time [s]; the caller holds the lock."""
+        """Wait until a thread has moved the world, or for some time [s]; the caller holds the lock."""
         self._moved.wait(seconds)
 
     def stop(self, handle: Handle) -> None:
-        """End a program, as Ctrl-C would; if it does not end within a second, or this is said again, at once.
+        """End a program, as Ctrl-C does; kill it if it does not end within a second, or at the second call.
 
-        One that has not used a port yet ends at once. When it has ended its robots stop, and are free.
+        A program that has not used a port yet is killed at once. After its end its robots stop and are free.
         """
         if not handle.is_running:
             return
@@ -292,7 +292,7 @@ class Programs:
         grace.start()
 
     def run(self) -> int:
-        """Let them run until the last has ended; return 0 if all went well, else the first exit code that tells.
+        """Run until the last program has ended; return the first exit code that is not 0, else 0.
 
         Raises:
             KiksError: If the computer does not let one start.
@@ -300,7 +300,7 @@ class Programs:
         self.begin()
         try:
             self._grace = Patience(GRACE_S)
-            # The programs have got it, too, and may still stop their robots.
+            # The programs get the signal, too, and may still stop their robots.
             with noting_endings(self._note_signal):
                 while any(not handle.has_been_noticed for handle in self.handles) or self._scheduler.participants:
                     if self._signals and (self._signals > 1 or self._grace.left_s() == 0):
@@ -311,20 +311,20 @@ class Programs:
         return INTERRUPTED if self._signals else next((each.code for each in self.handles if each.code), 0)
 
     def round(self, wait_limit_s: float) -> None:
-        """Do what may be done now, and listen to the programs.
+        """Advance the world, and take requests of the programs.
 
         Args:
-            wait_limit_s: Longest time that is waited for a word of theirs [s of real time].
+            wait_limit_s: Longest wait for a request [s of real time].
         """
         with self.sim.lock:
             wait_s = self.move()
-            over = self._look_around()
+            over = self._check_processes()
         wait_s = wait_limit_s if wait_s is None else min(wait_s, wait_limit_s)
         ready = self._selector.select(wait_s)
         with self.sim.lock:
             for key, events in ready:
                 if key.data is None:
-                    self._quieten()
+                    self._clear_wake()
                 elif events & selectors.EVENT_WRITE:
                     key.data.flush()
                 if key.data is not None and events & selectors.EVENT_READ and not key.data.receive():
@@ -340,11 +340,11 @@ class Programs:
             self._tell_end(handle)
 
     def close(self) -> None:
-        """End all processes that still run, say how those ended that had gone before, and close the connections."""
+        """End all processes, report how programs have ended, and close the connections."""
         self._is_closed = True
         for handle in self.handles:
             if handle.participant.has_hung_up:
-                handle.has_ended.wait(GRACE_S)  # the operating system is at it, and its exit code will be told
+                handle.has_ended.wait(GRACE_S)  # the process ends by itself and will have an exit code
             handle.process.kill()
         for handle in self._notice_ends():
             self._tell_end(handle)
@@ -356,8 +356,8 @@ class Programs:
                 participant.close()
             self._moved.notify_all()
         self._selector.close()
-        self._bell.close()
-        self._bell_rope.close()
+        self._wake_receiver.close()
+        self._wake_sender.close()
 
     # ---- inside ----
 
@@ -369,11 +369,11 @@ class Programs:
         return self._thinking + (self._suffix(number) if self._thinking.startswith("replay:") else "")
 
     def _suffix(self, number: int) -> str:
-        """Return what is appended to the names of files that each program has of its own."""
+        """Return the suffix of files that each program has for itself."""
         return f".{number}" if self._are_numbered else ""
 
     def _add(self, command: Command, robot: int) -> Handle:
-        """Start a program's process, if it may, and let it take part."""
+        """Start a program's process, if it may start, and add the program."""
         self.permission.check(command)
         number = self._count + 1
         name = f"program {number} ({command.program.name})"
@@ -395,7 +395,7 @@ class Programs:
             except KiksError:
                 participant.close()
                 raise
-        # A world that runs already does not stand still until somebody's imports are done.
+        # A running world does not wait for the imports of a new program.
         participant.is_waited_for = not self._scheduler.has_begun
         self._count = number
         self._scheduler.join(participant)
@@ -403,22 +403,22 @@ class Programs:
         return handle
 
     def _end(self, handle: Handle) -> None:
-        """Free the robots of a program that a person has stopped: here, as `round` may be waiting for time to go on."""
+        """Free the robots of a stopped program: here, because `round` may be waiting at the gate."""
         if handle.participant.is_stopped and not self._is_closed:
             with self.sim.lock:
-                handle.participant.part()
+                handle.participant.disconnect()
         handle.has_ended.set()
-        self._ring()
+        self._wake()
 
-    def _look_around(self) -> list[RemoteParticipant]:
-        """See to it that every connection is listened to for what matters; return those whose process has ended."""
+    def _check_processes(self) -> list[RemoteParticipant]:
+        """Kill silenced programs, update the selector, return programs whose process has ended."""
         over = []
         for handle in self.handles:
             participant = handle.participant
             if participant.is_silenced and handle.is_running:
                 handle.process.kill()
             if participant.is_stopped and handle.process.code is not None:
-                participant.part()
+                participant.disconnect()
                 handle.has_ended.set()
             if not participant.has_hung_up:
                 self._listen_to(participant)
@@ -448,7 +448,7 @@ class Programs:
         return noticed
 
     def _tell_end(self, handle: Handle) -> None:
-        """Say how a program has ended."""
+        """Report how a program has ended."""
         self._say(f"{handle.name} {'was stopped' if handle.participant.is_stopped else f'has ended {handle.how}'}.")
         left = [other.participant for other in self.handles if other.is_running and other.participant.is_here]
         if left and not any(participant.is_waited_for for participant in left):
@@ -458,14 +458,14 @@ class Programs:
     def _missing(self) -> str:
         return ", ".join(each.name for each in self.handles if not each.participant.is_here) or "a program elsewhere"
 
-    def _ring(self) -> None:
-        """Let `round` look up."""
+    def _wake(self) -> None:
+        """Wake `round`."""
         with contextlib.suppress(OSError):
-            self._bell_rope.send(b"!")
+            self._wake_sender.send(b"!")
 
-    def _quieten(self) -> None:
+    def _clear_wake(self) -> None:
         with contextlib.suppress(OSError):
-            self._bell.recv(1 << 10)
+            self._wake_receiver.recv(1 << 10)
 
     def _note_signal(self) -> None:
         self._signals += 1

@@ -1,13 +1,15 @@
-"""A pseudo-terminal: a serial port for any program in any language, under a name that stays.
+"""A pseudo-terminal: a serial port for any program in any language, under a stable name.
 
-Need: a client may open the port raw or canonical, at any speed, and the next one must find it as if it were new.
-Need: the server has to learn that a client has closed, to drop its unfinished command and its unread replies.
-Facts (Linux, tried): the master reports a hang-up while nobody has the slave open, but not before the first open; the
-settings of the slave and the characters in it outlive the client; the master reads and sets the slave's settings; what
-the master writes while the slave is closed waits for the next client.
-Method: between two clients the endpoint holds the slave open itself, so that nothing has to be polled. The first
-character shows that a client is there; the endpoint lets go, and the next hang-up is the client's. A program that opens
-the port and writes nothing, such as `stty`, is no client: its settings stay, as they do on a real port.
+A client may open the port raw or canonical, at any speed, and the next client must find it like new. The server must
+notice that a client has closed the port, to drop its unfinished command and its unread replies.
+
+On Linux (tried): the master reports a hang-up while the slave is closed, but not before its first open; the settings of
+the slave and the characters in it outlive the client; the master reads and sets the slave's settings; characters that
+the master writes while the slave is closed wait for the next client.
+
+So between two clients the endpoint itself holds the slave open, and needs no polling. The first character shows that a
+client is there. The endpoint then closes the slave, and the next hang-up is the client's. A program that opens the port
+and writes nothing, such as `stty`, is no client: its settings stay, as on a real port.
 """
 
 from __future__ import annotations
@@ -40,11 +42,11 @@ class PtyEndpoint(Endpoint):
     """A pseudo-terminal with a stable link to it.
 
     Args:
-        link: Where the link is made; a link that a dead server left there is replaced.
-        baud: Speed that a client finds who does not set one [bit/s].
+        link: Path of the link; a link that a dead server left there is replaced.
+        baud: Speed of the port until a client sets one [bit/s].
 
     Raises:
-        LinkError: If the link belongs to a living server, something else has its name, or it cannot be made.
+        LinkError: If the link belongs to a running server, another file has its name, or it cannot be created.
     """
 
     def __init__(self, link: str | Path, *, baud: int = 9600) -> None:
@@ -87,23 +89,23 @@ class PtyEndpoint(Endpoint):
         return self._master
 
     def accept(self) -> PtyChannel:
-        """Let go of the slave, so that the client's hang-up shows."""
-        # Its descriptor stays taken, for the slave again when the client has gone.
+        """Close the slave, so that the master reports the client's hang-up."""
+        # The descriptor's number stays reserved for the slave.
         os.dup2(self._master, self._held, inheritable=False)
         return PtyChannel(self)
 
-    def turn_away(self) -> None:
-        """Drop what was written."""
+    def reject(self) -> None:
+        """Drop the characters of the other client."""
         os.read(self._master, READ_SIZE)
 
     def renew(self) -> None:
-        """Make the port as good as new after a client."""
+        """Restore the port after a client."""
         self._reset()
         os.close(self._held)
         try:
             self._held = os.open(self._slave_name, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         except OSError:
-            # The client has locked the terminal (TIOCEXCL) and died: nobody can open that one any more.
+            # The client has locked the terminal (TIOCEXCL) and died: it cannot be opened any more.
             os.close(self._master)
             self._create()
             return
@@ -132,7 +134,7 @@ class PtyChannel(Channel):
         return self._master
 
     def read(self) -> bytes | None:
-        """Return what the client has written, and note the speed that it has set; None when it has closed the slave."""
+        """Return the bytes of the client, and note the speed that it has set; None when it has closed the slave."""
         try:
             data = os.read(self._master, READ_SIZE)
         except BlockingIOError:
@@ -181,7 +183,7 @@ def default_folder() -> Path:
 
 
 def _is_own(folder: Path) -> bool:
-    """Say whether a folder, and no link to one, is this user's, and nobody else can change what is in it."""
+    """Return whether a path is a folder (not a link) of this user in which no other user can write."""
     try:
         found = folder.lstat()
     except OSError:
@@ -195,7 +197,7 @@ def _is_own(folder: Path) -> bool:
 
 
 def _claim(path: str) -> socket.socket:
-    """Reserve a link's name until this process ends, however it ends: an abstract socket leaves no file behind."""
+    """Reserve a link's name until this process ends, in whatever way: an abstract socket leaves no file behind."""
     folder, name = os.path.split(path)
     # An abstract name holds 107 bytes; a path may be longer.
     digest = hashlib.sha256(os.fsencode(os.path.join(os.path.realpath(folder), name))).hexdigest()
@@ -211,7 +213,7 @@ def _claim(path: str) -> socket.socket:
 
 
 def _point(path: str, target: str) -> None:
-    """Make a link, in the place of one that a dead server left; no other file is touched."""
+    """Create a link; it replaces a link of a dead server, and no other file."""
     if os.path.lexists(path) and not (os.path.islink(path) and os.readlink(path).startswith(SLAVES)):
         raise LinkError(
             f"link {path!r} must not exist or be an old link to a terminal, but it is another file. Give another name."

@@ -1,7 +1,7 @@
-"""The line to a robot whose world others share: a program's end of what `participant.py` is the other end of.
+"""The line to a robot in a shared world: the program's end of the connection whose other end is `participant.py`.
 
-The program keeps its own time: thinking, sleeping and asking cost it nothing but that. Only what needs the world goes
-there and back.
+The program keeps its own time: thinking, sleeping and polling need no message. Only requests that need the world make a
+round trip.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from kiks.sim.read_completion import NEVER_NS, Read
 from kiks.units import TICK_NS
 
 TELL_NS = TICK_NS
-"""How far a program's time runs on before it says so to those who wait for it [ns]."""
+"""Time by which a program runs on before it reports its time to the scheduler [ns]."""
 
 
 class Connection(ABC):
-    """The way to the world, and the program's time.
+    """The connection to the world, and the program's time.
 
     Args:
         is_late: Whether the world may have begun already: then the program's time begins when it first needs it.
@@ -43,11 +43,11 @@ class Connection(ABC):
 
     @abstractmethod
     def _say(self, request: Request) -> None:
-        """Let the world know something."""
+        """Send a request."""
 
     @abstractmethod
     def _wait(self, ticket: int) -> Answer:
-        """Return the answer with a ticket, when it is there."""
+        """Wait for the answer with a ticket and return it."""
 
     @property
     def now_ns(self) -> int:
@@ -63,13 +63,13 @@ class Connection(ABC):
             self.tell(Kind.REACHED)
 
     def think(self, time_ns: int) -> None:
-        """Let the time pass that the program has thought [ns]."""
+        """Let the program's thinking time pass [ns]."""
         now_ns = self.now_ns
         self._thought_ns += time_ns
         self.pass_to(now_ns + time_ns)
 
     def tell(self, kind: Kind, robot: int = 0, *, first: int = 0, data: bytes = b"") -> None:
-        """Say something and go on."""
+        """Send a request without waiting for an answer."""
         self._send(Request(kind, robot, self._now_ns, 0, first, 0, 0, self._thought_ns, data))
         self._unanswered_count += 1
         if self._unanswered_count >= WINDOW:
@@ -78,12 +78,12 @@ class Connection(ABC):
     def ask(
         self, kind: Kind, robot: int = 0, *, first: int = 0, second: int = 0, third: int = 0, data: bytes = b""
     ) -> Answer:
-        """Say something and wait for the answer.
+        """Send a request and wait for the answer.
 
         Raises:
             LinkError: If the answer is an error.
         """
-        # The answer to a question that Ctrl-C has interrupted is still to come: it has another ticket.
+        # The answer to a request that Ctrl-C has interrupted may still come: it has another ticket.
         self._ticket = (self._ticket + 1) % (1 << 32)
         self._send(Request(kind, robot, self._now_ns, self._ticket, first, second, third, self._thought_ns, data))
         answer = self._wait(self._ticket)
@@ -101,10 +101,10 @@ class Connection(ABC):
 
 
 class SocketConnection(Connection):
-    """The way to a world in another process.
+    """The connection to a world in another process.
 
     Args:
-        there: The socket at whose other end it is.
+        there: The socket to it.
         is_late: Whether the world may have begun already.
     """
 
@@ -117,7 +117,7 @@ class SocketConnection(Connection):
         try:
             self._there.sendall(request.pack())
         except OSError:
-            # Python ends a program by clearing all it holds in any order: a port may be closed after this socket.
+            # At its end Python clears objects in any order: a port may be closed after this socket.
             if not sys.is_finalizing():
                 _end()
 
@@ -138,14 +138,14 @@ class SocketConnection(Connection):
 
 
 class FarLine:
-    """A robot's line in a world that others share; see `Line`."""
+    """A robot's line in a shared world; see `Line`."""
 
     def __init__(self, connection: Connection, robot: int) -> None:
         self.lock: AbstractContextManager[Any] = connection.lock
         self._connection = connection
         self._robot = robot
         self._is_claimed = False
-        # At least as many characters as are on the way to the robot.
+        # Upper bound of the characters on the way to the robot.
         self._ahead_count = 0
 
     @property
@@ -158,7 +158,7 @@ class FarLine:
         self._connection.pass_to(time_ns)
 
     def think(self, time_ns: int) -> None:
-        """Let the time pass that the program has thought [ns]."""
+        """Let the program's thinking time pass [ns]."""
         self._connection.think(time_ns)
 
     def send(self, data: bytes) -> None:
@@ -186,11 +186,11 @@ class FarLine:
         ).data
 
     def arrived_count(self) -> int:
-        """Return how many characters have arrived and were not read."""
+        """Return the number of characters that have arrived and were not read."""
         return self._ask(Kind.COUNT).number
 
     def sent_ns(self) -> int:
-        """Return when everything will have been sent [ns]."""
+        """Return when all characters will have been sent [ns]."""
         return self._ask(Kind.SENT).number
 
     def room_ns(self) -> int:
@@ -203,7 +203,7 @@ class FarLine:
         return [bool(flag) for flag in self._connection.ask(Kind.WAIT, second=second, data=pack_reads(reads)).data]
 
     def drop_arrived(self) -> None:
-        """Forget the characters that have arrived and were not read."""
+        """Drop the characters that have arrived and were not read."""
         self._connection.tell(Kind.DROP, self._robot)
 
     @property
@@ -216,16 +216,16 @@ class FarLine:
         self._connection.tell(Kind.SET_BAUD, self._robot, first=baud)
 
     def claim(self, holder: str) -> None:
-        """Take the line for one alone.
+        """Take the line exclusively.
 
         Raises:
-            LinkError: If somebody holds it already.
+            LinkError: If another program holds it.
         """
         self._ask(Kind.CLAIM, data=holder.encode())
         self._is_claimed = True
 
     def hang_up(self) -> None:
-        """Give the line back and forget what nobody read."""
+        """Release the line and drop unread characters."""
         self._connection.tell(Kind.HANG_UP, self._robot, first=self._is_claimed)
         self._is_claimed = False
 
@@ -236,6 +236,6 @@ class FarLine:
 
 
 def _end() -> None:
-    """End at once: the world has gone, and nothing that the program could still do has a meaning."""
+    """End at once: the world has gone, so the program cannot do anything useful."""
     sys.stdout.flush()
     os._exit(1)

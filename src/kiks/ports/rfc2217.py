@@ -1,6 +1,6 @@
-"""RFC 2217: a serial port over TCP whose client can set the speed, for `rfc2217://` of pyserial.
+"""RFC 2217: a serial port over TCP whose client can set the speed, for pyserial's `rfc2217://`.
 
-The protocol itself is pyserial's; it works on any object that has the attributes of a serial port.
+pyserial implements the protocol for any object that has the attributes of a serial port.
 """
 
 from __future__ import annotations
@@ -13,22 +13,22 @@ from typing import Any
 from kiks.ports.tcp import TcpChannel, TcpEndpoint
 
 REQUEST_LIMIT = 256
-"""Longest request of the telnet protocol [bytes]; the real ones have six."""
+"""Longest request of the telnet protocol [bytes]; real requests have six."""
 
 _log = logging.getLogger("kiks.serve")
 
 
 class Rfc2217Endpoint(TcpEndpoint):
-    """A port of this computer that speaks RFC 2217; arguments and errors are those of `TcpEndpoint`."""
+    """A TCP port of this computer that speaks RFC 2217; arguments and errors are those of `TcpEndpoint`."""
 
     def accept(self) -> Rfc2217Channel | None:
-        """Let the client in and begin to negotiate."""
+        """Accept the client and begin to negotiate."""
         connection = self._connect()
         return None if connection is None else Rfc2217Channel(self.name, connection, self)
 
 
 class _Settings:
-    """The serial port that the protocol believes it sets: all is accepted, the speed alone has an effect."""
+    """The serial port that the protocol sets: it accepts all settings, and only the speed has an effect."""
 
     def __init__(self, channel: Rfc2217Channel) -> None:
         self._channel = channel
@@ -50,11 +50,11 @@ class _Settings:
         self._channel.forget()
 
     def reset_output_buffer(self) -> None:
-        pass  # what was written is on the line already
+        pass  # written characters are on the line already
 
 
 class _Answers:
-    """Where the protocol sends its own messages, which are not data and so are not escaped."""
+    """Sends the protocol's own messages, which are not escaped because they are no data."""
 
     def __init__(self, channel: Rfc2217Channel) -> None:
         self._channel = channel
@@ -75,7 +75,7 @@ class Rfc2217Channel(TcpChannel):
         self._manager: Any = rfc2217.PortManager(settings, answers)
 
     def read(self) -> bytes | None:
-        """Return what the client has sent to the robot; None when it has gone or talks no telnet."""
+        """Return the client's bytes for the robot; None when it has gone or does not speak telnet."""
         data = super().read()
         if not data:
             return data
@@ -93,9 +93,9 @@ class Rfc2217Channel(TcpChannel):
         return data
 
     def write(self, data: bytes) -> None:
-        """Send characters, escaped as telnet wants it."""
+        """Send bytes, escaped for telnet."""
         super().write(b"".join(self._manager.escape(data)))
 
     def forget(self) -> None:
-        """Drop what waits for the client, because it asked for that."""
+        """Drop the bytes that wait for the client, at its request."""
         self._unsent.clear()

@@ -28,15 +28,15 @@ class Server:
 
     Args:
         sim: The simulation; others may use it at the same time if they hold its lock.
-        endpoints: The ways in to each robot, by its number from 1. They are closed with the server.
-        speed: Simulated seconds in a real one (live only).
+        endpoints: The endpoints of each robot, by its number from 1. The server closes them.
+        speed: Simulated seconds per real second (live only).
         thinking: 'live': the world runs all the time. 'none' or 'fixed:MS': the world waits for each command, before
             which no or a fixed time passes; repeatable to the bit for programs that wait for their replies.
-        programs: How many programs begin together; as many as there are robots if left out (not live).
+        programs: Number of programs that begin together; the number of robots if left out (not live).
         when_silent: What happens to a program that is silent while others wait for it: 'wait': the world waits for it;
-            'drop': it is hung up on; 'ignore': the world no longer waits for it (not live).
-        patience_s: How long it may be silent [s of real time].
-        pace: A pace that others hold too, instead of `speed`.
+            'drop': it is disconnected; 'ignore': the world no longer waits for it (not live).
+        patience_s: How long a program may be silent [s of real time].
+        pace: A pace to share, instead of `speed`.
         new_patience: Makes patiences with another wall clock: one that stands still while the world does.
 
     Raises:
@@ -81,10 +81,10 @@ class Server:
         self._selector = selectors.DefaultSelector()
         for robot, ways in self._endpoints.items():
             for endpoint in ways:
-                self._open_door(self._links[robot], endpoint)
+                self._listen(self._links[robot], endpoint)
 
     def serve(self, until: threading.Event | Callable[[], bool] | None = None) -> None:
-        """Serve until an event is set, a function returns True, or Ctrl-C; that is looked at every 50 ms at least."""
+        """Serve until an event is set, a function returns True, or Ctrl-C; checked at least every 50 ms."""
         is_over = until.is_set if isinstance(until, threading.Event) else until or (lambda: False)
         links = list(self._links.values())
         self._timing.start()
@@ -104,7 +104,7 @@ class Server:
                     key.data(events)
 
     def close(self) -> None:
-        """Part from all clients, close all endpoints and remove what they made."""
+        """Disconnect all clients, close all endpoints and remove their files."""
         with self.sim.lock:
             for link in self._links.values():
                 if link.channel is not None:
@@ -119,19 +119,19 @@ class Server:
 
     # ---- clients come and go ----
 
-    def _open_door(self, link: Link, endpoint: Endpoint) -> None:
+    def _listen(self, link: Link, endpoint: Endpoint) -> None:
         self._selector.register(endpoint.fileno(), selectors.EVENT_READ, partial(self._enter, link, endpoint))
 
     def _enter(self, link: Link, endpoint: Endpoint, _events: int) -> None:
-        """Let a client in if the robot has none."""
+        """Accept a client if the robot has none."""
         wire = link.wire
         if link.is_leaving:
-            return  # Who comes meanwhile waits at the door.
-        if self._has_fled(link):
+            return
+        if self._has_gone_unnoticed(link):
             self._leave(link)
             return
         if wire.holder is not None:
-            endpoint.turn_away()
+            endpoint.reject()
             if endpoint.name not in link.refused:
                 link.refused.add(endpoint.name)
                 _log.warning(
@@ -155,7 +155,7 @@ class Server:
         self._wait_for(link)
 
     def _leave(self, link: Link) -> None:
-        """Part from a client. Who comes next waits at the doors until what it has left behind is done."""
+        """Disconnect a client. The next one waits until its commands have acted."""
         channel = link.channel
         if channel is None:
             return
@@ -174,27 +174,27 @@ class Server:
         if self._timing.has_left(link):
             self._free(link)
 
-    def _has_fled(self, link: Link) -> bool:
-        """Say whether a client has gone that is so far ahead of its robot that nobody has read up to its end."""
+    def _has_gone_unnoticed(self, link: Link) -> bool:
+        """Return whether a client has gone that is so far ahead of its robot that the server has not read its end."""
         channel = link.channel
         return channel is not None and self._timing.forgets and self._timing.is_full(link) and channel.find_end()
 
     def _free(self, link: Link) -> None:
-        """Let the next client come."""
+        """Free the link for the next client."""
         link.clear()
         link.wire.leave_client(self.sim.now_ns)
         for endpoint in self._endpoints[link.robot]:
-            self._open_door(link, endpoint)
+            self._listen(link, endpoint)
 
     def _missing(self) -> str:
-        """Return whose programs are not there, for a person."""
+        """Return the names of the missing programs."""
         robots = [str(link.robot) for link in self._links.values() if link.channel is None and not link.is_leaving]
         return f"that of robot {' or '.join(robots)}"
 
     # ---- bytes come and go ----
 
     def _exchange(self, link: Link, events: int) -> None:
-        """Do what the channel's descriptor is ready for."""
+        """Read or write, as the channel's descriptor is ready for it."""
         channel = link.channel
         if channel is None:
             return
@@ -212,9 +212,9 @@ class Server:
                 self._timing.receive(link, data)
 
     def _wait_for(self, link: Link) -> None:
-        """Wait for what the channel can use: no characters without room on the line, no room that nobody needs.
+        """Select the events of the channel: reading if the line has room, writing if characters wait.
 
-        A descriptor that is waited for with no event would still report a hang-up, again and again: it is taken out.
+        A descriptor that is registered with no event would still report a hang-up, again and again: it is removed.
         """
         channel = link.channel
         if channel is None:

@@ -1,4 +1,4 @@
-"""TCP: the same bytes on a socket, for `socket://` of pyserial and for programs that know no serial port."""
+"""TCP: the same bytes on a socket, for pyserial's `socket://` and for programs without a serial port."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from kiks.ports.endpoint import READ_SIZE, Channel, Endpoint
 from kiks.ports.file_descriptors import RESERVE, opening
 
 WAITING_MAX = 128
-"""Most clients that wait at a port until the commands of the one before them are done; others must try again."""
+"""Most clients that wait at a port until the commands of the last client are done; others must try again."""
 
 AHEAD_MAX = 16 << 20
-"""Most characters that are read ahead of a robot [bytes]: more than the operating system holds for a client that is
-gone, and read only when another one knocks."""
+"""Most bytes read ahead of a robot: more than the operating system holds for a client that has gone. They are read only
+when another client connects."""
 
 _log = logging.getLogger("kiks.serve")
 
 
 class TcpEndpoint(Endpoint):
-    """A port of this computer; one client at a time.
+    """A TCP port of this computer; one client at a time.
 
     Args:
         port: Number of the port; 0 takes a free one.
-        host: Address of this computer that only programs on it reach.
+        host: A loopback address of this computer.
 
     Raises:
-        ParameterError: If the port is no number of one.
+        ParameterError: If the number is out of range.
         LinkError: If the port is busy, or other computers could reach the host.
     """
 
@@ -41,8 +41,8 @@ class TcpEndpoint(Endpoint):
         host = "127.0.0.1" if host == "localhost" else host
         if not _is_loopback(host):
             raise LinkError(
-                f"host must be an address that only this computer reaches, but it was {shown(host)}: whoever reaches "
-                "the port can drive the robot. Use 127.0.0.1, and an SSH tunnel from elsewhere."
+                f"host must be an address that only this computer reaches, but it was {shown(host)}: every client that "
+                "reaches the port can drive the robot. Use 127.0.0.1, and an SSH tunnel from elsewhere."
             )
         with opening("a TCP port"):
             self._listener = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET)
@@ -66,7 +66,7 @@ class TcpEndpoint(Endpoint):
         return self._listener.fileno()
 
     def accept(self) -> TcpChannel | None:
-        """Let the client in."""
+        """Accept the client."""
         connection = self._connect()
         return None if connection is None else TcpChannel(self.name, connection, self)
 
@@ -82,7 +82,7 @@ class TcpEndpoint(Endpoint):
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         return connection
 
-    def turn_away(self) -> None:
+    def reject(self) -> None:
         """Close the connection."""
         connection = self._connect()
         if connection is not None:
@@ -93,23 +93,23 @@ class TcpEndpoint(Endpoint):
         self._listener.close()
 
     def refuse_http(self) -> None:
-        """Tell a person, once, that a browser has come."""
+        """Log, once, that a browser has connected."""
         if not self._has_refused_http:
             self._has_refused_http = True
             _log.warning(
-                "a client of %s must speak as to a serial port, but one spoke HTTP and was hung up on: a page in a "
+                "a client of %s must speak as to a serial port, but one spoke HTTP and was disconnected: a page in a "
                 "browser may have tried to drive the robot. Do not open this port in a browser.",
                 self.name,
             )
 
 
 class FirstLine:
-    """Tells whether a client has begun with an HTTP request, from bytes that come in any pieces.
+    """Detects a client that begins with an HTTP request, from bytes in any pieces.
 
-    Need: pages of other sites can make a browser send a request to any port of this computer, with commands for a robot
-    in its body. No command of a Khepera looks like a request line, such as `POST / HTTP/1.1`.
-    Method: the bytes of the first line go on to the robot, so that no program is kept waiting; its end does not, if it
-    was a request line, nor does anything behind it. So no command is ever whole.
+    Pages of other sites can make a browser send a request to any port of this computer, with commands for a robot in
+    its body. No command of a Khepera looks like a request line, such as `POST / HTTP/1.1`. The bytes of the first line
+    go on to the robot at once, so no program waits. If it is a request line, its end and all that follows are dropped.
+    So no command is ever complete.
     """
 
     _METHOD = re.compile(rb"[A-Z]+ \S")
@@ -121,12 +121,12 @@ class FirstLine:
         self._tail = b""
 
     def is_http(self, data: bytes) -> bool:
-        """Look at the next bytes; say whether they end the line of a request."""
+        """Take the next bytes; return whether they end the line of a request."""
         if self._is_over:
             return False
         end = re.search(rb"[\r\n]", data)
         line = data if end is None else data[: end.start()]
-        # However long the line is: how it begins and how it ends is all that counts.
+        # Only the beginning and the end of the line count, however long it is.
         self._head += line[: 32 - len(self._head)]
         self._tail = (self._tail + line)[-16:]
         self._is_over = end is not None
@@ -137,9 +137,9 @@ class TcpChannel(Channel):
     """A client on a connection.
 
     Args:
-        name: Where it came in.
+        name: Name of the endpoint.
         connection: The connection.
-        endpoint: Who tells a person if it is a browser.
+        endpoint: The endpoint, which logs that a client is a browser.
     """
 
     def __init__(self, name: str, connection: socket.socket, endpoint: TcpEndpoint | None = None) -> None:
@@ -154,7 +154,7 @@ class TcpChannel(Channel):
         return self._connection.fileno()
 
     def read(self) -> bytes | None:
-        """Return what the client has sent; None when the connection is over, or was none of a program for a robot."""
+        """Return the bytes of the client; None when the connection is over, or the client is a browser."""
         if self._ahead:
             data: bytes | None = bytes(self._ahead[:READ_SIZE])
             del self._ahead[:READ_SIZE]
@@ -177,13 +177,13 @@ class TcpChannel(Channel):
 
     @property
     def has_ahead(self) -> bool:
-        """Say whether characters were read ahead and not yet taken."""
+        """Whether bytes were read ahead and not yet taken."""
         return bool(self._ahead)
 
     def find_end(self) -> bool:
-        """Read ahead and keep what comes, up to `AHEAD_MAX`; say whether the client has gone.
+        """Read ahead and keep the bytes, up to `AHEAD_MAX`; return whether the client has gone.
 
-        The end of a connection comes behind its last character: without reading it is not known.
+        The end of a connection comes after its last byte, so it shows only to a reader.
         """
         while len(self._ahead) < AHEAD_MAX:
             data = self._receive()

@@ -1,4 +1,4 @@
-"""PortNames of simulated ports: `kiks://1`, `kiks://sim2/1`, `kiks://1?arena=maze.toml&seed=3&thinking=fixed:2`."""
+"""Names of simulated ports: `kiks://1`, `kiks://sim2/1`, `kiks://1?arena=maze.toml&seed=3&thinking=fixed:2`."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ _OPTIONS = ("arena", "robots", "robot", "seed", "thinking")
 
 
 def find_port(url: str) -> SimPort:
-    """Return a port of its own on the line that a name stands for.
+    """Return a new port on the line that a name stands for.
 
-    A number alone is a robot of the simulation that was created last, or of a fresh one in the default arena if there
-    is none. Options after a question mark always make a fresh simulation.
+    A number alone is a robot of the newest simulation, or of a new one in the default arena if there is none. Options
+    after a question mark always create a new simulation.
 
     Args:
         url: 'kiks://ROBOT', 'kiks://SIMULATION/ROBOT' or 'kiks://ROBOT?arena=FILE&robots=2&seed=3&thinking=none'.
 
     Raises:
-        LinkError: If the name is malformed, or there is no such simulation or robot.
+        LinkError: If the name is malformed, or the simulation or the robot does not exist.
         ParameterError: If an option is unknown or out of range.
         ArenaError: If the arena cannot be read.
     """
@@ -49,7 +49,7 @@ def find_port(url: str) -> SimPort:
     if not 1 <= robot <= sim.robot_count:
         known = "robot 1 only" if sim.robot_count == 1 else f"robots 1 to {sim.robot_count}"
         raise LinkError(
-            f"a port must belong to a robot there is, but {shown(url)} names robot {robot} and the simulation has "
+            f"a port must belong to an existing robot, but {shown(url)} names robot {robot} and the simulation has "
             f"{known}. "
             f"Open {sim.url(min(max(robot, 1), sim.robot_count))!r}, or create it with more robots."
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from heapq import heappop, heappush
+from typing import Protocol
 
 from kiks.clock.gate import Gate
 from kiks.firmware.khepera import Firmware
@@ -31,6 +32,15 @@ class EventQueue:
         return wires[entries[0][1] if entries else 0]
 
 
+class Supervisor(Protocol):
+    """Acts in the world at instants of its own choice, after all events of that instant."""
+
+    next_ns: int
+
+    def act(self) -> None:
+        """Act, and choose a later `next_ns`, or raise to end the run."""
+
+
 class EventLoop:
     """Lets time pass in a world: does the events on its serial lines in their order.
 
@@ -41,6 +51,7 @@ class EventLoop:
     Attributes:
         wires: The robots' serial lines.
         gate: Decides how far time may go while it is watched; None while nothing watches it.
+        supervisor: Acts in the world at certain instants, such as a referee; None without one.
     """
 
     def __init__(self, world: World, sync: Callable[[], None]) -> None:
@@ -48,6 +59,7 @@ class EventLoop:
         self.lock = world.lock
         self.wires: list[Wire] = []
         self.gate: Gate | None = None
+        self.supervisor: Supervisor | None = None
         self._sync = sync
         self._events = EventQueue()
 
@@ -63,6 +75,14 @@ class EventLoop:
         """
         if not (time_ns.__class__ is int and time_ns <= CLOCK_END_NS):
             time_ns = check_count("time_ns", time_ns, -CLOCK_END_NS, CLOCK_END_NS)
+        supervisor = self.supervisor
+        if supervisor is not None:
+            while supervisor.next_ns <= time_ns:
+                self._pass_gate_to(supervisor.next_ns)
+                supervisor.act()
+        self._pass_gate_to(time_ns)
+
+    def _pass_gate_to(self, time_ns: int) -> None:
         gate = self.gate
         if gate is not None and gate.is_up:
             while (until_ns := gate.admit(self.world.now_ns, time_ns)) < time_ns:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tools.sensors.models import MAXIMUM_COUNTS
 
 from kiks.engine.parameters import pack
 from kiks.engine.sensing.responses import respond_all
 from kiks.engine.sensing.thesis_networks import pack_networks, respond_networks
-from kiks.fit.models import MAXIMUM_COUNTS
 from kiks.model.robot import RobotSpec
 from kiks.model.thesis_networks import NetworkResponse
 

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tools.sensors import models
+from tools.sensors.card import data_folder
+from tools.sensors.train_networks import fan_of
 
 import kiks
 from kiks.errors import ParameterError
-from kiks.fit import models
-from kiks.fit.accuracy import data_folder
 from kiks.fit.samples import Samples, nearnesses
-from kiks.fit.train_networks import fan_of
 from kiks.model.materials import REFLECTANCES
 from kiks.model.robot import RESPONSES, RobotSpec, save_robot
 from kiks.model.thesis_networks import NetworkResponse

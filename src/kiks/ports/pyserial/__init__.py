@@ -1,1 +1,1 @@
-"""Where pyserial looks for `protocol_kiks`: this package stands in its list of URL handlers once `kiks` is imported."""
+"""The package of `protocol_kiks`; importing `kiks` adds it to pyserial's list of URL handlers."""

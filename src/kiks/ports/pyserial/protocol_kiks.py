@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-# pyserial imports this module itself, when a program opens such a name: it is there already.
+# pyserial imports this module when a program opens such a name, so pyserial is loaded already.
 from serial import PortNotOpenError, SerialBase, SerialException  # noqa: TID253
 
 from kiks.errors import KiksError, shown
@@ -13,27 +13,27 @@ from kiks.sim.port import VirtualPort
 
 
 class Serial(SerialBase):  # type: ignore[misc, unused-ignore]
-    """A serial port at whose other end a simulated robot sits."""
+    """A serial port with a simulated robot at its other end."""
 
     _sim_port: VirtualPort | None = None
 
     def find(self, name: str) -> VirtualPort:
-        """Return the simulated port behind a name; `kiks run` puts its own mapping here."""
+        """Return the simulated port behind a name; `kiks run` overrides this with its own mapping."""
         return url.find_port(name)
 
     def _take(self, port: VirtualPort) -> None:
-        """Take a port for this program alone."""
+        """Take a port exclusively for this program."""
         port.claim(f"the program that opened {shown(self.port)}")
 
     def _give_back(self, port: VirtualPort) -> None:
-        """Let others have it."""
+        """Release a port."""
         port.close()
 
     def open(self) -> None:
         """Open the port.
 
         Raises:
-            SerialException: If there is no such port, or somebody has it open already.
+            SerialException: If the port does not exist, or another program has it open.
         """
         if self.port is None:
             raise SerialException(
@@ -57,7 +57,7 @@ class Serial(SerialBase):  # type: ignore[misc, unused-ignore]
         self._sim_port = None
 
     def _reconfigure_port(self, *_: Any, **__: Any) -> None:
-        # Stop bits, parity and flow control are ignored, as the real robot does (khepera-protocol.md 2.1).
+        # The real robot ignores stop bits, parity and flow control, too (khepera-protocol.md 2.1).
         if self._sim_port is None:
             return
         self._sim_port.timeout = self.timeout
@@ -79,11 +79,11 @@ class Serial(SerialBase):  # type: ignore[misc, unused-ignore]
 
     @property
     def out_waiting(self) -> int:
-        """Characters that were written and have not left: none, as with a large output buffer."""
+        """Characters in the output buffer: none, as if the driver took all at once."""
         return 0
 
     def read(self, size: int = 1) -> bytes:
-        """Read `size` characters, fewer if the time-out is over first."""
+        """Read `size` characters, fewer if the timeout is over first."""
         return self._ask(lambda port: port.read(size))
 
     def read_until(self, expected: bytes = b"\n", size: int | None = None) -> bytes:
@@ -106,15 +106,15 @@ class Serial(SerialBase):  # type: ignore[misc, unused-ignore]
         return self._open_port.write(b)
 
     def flush(self) -> None:
-        """Wait until everything has been sent."""
+        """Wait until all characters have been sent."""
         self._open_port.flush()
 
     def reset_input_buffer(self) -> None:
-        """Drop what has arrived."""
+        """Drop characters that have arrived."""
         self._open_port.reset_input_buffer()
 
     def reset_output_buffer(self) -> None:
-        """Do nothing: what was written is on the line."""
+        """Do nothing: written characters are on the line."""
         self._open_port.reset_output_buffer()
 
     # A Khepera has no control lines and needs none (khepera-protocol.md 2.1).
@@ -137,7 +137,7 @@ class Serial(SerialBase):  # type: ignore[misc, unused-ignore]
 
     @property
     def ri(self) -> bool:
-        """Nobody rings."""
+        """Never: no modem rings."""
         return False
 
     @property

@@ -1,4 +1,4 @@
-"""A picture of a soccer match: all paths on the pitch, and below it a small one of how each goal fell."""
+"""A picture of a soccer match: all paths on the pitch, and below it a small picture of each goal."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from soccer_match import LOOK_S, Goal, Match
 
 from kiks.demos import pitch
-from kiks.demos.match import LOOK_S, Goal, Match
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -23,8 +23,8 @@ _PAPER, _INK = (255, 255, 255), (40, 40, 40)
 
 _WIDTH, _HEAD, _CAPTION, _GAP = 1230, 64, 26, 14
 _COLUMNS = 4
-_FINER = 2  # drawn that much larger and shrunk, which smooths the lines
-_RUN_UP_S = 8.0  # of a goal that is shown [s]
+_FINER = 2  # drawn larger by this factor and shrunk, which smooths the lines
+_RUN_UP_S = 8.0  # time before a goal that its picture shows [s]
 _PALE = 0.55
 
 
@@ -66,8 +66,8 @@ def panel(trail: NDArray[np.float64], width: int, goals: Sequence[Goal], *, is_c
     Args:
         trail: float64 [look, left, right or ball, x or y] [mm].
         width: Of the picture [pixels].
-        goals: They are marked where they fell.
-        is_close: Whether a few seconds are shown, strong, and not a whole match, pale.
+        goals: The goals to mark.
+        is_close: True for a few seconds in strong colours, False for a whole match in pale ones.
     """
     from PIL import Image, ImageDraw
 
@@ -121,7 +121,7 @@ def _ground(scale: float) -> Image:
 
 
 def _pieces(path: NDArray[np.float64]) -> list[list[list[float]]]:
-    """Return a path in pieces, cut where a hand has carried the thing."""
+    """Return a path in pieces, cut where the referee has moved the ball."""
     if len(path) < 2:
         return []
     steps_mm = np.hypot(*np.diff(path, axis=0).T)

@@ -14,7 +14,7 @@ from kiks.model.atomic_files import make_folder, replace_file
 from kiks.model.robot import SENSOR_COUNT
 
 if TYPE_CHECKING:
-    from kiks.fit.accuracy import Card
+    from tools.sensors.card import Card
 
 _MEASURED, _PREDICTED, _ERROR = "black", "tab:blue", "tab:red"
 
@@ -75,8 +75,8 @@ def plot_card(card: Card, folder: Path) -> list[Path]:
     Raises:
         ParameterError: If Matplotlib is missing or the folder cannot be written.
     """
-    from kiks.fit.accuracy import FOUND, HALVES, HELD_OUT, smoothed
-    from kiks.fit.models import MODELS
+    from tools.sensors.card import FOUND, HALVES, HELD_OUT, smoothed
+    from tools.sensors.models import MODELS
 
     half = HALVES[HELD_OUT]
     measured = {name: table.counts[:, half] for name, table in card.tables.items()}

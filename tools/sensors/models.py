@@ -10,10 +10,10 @@ import math
 from collections.abc import Callable
 
 import numpy as np
+from tools.sensors.train_networks import PLACES, fan_of
 
 from kiks.engine.sensing import thesis_networks
 from kiks.fit.samples import BODY_RADIUS_MM, MAXIMUM_COUNTS, Fan, Floats, Samples, nearnesses, ray_lengths_mm
-from kiks.fit.train_networks import PLACES, fan_of
 from kiks.model.robot import SENSOR_COUNT
 from kiks.model.thesis_networks import NetworkResponse
 

@@ -1,46 +1,47 @@
-"""Where a soccer player is: its wheels tell, and the posts of the goals put right what they get wrong.
+"""Localization of a soccer player: odometry, corrected by the goal posts that it sees.
 
-Method: a Kalman filter of three numbers, x, y and heading. Wheels move the place and make it less sure; each post that
-is seen says how far its direction is off, and the place gives way along what is least sure.
+An extended Kalman filter of three numbers: x, y and heading. The wheels move the pose and add uncertainty. The measured
+direction of each post corrects it.
 """
 
 from __future__ import annotations
 
 import math
 
+from sight import View
+
 from kiks.client.khepera import Khepera
-from kiks.demos.sight import View
 
 Matrix = list[list[float]]
 
 GOAL_LINE_MM, POST_MM = 525.0, 150.0
-"""Where the posts are: so far before and behind, and so far to the left and right of the middle."""
+"""Distance of the goal lines from the middle, and of the posts from the long axis."""
 
 
 class Whereabouts:
-    """A place on the pitch.
+    """The pose of a player on the pitch.
 
     Args:
-        robot: Whose wheels.
-        x: Where it stands now [mm].
-        y: Where it stands now [mm].
-        heading: Where it looks [rad].
+        robot: The robot.
+        x: Its place at the start [mm].
+        y: Its place at the start [mm].
+        heading: Its heading at the start [rad].
     """
 
     BASE_MM = 53.0
     PULSE_MM = 0.08
 
     WAY_SHARE = 0.01
-    """Error of a way, as a share of it."""
+    """Error of a distance, as a share of it."""
 
     TURN_SHARE = 0.01
-    """Error of a turn, as a share of it, or of a way over the wheel base."""
+    """Error of a turn, as a share of it."""
 
     SIGHT_RAD = 0.05
     """Error of a post's direction."""
 
     DOUBT = (2.0, 2.0, 0.0001)
-    """What each post that cannot be it adds to the spread [mm^2, mm^2, rad^2]."""
+    """Variance that each rejected post adds [mm^2, mm^2, rad^2]."""
 
     def __init__(self, robot: Khepera, x: float, y: float, heading: float) -> None:
         self.robot = robot
@@ -50,7 +51,7 @@ class Whereabouts:
         self.turn = 0.0
 
     def read_wheels(self) -> float:
-        """Ask how far the wheels have turned, and follow; return the way [mm]."""
+        """Read the wheel counters, move the pose, return the distance driven [mm]."""
         before, self.wheels = self.wheels, self.robot.encoders()
         left, right = (self.PULSE_MM * (now - then) for now, then in zip(self.wheels, before, strict=True))
         way, turn = (left + right) / 2, (right - left) / self.BASE_MM
@@ -58,7 +59,7 @@ class Whereabouts:
         middle = self.heading + turn / 2
         step_x, step_y = way * math.cos(middle), way * math.sin(middle)
         self.x, self.y, self.heading = self.x + step_x, self.y + step_y, self.heading + turn
-        # What the heading is off, the step is off sideways.
+        # An error of the heading moves the step sideways.
         p = self.spread
         for row in range(3):
             p[row][0] -= step_y * p[row][2]
@@ -73,11 +74,11 @@ class Whereabouts:
         return way
 
     def see_posts(self, view: View, goals: tuple[str, str]) -> None:
-        """Take the posts in a view for what they are.
+        """Correct the pose by the posts in a view.
 
         Args:
-            view: What was seen.
-            goals: The looks of the own goal and of the other.
+            view: The view.
+            goals: The look of the player's own goal and of the other.
         """
         for edge in view.edges:
             x = GOAL_LINE_MM if edge.goal == goals[1] else -GOAL_LINE_MM
@@ -85,7 +86,7 @@ class Whereabouts:
             self.see(x, y, edge.bearing_rad)
 
     def see(self, x: float, y: float, bearing_rad: float) -> bool:
-        """Learn from the direction in which a post is seen; return False if that cannot be it."""
+        """Correct the pose by the direction of a post at (x, y); return False if the post is rejected."""
         to_x, to_y = x - self.x, y - self.y
         square = max(to_x**2 + to_y**2, 1.0)
         off = math.remainder(bearing_rad - math.atan2(to_y, to_x) + self.heading, 2 * math.pi)
@@ -95,7 +96,7 @@ class Whereabouts:
         share = [sum(p[row][k] * slope[k] for k in range(3)) for row in range(3)]
         variance = sum(slope[k] * share[k] for k in range(3)) + self.SIGHT_RAD**2 + self.turn**2
         if off * off > 9.0 * variance:
-            # One such post is a mistake. If it goes on, the mistake is ours, and sooner or later they are believed.
+            # One such post is an outlier. If they persist, the pose is wrong, so each one adds uncertainty.
             for k, doubt in enumerate(self.DOUBT):
                 p[k][k] += doubt
             return False

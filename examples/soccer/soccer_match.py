@@ -1,8 +1,8 @@
-"""A soccer match: two programs, each in a process of its own, one world, and a referee who stands outside.
+"""A soccer match: two programs, each in a process of its own, in one world with a referee.
 
-The programs know what their robots tell them, no more. The referee sees everything. He counts the goals, and after each
-puts the ball back on the middle mark; he does the same when it has not moved for long. He never touches a robot: a
-player is told nothing, and notices what a real one would, that the ball is gone.
+The programs know only what their robots tell them. The referee sees everything. It counts the goals, and after each
+goal drops the ball near the middle mark; it does the same when the ball has not moved for long. It never moves a robot
+and tells the players nothing: a player notices that the ball is gone, as a real one would.
 """
 
 from __future__ import annotations
@@ -27,14 +27,13 @@ LOOK_S = 0.1
 """Simulated time between two looks of the referee [s]: a ball moves 30 mm at most."""
 
 STILL_MM, STILL_S = 40.0, 10.0
-"""A ball that has come no farther than that in this time is taken back to the middle."""
-
+"""The referee drops a ball that has come no farther than this distance in this time."""
 
 DROP_MM = 40.0, 120.0
-"""How far from the middle mark the ball may fall, along the pitch and across it [mm]."""
+"""Largest distance from the middle mark at which the ball drops, along the pitch and across it [mm]."""
 
 ATTEMPTS = 100
-"""Places that are tried for it."""
+"""Places tried for a drop."""
 
 STREAM_REFEREE = 101
 """Random stream of these places."""
@@ -49,8 +48,8 @@ class Goal:
     """A goal.
 
     Attributes:
-        time_s: When.
-        side: For whom, 'left' or 'right'.
+        time_s: Simulated time [s].
+        side: The side that scored, 'left' or 'right'.
     """
 
     time_s: float
@@ -59,11 +58,11 @@ class Goal:
 
 @dataclass
 class Report:
-    """What the referee writes down.
+    """The record of a match.
 
     Attributes:
         goals: The goals, in their order.
-        drops_s: When the ball was taken back to the middle because it lay still [s].
+        drops_s: Times at which the referee dropped a ball that lay still [s].
         trail: Places of robots and ball at each look: left x, y, right x, y, ball x, y [mm].
     """
 
@@ -78,15 +77,16 @@ class Report:
 
 
 class Match(Simulation):
-    """A pitch with two robots on their marks, a ball, and a referee who looks at fixed instants.
+    """A pitch with two robots on their marks, a ball, and a referee that looks at fixed instants.
 
     Args:
-        seconds: How long it lasts [s of simulated time].
+        seconds: Length of the match [s of simulated time].
         seed: Seed of all random numbers.
         on_goal: Called after each goal.
 
     Attributes:
-        report: What the referee has written down so far.
+        report: The record of the match so far.
+        next_ns: When the referee looks next [ns].
     """
 
     def __init__(
@@ -98,7 +98,7 @@ class Match(Simulation):
             )
         jersey = RobotSpec.load("khepera").with_changes(body__brightness=pitch.JERSEY)
         self._period_ns, self._end_ns = ns_from_s(LOOK_S), ns_from_s(seconds)
-        self._next_ns = 0
+        self.next_ns = 0
         super().__init__(pitch.arena(), robots=2, seed=seed, robot=jersey)
         self.ball = self.add_ball(
             pitch.MIDDLE_X_MM, pitch.MIDDLE_Y_MM, brightness=pitch.BALL, friction_mm_s2=pitch.FRICTION_MM_S2
@@ -109,23 +109,19 @@ class Match(Simulation):
         self._on_goal = on_goal
         self._rest, self._rest_s = (pitch.MIDDLE_X_MM, pitch.MIDDLE_Y_MM), 0.0
         self._drop()
+        self.loop.supervisor = self
 
-    def advance_to(self, time_ns: int) -> None:
-        """Let time pass, and let the referee look at each of his instants on the way.
-
-        What happens at such an instant, happens before he looks; so it does not matter who lets time pass, and how far.
+    def act(self) -> None:
+        """Let the referee look; the event loop calls this at `next_ns`.
 
         Raises:
             FullTime: At the end.
         """
-        while self._next_ns <= time_ns:
-            super().advance_to(self._next_ns)
-            if self._next_ns % self._period_ns == 0:
-                self._look()
-            if self._next_ns == self._end_ns:
-                raise FullTime
-            self._next_ns = min(self._next_ns + self._period_ns, self._end_ns)
-        super().advance_to(time_ns)
+        if self.next_ns % self._period_ns == 0:
+            self._look()
+        if self.next_ns == self._end_ns:
+            raise FullTime
+        self.next_ns = min(self.next_ns + self._period_ns, self._end_ns)
 
     def finish(self) -> None:
         """Let time pass to the end.
@@ -138,7 +134,7 @@ class Match(Simulation):
     # ---- the referee ----
 
     def _look(self) -> None:
-        """See where everything is, and do what a referee does."""
+        """Note all places, count a goal, drop the ball after a goal or when it lies still."""
         self.sync()
         ball = self.world.state.bodies[0, 0]
         x_mm, y_mm, radius_mm = float(ball["x_mm"]), float(ball["y_mm"]), float(ball["radius_mm"])
@@ -157,7 +153,7 @@ class Match(Simulation):
             self._drop()
 
     def _drop(self) -> None:
-        """Drop the ball near the middle mark: a little to one side, as a hand does, and not onto a robot."""
+        """Drop the ball near the middle mark, a little to one side, and not onto a robot."""
         for attempt in range(ATTEMPTS):
             x_share, y_share = (
                 uniform(self.seed, 0, 0, STREAM_REFEREE, self.now_ns + attempt, axis) for axis in (0, 1)
@@ -167,35 +163,38 @@ class Match(Simulation):
             try:
                 self.move_body(self.ball, x_mm, y_mm)
             except ParameterError:
-                continue  # somebody stands there
+                continue  # a robot stands there
             self._rest, self._rest_s = (x_mm, y_mm), self.time_s
             return
 
     def trail(self) -> NDArray[np.float64]:
-        """Return where everybody was at each look, float64 [look, left, right or ball, x or y] [mm]."""
+        """Return the places at each look, float64 [look, left, right or ball, x or y] [mm]."""
         return np.array(self.report.trail, np.float64).reshape(-1, 3, 2)
 
 
 def scorer(x_mm: float, radius_mm: float) -> str | None:
-    """Return for whom a ball at x counts: all of it must be behind the line."""
+    """Return the side that scores with a ball at x: all of the ball must be behind the line."""
     if x_mm > pitch.RIGHT_LINE_MM + radius_mm:
         return "left"
     return "right" if x_mm < pitch.LEFT_LINE_MM - radius_mm else None
 
 
 def play(match: Match, players: Sequence[Command], say: Callable[[str], None] = lambda text: None) -> str:
-    """Let two programs play to the end; return why they might not play the same again, nothing if they would.
+    """Let two programs play to the end.
 
     Args:
         match: The match.
         players: The program of the left and of the right side.
-        say: Where a person is told if a program ends before its time.
+        say: Called with a line of text if a program ends early.
+
+    Returns:
+        Why the match might not repeat; empty if it does.
     """
     programs = Programs(match, players, when_silent="wait", say=say)
     try:
         programs.run()
         if not programs.doubt:
-            match.finish()  # nobody plays any more, but the ball may still roll
+            match.finish()  # both programs have ended, but the ball may still roll
     except FullTime:
         pass
     return programs.doubt

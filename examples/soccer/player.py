@@ -1,13 +1,13 @@
 """Play soccer: find the ball with the K213 camera, get behind it, drive it into the other goal.
 
-    python -m kiks.demos.soccer /dev/ttyUSB0 left
+    python examples/soccer/player.py /dev/ttyUSB0 left
 
-The robot needs a K213, a line of 38400 baud (mode 3), a white ball in a dark pitch, and to be put on its mark: 250 mm
-before the middle, facing it. Who plays on the left attacks the goal on the right. All that a player knows of the pitch
-are its sizes and the greys of walls and goals; where it is, it knows from its wheels and the goal posts it sees.
+The robot needs a K213, a line of 38400 baud (mode 3) and a white ball on a dark pitch. Put it on its mark: 250 mm from
+the middle, facing it. The left player attacks the goal on the right. A player knows the size of the pitch and the greys
+of walls and goals. It finds its place from its wheels and the goal posts that it sees.
 
 Places are in the player's own frame: the origin in the middle of the pitch, x to the goal that it attacks, y to the
-left of that. So there is one program for both sides.
+left of that. So one program serves both sides.
 """
 
 from __future__ import annotations
@@ -17,15 +17,16 @@ import sys
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from sight import BALL_MM, Eye, Sighting
+from whereabouts import Whereabouts
+
 from kiks.client.khepera import Khepera
-from kiks.demos.sight import BALL_MM, Eye, Sighting
-from kiks.demos.whereabouts import Whereabouts
 
 BAUD = 38400
 """A picture takes 41 ms on this line, and 165 ms at 9600 baud: the ball would be gone."""
 
 PAUSE_S = 0.03
-"""How long to wait after each step [s]: the wheels need some time to follow, and the next picture to be another."""
+"""Pause after each step [s]: the wheels need time to follow, and the camera to take its next picture."""
 
 LENGTH_MM, WIDTH_MM = 1050.0, 680.0
 """The pitch between the goal lines, and between the side walls."""
@@ -37,7 +38,7 @@ CORNER_MM = 140.0
 """Radius of the pitch's corners."""
 
 MARK_MM = 250.0
-"""How far from the middle a player stands at the kick-off."""
+"""Distance of a player from the middle at kick-off."""
 
 PULSE_MM_S = 8.0
 """Speed of a wheel at one pulse in 10 ms [mm/s]."""
@@ -51,18 +52,18 @@ class Point(NamedTuple):
 
 
 HOME = Point(-150.0, 0.0)
-"""Where to look for the ball from, if it is nowhere."""
+"""The place from which to look for a lost ball."""
 
 
 @dataclass(frozen=True)
 class Style:
-    """How somebody plays; speeds in pulses/10 ms.
+    """How a player plays; speeds in pulses/10 ms.
 
     Attributes:
         cruise: Speed without the ball.
         shot: Speed at the ball.
-        zone_mm: The ball is left alone beyond this x.
-        home: Where to wait for it.
+        zone_mm: The player ignores the ball beyond this x.
+        home: Where it waits for the ball.
     """
 
     cruise: float = 16.0
@@ -72,27 +73,27 @@ class Style:
 
 
 STYLES = {"attacker": Style(), "defender": Style(zone_mm=60.0, home=Point(-380.0, 0.0))}
-"""The attacker goes for every ball, the defender waits before his goal until it comes over the middle."""
+"""The attacker goes for every ball. The defender waits before its goal until the ball crosses the middle."""
 
 MEMORY_S = 2.5
-"""How long the ball is believed to be where it was seen last."""
+"""Time for which the ball is believed to be where it was seen last."""
 
 START_MM = 140.0
-"""How far behind the ball a shot begins."""
+"""Distance behind the ball from which a shot begins."""
 
 PASSING_MM = 85.0
-"""How far from the middle of the ball a player passes it that wants to get behind it."""
+"""Distance from the centre of the ball at which a player drives round it."""
 
 TURN_BACK_S = 0.7
-"""How long to back off when something is in the way."""
+"""How long to back off when something blocks the way."""
 
 
 class Player:
     """A player.
 
     Args:
-        robot: Its body, on its mark.
-        side: Which half is its own, 'left' or 'right'.
+        robot: The robot, on its mark.
+        side: Its own half, 'left' or 'right'.
         style: How it plays.
     """
 
@@ -137,7 +138,7 @@ class Player:
         if sighting is not None:
             distance, bearing = sighting.where(None if self.ball is None else self._way_to(self.ball)[0])
             if self.ball is None and not sighting.is_whole and abs(bearing) > 0.15:
-                return  # it might be anywhere behind that edge: turn to it first
+                return  # the ball may be anywhere behind that edge: turn to it first
             angle = place.heading + bearing
             self.ball = Point(
                 _within(place.x + distance * math.cos(angle), LENGTH_MM / 2 + BALL_MM),
@@ -152,7 +153,7 @@ class Player:
                 self.ball = None
 
     def _search(self, glimpse: Sighting | None) -> None:
-        """Turn to what is seen of the ball; else turn about, and go home if that does not help."""
+        """Turn to the visible part of the ball; without one turn round, then go home."""
         if glimpse is not None:
             self._drive(0.0, 3.0 * glimpse.where(None)[1])
             return
@@ -177,12 +178,12 @@ class Player:
         to_x, to_y = ball.x - self.place.x, ball.y - self.place.y
         behind, beside = to_x * aim.x + to_y * aim.y, abs(to_x * aim.y - to_y * aim.x)
         start = self._inside(Point(ball.x - START_MM * aim.x, ball.y - START_MM * aim.y))
-        # Whoever has begun goes on, unless the ball gets away to the side.
+        # A shot goes on unless the ball gets away to the side.
         cone = 0.9 if self.is_shooting else 0.45
         is_behind = behind > 20.0 and beside < max(cone * (behind - BALL_MM), 12.0)
         self.is_shooting = is_behind or (self._way_to(start)[0] < 30.0 and behind > 0.0)
         if self.is_shooting:
-            # Come onto the line through ball and goal, and shoot along it.
+            # Get onto the line through ball and goal, and shoot along it.
             lead = 0.4 * behind if behind > 90.0 else -60.0
             speed = self.style.shot if behind < 200.0 else self.style.cruise
             self._go(Point(ball.x - lead * aim.x, ball.y - lead * aim.y), speed)
@@ -193,7 +194,7 @@ class Player:
     def _aim(ball: Point) -> Point:
         """Return the direction in which the ball should go.
 
-        That is into the nearest part of the goal; along a wall that it lies at; and away from the own goal line.
+        That is into the nearest part of the goal, along a wall that it touches, or away from its own goal line.
         """
         to_x, to_y = LENGTH_MM / 2 + 80.0 - ball.x, _within(ball.y, GOAL_MM / 2 - 70.0) - ball.y
         if ball.x < 90.0 - LENGTH_MM / 2:
@@ -204,7 +205,7 @@ class Player:
         return Point(to_x / length, to_y / length)
 
     def _go_round(self, ball: Point, point: Point) -> None:
-        """Drive to a point, but round the ball."""
+        """Drive to a point, round the ball."""
         _, bearing = self._way_to(point)
         distance, to_ball = self._way_to(ball)
         free = math.asin(min(PASSING_MM / max(distance, 1.0), 1.0))
@@ -215,7 +216,7 @@ class Player:
 
     @staticmethod
     def _inside(point: Point) -> Point:
-        """Return a point near by where a robot has room; corners are round."""
+        """Return the nearest point where a robot has room; the corners are round."""
         x, y = _within(point.x, LENGTH_MM / 2 - 40.0), _within(point.y, WIDTH_MM / 2 - 40.0)
         into_x, into_y = abs(x) - LENGTH_MM / 2 + CORNER_MM, abs(y) - WIDTH_MM / 2 + CORNER_MM
         too_far = math.hypot(into_x, into_y) / (CORNER_MM - 35.0)
@@ -267,12 +268,12 @@ def _within(value: float, limit: float) -> float:
 
 
 def play(name: str = "kiks://1", side: str = "left", style: str = "attacker") -> None:
-    """Play until somebody switches the robot off.
+    """Play until the robot is switched off.
 
     Args:
-        name: Of the port.
+        name: Name of the port.
         side: 'left' or 'right'.
-        style: One of `STYLES`.
+        style: A key of `STYLES`.
     """
     with Khepera(name, baud=BAUD) as robot:
         player = Player(robot, side, STYLES[style])

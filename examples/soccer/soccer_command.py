@@ -1,4 +1,4 @@
-"""`kiks demo soccer`."""
+"""The command `kiks demo soccer`."""
 
 from __future__ import annotations
 
@@ -8,17 +8,18 @@ from time import perf_counter
 from typing import TYPE_CHECKING
 
 import typer
+from soccer_match import Match, Report, play
+from soccer_picture import draw_match
 
 from kiks.cli.desk import open_desk
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, shown
 
 if TYPE_CHECKING:
-    from kiks.demos.match import Match, Report
     from kiks.ports.program_process import Command
 
 SECONDS = 300.0
-"""How long a match takes if nobody says otherwise [s]."""
+"""Default length of a match [s]."""
 
 
 def show_match(
@@ -31,22 +32,20 @@ def show_match(
     on_desk: bool,
     waits: bool,
 ) -> None:
-    """Let two programs play, say when goals fall, and leave a picture.
+    """Let two programs play, print the goals, and write a picture.
 
     Args:
-        seconds: How long [s]; five minutes if left out.
+        seconds: Length of the match [s]; five minutes if left out.
         seed: Seed of all random numbers.
-        picture: Where the picture goes.
+        picture: The picture's file.
         left: The program of the left side with its arguments; KiKS's own player if left out.
-        right: That of the right side.
-        on_desk: Whether it is shown in a browser.
-        waits: Whether it begins when the first page shows it.
+        right: The program of the right side.
+        on_desk: Whether to show the match in a browser.
+        waits: Whether to begin when the first page shows it.
 
     Raises:
-        ParameterError: If one of them is no program, or a value is out of range.
+        ParameterError: If `left` or `right` names no program, or a value is out of range.
     """
-    from kiks.demos.match import Match
-
     players = [player(left, 1, "left"), player(right, 2, "right")]
 
     def tell(report: Report) -> None:
@@ -63,9 +62,7 @@ def show_match(
 
 
 def _play(match: Match, players: list[Command], picture: Path) -> None:
-    """Let them play to the end, say how it went, and draw it."""
-    from kiks.cli.match_picture import draw_match
-    from kiks.demos.match import play
+    """Play the match to the end, print the result, and draw it."""
     from kiks.drawing import save_picture
 
     end_as_with_ctrl_c()
@@ -83,7 +80,7 @@ def _play(match: Match, players: list[Command], picture: Path) -> None:
 
 
 def player(words: str | None, robot: int, side: str) -> Command:
-    """Return the program that drives a robot; it finds its port's name and its side before its own arguments.
+    """Return the program that drives a robot, with its port's name and its side before its own arguments.
 
     Raises:
         ParameterError: If the words name no program, or more than one.
@@ -93,12 +90,11 @@ def player(words: str | None, robot: int, side: str) -> Command:
         ['kiks://2', 'right']
     """
     from kiks.cli.options import parse_words
-    from kiks.demos import soccer
     from kiks.ports.program_process import Command
 
     given = [f"kiks://{robot}", side]
     if words is None:
-        return Command(Path(soccer.__file__), given)
+        return Command(Path(__file__).with_name("player.py"), given)
     is_program = bool(words.split()) and (Path(words).is_file() or Path(words.split()[0]).is_file())
     if not is_program:
         raise ParameterError(

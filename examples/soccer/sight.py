@@ -1,8 +1,8 @@
-"""What a soccer player makes of the pictures of its K213: the ball, and the posts of the goals.
+"""Find the ball and the goal posts in the pictures of a K213 camera.
 
-A picture says only what is brighter than what: the camera's exposure shifts all greys until the brightest is white.
-Order L tells how bright the scene was before, which undoes the shift (khepera-protocol.md 10.3). Then every grey has
-its meaning: dark the walls and the players, a little brighter the one goal, brighter the other, white the ball.
+A picture holds relative greys only: the camera's exposure shifts all greys until the brightest is white. Order L tells
+how bright the scene was before, which undoes the shift (khepera-protocol.md 10.3). Then each grey has a meaning: walls
+and players are dark, one goal is a little brighter, the other brighter still, and the ball is white.
 """
 
 from __future__ import annotations
@@ -14,43 +14,43 @@ from dataclasses import dataclass
 from kiks.client.khepera import Khepera
 
 COUNT = 32
-"""Order S answers every second pixel: half the time on the line, and still one for each 1.1 degrees."""
+"""Order S returns every second pixel: half the time on the line, and still one for each 1.1 degrees."""
 
 EDGE_RAD, PITCH_RAD = math.radians(18.0), math.radians(36.0 / 63 * 2)
-"""Where the leftmost pixel looks, and from one to the next."""
+"""Direction of the leftmost pixel, and the angle between two pixels."""
 
 WALL, DIM, BRIGHT, BALL = 80.0, 122.0, 165.0, 245.0
-"""Greys of what there is, without the shift."""
+"""Greys of walls, goals and ball, without the shift."""
 
 BALL_LIMIT = 185.0
-"""What is brighter than this is the ball. Blur darkens it beyond 0.6 m, to 200 at 0.9 m."""
+"""Brighter pixels show the ball. Blur darkens it beyond 0.6 m, to 200 at 0.9 m."""
 
 BALL_MM = 32.0
 """Radius of the ball."""
 
 TOUCHING_MM = 62.0
-"""How far the middle of a ball is that touches the robot, a little more."""
+"""Distance of the centre of a ball that touches the robot, with a small margin."""
 
 UNKNOWN_MM = 150.0
-"""How far a ball is taken to be of which only one edge is seen."""
+"""Assumed distance of a ball of which only one edge is visible."""
 
 FLAT = 50.0
-"""Most difference of greys in a picture that the ball fills."""
+"""Largest difference of greys in a picture that the ball fills."""
 
 BLUR_RAD = 0.05
-"""By how much motion may widen the ball."""
+"""Largest angle by which motion widens the ball."""
 
 LENS_MARGIN = 15.0
-"""What is so near to the brightest that the lens lets through may in truth be brighter."""
+"""A grey this close to the brightest that the lens passes may in truth be brighter."""
 
 
 @dataclass(frozen=True)
 class Sighting:
-    """The ball, from edge to edge.
+    """The edges of the ball in a picture.
 
     Attributes:
-        left_rad: Where its left edge is, positive to the left; None if that is out of the picture.
-        right_rad: Where its right edge is.
+        left_rad: Direction of its left edge, positive to the left; None if that is out of the picture.
+        right_rad: Direction of its right edge.
     """
 
     left_rad: float | None
@@ -58,14 +58,14 @@ class Sighting:
 
     @property
     def is_whole(self) -> bool:
-        """Whether its distance is known: both edges are seen, or none as it is so near."""
+        """Whether its distance is known: both edges are visible, or none because it is so near."""
         return (self.left_rad is None) == (self.right_rad is None)
 
     def where(self, distance_mm: float | None) -> tuple[float, float]:
-        """Return how far its middle is [mm], and in which direction [rad].
+        """Return the distance [mm] and the direction [rad] of its centre.
 
         Args:
-            distance_mm: How far it was thought to be, if anything: that is needed where an edge is out of the picture.
+            distance_mm: Expected distance, used if an edge is out of the picture; None if unknown.
         """
         left, right = self.left_rad, self.right_rad
         if left is not None and right is not None:
@@ -84,12 +84,12 @@ class Sighting:
 
 @dataclass(frozen=True)
 class Edge:
-    """Where wall and goal meet: a post.
+    """A post: the edge between wall and goal.
 
     Attributes:
-        bearing_rad: In which direction, positive to the left.
+        bearing_rad: Its direction, positive to the left.
         goal: 'dim' or 'bright'.
-        is_left: Whether it is the post on the left, as seen.
+        is_left: Whether it is the left post in the picture.
     """
 
     bearing_rad: float
@@ -99,19 +99,19 @@ class Edge:
 
 @dataclass(frozen=True)
 class View:
-    """What a picture shows."""
+    """Ball and posts in a picture."""
 
     ball: Sighting | None
     edges: tuple[Edge, ...]
 
 
 def bearing(index: float) -> float:
-    """Return where a pixel of order S looks [rad]."""
+    """Return the direction of a pixel of order S [rad]."""
     return EDGE_RAD - index * PITCH_RAD
 
 
 def ceiling(index: int) -> float:
-    """Return the brightest that the lens lets a pixel of order S be: it darkens towards the edges."""
+    """Return the brightest grey that the lens passes to a pixel of order S; it darkens towards the edges."""
     share = abs(bearing(index)) / EDGE_RAD
     return 240.0 - 108.0 * share * share * math.sqrt(share)
 
@@ -119,11 +119,11 @@ def ceiling(index: int) -> float:
 _OUTWARDS = [(i + 1, i, ceiling(i) - LENS_MARGIN) for i in range(COUNT // 2 - 2, -1, -1)] + [
     (i - 1, i, ceiling(i) - LENS_MARGIN) for i in range(COUNT // 2 + 1, COUNT)
 ]
-"""Pixels from the middle to either edge, each with the one before it and the brightest that can be relied on."""
+"""Pixels from the middle to either edge, each with the pixel before it and its largest reliable grey."""
 
 
 def exposure(greys: Sequence[float], light: int) -> float:
-    """Return by how much the exposure has brightened a picture.
+    """Return by how many greys the exposure has brightened a picture.
 
     The light level is 7 (255 - brightest) + 200 + (brightest - mean), give or take 25, of the greys before that.
     """
@@ -132,7 +132,7 @@ def exposure(greys: Sequence[float], light: int) -> float:
 
 
 def smooth(greys: Sequence[int]) -> list[float]:
-    """Return a picture with less chance in it: a tenth of each grey is chance, whose mean is taken off."""
+    """Return a picture with less noise: a tenth of each grey is noise, whose mean is subtracted."""
     around = [greys[0], *greys, greys[-1]]
     return [
         (left + 2 * here + right) / 3.6 - 12.75 / 0.9
@@ -141,14 +141,14 @@ def smooth(greys: Sequence[int]) -> list[float]:
 
 
 def undarken(greys: list[float]) -> None:
-    """Give pixels that are as bright as the lens lets them be the grey of their neighbour towards the middle."""
+    """Give pixels at the limit of the lens the grey of their neighbour towards the middle."""
     for inner, outer, limit in _OUTWARDS:
         if greys[outer] > limit:
             greys[outer] = max(greys[outer], greys[inner])
 
 
 def crossing(greys: Sequence[float], start: int, step: int, level: float) -> float | None:
-    """Return where a picture falls to a level, going from a pixel to one side; None if it does not."""
+    """Return the index at which a picture falls to a level, from a pixel to one side; None if it does not."""
     i = start
     while 0 <= i + step < len(greys):
         if greys[i] > level >= greys[i + step]:
@@ -158,7 +158,7 @@ def crossing(greys: Sequence[float], start: int, step: int, level: float) -> flo
 
 
 def find_ball(greys: Sequence[float]) -> Sighting | None:
-    """Return the ball in a picture of true greys, None if it is not there."""
+    """Return the ball in a picture of true greys; None without one."""
     peak = max(greys)
     if peak < BALL_LIMIT:
         return None
@@ -168,7 +168,7 @@ def find_ball(greys: Sequence[float]) -> Sighting | None:
         i = top
         while 0 <= i < len(greys) and greys[i] > BALL_LIMIT - 15.0:
             i += step
-        # What is beside the ball may be wall or goal: its edge is halfway to that.
+        # Wall or goal lies beside the ball; the edge is halfway between the greys.
         beside = greys[max(i - 4, 0) : i + 1] if step < 0 else greys[i : i + 5]
         ends.append(crossing(greys, top, step, (peak + min(beside)) / 2) if beside else None)
     left, right = (None if end is None else bearing(end) for end in ends)
@@ -192,7 +192,7 @@ def find_edges(greys: Sequence[float], shift: float) -> tuple[Edge, ...]:
             middle = (first + i - 1) // 2
             for step in (-1, 1):
                 at = crossing(greys, middle, step, (WALL + grey) / 2)
-                # Where the lens darkens the picture, nothing is sure.
+                # Greys that the lens darkens are not reliable.
                 if at is not None and (WALL + grey) / 2 + shift < ceiling(round(at + step)) - LENS_MARGIN:
                     edges.append(Edge(bearing(at), goal, step < 0))
         i = max(i, first + 1)
@@ -203,7 +203,7 @@ class Eye:
     """The camera.
 
     Args:
-        robot: Who carries it.
+        robot: The robot that carries it.
     """
 
     def __init__(self, robot: Khepera) -> None:
@@ -211,8 +211,8 @@ class Eye:
         robot.turret(2, "U,1")  # a picture each 50 ms
 
     def look(self) -> View:
-        """Take a picture and say what it shows."""
-        # In this order: the picture follows so soon that it is nearly always the one that the light level is of.
+        """Take a picture; return ball and posts in it."""
+        # Light level first: the picture follows so soon that both nearly always belong together.
         high, low = self.robot.turret(2, "L")
         greys = smooth(self.robot.turret(2, "S"))
         undarken(greys)

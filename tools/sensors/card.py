@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from tools.sensors.models import MODELS
 
 from kiks.errors import ParameterError
-from kiks.fit.models import MODELS
 from kiks.fit.reflection import Rig, active_pairs, find_rigs, fit_reflection
 from kiks.fit.samples import ACTIVE_COUNTS, MAXIMUM_COUNTS, Floats, Samples, is_active, load_samples
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
@@ -38,7 +38,7 @@ FOUND, TOLD = "found", "told"
 
 _FITTED = ("light", "threshold", "lobe_deg")
 
-_REPOSITORY = Path(__file__).parents[3]
+_REPOSITORY = Path(__file__).parents[2]
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Score:
 
 @dataclass(frozen=True)
 class Figure:
-    """One number of the card, as `kiks accuracy --json` prints it."""
+    """One number of the card, as `python tools/accuracy.py --json` prints it."""
 
     name: str
     value: float
@@ -212,41 +212,41 @@ def page(card: Card) -> str:
     lines = [
         "# How true the proximity sensors are",
         "",
-        "This page is made by `kiks accuracy --page docs/accuracy.md` from readings of a real Khepera. They stand in",
-        "`data/khepera-samples` of the shared folder, with a README that says where they come from. The robot stood at",
-        "20 gaps from 5 to 43 mm before a wall and a cylinder of its own size, and turned in steps of 2 degrees.",
-        "A test fails when the figures here are no longer those of the program. How to bring readings of your own:",
-        "[samples](samples.md).",
+        "`python tools/accuracy.py --page docs/accuracy.md` makes this page from readings of a real Khepera. They are",
+        "in `data/khepera-samples` of the shared folder, with a README that names their source. The robot stood at 20",
+        "gaps from 5 to 43 mm in front of a wall and of a cylinder of its own size, and turned in steps of 2 degrees.",
+        "A test fails when these figures differ from those of the program. [Samples](samples.md) tells how to fit",
+        "readings of your own.",
         "",
         "## Absolute errors [counts]",
         "",
-        f"Over the {cells} active cells of the held-out half: a measured reading between {ACTIVE_COUNTS[0]} and "
-        f"{ACTIVE_COUNTS[1]}, and an angle with an",
-        "odd index. The default, the networks and the table made of them were fitted to the even ones. The last line",
-        "predicts each reading from the two measured beside it: about the noise of the data.",
+        f"Over the {cells} active cells of the held-out half: measured readings between {ACTIVE_COUNTS[0]} and "
+        f"{ACTIVE_COUNTS[1]} at angles with an",
+        "odd index. The default, the networks and their table were fitted to the even ones. The last line predicts",
+        "each reading from the two beside it, and shows about the noise of the data.",
         "",
         *_score_table(card, FOUND),
         "",
-        "All models stand at the same poses: those at which the rig really was, as the even angles tell. The tables",
-        "say where it should have been. A hand set each gap, and the robot turned by its own wheels; eight sensors",
-        "that look different ways agree on how far each sweep was off, seen by the default model. Root mean square",
+        "All models get the same poses: those at which the rig really was, estimated from the even angles. The tables",
+        "say where it should have been. A hand set each gap, and the robot turned by its own wheels. The eight sensors",
+        "look different ways and agree on how far each sweep was off, as the default model sees it. Root mean square",
         "over the sweeps that saw something:",
         "",
         *_rig_table(card),
         "",
         "## The same at the poses of the tables [counts]",
         "",
-        "Here the rig's errors count as errors of the models; only one that learnt this rig by heart could do much",
-        "better, and a real robot no good.",
+        "Here the rig's errors count as errors of the models. Only a model that has memorized this rig could do much",
+        "better, and it would fail on a real robot.",
         "",
         *_score_table(card, TOLD),
     ]
     lines += [
         "",
-        "## A shape it never saw [counts]",
+        "## An unseen shape [counts]",
         "",
-        "The default response, fitted to one of the objects alone and then asked about the other: the held-out half of",
-        "it, at the poses that the robot so found sees, and at those of the table.",
+        "The default response is fitted to one of the objects alone and tested on the held-out half of the other: at",
+        "the poses that the fitted robot estimates, and at those of the table.",
         "",
         "| object | poses | median | mean | 95 % | maximum |",
         "|---|---|---|---|---|---|",
@@ -273,7 +273,7 @@ def page(card: Card) -> str:
             f"## 50 % distance, {name} [mm]",
             "",
             "Gap at which a sensor reads 512 at its best angle (mean of seven neighbouring angles): as measured, and",
-            "how much farther each model puts it.",
+            "the error of each model.",
             "",
             "| | " + " | ".join(f"sensor {sensor}" for sensor in range(SENSOR_COUNT)) + " |",
             "|---|" + "---|" * SENSOR_COUNT,
@@ -296,7 +296,7 @@ def _score_table(card: Card, poses: str) -> list[str]:
 
 
 def _rig_table(card: Card) -> list[str]:
-    lines = ["| object | gap [mm] | angle [deg] | more than once around [deg] |", "|---|---|---|---|"]
+    lines = ["| object | gap [mm] | angle [deg] | turn beyond 360 degrees [deg] |", "|---|---|---|---|"]
     for name, rig in card.rigs.items():
         saw = is_active(card.tables[name].counts).any(axis=(1, 2))
         sizes = [float(np.sqrt(np.mean(part[saw] ** 2))) for part in (rig.gap_mm, rig.angle_deg, rig.turn_deg)]

@@ -222,7 +222,6 @@ def train_sensors(
     tables: Sequence[Samples],
     layers: Layers,
     *,
-    places: str = "rim",
     seed: int = 0,
     starts: int = 5,
     progress: Progress = lambda text: None,
@@ -232,7 +231,7 @@ def train_sensors(
     Raises:
         ParameterError: If a sensor has too few samples.
     """
-    fan = Fan.spread(*PLACES[places])
+    fan = Fan.spread(*PLACES["rim"])
     networks = []
     for sensor in range(SENSOR_COUNT):
         progress(f"sensor {sensor}")
@@ -241,11 +240,9 @@ def train_sensors(
     return networks
 
 
-def predictions(
-    tables: Sequence[Samples], networks: Sequence[Network], *, places: str = "rim"
-) -> tuple[Floats, Floats]:
+def predictions(tables: Sequence[Samples], networks: Sequence[Network]) -> tuple[Floats, Floats]:
     """Return what networks answer to the active samples and what was measured [counts], both of the shape [samples]."""
-    fan = Fan.spread(*PLACES[places])
+    fan = Fan.spread(*PLACES["rim"])
     answers, readings = [], []
     for sensor, network in enumerate(networks):
         inputs, counts = pairs(tables, fan, sensor)
@@ -255,11 +252,11 @@ def predictions(
     return np.concatenate(answers), np.concatenate(readings)
 
 
-def response_of(networks: Sequence[Network], *, places: str = "rim") -> NetworkResponse:
+def response_of(networks: Sequence[Network]) -> NetworkResponse:
     """Return eight networks of the thesis's size as the response that a robot's file can name."""
     hidden, middle, last = ([network.weights[layer].tolist() for network in networks] for layer in range(3))
     weights: Any = {"hidden": hidden, "middle": middle, "last": [row for (row,) in last]}
-    return NetworkResponse(*PLACES[places], field_of_view_deg=120.0, range_mm=50.0, **weights)
+    return NetworkResponse(*PLACES["rim"], field_of_view_deg=120.0, range_mm=50.0, **weights)
 
 
 def fan_of(response: NetworkResponse) -> Fan:
