@@ -142,7 +142,7 @@ def test_keys_select_move_and_turn(visit: Callable[..., Visit]) -> None:
     here = visit()
     here.page.locator("[data-testid=arena-top]").focus()
     here.page.keyboard.press("n")
-    assert "robot 1 chosen" in here.page.locator("[aria-live]").inner_text()
+    assert "robot 1 selected" in here.page.locator("[aria-live]").inner_text()
     x_mm, y_mm, heading_rad = here.pose(0)
     for key in ("ArrowRight", "Shift+ArrowUp", "q"):
         here.page.keyboard.press(key)
@@ -161,7 +161,7 @@ def test_keys_select_move_and_turn(visit: Callable[..., Visit]) -> None:
     assert (last(said, "move")["x_mm"], last(said, "move")["y_mm"]) == pytest.approx((x_mm + 10, y_mm + 1), abs=0.01)
     assert math.remainder(said[7]["heading_rad"] - heading_rad, 2 * math.pi) == pytest.approx(math.radians(5), abs=1e-3)
     here.page.keyboard.press("Escape")
-    assert here.page.locator("[aria-live]").inner_text() == "Nothing chosen"
+    assert here.page.locator("[aria-live]").inner_text() == "Nothing selected"
 
 
 def test_tab_leaves_the_view_after_the_last_thing(visit: Callable[..., Visit]) -> None:
@@ -269,7 +269,7 @@ def test_fingers_drag_and_pinch(visit: Callable[..., Visit]) -> None:
 def test_select_from_python(visit: Callable[..., Visit]) -> None:
     here = visit()
     here.ask("select")
-    here.wait("() => document.querySelector('[aria-live]').textContent.startsWith('cylinder 2 chosen')")
+    here.wait("() => document.querySelector('[aria-live]').textContent.startsWith('cylinder 2 selected')")
 
 
 def test_a_lost_connection_is_restored(visit: Callable[..., Visit]) -> None:

@@ -158,7 +158,7 @@ def test_keys_alone_move_and_turn(visitor: Visitor) -> None:
         if visitor.answer("document.activeElement.dataset.testid") == "arena-top":
             break
     visitor.page.keyboard.press("n")
-    expect(visitor.page.locator(".kiks-live")).to_contain_text("robot 1 chosen")
+    expect(visitor.page.locator(".kiks-live")).to_contain_text("robot 1 selected")
     for key in ("ArrowRight", "ArrowRight", "Shift+ArrowUp"):
         visitor.page.keyboard.press(key)
     assert visitor.until(lambda: visitor.sim.pose(1)[:2] == pytest.approx((170, 201), abs=0.01))

@@ -192,6 +192,6 @@ def test_page_of_a_public_desk_starts_no_programs(new_page: NewPage, tmp_path: P
     with served(tmp_path, may="may-not") as address:
         page = new_page()
         page.goto(address)
-        expect(at(page, "may-not")).to_contain_text("cannot be started from this page")
+        expect(at(page, "may-not")).to_contain_text("cannot start programs from this page")
         assert at(page, "run-program").count() == 0
         page.close()

@@ -69,7 +69,7 @@ class ConsolePanel:
         self._of_robot = robot
         self._history = History()
         self._waiting: list[Typed] = []
-        ui.label("Type to the robot").classes("text-subtitle2")
+        ui.label("Commands to the robot").classes("text-subtitle2")
         self._rows = (
             ui.log(max_lines=ROWS)
             .classes("w-full text-caption")
@@ -86,7 +86,7 @@ class ConsolePanel:
                 .on("keydown.enter", self._send)
                 .on("keydown.up.prevent", self._back)
                 .on("keydown.down.prevent", self._forth)
-                .tooltip("A command for the robot, such as D,5,5 to drive; arrow keys bring earlier ones back")
+                .tooltip("A command for the robot, such as D,5,5 to drive; the arrow keys recall earlier ones")
             )
             icon_button("send", "Send", "console-send", self._send).tooltip("Send the command on the robot's line")
         self._hints = ui.column().classes("w-full gap-0").mark("hints").props('data-testid="hints"')

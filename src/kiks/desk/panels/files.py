@@ -40,15 +40,15 @@ class FilesPanel:
 
     def _build_open(self) -> None:
         with ui.row().classes("w-full items-end no-wrap gap-1"):
-            self._choice = ui.select([], label="Open a file of the folder", with_input=True)
+            self._choice = ui.select([], label="File in the folder", with_input=True)
             self._choice.props("dense options-dense data-testid=open-name").classes("col").mark("open-name")
             self._choice.tooltip(f"Projects, arenas and pictures in {self._desk.folder}")
             self._choice.on("focus", self._list)
-            text_button("Open", "folder_open", "open", "Begin with the world of this file", self._open)
+            text_button("Open", "folder_open", "open", "Open the world of this file", self._open)
         with ui.row().classes("w-full items-end no-wrap gap-1"):
             self._example = ui.select([*EXAMPLES], label="Or an example", value=next(iter(EXAMPLES)))
             self._example.props("dense options-dense data-testid=example-name").classes("col").mark("example-name")
-            tip = "Begin with the world of this example"
+            tip = "Open the world of this example"
             text_button("Open", "folder_open", "open-example", tip, self._open_example)
         self._list()
 

@@ -44,7 +44,7 @@ def _state_of(turret: Turret) -> str:
             f"a picture every {1000 * s_from_ns(turret.period_ns):g} ms, the last one at "
             f"{s_from_ns(turret.taken_ns):.3f} s, light level {turret.light}"
         )
-    return "of a user's own class"
+    return "a user-defined turret"
 
 
 def _radio(radio: Radio) -> str:

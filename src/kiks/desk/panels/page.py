@@ -24,7 +24,7 @@ PRIMARY, ACCENT, POSITIVE = "#174a63", "#b85c00", "#1b7a34"
 """Background colours for white text, with contrasts of 9.4, 4.7 and 5.4 to 1. On dark pages, text in these colours is
 lighter: see `STYLE`."""
 
-HINT = "Drag a robot to move it, its rim to turn it. Click it to look inside."
+HINT = "Drag a robot to move it, its rim to turn it. Click it to see its readings."
 
 MEMORY = """<script>
 try {

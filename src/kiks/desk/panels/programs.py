@@ -34,8 +34,8 @@ POLL_S = 0.02
 """Period at which the end of a program is polled [s]."""
 
 MAY_NOT = (
-    "Programs cannot be started from this page, because this desk is open to other computers, and any visitor could "
-    "run anything here. Start them where the desk was started, or open it for this computer alone."
+    "You cannot start programs from this page: the desk is open to other computers, so any visitor could run "
+    "anything here. Start them at the terminal, or open the desk for this computer only."
 )
 """Shown in place of the editor, whose programs would not start (`kiks.ports.program_process`)."""
 
@@ -172,12 +172,12 @@ class ProgramsPanel:
                 .mark("script")
                 .tooltip("Your programs in the desk's folder, and examples that come with KiKS")
             )
-            icon_button("note_add", "New program", "new-program", self._new).tooltip("Begin a new program")
+            icon_button("note_add", "New program", "new-program", self._new).tooltip("Write a new program")
         with ui.row().classes("w-full items-end no-wrap gap-2"):
             self._robot = ui.select({1: "robot 1"}, value=1, label="Runs on").props('dense data-testid="robot"')
             self._robot.mark("robot").tooltip("The robot that answers on every port that the program opens")
             self._arguments = ui.input("Arguments").classes("col").props('dense data-testid="arguments"')
-            self._arguments.mark("arguments").tooltip("Words that the program finds in sys.argv; usually none")
+            self._arguments.mark("arguments").tooltip("Command-line arguments of the program; usually none")
             run = ui.button("Run", icon="play_arrow", on_click=self._run).mark("run-program")
             run.props('unelevated no-caps color=primary data-testid="run-program"')
             run.tooltip("Save and run this program (Ctrl-Enter); first stops a program that runs on this robot")
@@ -278,7 +278,7 @@ class ProgramsPanel:
     @told
     async def _save(self) -> None:
         script = self._store()
-        where = "unchanged, it needs no saving" if script.is_example else f"saved in {self._desk.folder}"
+        where = "an unchanged example, with nothing to save" if script.is_example else f"saved in {self._desk.folder}"
         ui.notify(f"{script.name} is {where}.")
 
     @told
@@ -308,4 +308,4 @@ class ProgramsPanel:
         self._show(handle)
         self.refresh()
         if desk.gate.is_paused:
-            ui.notify("Time is paused. Press space to run it; then the program goes on.")
+            ui.notify("Time is paused. Press space to run it; then the program continues.")

@@ -32,12 +32,12 @@ MODELS = {
 
 BAUDS = [9600, 19200, 38400, 57600, 115200]
 
-OF_OLD = """
+MATLAB_KIKS_SETTINGS = """
 **The settings of the Matlab KiKS.**
 *Time mode* and *CPU*: thinking `live` with a factor, above. *Time acceleration*: the speed above the arena.
 *Movement limit* and *interpolation limit*: not needed, motion is exact at any speed. *Fast sensors*: sensor
 model `fast`. *Grid*, *redraw* and *visualization*: the layers button above the arena. *KiKSnet*: several robots in one
-world, each with its own program, and `kiks serve` for programs on other computers.
+world, each with its own program, and `kiks serve` for programs in any language.
 """
 
 
@@ -60,15 +60,15 @@ class SettingsPanel:
             )
             with ui.row().classes("w-full"):
                 apply = ui.button("Apply", icon="check", on_click=self._apply).props("no-caps data-testid=apply")
-                apply.tooltip("Restart at time 0 with these settings, everything where it stands")
+                apply.tooltip("Restart at time 0 with these settings; everything stays in place")
                 over = ui.button("Start over", icon="replay", on_click=self._start_over)
                 over.props("no-caps outline data-testid=start-over")
                 over.tooltip("Restart at time 0 with the same seed, programs and initial places")
             if not desk.owns_world:
-                ui.label("A program outside holds this world. Change its settings there.").classes("text-caption")
+                ui.label("Another program owns this world. Change the settings there.").classes("text-caption")
                 for element in (apply, over):
                     element.disable()
-            ui.markdown(OF_OLD).classes("text-body2")
+            ui.markdown(MATLAB_KIKS_SETTINGS).classes("text-body2")
         self._show()
 
     def _build_settings(self) -> None:

@@ -79,7 +79,7 @@ class TimePanel:
             "Checkpoint: remember where everything stands"
         )
         icon_button("settings_backup_restore", "Reset", "reset", self._reset, look=BAR).tooltip(
-            "Reset: move everything back to where it stood at the checkpoint, or at the start; time goes on"
+            "Reset: move everything back to where it stood at the checkpoint, or at the start; time continues"
         )
         ui.timer(REFRESH_S, self._refresh)
         ui.keyboard(on_key=self._press)

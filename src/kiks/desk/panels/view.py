@@ -25,14 +25,14 @@ HELP = """
 **With the mouse or a finger**
 
 * Drag a robot to move it. Drag its rim, or drag with Shift, to turn it. You can drag balls, cylinders and lamps, too.
-* Click a robot to look inside. Click one of its sensors to learn why it reads what it reads.
-* Turn the wheel or use two fingers to zoom. Drag the floor to move the view.
+* Click a robot to see its readings. Click one of its sensors to see an explanation of its reading.
+* Turn the mouse wheel or use two fingers to zoom. Drag the floor to move the view.
 
 **With the keyboard**
 
 * Space: run and pause. `.`: one step.
-* On the arena, which Tab reaches: `n` selects the next thing, arrows move it by 10 mm (with Shift 1 mm),
-  `q` and `e` turn it by 5 degrees, Escape drops it; `+` `-` `0`: zoom in, zoom out, show all.
+* On the arena (press Tab to reach it): `n` selects the next thing, arrows move it by 10 mm (with Shift 1 mm),
+  `q` and `e` turn it by 5 degrees, Escape deselects it; `+` `-` `0`: zoom in, zoom out, show all.
 * In the program editor: Ctrl-Enter runs; Tab indents, and leaves the editor after Escape.
 """
 
@@ -67,7 +67,7 @@ class ViewPanel:
             ui.button("Close", on_click=self._help.close).props("flat no-caps")
         dark = ui.dark_mode(value=None)
         with _button("contrast", "Light or dark", "dark"), ui.menu():
-            for text, value in (("As the computer has it", None), ("Light", False), ("Dark", True)):
+            for text, value in (("Same as the system", None), ("Light", False), ("Dark", True)):
                 ui.menu_item(text, on_click=lambda value=value: dark.set_value(value))
         _button("help_outline", "Help", "help").on_click(self._help.open)
 

@@ -78,7 +78,7 @@ class WirePanel:
                 with self._hold:
                     self._hold_tip = ui.tooltip("Hold the list to read it; nothing is lost")
                 icon_button("delete_sweep", "Clear the list", "wire-clear", self._clear).tooltip(
-                    "Clear the list; the robot and the program do not notice"
+                    "Clear the list; this does not affect the robot or the program"
                 )
             self._rows = (
                 ui.log(max_lines=ROWS)
@@ -197,7 +197,7 @@ class WirePanel:
 
     def _toggle_hold(self) -> None:
         self._is_held = not self._is_held
-        icon, word = ("play_arrow", "Let the list go on") if self._is_held else ("pause", "Hold the list")
+        icon, word = ("play_arrow", "Resume the list") if self._is_held else ("pause", "Hold the list")
         self._hold.props(f'icon={icon} aria-label="{word}"')
         self._hold_tip.text = word
         if not self._is_held:

@@ -22,13 +22,12 @@ export function palette(isDark) {
   return isDark ? DARK : LIGHT;
 }
 
-/** The grey on the screen of a wall of a brightness from 1 to 255: all of them differ from the floor by shade or by
-    hue. */
+/** The grey on the screen of a wall of a brightness from 1 to 255. All greys differ from the floor by shade or hue. */
 export function wallGrey(brightness, colours) {
   return Math.round(colours.wallFrom + (colours.wallTo - colours.wallFrom) * (brightness / 255));
 }
 
-/** Colours of rays by their sensor's reading, from nothing near to very near; the number of buckets is their number. */
+/** Colours of rays by their sensor's reading, from nothing near to very near, one per bucket. */
 export const READING_COLOURS = [
   [58, 128, 200], [20, 160, 140], [92, 176, 66], [214, 176, 30], [236, 122, 28], [226, 42, 34],
 ];
@@ -44,8 +43,8 @@ export function rgba([red, green, blue], alpha = 1) {
   return `rgba(${red},${green},${blue},${alpha})`;
 }
 
-/** The colour of a robot's number and trail: hues that differ by the golden share stay apart, however many there
-    are. */
+/** The colour of a robot's number and trail: hues that differ by the golden ratio stay distinct for any number
+    of robots. */
 export function robotHue(index) {
   return (212 + 222.5 * index) % 360;
 }
@@ -54,7 +53,7 @@ export function robotColour(index, isDark, alpha = 1) {
   return `hsla(${robotHue(index)},${isDark ? 80 : 72}%,${isDark ? 66 : 40}%,${alpha})`;
 }
 
-/** Balls are orange and cylinders wooden; the darker, the less light they send back. */
+/** Balls are orange and cylinders wooden; a body that reflects less light is darker. */
 export function bodyColour(body) {
   const share = 0.4 + 0.6 * Math.min(body.brightness / 190, 1);
   const full = body.what === "ball" ? [245, 130, 40] : [176, 122, 70];

@@ -93,7 +93,7 @@ export function paintCurves(context, width, height, history, kind, hidden, isDar
   nameEnds(context, history, kind, hidden, isDark, right, toY);
 }
 
-/** Write the names of the lines at their ends, those that would lie on each other side by side downwards. */
+/** Write the names of the lines at their ends; names that would overlap move down. */
 function nameEnds(context, history, kind, hidden, isDark, right, toY) {
   const { first, count } = KINDS[kind];
   const ends = [];
@@ -106,7 +106,7 @@ function nameEnds(context, history, kind, hidden, isDark, right, toY) {
   context.font = "700 11px system-ui, sans-serif";
   let above = Infinity, column = 0;
   for (const { line, y } of ends) {
-    // Idle sensors all lie at the bottom: there the legend must do.
+    // All idle sensors lie at the bottom, so their names are only in the legend.
     column = above - y < 10 ? column + 1 : 0;
     if (column === 0) above = y;
     if (column > 1) continue;

@@ -15,11 +15,11 @@ export function factsOf(scene, frame, index) {
     ["Encoders", `left ${robot.encoders[0]}, right ${robot.encoders[1]}`],
     ["Forwards", `${robot.forwards_mm.toFixed(0)} mm`],
     ["Backwards", `${robot.backwards_mm.toFixed(0)} mm`],
-    ["In all", `${(robot.forwards_mm + robot.backwards_mm).toFixed(0)} mm`],
+    ["Total", `${(robot.forwards_mm + robot.backwards_mm).toFixed(0)} mm`],
     ["From start", `${robot.straight_mm.toFixed(0)} mm straight`],
     ["Contacts", `${robot.contacts}${robot.isTouching ? ", touching now" : ""}`],
     ["LEDs", robot.leds.map((isOn, k) => `${k} ${isOn ? "on" : "off"}`).join(", ")],
-    ["Line", robot.isLineInUse ? "a program is connected" : "nobody is connected"],
+    ["Line", robot.isLineInUse ? "a program is connected" : "no program is connected"],
     ["Kind", known.kind],
     ["Turrets", known.turrets.length ? known.turrets.join(", ") : "none"],
   ];

@@ -77,8 +77,8 @@ export class Floor {
   }
 }
 
-/** Return a canvas of a pixel a cell: walls with their edges, and a shade on the floor below and to the right of
-    them. */
+/** Return a canvas with a pixel per cell: walls with their edges, and a shade on the floor below and to the right
+    of them. */
 function paintWalls({ cells, columns, rows, mm_per_cell }, colours) {
   const canvas = document.createElement("canvas");
   canvas.width = columns;

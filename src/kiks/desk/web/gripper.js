@@ -1,5 +1,5 @@
 /* The geometry of a gripper's arm and jaws, from frames. Lengths in mm in the robot's own frame, x ahead, y left;
-   the constants are those of kiks/firmware/gripper.py and kiks/engine/gripper.py. */
+   the constants are those of kiks/firmware/gripper.py and kiks/engine/physics/gripper.py. */
 
 export const PIVOT_MM = -15;
 const START_RAD = (-10 * Math.PI) / 180;

@@ -1,4 +1,4 @@
-/* The light of all lamps on the floor, with the shadows of walls: a small picture to be stretched over the arena.
+/* The light of all lamps on the floor, with the shadows of walls: a small picture that is stretched over the arena.
 
    Method: for each lamp, rays in all directions find the range of its light; a cell is lit if it is nearer than that.
    It is a soft and coarse picture for people; the engine computes what sensors measure. */
@@ -61,8 +61,8 @@ function shine(lamp, raster, light, columns, rows, cell_mm) {
   }
 }
 
-/** Return the square of the way to the first wall in each direction [mm^2], a cell more so that walls' faces are
-    lit. */
+/** Return the squared distance to the first wall in each direction [mm^2], plus a cell, so that the faces of walls
+    are lit. */
 function reaches(lamp, raster, step_mm) {
   const reach = new Float32Array(DIRECTIONS), { cells, columns, rows, mm_per_cell } = raster;
   for (let k = 0; k < DIRECTIONS; k++) {

@@ -9,25 +9,25 @@ export default {
     <div ref="root" class="kiks-monitor" data-testid="monitor">
       <div v-if="!known" class="kiks-monitor-empty" role="status">Waiting for the robot …</div>
       <div v-show="known">
-        <div class="kiks-monitor-robot" role="group" aria-label="Sensors around the robot: choose one for an explanation">
+        <div class="kiks-monitor-robot" role="group" aria-label="Sensors around the robot: click one for an explanation">
           <canvas ref="robot" aria-hidden="true"></canvas>
           <div v-for="(name, k) in names" :key="k" class="kiks-chip" :style="chipStyle(k)">
             <span class="kiks-chip-name" aria-hidden="true">{{ k }}</span>
             <button ref="near" type="button" :class="{chosen: isChosen(k, 'proximity')}" :data-testid="'proximity-' + k"
-              :title="'Sensor ' + k + ', ' + name + ': proximity. Why does it read so?'"
+              :title="'Sensor ' + k + ', ' + name + ': proximity. Click for an explanation'"
               :aria-pressed="isChosen(k, 'proximity')" @click="ask(k, 'proximity')">0</button>
             <button ref="light" type="button" class="kiks-chip-light" :class="{chosen: isChosen(k, 'ambient')}"
-              :data-testid="'ambient-' + k" :title="'Sensor ' + k + ', ' + name + ': light, less is brighter. Why does it read so?'"
+              :data-testid="'ambient-' + k" :title="'Sensor ' + k + ', ' + name + ': light, less is brighter. Click for an explanation'"
               :aria-pressed="isChosen(k, 'ambient')" @click="ask(k, 'ambient')">0</button>
           </div>
         </div>
-        <p class="kiks-monitor-hint">Upper number: proximity, 0 to 1023. Lower one: light, less is brighter. Click one to ask why.</p>
+        <p class="kiks-monitor-hint">Upper number: proximity, 0 to 1023. Lower one: light, less is brighter. Click one for an explanation.</p>
         <slot></slot>
 
         <div class="kiks-wheels" role="group" aria-label="Wheels: measured and commanded speed">
           <template v-for="side in ['left', 'right']" :key="side">
             <span>{{ side }}</span>
-            <span class="kiks-wheel-bar" :title="'Speed of the ' + side + ' wheel in pulses in 10 ms: the bar is measured, the line commanded'">
+            <span class="kiks-wheel-bar" :title="'Speed of the ' + side + ' wheel in pulses per 10 ms: the bar shows the measured speed, the line the commanded one'">
               <i ref="fills" class="kiks-wheel-fill"></i><i class="kiks-wheel-middle"></i><i ref="marks" class="kiks-wheel-mark"></i>
             </span>
             <span ref="speeds" class="kiks-wheel-text" :data-testid="'speed-' + side"></span>

@@ -11,8 +11,8 @@ const CLICK_PX = { mouse: 4, pen: 6, touch: 9 };
 const MIDDLE = 1, RIGHT = 2;
 
 export class Pointer {
-  /** `tell` is {pick(pick), draw(stroke), view(), fit()}: a click, a stroke, a view moved by hand, a wish to see
-      all. */
+  /** `tell` is {pick(pick), draw(stroke), view(), fit()}: a click, a stroke, a view moved by hand, a request to
+      show the whole arena. */
   constructor(surface, feed, hand, drawing, tell) {
     Object.assign(this, { surface, feed, hand, drawing, tell });
     this._fingers = new Map();

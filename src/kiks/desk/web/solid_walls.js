@@ -1,13 +1,12 @@
-/* Walls for the 3-D view: as few faces as the raster allows. Tops are rectangles of equal brightness, found
-   greedily; sides are runs along the edges between wall and floor. Light is painted on, by the way the wall around a
-   side's middle faces: so walls that are round in the picture look round, though their sides all run along the
-   raster. */
+/* Walls for the 3-D view, with few faces. Tops are rectangles of equal brightness, found greedily. Sides are runs along
+   the edges between wall and floor. The shade of a side depends on the direction of the wall around its middle. So
+   walls that are round in the picture look round, although all sides run along the raster. */
 
 import { THREE } from "nicegui-scene";
 import { wallGrey } from "./colours.js";
 
 export const WALL_HEIGHT_MM = 40;
-/** Similar brightnesses count as one; else pictures of drawn or photographed walls would need too many faces. */
+/** Similar brightnesses count as one, because pictures of drawn or photographed walls would need too many faces. */
 const LEVELS = 16;
 const MOST_FACES = 40000;
 /** Minimum light of a side; it grows the more the side faces south and a little east. */
@@ -61,8 +60,7 @@ function facesOf({ levels, columns, rows }) {
     }
   const isInside = (column, row) => column >= 0 && row >= 0 && column < columns && row < rows;
   const levelAt = (column, row) => (isInside(column, row) ? levels[row * columns + column] : 0);
-  /** Go along each line of the raster and make a face of each stretch of wall of one brightness with floor beside
-      it. */
+  /** Follow each line of the raster and make a face of each run of wall of one brightness with floor beside it. */
   const runs = (lines, length, cellAt, face) => {
     for (let line = 0; line <= lines; line++)
       for (const [own, other] of [[line, line - 1], [line - 1, line]]) {
@@ -85,7 +83,7 @@ function facesOf({ levels, columns, rows }) {
   }
 }
 
-/** Return the shade of a side; the wall's cells around its middle tell its direction. */
+/** Return the shade of a side; the wall's cells around its middle give its direction. */
 function shadeOf({ levels, columns, rows }, column, row) {
   let east = 0, north = 0;
   for (let y = Math.ceil(row - AROUND - 0.5); y < row + AROUND; y++)

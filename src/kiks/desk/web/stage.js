@@ -297,10 +297,10 @@ export class Stage {
 
   _announce(thing) {
     if (!thing || !this.feed.frame) {
-      this.live.textContent = "Nothing chosen";
+      this.live.textContent = "Nothing selected";
       return;
     }
     const { x_mm, y_mm } = placeOf(this.feed.frame, thing.what, thing.index);
-    this.live.textContent = `${nameOf(this.feed.scene, thing)} chosen, at ${Math.round(x_mm)}, ${Math.round(y_mm)} mm`;
+    this.live.textContent = `${nameOf(this.feed.scene, thing)} selected, at ${Math.round(x_mm)}, ${Math.round(y_mm)} mm`;
   }
 }

@@ -2,7 +2,7 @@
 
 const THIN_MM = 4;
 const MOST_POINTS = 1500;
-/** A hand or a reset has moved a robot that jumps farther between two frames: its trail is cut. */
+/** A jump between two frames beyond this is that of a hand or a reset, and cuts the trail. */
 const LEAP_MM = 250;
 
 export class Trails {
