@@ -100,7 +100,7 @@ def test_the_picture_shows_each_reading_at_its_place(robot: kiks.Khepera) -> Non
     console.print(command.picture(sample, 6.5, "a port"))
     assert isinstance(console.file, io.StringIO)
     lines = console.file.getvalue().splitlines()
-    assert "6.5 samples a second" in console.file.getvalue()
+    assert "6.5 samples per second" in console.file.getvalue()
     for number in sample.proximity + sample.ambient:
         assert str(number) in console.file.getvalue()
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.demos import pitch
-from kiks.engine.numbers import uniform
+from kiks.engine.scalar_math import uniform
 from kiks.errors import ParameterError, shown
 from kiks.model.robot import RobotSpec
 from kiks.ports.program_process import Command

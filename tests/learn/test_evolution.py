@@ -187,7 +187,7 @@ def test_map_elites_fills_its_map() -> None:
 
 
 def test_map_elites_needs_axes() -> None:
-    with pytest.raises(ParameterError, match="has no axes"):
+    with pytest.raises(ParameterError, match="this task has none"):
         kiks.Evolution(small(axes=()), "map-elites")
 
 
@@ -206,7 +206,7 @@ def test_wrong_arguments_are_named(given: dict[str, Any], said: str) -> None:
 
 def test_ask_and_tell_keep_their_order() -> None:
     evolution = kiks.Evolution(small(), "ga", population=8)
-    with pytest.raises(ParameterError, match="must have been told"):
+    with pytest.raises(ParameterError, match="tell\\(\\) must be called"):
         _ = evolution.champion
     with pytest.raises(ParameterError, match="ask\\(\\) must come before"):
         evolution.tell(np.zeros(8))

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import ClassVar
 
 from kiks.client.khepera import Khepera
-from kiks.engine.numbers import uniform
+from kiks.engine.scalar_math import uniform
 from kiks.errors import ArenaError, shown
 from kiks.model.arena import Arena
 from kiks.sim.simulation import Simulation

@@ -18,7 +18,7 @@ from kiks.demos.race import BAUD as RACE_BAUD
 from kiks.demos.race import Race
 from kiks.demos.scene import Scene
 from kiks.demos.swarm import Swarm
-from kiks.engine.numbers import sin_cos
+from kiks.engine.scalar_math import sin_cos
 from kiks.errors import ParameterError
 from kiks.model.arena import Arena, Cylinder, Pose
 

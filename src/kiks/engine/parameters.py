@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.engine.numbers import exponential, logarithm, power, sin_cos
+from kiks.engine.scalar_math import exponential, logarithm, power, sin_cos
 from kiks.engine.sensing.thesis_networks import NETWORK_RESPONSES, TABLE_LEVELS
 from kiks.engine.simd.f64x8 import LANES
 from kiks.model.robot import (

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.engine.numbers import uniform
+from kiks.engine.scalar_math import uniform
 from kiks.engine.physics import contact
 from kiks.engine.state import BALL, State
 from kiks.errors import ArenaError, ParameterError, shown

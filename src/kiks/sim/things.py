@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.engine.numbers import sin_cos
+from kiks.engine.scalar_math import sin_cos
 from kiks.engine.scene import enter_everybody
 from kiks.engine.state import BALL, BODY, CYLINDER
 from kiks.errors import ArenaError, KiksError, ParameterError, shown

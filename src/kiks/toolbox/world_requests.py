@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from kiks.engine.numbers import uniform
+from kiks.engine.scalar_math import uniform
 from kiks.engine.state import BALL
 from kiks.errors import ParameterError, shown
 from kiks.sim.free_space import ATTEMPTS
