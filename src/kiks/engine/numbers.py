@@ -1,9 +1,9 @@
 """Sine, power, tanh and random numbers that give the same bits on every machine.
 
-Need: the mathematical library differs between systems in the last bit, and a run must not.
-Method: additions, multiplications, divisions, square roots and roundings alone, which IEEE 754 fixes to the bit.
-Sine, cosine and random numbers are for `Lanes`, too (`kiks.engine.simd.f64x8`).
-Random numbers are counter-based: a pure function of who asks and when, so that neither order nor threads matter.
+Mathematical libraries differ between systems in the last bit, and a run must not. So these functions use additions,
+multiplications, divisions, square roots and roundings only, which IEEE 754 fixes to the bit. Sine, cosine and random
+numbers also work on `Lanes` (`kiks.engine.simd.f64x8`). Random numbers are counter-based: a pure function of seed,
+world, robot, stream, instant and index, so neither order nor threads matter.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ _LN2_HIGH = 0.6931471804855391
 _LN2_LOW = 7.440617110012397e-11
 
 SMALL_RAD = 0.78
-"""Angles below this need not be cut to within a quarter of a circle."""
+"""Angles below this need no reduction to a quarter of a circle."""
 
 FARTHEST_RAD = 1e9
-"""Angles beyond this count as this: the quarters in it still fit 32 bits, and what is left of one stays below pi/4."""
+"""Larger angles are limited to this: its number of quarters fits 32 bits, and the remainder stays below pi/4."""
 
 _RECIPROCALS = (0.0, *(1.0 / k for k in range(1, 22)))  # a multiplication costs a fraction of a division
 
@@ -65,14 +65,14 @@ def sin_cos_of_small(r: Any) -> Any:
 def sin_cos(angle_rad: Any) -> Any:
     """Return sine and cosine, each within 2e-16 for angles up to a million radians.
 
-    Of any other number, and of what is no number, they are those of some angle: directions are always of length 1, and
-    what follows one never leaves the raster.
+    For other numbers and NaN they belong to some angle: a direction always has length 1, so a ray never leaves the
+    raster.
     """
     angle_rad = min(max(-FARTHEST_RAD, angle_rad), FARTHEST_RAD)
     turns = floor(angle_rad * 0.6366197723675814 + 0.5)
     r = (angle_rad - turns * _HALF_PI_HIGH) - turns * _HALF_PI_LOW
     sine, cosine = sin_cos_of_small(r)
-    # Which quarter it is no processor can guess: these are choices without a jump.
+    # The quarter is unpredictable, so these are selections without a branch.
     is_swapped, is_second_half = has_bit(turns, 0), has_bit(turns, 1)
     first = choose(is_swapped, cosine, sine)
     second = choose(is_swapped, sine, cosine)
@@ -81,7 +81,7 @@ def sin_cos(angle_rad: Any) -> Any:
 
 @kernel
 def sinc(angle_rad: Any) -> Any:
-    """Return sin(a)/a: how much shorter a chord is than its arc of twice that angle."""
+    """Return sin(a)/a: the ratio of a chord to its arc of twice that angle."""
     is_small = abs(angle_rad) < SMALL_RAD
     ratio = 1.0 + sine_rest(angle_rad * angle_rad)
     if everywhere(is_small):
@@ -91,10 +91,10 @@ def sinc(angle_rad: Any) -> Any:
 
 @kernel
 def exponential(x: Any) -> Any:
-    """Return e to the power of x, 0 below -700 and for what is no number."""
+    """Return e to the power of x; 0 below -700 and for NaN."""
     if not x >= -700.0:
         return 0.0
-    x = min(x, 800.0)  # infinity, from there on
+    x = min(x, 800.0)  # the result is infinite from there on
     shift = math.floor(x * 1.4426950408889634 + 0.5)
     r = (x - shift * _LN2_HIGH) - shift * _LN2_LOW
     total = 1.0
@@ -141,7 +141,7 @@ def tanh(x: Any) -> Any:
 
 @kernel
 def mix(value: Any) -> Any:
-    """Scramble 64 bits so that every bit of the input flips half of the output (the finalizer of SplitMix64)."""
+    """Mix 64 bits so that each bit of the input flips half of the output (the finalizer of SplitMix64)."""
     z = word(value) + np.uint64(0x9E3779B97F4A7C15)
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
@@ -150,7 +150,7 @@ def mix(value: Any) -> Any:
 
 @kernel
 def stream_of(seed: Any, world: Any, robot: Any, stream: Any) -> Any:
-    """Return what the random numbers of this seed, world, robot and stream come from, for `at_instant`."""
+    """Return the origin of the random numbers of a seed, world, robot and stream, for `at_instant`."""
     z = mix(word(seed))
     z = mix(z ^ word(world))
     z = mix(z ^ word(robot))
@@ -159,18 +159,18 @@ def stream_of(seed: Any, world: Any, robot: Any, stream: Any) -> Any:
 
 @kernel
 def at_instant(origin: Any, instant: Any) -> Any:
-    """Return what the random numbers of a stream at an instant come from, for `draw`."""
+    """Return the origin of the random numbers of a stream at an instant, for `draw`."""
     return mix(origin ^ word(instant))
 
 
 @kernel
 def draw(origin: Any, index: Any) -> Any:
-    """Return a random number in [0, 1): the one of an index from an instant."""
+    """Return the random number in [0, 1) of an index at an instant."""
     z = mix(origin ^ word(index))
     return number(z >> np.uint64(11)) * (1.0 / 9007199254740992.0)
 
 
 @kernel
 def uniform(seed: Any, world: Any, robot: Any, stream: Any, instant: Any, index: Any) -> Any:
-    """Return the random number in [0, 1) that belongs to this seed, world, robot, stream, instant and index."""
+    """Return the random number in [0, 1) of a seed, world, robot, stream, instant and index."""
     return draw(at_instant(stream_of(seed, world, robot, stream), instant), index)

@@ -1,18 +1,18 @@
-"""What there is in a world besides its walls: discs, each a robot, a ball or a cylinder, and who is near whom.
+"""The scene: the discs of a world (robots, balls and cylinders), and a grid that finds neighbours.
 
-Discs are counted through: robots first, from 0, then bodies. All of it is one argument, `scene`, a plain tuple:
+Discs are numbered from 0, robots first, then bodies. A scene is one argument of kernels, a plain tuple:
 
 * robots: records of `ROBOT`, shape [world_count, robot_count];
 * bodies: records of `BODY`, shape [world_count, body_count];
-* kinds: records of `PARAMETERS`, one for each kind of robot; a robot's `kind` says which is its own;
+* kinds: records of `PARAMETERS`, one for each kind of robot; a robot's `kind` is the index of its own;
 * near: `begins` int32 [world_count, rows, columns + 1], `entries` int32 and `spots` float64 [3], both [world_count,
   disc_count], and the largest radius [mm].
 
-Need: a robot among a thousand must not cost much more than one alone, so nobody may look at all the others.
-Method: squares of 64 mm lie over the arena. `entries` has the discs square by square, row by row, and `spots` beside it
-their x, y and radius [mm]; `begins` says where each square begins, and where a row ends. So what a row of squares holds
-is one stretch of memory, and `find_near` reads one for each row that a circle touches. All of it follows from the
-places of the discs and is no part of the state: `enter_all` writes it afresh whenever something has moved.
+The grid makes a robot among a thousand hardly more expensive than one alone. Its squares of 64 mm cover the arena.
+`entries` lists the discs square by square, row by row, and `spots` beside it their x, y and radius [mm]. `begins` tells
+where each square begins and where a row ends. So the discs of a row of squares are one stretch of memory, and
+`find_near` reads one for each row that a circle touches. The grid follows from the places of the discs and is no part of
+the state: `enter_all` writes it anew whenever something has moved.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ from kiks.engine.state import TRAIL_LENGTH, State
 from kiks.units import TICK_NS
 
 SQUARE_MM = 64.0
-"""Edge of a square of the grid [mm]: somewhat more than a robot, so that a square holds one or two."""
+"""Edge of a square of the grid [mm]: somewhat larger than a robot, so a square holds one or two."""
 
 Scene = tuple[Any, Any, Any, tuple[Any, Any, Any, float]]
 
 
 def make_scene(state: State, kinds: NDArray[np.void], width_mm: float, height_mm: float) -> Scene:
-    """Return the scene of a state, with everybody entered.
+    """Return the scene of a state, with all discs in the grid.
 
     Args:
-        state: The state; when its arrays are replaced, a new scene is due.
+        state: The state; when its arrays are replaced, it needs a new scene.
         kinds: Constants of the kinds of robots, records of `PARAMETERS`.
         width_mm: Width of the arena [mm].
         height_mm: Height of the arena [mm].
@@ -55,14 +55,14 @@ def make_scene(state: State, kinds: NDArray[np.void], width_mm: float, height_mm
 
 @kernel
 def count_discs(scene: Any) -> Any:
-    """Return how many robots there are in a world, and how many discs."""
+    """Return the number of robots in a world, and the number of discs."""
     robots, bodies, _, _ = scene
     return robots.shape[1], robots.shape[1] + bodies.shape[1]
 
 
 @kernel
 def disc_at(scene: Any, world: Any, disc: Any) -> Any:
-    """Return where a disc is and its radius [mm]."""
+    """Return the place of a disc and its radius [mm]."""
     robots, bodies, kinds, _ = scene
     if disc < robots.shape[1]:
         robot = robots[world, disc]
@@ -73,7 +73,7 @@ def disc_at(scene: Any, world: Any, disc: Any) -> Any:
 
 @kernel
 def is_on_floor(scene: Any, world: Any, disc: Any) -> Any:
-    """Say whether others can meet and see a disc: a body that a gripper has lifted they cannot."""
+    """Return whether a disc collides and is visible: not if it is a body that a gripper has lifted."""
     robots, bodies, _, _ = scene
     return disc < robots.shape[1] or bodies[world, disc - robots.shape[1]].is_lifted == 0
 

@@ -1,4 +1,4 @@
-"""Everything that changes in a world: a record for each robot, ball and cylinder, so that a copy is a snapshot."""
+"""The state of a world: a record for each robot, ball and cylinder, so a copy is a snapshot."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ LEFT, RIGHT = 0, 1
 """Motor order of every command (khepera-protocol.md 4.1)."""
 
 TRAIL_LENGTH = 3
-"""Tick boundaries behind the present one whose poses are kept: a sensor reading is at most 20 ms old."""
+"""Number of past tick boundaries whose poses are stored: a sensor reading is at most 20 ms old."""
 
 PIXEL_COUNT = 64
 """Pixels in a row of the camera (khepera-protocol.md 10.3)."""
 
 MEMORY_COUNT = 16
-"""Numbers that the turrets of a user's own on one robot share among them: two to four turrets' worth."""
+"""Numbers that the user-defined turrets on one robot share: enough for two to four turrets."""
 
 ROBOT = np.dtype(
     [
@@ -60,7 +60,7 @@ ROBOT = np.dtype(
         ("profile_acceleration", "i4", (2,)),
         ("speed_gains", "i4", (3,)),
         ("position_gains", "i4", (3,)),
-        # The rest of the robot: which of the kinds' constants are its own, and what its user sees and sets.
+        # The rest of the robot: the index of its kind's constants, and what its user sees and sets.
         ("kind", "i8"),
         ("is_touching", "i4"),
         ("led", "u1", (2,)),
@@ -98,14 +98,14 @@ ROBOT = np.dtype(
         ("battle_energy", "f8"),
         ("battle_ns", "i8"),
         ("battle_hits", "i8"),
-        # Numbers that turrets of a user's own remember.
+        # Memory of user-defined turrets.
         ("turret_memory", "f8", (MEMORY_COUNT,)),
     ],
     align=True,
 )
 
 BALL, CYLINDER = 3, 4
-"""What a body is, numbered as in the arenas of KiKS (kiks-behaviour.md 1.1)."""
+"""Kinds of bodies, numbered as in the arenas of KiKS 2.2.0 (kiks-behaviour.md 1.1)."""
 
 BODY = np.dtype(
     [
@@ -115,14 +115,14 @@ BODY = np.dtype(
         ("velocity_x", "f8"),  # [mm/s]
         ("velocity_y", "f8"),
         ("radius_mm", "f8"),
-        ("friction_mm_s2", "f8"),  # what a rolling or sliding body loses of its speed
-        ("kick_share", "f8"),  # of a robot's speed that it takes on when the robot runs into it
+        ("friction_mm_s2", "f8"),  # deceleration of a rolling or sliding body
+        ("kick_share", "f8"),  # share of a robot's speed that it gets when the robot runs into it
         ("number", "i8"),  # from 1, never given twice
         ("brightness", "i4"),
         ("what", "i4"),
         ("holder", "i4"),  # number of the robot whose gripper holds it, from 1; 0 for none
-        ("is_lifted", "i4"),  # above the floor, where nothing meets and nothing sees it
-        ("hold_ahead_mm", "f8"),  # where it is held, as the holder sees it
+        ("is_lifted", "i4"),  # above the floor, without collisions and invisible to sensors
+        ("hold_ahead_mm", "f8"),  # the place at which it is held, relative to the holder
         ("hold_aside_mm", "f8"),
     ],
     align=True,
@@ -131,12 +131,12 @@ BODY = np.dtype(
 
 @dataclass
 class State:
-    """What changes: the records of robots and of bodies, and the ticks done.
+    """The records of robots and bodies, and the number of ticks.
 
     Attributes:
         robots: An array of `ROBOT`, shape [world_count, robot_count].
-        bodies: An array of `BODY`, shape [world_count, body_count]; another array when a body comes or goes.
-        tick_count: Ticks done.
+        bodies: An array of `BODY`, shape [world_count, body_count]; replaced when a body is added or removed.
+        tick_count: Number of ticks done.
 
     Example:
         >>> state = State.empty(world_count=1, robot_count=2)
@@ -163,7 +163,7 @@ class State:
         return State(self.robots.copy(), self.bodies.copy(), self.tick_count)
 
     def restore(self, snapshot: State) -> None:
-        """Become equal to a snapshot; robots in place, so that views of them stay valid."""
+        """Copy a snapshot into this state; robots in place, so views of them stay valid."""
         self.robots[...] = snapshot.robots
         self.bodies = snapshot.bodies.copy()
         self.tick_count = snapshot.tick_count

@@ -1,13 +1,13 @@
-"""Balls and cylinders: how they roll out, bounce off walls, and pass their speed on.
+"""Balls and cylinders: rolling, bouncing off walls, and passing on speed.
 
-Source: kiks-behaviour.md 3.6, whose constants these are. Equal masses for all; a robot is not slowed by a kick.
+Source of the constants: kiks-behaviour.md 3.6. All masses are equal; a kick does not slow the robot.
 
-* Friction takes `friction_mm_s2` off the speed until the body rests.
-* Off a wall, and off a robot that stands, the speed across comes back times 0.25.
+* Friction decelerates a body by `friction_mm_s2` until it rests.
+* Off a wall or a standing robot, the normal speed is reflected times 0.25.
 * Two bodies share their speeds along the line of their centres: u = ((1 - e) u + (1 + e) v)/2 and v likewise, with
   e = 0.95. That keeps their momentum and never adds energy.
-* A robot that runs into a body at the speed V gives it 0.975 V; the body's own speed towards the robot comes back
-  times 0.25 on top. Cylinders give way to robots without keeping any of that speed (thesis 3.4, "Pushable objects").
+* A robot that runs into a body at the speed V gives it 0.975 V; in addition the body's own speed towards the robot is
+  reflected times 0.25. Cylinders give way to robots and keep none of that speed (thesis 3.4, "Pushable objects").
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ BOUNCE = 0.95
 """Restitution between two bodies."""
 
 WALL_BOUNCE = 0.25
-"""Restitution at a wall or a robot that stands."""
+"""Restitution at a wall or a standing robot."""
 
 
 @kernel
 def remember_place(body: Any) -> Any:
-    """Phase: keep the place at this tick boundary, for sensors that were sampled a little while ago."""
+    """Phase: store the place at this tick boundary, for sensors that were sampled some milliseconds ago."""
     for k in range(body.trail.shape[0] - 1, 0, -1):
         body.trail[k, 0], body.trail[k, 1] = body.trail[k - 1, 0], body.trail[k - 1, 1]
     body.trail[0, 0], body.trail[0, 1] = body.x_mm, body.y_mm
@@ -41,7 +41,7 @@ def speed_of(body: Any) -> Any:
 
 @kernel
 def roll(field: Any, cell: Any, pad: Any, body: Any, duration_s: Any) -> Any:
-    """Let a body roll or slide for a while, slower and slower, and bounce off a wall."""
+    """Let a body roll or slide with friction, and bounce off a wall."""
     speed = speed_of(body)
     if speed == 0.0:
         return
@@ -65,7 +65,7 @@ def roll(field: Any, cell: Any, pad: Any, body: Any, duration_s: Any) -> Any:
 
 @kernel
 def collide(first: Any, second: Any, nx: Any, ny: Any) -> Any:
-    """Let two bodies that touch pass on their speeds along the line (nx, ny) from the first to the second."""
+    """Exchange speeds of two touching bodies along the line (nx, ny) from the first to the second."""
     u = first.velocity_x * nx + first.velocity_y * ny
     v = second.velocity_x * nx + second.velocity_y * ny
     if u <= v:
@@ -79,7 +79,7 @@ def collide(first: Any, second: Any, nx: Any, ny: Any) -> Any:
 
 @kernel
 def kick(body: Any, robot_speed: Any, nx: Any, ny: Any) -> Any:
-    """Let a robot kick a body that it touches.
+    """Change the speed of a body that a robot touches.
 
     Args:
         body: Record of the body.

@@ -1,13 +1,13 @@
-"""Things that meet: robots, balls and cylinders push each other, and walls push them all.
+"""Collisions of robots, balls and cylinders with each other and with walls.
 
-Need: nothing sinks into anything by more than half a millimetre, however many push from however many sides; a robot
-is not slowed by what gives way (kiks-behaviour.md 3.6), and is stopped by what cannot.
-Method: everything that may meet something within a tick moves in pieces of two millimetres. After each piece those that
-overlap are parted, two at a time and in the order of their numbers, each giving way by half, and walls push back
-whoever came too near; again and again, until all are free. Before a robot a body gives way by all of it in the
-first sweeps; where that does not help, because it is squeezed, the robot gives way, too. What even then will not be
-parted goes back to where the piece began: there it was free.
-Speeds change in hits (`kiks.engine.physics.balls`), never by being parted, so pushes give no energy.
+Nothing may sink into anything by more than half a millimetre, however many things push. A body that gives way does not
+slow a robot (kiks-behaviour.md 3.6); a body that cannot give way stops it.
+
+Things that may collide within a tick move in pieces of two millimetres. After each piece, sweeps resolve the overlaps:
+pair by pair in the order of numbers, each disc gives way by half, and then walls push discs back, until all are free. In
+the first sweeps a body in front of a robot gives way by all of the overlap. If that does not help, because the body is
+squeezed, the robot gives way, too. Discs that still overlap after the last sweep return to where the piece began, which
+was free. Speeds change in hits only (`kiks.engine.physics.balls`), so resolving overlaps adds no energy.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import numpy as np
 from kiks.engine.compiling import kernel
 from kiks.engine.physics.balls import collide, kick, roll, speed_of
 from kiks.engine.physics.contact import PIECES_MAX, clearance_mm, outward
-from kiks.engine.physics.grasp import begin_holds, carry_along, go_back_together, keep_holds, turn_back, way_of_held
+from kiks.engine.physics.grasp import begin_holds, carry_along, return_held, keep_holds, turn_back, way_of_held
 from kiks.engine.physics.motion import give_way, move, note_contact
 from kiks.engine.scene import count_discs, disc_at, enter_all, find_near, is_on_floor
 from kiks.engine.simd.f64x8 import floor
@@ -29,59 +29,59 @@ from kiks.engine.simd.stack_arrays import stack_integers
 from kiks.units import NS_PER_S, TICK_NS
 
 PIECE_MM = 2.0
-"""Longest piece of a motion in company [mm]: nothing smaller than that may be met."""
+"""Longest piece of a motion among discs [mm]: no disc is smaller."""
 
-PARTED_MM = 0.01
-"""Overlap that counts as none [mm]: sweeps halve what is left, so that less costs more of them."""
+RESOLVED_MM = 0.01
+"""Overlap that counts as resolved [mm]: sweeps halve the rest, so a smaller value takes more sweeps."""
 
 TOUCHING_MM = 0.02
 """Gap that counts as a touch [mm]."""
 
 STUCK_MM = 0.1
-"""Overlap with which nobody may stay [mm]."""
+"""Overlap above which a disc is stuck [mm]."""
 
 SWEEPS = 60
-"""Most sweeps after a piece. Two things take one, a robot that presses one against a wall ten."""
+"""Most sweeps after a piece. Two discs take one, a robot that presses a disc against a wall ten."""
 
 YIELDING_SWEEPS = 6
-"""Sweeps in which a body gives way to a robot by all of their overlap."""
+"""Sweeps in which a body gives way to a robot by all of the overlap."""
 
 NEAR_LIMIT = 64
-"""Most things that are near enough to one to meet it within a tick."""
+"""Most discs that are near enough to one to collide with it within a tick."""
 
 PAIRS_PER_DISC = 32
-"""Room for pairs: discs that do not overlap cannot have as many neighbours of their own size or larger."""
+"""Space for pairs per disc: discs that do not overlap cannot have as many neighbours of their own size or larger."""
 
 TICK_S = TICK_NS / NS_PER_S
 
 SLACK_MM = 10.0
-"""How much nearer than now two things may come before pairs are looked for again [mm]."""
+"""Distance by which two discs may approach before neighbours are searched again [mm]."""
 
 HASTE = 4.0
-"""How much nearer two things come in a tick at most, in ways of the fastest: what is hit may be faster than that."""
+"""Largest approach of two discs in a tick, in paths of the fastest: a disc that is hit may be faster than that."""
 
 Room: Any = namedtuple(
     "Room",
     ("ways", "starts", "moved", "neighbours", "pairs", "is_near", "is_touching", "is_driven", "is_pushed", "is_back"),
 )
-"""What a tick writes down about its discs.
+"""Scratch memory of a tick.
 
 * ways: paths of the left and right wheel [pulses] and slip ratio, float64 [robot_count, 3];
-* starts: places at which a piece began [mm], float64 [disc_count, 2];
-* moved: places to which wheels and speeds took them [mm], float64 [disc_count, 2];
-* neighbours: two discs, the lower number first, that may meet before these are looked for again, int64 [pair, 2];
-* pairs: those of them that may meet in this tick, int64 [pair, 2];
-* is_near: whether a disc may meet another in this tick or rolls, bool [disc_count];
-* is_touching: whether it touched something, bool [disc_count];
-* is_driven: whether a wheel drives it, or something that a wheel drives has pushed it, bool [disc_count];
-* is_pushed: whether it was pushed since a wall last had its say, bool [disc_count];
-* is_back: whether it has gone back to where the piece began, bool [disc_count].
+* starts: places at the start of a piece [mm], float64 [disc_count, 2];
+* moved: places to which wheels and speeds have moved the discs [mm], float64 [disc_count, 2];
+* neighbours: pairs of discs, the lower number first, that may collide before the next search, int64 [pair, 2];
+* pairs: those of them that may collide in this tick, int64 [pair, 2];
+* is_near: whether a disc may collide in this tick, or rolls, bool [disc_count];
+* is_touching: whether it has touched something, bool [disc_count];
+* is_driven: whether a wheel drives it, directly or through other discs, bool [disc_count];
+* is_pushed: whether it was pushed since the last check for walls, bool [disc_count];
+* is_back: whether it has returned to where the piece began, bool [disc_count].
 """
 
 
 @kernel
 def make_room(scene: Any) -> Any:
-    """Return room for the discs of a world."""
+    """Return scratch memory for the discs of a world."""
     robot_count, disc_count = count_discs(scene)
     return Room(
         np.empty((robot_count, 3)),
@@ -99,7 +99,7 @@ def make_room(scene: Any) -> Any:
 
 @kernel
 def move_alone(scene: Any, ground: Any, world: Any, number: Any, left: Any, right: Any, slip_ratio: Any) -> Any:
-    """Phase: let a robot drive that can meet nothing but walls; return whether it touched one."""
+    """Phase: drive a robot that can collide with walls only; return whether it touched one."""
     field, cell, pad = ground
     robot = scene[0][world, number]
     return move(field, cell, pad, robot, scene[2][robot.kind], left, right, slip_ratio)
@@ -107,15 +107,15 @@ def move_alone(scene: Any, ground: Any, world: Any, number: Any, left: Any, righ
 
 @kernel
 def move_together(scene: Any, ground: Any, world: Any, room: Any, neighbour_count: Any, slack_mm: Any) -> Any:
-    """Phase: drive and roll along, push and be pushed; count the contacts.
+    """Phase: drive and roll, collide, and count the contacts.
 
     Args:
-        scene: What there is.
-        ground: The arena, as contact sees it.
+        scene: The scene.
+        ground: The arena's clearance, as contact sees it.
         world: Index of the world.
-        room: What a tick writes down.
-        neighbour_count: How many neighbours are written down there.
-        slack_mm: How much nearer things may come before neighbours are looked for again; below 0 at first.
+        room: Scratch memory.
+        neighbour_count: Number of neighbour pairs in it.
+        slack_mm: Distance by which discs may approach before neighbours are searched again; below 0 at first.
 
     Returns:
         `neighbour_count` and `slack_mm` for the next tick.
@@ -155,8 +155,8 @@ def move_together(scene: Any, ground: Any, world: Any, room: Any, neighbour_coun
         drive_and_roll(scene, ground, world, room, pieces)
         carry_along(scene, world, room, TICK_S / pieces)
         hit(scene, world, room, pair_count, TICK_S / pieces)
-        if not part(scene, ground, world, room, pair_count):
-            go_back(scene, ground, world, room, pair_count)
+        if not resolve_overlaps(scene, ground, world, room, pair_count):
+            return_stuck(scene, ground, world, room, pair_count)
         for number in range(robot_count):
             if room.is_near[number]:
                 robot = robots[world, number]
@@ -172,7 +172,7 @@ def move_together(scene: Any, ground: Any, world: Any, room: Any, neighbour_coun
 
 @kernel
 def way_of(scene: Any, world: Any, room: Any, disc: Any) -> Any:
-    """Return how far a disc goes in this tick if nothing is in its way [mm]; a robot, its faster wheel."""
+    """Return the path of a disc in this tick without obstacles [mm]; that of the faster wheel for a robot."""
     robots, bodies, kinds, _ = scene
     if disc < robots.shape[1]:
         pulse = kinds[robots[world, disc].kind].pulse_mm
@@ -182,9 +182,9 @@ def way_of(scene: Any, world: Any, room: Any, disc: Any) -> Any:
 
 @kernel
 def find_neighbours(scene: Any, world: Any, room: Any, reach_mm: Any) -> Any:
-    """Write down all pairs of discs with a gap of at most a reach [mm]; return how many there are.
+    """List all pairs of discs with a gap of at most `reach_mm`; return their number.
 
-    They stand in the order of their numbers, so that it does not matter when they were looked for.
+    The pairs are in the order of the discs' numbers, so the time of the search does not matter.
     """
     enter_all(scene, world)
     found = stack_integers(NEAR_LIMIT)
@@ -203,7 +203,7 @@ def find_neighbours(scene: Any, world: Any, room: Any, reach_mm: Any) -> Any:
 
 @kernel
 def put_in_order(numbers: Any, count: Any) -> Any:
-    """Sort the first few of some numbers."""
+    """Sort the first `count` numbers."""
     for k in range(1, count):
         number, place = numbers[k], k
         while place > 0 and numbers[place - 1] > number:
@@ -214,7 +214,7 @@ def put_in_order(numbers: Any, count: Any) -> Any:
 
 @kernel
 def find_pairs(scene: Any, world: Any, room: Any, neighbour_count: Any, reach_mm: Any) -> Any:
-    """Write down which neighbours have a gap of at most a reach [mm], and that they are near; return how many pairs."""
+    """List the neighbours with a gap of at most `reach_mm` and mark them as near; return the number of pairs."""
     robot_count = scene[0].shape[1]
     pair_count = 0
     for k in range(neighbour_count):
@@ -224,7 +224,7 @@ def find_pairs(scene: Any, world: Any, room: Any, neighbour_count: Any, reach_mm
         dx, dy, apart = other_x - x, other_y - y, radius + other_radius + reach_mm
         if dx * dx + dy * dy < apart * apart:
             room.is_near[first] = room.is_near[second] = True
-            # Who is held and who holds it do not push each other.
+            # A robot and the body that it holds do not push each other.
             if second < robot_count or scene[1][world, second - robot_count].holder != first + 1:
                 room.pairs[pair_count, 0], room.pairs[pair_count, 1] = first, second
                 pair_count += 1
@@ -233,7 +233,7 @@ def find_pairs(scene: Any, world: Any, room: Any, neighbour_count: Any, reach_mm
 
 @kernel
 def drive_and_roll(scene: Any, ground: Any, world: Any, room: Any, pieces: Any) -> Any:
-    """Make a piece of everybody's way, with nothing but walls about."""
+    """Move all near discs by one piece, with walls as the only obstacles."""
     field, cell, pad = ground
     bodies = scene[1]
     robot_count, disc_count = count_discs(scene)
@@ -252,7 +252,7 @@ def drive_and_roll(scene: Any, ground: Any, world: Any, room: Any, pieces: Any) 
 
 @kernel
 def overlap_of(scene: Any, world: Any, first: Any, second: Any) -> Any:
-    """Return how deep two discs are in each other [mm], negative for a gap, and the direction from one to the other."""
+    """Return the overlap of two discs [mm], negative for a gap, and the direction from the first to the second."""
     x, y, radius = disc_at(scene, world, first)
     other_x, other_y, other_radius = disc_at(scene, world, second)
     dx, dy, apart = other_x - x, other_y - y, radius + other_radius + TOUCHING_MM
@@ -267,7 +267,7 @@ def overlap_of(scene: Any, world: Any, first: Any, second: Any) -> Any:
 
 @kernel
 def hit(scene: Any, world: Any, room: Any, pair_count: Any, duration_s: Any) -> Any:
-    """Let bodies that touch something take on its speed, or lose their own."""
+    """Change the speeds of bodies that touch something."""
     robots, bodies, _, _ = scene
     robot_count = robots.shape[1]
     for pair in range(pair_count):
@@ -288,7 +288,7 @@ def hit(scene: Any, world: Any, room: Any, pair_count: Any, duration_s: Any) -> 
 
 @kernel
 def shift(scene: Any, world: Any, disc: Any, dx: Any, dy: Any) -> Any:
-    """Push a disc away [mm]."""
+    """Move a disc by (dx, dy) [mm]."""
     robots, bodies, _, _ = scene
     if disc < robots.shape[1]:
         robot = robots[world, disc]
@@ -301,8 +301,8 @@ def shift(scene: Any, world: Any, disc: Any, dx: Any, dy: Any) -> Any:
 
 
 @kernel
-def part(scene: Any, ground: Any, world: Any, room: Any, pair_count: Any) -> Any:
-    """Part everybody who overlaps, until all are free; say whether that was reached."""
+def resolve_overlaps(scene: Any, ground: Any, world: Any, room: Any, pair_count: Any) -> Any:
+    """Resolve all overlaps in sweeps; return whether all discs are free."""
     field, cell, pad = ground
     disc_count = count_discs(scene)[1]
     room.is_pushed[:] = False
@@ -312,7 +312,7 @@ def part(scene: Any, ground: Any, world: Any, room: Any, pair_count: Any) -> Any
             first, second = room.pairs[pair, 0], room.pairs[pair, 1]
             overlap, nx, ny = overlap_of(scene, world, first, second)
             if overlap > 0.0:
-                push_apart(scene, world, room, sweep, first, second, overlap * nx, overlap * ny)
+                separate(scene, world, room, sweep, first, second, overlap * nx, overlap * ny)
                 worst = max(worst, overlap)
         worst = max(worst, keep_holds(scene, ground, world, room))
         for disc in range(disc_count):
@@ -324,19 +324,19 @@ def part(scene: Any, ground: Any, world: Any, room: Any, pair_count: Any) -> Any
                     nx, ny = outward(field, cell, pad, x, y)
                     shift(scene, world, disc, depth * nx, depth * ny)
                     worst = max(worst, depth)
-        if worst <= PARTED_MM:
+        if worst <= RESOLVED_MM:
             return True
     return False
 
 
 @kernel
-def push_apart(
+def separate(
     scene: Any, world: Any, room: Any, sweep: Any, first: Any, second: Any, overlap_x: Any, overlap_y: Any
 ) -> Any:
-    """Part two discs by their overlap (overlap_x, overlap_y) [mm], the way from the first to the second.
+    """Separate two discs by their overlap (overlap_x, overlap_y) [mm], directed from the first to the second.
 
-    Each gives way by half, but a body by all of it before a robot: in the first sweeps, and in all of them if nothing
-    that drives has a part in it, for a robot that stands is not moved by what rolls.
+    Each gives way by half. A body gives way to a robot by all of it: in the first sweeps, and in all sweeps if no wheel
+    drives either of them, because a rolling body does not move a standing robot.
     """
     robot_count = scene[0].shape[1]
     room.is_touching[first] = room.is_touching[second] = True
@@ -350,8 +350,8 @@ def push_apart(
 
 
 @kernel
-def go_back(scene: Any, ground: Any, world: Any, room: Any, pair_count: Any) -> Any:
-    """Put those whom nothing could part where the piece began, and those who are in their way there, too."""
+def return_stuck(scene: Any, ground: Any, world: Any, room: Any, pair_count: Any) -> Any:
+    """Return stuck discs to where the piece began, and discs that are in their way there, too."""
     field, cell, pad = ground
     disc_count = count_discs(scene)[1]
     room.is_back[:] = False
@@ -362,23 +362,23 @@ def go_back(scene: Any, ground: Any, world: Any, room: Any, pair_count: Any) -> 
             if room.is_near[disc] and not room.is_back[disc]:
                 x, y, radius = disc_at(scene, world, disc)
                 if radius - clearance_mm(field, cell, pad, x, y) > STUCK_MM:
-                    put_back(scene, world, room, disc)
+                    return_disc(scene, world, room, disc)
                     is_done = False
         for pair in range(pair_count):
             first, second = room.pairs[pair, 0], room.pairs[pair, 1]
             if room.is_back[first] and room.is_back[second]:
                 continue
             if overlap_of(scene, world, first, second)[0] > STUCK_MM:
-                put_back(scene, world, room, first)
-                put_back(scene, world, room, second)
+                return_disc(scene, world, room, first)
+                return_disc(scene, world, room, second)
                 is_done = False
-        if go_back_together(scene, world, room, STUCK_MM):
+        if return_held(scene, world, room, STUCK_MM):
             is_done = False
 
 
 @kernel
-def put_back(scene: Any, world: Any, room: Any, disc: Any) -> Any:
-    """Put a disc where the piece began, at rest."""
+def return_disc(scene: Any, world: Any, room: Any, disc: Any) -> Any:
+    """Return a disc to where the piece began, at rest."""
     x, y, _ = disc_at(scene, world, disc)
     shift(scene, world, disc, room.starts[disc, 0] - x, room.starts[disc, 1] - y)
     room.is_back[disc] = True

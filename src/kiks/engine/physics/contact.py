@@ -1,13 +1,15 @@
-"""Where the body may be: a disc against the raster, with friction that turns it and wheels that slip.
+"""Contact of a robot with walls: a disc against the raster, with friction at the rim and slipping wheels.
 
-Need: a robot that meets a wall at an angle slides along it, is turned by the friction at its rim, and its wheels run
-on slower than commanded; it never sinks in, never jitters, and always drives out backwards.
-Assumption: the tyres drag with a force proportional to their slip, the same in all directions. Then the motion that
-the wheels want and the one they get differ like the velocities of a free disc before and after an impulse, a disc of
-mass 1 whose radius of gyration is half the wheel base; and there is no momentum from one tick to the next.
-Method: move a short piece; let the wall push the disc back along its gradient, which yields the normal impulse N; let
-friction, at most mu N, oppose what remains of the sliding at the rim (Coulomb). No push leads farther than the wheels
-wanted to go, so that walls give no energy.
+A robot that hits a wall at an angle slides along it, friction at its rim turns it, and its wheels turn more slowly than
+commanded. It never sinks in, never jitters, and can always drive out backwards.
+
+Assumption: the tyres drag with a force proportional to their slip, the same in all directions. Then the motion that the
+wheels command and the resulting one differ like the velocities of a free disc before and after an impulse. The disc has
+mass 1 and a radius of gyration of half the wheel base, and keeps no momentum from one tick to the next.
+
+Method: move a short piece; the wall pushes the disc back along its gradient, which yields the normal impulse N; friction,
+at most mu N, opposes the remaining sliding at the rim (Coulomb). No push leads farther than the commanded motion, so
+walls add no energy.
 
 Symbols: (u, v) the piece's displacement [mm], q its turn [rad], R the body's radius, h half the wheel base,
 n the wall's normal, t = (-ny, nx) along the wall. The rim's point at the wall moves by s = (u, v).t - R q along t.
@@ -23,22 +25,23 @@ from kiks.engine.compiling import entry, kernel
 from kiks.engine.simd.f64x8 import corners, floor
 
 PIECE_MM = 1.0
-"""Longest piece of a motion near a wall [mm]: short against the radius, so that no wall is jumped over."""
+"""Longest piece of a motion near a wall [mm]: short against the radius, so the robot does not jump over walls."""
 
 PIECES_MAX = 100.0
-"""Most pieces of a motion in a tick: three times what the fastest robot that a file may describe needs."""
+"""Most pieces of a motion in a tick: three times as many as the fastest robot that a file may describe needs."""
 
 SETTLED_MM = 1e-5
 """Penetration that counts as none [mm]."""
 
 PUSHES = 100
-"""Most steps out of the walls. One wall takes one or two, a corner of 90 degrees three, a sharp one more."""
+"""Most steps out of the walls. One wall takes one or two, a corner of 90 degrees three, a sharper one more."""
 
 LEAST_GAIN = 0.2
-"""Clearance that a step out is taken to gain per way at least; along the middle of a corner of 23 degrees it does."""
+"""Smallest gain of clearance per path that a step out assumes; in a corner of 23 degrees the gain is that large."""
 
 ROUND_A_CORNER = 1.001
-"""How much farther than wanted a disc may get: beyond a convex corner the nearest free place is 0.02 % farther."""
+"""Factor by which a push may exceed the commanded motion: beyond a convex corner the nearest free place is 0.02 %
+farther."""
 
 
 @kernel
@@ -58,17 +61,17 @@ def clearance_mm(field: Any, cell: Any, pad: Any, x: Any, y: Any) -> Any:
 
 @kernel
 def outward(field: Any, cell: Any, pad: Any, x: Any, y: Any) -> Any:
-    """Return the unit vector away from the nearest wall, (0, 0) where there is none."""
+    """Return the unit vector away from the nearest wall; (0, 0) without one."""
     nx, ny, _ = slope(field, cell, pad, x, y)
     return nx, ny
 
 
 @kernel
 def slope(field: Any, cell: Any, pad: Any, x: Any, y: Any) -> Any:
-    """Return the unit vector away from the nearest wall, and by how much the clearance grows per way along it.
+    """Return the unit vector away from the nearest wall, and the gain of clearance per path along it.
 
-    That is 1 at a wall, less between two walls, and 0 where there is none, with the vector (0, 0). It is taken across a
-    cell, from half a cell on one side to half a cell on the other; those places lie among three times three cells.
+    The gain is 1 at a wall, less between two walls, and 0 without a wall, with the vector (0, 0). It is the difference
+    over one cell, from half a cell on one side to half a cell on the other; these places lie within 3 x 3 cells.
     """
     column = min(max(0.0, x / cell + (pad - 1.0)), field.shape[1] - 2.001)
     row = min(max(0.0, y / cell + (pad - 1.0)), field.shape[0] - 2.001)
@@ -98,10 +101,10 @@ def slope(field: Any, cell: Any, pad: Any, x: Any, y: Any) -> Any:
 def push_out(field: Any, cell: Any, pad: Any, radius: Any, from_x: Any, from_y: Any, x: Any, y: Any) -> Any:
     """Return the free place nearest to (x, y), which a disc has entered from the free place (from_x, from_y).
 
-    Each step goes by the depth along the gradient. Towards any free place beyond straight walls that is never a step
-    away, so the disc ends no farther from where it came than it wanted to go, and energy does not grow. Between two
-    walls, where such a step gains less than the depth, it is longer by as much. Where walls are no longer straight, in
-    a pinch, that is no law but a condition: else it goes back along the way.
+    Each step goes along the gradient by the depth. With straight walls such a step never increases the distance to a
+    free place, so the disc ends no farther from its start than commanded, and energy does not grow. Between two walls,
+    where a step gains less than the depth, the step is longer by that ratio. If walls are not straight, in a pinch, this
+    may fail; then the disc goes back along its path.
     """
     allowed = distance(from_x, from_y, x, y) * ROUND_A_CORNER
     depth = radius - clearance_mm(field, cell, pad, x, y)
@@ -132,19 +135,19 @@ def push_out(field: Any, cell: Any, pad: Any, radius: Any, from_x: Any, from_y: 
 
 @kernel
 def distance(x0: Any, y0: Any, x1: Any, y1: Any) -> Any:
-    """Return how far two points are from each other."""
+    """Return the distance between two points."""
     return math.sqrt((x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0))
 
 
 @kernel
 def is_free(field: Any, cell: Any, pad: Any, parameters: Any, x: Any, y: Any) -> Any:
-    """Say whether a robot touches no wall at (x, y)."""
+    """Return whether a robot touches no wall at (x, y)."""
     return clearance_mm(field, cell, pad, x, y) >= parameters.radius_mm - SETTLED_MM
 
 
 @kernel
 def slide(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, u: Any, v: Any, q: Any) -> Any:
-    """Move a robot that touches where (u, v) leads it as far as walls let it; return the displacement and the turn."""
+    """Move a touching robot by (u, v) as far as walls allow; return the displacement and the turn."""
     radius = parameters.radius_mm
     x, y = robot.x_mm, robot.y_mm
     wanted_x, wanted_y = x + u, y + v
@@ -170,5 +173,5 @@ def slide(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, u: Any, 
 
 @entry
 def clearance_of_disc(field: Any, cell: Any, pad: Any, x: Any, y: Any, radius: Any) -> Any:
-    """Return how far a disc at (x, y) is from the nearest wall [mm], negative inside one."""
+    """Return the gap between a disc at (x, y) and the nearest wall [mm], negative inside one."""
     return clearance_mm(field, cell, pad, x, y) - radius

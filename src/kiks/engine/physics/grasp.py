@@ -1,12 +1,12 @@
-"""A robot and what its gripper holds on the floor, among all that pushes (`kiks.engine.physics.collisions`).
+"""A robot and the body that its gripper holds on the floor, in collisions (`kiks.engine.physics.collisions`).
 
-The two are one rigid thing: equal masses, and the robot turns as in `kiks.engine.physics.contact`.
-Derivation: let r be the way from the robot to the place where the body ought to be, e the body's deviation from it, and
-k the radius of gyration. An impulse p moves the body by -p and the robot by p, which also turns by (r x p)/k^2. That
-takes e away if p = e/2 along r, and p = e/(2 + r^2/k^2) across.
+The two are one rigid body: equal masses, and the robot turns as in `kiks.engine.physics.contact`.
+Derivation: let r lead from the robot to the place where it holds the body, e be the body's deviation from it, and k the
+radius of gyration. An impulse p moves the body by -p and the robot by p, which also turns by (r x p)/k^2. That cancels e
+if p = e/2 along r, and p = e/(2 + r^2/k^2) across.
 
-So a hold is one more thing that `part` has to bring in order in each sweep, after the overlaps: what pushes the one
-moves the other, and where both are stopped the sweeps find that out.
+So a hold is one more constraint that each sweep of `resolve_overlaps` enforces, after the overlaps: a push on either
+moves both, and if both are blocked, the sweeps find that.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from kiks.engine.physics.contact import clearance_mm, outward
 from kiks.engine.physics.motion import between_nought_and
 
 REACH = 3.0
-"""Most that a held body goes, in ways of the faster wheel: it is 72 mm from the middle of wheels 53 mm apart."""
+"""Longest path of a held body, in paths of the faster wheel: it is 72 mm from the middle of wheels 53 mm apart."""
 
 SETTLED_MM = 1e-9
 
 
 @kernel
 def held_place(robot: Any, body: Any) -> Any:
-    """Return where a body ought to be that a robot holds [mm]."""
+    """Return the place at which a robot holds a body [mm]."""
     sine, cosine = sin_cos(robot.heading_rad)
     ahead, aside = body.hold_ahead_mm, body.hold_aside_mm
     return robot.x_mm + ahead * cosine - aside * sine, robot.y_mm + ahead * sine + aside * cosine
@@ -35,13 +35,13 @@ def held_place(robot: Any, body: Any) -> Any:
 
 @kernel
 def is_dragged(body: Any) -> Any:
-    """Say whether a body is held on the floor."""
+    """Return whether a body is held on the floor."""
     return body.holder != 0 and body.is_lifted == 0
 
 
 @kernel
 def way_of_held(scene: Any, world: Any, room: Any) -> Any:
-    """Return the longest way in this tick of what is held on the floor [mm], if nothing is in its way."""
+    """Return the longest path of bodies held on the floor in this tick [mm], without obstacles."""
     robots, bodies, kinds, _ = scene
     longest_mm = 0.0
     for row in range(bodies.shape[1]):
@@ -55,7 +55,7 @@ def way_of_held(scene: Any, world: Any, room: Any) -> Any:
 
 @kernel
 def begin_holds(scene: Any, world: Any, room: Any) -> Any:
-    """Let those who hold something on the floor, and what they hold, take part in all pieces of this tick."""
+    """Mark bodies held on the floor and their robots as near, so they move in pieces in this tick."""
     robots, bodies, _, _ = scene
     for row in range(bodies.shape[1]):
         body = bodies[world, row]
@@ -67,7 +67,7 @@ def begin_holds(scene: Any, world: Any, room: Any) -> Any:
 
 @kernel
 def carry_along(scene: Any, world: Any, room: Any, duration_s: Any) -> Any:
-    """Let what is held follow its robot through a piece of a motion, whatever is there, with the speed of that."""
+    """Move held bodies with their robots by one piece, without regard to obstacles, and set their speeds."""
     robots, bodies, _, _ = scene
     for row in range(bodies.shape[1]):
         body = bodies[world, row]
@@ -82,7 +82,7 @@ def carry_along(scene: Any, world: Any, room: Any, duration_s: Any) -> Any:
 
 @kernel
 def keep_holds(scene: Any, ground: Any, world: Any, room: Any) -> Any:
-    """Bring robots and what they hold together again where something pushed one of them; return by how much [mm]."""
+    """Bring robots and held bodies together again after pushes; return the largest deviation [mm]."""
     field, cell, pad = ground
     robots, bodies, kinds, _ = scene
     worst = 0.0
@@ -107,7 +107,7 @@ def keep_holds(scene: Any, ground: Any, world: Any, room: Any) -> Any:
 
 @kernel
 def pull_together(robot: Any, parameters: Any, body: Any) -> Any:
-    """Share a held body's deviation from its place between it and the robot; return how much it was [mm]."""
+    """Share a held body's deviation from its place between it and the robot; return the deviation [mm]."""
     x, y = held_place(robot, body)
     dx, dy = body.x_mm - x, body.y_mm - y
     error = math.sqrt(dx * dx + dy * dy)
@@ -130,11 +130,11 @@ def pull_together(robot: Any, parameters: Any, body: Any) -> Any:
 
 
 @kernel
-def go_back_together(scene: Any, world: Any, room: Any, stuck_mm: Any) -> Any:
-    """Put a robot and what it holds where the piece began if one of them is there, or they got apart.
+def return_held(scene: Any, world: Any, room: Any, stuck_mm: Any) -> Any:
+    """Return robots with held bodies to where the piece began, if one of the two has returned or they are apart.
 
     Returns:
-        Whether somebody went back.
+        Whether any of them returned.
     """
     robots, bodies, _, _ = scene
     has_gone = False
@@ -158,9 +158,9 @@ def go_back_together(scene: Any, world: Any, room: Any, stuck_mm: Any) -> Any:
 
 @kernel
 def turn_back(scene: Any, world: Any, room: Any, pieces: Any) -> Any:
-    """Let robots whose load kept them from turning count what their wheels did; a new piece begins.
+    """Correct the wheel counts of robots whose load kept them from turning; a new piece begins.
 
-    As in `kiks.engine.physics.motion.give_way`: a wheel loses at most what it turned, and turns on by its slip ratio.
+    As in `kiks.engine.physics.motion.give_way`: a wheel loses at most its path, and turns on by its slip ratio.
     """
     robots, bodies, kinds, _ = scene
     for row in range(bodies.shape[1]):
@@ -177,7 +177,7 @@ def turn_back(scene: Any, world: Any, room: Any, pieces: Any) -> Any:
         pushed = (dx * cosine + dy * sine) / parameters.pulse_mm
         for wheel in range(2):
             path = room.ways[number, wheel] / pieces
-            gone = between_nought_and(path, -pushed)  # what `give_way` has taken off
+            gone = between_nought_and(path, -pushed)  # the loss that `give_way` has counted
             lost = between_nought_and(path, gone + (rim if wheel == 0 else -rim)) - gone
             robot.wheel_pulses[wheel] -= (1.0 - room.ways[number, 2]) * lost
             robot.slip_pulses[wheel] += (1.0 - room.ways[number, 2]) * lost
@@ -186,7 +186,7 @@ def turn_back(scene: Any, world: Any, room: Any, pieces: Any) -> Any:
 
 @kernel
 def carry_lifted(scene: Any, world: Any) -> Any:
-    """Phase: let what is lifted move with its robot."""
+    """Phase: move lifted bodies with their robots."""
     robots, bodies, _, _ = scene
     for row in range(bodies.shape[1]):
         body = bodies[world, row]

@@ -1,20 +1,19 @@
-"""The gripper: an arm that goes up and down, jaws that close, and the ball or cylinder that they hold.
+"""The gripper: arm, jaws, and the ball or cylinder that they hold.
 
 Source: kiks-behaviour.md 3.5 (jaws 37 mm long, half gap 0.5 + 27 mm * opening/200) and khepera-protocol.md 10.2 (arm
-255 down in front, 127 upright, 0 folded back, a full swing in about 1 s). The notes leave open, and we chose:
+255 down in front, 127 upright, 0 folded back, a full swing in about 1 s). The sources leave some points open; KiKS
+assumes:
 
-* the jaws begin at the robot's rim; arm and jaws themselves meet nothing, only what they hold does;
+* the jaws begin at the robot's rim; arm and jaws do not collide with anything, only the held body does;
 * the arm is down from 215 on: a robot's programs lift to 190 or less and put down at 240 (10.2);
 * the jaws close in half a second.
 
-A body is gripped when closing jaws, the arm down, touch it: its centre is between them, all of it fits between them,
-and nobody else holds it. The jaws then move it into their middle and stop at its width.
+The gripper grips a body when its arm is down and its closing jaws touch the body: the body's centre is between them, it
+fits between them, and no other gripper holds it. The jaws then move it to their middle and stop at its width.
 
-Held on the floor it and the robot are one rigid thing (`kiks.engine.physics.grasp`).
-
-Lifted, it is a disc in front of the robot that nothing meets and nothing sees. It comes down only where it is free;
-where it is not, the arm stays above the floor and open jaws wait. So nothing ends inside anything else, and nothing is
-lost.
+On the floor, the held body and the robot are one rigid body (`kiks.engine.physics.grasp`). A lifted body is a disc in
+front of the robot that collides with nothing and that no sensor sees. It comes down only where the floor is free;
+elsewhere the arm stays above the floor and open jaws wait. So no body ends inside another.
 """
 
 from __future__ import annotations
@@ -33,28 +32,28 @@ ARM_MAX = 255.0
 """The arm down in front (khepera-protocol.md 10.2)."""
 
 ARM_START = 127.0
-"""Where the arm is at the power-on: upright (kiks-behaviour.md 3.5)."""
+"""The arm at power-on: upright (kiks-behaviour.md 3.5)."""
 
 ARM_DOWN = 215.0
-"""From here on what is between the jaws stands on the floor."""
+"""From here on, a body between the jaws stands on the floor."""
 
 ARM_STEP = 2.55
-"""Way of the arm in a tick: a full swing takes 1 s (khepera-protocol.md 10.2)."""
+"""Step of the arm per tick: a full swing takes 1 s (khepera-protocol.md 10.2)."""
 
 JAWS_MAX = 200.0
 """The jaws fully open (kiks-behaviour.md 3.5)."""
 
 JAWS_STEP = 4.0
-"""Way of the jaws in a tick: from open to closed in 0.5 s."""
+"""Step of the jaws per tick: from open to closed in 0.5 s."""
 
 JAW_LENGTH_MM = 37.0
 """Length of the jaws [mm] (kiks-behaviour.md 3.5)."""
 
 GAP_MM, GAP_PER_STEP = 0.5, 27.0 / 200.0
-"""Half the gap between the closed jaws [mm], and what each step of their opening adds (kiks-behaviour.md 3.5)."""
+"""Half the gap between the closed jaws [mm], and its growth per step of their opening (kiks-behaviour.md 3.5)."""
 
 LOOSE_MM = 0.5
-"""A body that is farther from where it is held has been taken out, or slipped out [mm]."""
+"""Deviation from the held place at which a body counts as moved away [mm]."""
 
 FREE_MM = 0.01
 """Overlap with which a body may come down [mm], as `kiks.sim.world` allows it."""
@@ -65,19 +64,19 @@ GAP_TO_ROBOT_MM = 0.02
 
 @kernel
 def half_gap_mm(jaws: Any) -> Any:
-    """Return how far each jaw is from the middle [mm]."""
+    """Return the distance of each jaw from the middle [mm]."""
     return GAP_MM + GAP_PER_STEP * jaws
 
 
 @kernel
 def move_arm(robot: Any) -> Any:
-    """Let the arm go a tick's way."""
+    """Move the arm by one tick."""
     robot.arm += min(max(robot.arm_target - robot.arm, -ARM_STEP), ARM_STEP)
 
 
 @kernel
 def move_gripper(robot: Any, least_jaws: Any) -> Any:
-    """Phase: let the arm and the jaws go a tick's way; the jaws stop at a width."""
+    """Phase: move arm and jaws by one tick; the jaws stop at a width."""
     move_arm(robot)
     target = choose(robot.is_closing != 0, least_jaws, JAWS_MAX)
     robot.jaws += min(max(target - robot.jaws, -JAWS_STEP), JAWS_STEP)
@@ -85,7 +84,7 @@ def move_gripper(robot: Any, least_jaws: Any) -> Any:
 
 @kernel
 def tend_grippers(scene: Any, ground: Any, world: Any) -> Any:
-    """Phase: move all grippers; grip, lift, put down and let go. Return whether any body changed hands or level."""
+    """Phase: move all grippers; grip, lift, put down and let go. Return whether any body changed holder or level."""
     robots, bodies, _, _ = scene
     has_any = False
     for number in range(robots.shape[1]):
@@ -117,7 +116,7 @@ def tend_grippers(scene: Any, ground: Any, world: Any) -> Any:
 
 @kernel
 def tend_held(scene: Any, ground: Any, world: Any, number: Any) -> Any:
-    """Move a gripper that holds something; return whether it was let go, lifted or put on the floor."""
+    """Move a gripper that holds a body; return whether the body was let go, lifted or put on the floor."""
     robot = scene[0][world, number]
     body = scene[1][world, robot.held_row - 1]
     row = robot.held_row - 1
@@ -129,7 +128,7 @@ def tend_held(scene: Any, ground: Any, world: Any, number: Any) -> Any:
     is_waiting = robot.is_closing == 0
     robot.jaws = max(robot.jaws, width)
     arm = robot.arm
-    if is_waiting:  # there is no room below: the jaws stay as they are
+    if is_waiting:  # the floor below is not free: the jaws stay as they are
         move_arm(robot)
     else:
         move_gripper(robot, width)
@@ -149,7 +148,7 @@ def tend_held(scene: Any, ground: Any, world: Any, number: Any) -> Any:
 
 @kernel
 def centre(scene: Any, world: Any, number: Any, body: Any) -> Any:
-    """Let closing jaws move what they hold into their middle, around the robot where it would be in its way."""
+    """Let closing jaws move the held body to their middle, without pushing it into the robot."""
     robot = scene[0][world, number]
     most = max(half_gap_mm(robot.jaws) - body.radius_mm, 0.0)
     body.hold_aside_mm = min(max(body.hold_aside_mm, -most), most)
@@ -160,7 +159,7 @@ def centre(scene: Any, world: Any, number: Any, body: Any) -> Any:
 
 @kernel
 def from_robot(robot: Any, body: Any) -> Any:
-    """Return where a body is as a robot sees it: ahead and to the left of its centre [mm]."""
+    """Return the place of a body relative to a robot: ahead and to the left of its centre [mm]."""
     sine, cosine = sin_cos(robot.heading_rad)
     dx, dy = body.x_mm - robot.x_mm, body.y_mm - robot.y_mm
     return dx * cosine + dy * sine, dy * cosine - dx * sine
@@ -168,7 +167,7 @@ def from_robot(robot: Any, body: Any) -> Any:
 
 @kernel
 def is_between_jaws(robot: Any, parameters: Any, body: Any) -> Any:
-    """Say whether the centre of a body is between a robot's jaws, were the arm down."""
+    """Return whether the centre of a body would be between a robot's jaws with the arm down."""
     ahead, aside = from_robot(robot, body)
     begin = parameters.radius_mm
     return begin <= ahead <= begin + JAW_LENGTH_MM and abs(aside) <= half_gap_mm(robot.jaws)
@@ -196,7 +195,7 @@ def grip(scene: Any, world: Any, number: Any, half_gap_before: Any) -> Any:
 
 @kernel
 def is_in_its_place(scene: Any, world: Any, row: Any) -> Any:
-    """Say whether a held body is where a gripper holds it."""
+    """Return whether a held body is where its gripper holds it."""
     robots, bodies, _, _ = scene
     body = bodies[world, row]
     robot = robots[world, body.holder - 1]
@@ -211,7 +210,7 @@ def is_in_its_place(scene: Any, world: Any, row: Any) -> Any:
 
 @kernel
 def put_down(scene: Any, ground: Any, world: Any, row: Any) -> Any:
-    """Let a held body go, at rest; say whether there was room for it."""
+    """Let a held body go, at rest; return False if the floor is not free."""
     body = scene[1][world, row]
     if body.is_lifted != 0 and not is_free(scene, ground, world, row):
         return False
@@ -222,7 +221,7 @@ def put_down(scene: Any, ground: Any, world: Any, row: Any) -> Any:
 
 @kernel
 def is_free(scene: Any, ground: Any, world: Any, row: Any) -> Any:
-    """Say whether nothing is on the floor where a lifted body is."""
+    """Return whether the floor under a lifted body is free."""
     field, cell, pad = ground
     robot_count, disc_count = count_discs(scene)
     x, y, radius = disc_at(scene, world, robot_count + row)

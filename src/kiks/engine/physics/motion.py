@@ -1,4 +1,4 @@
-"""From the paths of two wheels to a pose: the exact arc, cut into short pieces where a wall is near.
+"""Kinematics: from the paths of two wheels to a pose, along the exact arc, in short pieces near walls.
 
 Derivation: with wheel paths l and r [mm] the centre moves s = (l + r)/2 along an arc that turns by q = (r - l)/b. Its
 chord has the length s sinc(q/2) and the direction heading + q/2 (khepera-protocol.md 7.3).
@@ -24,12 +24,12 @@ STREAM_SLIP = 1
 """Random stream of the slip ratios (`kiks.engine.sensing.proximity` has the next)."""
 
 CONTACT_TICKS = 20
-"""Ticks without a touch after which a contact is over: what touches again within 0.2 s is the same one."""
+"""Ticks without a touch after which a contact is over: a touch within 0.2 s belongs to the same contact."""
 
 
 @inlined
 def remember_pose(robot: Any) -> Any:
-    """Phase: keep the pose at this tick boundary, for sensors that were sampled a little while ago."""
+    """Phase: store the pose at this tick boundary, for sensors that were sampled some milliseconds ago."""
     for k in range(TRAIL_LENGTH - 1, 0, -1):
         for axis in range(3):
             robot.trail[k, axis] = robot.trail[k - 1, axis]
@@ -40,7 +40,7 @@ def remember_pose(robot: Any) -> Any:
 
 @inlined
 def move(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, left: Any, right: Any, chance: Any) -> Any:
-    """Phase: drive along the arc that the wheels ask for, as far as the walls let it; count what the rims did.
+    """Phase: drive along the arc that the wheels command, as far as walls allow; count the paths of the rims.
 
     Args:
         field: Distance of cells to the nearest wall [mm], shape [rows, columns].
@@ -48,9 +48,9 @@ def move(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, left: Any
         pad: Cells of the border around the arena.
         robot: Record of the robot, or of eight.
         parameters: Record of its constants.
-        left: Path that the left wheel would make without a wall [pulses].
-        right: The same of the right wheel.
-        chance: Share of its command at which a blocked wheel turns, or what it is drawn from (`slip_ratio_of`).
+        left: Path of the left wheel without a wall [pulses].
+        right: Path of the right wheel without a wall [pulses].
+        chance: Share of its command at which a blocked wheel turns, or the source of it (`slip_ratio_of`).
 
     Returns:
         Whether it touched a wall.
@@ -59,7 +59,7 @@ def move(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, left: Any
     travel = max(abs(left), abs(right)) * pulse
     arc = 0.5 * (left + right) * pulse
     turn = (right - left) * pulse / parameters.wheel_base_mm
-    # Between cell centres the clearance errs by less than one and a half cells: farther away no wall is touched.
+    # Between cell centres the error of the clearance is below one and a half cells: farther away no wall is touched.
     room = clearance_mm(field, cell, pad, robot.x_mm, robot.y_mm)
     is_near = room < parameters.radius_mm + travel + 2.0 * cell
     if anywhere(is_near):
@@ -76,7 +76,7 @@ def move(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, left: Any
 def move_near(
     field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, paths: Any, whole: Any, pieces: Any, chance: Any
 ) -> Any:
-    """Drive along an arc in pieces, and touch what is in the way.
+    """Drive along an arc in pieces, with contact.
 
     Args:
         field: Distance of cells to the nearest wall [mm], shape [rows, columns].
@@ -84,9 +84,9 @@ def move_near(
         pad: Cells of the border around the arena.
         robot: Record of the robot, or of eight.
         parameters: Record of its constants.
-        paths: Paths that the wheels would make without a wall [pulses].
+        paths: Paths of the wheels without a wall [pulses].
         whole: The arc [mm] and its turn [rad].
-        pieces: How many pieces to make of it.
+        pieces: Number of pieces.
         chance: As in `move`.
 
     Returns:
@@ -132,14 +132,14 @@ def move_near(
 
 @inlined
 def end_of_arc(robot: Any, chord: Any, turn: Any) -> Any:
-    """Return where a free robot is after an arc, x and y [mm], and sine and cosine of the direction of its chord."""
+    """Return the place of a free robot after an arc, x and y [mm], and sine and cosine of its chord's direction."""
     sine, cosine = sin_cos(robot.heading_rad + 0.5 * turn)
     return robot.x_mm + chord * cosine, robot.y_mm + chord * sine, sine, cosine
 
 
 @inlined
 def drive(robot: Any, x: Any, y: Any, turn: Any, arc: Any) -> Any:
-    """Be at (x, y) [mm], turned [rad], after an arc [mm]."""
+    """Move to (x, y) [mm] and turn [rad] after an arc [mm]."""
     robot.x_mm = x
     robot.y_mm = y
     robot.heading_rad += turn
@@ -148,7 +148,7 @@ def drive(robot: Any, x: Any, y: Any, turn: Any, arc: Any) -> Any:
 
 @kernel
 def scrape(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, piece: Any, ways: Any, slip_ratio: Any) -> Any:
-    """Make a piece of an arc that leads into a wall; return what the rims of the wheels did [pulses].
+    """Drive a piece of an arc that leads into a wall; return the paths of the wheels' rims [pulses].
 
     Args:
         field: Distance of cells to the nearest wall [mm], shape [rows, columns].
@@ -157,7 +157,7 @@ def scrape(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, piece: 
         robot: Record of the robot.
         parameters: Record of its constants.
         piece: The chord [mm], sine and cosine of its direction, and the turn [rad].
-        ways: What the wheels ask for [mm].
+        ways: Commanded paths of the wheels [mm].
         slip_ratio: Share of its command at which a blocked wheel turns.
     """
     chord, sine, cosine, turn = piece
@@ -166,7 +166,7 @@ def scrape(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, piece: 
     robot.heading_rad += q
     along = u * cosine + v * sine
     count_path(robot, math.sqrt(u * u + v * v) if along > 0.0 else -math.sqrt(u * u + v * v))
-    # The rim goes with the floor, but for the slip ratio of what it wanted more.
+    # The rim follows the floor, plus the slip ratio times the rest of its commanded path.
     rim_left = slip(along - 0.5 * q * base, ways[0], slip_ratio) / parameters.pulse_mm
     rim_right = slip(along + 0.5 * q * base, ways[1], slip_ratio) / parameters.pulse_mm
     return rim_left, rim_right
@@ -174,14 +174,14 @@ def scrape(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, piece: 
 
 @kernel
 def draw_slip(parameters: Any, seed: Any, world: Any, number: Any, tick: Any) -> Any:
-    """Return at which share of its command a wheel of a robot turns in a tick, if it is blocked."""
+    """Return the share of its command at which a blocked wheel of a robot turns in a tick."""
     drawn = uniform(seed, world, number, STREAM_SLIP, tick, 0)
     return parameters.slip_ratio_min + drawn * (parameters.slip_ratio_max - parameters.slip_ratio_min)
 
 
 def slip_ratio_of(chance: Any, parameters: Any, lane: Any) -> Any:
-    """Return a slip ratio that is given, or draw it from a seed, a world, a robot's number and a tick."""
-    raise NotImplementedError("it is for kernels")
+    """Return a given slip ratio, or draw one from a seed, a world, a robot's number and a tick."""
+    raise NotImplementedError("only kernels can call this")
 
 
 @extending.overload(slip_ratio_of)  # type: ignore[untyped-decorator, unused-ignore]
@@ -198,14 +198,14 @@ def _overload_slip_ratio_of(chance: Any, parameters: Any, lane: Any) -> Any:
 
 @inlined
 def count_path(robot: Any, way_mm: Any) -> Any:
-    """Add a piece of path to what the robot has driven ahead, or back if it is negative."""
+    """Add a path to the distance driven forwards, or backwards if it is negative."""
     robot.forwards_mm += max(way_mm, 0.0)
     robot.backwards_mm -= min(way_mm, 0.0)
 
 
 @inlined
 def note_contact(robot: Any, is_touching: Any) -> Any:
-    """Phase: count the contacts; one that lasts counts once, with gaps in it, too.
+    """Phase: count the contacts; a lasting contact counts once, even with short gaps.
 
     A ball that is pushed along runs ahead by hundredths of a millimetre whenever the motors falter.
     """
@@ -215,22 +215,22 @@ def note_contact(robot: Any, is_touching: Any) -> Any:
 
 @kernel
 def between_nought_and(limit: Any, value: Any) -> Any:
-    """Return a value, or 0 or the limit if it is beyond one of them."""
+    """Return a value, limited to the range between 0 and a limit of either sign."""
     return min(max(value, 0.0), limit) if limit > 0.0 else max(min(value, 0.0), limit)
 
 
 @kernel
 def give_way(robot: Any, parameters: Any, dx: Any, dy: Any, wheels: Any, slip_ratio: Any) -> Any:
-    """Let a robot that something has pushed by (dx, dy) [mm] count what its rims did.
+    """Correct the wheel counts of a robot that was pushed by (dx, dy) [mm].
 
-    A push brakes the wheels, at most to a stop, and turns none faster: gears of 25:1 cannot be driven from the wheel.
+    A push brakes the wheels, at most to a stop, and turns none faster: a gear of 25:1 cannot be driven from the wheel.
 
     Args:
         robot: Record of the robot.
         parameters: Record of its constants.
-        dx: How far it was pushed [mm].
-        dy: How far it was pushed [mm].
-        wheels: The paths that its wheels have made [pulses].
+        dx: The push [mm].
+        dy: The push [mm].
+        wheels: Paths that its wheels have made [pulses].
         slip_ratio: Share of its command at which a blocked wheel turns.
     """
     sine, cosine = sin_cos(robot.heading_rad)
@@ -240,7 +240,7 @@ def give_way(robot: Any, parameters: Any, dx: Any, dy: Any, wheels: Any, slip_ra
         lost = between_nought_and(path, -pushed)
         robot.wheel_pulses[wheel] -= (1.0 - slip_ratio) * lost
         robot.slip_pulses[wheel] += (1.0 - slip_ratio) * lost
-        # What was counted as driven and was not is taken off again.
+        # Subtract the path that was counted as driven but was not.
         if lost > 0.0:
             robot.forwards_mm -= 0.5 * lost * parameters.pulse_mm
         else:
@@ -249,7 +249,7 @@ def give_way(robot: Any, parameters: Any, dx: Any, dy: Any, wheels: Any, slip_ra
 
 @kernel
 def slip(floor_path: Any, wanted_path: Any, slip_ratio: Any) -> Any:
-    """Return the path of a rim that wants more than the floor under it gives."""
+    """Return the path of a rim that slips on the floor."""
     return floor_path + slip_ratio * (wanted_path - floor_path)
 
 
@@ -271,7 +271,7 @@ def pose_between(robot: Any, ticks_ago: Any, share: Any) -> Any:
 
 @inlined
 def boundary(robot: Any, ticks_ago: Any, axis: Any) -> Any:
-    """Return x, y or heading at the beginning of the tick that ended so many ticks ago; -1 is the one to come."""
+    """Return x, y or heading at the beginning of the tick that ended `ticks_ago` ticks ago; -1 is the next tick."""
     now = robot.x_mm if axis == 0 else (robot.y_mm if axis == 1 else robot.heading_rad)
     value = choose(ticks_ago == 0, robot.trail[0, axis], now)
     for k in range(1, TRAIL_LENGTH):

@@ -1,10 +1,10 @@
-"""The two motors: set-points, trajectory generator, the firmware's PID, and the motor that obeys it.
+"""The two motors: set points, trajectory generator, the firmware's PID controller, and the motor model.
 
-Need: the transients of the real robot, so that `E`, `K` and `H` answer like its own while it accelerates, arrives and
-stalls. Source: khepera-protocol.md 6.1 to 6.4 (K-Team's algorithm and gains; the plant is inferred there).
-Assumption: a wheel that slips at a wall turns at 10-15 % of its command and stays there (thesis 3.3). A loop closed
-over the slip would wind up to full power instead, so the controllers regulate the path the motor would have made
-without the slip (`slip_pulses`), while the encoders, and with them E, H and K, count what the wheel really did.
+`E`, `K` and `H` answer like the real robot while it accelerates, arrives and stalls. Source: khepera-protocol.md 6.1 to
+6.4 (K-Team's algorithm and gains; the plant is inferred there).
+Assumption: a wheel that slips at a wall turns at 10-15 % of its command and stays there (thesis 3.3). A loop closed over
+the slip would wind up to full power instead. So the controllers regulate the path without the slip (`slip_pulses`),
+while the encoders, and with them E, H and K, count the real path of the wheel.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ TARGET_MAX = 2**23 - 2
 
 @kernel
 def clamp(value: Any, limit: Any) -> Any:
-    """Return a value cut to +-limit."""
+    """Return a value limited to +-limit."""
     return min(max(value, -limit), limit)
 
 
@@ -47,12 +47,12 @@ def counter(robot: Any, wheel: Any) -> Any:
     return wrap_int32(robot.pulse_count[wheel] + robot.counter_offset[wheel])
 
 
-# ---- set-points: what the commands A, C, D, F, G, J, P and a reset write ----
+# ---- set points: written by the commands A, C, D, F, G, J, P and a reset ----
 
 
 @kernel
 def change_mode(robot: Any, wheel: Any, mode: Any) -> Any:
-    """Hand a motor to another controller, which begins with an empty memory (khepera-protocol.md 6.3)."""
+    """Switch the controller of a motor; the new one begins with an empty memory (khepera-protocol.md 6.3)."""
     is_other = robot.motor_mode[wheel] != mode
     robot.motor_mode[wheel] = mode
     robot.error_sum[wheel] = choose(is_other, 0, robot.error_sum[wheel])
@@ -70,7 +70,7 @@ def command_speed(robot: Any, left_pulses: Any, right_pulses: Any) -> Any:
 
 @kernel
 def command_pwm(robot: Any, left_pwm: Any, right_pwm: Any) -> Any:
-    """Command P: feed the motors without control, -255 to 255."""
+    """Command P: set the power of the motors without control, -255 to 255."""
     for wheel in range(2):
         change_mode(robot, wheel, MODE_PWM)
         robot.pwm_setpoint[wheel] = clamp(left_pwm if wheel == 0 else right_pwm, PWM_MAX)
@@ -81,8 +81,8 @@ def command_position(robot: Any, left_pulses: Any, right_pulses: Any) -> Any:
     """Command C: move the wheels to these counter readings [pulses], along a trapezoid of speed."""
     for wheel in range(2):
         if robot.motor_mode[wheel] == MODE_POSITION:
-            # What slip has swallowed is not made up for: the move starts where the wheel is, and where its counter is,
-            # should that have gone over 32 bits.
+            # The move does not make up for slip: it starts where the wheel is, and where its counter is after an
+            # overflow of 32 bits.
             overflow = robot.pulse_count[wheel] + robot.counter_offset[wheel] - counter(robot, wheel)
             robot.trajectory_pulses[wheel] -= robot.slip_count[wheel] + overflow
         else:
@@ -96,7 +96,7 @@ def command_position(robot: Any, left_pulses: Any, right_pulses: Any) -> Any:
 
 @kernel
 def command_counters(robot: Any, left_pulses: Any, right_pulses: Any) -> Any:
-    """Command G: set the counters [pulses]. A move in progress is shifted with them, so that nothing stirs."""
+    """Command G: set the counters [pulses]. A move in progress is shifted with them, so the wheels do not move."""
     for wheel in range(2):
         offset = wrap_int32(left_pulses if wheel == 0 else right_pulses) - robot.pulse_count[wheel]
         shift = offset - robot.counter_offset[wheel]
@@ -107,7 +107,7 @@ def command_counters(robot: Any, left_pulses: Any, right_pulses: Any) -> Any:
 
 @kernel
 def position_error(robot: Any, wheel: Any) -> Any:
-    """Return by how many pulses a wheel lags behind its trajectory, counted over the overflow of 32 bits."""
+    """Return the lag of a wheel behind its trajectory [pulses], across the overflow of 32 bits."""
     return wrap_int32(floor(robot.trajectory_pulses[wheel] + 0.5) - counter(robot, wheel))
 
 
@@ -151,7 +151,7 @@ def controller_error(robots: Any, world: Any, robot: Any, wheel: Any) -> Any:
 
 @inlined
 def latch_encoders(robot: Any) -> Any:
-    """Phase: count the whole pulses that the wheels have made, and how many of them since the last tick."""
+    """Phase: count the whole pulses of the wheels, in total and since the last tick."""
     for wheel in range(2):
         pulses = floor(robot.wheel_pulses[wheel])
         slipped = floor(robot.wheel_pulses[wheel] + robot.slip_pulses[wheel]) - pulses
@@ -174,20 +174,20 @@ def advance_trajectory(robot: Any, wheel: Any) -> Any:
         robot.trajectory_pulses[wheel] = robot.target_pulses[wheel]
         robot.trajectory_speed[wheel] = 0.0
         robot.on_target[wheel] = 1
-        # What the integrator gathered against friction on the way would hold the wheel some pulses beyond the target.
+        # The integrator has compensated friction on the way. Left in, it would hold the wheel beyond the target.
         robot.error_sum[wheel] = 0
         return
-    if speed < 0.0:  # it still runs away from the target
+    if speed < 0.0:  # it still moves away from the target
         speed = min(speed + acceleration, 0.0)
     elif distance < speed * speed / (2.0 * acceleration):
-        # Brake as hard as the distance asks for, even beyond the set acceleration: this guarantees the arrival.
+        # Brake as hard as the distance requires, even beyond the set acceleration: this guarantees the arrival.
         speed = max(speed - speed * speed / (2.0 * max(distance, 1e-9)), 0.0)
     elif speed < fastest:
         speed = min(speed + acceleration, fastest)
     elif speed > fastest:
         speed = max(speed - acceleration, fastest)
     if 0.0 <= speed < acceleration:
-        speed = min(acceleration, distance)  # the last crumbs of the way: never a standstill short of the target
+        speed = min(acceleration, distance)  # the rest of the path: no standstill short of the target
     speed = min(speed, max(distance, 0.0)) if speed > 0.0 else speed
     robot.trajectory_speed[wheel] = speed * side
     robot.trajectory_pulses[wheel] += speed * side
@@ -195,14 +195,14 @@ def advance_trajectory(robot: Any, wheel: Any) -> Any:
 
 @inlined
 def pid(robot: Any, wheel: Any, gains: Any, error: Any, scale: Any) -> Any:
-    """Return the power that the firmware's controller asks for (khepera-protocol.md 6.3), in whole numbers as there.
+    """Return the power that the firmware's controller demands (khepera-protocol.md 6.3), in whole numbers as there.
 
-    Each is below 2^53, but for a demand that is far beyond full power anyway.
+    All are below 2^53, except a demand that is far beyond full power anyway.
     """
     error_sum = robot.error_sum[wheel] + error
     demand = gains[0] * error + gains[1] * error_sum + gains[2] * (error - robot.last_error[wheel])
     power = floor(abs(demand) / scale)
-    # The integrator rests while the power is clipped, unless it works its way back.
+    # The integrator stops while the power is clipped, unless the error reduces it (anti-windup).
     is_working = (power <= PWM_MAX) | ((error < 0) != (demand <= 0))
     robot.error_sum[wheel] = choose(is_working, error_sum, robot.error_sum[wheel])
     robot.last_error[wheel] = error
@@ -211,7 +211,7 @@ def pid(robot: Any, wheel: Any, gains: Any, error: Any, scale: Any) -> Any:
 
 @inlined
 def control_motors(robot: Any, parameters: Any) -> Any:
-    """Phase: each motor's controller compares its set-point with the encoders and sets the power."""
+    """Phase: each motor's controller compares its set point with the encoders and sets the power."""
     for wheel in range(2):
         is_simple = robot.motor_mode[wheel] == MODE_SPEED
         if everywhere(is_simple):
@@ -223,14 +223,14 @@ def control_motors(robot: Any, parameters: Any) -> Any:
 
 @inlined
 def control_speed(robot: Any, parameters: Any, wheel: Any) -> Any:
-    """Return the power of a motor that is to turn at a speed."""
+    """Return the power of a motor under speed control."""
     error = robot.speed_setpoint[wheel] - robot.controlled_speed[wheel]
     return pid(robot, wheel, robot.speed_gains, error, parameters.gain_scale)
 
 
 @kernel
 def control_motor(robot: Any, parameters: Any, wheel: Any) -> Any:
-    """Set the power of one motor, whatever controls it."""
+    """Set the power of one motor according to its mode."""
     mode = robot.motor_mode[wheel]
     if mode == MODE_SPEED:
         robot.pwm[wheel] = control_speed(robot, parameters, wheel)
@@ -245,7 +245,7 @@ def control_motor(robot: Any, parameters: Any, wheel: Any) -> Any:
 
 @inlined
 def turn_motors(robot: Any, parameters: Any, wheel: Any) -> Any:
-    """Phase: the motor follows its power with a lag; return the path its wheel would make in this tick [pulses]."""
+    """Phase: the motor follows its power with a lag; return its wheel's path in this tick without obstacles [pulses]."""
     power = robot.pwm[wheel]
     driving = max(abs(power) - parameters.dead_band_pwm, 0.0) / (PWM_MAX - parameters.dead_band_pwm)
     final = driving * parameters.free_speed_pulses * parameters.motor_gain[wheel]
