@@ -14,7 +14,7 @@ from tests.learn import works
 from kiks.errors import ParameterError, WorkError
 from kiks.learn.evaluation import Lost, Ready, Values, Worker
 from kiks.learn.executors import executor_for
-from kiks.learn.worker_pool import LOSSES_MAX, Chunks, PoolExecutor
+from kiks.learn.ray_executor import LOSSES_MAX, Chunks, RayExecutor
 
 
 def expected(candidates, seeds):
@@ -109,14 +109,14 @@ class FakePool:
 def test_values_are_the_same_for_any_chunks_and_losses(count, worker_count, durations_s, deaths):
     candidates, seeds = works.candidates(count), works.seeds(count)
     # No two losses follow each other, so no chunk loses three workers.
-    with PoolExecutor(FakePool(worker_count, durations_s, deaths)) as executor:
+    with RayExecutor(FakePool(worker_count, durations_s, deaths)) as executor:
         for _ in range(2):
             assert np.array_equal(executor.evaluate(candidates, seeds), expected(candidates, seeds))
 
 
 def test_the_error_names_a_chunk_that_loses_three_workers():
     pool = FakePool(1, deaths=range(1, 1 + LOSSES_MAX))
-    with PoolExecutor(pool) as executor:
+    with RayExecutor(pool) as executor:
         with pytest.raises(WorkError, match="3 in a row were lost with candidates 0 to 7; the last one was ended"):
             executor.evaluate(works.candidates(20), works.seeds(20))
         # The next evaluation works.
@@ -125,7 +125,7 @@ def test_the_error_names_a_chunk_that_loses_three_workers():
 
 def test_workers_that_end_before_their_first_evaluation_are_an_error():
     with (
-        PoolExecutor(FakePool(5, dies_at_start=True)) as executor,
+        RayExecutor(FakePool(5, dies_at_start=True)) as executor,
         pytest.raises(WorkError, match="must live until its first evaluation, but 5 in a row did not"),
     ):
         executor.evaluate(works.candidates(20), works.seeds(20))
@@ -181,7 +181,7 @@ def test_values_must_have_their_shape():
     ("where", "words"),
     [
         ("thread", "Did you mean 'threads'"),
-        ("processes", "must run on 'threads"),
+        ("processes", r"must run on 'threads\[:COUNT\]', 'ray' or 'ray:ADDRESS', but it was 'processes'"),
         ("threads:", "must run on 'threads"),
         ("threads:0", "whole number from 1"),
         ("threads:many", "it was 'many'"),

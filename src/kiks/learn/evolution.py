@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from kiks.errors import ParameterError, shown
 from kiks.learn.algorithms import make_algorithm
 from kiks.learn.champion import Champion
+from kiks.learn.evaluation import Executor
 from kiks.learn.evolution_log import Folder, Generation, Identity
-from kiks.learn.executor import Executor
 from kiks.learn.executors import executor_for
 from kiks.learn.task import Task
 from kiks.model.checks import check_count, check_kind, check_number, check_numbers
