@@ -266,12 +266,12 @@ class RayPool:
         self._work = work
         self._address = address
         self._ray: Any = None
-        self._has_connected = False
+        self._owns_connection = False
         self._sigterm_before: Any = None
         self._actors: dict[int, Any] = {}
-        self._owed: dict[Any, int] = {}
+        self._pending: dict[Any, int] = {}
         self._next_number = 0
-        self._shipped: Any = None
+        self._stored_work: Any = None
 
     def open(self) -> None:
         """Connect to the cluster, put the work into its store, once for all workers, and start the workers.
@@ -289,7 +289,7 @@ class RayPool:
             ) from error
         self._connect()
         try:
-            self._shipped = ray.put(pickled)
+            self._stored_work = ray.put(pickled)
             self.refill()
         except BaseException:
             self.close()
@@ -321,7 +321,7 @@ class RayPool:
                 f"A Ray cluster must be reached, but at {self._address or 'this computer'} none was ({error}). Start"
                 " one with `ray start --head`, and this program on one of its computers."
             ) from error
-        self._has_connected = True
+        self._owns_connection = True
         there = ray.get_runtime_context().gcs_address
         if self._address is None and not there.startswith(f"{LOOPBACK}:"):
             _log.warning(
@@ -334,9 +334,9 @@ class RayPool:
         """End all actors, and the connection if there was none before."""
         while self._actors:
             self.end(next(iter(self._actors)))
-        self._shipped = None
-        if self._has_connected:
-            self._has_connected = False
+        self._stored_work = None
+        if self._owns_connection:
+            self._owns_connection = False
             self._ray.shutdown()
             if self._sigterm_before is not None:
                 signal.signal(signal.SIGTERM, self._sigterm_before)
@@ -346,29 +346,29 @@ class RayPool:
 
         A worker that finds no free core waits for one: that of another program, or of a computer that joins.
         """
-        busy = set(self._owed.values())
+        busy = set(self._pending.values())
         for number, actor in self._actors.items():
             if number not in busy:
-                self._owed[actor.answer.remote()] = number
+                self._pending[actor.answer.remote()] = number
         worker_count = max(1, int(self._ray.cluster_resources().get("CPU", 0)))
         actor_class = self._ray.remote(num_cpus=1, max_restarts=0, max_task_retries=0)(RayWorker)
         for _ in range(worker_count - len(self._actors)):
             actor = self._actors[self._next_number] = actor_class.remote()
-            self._owed[actor.prepare.remote(self._shipped, __version__)] = self._next_number
+            self._pending[actor.prepare.remote(self._stored_work, __version__)] = self._next_number
             self._next_number += 1
         return worker_count
 
     def send(self, worker: int, candidates: Floats, seeds: Integers) -> None:
         """Send a chunk to a worker that is ready."""
-        self._owed[self._actors[worker].evaluate.remote(candidates, seeds)] = worker
+        self._pending[self._actors[worker].evaluate.remote(candidates, seeds)] = worker
 
     def wait(self) -> list[tuple[int, Answer]]:
         """Wait for answers and return them with their workers; an empty list after a while without any."""
-        answered, _ = self._ray.wait(list(self._owed), num_returns=1, timeout=ANSWER_TIMEOUT_S)
-        return [(self._owed[reference], self._answer(reference)) for reference in answered]
+        answered, _ = self._ray.wait(list(self._pending), num_returns=1, timeout=ANSWER_TIMEOUT_S)
+        return [(self._pending[reference], self._answer(reference)) for reference in answered]
 
     def _answer(self, reference: Any) -> Answer:
-        number = self._owed.pop(reference)
+        number = self._pending.pop(reference)
         try:
             answer: Answer = self._ray.get(reference)
         except self._ray.exceptions.RayTaskError as error:
@@ -382,7 +382,7 @@ class RayPool:
     def end(self, worker: int) -> None:
         """End a worker, even a busy one, without an answer from it. Does nothing if it has ended already."""
         actor = self._actors.pop(worker, None)
-        self._owed = {reference: number for reference, number in self._owed.items() if number != worker}
+        self._pending = {reference: number for reference, number in self._pending.items() if number != worker}
         if actor is not None:
             with suppress(self._ray.exceptions.RayError):
                 self._ray.kill(actor)
