@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def returns_of(envs: Any, weights: np.ndarray, steps: int) -> np.ndarray:
-    """Return what each world's linear policy, float64 [world, sensor + 1, wheel], gets as total reward of an episode."""
+    """Return the reward of an episode for the linear policy of each world, float64 [world, sensor + 1, wheel]."""
     seen, _ = envs.reset(seed=1)
     total = np.zeros(envs.num_envs)
     for _ in range(steps):

@@ -98,7 +98,8 @@ class Folder:
             if (known := getattr(found, name)) != value:
                 raise ParameterError(
                     f"the folder {str(self.path)!r} must hold the same evolution, but its {name} is "
-                    f"{shown(known)}, not {shown(value)}. Take a new folder, or the arguments of the evolution that it holds."
+                    f"{shown(known)}, not {shown(value)}. Take a new folder, or "
+                    "the arguments of the evolution that it holds."
                 )
 
     def generation(self, number: int, shape: tuple[int, int], value_count: int) -> dict[str, NDArray[Any]] | None:

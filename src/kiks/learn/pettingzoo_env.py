@@ -93,7 +93,7 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
         """
         if not self.agents or not isinstance(actions, dict) or set(actions) != set(self.agents):
             raise ParameterError(
-                f"actions must be given for {', '.join(self.agents) or 'no robot, because the episode is over: call reset()'}, "
+                f"actions must be given for {', '.join(self.agents) or 'no robot: the episode is over, call reset()'}, "
                 f"but they were for {shown(list(actions) if isinstance(actions, dict) else actions)}."
             )
         rewards = self.episodes.step([[actions[agent] for agent in self.agents]])[0]
