@@ -142,7 +142,7 @@ def test_the_error_names_candidates_that_kill_their_workers(cluster):
     with (
         # The chunk begins at 3 if both nodes of the cluster are still there.
         executor_for(f"ray:{cluster.address}", works.Deadly()) as executor,
-        pytest.raises(WorkError, match="3 in a row were lost with candidates [03] to 4; the last one went"),
+        pytest.raises(WorkError, match=r"3 in a row were lost with candidates [03] to 4; the last one went"),
     ):
         executor.evaluate(works.candidates(5, marked=3), works.seeds(5))
 
