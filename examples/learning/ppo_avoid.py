@@ -1,10 +1,10 @@
-"""Learn to avoid obstacles by PPO, in 64 worlds at once, and drive what was learnt on a serial line.
+"""Learn to avoid obstacles by PPO in 64 worlds at once, then drive a robot on a serial line with the policy.
 
 pip install '.[learn]' stable-baselines3
 python examples/learning/ppo_avoid.py
 
-The policy's network has the shape of `kiks.controllers.mlp`, so that its weights become a controller: no PyTorch is
-needed where it drives, be it in a batch, in a simulation or on a real robot.
+The policy's network has the shape of `kiks.controllers.mlp`, so its weights become a controller that needs no
+PyTorch: in a batch, in a simulation and on a real robot.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ HIDDEN = (16, 16)
 WORLDS = 64
 EPISODE_STEPS = 300
 RAW_LIMIT = 3.0
-"""Actions of the policy are cut to +-3 before tanh makes speeds of them, as the last layer of the controller does."""
+"""The policy's actions are clipped to +-3, then tanh maps them to speeds, as the last layer of the controller does."""
 
 
-class Lanes(VecEnv):
-    """A vector environment of Gymnasium as Stable-Baselines3 wants it: with tanh before the wheels.
+class Sb3VecEnv(VecEnv):
+    """Adapts a vector environment of Gymnasium to Stable-Baselines3, with tanh before the wheels.
 
     Args:
-        envs: The environment; its worlds must begin anew in the step in which they end.
+        envs: The environment; its worlds must reset in the step in which they end (`SAME_STEP`).
     """
 
     def __init__(self, envs: gymnasium.vector.VectorEnv) -> None:
@@ -49,13 +49,13 @@ class Lanes(VecEnv):
 
     def step_wait(self) -> Any:
         seen, rewards, terminations, truncations, infos = self.envs.step(self.actions)
-        told: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        step_infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for k in np.flatnonzero(infos.get("_final_obs", ())):
-            told[k] = {
+            step_infos[k] = {
                 "terminal_observation": infos["final_obs"][k],
                 "TimeLimit.truncated": bool(truncations[k] and not terminations[k]),
             }
-        return seen, rewards.astype(np.float32), terminations | truncations, told
+        return seen, rewards.astype(np.float32), terminations | truncations, step_infos
 
     def close(self) -> None:
         self.envs.close()
@@ -83,7 +83,7 @@ def parameters_of(model: PPO) -> np.ndarray:
 
 
 def report(title: str, controller: kiks.Controller, parameters: np.ndarray, arena: kiks.Arena) -> None:
-    """Print how well a controller does on 100 starts, for a minute each."""
+    """Print the mean performance of a controller over 100 starts, a minute each."""
     batch = kiks.Batch(arena, 100, seed=1000, starts=random_starts(arena, 100, seed=1)[:, None])
     measures = [kiks.measures.avoidance, kiks.measures.contacts, kiks.measures.path_mm]
     rollouts = batch.run(controller, parameters, seconds=60, measures=measures)
@@ -92,20 +92,20 @@ def report(title: str, controller: kiks.Controller, parameters: np.ndarray, aren
 
 
 def main() -> None:
-    torch.set_num_threads(1)  # its networks are small: threads would wait for each other
+    torch.set_num_threads(1)  # the networks are small: more threads are slower
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--steps", type=int, default=400_000, help="steps of all worlds together")
-    options.add_argument("--save", default="ppo_avoid", help="what the files are called")
-    options.add_argument("--port", help="drive the robot on this serial line, such as /dev/ttyUSB0, for a minute")
+    options.add_argument("--save", default="ppo_avoid", help="name of the files, without suffix")
+    options.add_argument("--port", help="drive the robot on this serial port for a minute, for example /dev/ttyUSB0")
     given = options.parse_args()
 
     envs = gymnasium.make_vec(
         "kiks/Avoid-v0", num_envs=WORLDS, max_episode_steps=EPISODE_STEPS, autoreset_mode="SameStep"
     )
-    lanes = Lanes(envs)
+    vec_env = Sb3VecEnv(envs)
     model = PPO(
         "MlpPolicy",
-        lanes,
+        vec_env,
         n_steps=64,
         batch_size=1024,
         n_epochs=10,
@@ -115,8 +115,8 @@ def main() -> None:
         seed=1,
         device="cpu",
     )
-    lesson = envs.unwrapped.episodes.lesson
-    arena, controller = lesson.arenas[0], kiks.controllers.mlp(hidden=HIDDEN, speed_limit=lesson.speed_limit)
+    spec = envs.unwrapped.episodes.spec
+    arena, controller = spec.arenas[0], kiks.controllers.mlp(hidden=HIDDEN, speed_limit=spec.speed_limit)
     report("before", controller, parameters_of(model), arena)
     model.learn(given.steps)
     parameters = parameters_of(model)

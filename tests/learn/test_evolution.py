@@ -1,4 +1,4 @@
-"""Evolution: the same seed the same run, nothing lost when it is killed, and a champion that drives as it was bred."""
+"""Evolution: reproducible by its seed, resumable when killed; champions drive on a serial line as in the batch."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ parquet = pytest.importorskip("pyarrow.parquet")
 
 
 def small(**changes: Any) -> kiks.Task:
-    """A task that takes a hundredth of a second."""
+    """Return a task that takes 10 ms to evaluate."""
     return kiks.tasks.avoid(**{"seconds": 1.0, "worlds": 3} | changes)
 
 
@@ -38,11 +38,11 @@ def candidates_of(evolution: kiks.Evolution) -> bytes:
     return b"".join(each.candidates.tobytes() + each.values.tobytes() for each in evolution.generations)
 
 
-# ---- the same run again ----
+# ---- seeds ----
 
 
 @pytest.mark.parametrize("algorithm", ["cma", "ga", "map-elites"])
-def test_the_same_seed_is_the_same_run(algorithm: str) -> None:
+def test_the_same_seed_gives_the_same_evolution(algorithm: str) -> None:
     np.random.seed(1)
     one = run(algorithm)
     np.random.seed(2)
@@ -52,7 +52,7 @@ def test_the_same_seed_is_the_same_run(algorithm: str) -> None:
     assert one.champion.parameters == two.champion.parameters
 
 
-def test_each_generation_has_worlds_of_its_own_and_trials_always_the_same() -> None:
+def test_worlds_differ_between_generations_but_trial_worlds_do_not() -> None:
     evolution = run("ga")
     before = evolution.seeds
     evolution.tell(np.zeros(len(evolution.ask())))
@@ -62,10 +62,10 @@ def test_each_generation_has_worlds_of_its_own_and_trials_always_the_same() -> N
     assert len(before) > 8
 
 
-# ---- what is on the disk ----
+# ---- files ----
 
 
-def test_an_evolution_goes_on_where_it_stopped(tmp_path: Path) -> None:
+def test_a_resumed_evolution_equals_one_that_never_stopped(tmp_path: Path) -> None:
     whole = run("cma", tmp_path / "whole")
     part = kiks.Evolution(small(), "cma", population=8, seed=3, folder=tmp_path / "part")
     part.run(generations=2)
@@ -76,23 +76,23 @@ def test_an_evolution_goes_on_where_it_stopped(tmp_path: Path) -> None:
 
 KILLED = """
 import sys, kiks
-def told(evolution):
+def report(evolution):
     print(len(evolution.generations), flush=True)
 task = kiks.tasks.avoid(seconds=1.0, worlds=3)
 evolution = kiks.Evolution(task, "cma", population=8, seed=3, folder=sys.argv[1])
-evolution.run(generations=10**6, each=told)
+evolution.run(generations=10**6, each=report)
 """
 
 
 @pytest.mark.slow
-def test_who_is_killed_loses_the_current_generation_at_most(tmp_path: Path) -> None:
+def test_a_killed_evolution_loses_at_most_the_current_generation(tmp_path: Path) -> None:
     with subprocess.Popen([sys.executable, "-c", KILLED, str(tmp_path)], stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
-        told = [int(process.stdout.readline()) for _ in range(3)][-1]
+        reported_count = [int(process.stdout.readline()) for _ in range(3)][-1]
         os.kill(process.pid, signal.SIGKILL)
     again = kiks.Evolution(small(), "cma", population=8, seed=3, folder=tmp_path)
     count = len(again.generations)
-    assert count >= told
+    assert count >= reported_count
     again.run(generations=count + 1)
     whole = kiks.Evolution(small(), "cma", population=8, seed=3)
     whole.run(generations=count + 1)
@@ -110,7 +110,7 @@ def test_the_log_has_a_row_for_each_candidate(tmp_path: Path) -> None:
     assert log["evaluations"][-1] == sum(len(each.values) for each in evolution.generations)
 
 
-def test_a_folder_of_another_evolution_is_refused(tmp_path: Path) -> None:
+def test_a_folder_of_another_evolution_is_an_error(tmp_path: Path) -> None:
     run("cma", tmp_path)
     with pytest.raises(ParameterError, match="must hold the same evolution, but its seed is 3, not 4"):
         kiks.Evolution(small(), "cma", population=8, seed=4, folder=tmp_path)
@@ -121,14 +121,14 @@ def test_a_folder_of_another_evolution_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "data", [b"", b"[]", b"[" * 100_000, b'"x"', b"{}", b"\xff", b'{"seed": 1' + b"0" * 5000, b'{"task": ' + b"9" * 400]
 )
-def test_a_broken_record_of_an_evolution_is_named(data: bytes, tmp_path: Path) -> None:
+def test_the_error_names_a_broken_identity_file(data: bytes, tmp_path: Path) -> None:
     (tmp_path / "evolution.json").write_bytes(data)
     with pytest.raises(ParameterError, match=r"^The record of an evolution '.*evolution.json'") as caught:
         kiks.Evolution(small(), "cma", population=8, seed=3, folder=tmp_path)
     assert len(str(caught.value).replace(str(tmp_path), "")) < 300
 
 
-def test_a_broken_generation_is_named(tmp_path: Path) -> None:
+def test_the_error_names_a_broken_generation_file(tmp_path: Path) -> None:
     run("cma", tmp_path)
     file = tmp_path / "generations/000002.npz"
     with np.load(file) as saved:
@@ -156,7 +156,7 @@ def test_a_broken_generation_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("algorithm", ["ga", "map-elites"])
-def test_the_picture_is_drawn(algorithm: str, tmp_path: Path) -> None:
+def test_save_plot_writes_a_png_file(algorithm: str, tmp_path: Path) -> None:
     from kiks.learn.evolution_plot import save_plot
 
     save_plot(run(algorithm), tmp_path / "fitness.png")
@@ -167,7 +167,7 @@ def test_the_picture_is_drawn(algorithm: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("algorithm", ["cma", "ga"])
-def test_algorithms_climb(algorithm: str) -> None:
+def test_algorithms_maximise_fitness(algorithm: str) -> None:
     evolution = kiks.Evolution(small(), algorithm, seed=1, population=20)
     for _ in range(40):
         evolution.tell(-((evolution.ask() - 0.5) ** 2).sum(axis=1))
@@ -175,7 +175,7 @@ def test_algorithms_climb(algorithm: str) -> None:
     assert evolution.generations[0].fitness.max() < -5
 
 
-def test_map_elites_fills_its_map() -> None:
+def test_the_heat_map_of_map_elites() -> None:
     evolution = kiks.Evolution(small(), "map-elites", seed=1, population=20)
     rng = np.random.default_rng(1)
     for _ in range(5):
@@ -187,26 +187,26 @@ def test_map_elites_fills_its_map() -> None:
 
 
 def test_map_elites_needs_axes() -> None:
-    with pytest.raises(ParameterError, match="this task has none"):
+    with pytest.raises(ParameterError, match="but this task has none"):
         kiks.Evolution(small(axes=()), "map-elites")
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("given", "message"),
     [
         ({"algorithm": "cna"}, "Did you mean 'cma'"),
         ({"population": 3}, "population must be a whole number from 4"),
         ({"seed": -1}, "seed must be a whole number from 0"),
     ],
 )
-def test_wrong_arguments_are_named(given: dict[str, Any], said: str) -> None:
-    with pytest.raises(ParameterError, match=said):
+def test_wrong_arguments_are_errors(given: dict[str, Any], message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
         kiks.Evolution(small(), **given)
 
 
-def test_ask_and_tell_keep_their_order() -> None:
+def test_calls_in_the_wrong_order_are_errors() -> None:
     evolution = kiks.Evolution(small(), "ga", population=8)
-    with pytest.raises(ParameterError, match="tell\\(\\) must be called"):
+    with pytest.raises(ParameterError, match="before there is a champion"):
         _ = evolution.champion
     with pytest.raises(ParameterError, match="ask\\(\\) must come before"):
         evolution.tell(np.zeros(8))
@@ -220,14 +220,14 @@ def test_ask_and_tell_keep_their_order() -> None:
 # ---- tasks ----
 
 
-def test_the_worse_half_counts() -> None:
+def test_cautious_mean_weights_the_worse_half() -> None:
     scores = np.array([[1.0, 1.0, 1.0, 1.0], [1.0, 1.0, 1.0, 0.0]])
     assert cautious_mean(scores, 0.0).tolist() == [1.0, 0.75]
     assert cautious_mean(scores, 1.0).tolist() == [1.0, 0.5]
 
 
 @pytest.mark.parametrize("name", list(kiks.tasks.TASKS))
-def test_the_tasks_can_be_evaluated(name: str) -> None:
+def test_ready_tasks_can_be_evaluated(name: str) -> None:
     task = kiks.tasks.TASKS[name](seconds=0.5)
     values = task.evaluate(np.zeros((2, task.parameter_count)), np.array([5, 5]), 1)
     assert values.shape == (2, len(task.value_names))
@@ -235,13 +235,13 @@ def test_the_tasks_can_be_evaluated(name: str) -> None:
     assert (values[0] == values[1]).all()
 
 
-def test_values_do_not_depend_on_neighbours() -> None:
+def test_values_do_not_depend_on_other_candidates() -> None:
     task = small()
     candidates = np.random.default_rng(1).standard_normal((5, task.parameter_count))
     seeds = np.array([1, 2, 3, 3, 1])
-    together = task.evaluate(candidates, seeds, 2)
-    alone = [task.evaluate(candidates[k : k + 1], seeds[k : k + 1], 1)[0] for k in range(5)]
-    assert (together == np.array(alone)).all()
+    all_at_once = task.evaluate(candidates, seeds, 2)
+    one_by_one = [task.evaluate(candidates[k : k + 1], seeds[k : k + 1], 1)[0] for k in range(5)]
+    assert (all_at_once == np.array(one_by_one)).all()
 
 
 OWN = """
@@ -261,7 +261,7 @@ task = kiks.Task("far", [kiks.Arena.box(500, 500)], ahead, [farthest_mm], second
 
 
 @pytest.mark.slow
-def test_a_task_in_python_leaves_a_champion_that_does_not_need_it(tmp_path: Path) -> None:
+def test_a_champion_does_not_need_the_python_file_of_its_task(tmp_path: Path) -> None:
     (tmp_path / "far.py").write_text(OWN)
     task = kiks.tasks.load(str(tmp_path / "far.py"))
     evolution = kiks.Evolution(task, "ga", population=8, folder=tmp_path / "out")
@@ -274,7 +274,7 @@ def test_a_task_in_python_leaves_a_champion_that_does_not_need_it(tmp_path: Path
     assert sim.travelled_mm(1) > 0
 
 
-def test_files_that_hold_no_task_are_refused(tmp_path: Path) -> None:
+def test_files_without_a_task_are_errors(tmp_path: Path) -> None:
     (tmp_path / "none.py").write_text("task = 1\n")
     with pytest.raises(ParameterError, match="must hold a `task"):
         kiks.tasks.load(str(tmp_path / "none.py"))
@@ -285,7 +285,7 @@ def test_files_that_hold_no_task_are_refused(tmp_path: Path) -> None:
         kiks.tasks.load("avoyd")
 
 
-def test_wrong_tasks_are_named() -> None:
+def test_wrong_tasks_are_errors() -> None:
     with pytest.raises(ParameterError, match="worlds must be a multiple of the number of arenas, 3"):
         small(worlds=4)
     with pytest.raises(ParameterError, match="an axis must name one of"):
@@ -298,7 +298,7 @@ def test_wrong_tasks_are_named() -> None:
 # ---- champions ----
 
 
-def test_a_champion_is_the_same_after_its_file(tmp_path: Path) -> None:
+def test_a_champion_equals_the_one_loaded_from_its_file(tmp_path: Path) -> None:
     champion = run("cma").champion
     champion.save(tmp_path / "champion.toml")
     again = kiks.Champion.load(tmp_path / "champion.toml")
@@ -307,7 +307,7 @@ def test_a_champion_is_the_same_after_its_file(tmp_path: Path) -> None:
     assert again.controller is champion.controller
 
 
-def test_a_champion_drives_on_the_wire_as_in_the_batch() -> None:
+def test_a_champion_drives_on_a_serial_line_as_in_the_batch() -> None:
     task = small()
     champion = run("cma").champion
     sim, ports = champion.simulation(task.arenas[0], seed=7)
@@ -319,7 +319,7 @@ def test_a_champion_drives_on_the_wire_as_in_the_batch() -> None:
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "said"),
+    ("before", "after", "message"),
     [
         ("champion = 1", "champion = 9", "champion must be 1, but it was 9. It is the version of the format"),
         ('kind = "linear"', 'kind = "linaer"', "Did you mean 'linear'"),
@@ -332,20 +332,20 @@ def test_a_champion_drives_on_the_wire_as_in_the_batch() -> None:
         ("[controller]", "[measures.deep]\na = 1\n[controller]", "measures must be a table|measures.* must be"),
     ],
 )
-def test_wrong_champions_are_named(before: str, after: str, said: str, tmp_path: Path) -> None:
+def test_wrong_champion_files_are_errors(before: str, after: str, message: str, tmp_path: Path) -> None:
     run("cma").champion.save(tmp_path / "champion.toml")
     text = (tmp_path / "champion.toml").read_text()
     assert before in text
     (tmp_path / "wrong.toml").write_text(text.replace(before, after))
-    with pytest.raises(ParameterError, match=said):
+    with pytest.raises(ParameterError, match=message):
         kiks.Champion.load(tmp_path / "wrong.toml")
 
 
-# ---- what it is all for ----
+# ---- all together ----
 
 
 @pytest.mark.slow
-def test_obstacle_avoidance_evolves_and_drives_on_the_wire() -> None:
+def test_obstacle_avoidance_evolves_and_works_on_a_serial_line() -> None:
     task = kiks.tasks.avoid()
     evolution = kiks.Evolution(task, "cma", seed=1)
     champion = evolution.run(generations=25)

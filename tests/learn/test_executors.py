@@ -14,7 +14,7 @@ from tests.learn import works
 from kiks.errors import ParameterError, WorkError
 from kiks.learn.evaluation import Lost, Ready, Values, Worker
 from kiks.learn.executors import executor_for
-from kiks.learn.worker_pool import LOSSES_MAX, Chunks, PoolExecutor
+from kiks.learn.ray_executor import LOSSES_MAX, Chunks, RayExecutor
 
 
 def expected(candidates, seeds):
@@ -41,7 +41,7 @@ def test_chunks_hold_each_candidate_once(count, worker_count, paces):
 
 def test_chunks_are_long_enough_and_equal_workers_finish_together():
     chunks = Chunks(1000, worker_count=8)
-    # 125 ms of work for each: twice 63 ms, in eights.
+    # Each worker has 125 ms of work: two chunks of 63 ms, rounded up to a multiple of eight candidates.
     assert [len(chunks.take(0.001)) for _ in range(16)] == [64] * 15 + [40]
     assert not chunks
     # Every worker gets a chunk, even if it holds fewer than eight candidates.
@@ -57,7 +57,7 @@ class FakePool:
         self.deaths = deaths
         self.dies_at_start = dies_at_start
         self.workers = {}
-        self.owed = []
+        self.pending = []
         self.started_count = 0
         self.chunk_count = 0
 
@@ -68,23 +68,23 @@ class FakePool:
         self.workers.clear()
 
     def refill(self):
-        busy = {worker for worker, _ in self.owed}
-        self.owed += [(worker, None) for worker in self.workers if worker not in busy]
+        busy = {worker for worker, _ in self.pending}
+        self.pending += [(worker, None) for worker in self.workers if worker not in busy]
         while len(self.workers) < self.worker_count:
             worker = Worker(works.Sums, threads=1)
             worker.prepare()
             self.workers[self.started_count] = worker
-            self.owed.append((self.started_count, None))
+            self.pending.append((self.started_count, None))
             self.started_count += 1
         return self.worker_count
 
     def send(self, worker, candidates, seeds):
-        assert all(worker != other for other, _ in self.owed)
-        self.owed.append((worker, (candidates, seeds)))
+        assert all(worker != other for other, _ in self.pending)
+        self.pending.append((worker, (candidates, seeds)))
 
     def wait(self):
-        # The latest first, so chunks come back in another order.
-        number, chunk = self.owed.pop()
+        # Answers arrive latest first, not in the order of the chunks.
+        number, chunk = self.pending.pop()
         if chunk is None and not self.dies_at_start:
             return [(number, Ready())]
         self.chunk_count += 1
@@ -96,7 +96,7 @@ class FakePool:
 
     def end(self, worker):
         del self.workers[worker]
-        self.owed = [(other, chunk) for other, chunk in self.owed if other != worker]
+        self.pending = [(other, chunk) for other, chunk in self.pending if other != worker]
 
 
 @settings(deadline=None)
@@ -108,15 +108,15 @@ class FakePool:
 )
 def test_values_are_the_same_for_any_chunks_and_losses(count, worker_count, durations_s, deaths):
     candidates, seeds = works.candidates(count), works.seeds(count)
-    # No two losses follow each other, so no chunk loses three workers.
-    with PoolExecutor(FakePool(worker_count, durations_s, deaths)) as executor:
+    # No two losses are consecutive, so no chunk loses three workers.
+    with RayExecutor(FakePool(worker_count, durations_s, deaths)) as executor:
         for _ in range(2):
             assert np.array_equal(executor.evaluate(candidates, seeds), expected(candidates, seeds))
 
 
 def test_the_error_names_a_chunk_that_loses_three_workers():
     pool = FakePool(1, deaths=range(1, 1 + LOSSES_MAX))
-    with PoolExecutor(pool) as executor:
+    with RayExecutor(pool) as executor:
         with pytest.raises(WorkError, match="3 in a row were lost with candidates 0 to 7; the last one was ended"):
             executor.evaluate(works.candidates(20), works.seeds(20))
         # The next evaluation works.
@@ -125,27 +125,27 @@ def test_the_error_names_a_chunk_that_loses_three_workers():
 
 def test_workers_that_end_before_their_first_evaluation_are_an_error():
     with (
-        PoolExecutor(FakePool(5, dies_at_start=True)) as executor,
+        RayExecutor(FakePool(5, dies_at_start=True)) as executor,
         pytest.raises(WorkError, match="must live until its first evaluation, but 5 in a row did not"),
     ):
         executor.evaluate(works.candidates(20), works.seeds(20))
 
 
 @pytest.mark.parametrize("where", ["threads", "threads:2"])
-def test_values_are_the_same_wherever_they_run(where):
+def test_values_are_the_same_on_any_number_of_threads(where):
     candidates, seeds = works.candidates(300), works.seeds(300)
-    kept = candidates.copy()
+    before = candidates.copy()
     with executor_for(where, works.Sums()) as executor:
         for count in (300, 1, 0, 17):
             values = executor.evaluate(candidates[:count], seeds[:count])
             assert len(values) == count
             if count:
                 assert values.tobytes() == expected(candidates[:count], seeds[:count]).tobytes()
-    assert np.array_equal(candidates, kept)
+    assert np.array_equal(candidates, before)
 
 
 def test_the_work_gets_the_number_of_threads():
-    with executor_for("threads:3", works.Whereabouts()) as executor:
+    with executor_for("threads:3", works.WorkerFacts()) as executor:
         (value,) = executor.evaluate(works.candidates(1), works.seeds(1))
     assert list(value) == [os.getpid(), 1, 3]
 
@@ -171,25 +171,25 @@ def test_an_exception_in_prepare_is_an_error():
 
 def test_values_must_have_their_shape():
     with (
-        executor_for("threads", works.Shapeless()) as executor,
+        executor_for("threads", works.WrongShape()) as executor,
         pytest.raises(WorkError, match=r"for 5 candidates, but it was shape \(5,\)"),
     ):
         executor.evaluate(works.candidates(5), works.seeds(5))
 
 
 @pytest.mark.parametrize(
-    ("where", "words"),
+    ("where", "message"),
     [
         ("thread", "Did you mean 'threads'"),
-        ("processes", "must run on 'threads"),
+        ("processes", r"must run on 'threads\[:COUNT\]', 'ray' or 'ray:ADDRESS', but it was 'processes'"),
         ("threads:", "must run on 'threads"),
         ("threads:0", "whole number from 1"),
         ("threads:many", "it was 'many'"),
         ("", "it was ''"),
     ],
 )
-def test_unknown_places_are_errors(where, words):
-    with pytest.raises(ParameterError, match=words):
+def test_unknown_executors_are_errors(where, message):
+    with pytest.raises(ParameterError, match=message):
         executor_for(where, works.Sums())
 
 

@@ -1,4 +1,4 @@
-"""Environments: as Gymnasium and PettingZoo want them, and the same episodes in all of them."""
+"""Environments pass the checks of Gymnasium and PettingZoo, and have the same episodes with the same seeds."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ IDS = [f"kiks/{name}-v0" for name in ENV_SPECS]
 
 
 def small_spec(**changes: Any) -> EnvSpec:
-    """Return a small environment that ends when the robot has gone 40 mm."""
+    """Return a small environment that ends when the robot has driven 40 mm."""
 
     @kiks.measure
     def arrived(moment: Any, notes: Any) -> None:
@@ -37,26 +37,26 @@ def vector(count: int = 3, **options: Any) -> KheperaVectorEnv:
     return KheperaVectorEnv(count, "Avoid", **options)
 
 
-def some_actions(*shape: int) -> Any:
+def random_actions(*shape: int) -> Any:
     return np.random.default_rng(5).uniform(-1, 1, (*shape, 2)).astype(np.float32)
 
 
 @pytest.mark.parametrize("name", IDS)
 @pytest.mark.filterwarnings("error")
-def test_gymnasium_accepts_each(name: str) -> None:
+def test_environments_pass_the_checks_of_gymnasium(name: str) -> None:
     env = gymnasium.make(name, render_mode="rgb_array")
     assert env.spec is not None
     assert env.spec.max_episode_steps == 600
     check_env(env.unwrapped)
 
 
-def test_each_is_registered_by_naming_its_module() -> None:
+def test_a_module_in_the_name_registers_the_environments() -> None:
     code = "import gymnasium; print(gymnasium.make('kiks.learn.gymnasium_envs:kiks/Avoid-v0').unwrapped)"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert "KheperaEnv" in found.stdout, found.stderr
 
 
-def test_kiks_alone_imports_no_gymnasium() -> None:
+def test_import_kiks_does_not_import_gymnasium() -> None:
     code = "import sys, kiks; assert not {'gymnasium', 'pettingzoo', 'numba'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)
 
@@ -64,40 +64,40 @@ def test_kiks_alone_imports_no_gymnasium() -> None:
 @pytest.mark.parametrize(
     ("missing", "module"), [("gymnasium", "kiks.learn.gymnasium_envs"), ("pettingzoo", "kiks.learn.pettingzoo_env")]
 )
-def test_what_is_not_installed_is_named(missing: str, module: str) -> None:
+def test_the_error_names_a_missing_package(missing: str, module: str) -> None:
     code = f"import sys; sys.modules['{missing}'] = None; import {module}"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert "pip install '.[learn]'" in found.stderr
 
 
 @pytest.mark.parametrize("name", ["kiks/Avoid-v0", "kiks/Maze-v0"])
-def test_one_robot_and_one_of_many_have_the_same_episodes(name: str) -> None:
+def test_single_and_vector_environments_have_the_same_episodes(name: str) -> None:
     many = gymnasium.make_vec(name, num_envs=9, max_episode_steps=7, threads=2)
     assert isinstance(many, KheperaVectorEnv)
-    actions = some_actions(24, 9)
-    alone = gymnasium.make(name, max_episode_steps=7)
-    lane = 4
+    actions = random_actions(24, 9)
+    single = gymnasium.make(name, max_episode_steps=7)
+    world = 4
     seen, _ = many.reset(seed=10)
-    expected, _ = alone.reset(seed=10 + lane)
+    expected, _ = single.reset(seed=10 + world)
     is_done = False
     for action in actions:
-        np.testing.assert_array_equal(seen[lane], expected)
+        np.testing.assert_array_equal(seen[world], expected)
         seen, rewards, terminations, truncations, infos = many.step(action)
-        if is_done:  # the step in which the vector environment begins anew
-            expected, _ = alone.reset()
+        if is_done:  # the step in which the vector environment resets this world
+            expected, _ = single.reset()
             is_done = False
-            assert rewards[lane] == 0.0
+            assert rewards[world] == 0.0
             continue
-        expected, reward, terminated, truncated, info = alone.step(action[lane])
-        assert (reward, terminated, truncated) == (rewards[lane], terminations[lane], truncations[lane])
-        assert info == {key: infos[key][lane] for key in info}
+        expected, reward, terminated, truncated, info = single.step(action[world])
+        assert (reward, terminated, truncated) == (rewards[world], terminations[world], truncations[world])
+        assert info == {key: infos[key][world] for key in info}
         assert all(infos[f"_{key}"].all() for key in info)
         is_done = truncated
-    hashes = [env.unwrapped.episodes.batch.state_hash(k) for env, k in ((many, lane), (alone, 0))]
+    hashes = [env.unwrapped.episodes.batch.state_hash(k) for env, k in ((many, world), (single, 0))]
     assert hashes[0] == hashes[1]
 
 
-def test_a_seed_is_an_episode_and_none_goes_on() -> None:
+def test_reset_with_a_seed_repeats_an_episode_and_without_one_continues() -> None:
     env = KheperaEnv("Avoid")
 
     def episode(seed: int | None) -> list[float]:
@@ -110,7 +110,7 @@ def test_a_seed_is_an_episode_and_none_goes_on() -> None:
     assert episode(8) != first
 
 
-def test_lanes_differ_and_seeds_may_be_given_for_each() -> None:
+def test_worlds_have_different_seeds_or_those_of_a_list() -> None:
     envs = vector()
     envs.reset(seed=[4, 9, 4])
     one, two, three = (envs.episodes.batch.poses[k].tolist() for k in range(3))
@@ -120,7 +120,7 @@ def test_lanes_differ_and_seeds_may_be_given_for_each() -> None:
 
 
 @pytest.mark.parametrize("mode", list(AutoresetMode))
-def test_each_way_to_begin_anew(mode: AutoresetMode) -> None:
+def test_autoreset_modes(mode: AutoresetMode) -> None:
     envs = KheperaVectorEnv(2, small_spec(), autoreset_mode=mode)
     assert envs.metadata["autoreset_mode"] is mode
     envs.reset(seed=1)
@@ -152,7 +152,7 @@ def test_each_way_to_begin_anew(mode: AutoresetMode) -> None:
     assert seen in envs.observation_space
 
 
-def test_gymnasiums_wrappers_take_the_vector_environment() -> None:
+def test_wrappers_of_gymnasium_accept_the_vector_environment() -> None:
     envs = gymnasium.wrappers.vector.RecordEpisodeStatistics(
         gymnasium.make_vec("kiks/Avoid-v0", num_envs=2, max_episode_steps=3)
     )
@@ -162,14 +162,14 @@ def test_gymnasiums_wrappers_take_the_vector_environment() -> None:
     assert infos["episode"]["l"].tolist() == [3, 3]
 
 
-def test_rewards_add_up_to_the_measure() -> None:
+def test_the_sum_of_rewards_is_the_measure() -> None:
     envs = vector(4, threads=1)
     envs.reset(seed=2)
-    total = sum(envs.step(action)[1] for action in some_actions(12, 4))
+    total = sum(envs.step(action)[1] for action in random_actions(12, 4))
     np.testing.assert_allclose(total / 12, envs.episodes.batch.values[:, 0, 0])
 
 
-def test_timing_and_robot_may_be_chosen() -> None:
+def test_arguments_change_timing_and_response() -> None:
     env = KheperaEnv("Avoid", timing=kiks.Timing(0.05, None), response="fast")
     env.reset(seed=1)
     assert env.step(np.zeros(2, np.float32))[4]["time_s"] == 0.05
@@ -179,7 +179,7 @@ def test_timing_and_robot_may_be_chosen() -> None:
 
 
 @pytest.mark.parametrize(
-    ("action", "words"),
+    ("action", "message"),
     [
         (np.array([0.0, 1.5]), "from -1 to 1, but among them was 1.5"),
         (np.array([0.0, np.nan]), "from -1 to 1, but among them was nan"),
@@ -187,14 +187,14 @@ def test_timing_and_robot_may_be_chosen() -> None:
         ("ahead", "two for each robot"),
     ],
 )
-def test_actions_that_are_none_are_refused(action: Any, words: str) -> None:
+def test_wrong_actions_are_errors(action: Any, message: str) -> None:
     env = KheperaEnv("Avoid")
     env.reset(seed=0)
-    with pytest.raises(ParameterError, match=words):
+    with pytest.raises(ParameterError, match=message):
         env.step(action)
 
 
-def test_step_before_reset_is_refused() -> None:
+def test_step_before_reset_is_an_error() -> None:
     with pytest.raises(ParameterError, match="reset"):
         KheperaEnv("Avoid").step(np.zeros(2, np.float32))
     with pytest.raises(ParameterError, match="reset"):
@@ -202,7 +202,7 @@ def test_step_before_reset_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("make", "words"),
+    ("make", "message"),
     [
         (lambda: KheperaEnv("Avoit"), "Did you mean 'Avoid'"),
         (lambda: KheperaEnv("Avoid", arena=1), "Known are name, arenas"),
@@ -215,8 +215,8 @@ def test_step_before_reset_is_refused() -> None:
         (lambda: vector().reset(options={"reset_mask": [1, 0]}), "reset_mask must be bool"),
     ],
 )
-def test_wrong_arguments_are_named(make: Any, words: str) -> None:
-    with pytest.raises(ParameterError, match=words):
+def test_wrong_arguments_are_errors(make: Any, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
         make()
 
 
@@ -235,28 +235,28 @@ def test_pictures_show_the_robot() -> None:
     np.testing.assert_array_equal(pictures[0], before)
 
 
-def test_a_team_must_have_room() -> None:
+def test_a_team_without_room_is_an_error() -> None:
     team = KheperaTeam("Avoid", robots=40, arenas=kiks.Arena.box(500, 500))
     with pytest.raises(ParameterError, match="room for 40 robots"):
         team.reset(seed=1)
 
 
-def test_pettingzoo_accepts_teams() -> None:
+def test_teams_pass_the_checks_of_pettingzoo() -> None:
     parallel_api_test(KheperaTeam(robots=3), num_cycles=30)
 
 
-def test_a_team_of_one_is_the_single_environment() -> None:
+def test_a_team_of_one_has_the_episodes_of_the_single_environment() -> None:
     team, env = KheperaTeam("Avoid", robots=1), KheperaEnv("Avoid")
     seen, _ = team.reset(seed=3)
     expected, _ = env.reset(seed=3)
-    for action in some_actions(5, 1)[:, 0]:
+    for action in random_actions(5, 1)[:, 0]:
         np.testing.assert_array_equal(seen["robot_1"], expected)
         seen, rewards, *_, infos = team.step({"robot_1": action})
         expected, reward, *_, info = env.step(action)
         assert (rewards["robot_1"], infos["robot_1"]) == (reward, info)
 
 
-def test_an_episode_of_a_team_ends_for_all_at_once() -> None:
+def test_an_episode_of_a_team_ends_for_all_robots_at_once() -> None:
     team = KheperaTeam(small_spec(), robots=2)
     team.reset(seed=1)
     actions = {"robot_1": np.ones(2, np.float32), "robot_2": np.zeros(2, np.float32)}

@@ -21,18 +21,18 @@ from kiks.learn.executors import executor_for
 
 pytestmark = pytest.mark.slow
 
-GUARD_S = 20.0
+TIMEOUT_S = 20.0
 ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
 def ray():
     with pytest.MonkeyPatch.context() as patch:
-        # A token of the test's own, and none in the home folder.
+        # This token is for the tests alone; without it, Ray would write one into the home folder.
         patch.setenv("RAY_AUTH_MODE", "token")
         patch.setenv("RAY_AUTH_TOKEN", os.urandom(32).hex())
         patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
-        # What lets Ray stay on the loopback address.
+        # Ray listens on the loopback address alone only with this variable.
         patch.setenv("RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER", "0")
         yield pytest.importorskip("ray", reason="Ray is not installed: pip install '.[ray]'")
 
@@ -48,7 +48,7 @@ def cluster(ray):
     cluster.shutdown()
 
 
-def test_values_are_the_same_and_a_lost_worker_costs_its_chunk_only(cluster, ray, tmp_path):
+def test_values_are_the_same_and_only_the_chunk_of_a_lost_worker_is_repeated(cluster, ray, tmp_path):
     candidates, seeds = works.candidates(100, marked=50), works.seeds(100)
     with executor_for(f"ray:{cluster.address}", works.Deadly(tmp_path / "died")) as executor:
         for count in (100, 0, 1, 100):
@@ -64,7 +64,7 @@ def test_a_connection_of_the_program_is_used_and_stays_open(cluster, ray):
     candidates, seeds = works.candidates(40), works.seeds(40)
     ray.init(cluster.address)
     try:
-        with executor_for("ray", works.Whereabouts()) as executor:
+        with executor_for("ray", works.WorkerFacts()) as executor:
             values = np.concatenate([executor.evaluate(candidates, seeds) for _ in range(3)])
         assert set(values[:, 0]).isdisjoint({os.getpid()})
         assert len(set(values[:, 0])) <= 2
@@ -85,9 +85,9 @@ def test_a_connection_of_the_program_is_used_and_stays_open(cluster, ray):
         ray.shutdown()
 
 
-def test_a_lost_node_costs_its_chunks_only(cluster, tmp_path):
+def test_only_the_chunks_of_a_lost_node_are_repeated(cluster, tmp_path):
     candidates, seeds = works.candidates(100), works.seeds(100)
-    # The first two chunks: each node has one of them, for the first that comes waits until the other is stuck.
+    # Each node gets one of the first two chunks: the chunk that starts first waits until the other is stuck.
     candidates[:16, 0] = works.MARK
     os.mkfifo(tmp_path / "pipe")
     os.mkfifo(tmp_path / "gate")
@@ -109,7 +109,7 @@ def test_a_lost_node_costs_its_chunks_only(cluster, tmp_path):
     os.close(gate)
 
 
-def test_a_cluster_that_is_started_here_listens_on_loopback_alone(ray, caplog):
+def test_a_local_cluster_listens_on_loopback_alone(ray, caplog):
     candidates, seeds = works.candidates(40), works.seeds(40)
     with executor_for("ray", works.Sums()) as executor:
         assert ray.get_runtime_context().gcs_address.startswith("127.0.0.1:")
@@ -118,30 +118,31 @@ def test_a_cluster_that_is_started_here_listens_on_loopback_alone(ray, caplog):
     assert not [record for record in caplog.records if record.name.startswith("kiks")]
 
 
-def test_connecting_has_a_time_limit(ray, monkeypatch):
-    is_over, left = threading.Event(), threading.Event()
-    with socket.create_server(("127.0.0.1", 0)) as deaf:
-        address = f"127.0.0.1:{deaf.getsockname()[1]}"
-        monkeypatch.setattr(ray, "init", lambda *words, **settings: is_over.wait(GUARD_S))
-        monkeypatch.setattr(ray, "shutdown", left.set)
+def test_connecting_has_a_timeout(ray, monkeypatch):
+    may_connect, is_shut_down = threading.Event(), threading.Event()
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        address = f"127.0.0.1:{silent.getsockname()[1]}"
+        monkeypatch.setattr(ray, "init", lambda *args, **options: may_connect.wait(TIMEOUT_S))
+        monkeypatch.setattr(ray, "shutdown", is_shut_down.set)
         monkeypatch.setattr(ray_executor, "CONNECT_S", 0.01)
         with pytest.raises(ParameterError, match=r"was \(no answer within 0\.01 s\)\. Start one with"):
             executor_for(f"ray:{address}", works.Sums()).__enter__()
-    assert not left.is_set()
+    assert not is_shut_down.is_set()
     # A connection that comes too late is closed.
-    is_over.set()
-    assert left.wait(GUARD_S)
+    may_connect.set()
+    assert is_shut_down.wait(TIMEOUT_S)
 
 
-def test_an_address_where_no_server_listens(ray):
+def test_an_address_without_a_server_is_an_error(ray):
     with pytest.raises(ParameterError, match=r"must be reached, but at 127\.0\.0\.1:1 none was.*ray start --head"):
         executor_for("ray:127.0.0.1:1", works.Sums()).__enter__()
 
 
-def test_candidates_that_always_kill_their_worker_are_named(cluster):
+def test_the_error_names_candidates_that_kill_their_workers(cluster):
     with (
+        # The chunk begins at 3 if both nodes of the cluster are still there.
         executor_for(f"ray:{cluster.address}", works.Deadly()) as executor,
-        pytest.raises(WorkError, match=r"3 in a row were lost with candidates \d to \d; the last one went"),
+        pytest.raises(WorkError, match=r"3 in a row were lost with candidates [03] to 4; the last one went"),
     ):
         executor.evaluate(works.candidates(5, marked=3), works.seeds(5))
 
@@ -162,7 +163,7 @@ def test_work_that_cannot_be_pickled_is_an_error(ray):
 
 
 def start_program(tmp_path: Path, work: str, rest: str) -> subprocess.Popen[str]:
-    """Start a program that evaluates on a cluster of its own, in a process group of its own."""
+    """Start a program that evaluates on its own cluster, in its own process group."""
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "program.py").write_text(
         "import os, pathlib, signal, sys\n"
@@ -196,7 +197,7 @@ def test_ctrl_c_ends_all_workers(ray, tmp_path):
 
 def test_workers_end_with_a_program_that_is_killed(ray, tmp_path):
     rest = "executor.evaluate(works.candidates(1), works.seeds(1)); os.kill(os.getpid(), signal.SIGKILL)"
-    running = start_program(tmp_path, "Lasting", rest)
+    running = start_program(tmp_path, "OpenPipe", rest)
     assert (tmp_path / "pipe").read_text() == ""
     running.communicate(timeout=60)
     assert running.returncode == -signal.SIGKILL

@@ -1,4 +1,4 @@
-"""Task files: a ready-made task with changes, without a line of Python."""
+"""Task files: a ready-made task with changes, in TOML."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def load(folder: Path, text: str, name: str = "mine.toml") -> kiks.Task:
     return kiks.tasks.load(str(folder / name))
 
 
-def test_what_is_not_said_is_as_in_the_ready_made_task(folder: Path) -> None:
+def test_keys_left_out_keep_the_values_of_the_ready_made_task(folder: Path) -> None:
     base = kiks.tasks.load("light")
     task = load(folder, 'base = "light"\n')
     assert task.name == "mine"
@@ -41,7 +41,7 @@ def test_what_is_not_said_is_as_in_the_ready_made_task(folder: Path) -> None:
     assert task.controller is base.controller
 
 
-def test_all_that_can_be_said(folder: Path) -> None:
+def test_all_keys(folder: Path) -> None:
     (folder / "my.toml").write_bytes((Path(kiks.__file__).parent / "model/robots/khepera.toml").read_bytes())
     task = load(
         folder,
@@ -63,7 +63,7 @@ def test_all_that_can_be_said(folder: Path) -> None:
     assert (own.controller.name, own.parameter_count) == ("shy", 1)
 
 
-def test_its_digest_tells_of_the_file_and_its_arenas(folder: Path) -> None:
+def test_the_digest_depends_on_the_file_and_its_arenas(folder: Path) -> None:
     text = 'base = "avoid"\narenas = ["room.toml"]\n'
     first = load(folder, text).digest()
     assert load(folder, text).digest() == first
@@ -97,14 +97,14 @@ def test_its_digest_tells_of_the_file_and_its_arenas(folder: Path) -> None:
         ('base = "avoid"\n[controller]\nfile = "../shy.py"\nname = "shy"', "must lead to a file in"),
     ],
 )
-def test_one_line_says_what_is_wrong(text: str, message: str, folder: Path) -> None:
+def test_wrong_files_are_errors_of_one_short_line(text: str, message: str, folder: Path) -> None:
     with pytest.raises(kiks.ParameterError, match=message) as caught:
         load(folder, text).digest()
     assert "\n" not in str(caught.value)
     assert len(str(caught.value).replace(str(folder), "")) < 400
 
 
-def test_an_evolution_of_a_task_file_goes_on_only_with_the_same_file(folder: Path) -> None:
+def test_an_evolution_resumes_only_with_the_same_task_file(folder: Path) -> None:
     pytest.importorskip("pyarrow")
     text = 'base = "avoid"\nseconds = 0.5\nworlds = 1\narenas = ["room.toml"]\n'
     options: dict[str, Any] = {"population": 4, "folder": folder / "out"}
@@ -114,7 +114,7 @@ def test_an_evolution_of_a_task_file_goes_on_only_with_the_same_file(folder: Pat
         kiks.Evolution(load(folder, text + "# a word\n"), "ga", **options)
 
 
-def test_the_example_stands_in_the_documents_and_is_a_task() -> None:
+def test_the_example_is_a_task_and_is_quoted_in_the_documentation() -> None:
     root = Path(__file__).parents[2]
     text = (root / "examples/office_task.toml").read_text(encoding="utf-8")
     assert f"```toml\n{text}```" in (root / "docs/evolution.md").read_text(encoding="utf-8")

@@ -45,7 +45,7 @@ class Sums:
 
 @dataclass
 class Deadly(Sums):
-    """Kills its process at a marked candidate; only once, if it has a file to remember that in."""
+    """Kills its process at a marked candidate; with a file as memory, only once."""
 
     memory: Path | None = None
 
@@ -74,14 +74,14 @@ class DeadAtStart(Sums):
         os.kill(os.getpid(), signal.SIGKILL)
 
 
-class Shapeless(Sums):
+class WrongShape(Sums):
     def evaluate(self, candidates, seeds, threads):
         return candidates[:, 0]
 
 
 @dataclass
-class Whereabouts(Sums):
-    """Returns the process, how often it was prepared, and the number of threads."""
+class WorkerFacts(Sums):
+    """Returns the process id, the number of calls of `prepare`, and the number of threads."""
 
     prepare_count: int = 0
 
@@ -94,16 +94,16 @@ class Whereabouts(Sums):
 
 @dataclass
 class Stuck(Sums):
-    """With a marked candidate, says through a named pipe that it is there, and stays until its process ends."""
+    """At a marked candidate, writes a line to a named pipe and then blocks until its process ends."""
 
     pipe: Path
 
     def evaluate(self, candidates, seeds, threads):
         if MARK in candidates[:, 0]:
-            self.stay()
+            self.block()
         return super().evaluate(candidates, seeds, threads)
 
-    def stay(self):
+    def block(self):
         self.open_pipe = self.pipe.open("w")
         self.open_pipe.write("here\n")
         self.open_pipe.flush()
@@ -113,22 +113,22 @@ class Stuck(Sums):
 
 @dataclass
 class StuckOnANode(Stuck):
-    """With a marked candidate, stays on one node of a Ray cluster; on others it waits for a byte from the gate."""
+    """At a marked candidate, blocks for ever on one node of a Ray cluster; on others, until the gate has a byte."""
 
     gate: Path
     node: str
 
-    def stay(self):
+    def block(self):
         import ray
 
         if ray.get_runtime_context().get_node_id() == self.node:
-            super().stay()
+            super().block()
         with self.gate.open("rb", buffering=0) as gate:
             gate.read(1)
 
 
 @dataclass
-class Lasting(Sums):
+class OpenPipe(Sums):
     """Keeps a named pipe open as long as its worker lives."""
 
     pipe: Path

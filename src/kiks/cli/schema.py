@@ -33,7 +33,7 @@ def schema_of(kind: FileKind) -> JsonSchemaValue:
     """Return the JSON schema, 2020-12, of a kind of file: that of the model which checks it when it is read."""
     from pydantic.json_schema import GenerateJsonSchema
 
-    from kiks.learn.task_file import TaskFile
+    from kiks.learn.tasks import TaskFile
     from kiks.model.arena_file import ArenaFile
     from kiks.model.data_file import adapter, descriptions
     from kiks.model.project import ProjectFile

@@ -1,1 +1,1 @@
-"""Evolution and learning: what is evaluated, where it is evaluated, and what comes of it."""
+"""Evolution and learning: tasks, executors, algorithms, champions and environments."""

@@ -26,10 +26,10 @@ FORMAT = 1
 """Version of the file's format."""
 
 FILE_BYTES_MAX = 32 << 20
-"""Most bytes of a champion's file."""
+"""Largest size of a champion's file [byte]."""
 
 PARAMETERS_MAX = 1_000_000
-"""Most parameters of a champion."""
+"""Largest number of parameters of a champion."""
 
 
 Parameters = Annotated[tuple[Number, ...], BeforeValidator(as_list), Field(max_length=PARAMETERS_MAX)]
@@ -40,7 +40,7 @@ Seed = Annotated[Whole, Field(ge=0, lt=2**63)]
 
 @record
 class _FileTiming(Timing):
-    """The timing of its control loop; without a baud rate there is no line."""
+    """Timing of the control loop; without a baud rate there is no line."""
 
     baud: Baud | None = None
 
@@ -123,7 +123,7 @@ class Champion:
 
     @property
     def baud(self) -> int:
-        """Speed of its lines [bit/s]: the highest of a Khepera if it was evolved without a line."""
+        """Speed of its lines [bit/s]: the highest baud rate of a Khepera if it was evolved without a line."""
         return self.timing.baud or 57600
 
     def simulation(self, arena: Arena, *, robots: int = 1, seed: int = 0) -> tuple[Simulation, list[Port]]:
@@ -146,7 +146,7 @@ class Champion:
     # ---- files ----
 
     def save(self, path: str | Path) -> None:
-        """Write a file that `load` reads; the user's file with the controller is copied beside it.
+        """Write a file that `load` reads; a Python file that defines the controller is copied beside it.
 
         Raises:
             ParameterError: If the file cannot be written, or the controller is not defined in a file.
@@ -155,9 +155,9 @@ class Champion:
         recipe = recipe_for(self.controller, target.parent)
         files: dict[Path, bytes | str] = {}
         if "file" in recipe:
-            beside = target.with_name(f"{target.stem}_controller.py")
-            files[beside] = read_file(target.parent / recipe["file"], "the file of the controller")
-            recipe = {"file": beside.name, "name": recipe["name"]}
+            copy = target.with_name(f"{target.stem}_controller.py")
+            files[copy] = read_file(target.parent / recipe["file"], "the file of the controller")
+            recipe = {"file": copy.name, "name": recipe["name"]}
         files[target] = self._text(recipe)
         replace_files(files, "a champion")
 
@@ -166,7 +166,7 @@ class Champion:
         lines = [
             "# A controller for Khepera robots. See it: kiks demo FILE. Let it drive: kiks run FILE.",
             f"champion = {FORMAT}",
-            *(f"{name} = {_word(getattr(self, name))}" for name in top),
+            *(f"{name} = {_toml_value(getattr(self, name))}" for name in top),
             "parameters = [",
             *(f"    {value!r}," for value in self.parameters),
             "]",
@@ -174,15 +174,17 @@ class Champion:
         sections = {"timing": asdict(self.timing), "controller": recipe, "measures": self.measures}
         for section, entries in sections.items():
             lines += ["", f"[{section}]"]
-            lines += [f"{_key(name)} = {_word(value)}" for name, value in entries.items() if value is not None]
+            lines += [
+                f"{_toml_key(name)} = {_toml_value(value)}" for name, value in entries.items() if value is not None
+            ]
         return "\n".join(lines) + "\n"
 
     @classmethod
     def load(cls, path: str | Path) -> Champion:
-        """Read a champion's file. A controller of the user's is imported: its file or module runs.
+        """Read a champion's file. A controller from a Python file or module is imported, which runs its code.
 
         Raises:
-            ParameterError: If the file is no champion's.
+            ParameterError: If the file does not hold a champion.
         """
         path = path_of(path)
         what = f"Champion's file {str(path)!r}"
@@ -193,13 +195,13 @@ class Champion:
         return cls(**given | {"controller": controller, "timing": timing})
 
 
-def _key(name: str) -> str:
+def _toml_key(name: str) -> str:
     """Return a name as a TOML key; names of measures may have letters that bare keys do not allow."""
     return name if name.isascii() and name.isidentifier() else quoted(name)
 
 
-def _word(value: Any) -> str:
+def _toml_value(value: Any) -> str:
     """Return a value in TOML."""
     if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_word, value))}]"
+        return f"[{', '.join(map(_toml_value, value))}]"
     return quoted(value) if isinstance(value, str) else repr(value).lower()

@@ -21,7 +21,7 @@ from kiks.model.arena import Arena, Cylinder, Lamp, Pose
 from kiks.model.data_file import Number, Text, record
 from kiks.model.robot import SENSOR_COUNT
 
-_Watch = Annotated[Measure, Field(description="Write @kiks.measure over the function.")]
+_CheckedMeasure = Annotated[Measure, Field(description="Write @kiks.measure over the function.")]
 
 
 @record
@@ -45,8 +45,8 @@ class EnvSpec:
 
     name: Text
     arenas: Arenas
-    reward: _Watch
-    goal: _Watch | None = None
+    reward: _CheckedMeasure
+    goal: _CheckedMeasure | None = None
     senses: Annotated[tuple[Text, ...], BeforeValidator(check_senses), Field(min_length=1)] = ("proximity",)
     starts: Starts = "random"
     speed_limit: Annotated[Number, Field(gt=0, le=SPEED_MAX)] = 10.0
@@ -71,7 +71,7 @@ class EnvSpec:
 
 
 ARRIVED_MM = 60.0
-"""Distance to a lamp at which a robot has arrived [mm]: the light then comes more from above than from the side."""
+"""Distance to a lamp at which a robot has arrived [mm]; nearer, most light comes from above."""
 
 
 @measure(notes=2)
@@ -90,9 +90,9 @@ def drawn_together(moment: Any, notes: Any) -> None:
     total_mm = 0.0
     for one in range(moment.bodies.shape[0]):
         for other in range(one):
-            across = moment.bodies[one].x_mm - moment.bodies[other].x_mm
-            up = moment.bodies[one].y_mm - moment.bodies[other].y_mm
-            total_mm += (across * across + up * up) ** 0.5
+            dx_mm = moment.bodies[one].x_mm - moment.bodies[other].x_mm
+            dy_mm = moment.bodies[one].y_mm - moment.bodies[other].y_mm
+            total_mm += (dx_mm * dx_mm + dy_mm * dy_mm) ** 0.5
     if notes[1] > 0.0:
         notes[0] += (notes[1] - total_mm) / 100.0
     notes[1] = total_mm

@@ -18,20 +18,20 @@ from kiks.errors import ParameterError
 from kiks.learn.env_specs import EnvSpec
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
 
-PLACES = 1000
-"""Free places in an arena from which starts are drawn."""
+PLACE_COUNT = 1000
+"""Number of free places in an arena from which starts are drawn."""
 
-APART_MM = 5.0
-"""Smallest gap between a random start and anything else [mm]."""
+CLEAR_MM = 5.0
+"""Smallest gap between a start and anything else [mm]."""
 
 SEED_LIMIT = 2**63 - 1
 
-PICTURE_SIDE = 480
-"""Pixels of the longer side of a rendered picture."""
+PICTURE_SIDE_PX = 480
+"""Length of the longer side of a rendered picture [pixels]."""
 
 
 class Episodes:
-    """Worlds in which robots act step by step and get observations and rewards.
+    """Worlds in which robots act step by step, with observations and rewards.
 
     An episode depends on the random generator with which it begins, not on its world's number: two worlds with equal
     generators, arenas and actions give the same episode, to the bit.
@@ -82,21 +82,21 @@ class Episodes:
         """Number of worlds, and of robots in each."""
         return self.batch.world_count, self.batch.robot_count
 
-    def begin(self, worlds: ArrayLike, chances: Sequence[np.random.Generator]) -> None:
+    def begin(self, worlds: ArrayLike, rngs: Sequence[np.random.Generator]) -> None:
         """Begin new episodes in some worlds; the first call must name all worlds.
 
         Args:
             worlds: Their numbers, int64 [world].
-            chances: A generator for each world; its seed and its start are drawn from it.
+            rngs: A random generator for each world; its seed and its start are drawn from it.
         """
         chosen = np.asarray(worlds, np.int64)
-        seeds = np.array([chance.integers(SEED_LIMIT) for chance in chances], np.int64)
+        seeds = np.array([rng.integers(SEED_LIMIT) for rng in rngs], np.int64)
         starts = None
         if self._places:
-            pairs = zip(chosen.tolist(), chances, strict=True)
-            starts = np.array([self._draw_starts(world, chance) for world, chance in pairs])
-        everything = None if len(chosen) == self.batch.world_count else chosen
-        self._sensors = self.batch.reset(everything, seeds=seeds, starts=starts)
+            pairs = zip(chosen.tolist(), rngs, strict=True)
+            starts = np.array([self._draw_starts(world, rng) for world, rng in pairs])
+        selected = None if len(chosen) == self.batch.world_count else chosen
+        self._sensors = self.batch.reset(selected, seeds=seeds, starts=starts)
         self._scores[chosen] = 0.0
 
     def step(self, actions: ArrayLike) -> NDArray[np.float64]:
@@ -125,8 +125,8 @@ class Episodes:
             )
         if not (np.abs(given) <= 1).all():
             raise ParameterError(
-                f"actions must be from -1 to 1, but among them was {given[~(np.abs(given) <= 1)][0]}. Cut them off "
-                "before, as gymnasium.wrappers.ClipAction does."
+                f"actions must be from -1 to 1, but among them was {given[~(np.abs(given) <= 1)][0]}. Clip them, "
+                "for example with gymnasium.wrappers.ClipAction."
             )
         self._sensors = self.batch.step(given * self.spec.speed_limit)
         before, self._scores = self._scores, self.batch.notes[:, :, 0].copy()
@@ -136,15 +136,15 @@ class Episodes:
         """Return the last readings as shares of the largest count, float32 [world, robot, sensor]."""
         return (self._sensors / COUNT_MAX).astype(np.float32)
 
-    def are_over(self) -> NDArray[np.bool_]:
-        """Return in which worlds a robot has reached the goal, bool [world]."""
+    def terminations(self) -> NDArray[np.bool_]:
+        """Return whether a robot of each world has reached the goal, bool [world]."""
         if self._goal_note is None:
             return np.zeros(self.batch.world_count, np.bool_)
         reached: NDArray[np.bool_] = np.any(self.batch.notes[:, :, self._goal_note] > 0, axis=1)
         return reached
 
-    def facts(self) -> dict[str, NDArray[np.float64]]:
-        """Return further figures, float64 [world, robot]: time_s, path_mm and contacts."""
+    def infos(self) -> dict[str, NDArray[np.float64]]:
+        """Return time_s, path_mm and contacts since the episodes began, each float64 [world, robot]."""
         first = self.spec.reward.note_count
         paths_mm, contact_counts = (self.batch.notes[:, :, first + k].copy() for k in range(2))
         times_s = np.repeat(self.batch.times_s[:, None], self.batch.robot_count, axis=1)
@@ -156,26 +156,28 @@ class Episodes:
         radii_mm = [self._radius_mm] * batch.robot_count
         bodies: Any = batch.state.bodies[world]
         arena = batch.arenas[batch.arena_indices[world]]
-        drawn = draw_world(arena, batch.lamps[world], bodies, batch.poses[world], radii_mm, longest_side=PICTURE_SIDE)
+        drawn = draw_world(
+            arena, batch.lamps[world], bodies, batch.poses[world], radii_mm, longest_side=PICTURE_SIDE_PX
+        )
         return np.asarray(drawn)
 
     # ---- inside ----
 
     def _free_places(self, arena: Any) -> NDArray[np.float64]:
-        return random_starts(arena, PLACES, seed=0, radius_mm=self._radius_mm, clear_mm=APART_MM)
+        return random_starts(arena, PLACE_COUNT, seed=0, radius_mm=self._radius_mm, clear_mm=CLEAR_MM)
 
-    def _draw_starts(self, world: int, chance: np.random.Generator) -> list[list[float]]:
+    def _draw_starts(self, world: int, rng: np.random.Generator) -> list[list[float]]:
         """Return start poses of a world's robots that do not overlap.
 
         Raises:
             ParameterError: If the arena has not enough room.
         """
         places = self._places[self.batch.arena_indices[world]]
-        least_mm = 2 * self._radius_mm + APART_MM
+        distance_min_mm = 2 * self._radius_mm + CLEAR_MM
         taken: list[list[float]] = []
         for _ in range(100 * self.batch.robot_count):
-            pose = places[chance.integers(len(places))].tolist()
-            if all(math.hypot(pose[0] - other[0], pose[1] - other[1]) >= least_mm for other in taken):
+            pose = places[rng.integers(len(places))].tolist()
+            if all(math.hypot(pose[0] - other[0], pose[1] - other[1]) >= distance_min_mm for other in taken):
                 taken.append(pose)
                 if len(taken) == self.batch.robot_count:
                     return taken

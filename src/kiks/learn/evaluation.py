@@ -1,17 +1,18 @@
-"""The interface of evaluations, and a worker that runs them: the same in this process and on another computer."""
+"""The interfaces of evaluations and executors, and a worker: the same in this process and on another computer."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
 from traceback import format_exception
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, WorkError
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -161,3 +162,62 @@ class Worker:
             return Values(values.astype(np.float64, casting="safe"), duration_s)
         except Exception as error:
             return Raised.of(error)
+
+
+class Executor(ABC):
+    """Evaluates candidates, generation by generation: in a `with` statement, called by one thread."""
+
+    def __init__(self) -> None:
+        self._is_open = False
+
+    def __enter__(self) -> Self:
+        """Open it.
+
+        Raises:
+            ParameterError: If the work cannot be sent to workers, or these cannot be reached.
+            WorkError: If the work raises when it is prepared; on a cluster the first evaluation raises this.
+        """
+        self._open()
+        self._is_open = True
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._is_open = False
+        self._close()
+
+    def evaluate(self, candidates: Floats, seeds: Integers) -> Floats:
+        """Return the values of candidates.
+
+        Args:
+            candidates: Parameters [candidate, parameter].
+            seeds: A seed for each [candidate].
+
+        Returns:
+            Values [candidate, value], in the order of the candidates; [0, 0] if there are none.
+
+        Raises:
+            ParameterError: If candidates and seeds have not these shapes and types.
+            WorkError: If the work raises, too many workers are lost, or the executor is not open.
+        """
+        if not self._is_open:
+            raise WorkError(
+                "An executor must be open, but it is closed. Use it inside `with executor_for(...) as executor:`."
+            )
+        candidates, seeds = check_candidates(candidates, seeds)
+        return self._evaluate(candidates, seeds) if len(candidates) else np.empty((0, 0))
+
+    @abstractmethod
+    def _open(self) -> None: ...
+
+    @abstractmethod
+    def _close(self) -> None: ...
+
+    @abstractmethod
+    def _evaluate(self, candidates: Floats, seeds: Integers) -> Floats: ...
+
+
+def work_error(where: str, raised: Raised) -> WorkError:
+    """Return the error for work that raised in `where`, with the worker's traceback as a note."""
+    error = WorkError(f"Evaluation must not raise, but its {where} raised {raised.what}")
+    error.add_note(f"In the worker:\n{raised.traceback}")
+    return error

@@ -1,8 +1,8 @@
 """An evolution: it evaluates generations of candidates and keeps the best one, the champion.
 
-Each generation drives in worlds of its own, so its best candidate may have been lucky. So the candidate that the
-algorithm considers best, the rival, is tried together with the next generation, in trial worlds that stay the same for
-the whole evolution and that no generation trains in. The best rival there is the champion.
+Each generation drives in its own worlds, and its best candidate may have been lucky. So the candidate that the
+algorithm considers best, the rival, is tried together with the next generation. Its trial worlds stay the same for the
+whole evolution, and no generation trains in them. The best rival there is the champion.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from kiks.errors import ParameterError, shown
 from kiks.learn.algorithms import make_algorithm
 from kiks.learn.champion import Champion
+from kiks.learn.evaluation import Executor
 from kiks.learn.evolution_log import Folder, Generation, Identity
-from kiks.learn.executor import Executor
 from kiks.learn.executors import executor_for
 from kiks.learn.task import Task
 from kiks.model.checks import check_count, check_kind, check_number, check_numbers
@@ -37,7 +37,7 @@ TRIALS = 8
 LOG_EVERY_S = 10.0
 """Time between two writes of the log [s]; each writes the whole log."""
 
-_OF_ALGORITHM, _OF_WORLDS, _OF_TRIALS = range(3)
+_ALGORITHM_SEED, _WORLDS_SEED, _TRIAL_SEED = range(3)
 """Purposes of seeds."""
 
 
@@ -85,9 +85,9 @@ class Evolution:
         self.seed = check_count("seed", seed, most=2**63 - 1)
         self.generations: list[Generation] = []
         self.algorithm = make_algorithm(
-            algorithm, task.parameter_count, self.population, self._seed_for(_OF_ALGORITHM), task.axes
+            algorithm, task.parameter_count, self.population, self._seed_for(_ALGORITHM_SEED), task.axes
         )
-        self._trial_seeds = [self._seed_for(_OF_TRIALS, number) for number in range(TRIALS)]
+        self._trial_seeds = [self._seed_for(_TRIAL_SEED, number) for number in range(TRIALS)]
         self._rival: Floats | None = None
         self._asked: Floats | None = None
         self._best: Champion | None = None
@@ -116,7 +116,7 @@ class Evolution:
 
         All candidates of a population drive in the same worlds, so their fitness can be compared.
         """
-        seeds = [self._seed_for(_OF_WORLDS, len(self.generations))] * self.population
+        seeds = [self._seed_for(_WORLDS_SEED, len(self.generations))] * self.population
         return np.array(seeds + ([] if self._rival is None else self._trial_seeds), np.int64)
 
     def tell(self, values: ArrayLike) -> None:
@@ -138,10 +138,10 @@ class Evolution:
             raise ParameterError("ask() must come before each tell(), but it did not.")
         given = check_numbers("values", values)
         given = given[:, None] if given.ndim == 1 else given
-        count, most = len(self._asked), len(self.task.value_names)
-        if given.ndim != 2 or len(given) != count or given.shape[1] not in (1, most):
+        count, value_count = len(self._asked), len(self.task.value_names)
+        if given.ndim != 2 or len(given) != count or given.shape[1] not in (1, value_count):
             raise ParameterError(
-                f"values must be numbers [candidate] or [candidate, value], here ({count},) or {(count, most)}, "
+                f"values must be numbers [candidate] or [candidate, value], here ({count},) or {(count, value_count)}, "
                 f"but their shape was {given.shape}."
             )
         fitness, trials = given[: self.population, 0], given[self.population :]
@@ -150,7 +150,7 @@ class Evolution:
         best_fitness = np.nan if self._best is None else self._best.fitness
         generation = Generation(self._asked, given, self.population, best_fitness, seconds)
         behaviours = np.zeros((self.population, 0))
-        if given.shape[1] == most:
+        if given.shape[1] == value_count:
             columns = [self.task.value_names.index(axis.measure) for axis in self.task.axes]
             behaviours = given[: self.population, columns]
         self.algorithm.tell(fitness, behaviours)
@@ -172,7 +172,7 @@ class Evolution:
         Args:
             generations: Total number of generations, including earlier ones.
             seconds: No generation begins later than this [s of the wall clock].
-            executor: An executor, or the place to evaluate: see `kiks.learn.executors.executor_for`.
+            executor: An open executor, or where to evaluate: see `kiks.learn.executors.executor_for`.
             each: Called after each generation.
 
         Returns:
@@ -188,7 +188,9 @@ class Evolution:
             if value is not None:
                 check_number(name, value, 0)
         if not isinstance(executor, Executor | str):
-            raise ParameterError(f"executor must be one or a place such as 'threads', but it was {shown(executor)}.")
+            raise ParameterError(
+                f"executor must be an Executor or a text such as 'threads', but it was {shown(executor)}."
+            )
         if isinstance(executor, str):
             with executor_for(executor, self.task) as opened:
                 return self.run(generations=generations, seconds=seconds, executor=opened, each=each)
@@ -249,11 +251,11 @@ class Evolution:
             timing=task.timing,
         )
 
-    # ---- inside ----
+    # ---- seeds and folders ----
 
-    def _seed_for(self, what: int, number: int = 0) -> int:
+    def _seed_for(self, purpose: int, number: int = 0) -> int:
         """Return a seed derived from that of the evolution."""
-        sequence = np.random.SeedSequence(self.seed, spawn_key=(what, number))
+        sequence = np.random.SeedSequence(self.seed, spawn_key=(purpose, number))
         return int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(2))
 
     def _resume(self, folder: Folder) -> None:
@@ -266,13 +268,13 @@ class Evolution:
         folder.check_identity(
             Identity(task.name, self.name, self.seed, self.population, task.controller.name, task.digest(), __version__)
         )
-        most = len(task.value_names)
-        while (saved := folder.generation(len(self.generations), self.ask().shape, most)) is not None:
+        value_count = len(task.value_names)
+        while (saved := folder.generation(len(self.generations), self.ask().shape, value_count)) is not None:
             if not np.array_equal(self.ask(), saved["candidates"]):
                 raise ParameterError(
                     f"the evolution in {str(folder.path)!r} must continue to the bit, but generation "
                     f"{len(self.generations) + 1} would have other candidates here: the libraries or the computer have "
-                    "changed. Continue where it began, or take a new folder."
+                    "changed. Continue on the computer where it began, or take a new folder."
                 )
             self._tell(saved["values"], float(saved["seconds"]))
         self._earlier_s = self.generations[-1].seconds if self.generations else 0.0

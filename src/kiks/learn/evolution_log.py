@@ -28,7 +28,6 @@ Floats = NDArray[np.float64]
 IDENTITY, GENERATIONS, LOG = "evolution.json", "generations", "log.parquet"
 """Names in the folder."""
 
-
 _ADVICE = "Remove the file, and those after it."
 
 
@@ -99,7 +98,8 @@ class Folder:
             if (known := getattr(found, name)) != value:
                 raise ParameterError(
                     f"the folder {str(self.path)!r} must hold the same evolution, but its {name} is "
-                    f"{shown(known)}, not {shown(value)}. Take a new folder, or ask for what it holds."
+                    f"{shown(known)}, not {shown(value)}. Take a new folder, or "
+                    "the arguments of the evolution that it holds."
                 )
 
     def generation(self, number: int, shape: tuple[int, int], value_count: int) -> dict[str, NDArray[Any]] | None:
@@ -121,8 +121,8 @@ class Folder:
             "values": Numbers((shape[0], "value"), advice=_ADVICE),
             "seconds": Numbers((), low=0.0, advice=_ADVICE),
         }
-        most = shape[0] * (shape[1] + value_count) + 1
-        return read_arrays(file, rules, f"Generation {str(file)!r}", numbers_max=most)
+        number_count_max = shape[0] * (shape[1] + value_count) + 1
+        return read_arrays(file, rules, f"Generation {str(file)!r}", numbers_max=number_count_max)
 
     def save(self, number: int, generation: Generation) -> None:
         """Save a generation.
@@ -144,20 +144,20 @@ class Folder:
         pyarrow, parquet = library("pyarrow"), library("pyarrow.parquet")
         counts = [len(each.fitness) for each in generations]
 
-        def of_each(values: Sequence[float]) -> NDArray[Any]:
+        def per_candidate(values: Sequence[float]) -> NDArray[Any]:
             return np.repeat(np.array(values), counts) if counts else np.zeros(0)
 
         columns: dict[str, Any] = {
-            "generation": of_each(range(1, len(counts) + 1)).astype(np.int64),
+            "generation": per_candidate(range(1, len(counts) + 1)).astype(np.int64),
             "candidate": np.concatenate([np.zeros(0, np.int64), *map(np.arange, counts)]).astype(np.int64),
         }
         values = [each.values[: each.population] for each in generations]
         table = np.concatenate(values) if values else np.zeros((0, len(value_names)))
         columns |= {name: table[:, number] for number, name in enumerate(value_names[: table.shape[1]])}
-        columns["champion_fitness"] = of_each([each.champion_fitness for each in generations])
-        columns["seconds"] = of_each([each.seconds for each in generations])
+        columns["champion_fitness"] = per_candidate([each.champion_fitness for each in generations])
+        columns["seconds"] = per_candidate([each.seconds for each in generations])
         evaluated = np.cumsum([len(each.values) for each in generations]).tolist()
-        columns["evaluations"] = of_each(evaluated).astype(np.int64)
+        columns["evaluations"] = per_candidate(evaluated).astype(np.int64)
         buffer = io.BytesIO()
         parquet.write_table(pyarrow.table(columns), buffer)
         replace_file(self.path / LOG, buffer.getvalue(), "the log")

@@ -5,11 +5,37 @@ from __future__ import annotations
 import os
 
 from kiks.errors import ParameterError, nearest, shown
-from kiks.learn.evaluation import Evaluation
-from kiks.learn.executor import Executor, ThreadsExecutor
+from kiks.learn.evaluation import Evaluation, Executor, Floats, Integers, Raised, Ready, Worker, work_error
 from kiks.model.checks import check_kind
 
 KINDS = ("threads", "ray")
+
+
+class ThreadsExecutor(Executor):
+    """Evaluates in this process; the work itself shares a generation among threads.
+
+    Args:
+        work: Evaluates candidates.
+        thread_count: Number of threads that it may use.
+    """
+
+    def __init__(self, work: Evaluation, *, thread_count: int) -> None:
+        super().__init__()
+        self._worker = Worker(lambda: work, threads=thread_count)
+
+    def _open(self) -> None:
+        answer = self._worker.prepare()
+        if not isinstance(answer, Ready):
+            raise work_error("prepare()", answer)
+
+    def _close(self) -> None:
+        pass
+
+    def _evaluate(self, candidates: Floats, seeds: Integers) -> Floats:
+        answer = self._worker.evaluate(candidates, seeds)
+        if isinstance(answer, Raised):
+            raise work_error(f"evaluate() for candidates 0 to {len(candidates) - 1}", answer)
+        return answer.values
 
 
 def executor_for(where: str, work: Evaluation) -> Executor:
@@ -47,10 +73,9 @@ def executor_for(where: str, work: Evaluation) -> Executor:
         )
     if kind == "threads":
         return ThreadsExecutor(work, thread_count=_count(where, detail))
-    from kiks.learn.ray_executor import RayPool
-    from kiks.learn.worker_pool import PoolExecutor
+    from kiks.learn.ray_executor import RayExecutor, RayPool
 
-    return PoolExecutor(RayPool(work, address=detail or None))
+    return RayExecutor(RayPool(work, address=detail or None))
 
 
 def _count(where: str, detail: str) -> int:

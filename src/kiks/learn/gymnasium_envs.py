@@ -7,7 +7,7 @@
     envs = gymnasium.make_vec("kiks/Avoid-v0", num_envs=1000)
 
 `kiks.learn.env_specs` defines the environments. All kinds use `kiks.learn.episode_batch`: with the same seed, a single
-environment and one of a thousand have the same episodes, to the bit.
+environment and a world of a vector environment have the same episodes, to the bit.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
         ParameterError: If an argument is out of range.
     """
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012  (as Gymnasium has it)
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012  (a class attribute in Gymnasium)
 
     def __init__(self, spec: str | EnvSpec, *, render_mode: str | None = None, **changes: Any) -> None:
         self.render_mode = checked_mode(render_mode)
@@ -70,7 +70,7 @@ class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Floats32, dict[str, Any]]:
-        """Begin an episode; one with the same seed is the same.
+        """Begin an episode; the same seed gives the same episode.
 
         Raises:
             ParameterError: If the seed is no whole number from 0 to 2^63 - 1.
@@ -86,7 +86,7 @@ class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
             ParameterError: If the action is not two numbers from -1 to 1.
         """
         reward = self.episodes.step([action])[0, 0]
-        is_over = bool(self.episodes.are_over()[0])
+        is_over = bool(self.episodes.terminations()[0])
         return self.episodes.observations()[0, 0], float(reward), is_over, False, self._info()
 
     def render(self) -> Any:
@@ -94,7 +94,7 @@ class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
         return None if self.render_mode is None else self.episodes.picture(0)
 
     def _info(self) -> dict[str, Any]:
-        return {name: float(values[0, 0]) for name, values in self.episodes.facts().items()}
+        return {name: float(values[0, 0]) for name, values in self.episodes.infos().items()}
 
 
 class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[Any]]):
@@ -104,8 +104,8 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
         num_envs: Number of worlds.
         spec: The environment: an `EnvSpec` or the name of one.
         max_episode_steps: Number of steps after which an episode is truncated; None for no limit.
-        autoreset_mode: When a world begins a new episode: in the next step, whose action it ignores; in the same step,
-            which then returns the first observation of the new episode; or only by `reset`, with the option
+        autoreset_mode: When a world resets: in the next step, whose action it ignores; in the same step, which then
+            returns the first observation of the new episode; or only when `reset` is called, with the option
             'reset_mask', bool [world].
         render_mode: 'rgb_array' for pictures from above, None for none.
         threads: Number of threads; the number of cores if left out. Results do not depend on it.
@@ -143,19 +143,19 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
         self.single_observation_space, self.single_action_space = spaces_of(self.episodes.spec)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._chances: list[np.random.Generator] = []
+        self._rngs: list[np.random.Generator] = []
         self._step_counts = np.zeros(num_envs, np.int64)
-        self._are_done = np.zeros(num_envs, np.bool_)
+        self._done = np.zeros(num_envs, np.bool_)
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Floats32, dict[str, Any]]:
-        """Begin episodes: in all worlds, or in those of `options["reset_mask"]`.
+        """Begin episodes in all worlds, or in some.
 
         Args:
-            seed: The seed of the first world, and the others count up; or a seed for each. Without one, each world
-                continues its random numbers.
-            options: See above.
+            seed: World k gets `seed` + k; or a list with a seed for each. Without one, each world continues its random
+                numbers.
+            options: "reset_mask" selects worlds, bool [world].
 
         Raises:
             ParameterError: If there are not as many seeds as worlds, or the mask is invalid.
@@ -167,43 +167,48 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
             raise ParameterError(f"reset_mask must be bool [{self.num_envs}], but it was {shown(mask)}.")
         seeds = self._seeds(seed)
         chosen = np.arange(self.num_envs)
-        if not self._chances:
-            self._chances = [np_random(None if seeds is None else seeds[k])[0] for k in range(self.num_envs)]
+        if not self._rngs:
+            self._rngs = [np_random(None if seeds is None else seeds[k])[0] for k in range(self.num_envs)]
         elif mask is not None:
             chosen = np.flatnonzero(mask)
         if seeds is not None:
             for k in chosen.tolist():
                 if seeds[k] is not None:
-                    self._chances[k] = np_random(seeds[k])[0]
+                    self._rngs[k] = np_random(seeds[k])[0]
         self._begin(chosen)
         return self.episodes.observations()[:, 0], self._infos()
 
     def step(self, actions: Floats32) -> tuple[Floats32, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
-        """Let all robots act and read their sensors; ended worlds begin anew according to the autoreset mode.
+        """Let all robots act and read their sensors; ended worlds reset according to the autoreset mode.
 
         Raises:
-            ParameterError: If the actions are not two numbers from -1 to 1 for each robot, or an ended world does not
-                begin anew by itself.
+            ParameterError: If the actions are not two numbers from -1 to 1 for each robot, or an ended world was not
+                reset while autoreset is disabled.
         """
-        if self.autoreset_mode is AutoresetMode.DISABLED and self._are_done.any():
+        if self.autoreset_mode is AutoresetMode.DISABLED and self._done.any():
             raise ParameterError(
-                "worlds that have ended must begin anew before the next step, but "
-                f"{np.count_nonzero(self._are_done)} have not. Call reset(options={{'reset_mask': mask}})."
+                "worlds that have ended must be reset before the next step, but "
+                f"{np.count_nonzero(self._done)} were not. Call reset(options={{'reset_mask': mask}})."
             )
         rewards = self.episodes.step(actions)[:, 0]
         self._step_counts += 1
-        terminations = self.episodes.are_over()
+        terminations = self.episodes.terminations()
         truncations = np.zeros(self.num_envs, np.bool_)
         if self.max_episode_steps is not None:
             truncations = self._step_counts >= self.max_episode_steps
-        again, self._are_done = self._are_done, terminations | truncations
-        if self.autoreset_mode is AutoresetMode.NEXT_STEP and again.any():
-            rewards[again], terminations[again], truncations[again], self._are_done[again] = 0.0, False, False, False
-            self._begin(np.flatnonzero(again))
+        resetting, self._done = self._done, terminations | truncations
+        if self.autoreset_mode is AutoresetMode.NEXT_STEP and resetting.any():
+            rewards[resetting], terminations[resetting], truncations[resetting], self._done[resetting] = (
+                0.0,
+                False,
+                False,
+                False,
+            )
+            self._begin(np.flatnonzero(resetting))
         final: dict[str, Any] = {}
-        if self.autoreset_mode is AutoresetMode.SAME_STEP and self._are_done.any():
-            final = self._final()
-            self._begin(np.flatnonzero(self._are_done))
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and self._done.any():
+            final = self._final_infos()
+            self._begin(np.flatnonzero(self._done))
         return self.episodes.observations()[:, 0], rewards, terminations, truncations, self._infos() | final
 
     def render(self) -> tuple[Any, ...] | None:
@@ -227,19 +232,19 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
         return [first + k for k in range(self.num_envs)]
 
     def _begin(self, chosen: NDArray[np.int64]) -> None:
-        self.episodes.begin(chosen, [self._chances[k] for k in chosen.tolist()])
+        self.episodes.begin(chosen, [self._rngs[k] for k in chosen.tolist()])
         self._step_counts[chosen] = 0
-        self._are_done[chosen] = False
+        self._done[chosen] = False
 
     def _infos(self) -> dict[str, Any]:
         infos: dict[str, Any] = {}
-        for name, values in self.episodes.facts().items():
+        for name, values in self.episodes.infos().items():
             infos[name], infos[f"_{name}"] = values[:, 0], np.ones(self.num_envs, np.bool_)
         return infos
 
-    def _final(self) -> dict[str, Any]:
+    def _final_infos(self) -> dict[str, Any]:
         """Return the last observations of ended worlds in the form that Gymnasium defines for the same-step mode."""
-        done = self._are_done.copy()
+        done = self._done.copy()
         seen = np.full(self.num_envs, None, object)
         for k in np.flatnonzero(done).tolist():
             seen[k] = self.episodes.observations()[k, 0]

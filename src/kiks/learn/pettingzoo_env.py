@@ -55,9 +55,9 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
         self.possible_agents = [f"robot_{number + 1}" for number in range(robots)]
         self.agents: list[str] = []
         spaces = {agent: spaces_of(self.episodes.spec) for agent in self.possible_agents}
-        self.observation_spaces = {agent: observed for agent, (observed, _) in spaces.items()}
-        self.action_spaces = {agent: done for agent, (_, done) in spaces.items()}
-        self._chance: np.random.Generator | None = None
+        self.observation_spaces = {agent: observations for agent, (observations, _) in spaces.items()}
+        self.action_spaces = {agent: actions for agent, (_, actions) in spaces.items()}
+        self._rng: np.random.Generator | None = None
         self._step_count = 0
 
     def observation_space(self, agent: str) -> Any:
@@ -71,17 +71,17 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Floats32], dict[str, dict[str, Any]]]:
-        """Begin an episode; one with the same seed is the same.
+        """Begin an episode; the same seed gives the same episode.
 
         Raises:
             ParameterError: If the seed is no whole number from 0 to 2^63 - 1.
         """
-        if seed is not None or self._chance is None:
-            self._chance, _ = np_random(checked_seed(seed))
-        self.episodes.begin([0], [self._chance])
+        if seed is not None or self._rng is None:
+            self._rng, _ = np_random(checked_seed(seed))
+        self.episodes.begin([0], [self._rng])
         self.agents = list(self.possible_agents)
         self._step_count = 0
-        return self._each(self.episodes.observations()[0]), self._infos()
+        return self._by_agent(self.episodes.observations()[0]), self._infos()
 
     def step(
         self, actions: dict[str, Floats32]
@@ -93,32 +93,32 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
         """
         if not self.agents or not isinstance(actions, dict) or set(actions) != set(self.agents):
             raise ParameterError(
-                f"actions must be given for {', '.join(self.agents) or 'no robot: the episode is over, reset() it'}, "
+                f"actions must be given for {', '.join(self.agents) or 'no robot: the episode is over, call reset()'}, "
                 f"but they were for {shown(list(actions) if isinstance(actions, dict) else actions)}."
             )
         rewards = self.episodes.step([[actions[agent] for agent in self.agents]])[0]
         self._step_count += 1
-        is_over, is_late = bool(self.episodes.are_over()[0]), self._step_count >= self.max_cycles
-        told = (
-            self._each(self.episodes.observations()[0]),
-            self._each(rewards.tolist()),
-            dict.fromkeys(self.agents, is_over),
-            dict.fromkeys(self.agents, is_late),
+        is_terminated, is_truncated = bool(self.episodes.terminations()[0]), self._step_count >= self.max_cycles
+        result = (
+            self._by_agent(self.episodes.observations()[0]),
+            self._by_agent(rewards.tolist()),
+            dict.fromkeys(self.agents, is_terminated),
+            dict.fromkeys(self.agents, is_truncated),
             self._infos(),
         )
-        if is_over or is_late:
+        if is_terminated or is_truncated:
             self.agents = []
-        return told
+        return result
 
     def render(self) -> Any:
         """Return a picture from above, uint8 [row, column, 3]; None without a render mode."""
         return None if self.render_mode is None else self.episodes.picture(0)
 
-    def _each(self, values: Any) -> dict[str, Any]:
+    def _by_agent(self, values: Any) -> dict[str, Any]:
         return dict(zip(self.agents, values, strict=True))
 
     def _infos(self) -> dict[str, dict[str, Any]]:
-        facts = self.episodes.facts()
+        infos = self.episodes.infos()
         return {
-            agent: {name: float(values[0, k]) for name, values in facts.items()} for k, agent in enumerate(self.agents)
+            agent: {name: float(values[0, k]) for name, values in infos.items()} for k, agent in enumerate(self.agents)
         }

@@ -25,7 +25,7 @@ CONTACT_COST = 3.0
 """Fitness is divided by 1 plus this times the mean number of contacts per world."""
 
 CONTACTS_COUNTED = 3.0
-"""Largest number of contacts of a world that counts: a robot that is stuck has hundreds."""
+"""Largest number of contacts of a world that counts: a stuck robot has hundreds."""
 
 
 def without_contacts(fitness: Floats, values: Values) -> Floats:
@@ -39,12 +39,12 @@ def without_contacts(fitness: Floats, values: Values) -> Floats:
 
 
 def avoid_fitness(values: Values) -> Floats:
-    """Return the fitness of `avoid`: that of the paper times `roaming`."""
+    """Return the fitness of `avoid`: that of Floreano and Mondada (1994) times `roaming`."""
     return without_contacts(cautious_mean(values["avoidance"] * values["roaming"]), values)
 
 
 def avoid(controller: Controller | None = None, **changes: Any) -> Task:
-    """Return the task to drive fast, straight and about, and touch nothing (after Floreano and Mondada 1994).
+    """Return the task to drive fast and straight, explore, and touch nothing (Floreano and Mondada 1994).
 
     Args:
         controller: The controller to evolve; a linear one if left out.
@@ -60,7 +60,7 @@ def avoid(controller: Controller | None = None, **changes: Any) -> Task:
         worlds=12,
         axes=(Axis("path_mm", 0, 1500), Axis("straightness", 0, 1)),
         exam=training_arenas.unseen(),
-        about="drive fast, straight and about, touch nothing",
+        about="drive fast and straight, explore, touch nothing",
     )
     return replace(task, **changes)
 
@@ -110,7 +110,7 @@ def light(controller: Controller | None = None, **changes: Any) -> Task:
         controller: The controller to evolve; a network of both senses with four hidden units if left out.
         changes: Other arguments of `Task`.
     """
-    usual = controllers.mlp(hidden=(4,), senses=("proximity", "ambient"), speed_limit=SPEED_LIMIT)
+    default = controllers.mlp(hidden=(4,), senses=("proximity", "ambient"), speed_limit=SPEED_LIMIT)
     task = Task(
         "light",
         (
@@ -118,14 +118,14 @@ def light(controller: Controller | None = None, **changes: Any) -> Task:
             _lit(training_arenas.wedges(), 300, 300),
             _lit(training_arenas.corridors(), 400, 400),
         ),
-        usual if controller is None else controller,
+        default if controller is None else controller,
         (measures.near_light_share(100.0), measures.light_mm, measures.contacts, measures.path_mm),
         fitness=light_fitness,
         seconds=40.0,
         worlds=12,
         axes=(Axis("light_mm", 0, 600), Axis("path_mm", 0, 3000)),
         exam=_lit(training_arenas.unseen(), 550, 320),
-        about="go to the lamp and stay with it",
+        about="go to the lamp and stay there",
     )
     return replace(task, **changes)
 
@@ -186,7 +186,7 @@ def maze_fitness(values: Values) -> Floats:
 
 
 def maze(controller: Controller | None = None, **changes: Any) -> Task:
-    """Return the task to end near the goal of Kheperax's maze; the direct way there is a dead end.
+    """Return the task to end near the goal of Kheperax's maze; the direct path is a dead end.
 
     Args:
         controller: The controller to evolve; a network with eight hidden units if left out.
@@ -219,14 +219,14 @@ def maze_qd_fitness(values: Values) -> Floats:
 
 
 def maze_qd(controller: Controller | None = None, **changes: Any) -> Task:
-    """Return the task to find short ways to every place in Kheperax's maze.
+    """Return the task to find short paths to every place in Kheperax's maze.
 
     Args:
         controller: The controller to evolve; a network with eight hidden units if left out.
         changes: Other arguments of `Task`.
     """
     given = {"name": "maze-qd", "fitness": maze_qd_fitness, "worlds": 1}
-    return maze(controller, **given | {"about": "reach every place in the Kheperax maze, by short ways"} | changes)
+    return maze(controller, **given | {"about": "reach every place in the Kheperax maze by short paths"} | changes)
 
 
 # ---- tasks by name ----

@@ -26,16 +26,14 @@ from kiks.model.robot import RobotSpec
 
 Fitness = Callable[[Mapping[str, Floats]], Floats]
 
-WORLDS_AT_ONCE = 20_000
-"""Most worlds of one batch: more would need more memory and run no faster."""
-
+BATCH_WORLDS_MAX = 20_000
+"""Largest number of worlds in a batch: more need more memory and run no faster."""
 
 CLEAR_MM = 8.0
 """Smallest gap between a start and anything else [mm]."""
 
-
 WORLDS_MAX, ROBOTS_MAX, MEASURES_MAX = 100_000, 1000, 100
-"""Most worlds of a candidate, robots in each world, and measures."""
+"""Largest number of worlds of a candidate, of robots in each world, and of measures."""
 
 Seconds = Annotated[Number, Field(ge=1e-3, le=1e6)]
 
@@ -145,7 +143,7 @@ class Task:
                 )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # Functions go by value: a worker on another computer does not have the user's file.
+        # Functions are pickled by value, because a worker on another computer does not have the user's file.
         from numba import cloudpickle
 
         dumps: Any = cloudpickle.dumps
@@ -182,16 +180,22 @@ class Task:
 
     def digest(self) -> str:
         """Return 16 hexadecimal digits that differ between tasks whose evolutions differ."""
-        said = hashlib.sha256()
+        digest = hashlib.sha256()
         for each in self.arenas:
-            said.update(each.brightness.tobytes())
-            said.update(repr((each.mm_per_cell, each.starts, each.lamps, each.balls, each.cylinders)).encode())
-        made_of = (self.controller.recipe, self.controller.name, self.parameter_count, self.measure_names, self.seconds)
-        how = (self.worlds, self.axes, self.robots, self.timing, self.starts)
-        said.update(repr((self.name, made_of, how, RobotSpec.load(self.robot))).encode())
+            digest.update(each.brightness.tobytes())
+            digest.update(repr((each.mm_per_cell, each.starts, each.lamps, each.balls, each.cylinders)).encode())
+        evaluated = (
+            self.controller.recipe,
+            self.controller.name,
+            self.parameter_count,
+            self.measure_names,
+            self.seconds,
+        )
+        worlds = (self.worlds, self.axes, self.robots, self.timing, self.starts)
+        digest.update(repr((self.name, evaluated, worlds, RobotSpec.load(self.robot))).encode())
         if self.file:
-            said.update(read_file(Path(self.file), "the task's file"))
-        return said.hexdigest()[:16]
+            digest.update(read_file(Path(self.file), "the task's file"))
+        return digest.hexdigest()[:16]
 
     # ---- evaluation ----
 
@@ -219,10 +223,10 @@ class Task:
         if not len(candidates):
             return np.empty((0, len(self.value_names)))
         seconds = self.seconds if seconds is None else check_number("seconds", seconds, 1e-3, 1e6)
-        at_once = max(1, WORLDS_AT_ONCE // self.worlds)
+        batch_size = max(1, BATCH_WORLDS_MAX // self.worlds)
         parts = []
-        for first in range(0, len(candidates), at_once):
-            part = slice(first, first + at_once)
+        for first in range(0, len(candidates), batch_size):
+            part = slice(first, first + batch_size)
             parts.append(self._evaluate(candidates[part], seeds[part], threads, seconds))
         return np.concatenate(parts)
 
@@ -246,23 +250,23 @@ class Task:
             if not np.isfinite(values[:, :, number]).all():
                 raise ParameterError(f"measures must be finite, but {shown(name)} was not. Check its divisions.")
         named = {name: values[:, :, number] for number, name in enumerate(self.measure_names)}
-        made = cautious_mean(values[:, :, 0]) if self.fitness is None else self.fitness(named)
-        fitness = np.asarray(made, np.float64)
+        result = cautious_mean(values[:, :, 0]) if self.fitness is None else self.fitness(named)
+        fitness = np.asarray(result, np.float64)
         if fitness.shape != (count,) or not np.isfinite(fitness).all():
             raise ParameterError(
-                f"fitness must return a finite number for each of {count} candidates, but returned {shown(made)}. The "
-                "measures have the shape [candidate, world]: take a mean over axis 1."
+                f"fitness must return a finite number for each of {count} candidates, but returned {shown(result)}. "
+                "The measures have the shape [candidate, world]: take a mean over axis 1."
             )
         return np.column_stack([fitness, values.mean(axis=1)])
 
     def _starts(self, seeds: Integers) -> Floats:
         """Return random start poses, float64 [world, 1, 3]: the same for the same seed."""
-        each_count = self.worlds // len(self.arenas)
+        arena_world_count = self.worlds // len(self.arenas)
         radius_mm = RobotSpec.load(self.robot).body.radius_mm
         poses = {}
         for seed in dict.fromkeys(seeds.tolist()):
             of_arenas = [
-                random_starts(arena, each_count, seed=seed, radius_mm=radius_mm, clear_mm=CLEAR_MM)
+                random_starts(arena, arena_world_count, seed=seed, radius_mm=radius_mm, clear_mm=CLEAR_MM)
                 for arena in self.arenas
             ]
             # The worlds take the arenas in turn.

@@ -1,19 +1,66 @@
-"""Tasks by name: those that come with KiKS, and those in files of the user."""
+"""Tasks by name, and task files: a ready-made task with changes, in a few lines of TOML (docs/evolution.md)."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Annotated, Any, Literal
 
+from pydantic import Field
+
+from kiks.batch.initial_state import Starts
+from kiks.batch.loop_timing import Milliseconds
 from kiks.control.controller import Controller
-from kiks.control.controller_spec import module_in
-from kiks.errors import ParameterError, nearest, shown
+from kiks.control.controller_spec import Recipe, module_in
+from kiks.control.controllers import controller_of
+from kiks.errors import KiksError, ParameterError, nearest, shown
 from kiks.learn.ready_tasks import TASKS, avoid, follow, gather, light, maze, maze_qd
-from kiks.learn.task import Task
-from kiks.learn.task_file import load_task_file
-from kiks.model.atomic_files import path_of
+from kiks.learn.task import ROBOTS_MAX, WORLDS_MAX, Seconds, Task
+from kiks.model.arena import Arena
+from kiks.model.atomic_files import inside, path_of
+from kiks.model.data_file import OneOf, Rule, Text, Whole, check, parse_toml, read_file, record
+from kiks.model.robot import robot_names
 
 __all__ = ["TASKS", "avoid", "follow", "gather", "light", "load", "maze", "maze_qd"]
+
+Name = Annotated[
+    Text,
+    Field(pattern=r"^\w[\w .-]{0,59}$", description="The folder of its evolution has this name."),
+    Rule("a text of 1 to 60 letters, digits, blanks, dots, - and _"),
+]
+ArenaPath = Annotated[Text, Field(min_length=1, description="An arena file in the folder of this file or below it.")]
+
+
+@record
+class TaskFile:
+    """A task for `kiks evolve`: a ready-made task with changes."""
+
+    task: Annotated[Literal[1], Field(description="Version of the format.")]
+    base: Annotated[str, OneOf(tuple(TASKS)), Field(description="The ready-made task: what is measured, and fitness.")]
+    name: Name | None = None
+    about: Annotated[Text, Field(description="A description in one line.")] | None = None
+    seconds: Annotated[Seconds, Field(description="Time for which a candidate drives in each world.")] | None = None
+    worlds: (
+        Annotated[Whole, Field(ge=1, le=WORLDS_MAX, description="Worlds of a candidate, a multiple of the arenas.")]
+        | None
+    ) = None
+    arenas: (
+        Annotated[tuple[ArenaPath, ...], Field(min_length=1, max_length=100, description="Arena files to train in.")]
+        | None
+    ) = None
+    exam: ArenaPath | None = None
+    robot: (
+        Annotated[Text, Field(min_length=1, description="'khepera', 'khepera_ii', or a robot file beside.")] | None
+    ) = None
+    robots: Annotated[Whole, Field(ge=1, le=ROBOTS_MAX, description="Robots in each world.")] | None = None
+    starts: (
+        Annotated[Starts, Field(description="'random' places, or those of the 'arena'; 'arena' for several robots.")]
+        | None
+    ) = None
+    period_ms: Annotated[Milliseconds, Field(description="Period of the control loop.")] | None = None
+    think_ms: Annotated[Milliseconds, Field(description="Thinking time before each command.")] | None = None
+    baud: Annotated[Whole, Field(ge=0, le=10_000_000, description="Bits per second; 0 for no line.")] | None = None
+    controller: Annotated[Recipe, Field(description="The controller to evolve.")] | None = None
 
 
 def load(name: str | Path, controller: Controller | None = None) -> Task:
@@ -34,7 +81,7 @@ def load(name: str | Path, controller: Controller | None = None) -> Task:
         return TASKS[name](controller)
     path = Path(name)
     if path.suffix == ".toml":
-        return load_task_file(path, controller)
+        return _load_task_file(path, controller)
     if path.suffix != ".py" or not path.is_file():
         raise ParameterError(
             f"a task must be one of {', '.join(TASKS)}, a task file *.toml or a Python file, but it was {shown(name)}."
@@ -45,3 +92,46 @@ def load(name: str | Path, controller: Controller | None = None) -> Task:
         raise ParameterError(f"{shown(name)} must hold a `task = kiks.Task(...)`, but `task` was {shown(task)}.")
     task = replace(task, file=str(path.absolute()))
     return task if controller is None else replace(task, controller=controller)
+
+
+def _load_task_file(path: Path, controller: Controller | None) -> Task:
+    """Return the task of a file; the files that it names lie in its folder or below.
+
+    Raises:
+        ParameterError: If it is no task file, or a file that it names is invalid.
+    """
+    what = f"Task file {str(path)!r}"
+    given = check(TaskFile, parse_toml(read_file(path, what), what), what)
+    try:
+        return _task_of(given, path, controller)
+    except KiksError as error:
+        raise ParameterError(f"{what}: {error}") from None
+
+
+def _task_of(given: TaskFile, path: Path, controller: Controller | None) -> Task:
+    folder, base = path.parent, TASKS[given.base]()
+    changes: dict[str, Any] = {
+        name: value
+        for name in ("about", "seconds", "worlds", "robots", "starts")
+        if (value := getattr(given, name)) is not None
+    }
+    if given.arenas is not None:
+        changes["arenas"] = tuple(Arena.load(inside(folder, each, "arenas")) for each in given.arenas)
+    if given.exam is not None:
+        changes["exam"] = Arena.load(inside(folder, given.exam, "exam"))
+    if given.robot is not None:
+        is_name = given.robot in robot_names()
+        changes["robot"] = given.robot if is_name else str(inside(folder, given.robot, "robot"))
+    timing: dict[str, Any] = {}
+    if given.period_ms is not None:
+        timing["period_s"] = given.period_ms / 1000
+    if given.think_ms is not None:
+        timing["think_s"] = given.think_ms / 1000
+    if given.baud is not None:
+        timing["baud"] = given.baud or None
+    changes["timing"] = replace(base.timing, **timing)
+    if controller is None and given.controller is not None:
+        controller = controller_of(given.controller, folder)
+    if controller is not None:
+        changes["controller"] = controller
+    return replace(base, name=given.name or path.stem, file=str(path.absolute()), **changes)

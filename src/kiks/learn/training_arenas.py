@@ -52,11 +52,11 @@ def draw(width_mm: int, height_mm: int, strokes: Sequence[Stroke], name: str, br
     for stroke in strokes:
         (begin_x, begin_y), (end_x, end_y) = stroke.begin_mm, stroke.end_mm
         along_x, along_y = end_x - begin_x, end_y - begin_y
-        length = along_x**2 + along_y**2
-        share = ((x_mm - begin_x) * along_x + (y_mm - begin_y) * along_y) / (length or 1.0)
+        length_squared = along_x**2 + along_y**2
+        share = ((x_mm - begin_x) * along_x + (y_mm - begin_y) * along_y) / (length_squared or 1.0)
         share = np.clip(share, 0.0, 1.0)
-        away = (x_mm - begin_x - share * along_x) ** 2 + (y_mm - begin_y - share * along_y) ** 2
-        cells[away <= (stroke.thickness_mm / 2) ** 2] = stroke.brightness
+        distance_squared = (x_mm - begin_x - share * along_x) ** 2 + (y_mm - begin_y - share * along_y) ** 2
+        cells[distance_squared <= (stroke.thickness_mm / 2) ** 2] = stroke.brightness
     return Arena.from_array(cells, name=name)
 
 
