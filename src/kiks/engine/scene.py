@@ -11,8 +11,8 @@ Discs are numbered from 0, robots first, then bodies. A scene is one argument of
 The grid makes a robot among a thousand hardly more expensive than one alone. Its squares of 64 mm cover the arena.
 `entries` lists the discs square by square, row by row, and `spots` beside it their x, y and radius [mm]. `begins` tells
 where each square begins and where a row ends. So the discs of a row of squares are one stretch of memory, and
-`find_near` reads one for each row that a circle touches. The grid follows from the places of the discs and is no part of
-the state: `enter_all` writes it anew whenever something has moved.
+`find_near` reads one for each row that a circle touches. The grid follows from the places of the discs and is no part
+of the state: `enter_all` writes it anew whenever something has moved.
 """
 
 from __future__ import annotations

@@ -8,8 +8,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.engine.scalar_math import uniform
 from kiks.engine.physics import contact
+from kiks.engine.scalar_math import uniform
 from kiks.engine.state import BALL, State
 from kiks.errors import ArenaError, ParameterError, shown
 from kiks.model.arena import PAD, Arena

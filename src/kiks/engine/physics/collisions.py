@@ -4,10 +4,10 @@ Nothing may sink into anything by more than half a millimetre, however many thin
 slow a robot (kiks-behaviour.md 3.6); a body that cannot give way stops it.
 
 Things that may collide within a tick move in pieces of two millimetres. After each piece, sweeps resolve the overlaps:
-pair by pair in the order of numbers, each disc gives way by half, and then walls push discs back, until all are free. In
-the first sweeps a body in front of a robot gives way by all of the overlap. If that does not help, because the body is
-squeezed, the robot gives way, too. Discs that still overlap after the last sweep return to where the piece began, which
-was free. Speeds change in hits only (`kiks.engine.physics.balls`), so resolving overlaps adds no energy.
+pair by pair in the order of numbers, each disc gives way by half, and then walls push discs back, until all are free.
+In the first sweeps a body in front of a robot gives way by all of the overlap. If that does not help, because the body
+is squeezed, the robot gives way, too. Discs that still overlap after the last sweep return to where the piece began,
+which was free. Speeds change in hits only (`kiks.engine.physics.balls`), so resolving overlaps adds no energy.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import numpy as np
 from kiks.engine.compiling import kernel
 from kiks.engine.physics.balls import collide, kick, roll, speed_of
 from kiks.engine.physics.contact import PIECES_MAX, clearance_mm, outward
-from kiks.engine.physics.grasp import begin_holds, carry_along, return_held, keep_holds, turn_back, way_of_held
+from kiks.engine.physics.grasp import begin_holds, carry_along, keep_holds, return_held, turn_back, way_of_held
 from kiks.engine.physics.motion import give_way, move, note_contact
 from kiks.engine.scene import count_discs, disc_at, enter_all, find_near, is_on_floor
 from kiks.engine.simd.f64x8 import floor

@@ -7,9 +7,9 @@ Assumption: the tyres drag with a force proportional to their slip, the same in 
 wheels command and the resulting one differ like the velocities of a free disc before and after an impulse. The disc has
 mass 1 and a radius of gyration of half the wheel base, and keeps no momentum from one tick to the next.
 
-Method: move a short piece; the wall pushes the disc back along its gradient, which yields the normal impulse N; friction,
-at most mu N, opposes the remaining sliding at the rim (Coulomb). No push leads farther than the commanded motion, so
-walls add no energy.
+Method: move a short piece; the wall pushes the disc back along its gradient, which yields the normal impulse N;
+friction, at most mu N, opposes the remaining sliding at the rim (Coulomb). No push leads farther than the commanded
+motion, so walls add no energy.
 
 Symbols: (u, v) the piece's displacement [mm], q its turn [rad], R the body's radius, h half the wheel base,
 n the wall's normal, t = (-ny, nx) along the wall. The rim's point at the wall moves by s = (u, v).t - R q along t.
@@ -103,8 +103,8 @@ def push_out(field: Any, cell: Any, pad: Any, radius: Any, from_x: Any, from_y: 
 
     Each step goes along the gradient by the depth. With straight walls such a step never increases the distance to a
     free place, so the disc ends no farther from its start than commanded, and energy does not grow. Between two walls,
-    where a step gains less than the depth, the step is longer by that ratio. If walls are not straight, in a pinch, this
-    may fail; then the disc goes back along its path.
+    where a step gains less than the depth, the step is longer by that ratio. If walls are not straight, in a pinch,
+    this may fail; then the disc goes back along its path.
     """
     allowed = distance(from_x, from_y, x, y) * ROUND_A_CORNER
     depth = radius - clearance_mm(field, cell, pad, x, y)

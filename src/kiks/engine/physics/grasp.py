@@ -1,9 +1,9 @@
 """A robot and the body that its gripper holds on the floor, in collisions (`kiks.engine.physics.collisions`).
 
-The two are one rigid body: equal masses, and the robot turns as in `kiks.engine.physics.contact`.
-Derivation: let r lead from the robot to the place where it holds the body, e be the body's deviation from it, and k the
-radius of gyration. An impulse p moves the body by -p and the robot by p, which also turns by (r x p)/k^2. That cancels e
-if p = e/2 along r, and p = e/(2 + r^2/k^2) across.
+The two are one rigid body: equal masses, and the robot turns as in `kiks.engine.physics.contact`. Derivation: let r
+lead from the robot to the place where it holds the body, e be the body's deviation from it, and k the radius of
+gyration. An impulse p moves the body by -p and the robot by p, which also turns by (r x p)/k^2. That cancels e if p =
+e/2 along r, and p = e/(2 + r^2/k^2) across.
 
 So a hold is one more constraint that each sweep of `resolve_overlaps` enforces, after the overlaps: a push on either
 moves both, and if both are blocked, the sweeps find that.

@@ -2,9 +2,9 @@
 
 `E`, `K` and `H` answer like the real robot while it accelerates, arrives and stalls. Source: khepera-protocol.md 6.1 to
 6.4 (K-Team's algorithm and gains; the plant is inferred there).
-Assumption: a wheel that slips at a wall turns at 10-15 % of its command and stays there (thesis 3.3). A loop closed over
-the slip would wind up to full power instead. So the controllers regulate the path without the slip (`slip_pulses`),
-while the encoders, and with them E, H and K, count the real path of the wheel.
+Assumption: a wheel that slips at a wall turns at 10-15 % of its command and stays there (thesis 3.3). A loop closed
+over the slip would wind up to full power instead. So the controllers regulate the path without the slip
+(`slip_pulses`), while the encoders, and with them E, H and K, count the real path of the wheel.
 """
 
 from __future__ import annotations
