@@ -62,7 +62,7 @@ class Batch:
         measures: What is measured step by step: see `values`. `run` has its own.
         timing: The pace of the loop that drives them.
         response: Response of the proximity sensors, if not that of the robots' files.
-        threads: How many threads; as many as the computer has cores if left out. Results do not depend on it.
+        threads: How many threads; the number of cores if left out. Results do not depend on it.
 
     Attributes:
         notes: What the measures have noted step by step, one after the other, float64 [world, robot, note].

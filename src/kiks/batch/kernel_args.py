@@ -25,7 +25,7 @@ Worlds: Any = namedtuple(
 )
 """All worlds of a batch.
 
-* scene: what there is (`kiks.engine.scene`);
+* scene: the scene (`kiks.engine.scene`);
 * lamps: float64 [world, lamp, 4];
 * seeds: int64 [world];
 * ticks: ticks done, int64 [world];

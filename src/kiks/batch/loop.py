@@ -135,7 +135,7 @@ def bunch_up(block: Any, first: Any, numbers: Any, is_on: Any) -> Any:
 
 @spliced
 def goes_on(worlds: Any, numbers: Any, is_on: Any, until_ns: Any) -> Any:
-    """Let only those worlds of a bunch take part whose next loop begins before a time [ns]; say whether one does."""
+    """Let only those worlds of a bunch take part whose next loop begins before a time [ns]; return whether one does."""
     left = 0
     for k in range(numbers.shape[0]):
         is_on[k] = is_on[k] and worlds.begins_ns[numbers[k]] < until_ns

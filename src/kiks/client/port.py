@@ -119,7 +119,7 @@ class QuickLines:
         return some
 
     def _wait(self, descriptor: int) -> bool:
-        """Wait for a character; say whether one came before the time-out."""
+        """Wait for a character; return whether one came before the time-out."""
         until_s = time.perf_counter() + AWAKE_S
         while time.perf_counter() < until_s:
             if _is_readable(descriptor, 0.0):
@@ -132,7 +132,7 @@ class QuickLines:
 
 
 def _is_readable(descriptor: int, timeout_s: float | None) -> bool:
-    """Wait until a descriptor can be read; say whether it can before the time-out."""
+    """Wait until a descriptor can be read; return whether it can before the time-out."""
     if descriptor < SELECT_END:
         return bool(select.select([descriptor], [], [], timeout_s)[0])
     ready = select.poll()

@@ -39,10 +39,10 @@ class Scene:
     """
 
     seconds: ClassVar[float] = 120.0
-    """How long it takes if nobody says otherwise [s]."""
+    """How long it takes by default [s]."""
 
     baud: ClassVar[int] = 9600
-    """Speed of the lines if nobody says otherwise [bit/s]."""
+    """Speed of the lines by default [bit/s]."""
 
     slice_s: ClassVar[float] = 0.1
     """Simulated time between two looks from outside [s]."""
@@ -62,7 +62,7 @@ class Scene:
     # ---- what each scene has of its own ----
 
     def make_arena(self) -> Arena:
-        """Return the arena if nobody gives another."""
+        """Return the arena if no other is given."""
         return Arena.default()
 
     def make_simulation(self, arena: Arena) -> Simulation:

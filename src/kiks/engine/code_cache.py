@@ -116,7 +116,7 @@ class CodeCache:
 
 
 def is_kept(name: str) -> bool:
-    """Say whether there is machine code of a function on the disk."""
+    """Return whether there is machine code of a function on the disk."""
     return any(_files(f"*.{name}"))
 
 

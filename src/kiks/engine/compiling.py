@@ -51,7 +51,7 @@ def entry(function: Callable[..., Any]) -> Any:
 
 
 def is_compiled(name: str = LAST) -> bool:
-    """Say whether the machine code of a function that Python calls is on the disk, so that its first call is quick.
+    """Return whether the machine code of a function that Python calls is on the disk, so that its first call is quick.
 
     Args:
         name: Name of the function; the last of the engine if left out.

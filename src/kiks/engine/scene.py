@@ -49,7 +49,7 @@ def make_scene(state: State, kinds: NDArray[np.void], width_mm: float, height_mm
     entries, spots = np.zeros((world_count, disc_count), np.int32), np.zeros((world_count, disc_count, 3))
     widest_mm = max(kinds["radius_mm"].max(), state.bodies["radius_mm"].max(initial=0.0))
     scene = (state.robots, state.bodies, kinds, (begins, entries, spots, float(widest_mm)))
-    enter_everybody(scene)
+    enter_all_worlds(scene)
     return scene
 
 
@@ -88,7 +88,7 @@ def square_of(begins: Any, x: Any, y: Any) -> Any:
 
 @kernel
 def enter_all(scene: Any, world: Any) -> Any:
-    """Write down which discs of a world are over which square, in each square in the order of their numbers."""
+    """Enter the discs of a world into its grid, in each square in the order of their numbers."""
     begins, entries, spots, _ = scene[3]
     disc_count = count_discs(scene)[1]
     begins[world] = 0
@@ -97,7 +97,7 @@ def enter_all(scene: Any, world: Any) -> Any:
             x, y, _ = disc_at(scene, world, disc)
             column, row = square_of(begins, x, y)
             begins[world, row, column] += 1
-    # From how many there are to where each square ends, and from there, disc by disc, to where it begins.
+    # Turn counts into the end of each square, and then, disc by disc, into its beginning.
     total = np.int32(0)
     for row in range(begins.shape[1]):
         for column in range(begins.shape[2]):
@@ -114,31 +114,31 @@ def enter_all(scene: Any, world: Any) -> Any:
 
 
 @entry
-def enter_everybody(scene: Any) -> Any:
-    """Write down where everybody is, in all worlds: for Python, after it has moved something."""
+def enter_all_worlds(scene: Any) -> Any:
+    """Update the grids of all worlds: for Python, after it has moved something."""
     for world in range(scene[0].shape[0]):
         enter_all(scene, world)
 
 
 @entry
 def enter_worlds(scene: Any, worlds: Any) -> Any:
-    """Do the same in the worlds of these numbers, int64 [world]."""
+    """Update the grids of some worlds, int64 [world]."""
     for world in worlds:
         enter_all(scene, world)
 
 
 @kernel
 def find_near(scene: Any, world: Any, x: Any, y: Any, reach_mm: Any, itself: Any, found: Any) -> Any:
-    """Write the discs whose edge is within a reach [mm] of a place into `found`, without one; return how many.
+    """Write the discs whose edge is within `reach_mm` of a place into `found`, except one; return their number.
 
     Args:
-        scene: What there is.
+        scene: The scene.
         world: Index of the world.
         x: The place [mm].
         y: The place [mm].
-        reach_mm: How far an edge may be away.
-        itself: The disc that does not count.
-        found: int64 [limit]; what is beyond its end is left out.
+        reach_mm: Largest distance of an edge [mm].
+        itself: The disc to leave out.
+        found: int64 [limit]; further discs are left out.
     """
     begins, entries, spots, widest = scene[3]
     if entries.shape[1] == 1 and itself == 0:
@@ -158,10 +158,10 @@ def find_near(scene: Any, world: Any, x: Any, y: Any, reach_mm: Any, itself: Any
 
 @kernel
 def moment_of(tick_count: Any, time_ns: Any) -> Any:
-    """Return the tick of a time at most 20 ms before the end of the last one, and how much of it was yet to come.
+    """Return the tick of a time at most 20 ms before the end of the last tick, and the place of the time in it.
 
     Returns:
-        How many ticks ago it ended, and the share of it, 0..1, that lies behind the time; for `Lanes`, lanes.
+        The number of ticks since that tick ended, and its share, 0..1, after the time; for `Lanes`, lanes.
     """
     age_ns = max(1.0 * tick_count * TICK_NS - time_ns, 0.0)
     ticks_ago = min(floor(age_ns * (1.0 / TICK_NS)), TRAIL_LENGTH - 1.0)

@@ -28,7 +28,7 @@ def advance(scene: Any, ground: Any, seed: Any, tick: Any, tick_count: Any) -> A
     """Let time pass.
 
     Args:
-        scene: What there is (`kiks.engine.scene`); changed in place.
+        scene: The scene (`kiks.engine.scene`); changed in place.
         ground: Distance of cells to the nearest wall [mm], shape [rows, columns]; edge of a cell [mm]; cells of the
             border around the arena.
         seed: Seed of the run.
@@ -44,7 +44,7 @@ def advance(scene: Any, ground: Any, seed: Any, tick: Any, tick_count: Any) -> A
 
 @kernel
 def advance_one(scene: Any, ground: Any, seed: Any, world: Any, tick: Any, tick_count: Any) -> Any:
-    """Let time pass in a world of one robot: what is below, without company."""
+    """Let time pass in a world with one robot and nothing else."""
     robot = scene[0][world, 0]
     parameters = scene[2][robot.kind]
     for now in range(tick, tick + tick_count):
@@ -53,7 +53,7 @@ def advance_one(scene: Any, ground: Any, seed: Any, world: Any, tick: Any, tick_
 
 @inlined
 def advance_alone(robot: Any, parameters: Any, ground: Any, chance: Any) -> Any:
-    """Let a tick pass for a robot that is alone, or for eight, each in its own world."""
+    """Let a tick pass for a lone robot, or for eight, each in its own world."""
     field, cell, pad = ground
     left, right = turn_wheels(robot, parameters)
     has_gripper = robot.has_gripper != 0
@@ -72,7 +72,7 @@ def advance_eight(eight: Any, parameters: Any, ground: Any, seeds: Any, until: A
         parameters: Their constants, an `Record8` of `EIGHT_KINDS`.
         ground: The arena, as in `advance`.
         seeds: Seeds of the eight worlds, `Words`; each is the first world of its seed.
-        until: Number of ticks after which each is to stand, `Lanes`; who has done as many does none.
+        until: Final tick number of each world, `Lanes`; a world that has reached it does no tick.
     """
     before = open_record8(stack_record(EIGHT))
     while True:
@@ -80,7 +80,7 @@ def advance_eight(eight: Any, parameters: Any, ground: Any, seeds: Any, until: A
         is_due = now < until
         if not anywhere(is_due):
             break
-        # Some are done before the others for a tick or two: putting them back costs less than asking at each number.
+        # Some finish a tick or two before the others: restoring them costs less than masking each operation.
         if not everywhere(is_due):
             copy_record8(eight, before)
         advance_alone(eight, parameters, ground, (seeds, 0, 0, now))
@@ -91,7 +91,7 @@ def advance_eight(eight: Any, parameters: Any, ground: Any, seeds: Any, until: A
 
 @kernel
 def advance_many(scene: Any, ground: Any, seed: Any, world: Any, tick: Any, tick_count: Any) -> Any:
-    """Let time pass in a world of several things."""
+    """Let time pass in a world with several discs."""
     robots, bodies, kinds, _ = scene
     room = make_room(scene)
     neighbour_count, slack_mm = 0, -1.0
@@ -112,7 +112,7 @@ def advance_many(scene: Any, ground: Any, seed: Any, world: Any, tick: Any, tick
 
 @inlined
 def turn_wheels(robot: Any, parameters: Any) -> Any:
-    """Phases of a robot before it moves; return the paths of its wheels [pulses]."""
+    """Do the phases of a robot before it moves; return the paths of its wheels [pulses]."""
     remember_pose(robot)
     latch_encoders(robot)
     control_motors(robot, parameters)

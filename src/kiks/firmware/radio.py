@@ -119,7 +119,7 @@ class Radio(Turret):
             record["radio_has_failed"] = 1
 
     def hears(self, begin_ns: int, end_ns: int) -> bool:
-        """Say whether a message that was on the air for this time is received: there is room, and it was silent."""
+        """Return whether a message that was on the air for this time is received: there is room, and it was silent."""
         record = self.site.record
         has_spoken = int(record["radio_ended_ns"]) > begin_ns
         is_speaking = record["radio_attempt"] != 0 and int(record["radio_starts_ns"]) < end_ns

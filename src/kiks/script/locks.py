@@ -43,7 +43,7 @@ class Lock:
         self._waiters: deque[Task] | None = None
 
     def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:
-        """Take the lock; say whether that went."""
+        """Take the lock; return whether that went."""
         if not self._is_locked:
             if blocking and timeout != -1:
                 _check_timeout(timeout)
@@ -75,7 +75,7 @@ class Lock:
         self._is_locked = False
 
     def locked(self) -> bool:
-        """Say whether anybody has it."""
+        """Return whether anybody has it."""
         if self.scheduler.is_here:
             self.scheduler.poll()
         return self._is_locked
@@ -94,7 +94,7 @@ class Lock:
             self._is_locked = False
 
     def _is_owned(self) -> bool:
-        """Say whether anybody has it; `threading.Condition` asks so, and would else try to take it."""
+        """Return whether anybody has it; `threading.Condition` asks so, and would else try to take it."""
         return self._is_locked
 
     def _at_fork_reinit(self) -> None:

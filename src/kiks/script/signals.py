@@ -156,7 +156,7 @@ class Signals:
 
 
 def _is_in_program(frame: FrameType | None) -> bool:
-    """Say whether a thread runs the program's own code: it may be stopped there, but not in that of KiKS."""
+    """Return whether a thread runs the program's own code: it may be stopped there, but not in that of KiKS."""
     while frame is not None:
         name = frame.f_code.co_filename
         if name.startswith(_HERE):

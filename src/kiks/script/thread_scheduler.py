@@ -183,22 +183,22 @@ class Scheduler:
 
     @property
     def is_here(self) -> bool:
-        """Say whether the program asks, not another thread of this process, such as a server's."""
+        """Return whether the program asks, not another thread of this process, such as a server's."""
         return get_ident() == self._os_thread
 
     @property
     def is_main(self) -> bool:
-        """Say whether the program's main thread runs."""
+        """Return whether the program's main thread runs."""
         return self.current is self._main
 
     @property
     def is_alone(self) -> bool:
-        """Say whether no other thread goes on before this one, unless this one does something for it."""
+        """Return whether no other thread goes on before this one, unless this one does something for it."""
         return not (self._ready or self._readers or self._watchers) and self._next_deadline_ns() == NEVER_NS
 
     @property
     def has_timed(self) -> bool:
-        """Say whether another thread waits for a time or a robot; any thread of the process may ask."""
+        """Return whether another thread waits for a time or a robot; any thread of the process may ask."""
         deadlines = [task for _, number, task in list(self._deadlines) if task.waits_for and task.number == number]
         return bool(self._readers or deadlines)
 
@@ -281,7 +281,7 @@ class Scheduler:
         return task.cause
 
     def wake(self, task: Task, cause: object) -> bool:
-        """Let a thread go on that waits; say whether it did."""
+        """Let a thread go on that waits; return whether it did."""
         if not task.waits_for:
             return False
         task.waits_for = ""

@@ -136,7 +136,7 @@ class _Watch:
                 )
 
     def _waits_for(self) -> str:
-        """Say whether the thread waits for a 'time' or file, or a 'lock', in code that is none of ours."""
+        """Return whether the thread waits for a 'time' or file, or a 'lock', in code that is none of ours."""
         try:
             state = (self._folder / "stat").read_text().rpartition(")")[2].split()[0]
             if state != "S":

@@ -56,7 +56,7 @@ class Cameras:
                 fitted.look(instant_ns)
 
     def retake(self) -> None:
-        """Take those pictures again that were taken at this very instant, before something was moved."""
+        """Take those pictures again that were taken at this instant, before something was moved."""
         for fitted in self._fitted.values():
             if fitted.taken_ns == self._world.now_ns:
                 fitted.look(fitted.taken_ns)

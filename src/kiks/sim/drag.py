@@ -71,7 +71,7 @@ class Drags:
         return not self._held
 
     def holds(self, what: str, index: int) -> bool:
-        """Say whether somebody holds a thing."""
+        """Return whether somebody holds a thing."""
         return any(held.what == what and held.index == index for held in self._held.values())
 
     def grab(self, owner: str, what: str, index: int) -> None:

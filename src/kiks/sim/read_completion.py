@@ -81,7 +81,7 @@ def end_of_wait(wires: Sequence[Wire], reads: Sequence[Read], until_ns: int) -> 
 
 
 def is_complete(wire: Wire, read: Read, now_ns: int) -> bool:
-    """Say whether what a read waits for has arrived."""
+    """Return whether what a read waits for has arrived."""
     count = _complete(wire.line.waiting, read.size, read.terminator)
     return read.size == 0 or 0 < count <= wire.line.arrived_count(now_ns)
 

@@ -261,7 +261,7 @@ class Simulation:
         return self.world.index_of(robot)
 
     def pose(self, robot: int) -> tuple[float, float, float]:
-        """Return where a robot is at this very instant: x_mm, y_mm, heading_rad (not wrapped).
+        """Return where a robot is at this instant: x_mm, y_mm, heading_rad (not wrapped).
 
         Raises:
             ParameterError: If there is no such robot.
@@ -271,7 +271,7 @@ class Simulation:
             return world.pose(index)
 
     def poses(self) -> NDArray[np.float64]:
-        """Return where all robots are at this very instant, float64 [robot, 3]: x_mm, y_mm, heading_rad."""
+        """Return where all robots are at this instant, float64 [robot, 3]: x_mm, y_mm, heading_rad."""
         with self._up_to_date() as world:
             return world.poses()
 

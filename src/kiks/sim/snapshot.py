@@ -50,7 +50,7 @@ def look(world: World) -> Snapshot:
     observe.places_at(world.scene, ticks, now_ns, poses, places)
     lengths_mm, cosines, brightnesses, met = trace_rays(world, 0, robots)
     proximity, ambient = (np.empty((robots, SENSOR_COUNT), np.int64) for _ in range(2))
-    observe.read_everybody(
+    observe.read_all(
         world.scene, world.sight, world.networks, world.lamps, ticks, now_ns, world.seed, proximity, ambient
     )
     return Snapshot(poses, places, lengths_mm, cosines, brightnesses, met, proximity, ambient)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.engine.scalar_math import sin_cos
-from kiks.engine.scene import enter_everybody
+from kiks.engine.scene import enter_all_worlds
 from kiks.engine.state import BALL, BODY, CYLINDER
 from kiks.errors import ArenaError, KiksError, ParameterError, shown
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp
@@ -103,7 +103,7 @@ class Things:
         record["holder"] = record["is_lifted"] = 0
         record["x_mm"], record["y_mm"], record["trail"][:] = x_mm, y_mm, (x_mm, y_mm)
         record["velocity_x"], record["velocity_y"] = speed_mm_s * cosine, speed_mm_s * sine
-        enter_everybody(world.scene)
+        enter_all_worlds(world.scene)
 
     def remove_body(self, body: int) -> None:
         """Remove a ball or cylinder.

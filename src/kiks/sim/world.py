@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from kiks.engine import step
 from kiks.engine.parameters import PARAMETERS, pack
-from kiks.engine.scene import enter_everybody, make_scene
+from kiks.engine.scene import enter_all_worlds, make_scene
 from kiks.engine.sensing import proximity
 from kiks.engine.sensing.rays import sight_of
 from kiks.engine.sensing.thesis_networks import networks_for
@@ -45,7 +45,7 @@ class World:
         now_ns: The simulated time [ns].
         state: Everything that changes.
         scene: The state, arranged for the engine.
-        sight: What rays meet of the walls.
+        sight: The arena as rays see it of the walls.
         networks: What the responses of the robots need besides rays.
         free_space: What is in the way of what.
         watchers: Objects that read the state after ticks of their own choice.
@@ -119,7 +119,7 @@ class World:
     def rebuild_scene(self) -> None:
         """Arrange the state for the engine again: needed when its arrays were replaced."""
         self.scene = make_scene(self.state, self._kinds, self.arena.width_mm, self.arena.height_mm)
-        enter_everybody(self.scene)
+        enter_all_worlds(self.scene)
 
     # ---- time ----
 
@@ -171,7 +171,7 @@ class World:
         radius_mm = self.specs[index].body.radius_mm
         self.free_space.check_free(f"the place of robot {index + 1}", x_mm, y_mm, radius_mm, but=index)
         self.put_robot(index, x_mm, y_mm, heading_rad)
-        enter_everybody(self.scene)
+        enter_all_worlds(self.scene)
 
     def put_robot(self, index: int, x_mm: float, y_mm: float, heading_rad: float) -> None:
         """Write a robot's pose into the state, whatever is there."""

@@ -175,7 +175,7 @@ def is_between_jaws(robot: Any, parameters: Any, body: Any) -> Any:
 
 @kernel
 def grip(scene: Any, world: Any, number: Any, half_gap_before: Any) -> Any:
-    """Grip the first body that the jaws have touched in this tick; say whether there was one."""
+    """Grip the first body that the jaws have touched in this tick; return whether there was one."""
     robots, bodies, kinds, _ = scene
     robot = robots[world, number]
     for row in range(bodies.shape[1]):

@@ -245,7 +245,7 @@ def control_motor(robot: Any, parameters: Any, wheel: Any) -> Any:
 
 @inlined
 def turn_motors(robot: Any, parameters: Any, wheel: Any) -> Any:
-    """Phase: the motor follows its power with a lag; return its wheel's path in this tick without obstacles [pulses]."""
+    """Phase: the motor follows its power with a lag; return its wheel's path in this tick, without walls [pulses]."""
     power = robot.pwm[wheel]
     driving = max(abs(power) - parameters.dead_band_pwm, 0.0) / (PWM_MAX - parameters.dead_band_pwm)
     final = driving * parameters.free_speed_pulses * parameters.motor_gain[wheel]

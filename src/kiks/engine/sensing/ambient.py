@@ -1,16 +1,16 @@
-"""The eight sensors as light meters: what the lamps shine on each, what hides them, and the count that comes of it.
+"""The eight ambient light sensors: the light of lamps on each, obstacles before lamps, and the resulting count.
 
 Source: khepera-protocol.md 9.1 (reading at distances from a lamp of 1 W) and 9.2 (at angles), thesis 3.3 ("Ambient
 light sensors"). The sensors are sampled in turn, at the same instants as their reflected light (8.1).
 
-Derivation: a lamp of the power P at the distance d, seen at the angle a off a sensor's axis, shines with the flux
-P cos(a)^n / d^2 [W/mm^2] on it, nothing from behind. Fluxes of several lamps and of the room's daylight add up to E.
-The published curve R0(d) was measured with 1 W on the axis, where E = 1/d^2; so any flux reads as that lamp would at
-the equivalent distance d = 1/sqrt(E), and no other curve is needed: R = R0(1/sqrt(E)). For one lamp on the axis that
-is d/sqrt(P). Beyond its last point the curve closes in on the dark value in proportion to the flux.
+Derivation: a lamp of power P at the distance d and the angle a off a sensor's axis gives the flux P cos(a)^n / d^2
+[W/mm^2], and none from behind. The fluxes of several lamps and of daylight add up to E. The published curve R0(d) was
+measured with 1 W on the axis, where E = 1/d^2. So any flux gives the reading of that lamp at the equivalent distance
+d = 1/sqrt(E): R = R0(1/sqrt(E)). For one lamp on the axis the equivalent distance is d/sqrt(P). Beyond its last point
+the curve approaches the dark value in proportion to the flux.
 
-Angle: n = 2.5 was fitted to the two published curves of 9.2 (mean error 21 counts; the best n, 2.7, errs by 20, the
-thesis's 1 - cos a by 52). A lamp behind the tangent of the body at the sensor is hidden by the body.
+Angle: n = 2.5 was fitted to the two published curves of 9.2 (mean error 21 counts; the best n, 2.7, has 20, the
+thesis's 1 - cos a has 52). The body hides a lamp behind the body's tangent at the sensor.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import numpy as np
 from kiks.engine.compiling import entry, inlined, kernel
 from kiks.engine.numbers import power, sin_cos, uniform
 from kiks.engine.scene import moment_of
-from kiks.engine.sensing.disc_rays import ALL_AROUND, everybody_else, see
+from kiks.engine.sensing.disc_rays import ALL_AROUND, other_tracks, see
 from kiks.engine.sensing.proximity import quantize, sampled_pose
 from kiks.engine.sensing.rays import is_lit, scale
 
@@ -31,21 +31,21 @@ STREAM_AMBIENT = 3
 """Random stream of the noise on light readings."""
 
 MODEL_FLUX, MODEL_THESIS = 0, 1
-"""Lamps add up, or the thesis's formula for the strongest."""
+"""The sum of all lamps, or the thesis's formula for the strongest lamp."""
 
 FACING, BEHIND, BEHIND_BODY = 0, 1, 2
-"""How a lamp lies: before a sensor, behind it (or nowhere), or behind the edge of the robot's own body."""
+"""Place of a lamp: before a sensor, behind it (or nowhere), or behind the edge of the robot's own body."""
 
 THESIS_DARK = 500.0
-"""What a sensor reads without light in the thesis's formula [counts]."""
+"""Reading without light in the thesis's formula [counts]."""
 
 _NEAREST_MM = 1e-3  # a lamp on the sensor itself
-_FARTHEST_MM = 1e9  # farther off is nowhere, as is a place that is no number
+_FARTHEST_MM = 1e9  # a lamp farther away, or at NaN, is nowhere
 
 
 @kernel
 def curve(parameters: Any, distance_mm: Any) -> Any:
-    """Return what a sensor reads that looks straight at a lamp of 1 W [counts]."""
+    """Return the reading of a sensor that faces a lamp of 1 W [counts]."""
     last = parameters.lamp_point_count - 1
     place = max(0.0, distance_mm / parameters.lamp_step_mm)
     if place >= last:
@@ -67,14 +67,14 @@ def expected_ambient(
     heading: Any,
     sensor: Any,
 ) -> Any:
-    """Return the count that a sensor of a robot at this pose gives on average for the lamps' light.
+    """Return the mean count of a sensor of a robot at a pose.
 
     Args:
-        sight: What rays meet of the arena.
+        sight: The arena as rays see it.
         lamps: x [mm], y [mm], power [W] and 1 for on or 0 for off, shape [lamp, 4].
         parameters: Record of the robot's constants.
-        seen: The discs that may hide a lamp (`kiks.engine.sensing.disc_rays`).
-        seen_count: How many they are.
+        seen: Discs that may hide a lamp (`kiks.engine.sensing.disc_rays`).
+        seen_count: Number of discs.
         x: Where the robot is [mm].
         y: Where the robot is [mm].
         heading: Where it looks [rad].
@@ -102,7 +102,7 @@ def expected_ambient(
 
 @inlined
 def mount_of(parameters: Any, x: Any, y: Any, heading: Any, sensor: Any) -> Any:
-    """Return where a sensor is [mm], how that lies from the robot's centre [mm], and the direction of its axis."""
+    """Return the place of a sensor [mm], the same relative to the robot's centre [mm], and its axis."""
     sine, cosine = sin_cos(heading)
     out_x = parameters.mount_x_mm[sensor] * cosine - parameters.mount_y_mm[sensor] * sine
     out_y = parameters.mount_x_mm[sensor] * sine + parameters.mount_y_mm[sensor] * cosine
@@ -113,7 +113,7 @@ def mount_of(parameters: Any, x: Any, y: Any, heading: Any, sensor: Any) -> Any:
 
 @inlined
 def face(mount: Any, lamps: Any, number: Any) -> Any:
-    """Return how a lamp lies before a sensor (`FACING` or why not), its distance [mm] and the cosine of its angle."""
+    """Return the place of a lamp (`FACING`, ...), its distance [mm] and the cosine of its angle off the axis."""
     x, y, out_x, out_y, axis_x, axis_y = mount
     dx, dy = lamps[number, 0] - x, lamps[number, 1] - y
     distance = math.sqrt(dx * dx + dy * dy)
@@ -129,7 +129,7 @@ def face(mount: Any, lamps: Any, number: Any) -> Any:
 
 @inlined
 def is_burning(lamps: Any, number: Any) -> Any:
-    """Say whether a lamp is on and has power."""
+    """Return whether a lamp is on and has power."""
     return lamps[number, 3] > 0.0 and lamps[number, 2] > 0.0
 
 
@@ -148,20 +148,20 @@ def read_ambient(
     """Write the eight counts that command O returns at a time into `out`, each sampled at its own instant.
 
     Args:
-        scene: What there is (`kiks.engine.scene`).
-        sight: What rays meet of the arena (`kiks.engine.sensing.rays`).
+        scene: The scene (`kiks.engine.scene`).
+        sight: The arena as rays see it (`kiks.engine.sensing.rays`).
         lamps: x [mm], y [mm], power [W] and 1 for on or 0 for off, shape [lamp, 4].
         tick_count: Ticks done.
-        time_ns: When the robot reads.
+        time_ns: Time of the reading [ns].
         seed: Seed of the run.
         robot: Index of the robot.
-        is_noisy: False for the expected counts at the pose of this very time, without rounding.
+        is_noisy: False for the expected counts at the present pose, without rounding.
         out: int64, or float64 for expected counts, shape [8].
     """
     robots, _, kinds, _ = scene
     state = robots[0, robot]
     parameters = kinds[state.kind]
-    tracks, count, seen = everybody_else(scene, 0, robot)
+    tracks, count, seen = other_tracks(scene, 0, robot)
     for sensor in range(out.shape[0]):
         turn, instant_ns, x, y, heading = sampled_pose(state, tick_count, time_ns, sensor, is_noisy)
         seen_count = see(tracks, count, moment_of(tick_count, instant_ns), scale(sight), ALL_AROUND, seen)

@@ -1,16 +1,16 @@
-"""The linear camera K213: a row of 64 pixels over 36 degrees, as its own lens and exposure make it.
+"""The linear camera K213: a row of 64 pixels over 36 degrees, with its lens, exposure and noise.
 
 Source: khepera-protocol.md 10.3, kiks-behaviour.md 3.3 (whose constants were tuned by eye to the images in the K213's
 manual) and thesis 3.4 ("Linear vision extension module").
 
 Method: 64 rays from +18 to -18 degrees, the leftmost pixel first, from the robot's centre; the view begins 50 mm from
-it. A ray ends at the first thing, whose brightness 1..255 becomes a grey of 50..245. Then, in this order: the lens
-blurs what is far, the exposure adapts to the scene, the converter adds noise, the picture darkens towards its edges,
-motion smears it, the line adds noise once more.
+it. A ray ends at the first surface, whose brightness 1..255 becomes a grey of 50..245. Then, in this order: the lens
+blurs distant surfaces, the exposure adapts to the scene, the converter adds noise, the picture darkens towards its
+edges, motion smears it, and the line adds noise.
 
-Blur: every pixel becomes the mean over a stretch of the row, with a width of its own [pixels].
+Blur: each pixel becomes the mean over an interval of the row, with a width of its own [pixels].
 
-* Lens. Sharp to D = 250 mm. Beyond, the circle of confusion of a lens grows like 1/D - 1/d, so the stretch reaches
+* Lens. Sharp to D = 250 mm. Beyond, the circle of confusion of a lens grows like 1/D - 1/d, so the interval reaches
   7 (1 - D/d) pixels to each side: 3.5 at 500 mm, where KiKS 2.2.0 takes the mean of 7 pixels, and 7 at any distance.
 * Motion. While the picture is exposed for the time T, a wall at the distance d and the angle a moves across the row
   by (turn - way sin(a)/d) / pixel angle, and driving shakes the turret. T and the shaking are chosen so that a robot
@@ -27,7 +27,7 @@ import numpy as np
 from kiks.engine.compiling import entry, kernel
 from kiks.engine.numbers import at_instant, draw, sin_cos, stream_of
 from kiks.engine.scene import moment_of
-from kiks.engine.sensing.disc_rays import ALL_AROUND, everybody_else, meet_disc, see
+from kiks.engine.sensing.disc_rays import ALL_AROUND, meet_disc, other_tracks, see
 from kiks.engine.sensing.proximity import pose_at
 from kiks.engine.sensing.rays import cast, cast_many, free_cells, scale
 from kiks.engine.simd.stack_arrays import stack_floats
@@ -48,20 +48,20 @@ _BEGIN_MM = 50.0
 _NEAREST_MM = 1e-3  # a camera within a wall
 _ANYWHERE = 1e9  # cells: the border of the world is always nearer
 _SHARP_MM = 250.0
-_DEFOCUS_PIXELS = 7.0  # to each side, for what is infinitely far
+_DEFOCUS_PIXELS = 7.0  # to each side, at infinite distance
 
 _BLACK, _WHITE = 50.0, 245.0  # greys of the blackest and the whitest wall
-_DARKEN = 10.0  # what the exposure takes off a scene without black
+_DARKEN = 10.0  # subtracted by the exposure in a scene without black
 _NOISE = 10.0  # of the converter, to each side
-_LINE_NOISE = 0.1  # share of the final grey that is mere chance
+_LINE_NOISE = 0.1  # share of the final grey that is random
 
 _EXPOSURE_TICKS = 5.0  # 50 ms, the shortest reading period
-_SHAKE_PIXELS_PER_MM, _SHAKE_PIXELS = 1.5, 6.0  # by the way during the exposure, and at most
+_SHAKE_PIXELS_PER_MM, _SHAKE_PIXELS = 1.5, 6.0  # per path during the exposure, and at most
 
 
 @kernel
 def integral(sums: Any, grey: Any, place: Any) -> Any:
-    """Return the integral of a row of pixels from its left edge to a place; beyond the edges it goes on unchanged."""
+    """Return the integral of a row of pixels from its left edge to a place; the edges continue outside."""
     last = grey.shape[0]
     if not place > 0.0:
         return place * grey[0]
@@ -73,9 +73,9 @@ def integral(sums: Any, grey: Any, place: Any) -> Any:
 
 @kernel
 def smear(grey: Any, half_width: Any) -> Any:
-    """Replace each pixel by the mean over its own stretch of the row: `half_width` pixels to each side of its middle.
+    """Replace each pixel by the mean over its own interval of the row: `half_width` pixels to each side of its middle.
 
-    Half a pixel is no blur. All means come from one running sum, so wide ones cost as much as narrow ones.
+    Half a pixel is no blur. All means come from one running sum, so wide intervals cost as much as narrow ones.
     """
     sums, mean = stack_floats(_SUM_COUNT), stack_floats(PIXEL_COUNT)
     sums[0] = 0.0
@@ -89,7 +89,7 @@ def smear(grey: Any, half_width: Any) -> Any:
 
 @kernel
 def look(sight: Any, seen: Any, seen_count: Any, x: Any, y: Any, heading: Any, grey: Any, distance_mm: Any) -> Any:
-    """Write the grey of what each pixel looks at, and how far it is [mm] from the robot's centre."""
+    """Write the grey of the surface that each pixel sees, and its distance from the robot's centre [mm]."""
     cell, pad = scale(sight)
     per_cell = 1.0 / cell
     column, row = x * per_cell + pad, y * per_cell + pad
@@ -108,7 +108,7 @@ def look(sight: Any, seen: Any, seen_count: Any, x: Any, y: Any, heading: Any, g
     cast_many(sight, begin_columns, begin_rows, rays_x, rays_y, lengths, brightnesses)
     for p in range(PIXEL_COUNT):
         start, length, brightness = begin, lengths[p], brightnesses[p]
-        if length == 0.0:  # the view begins inside a wall: what is seen is its surface
+        if length == 0.0:  # the view begins inside a wall: the pixel sees its surface
             start = 0.0
             length, brightness = cast(sight, column, row, rays_x[p], rays_y[p], _ANYWHERE)
         if seen_count > 0:
@@ -121,14 +121,14 @@ def look(sight: Any, seen: Any, seen_count: Any, x: Any, y: Any, heading: Any, g
 
 @kernel
 def expose(grey: Any) -> Any:
-    """Adapt the exposure: the brightest pixel becomes white, and a scene without black gets a little darker."""
+    """Adapt the exposure: the brightest pixel becomes white, and a scene without black becomes slightly darker."""
     brightest, darkest = grey.max(), grey.min()
     grey += max(_WHITE - brightest, 0.0) - min(max(darkest - _BLACK, 0.0), _DARKEN)
 
 
 @kernel
 def darken_edges(grey: Any, noise: Any) -> Any:
-    """Cut the greys by a ceiling that falls towards the edges: 240 in the middle, 132 at 18 degrees."""
+    """Limit the greys by a ceiling that falls towards the edges: 240 in the middle, 132 at 18 degrees."""
     for p in range(PIXEL_COUNT):
         angle = abs(_EDGE_DEG - p * _PIXEL_DEG)
         share = angle / _EDGE_DEG
@@ -148,20 +148,20 @@ def take_image(
     is_noisy: Any,
     out: Any,
 ) -> Any:
-    """Write the image that a robot's camera takes at a time into `out` and return its light level.
+    """Write the image of a robot's camera at a time into `out` and return its light level.
 
     Args:
-        scene: What there is (`kiks.engine.scene`).
-        sight: What rays meet of the arena (`kiks.engine.sensing.rays`).
+        scene: The scene (`kiks.engine.scene`).
+        sight: The arena as rays see it (`kiks.engine.sensing.rays`).
         tick_count: Ticks done.
-        time_ns: When, at most 10 ms before the end of the last tick.
+        time_ns: Time [ns], at most 10 ms before the end of the last tick.
         seed: Seed of the run.
         robot: Index of the robot.
-        is_noisy: False for the expected image, without rounding; motion smears it all the same.
+        is_noisy: False for the expected image, without rounding; motion smears that, too.
         out: float64, shape [64]: greys 0..255, the leftmost pixel first.
 
     Returns:
-        What the light detector says of the scene, more for a darker one.
+        The reading of the light detector, larger for a darker scene.
     """
     state = scene[0][0, robot]
     x, y, heading = pose_at(state, tick_count, time_ns)
@@ -170,7 +170,7 @@ def take_image(
     way_mm = ((x - x_before) * cosine + (y - y_before) * sine) * _EXPOSURE_TICKS
     turn = (heading - heading_before) * _EXPOSURE_TICKS
 
-    # Three random numbers a pixel; their middles where nothing is to be random.
+    # Three random numbers per pixel; their means for an expected image.
     chance = np.full((3, PIXEL_COUNT), 0.5)
     flicker = 0.5
     if is_noisy:
@@ -181,7 +181,7 @@ def take_image(
                 chance[kind, p] = draw(origin, kind * PIXEL_COUNT + p)
 
     distance_mm, half_width = stack_floats(PIXEL_COUNT), stack_floats(PIXEL_COUNT)
-    tracks, count, seen = everybody_else(scene, 0, robot)
+    tracks, count, seen = other_tracks(scene, 0, robot)
     seen_count = see(tracks, count, moment_of(tick_count, time_ns), scale(sight), ALL_AROUND, seen)
     look(sight, seen, seen_count, x, y, heading, out, distance_mm)
     for p in range(PIXEL_COUNT):
@@ -199,7 +199,7 @@ def take_image(
         shake = min(_SHAKE_PIXELS_PER_MM * abs(way_mm), _SHAKE_PIXELS)
         for p in range(PIXEL_COUNT):
             sine = _EDGE_SIN * (1.0 - p * (2.0 / (PIXEL_COUNT - 1)))  # of the pixel's angle, within 1 %
-            # Driving moves what is ahead on the left to the left of the picture; a left turn moves all to the right.
+            # Driving moves surfaces on the left to the left of the picture; a left turn moves all to the right.
             shift = abs(turn - way_mm * sine / distance_mm[p]) / _PIXEL_RAD
             half_width[p] = 0.5 + 0.5 * (shake + shift)
         smear(out, half_width)

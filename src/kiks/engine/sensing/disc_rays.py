@@ -1,12 +1,12 @@
-"""What rays meet besides walls: robots, balls and cylinders, as discs at the instant of a reading.
+"""Rays and discs: robots, balls and cylinders at the instant of a reading.
 
-Derivation: from a ray's origin let b be the way along it to the point nearest to the disc's centre, and h the distance
-of the two there. The ray enters a disc of the radius r at b - w with w^2 = r^2 - h^2; there its direction and the
-disc's normal have the angle whose cosine is w/r.
+Derivation: from a ray's origin let b be the path along it to the point nearest to the disc's centre, and h the distance
+of the two there. The ray enters a disc of radius r at b - w with w^2 = r^2 - h^2; there the angle between its direction
+and the disc's normal has the cosine w/r.
 
-Who reads a sensor first writes down the tracks of the discs that come into question: where each has been at the last
-tick boundaries. From them each sensor, which has an instant of its own, writes down what it sees: four numbers for each
-disc, column, row and radius [cells], and brightness.
+A reading first lists the tracks of nearby discs: their places at the last tick boundaries. Each sensor has an instant
+of its own, and lists from the tracks the discs that it sees: four numbers for each, column, row and radius [cells], and
+brightness.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from kiks.engine.simd.f64x8 import load, root, store, where_less
 from kiks.engine.state import TRAIL_LENGTH
 
 SEEN_LIMIT = 64
-"""Most discs that a proximity sensor takes into account: more than there is room for within its range."""
+"""Most discs that a proximity sensor takes into account: more than fit within its range."""
 
 PER_DISC = 4
-"""Numbers that describe a disc that is seen."""
+"""Numbers per visible disc."""
 
 SEEN_SIZE = 256
-"""Numbers that describe as many discs as that."""
+"""Numbers for `SEEN_LIMIT` discs."""
 
 PER_TRACK = 2 * (TRAIL_LENGTH + 1) + 3
-"""Numbers of a track: x and y [mm] now and at the tick boundaries before, radius [mm], brightness, and whose it is."""
+"""Numbers of a track: x and y [mm] now and at the past tick boundaries, radius [mm], brightness, and the disc."""
 
 TRACKS_SIZE = 704
-"""Numbers of as many tracks as a proximity sensor takes into account."""
+"""Numbers for `SEEN_LIMIT` tracks."""
 
 _ANYWHERE_MM = 1e6
 
@@ -43,21 +43,21 @@ _NEVER = 1e30  # cells
 _RADIUS, _BRIGHTNESS, _DISC = (2 * (TRAIL_LENGTH + 1) + k for k in range(3))
 
 ALL_AROUND = (0.0, 0.0, (0.0, 0.0), (0.0, 0.0), _ANYWHERE_MM)
-"""The view of everything there is."""
+"""The view in all directions."""
 
 
 @kernel
 def follow(scene: Any, world: Any, found: Any, count: Any, x: Any, y: Any, reach_mm: Any, tracks: Any) -> Any:
-    """Write down the tracks of discs that were ever within a reach of a place; return how many.
+    """List the tracks of discs that were ever within reach of a place; return their number.
 
     Args:
-        scene: What there is.
+        scene: The scene.
         world: Index of the world.
-        found: Discs that come into question, int64, as `kiks.engine.scene.find_near` writes them.
-        count: How many of them count.
+        found: Candidate discs, int64, as `kiks.engine.scene.find_near` writes them.
+        count: Number of candidates.
         x: The place [mm].
         y: The place [mm].
-        reach_mm: How far an edge may have been away.
+        reach_mm: Largest distance of an edge [mm].
         tracks: float64 [`PER_TRACK` * `count` at least].
     """
     robots, bodies, kinds, _ = scene
@@ -79,13 +79,13 @@ def follow(scene: Any, world: Any, found: Any, count: Any, x: Any, y: Any, reach
 
 @kernel
 def disc_of(tracks: Any, k: Any) -> Any:
-    """Return which disc a track is of."""
+    """Return the disc of a track."""
     return np.int64(tracks[PER_TRACK * k + _DISC])
 
 
 @kernel
 def note_track(thing: Any, x: Any, y: Any, place: Any, tracks: Any) -> Any:
-    """Write where a robot or body has been at a place of `tracks`; return the least square of its distances [mm^2]."""
+    """Write the track of a robot or body into `tracks`; return the smallest square of its distances [mm^2]."""
     tracks[place], tracks[place + 1] = thing.x_mm, thing.y_mm
     nearest = (thing.x_mm - x) * (thing.x_mm - x) + (thing.y_mm - y) * (thing.y_mm - y)
     for k in range(TRAIL_LENGTH):
@@ -97,15 +97,15 @@ def note_track(thing: Any, x: Any, y: Any, place: Any, tracks: Any) -> Any:
 
 @kernel
 def see(tracks: Any, count: Any, moment: Any, scale: Any, view: Any, seen: Any) -> Any:
-    """Write down the discs that are in view at a moment; return how many.
+    """List the discs in view at a moment; return their number.
 
     Args:
-        tracks: Where discs have been (`follow`).
-        count: How many they are.
-        moment: When (`kiks.engine.scene.moment_of`).
+        tracks: Tracks of discs (`follow`).
+        count: Number of discs.
+        moment: The time (`kiks.engine.scene.moment_of`).
         scale: Edge of a cell [mm] and cells of the border around the arena.
-        view: Where it is seen from, x and y [mm]; the directions, cosine and sine, of the leftmost and of the rightmost
-            ray, (0, 0) for all around; how far [mm].
+        view: The place of the sensor, x and y [mm]; the directions, cosine and sine, of the leftmost and of the
+            rightmost ray, (0, 0) for all directions; the range [mm].
         seen: float64 [`PER_DISC` * `count` at least].
     """
     ticks_ago, back = np.int64(moment[0]), moment[1]
@@ -119,7 +119,7 @@ def see(tracks: Any, count: Any, moment: Any, scale: Any, view: Any, seen: Any) 
         disc_x = tracks[later] + back * (tracks[earlier] - tracks[later])
         disc_y = tracks[later + 1] + back * (tracks[earlier + 1] - tracks[later + 1])
         dx, dy, far = disc_x - x, disc_y - y, reach_mm + radius
-        # How far beyond the view's edges its centre is; the two together leave at most half of all around.
+        # Distances of the centre beyond the edges of the view, which covers at most half a circle.
         beyond_left, beyond_right = dy * left[0] - dx * left[1], dx * right[1] - dy * right[0]
         if dx * dx + dy * dy < far * far and max(beyond_left, beyond_right) < radius:
             place = PER_DISC * seen_count
@@ -135,7 +135,7 @@ def meet_disc(seen: Any, count: Any, column: Any, row: Any, cosine: Any, sine: A
 
     Args:
         seen: The discs.
-        count: How many they are.
+        count: Number of discs.
         column: Origin [cells].
         row: Origin [cells].
         cosine: Direction.
@@ -156,7 +156,7 @@ def meet_disc(seen: Any, count: Any, column: Any, row: Any, cosine: Any, sine: A
 
 @kernel
 def enter_disc(seen: Any, k: Any, column: Any, row: Any, cosine: Any, sine: Any) -> Any:
-    """Return where a ray enters a disc, 0 from within, the cosine of the angle of incidence, and whether it does."""
+    """Return the length at which a ray enters a disc (0 from inside), the cosine of its incidence, and if it does."""
     dx, dy, radius = seen[PER_DISC * k] - column, seen[PER_DISC * k + 1] - row, seen[PER_DISC * k + 2]
     along, aside = dx * cosine + dy * sine, dx * sine - dy * cosine
     square = radius * radius - aside * aside
@@ -168,18 +168,18 @@ def enter_disc(seen: Any, k: Any, column: Any, row: Any, cosine: Any, sine: Any)
 def meet_discs(
     seen: Any, count: Any, column: Any, row: Any, cosines: Any, sines: Any, lengths: Any, squarely: Any, shades: Any
 ) -> Any:
-    """Follow a sensor's rays to the first disc that each meets: what `meet_disc` says, for all of them at once.
+    """Follow a sensor's rays to the first disc that each hits: `meet_disc` for all of them at once.
 
     Args:
         seen: The discs.
-        count: How many they are.
+        count: Number of discs.
         column: Origin of all rays [cells].
         row: Origin of all rays [cells].
         cosines: Directions, `Lanes`, as are the others.
         sines: Directions.
         lengths: Lengths up to the walls [cells].
         squarely: Cosines of the angles of incidence there.
-        shades: Brightnesses of what the rays meet there.
+        shades: Brightnesses there.
 
     Returns:
         Lengths, cosines and brightnesses up to walls or discs.
@@ -201,7 +201,7 @@ def meet_discs(
 
 @entry
 def meet_discs_all(seen: Any, count: Any, cosines: Any, sines: Any, out: Any) -> Any:
-    """Follow eight rays from (0, 0) from Python: `out`, shape [3, 8], has what they meet of walls, and then of all."""
+    """Follow eight rays from (0, 0), for Python: `out`, shape [3, 8], holds the hits on walls, and then on all."""
     lengths, squarely, shades = meet_discs(
         seen, count, 0.0, 0.0, load(cosines), load(sines), load(out[0]), load(out[1]), load(out[2])
     )
@@ -212,7 +212,7 @@ def meet_discs_all(seen: Any, count: Any, cosines: Any, sines: Any, out: Any) ->
 
 @kernel
 def hides(seen: Any, k: Any, column: Any, row: Any, cosine: Any, sine: Any, reach: Any) -> Any:
-    """Say whether a disc stands between the origin of a ray and its end; a lamp that hangs over it is not hidden."""
+    """Return whether a disc is between the two ends of a ray; it does not hide a lamp that hangs over it."""
     dx, dy = seen[PER_DISC * k] - column, seen[PER_DISC * k + 1] - row
     radius = seen[PER_DISC * k + 2]
     along, aside = dx * cosine + dy * sine, dx * sine - dy * cosine
@@ -221,8 +221,8 @@ def hides(seen: Any, k: Any, column: Any, row: Any, cosine: Any, sine: Any, reac
 
 
 @kernel
-def everybody_else(scene: Any, world: Any, itself: Any) -> Any:
-    """Return the tracks of all discs of a world but one, how many they are, and room for what they look like."""
+def other_tracks(scene: Any, world: Any, itself: Any) -> Any:
+    """Return the tracks of all discs of a world except one, their number, and memory for the visible discs."""
     limit = count_discs(scene)[1]
     found, tracks = np.empty(limit, np.int64), np.empty(PER_TRACK * limit, np.float64)
     count = find_near(scene, world, 0.0, 0.0, _ANYWHERE_MM, itself, found)

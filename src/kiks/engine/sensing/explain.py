@@ -1,4 +1,4 @@
-"""Why a sensor reads what it reads: the parts that its count is made of, by the very functions that make it."""
+"""Explains the count of a sensor by its parts, with the same functions that compute it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from kiks.engine.numbers import stream_of, uniform
 from kiks.engine.parameters import RAY_COUNT
 from kiks.engine.scene import moment_of
 from kiks.engine.sensing.ambient import STREAM_AMBIENT, expected_ambient, face, is_burning, mount_of
-from kiks.engine.sensing.disc_rays import ALL_AROUND, PER_TRACK, SEEN_SIZE, TRACKS_SIZE, disc_of, everybody_else, see
+from kiks.engine.sensing.disc_rays import ALL_AROUND, PER_TRACK, SEEN_SIZE, TRACKS_SIZE, disc_of, other_tracks, see
 from kiks.engine.sensing.observe import WALL, find_met, gaze_sensor, keep
 from kiks.engine.sensing.proximity import (
     STREAM_PROXIMITY,
@@ -32,7 +32,7 @@ from kiks.engine.simd.f64x8 import LANES, load, store
 from kiks.engine.simd.stack_arrays import stack_floats
 
 SHINING, BEHIND, BEHIND_BODY, HIDDEN, OFF = 0, 1, 2, 3, 4
-"""What a lamp is to a sensor; the first three are those of `kiks.engine.sensing.ambient.face`."""
+"""Effect of a lamp on a sensor; the first three values are those of `kiks.engine.sensing.ambient.face`."""
 
 
 @kernel
@@ -45,7 +45,7 @@ def respond_without(
     brightnesses: Any,
     ray: Any,
 ) -> Any:
-    """Return the counts above its baseline that a sensor would expect if one ray met nothing."""
+    """Return the expected counts above the baseline if one ray hit nothing."""
     far, square, bright = stack_floats(LANES), stack_floats(LANES), stack_floats(LANES)
     store(far, lengths_mm)
     store(square, cosines)
@@ -68,25 +68,24 @@ def explain_proximity(
     met: Any,
     without: Any,
 ) -> Any:
-    """Take apart the count that command N returns at a time for one sensor.
+    """Explain the count that command N returns at a time for one sensor.
 
     Args:
-        scene: What there is (`kiks.engine.scene`).
-        sight: What rays meet of the arena (`kiks.engine.sensing.rays`).
+        scene: The scene (`kiks.engine.scene`).
+        sight: The arena as rays see it (`kiks.engine.sensing.rays`).
         networks: As `kiks.engine.sensing.proximity.read_proximity` takes them.
         tick_count: Ticks done.
-        time_ns: When the robot reads.
+        time_ns: Time of the reading [ns].
         seed: Seed of the run.
         robot: Index of the robot.
         sensor: Index of the sensor.
-        rays: Where lengths [mm] and brightnesses go as the response takes them, and cosines of the angles of incidence,
-            whether it takes them or not: lengths, cosines, brightnesses, float64 [3, 7].
-        met: What the rays met, as in `kiks.engine.sensing.observe`, int64 [7].
-        without: What the sensor would expect if one ray met nothing, float64 [7].
+        rays: Output, float64 [3, 7]: lengths [mm], cosines of the angles of incidence, brightnesses. Lengths and
+            brightnesses are those that the response uses.
+        met: Output: hits of the rays, as in `kiks.engine.sensing.observe`, int64 [7].
+        without: Output: expected count if one ray hit nothing, float64 [7].
 
     Returns:
-        When the sensor was sampled [ns]; the count expected, noise in proportion to it, noise that is always there; the
-        count.
+        Time of the sample [ns]; expected count; proportional noise; constant noise; count.
     """
     robots, _, kinds, _ = scene
     state = robots[0, robot]
@@ -143,30 +142,29 @@ def explain_ambient(
     facts: Any,
     reasons: Any,
 ) -> Any:
-    """Take apart the count that command O returns at a time for one sensor.
+    """Explain the count that command O returns at a time for one sensor.
 
     Args:
-        scene: What there is.
-        sight: What rays meet of the arena.
+        scene: The scene.
+        sight: The arena as rays see it.
         lamps: As `kiks.engine.sensing.ambient.read_ambient` takes them, shape [lamp, 4].
         tick_count: Ticks done.
-        time_ns: When the robot reads.
+        time_ns: Time of the reading [ns].
         seed: Seed of the run.
         robot: Index of the robot.
         sensor: Index of the sensor.
-        facts: Of each lamp its distance from the sensor [mm], the cosine of its angle off the sensor's axis, and the
-            count that would be expected without it; float64 [lamp, 3].
-        reasons: Of each lamp what it is to the sensor (`SHINING` and so on), and the disc that hides it, `WALL` if it
-            is a wall; int64 [lamp, 2].
+        facts: Output, float64 [lamp, 3]: distance of a lamp from the sensor [mm], cosine of its angle off the sensor's
+            axis, and the expected count without it.
+        reasons: Output, int64 [lamp, 2]: effect of a lamp on the sensor (`SHINING`, ...), and the disc that hides it,
+            `WALL` for a wall.
 
     Returns:
-        When the sensor was sampled [ns]; the count expected, the noise, the count; and what would be expected without
-        any lamp.
+        Time of the sample [ns]; expected count; noise; count; expected count without lamps.
     """
     robots, _, kinds, _ = scene
     state = robots[0, robot]
     parameters = kinds[state.kind]
-    tracks, count, seen = everybody_else(scene, 0, robot)
+    tracks, count, seen = other_tracks(scene, 0, robot)
     turn, instant_ns, x, y, heading = sampled_pose(state, tick_count, time_ns, sensor, True)
     moment = moment_of(tick_count, instant_ns)
     seen_count = see(tracks, count, moment, scale(sight), ALL_AROUND, seen)

@@ -1,9 +1,9 @@
-"""Readings of eight lone robots at once, each alone in its world: what command N returns, with the same bits.
+"""Proximity readings of eight lone robots at once: the counts of command N, with the same bits.
 
-Need: a program that drives many worlds spends most of its time reading sensors.
-Method: poses, places of sensors, what is free around them, and noise are calculated for eight robots at a time, as
-`Lanes`, by the functions that read one robot's. Only sensors that are near something go on: their fans are written
-down, of all robots and sensors together, and followed in turn (`kiks.engine.sensing.ray_packets`).
+A program that drives many worlds spends most of its time reading sensors. Poses, places of sensors, the clearance
+around them and noise are computed for eight robots at a time, as `Lanes`, by the functions that read one robot. Only
+sensors near something need more: their ray packets, those of all robots and sensors together, step in turn
+(`kiks.engine.sensing.ray_packets`).
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ EIGHT_SENSES = record8_of(
         *("noise_small", "noise_large", "noise_exponent", "noise_down"),
     ),
 )
-"""The constants of eight robots that the reading of their sensors takes as lanes."""
+"""The constants of eight robots that readings use as lanes."""
 
 # Record8 robots have 64 sensors; sizes of stack arrays must be constants of their own.
 _FANS = 64
@@ -55,13 +55,13 @@ def read_eight(
     """Write the counts that command N returns at eight times in eight worlds, each with a lone robot.
 
     Args:
-        robots: `Record8` of `EIGHT`, with the ticks that each has done.
+        robots: `Record8` of `EIGHT`, with the number of ticks of each.
         senses: `Record8` of `EIGHT_SENSES`.
-        which: Which of the kinds each is, int64 [8].
+        which: Index of each robot's kind, int64 [8].
         kinds: Records of `PARAMETERS`, one for each kind.
-        sight: What rays meet of the arena (`kiks.engine.sensing.rays`).
+        sight: The arena as rays see it (`kiks.engine.sensing.rays`).
         networks: As `kiks.engine.sensing.proximity.read_proximity` takes them.
-        times_ns: When each robot reads, `Lanes`.
+        times_ns: Time of each reading [ns], `Lanes`.
         seeds: Seeds of the runs, `Words`.
         out: int64 or float64, shape [8, 8]: a row for each robot.
     """

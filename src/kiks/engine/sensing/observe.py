@@ -1,7 +1,7 @@
-"""What sensors see, for a person who looks: the rays of all robots, what each met, and all readings in one call.
+"""Observation for display: the rays of all robots with their hits, and all readings in one call.
 
-Looking writes to the arrays that are handed over and to nothing else. Rays are followed as exactly as can be, with
-smooth surfaces and angles of incidence, whichever of it a robot's response takes.
+Observing changes only the output arrays. Rays are exact, with smooth surfaces and angles of incidence, even if a
+robot's response uses coarser ones.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from kiks.engine.simd.f64x8 import LANES, lane_of, splat, store
 from kiks.engine.simd.stack_arrays import stack_floats
 
 NOTHING, WALL = -2, -1
-"""What a ray met that met no disc; discs are counted as in `kiks.engine.scene`."""
+"""Hits of a ray that hit no disc; discs are numbered as in `kiks.engine.scene`."""
 
 _FAR_MM = 1e6
 
@@ -48,7 +48,7 @@ def find_met(
     brightnesses: Any,
     met: Any,
 ) -> Any:
-    """Write what each of a sensor's rays met into `met`, shape [7], from where it ended and how bright that was."""
+    """Write the hits of a sensor's rays into `met`, shape [7], from their lengths and brightnesses."""
     x, y, rays_x, rays_y, _ = view
     cell, pad = scale(sight)
     per_cell = 1.0 / cell
@@ -91,7 +91,7 @@ def gaze_sensor(
     rays: Any,
     met: Any,
 ) -> Any:
-    """Write what a sensor's rays meet: `rays` [3, 7] has lengths, cosines and brightnesses, `met` [7] what it is."""
+    """Write the hits of a sensor's rays: `rays` [3, 7] holds lengths, cosines and brightnesses, `met` [7] the discs."""
     view = view_of(parameters, pose[0], pose[1], pose[2], sensor)
     seen = stack_floats(SEEN_SIZE)
     _, seen_count = survey(sight, parameters, tracks, track_count, moment, view, seen)
@@ -104,11 +104,11 @@ def gaze_sensor(
 
 @entry
 def gaze(scene: Any, sight: Any, tick_count: Any, time_ns: Any, first: Any, rays: Any, met: Any) -> Any:
-    """Write what all rays of the proximity sensors of some robots meet at this very time, at the poses of this time.
+    """Write the hits of all rays of some robots' proximity sensors at the present time and poses.
 
     Args:
-        scene: What there is (`kiks.engine.scene`).
-        sight: What rays meet of the arena (`kiks.engine.sensing.rays`).
+        scene: The scene (`kiks.engine.scene`).
+        sight: The arena as rays see it (`kiks.engine.sensing.rays`).
         tick_count: Ticks done.
         time_ns: The present time.
         first: Index of the first of the robots.
@@ -128,7 +128,7 @@ def gaze(scene: Any, sight: Any, tick_count: Any, time_ns: Any, first: Any, rays
 
 
 @entry
-def read_everybody(
+def read_all(
     scene: Any,
     sight: Any,
     networks: Any,
@@ -142,8 +142,8 @@ def read_everybody(
     """Write the counts that commands N and O of all robots return at a time.
 
     Args:
-        scene: What there is.
-        sight: What rays meet of the arena.
+        scene: The scene.
+        sight: The arena as rays see it.
         networks: As `kiks.engine.sensing.proximity.read_proximity` takes them.
         lamps: As `kiks.engine.sensing.ambient.read_ambient` takes them.
         tick_count: Ticks done.
@@ -162,7 +162,7 @@ def places_at(scene: Any, tick_count: Any, time_ns: Any, poses: Any, places: Any
     """Write where everybody is at a time.
 
     Args:
-        scene: What there is.
+        scene: The scene.
         tick_count: Ticks done.
         time_ns: When.
         poses: Of robots, x and y [mm] and heading [rad], float64 [robot, 3].
@@ -185,11 +185,11 @@ def places_at(scene: Any, tick_count: Any, time_ns: Any, poses: Any, places: Any
 def read_from(
     scene: Any, sight: Any, networks: Any, tick_count: Any, time_ns: Any, robot: Any, poses: Any, out: Any
 ) -> Any:
-    """Write the counts that a robot would read on average at this very time if it stood elsewhere.
+    """Write the counts that a robot would read on average now if it stood elsewhere.
 
     Args:
         scene: The robots, balls and cylinders (`kiks.engine.scene`).
-        sight: What rays meet of the arena.
+        sight: The arena as rays see it.
         networks: As `kiks.engine.sensing.proximity.read_proximity` takes them.
         tick_count: Ticks done.
         time_ns: The present time.

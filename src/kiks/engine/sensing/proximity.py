@@ -1,4 +1,4 @@
-"""The eight proximity sensors: when each was sampled, its seven rays, and the noise on its response to them.
+"""The eight proximity sensors: the instants of their samples, their seven rays, and the noise of their counts.
 
 Source: thesis section 3.3 ("Proximity sensors", "noise model"), khepera-protocol.md 8.1 (sampling) and
 kiks-behaviour.md 3.1 (rays, noise). The responses themselves are in `kiks.engine.sensing.responses`.
@@ -25,17 +25,17 @@ from kiks.engine.simd.stack_arrays import stack_floats, stack_integers
 from kiks.units import SENSOR_ROUND_NS, SENSOR_SLOT_NS
 
 STREAM_PROXIMITY = 2
-"""Random stream of the noise: whoever draws has a number of his own."""
+"""Random stream of the noise; each purpose has a number of its own."""
 
 MOVED_MM = 30.0
-"""How far a robot or a thing moves between the first sensor's sample and a reading, at most: 20 ms at 1.5 m/s."""
+"""Longest path of a robot or body between the first sensor's sample and a reading: 20 ms at 1.5 m/s."""
 
 
 @kernel
 def sample_instant(time_ns: Any, sensor: Any) -> Any:
-    """Return the number of the round in which a sensor was last sampled, and when that was [ns].
+    """Return the round in which a sensor was last sampled, and the time of that sample [ns].
 
-    Times are numbers with a point, or eight: whole ones are exact for a hundred days.
+    Times are float64, or eight of them: whole nanoseconds are exact for a hundred days.
     """
     slot_ns = 1.0 * sensor * SENSOR_SLOT_NS
     turn = floor((time_ns - slot_ns) / SENSOR_ROUND_NS)
@@ -52,7 +52,7 @@ def pose_at(robot: Any, tick_count: Any, time_ns: Any) -> Any:
 
 @kernel
 def sampled_pose(robot: Any, tick_count: Any, time_ns: Any, sensor: Any, is_sampled: Any) -> Any:
-    """Return a sensor's round, its instant [ns], and x, y and heading of the robot then; if not sampled, those now."""
+    """Return a sensor's round, its instant [ns], and x, y and heading then; without sampling, those of now."""
     turn, instant_ns = sample_instant(time_ns, sensor)
     if not is_sampled:
         turn, instant_ns = 0.0 * time_ns, 1.0 * time_ns
@@ -73,15 +73,15 @@ def expected_count(
     heading: Any,
     sensor: Any,
 ) -> Any:
-    """Return the count that a sensor of a robot at this pose gives on average; nothing cuts it off at the top.
+    """Return the mean count of a sensor of a robot at a pose, without an upper limit.
 
     Args:
-        sight: What rays meet of the arena.
-        networks: What the response needs besides.
+        sight: The arena as rays see it.
+        networks: Networks of the response, if it needs any.
         parameters: Record of the robot's constants.
-        tracks: Where the discs about have been (`kiks.engine.sensing.disc_rays`).
-        track_count: How many they are.
-        moment: When (`kiks.engine.scene.moment_of`).
+        tracks: Tracks of nearby discs (`kiks.engine.sensing.disc_rays`).
+        track_count: Number of tracks.
+        moment: The time (`kiks.engine.scene.moment_of`).
         x: Where the robot is [mm].
         y: Where the robot is [mm].
         heading: Where it looks [rad].
@@ -99,10 +99,10 @@ def expected_count(
 
 @inlined
 def view_of(parameters: Any, x: Any, y: Any, heading: Any, sensor: Any) -> Any:
-    """Return what a sensor looks at.
+    """Return the view of a sensor.
 
     Returns:
-        Where its rays begin, x and y [mm]; their directions, cosines and sines, `Lanes`; the circle in which something
+        Origin of its rays, x and y [mm]; their directions, cosines and sines, `Lanes`; the circle outside which nothing
         makes it respond, x, y and radius [mm].
     """
     sine, cosine = sin_cos(heading)
@@ -114,31 +114,31 @@ def view_of(parameters: Any, x: Any, y: Any, heading: Any, sensor: Any) -> Any:
 
 @inlined
 def watched(parameters: Any, x: Any, y: Any, sine: Any, cosine: Any, sensor: Any) -> Any:
-    """Return the middle of the circle in which something makes a sensor respond, x and y [mm]; of a robot or eight."""
+    """Return the centre of the circle outside which nothing makes a sensor respond, x and y [mm]."""
     watch_x, watch_y = parameters.watch_x_mm[sensor], parameters.watch_y_mm[sensor]
     return x + watch_x * cosine - watch_y * sine, y + watch_x * sine + watch_y * cosine
 
 
 @inlined
 def mount(parameters: Any, x: Any, y: Any, sine: Any, cosine: Any, sensor: Any) -> Any:
-    """Return where a sensor's rays begin, x and y [mm]; of a robot or of eight."""
+    """Return the origin of a sensor's rays, x and y [mm]; of one robot or eight."""
     ray_x, ray_y = parameters.ray_x_mm[sensor], parameters.ray_y_mm[sensor]
     return x + ray_x * cosine - ray_y * sine, y + ray_x * sine + ray_y * cosine
 
 
 @inlined
 def aim(parameters: Any, sine: Any, cosine: Any, sensor: Any) -> Any:
-    """Return where the rays of a robot's sensor go, cosines and sines, `Lanes`."""
+    """Return the directions of a sensor's rays, cosines and sines, `Lanes`."""
     ray_cos, ray_sin = load(parameters.ray_cos[sensor]), load(parameters.ray_sin[sensor])
     return ray_cos * cosine - ray_sin * sine, ray_cos * sine + ray_sin * cosine
 
 
 @inlined
 def survey(sight: Any, parameters: Any, tracks: Any, track_count: Any, moment: Any, view: Any, seen: Any) -> Any:
-    """Find out what is about a sensor; write the discs in its view into `seen`, float64 [`SEEN_SIZE`].
+    """Check whether anything is near a sensor; write the discs in its view into `seen`, float64 [`SEEN_SIZE`].
 
     Returns:
-        Whether anything may be near enough; if not, it reads its baseline. How many discs are in view.
+        Whether anything may be near enough (otherwise the sensor reads its baseline), and the number of discs in view.
     """
     x, y, rays_x, rays_y, (watch_x, watch_y, watch_mm) = view
     cell, pad = scale(sight)
@@ -154,7 +154,7 @@ def survey(sight: Any, parameters: Any, tracks: Any, track_count: Any, moment: A
 
 @inlined
 def trace(sight: Any, response: Any, view: Any, reach_mm: Any, seen: Any, seen_count: Any) -> Any:
-    """Follow the rays of a sensor to what they meet, as exactly as a response needs them.
+    """Follow the rays of a sensor to their hits, as exactly as a response needs them.
 
     Returns:
         Lengths of the rays [mm], cosines of the angles of incidence, and brightnesses, 0 for nothing, `Lanes`.
@@ -174,7 +174,7 @@ def trace(sight: Any, response: Any, view: Any, reach_mm: Any, seen: Any, seen_c
 
 @kernel
 def integer_power(base: Any, exponent: Any) -> Any:
-    """Return a number, or eight, to a whole, positive power by multiplication alone."""
+    """Return one number or eight to a positive whole power, by multiplication alone."""
     result = 1.0 + 0.0 * base
     for k in range(np.int64(greatest(exponent))):
         result = choose(k < exponent, result * base, result)
@@ -183,7 +183,7 @@ def integer_power(base: Any, exponent: Any) -> Any:
 
 @kernel
 def quantile(values: Any, count: Any, share: Any) -> Any:
-    """Return what a share 0..1 of all draws stays below: the first `count` of the values are equally probable steps."""
+    """Return the quantile 0..1 of a distribution: the first `count` values are its equally probable steps."""
     place = share * (count - 1)
     i = min(np.int64(place), max(count - 2, 0))
     return values[i] + (place - i) * (values[i + 1] - values[i])
@@ -191,9 +191,9 @@ def quantile(values: Any, count: Any, share: Any) -> Any:
 
 @inlined
 def scatter(parameters: Any, count: Any, sign: Any, size: Any) -> Any:
-    """Return a count with that noise that is a share of it, from two random numbers 0..1; of a robot or of eight.
+    """Return a count with proportional noise, from two random numbers 0..1; of one robot or eight.
 
-    It is at most 25 % of small and 10 % of large counts and seldom that much, to either side.
+    The noise is at most 25 % of small and 10 % of large counts, and rarely that much.
     """
     largest = parameters.noise_small - count / 1000.0 * (parameters.noise_small - parameters.noise_large)
     deviation = largest * integer_power(size, parameters.noise_exponent)
@@ -202,34 +202,34 @@ def scatter(parameters: Any, count: Any, sign: Any, size: Any) -> Any:
 
 @inlined
 def jitter_of(parameters: Any, chance: Any) -> Any:
-    """Return the noise that is there with nothing near, too, from the robot's own distribution."""
+    """Return the noise that does not depend on the count, from the robot's measured distribution."""
     return quantile(parameters.jitter_counts, parameters.jitter_point_count, chance)
 
 
 @inlined
 def chances(stream: Any, turn: Any, sensor: Any) -> Any:
-    """Return the three random numbers 0..1 of a sensor's reading in a round: sign and size of the share, and jitter."""
+    """Return three random numbers 0..1 for a sensor in a round: sign and size of proportional noise, and jitter."""
     chance = at_instant(stream, turn)
     return draw(chance, sensor * 3), draw(chance, sensor * 3 + 1), draw(chance, sensor * 3 + 2)
 
 
 @kernel
 def quantize(parameters: Any, count: Any) -> Any:
-    """Return a count as the converter gives it: whole steps, within its range; of a robot or of eight."""
+    """Return a count in the steps and the range of the converter; of one robot or eight."""
     steps = floor(count / parameters.step_counts + 0.5)
     return min(max(0.0, steps * parameters.step_counts), parameters.maximum_counts)
 
 
 @inlined
 def follow_near(scene: Any, robot: Any, tracks: Any) -> Any:
-    """Write down the tracks of the discs that a robot's proximity sensors may see; return how many."""
+    """List the tracks of the discs that a robot's proximity sensors may see; return their number."""
     state = scene[0][0, robot]
     return follow_around(scene, robot, state.x_mm, state.y_mm, tracks)
 
 
 @inlined
 def follow_around(scene: Any, robot: Any, x: Any, y: Any, tracks: Any) -> Any:
-    """Write down the tracks of the discs that a robot's proximity sensors might see from a place; return how many.
+    """List the tracks of the discs that a robot's proximity sensors might see from a place; return their number.
 
     Args:
         scene: The robots, balls and cylinders (`kiks.engine.scene`).
@@ -261,14 +261,14 @@ def read_proximity(
     """Write the eight counts that command N returns at a time into `out`, each sampled at its own instant.
 
     Args:
-        scene: What there is (`kiks.engine.scene`).
-        sight: What rays meet of the arena (`kiks.engine.sensing.rays`).
-        networks: A record of `kiks.engine.sensing.thesis_networks.NETWORKS`, or none if no robot's response needs them.
+        scene: The scene (`kiks.engine.scene`).
+        sight: The arena as rays see it (`kiks.engine.sensing.rays`).
+        networks: A record of `kiks.engine.sensing.thesis_networks.NETWORKS`; empty if no robot's response needs one.
         tick_count: Ticks done.
-        time_ns: When the robot reads.
+        time_ns: Time of the reading [ns].
         seed: Seed of the run.
         robot: Index of the robot.
-        is_noisy: False for the expected counts at the pose of this very time, without rounding.
+        is_noisy: False for the expected counts at the present pose, without rounding.
         out: int64, or float64 for expected counts, shape [8].
     """
     robots, _, kinds, _ = scene

@@ -1,14 +1,13 @@
-"""Fans: the rays of proximity sensors, eight numbers each, of one sensor or of several at once.
+"""Ray packets: the rays of proximity sensors in eight lanes each, of one sensor or of several at once.
 
-Need: a reading of eight sensors is mostly rays, and a ray is mostly waiting for what it looks up. While one fan waits,
-others can go on.
-Method: `enter` writes fans down one by one, `follow` lets them step in turn until all have ended, `met` says where that
-was. A fan's steps are its own, so the bits do not depend on how many there are. They are in float32, from the cell that
-a fan begins in (`kiks.engine.simd.f32x8`).
+A reading of eight sensors is mostly rays, and a ray mostly waits for memory. While one packet waits, others go on:
+`enter` starts packets one by one, `follow` lets them step in turn until all have ended, `met` returns the hits. The
+steps of a packet do not depend on other packets, and so neither do its bits. They are in float32, relative to the cell
+in which the packet begins (`kiks.engine.simd.f32x8`).
 
-From anywhere in a cell, its edge too, one may go in any direction as far as its square is from that of the nearest wall
-(`kiks.model.arena.Arena.leaps`). So a step is the way to the edge of the cell, and then that far: no corner is missed,
-and none ends deeper in a wall than by the nudge that takes it over the edge.
+From any point of a cell, a ray may go in any direction as far as the cell's square is from that of the nearest wall
+(`kiks.model.arena.Arena.leaps`). So a step goes to the edge of the cell, and then that far: no corner is missed, and a
+ray ends in a wall no deeper than by the nudge that takes it over the edge.
 """
 
 from __future__ import annotations
@@ -34,12 +33,12 @@ from kiks.engine.simd.stack_arrays import stack_integers, stack_narrow
 from kiks.model.raster import LEAPS_PER_CELL
 
 WAY_SIZE = 72
-"""Numbers of a fan, float32: eight times eight, and the two of where it begins and its reach."""
+"""Numbers of a packet, float32: eight times eight, and its origin and reach."""
 
 LONGEST = 16000.0
-"""Longest ray [cells]: up to here a nudge still moves a float32, and none stands still for ever."""
+"""Longest ray [cells]: up to here a nudge still changes a float32, so no ray gets stuck."""
 
-# Places of what a fan has.
+# Offsets of a packet's fields.
 _DX, _DY, _PER_DX, _PER_DY, _RIGHT, _UP, _LENGTH, _MET, _REST = (8 * k for k in range(9))
 
 _NUDGE = 1e-3  # over the edge of a cell [cells]
@@ -52,21 +51,21 @@ _FLAT = 1e-10  # square of a direction's part along an axis below which it count
 def enter(
     sight: Any, ways: Any, origins: Any, k: Any, column: Any, row: Any, rays_x: Any, rays_y: Any, reach: Any
 ) -> Any:
-    """Write a fan down.
+    """Start a packet.
 
     Args:
-        sight: What rays meet (`kiks.engine.sensing.rays`).
-        ways: float32 [`WAY_SIZE` each].
-        origins: int64, one each.
-        k: Number of the fan.
-        column: Where its rays begin [cells].
-        row: Where its rays begin [cells].
+        sight: The arena as rays see it (`kiks.engine.sensing.rays`).
+        ways: float32 [`WAY_SIZE` per packet].
+        origins: int64, one per packet.
+        k: Index of the packet.
+        column: Origin of its rays [cells].
+        row: Origin of its rays [cells].
         rays_x: Directions, `Lanes`.
         rays_y: Directions, `Lanes`.
         reach: Longest length of a ray [cells].
     """
     field = sight[0]
-    # Who is out of the arena is in the wall around it, a cell from its edge, so that no look-up leaves the raster.
+    # An origin outside the arena counts as in the wall around it, a cell from its edge: no lookup leaves the raster.
     i = np.int64(min(max(1.0, column), field.shape[1] - 2.0))
     j = np.int64(min(max(1.0, row), field.shape[0] - 2.0))
     x, y = min(max(0.0, column - i), 1.0), min(max(0.0, row - j), 1.0)
@@ -86,11 +85,11 @@ def enter(
 
 @inlined
 def step(leaps: Any, origin: Any, ways: Any, way: Any, lengths: Any) -> Any:
-    """Return how long the rays of a fan are after one more step.
+    """Advance the rays of a packet by one step.
 
     Returns:
-        The lengths; numbers above 0 for rays that took it, 0 for those that are beyond their reach, and 1/2 less the
-        brightness of what they met for the others.
+        The new lengths; and for each ray a number above 0 if it goes on, 0 if it is beyond its reach, or 1/2 minus the
+        brightness of the wall that it hit.
     """
     columns = whole(ways[way + _REST] + lengths * load_narrow(ways, way + _DX))
     rows = whole(ways[way + _REST + 1] + lengths * load_narrow(ways, way + _DY))
@@ -105,7 +104,7 @@ def step(leaps: Any, origin: Any, ways: Any, way: Any, lengths: Any) -> Any:
 
 @kernel
 def follow(sight: Any, ways: Any, origins: Any, under_way: Any, count: Any) -> Any:
-    """Let the rays of fans go until each has met a wall or gone its reach; `under_way` is room for as many int64."""
+    """Step packets until each ray has hit a wall or its reach; `under_way` is scratch memory, int64 [packet]."""
     leaps = sight[2]
     for k in range(count):
         under_way[k] = k
@@ -125,16 +124,16 @@ def follow(sight: Any, ways: Any, origins: Any, under_way: Any, count: Any) -> A
 
 @inlined
 def meet_faces(sight: Any, ways: Any, origin: Any, way: Any, lengths: Any, shades: Any) -> Any:
-    """Return where rays that met a wall meet its surface, taken to be smooth, and how squarely.
+    """Return the hits of rays on the smooth surface of a wall.
 
     Returns:
-        Lengths of the rays [cells], at most a cell from those given, and cosines of the angles of incidence.
+        Lengths of the rays [cells], at most a cell from the given ones, and cosines of the angles of incidence.
     """
     dx, dy = load_narrow(ways, way + _DX), load_narrow(ways, way + _DY)
     before = lengths - 2.0 * _NUDGE
     x, y = ways[way + _REST] + before * dx, ways[way + _REST + 1] + before * dy
     columns, rows = whole(x), whole(y)
-    # What met nothing looks at where it began: a cell elsewhere would have to come from farther memory.
+    # A ray without a hit looks up its origin: another cell would cost a memory access.
     place_x, place_y = if_less(0.0, shades, columns, 0.0), if_less(0.0, shades, rows, 0.0)
     face_x, face_y, left = faces_at(sight[3], origin, place_x, place_y)
     squarely = face_x * dx + face_y * dy
@@ -152,7 +151,7 @@ def meet_faces(sight: Any, ways: Any, origin: Any, way: Any, lengths: Any, shade
 
 @inlined
 def met(sight: Any, has_faces: Any, ways: Any, origins: Any, k: Any) -> Any:
-    """Return what `cast_fan` does, of a fan that was followed."""
+    """Return the result of `cast_fan` for a packet that has ended."""
     way = k * WAY_SIZE
     ended = load_narrow(ways, way + _MET)
     shades = if_less(ended, 0.0, 0.5 - ended, 0.0)
@@ -165,19 +164,20 @@ def met(sight: Any, has_faces: Any, ways: Any, origins: Any, k: Any) -> Any:
 
 @kernel
 def cast_fan(sight: Any, has_faces: Any, column: Any, row: Any, rays_x: Any, rays_y: Any, reach: Any) -> Any:
-    """Follow the rays of one fan.
+    """Follow the rays of one packet.
 
     Args:
-        sight: What rays meet.
-        has_faces: Whether walls are to be smooth.
-        column: Where they begin [cells].
-        row: Where they begin [cells].
+        sight: The arena as rays see it.
+        has_faces: Whether walls have smooth surfaces.
+        column: Origin [cells].
+        row: Origin [cells].
         rays_x: Directions, `Lanes`.
         rays_y: Directions, `Lanes`.
         reach: Longest length followed [cells].
 
     Returns:
-        Lengths [cells], cosines of the angles of incidence, 1 without faces, and brightnesses, 0 for nothing, `Lanes`.
+        Lengths [cells], cosines of the angles of incidence (1 without surfaces), and brightnesses (0 for no hit),
+        `Lanes`.
     """
     ways, origins, under_way = stack_narrow(WAY_SIZE), stack_integers(1), stack_integers(1)
     enter(sight, ways, origins, 0, column, row, rays_x, rays_y, reach)
@@ -187,15 +187,15 @@ def cast_fan(sight: Any, has_faces: Any, column: Any, row: Any, rays_x: Any, ray
 
 @entry
 def cast_eight(sight: Any, column: Any, row: Any, directions: Any, reach: Any, out: Any) -> Any:
-    """Follow eight rays from Python as a proximity sensor does; all in cells.
+    """Follow eight rays as a proximity sensor does, for Python; all lengths in cells.
 
     Args:
-        sight: What rays meet.
-        column: Where they begin.
-        row: Where they begin.
+        sight: The arena as rays see it.
+        column: Origin.
+        row: Origin.
         directions: Cosines and sines, shape [2, 8].
         reach: Longest length followed.
-        out: Where lengths and brightnesses go, shape [2, 8].
+        out: Output: lengths and brightnesses, shape [2, 8].
     """
     lengths, _, brightnesses = cast_fan(sight, False, column, row, load(directions[0]), load(directions[1]), reach)
     store(out[0], lengths)

@@ -76,7 +76,7 @@ def cast(sight: Any, column: Any, row: Any, cosine: Any, sine: Any, reach: Any, 
     """Follow one ray.
 
     Args:
-        sight: What rays meet.
+        sight: The arena as rays see it.
         column: Origin [cells].
         row: Origin [cells].
         cosine: Direction.
@@ -117,7 +117,7 @@ def cast_many(sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, len
     Neighbours step together, one lane each, until the last of them has met its wall; a lane that has stays where it is.
 
     Args:
-        sight: What rays meet.
+        sight: The arena as rays see it.
         columns: Origins [cells], shape [rays].
         rows: Origins [cells], shape [rays].
         cosines: Directions, shape [rays].
@@ -165,14 +165,14 @@ def cast_many(sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, len
 
 @kernel
 def is_lit(sight: Any, seen: Any, seen_count: Any, x: Any, y: Any, lamp_x: Any, lamp_y: Any) -> Any:
-    """Say whether nothing stands between a place and a lamp [mm].
+    """Return whether nothing stands between a place and a lamp [mm].
 
     A lamp may hang over a wall or a thing, which hides nothing then.
 
     Args:
-        sight: What rays meet of the arena.
+        sight: The arena as rays see it.
         seen: Discs that may stand between (`kiks.engine.sensing.disc_rays`).
-        seen_count: How many they are.
+        seen_count: Number of discs.
         x: The place [mm].
         y: The place [mm].
         lamp_x: The lamp [mm].

@@ -1,18 +1,17 @@
-"""What a proximity sensor makes of its seven rays: the responses that a robot's file can name.
+"""The responses of proximity sensors: they map seven rays to counts. A robot's file names one.
 
-A response takes the length of each ray [mm], how squarely it met a surface (the cosine of the angle of incidence) and
-that one's brightness 1..255, 0 for nothing, and says how many counts above its baseline the sensor expects. Where the
-rays begin and go is the response's own, too (`kiks.engine.parameters`); baseline, noise and rounding are common to all
-and no part of it. The sensor's gain is a factor on the light where there is one, else on the counts.
+A response takes the length of each ray [mm], the cosine of its angle of incidence and the brightness of the surface
+(1..255, 0 for no hit), and returns the expected counts above the baseline. The rays' origins and directions belong to
+the response, too (`kiks.engine.parameters`); baseline, noise and rounding are common to all responses. The sensor's
+gain is a factor on the light if the response computes it, otherwise on the counts.
 
-* REFLECTION: the light that comes back along the rays, and the share of it above a threshold
-  (`kiks.model.robot.Reflection`).
+* REFLECTION: the light that returns along the rays, and its share above a threshold (`kiks.model.robot.Reflection`).
 * STANDIN: a formula in place of the lost table of KiKS 2.2.0 (kiks-behaviour.md 3.1.1).
 * THESIS, FAST: the thesis's networks, and its table made of them (`kiks.engine.sensing.thesis_networks`).
-* CURVE: counts against distance as measured, times reflectance, over rays that count less off the axis
+* CURVE: measured counts over distance, times reflectance, over rays that are weighted by their angle off the axis
   (khepera-protocol.md 8.6).
 
-A further one is a number here, a name in `kiks.model.robot.RESPONSES`, its kernel and a branch of `respond`.
+A new response needs a number here, a name in `kiks.model.robot.RESPONSES`, a kernel and a branch of `respond`.
 """
 
 from __future__ import annotations
@@ -39,19 +38,19 @@ _WEIGHTS = (0.35, 0.33, 0.69, 0.43, 0.69, 0.33, 0.35)  # kiks-behaviour.md 3.1.1
 
 @kernel
 def darkness(brightness: Any) -> Any:
-    """Return by how much a dark surface looks farther: black counts half of white (thesis 3.4)."""
+    """Return the weight of a surface's brightness: black counts half as much as white (thesis 3.4)."""
     return 0.5 + brightness * (0.5 / 255.0)
 
 
 @kernel
 def reflectance(brightness: Any) -> Any:
-    """Return the share of light that a surface sends back (`kiks.model.materials`), 0 for nothing."""
+    """Return the reflectance of a surface (`kiks.model.materials`), 0 for no hit."""
     return BLACK_REFLECTANCE + brightness * ((1.0 - BLACK_REFLECTANCE) / 255.0) if brightness > 0.0 else 0.0
 
 
 @kernel
 def ramp(share: Any, rounding: Any) -> Any:
-    """Return a share, 0 instead of a negative one, with a parabola between -rounding and +rounding."""
+    """Return the positive part of a number, with a parabola between -rounding and +rounding."""
     if share <= -rounding:
         return 0.0
     return share if share >= rounding else (share + rounding) * (share + rounding) / (4.0 * rounding)
@@ -59,7 +58,7 @@ def ramp(share: Any, rounding: Any) -> Any:
 
 @kernel
 def reflection_count(parameters: Any, sensor: Any, lengths_mm: Any, cosines: Any, brightnesses: Any) -> Any:
-    """Return the count for the light that comes back to a sensor; its rays are `Lanes`."""
+    """Return the count for the light that returns to a sensor; its rays are `Lanes`."""
     near = cosines / (lengths_mm + parameters.behind_mm)
     shares = BLACK_REFLECTANCE + brightnesses * ((1.0 - BLACK_REFLECTANCE) / 255.0)
     shares = where_less(0.0, brightnesses, shares, 0.0)
@@ -73,7 +72,7 @@ def reflection_count(parameters: Any, sensor: Any, lengths_mm: Any, cosines: Any
 
 @kernel
 def standin_count(range_mm: Any, lengths_mm: Any, brightnesses: Any) -> Any:
-    """Return the count of the stand-in; lengths are shares of the robot's own range."""
+    """Return the count of the stand-in; it uses lengths relative to the robot's range."""
     total, per_range = 0.0, 1.0 / range_mm
     for ray in range(RAY_COUNT):
         if brightnesses[ray] > 0.0:
@@ -95,7 +94,7 @@ def nearnesses(range_mm: Any, lengths_mm: Any, brightnesses: Any) -> Any:
 
 @kernel
 def curve_count(parameters: Any, sensor: Any, lengths_mm: Any, brightnesses: Any) -> Any:
-    """Return the count of a measured curve, whose values up to its range stand in the robot's record."""
+    """Return the count of a measured curve, whose values up to its range are in the robot's record."""
     total, points_per_mm = 0.0, (CURVE_POINT_COUNT - 1) / parameters.range_mm
     for ray in range(RAY_COUNT):
         place = min(max(0.0, lengths_mm[ray] * points_per_mm), CURVE_POINT_COUNT - 1.001)
@@ -108,7 +107,7 @@ def curve_count(parameters: Any, sensor: Any, lengths_mm: Any, brightnesses: Any
 
 @kernel
 def respond(networks: Any, parameters: Any, sensor: Any, lengths_mm: Any, cosines: Any, brightnesses: Any) -> Any:
-    """Return the counts above its baseline that a sensor expects, by its robot's response; the rays are `Lanes`."""
+    """Return the expected counts of a sensor above its baseline by its robot's response; the rays are `Lanes`."""
     if parameters.response == REFLECTION:
         return reflection_count(parameters, sensor, lengths_mm, cosines, brightnesses)
     gain = parameters.gain[sensor]
@@ -123,7 +122,7 @@ def respond(networks: Any, parameters: Any, sensor: Any, lengths_mm: Any, cosine
 
 @kernel
 def respond_one_by_one(parameters: Any, sensor: Any, lengths: Any, shades: Any) -> Any:
-    """Return the same, but for the gain, for the responses that take ray by ray."""
+    """Return the counts without the gain, for responses that take rays one by one."""
     lengths_mm, brightnesses = stack_floats(LANES), stack_floats(LANES)
     store(lengths_mm, lengths)
     store(brightnesses, shades)
@@ -134,13 +133,13 @@ def respond_one_by_one(parameters: Any, sensor: Any, lengths: Any, shades: Any) 
 
 @entry
 def respond_all(kinds: Any, lengths_mm: Any, cosines: Any, out: Any) -> Any:
-    """Write the counts above its baseline that a robot without networks expects of white surfaces.
+    """Write the expected counts above the baseline for white surfaces, for a robot without networks.
 
     Args:
         kinds: Records of `PARAMETERS`, shape [1].
-        lengths_mm: Of rays [mm], shape [samples, 8, 7].
-        cosines: Of the angles of incidence, 0 for a ray that meets nothing, shape [samples, 8, 7].
-        out: Shape [samples, 8].
+        lengths_mm: Lengths of rays [mm], shape [samples, 8, 7].
+        cosines: Cosines of the angles of incidence, 0 for a ray without a hit, shape [samples, 8, 7].
+        out: Output: counts, shape [samples, 8].
     """
     padded_mm, padded = stack_floats(LANES), stack_floats(LANES)
     padded_mm[RAY_COUNT], padded[RAY_COUNT] = 1.0, 0.0

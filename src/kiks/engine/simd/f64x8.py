@@ -72,7 +72,7 @@ def _splat(builder: Any, value: Any) -> Any:
 
 
 def are_lanes(*kinds: Any) -> bool:
-    """Say whether these types are `Lanes` and numbers, one of them at least `Lanes`."""
+    """Return whether these types are `Lanes` and numbers, one of them at least `Lanes`."""
     return all(isinstance(kind, Lanes | types.Number) for kind in kinds) and _LANES in kinds
 
 

@@ -159,7 +159,7 @@ def lane_count(typing: Any, condition: Any) -> Any:
 
 @_intrinsic
 def holds(typing: Any, condition: Any, lane: Any) -> Any:
-    """Say whether a condition holds in a lane."""
+    """Return whether a condition holds in a lane."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         if not isinstance(condition, Mask):
@@ -172,7 +172,7 @@ def holds(typing: Any, condition: Any, lane: Any) -> Any:
 
 @_intrinsic
 def has_bit(typing: Any, number: Any, bit: Any) -> Any:
-    """Say whether a bit is set in a float64 that holds a whole number, negative ones in two's complement."""
+    """Return whether a bit is set in a float64 that holds a whole number, negative ones in two's complement."""
     is_one = not isinstance(number, Lanes)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:

@@ -37,13 +37,13 @@ class _Timers:
         return f"after#kiks{self._count}"
 
     def cancel(self, name: str) -> bool:
-        """Forget one; say whether it was there."""
+        """Forget one; return whether it was there."""
         before = len(self._due)
         self._due = [entry for entry in self._due if f"after#kiks{entry[1]}" != name]
         return len(self._due) < before
 
     def run_due(self) -> bool:
-        """Call the first function that is due; say whether there was one."""
+        """Call the first function that is due; return whether there was one."""
         if not self._due or self._due[0][0] > self._host.scheduler.world.now_ns:
             return False
         _, _, widget, function, arguments = self._due.pop(0)
