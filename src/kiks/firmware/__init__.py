@@ -1,1 +1,1 @@
-"""The Khepera's mind: bytes in, bytes out. No sockets and no physics formulas."""
+"""The Khepera's firmware: bytes in, bytes out. No sockets and no physics formulas."""

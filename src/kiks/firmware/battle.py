@@ -15,13 +15,13 @@ from kiks.firmware.turret import Orders, Shape, Site, Turret, Values
 from kiks.units import NS_PER_S
 
 SHOT_POINTS = 5.0
-"""What a shot costs (kiks-behaviour.md 1.6)."""
+"""Cost of a shot (kiks-behaviour.md 1.6)."""
 
 HIT_POINTS = 10.0
-"""What a hit takes (kiks-behaviour.md 1.6)."""
+"""Loss by a hit (kiks-behaviour.md 1.6)."""
 
 POINTS_PER_S = 1.0
-"""What comes back (kiks-behaviour.md 1.6)."""
+"""Recovery (kiks-behaviour.md 1.6)."""
 
 DEGREES_PER_RAD = 57.29577951308232
 
@@ -62,26 +62,26 @@ def _sense(battle: Battle) -> Values:
 
 
 class Battle(Turret):
-    """A gun, a compass and a positioning system."""
+    """A turret with a gun, a compass and a positioning system."""
 
     number = 99
     name = "Battle"
     orders: ClassVar[Orders] = {"F": (0, _fire), "S": (0, _sense)}
 
     def fit(self, site: Site) -> None:
-        """Come to sit on a robot, full of energy."""
+        """Fit the turret to a robot, with full energy."""
         super().fit(site)
         self.energy = self.most
         site.record["battle_hits"] = 0
 
     @property
     def most(self) -> float:
-        """The most energy that the robot can have [points]."""
+        """Maximum energy of the robot [points]."""
         return self.site.spec.body.radius_mm
 
     @property
     def energy(self) -> float:
-        """What it has now [points]."""
+        """Present energy [points]."""
         record = self.site.record
         passed_ns = self.site.time_ns - int(record["battle_ns"])
         return min(float(record["battle_energy"]) + POINTS_PER_S * passed_ns / NS_PER_S, self.most)
@@ -91,11 +91,11 @@ class Battle(Turret):
         self.site.record["battle_energy"], self.site.record["battle_ns"] = points, self.site.time_ns
 
     def ahead_mm(self, distance_mm: float) -> int:
-        """Return how far something is from the robot's front that is this far from its centre [mm]."""
+        """Convert a distance from the robot's centre to one from its front [mm]."""
         return max(int(distance_mm - self.site.spec.body.radius_mm), 0)
 
     def shapes(self) -> Sequence[Shape]:
-        """Return a barrel, and a ring that gets darker as the energy goes."""
+        """Return a barrel, and a ring whose brightness shows the energy."""
         red = 60 + int(195.0 * self.energy / self.most)
         barrel = ((0.0, -3.0), (24.0, -3.0), (24.0, 3.0), (0.0, 3.0))
         return Shape(((0.0, 0.0),), f"#{red:02x}3030", 12.0), Shape(barrel, "#202020")

@@ -1,4 +1,4 @@
-"""The command table: one function a letter, whose first line is the command's entry in the reference.
+"""The command table: one function per letter; its first line is the command's entry in the reference.
 
 Source: khepera-protocol.md section 4. A function gets as many whole numbers as the table says and returns the values
 of its reply; the letter in lower case, the commas and the line end are put around them in one place.
@@ -21,11 +21,11 @@ _log = logging.getLogger("kiks.turrets")
 
 
 class ProtocolError(Exception):
-    """The parameters are not what the command takes: the robot answers `z,Protocol error`."""
+    """The parameters do not fit the command: the robot answers `z,Protocol error`."""
 
 
 class NoTurretError(Exception):
-    """No turret of that number is fitted: the robot answers `z,Turret order not supported`."""
+    """No turret with this number is fitted: the robot answers `z,Turret order not supported`."""
 
 
 @dataclass(frozen=True)
@@ -250,4 +250,4 @@ COMMANDS: tuple[Command, ...] = (
     ),
     Command("W", "write extension bus", ("data", "address"), (), "address 0..63, low 8 bits of data", write_bus),
 )
-"""All commands. The parameters of T are a command in themselves; `Firmware` takes them apart."""
+"""All commands. The parameters of T are a turret's order; `Firmware` parses them."""

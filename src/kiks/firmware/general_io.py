@@ -36,7 +36,7 @@ class GeneralIO(Turret):
 
     @property
     def outputs(self) -> int:
-        """What the program wrote last, a byte; 0 at the beginning and after a reset."""
+        """The last byte that the program wrote; 0 at the start and after a reset."""
         return int(self.site.record["bus"][ADDRESS])
 
     @property

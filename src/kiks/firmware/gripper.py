@@ -1,4 +1,4 @@
-"""The gripper, turret 1: what it answers to each order (khepera-protocol.md 10.2); what it does is in the engine.
+"""The gripper, turret 1: its answers to orders (khepera-protocol.md 10.2); its physics is in the engine.
 
 The notes leave open, and we chose: power on with the arm upright and the jaws open; the resistivity is 255 with nothing
 between the jaws, else as the brightness of what is there, which is all that KiKS knows of a material; the barrier is 0
@@ -79,7 +79,7 @@ class Gripper(Turret):
     }
 
     def fit(self, site: Site) -> None:
-        """Come to sit on a robot, upright and open."""
+        """Fit the gripper to a robot, upright and open."""
         super().fit(site)
         record = site.record
         record["has_gripper"] = 1

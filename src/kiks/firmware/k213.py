@@ -1,4 +1,4 @@
-"""The K213 linear camera, turret 2: what it answers to each order (khepera-protocol.md 10.3).
+"""The K213 linear camera, turret 2: its answers to orders (khepera-protocol.md 10.3).
 
 It takes pictures at times of its own, one in each reading period, and answers with the last one, however often it is
 asked: two answers between two instants are equal to the bit.
@@ -15,7 +15,7 @@ from kiks.engine.state import PIXEL_COUNT, ROBOT
 from kiks.firmware.turret import Orders, Shape, Turret
 
 NUMBER = 2
-"""Where K-Team put it among the turrets (khepera-protocol.md 10.1)."""
+"""Its turret number (khepera-protocol.md 10.1)."""
 
 PERIODS_NS = tuple(ms * 1_000_000 for ms in (200, 50, 100, 150, 250, 500, 1000, 5000))
 """Reading periods by the code of order U [ns]; code 0 is also that of the power-on."""
@@ -138,7 +138,7 @@ class K213(Turret):
 
     @property
     def taken_ns(self) -> int:
-        """When the last picture was taken [ns]."""
+        """Time of the last picture [ns]."""
         return int(self.record["camera_taken_ns"])
 
     @property

@@ -1,4 +1,4 @@
-"""The robot's program: a line comes in, a reply goes out; never an exception (khepera-protocol.md 3.2 to 3.4)."""
+"""The robot's firmware: a line comes in, a reply goes out; never an exception (khepera-protocol.md 3.2 to 3.4)."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ PROTOCOL_ERROR = b"z,Protocol error\r\n"
 NO_TURRET = b"z,Turret order not supported\r\n"
 
 DEMO_PERIOD_NS = 20_000_000
-"""How often the demonstration of mode 0 reads its sensors [ns]: once in a sensor round."""
+"""Period of the demonstration of mode 0 [ns]: one sensor round."""
 
 _NUMBER = re.compile(rb"[ \t]*([+-]?[0-9]+)[ \t]*")
 
 
 class Firmware(Robot):
-    """The program of one robot: it answers lines; for the arguments see `Robot`."""
+    """The firmware of one robot: it answers lines; for the arguments see `Robot`."""
 
     def __init__(
         self,

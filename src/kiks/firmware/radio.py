@@ -85,12 +85,12 @@ class Radio(Turret):
     orders: ClassVar[Orders] = {"F": (0, _read_status), "R": (0, _read_message), "S": (2 + DATA_LIMIT, _send)}
 
     def fit(self, site: Site) -> None:
-        """Come to sit on a robot, silent."""
+        """Fit the radio to a robot."""
         super().fit(site)
         self.reset()
 
     def reset(self) -> None:
-        """Forget what is on its way and what was received."""
+        """Drop the message on its way and the received one."""
         record = self.site.record
         for name in ("attempt", "has_failed", "to", "to_length", "to_data", "from", "from_length", "from_data"):
             record[f"radio_{name}"] = 0

@@ -52,7 +52,7 @@ class Robot:
         self.reset()
 
     def take(self, state: State) -> None:
-        """Take the arrays of a state for those of the robot; due again when they were replaced."""
+        """Use the arrays of a state; call again when they are replaced."""
         self.robots = state.robots
         # Writable views of this robot's fields: a field of one number has shape [1], the others keep their own.
         fields: dict[str, Any] = {}
@@ -62,7 +62,7 @@ class Robot:
         self.view = SimpleNamespace(**fields)
 
     def fit(self, turret: Turret) -> None:
-        """Take a turret on; one without a number answers no orders."""
+        """Add a turret; one without a number answers no orders."""
         self.fitted.append(turret)
         if turret.number >= 0:
             self.turrets[turret.number] = turret
@@ -70,7 +70,7 @@ class Robot:
     # ---- power ----
 
     def reset(self) -> None:
-        """Put all that the firmware holds to its default (khepera-protocol.md 6.7); the body stays where it is."""
+        """Reset the firmware to its defaults (khepera-protocol.md 6.7); the body stays where it is."""
         view, reset = self.view, self.spec.reset
         for name in ("target_pulses", "trajectory_pulses", "trajectory_speed", "error_sum", "last_error", "pwm"):
             getattr(view, name)[:] = 0
@@ -92,5 +92,5 @@ class Robot:
         return self.now_ns // SENSOR_SLOT_NS % 8
 
     def start_demo(self) -> None:
-        """Begin to avoid obstacles without a host (khepera-protocol.md 6.9)."""
+        """Start the demonstration that avoids obstacles without a host (khepera-protocol.md 6.9)."""
         self.demo_wakes_ns = self.now_ns

@@ -69,7 +69,7 @@ class Site(Protocol):
 
     @property
     def spec(self) -> RobotSpec:
-        """What kind of robot it is."""
+        """The robot's kind."""
 
     @property
     def record(self) -> Any:
@@ -85,14 +85,14 @@ class Site(Protocol):
 
     @property
     def lock(self) -> AbstractContextManager[Any]:
-        """To be held by whoever changes something from outside the simulation."""
+        """The lock of the simulation: hold it to change something from outside."""
 
     @property
     def time_ns(self) -> int:
         """The simulated time [ns]."""
 
     def pose(self) -> tuple[float, float, float]:
-        """Return where the robot is: x_mm, y_mm, heading_rad."""
+        """Return the robot's pose: x_mm, y_mm, heading_rad."""
 
     def ray(self, angle_rad: float = 0.0) -> Met:
         """Return what is in a direction, counter-clockwise from ahead."""
@@ -101,13 +101,13 @@ class Site(Protocol):
         """Return a number in [0, 1) that belongs to this seed, robot, turret, time (the present one) and index."""
 
     def poses(self) -> list[tuple[float, float, float]]:
-        """Return where all robots are, robot 1 first."""
+        """Return the poses of all robots, robot 1 first."""
 
     def bodies(self) -> Any:
         """Return the balls and cylinders, records of `kiks.engine.state.BODY`."""
 
     def held_body(self) -> Any:
-        """Return the record of what a gripper holds or has between its jaws, None for nothing."""
+        """Return the record of the body that a gripper holds or has between its jaws; None without one."""
 
     def turrets(self, kind: type[AnyTurret]) -> dict[int, AnyTurret]:
         """Return the turrets of a kind on all robots, by the robots' numbers, in rising order."""
@@ -147,11 +147,11 @@ class Turret:
     site: Site
 
     def fit(self, site: Site) -> None:
-        """Come to sit on a robot; the power is on."""
+        """Fit the turret to a robot; the power is on."""
         self.site = site
 
     def reset(self) -> None:
-        """Do what a reset of the robot does to the turret: nothing, unless a kind says otherwise."""
+        """React to a reset of the robot; by default do nothing."""
 
     def order(self, letter: str, values: Values) -> Values | None:
         """Carry out an order and return the values of its answer, None for an order it does not know."""
@@ -159,5 +159,5 @@ class Turret:
         return entry[1](self, *values) if entry is not None and len(values) == entry[0] else None
 
     def shapes(self) -> Sequence[Shape]:
-        """Return what to draw of it now."""
+        """Return its present drawing."""
         return ()

@@ -1,4 +1,4 @@
-"""A program in a process of its own; `programs.py` starts it by `python -m kiks.script.child_main`."""
+"""The process of a program; `ports/program_process.py` starts it by `python -m kiks.script.child_main`."""
 
 from __future__ import annotations
 
@@ -29,19 +29,19 @@ def main(
     Args:
         descriptor: The socket at whose other end the world is.
         is_late: Whether the world may have begun already.
-        thinking: What the program's computing costs.
-        record: File for the thinking times that were measured; none if empty.
-        offered: The port names that the program finds when it looks for ports.
+        thinking: The thinking policy.
+        record: File for the measured thinking times; empty for none.
+        offered: The port names that the program finds when it lists ports.
         program: The Python file.
         arguments: What it finds in `sys.argv` after its name.
     """
     if sys.platform == "linux":
-        # A program that never talks to the world would not notice that it has gone.
+        # A program that never sends a request would not notice that the world has gone.
         ctypes.CDLL(None).prctl(DIE_WITH_PARENT, signal.SIGKILL)
     if os.getpgrp() == os.getpid():
-        # Whoever started KiKS may have had Ctrl-C ignored; the desk interrupts a program by it.
+        # KiKS may have been started with Ctrl-C ignored, but the desk interrupts programs with it.
         signal.signal(signal.SIGINT, signal.default_int_handler)
-    # A process that the program starts has no business with the world.
+    # Processes that the program starts must not inherit the socket.
     os.set_inheritable(descriptor, False)
     connection = SocketConnection(socket.socket(fileno=descriptor), is_late=is_late)
     policy = ProgramClock(thinking)

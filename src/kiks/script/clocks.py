@@ -1,4 +1,4 @@
-"""The clocks of a program: `time` and `datetime` tell the robot's time, and waiting costs none of ours."""
+"""The clocks of a program: `time` and `datetime` tell simulated time, and sleeping takes no real time."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from kiks.sim.port import VirtualPort
 from kiks.units import NS_PER_S
 
 CALENDARS = frozenset(getattr(time, name) for name in ("CLOCK_REALTIME", "CLOCK_TAI") if hasattr(time, name))
-"""Clocks of `time.clock_gettime` that tell the date; the others tell how long the program has been running."""
+"""Clocks of `time.clock_gettime` that tell the date; the others tell the time since the program's start."""
 
 SHORTEST_S = 1e-9
-"""Shortest sleep [s]: what floating-point numbers leave of one may be less, and time goes on nevertheless."""
+"""Shortest sleep [s]: rounding may leave less of a wait, and time must pass nevertheless."""
 
 
 def replacements(scheduler: Scheduler, clock: VirtualPort) -> dict[str, dict[str, Any]]:
-    """Return what stands in for names of `time` and `datetime`, by module.
+    """Return the replacements for names of `time` and `datetime`, by module.
 
     Args:
         scheduler: The program's threads.
@@ -74,7 +74,7 @@ def replacements(scheduler: Scheduler, clock: VirtualPort) -> dict[str, dict[str
         functions[name] = of_now(name)
 
     def deadline_time(*_: object) -> float:
-        """Return the time [s] to a library that waits up to a time-out: a program that waits so asks for nothing."""
+        """Return the time [s] to a library that waits with a timeout; the program does not poll the time here."""
         scheduler.poll()
         return scheduler.world.now_ns / NS_PER_S
 
@@ -91,7 +91,7 @@ def replacements(scheduler: Scheduler, clock: VirtualPort) -> dict[str, dict[str
         "time": simulated,
         "sched.scheduler": {"__init__": begin},
         "queue": {"time": deadline_time},
-        # `relativeCreated` of a log counts from here.
+        # Start of `relativeCreated` of log records.
         "logging": {"_startTime": float(EPOCH_S)},
         "threading": {"_time": deadline_time},
         "asyncio.base_events.BaseEventLoop": {"time": deadline_time},
@@ -101,7 +101,7 @@ def replacements(scheduler: Scheduler, clock: VirtualPort) -> dict[str, dict[str
 
 
 def _here(scheduler: Scheduler, function: Callable[..., Any], original: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function for the program's threads; others of this process, such as a server's, keep the original."""
+    """Return a function for the program's threads; other threads of this process get the original."""
 
     def choose(*given: Any) -> Any:
         return (function if scheduler.is_here else original)(*given)
@@ -111,10 +111,10 @@ def _here(scheduler: Scheduler, function: Callable[..., Any], original: Callable
 
 
 def _dates(calendar_ns: Callable[[], int]) -> dict[str, type]:
-    """Return `datetime` and `date` whose present is simulated; dates made before are of the same type to them."""
+    """Return `datetime` and `date` whose present is simulated; older objects count as instances of them."""
 
     class Kind(type):
-        """What makes a class with the same members as the one that it stands in for."""
+        """Metaclass of a class that has the same instances as the class that it replaces."""
 
         def __instancecheck__(cls, instance: object) -> bool:
             return isinstance(instance, cls.__bases__[0])

@@ -1,4 +1,4 @@
-"""What asyncio keeps for each thread, kept for each of the program's; and the order of what it keeps in sets."""
+"""The values that asyncio keeps per thread, for the program's threads, and a repeatable order of its sets."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from kiks.script.thread_scheduler import Scheduler
 
 
 def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
-    """Return what stands in for names of `asyncio` and `concurrent.futures`, by module.
+    """Return the replacements for names of `asyncio` and `concurrent.futures`, by module.
 
     Args:
-        scheduler: The program's threads; each has a running loop of its own from now on.
+        scheduler: The program's threads; each gets a running loop of its own.
     """
     scheduler.carried.append((asyncio._get_running_loop, asyncio._set_running_loop))
 
     class Local(local):
-        """Which loop each thread has."""
+        """The loop of each thread."""
 
         _loop = None
         _set_called = False
 
-    # `wait` and `as_completed` go through a set, whose order must not depend on where in memory a future lies.
+    # `wait` and `as_completed` iterate over sets, whose order must not depend on memory addresses of futures.
     numbers: Iterator[int] = count()
 
     class Task(asyncio.Task):  # type: ignore[type-arg]

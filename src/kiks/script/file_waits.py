@@ -1,7 +1,7 @@
-"""PollCost for several files at once, simulated ports among them: `select`, `selectors`, and so the loops of asyncio.
+"""Waiting for several files at once, simulated ports among them: `select`, `selectors`, and so asyncio's event loops.
 
-A port is ready to be read when a character has arrived, and always ready to be written. What belongs to this computer,
-such as a pipe between two threads, is asked in real time, and simulated time passes only while none of it is ready.
+A port is readable when a character has arrived, and always writable. Real files, such as a pipe between two threads,
+are polled in real time, and simulated time passes only while none of them is ready.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from kiks.script.thread_scheduler import Scheduler, timeout_ns
 from kiks.sim.read_completion import NEVER_NS, Read
 
 BLOCK_MS = 50
-"""How long a wait in real time lasts before signals are looked at [ms]."""
+"""Longest wait in real time between two checks for signals [ms]."""
 
 READ, WRITE = select.POLLIN, select.POLLOUT
 
@@ -26,15 +26,15 @@ _real_poll, _real_read, _real_write = select.poll, os.read, os.write
 
 
 class RealFiles:
-    """What threads wait for outside of the simulation."""
+    """The real files that threads wait for."""
 
     def ready(self, wanted: Mapping[int, int], *, block: bool) -> set[int]:
-        """Return the descriptors at which something has happened; see `scheduler.Files`."""
+        """Return the descriptors with an event; see `thread_scheduler.Files`."""
         return set(poll_files(wanted, None if block else 0))
 
 
 def poll_files(wanted: Mapping[int, int], timeout_ms: int | None) -> dict[int, int]:
-    """Return what has happened to files of this computer, by descriptor; wait in real time up to a time [ms]."""
+    """Return the events of real files by descriptor; wait in real time up to a timeout [ms]."""
     poll = _real_poll()
     for descriptor, events in wanted.items():
         poll.register(descriptor, events)
@@ -45,7 +45,7 @@ def poll_files(wanted: Mapping[int, int], timeout_ms: int | None) -> dict[int, i
 
 
 class OpenPorts:
-    """The simulated ports that have a file descriptor, and what may be done with that.
+    """The simulated ports that have a file descriptor.
 
     Args:
         scheduler: The program's threads.
@@ -53,28 +53,28 @@ class OpenPorts:
 
     def __init__(self, scheduler: Scheduler) -> None:
         self._scheduler = scheduler
-        # By descriptor: the line, and the port of `serial` that has it.
+        # By descriptor: the line, and its port of `serial`.
         self._ports: dict[int, tuple[SharedLine, Any]] = {}
 
     def add(self, line: SharedLine, port: Any) -> int:
-        """Return a file descriptor for a port: the end of a terminal, so that all may be asked what is asked of one."""
+        """Return a file descriptor for a port: the end of a terminal, which answers all requests to one."""
         other, descriptor = os.openpty()
         os.close(other)
         self._ports[descriptor] = line, port
         return descriptor
 
     def remove(self, descriptor: int) -> None:
-        """Close a descriptor; who waits for it goes on."""
+        """Close a descriptor; threads that wait for it go on."""
         line, _ = self._ports.pop(descriptor)
         line.cancel_read()
         os.close(descriptor)
 
     def wait(self, wanted: Mapping[int, int], timeout_s: float | None) -> dict[int, int]:
-        """Return what has happened, by descriptor; wait for it for some time [s], None: for ever.
+        """Return events by descriptor; wait for one.
 
         Args:
-            wanted: The events that are waited for, as `select.poll` has them, by descriptor.
-            timeout_s: How long.
+            wanted: The events of interest, as in `select.poll`, by descriptor.
+            timeout_s: Timeout [s]; None for ever.
         """
         scheduler = self._scheduler
         deadline_ns = NEVER_NS if timeout_s is None else scheduler.world.now_ns + timeout_ns(timeout_s)
@@ -110,10 +110,10 @@ class OpenPorts:
             found |= poll_files(files, 0)
         return found
 
-    # ---- what stands in for names of `select`, `selectors` and `os` ----
+    # ---- replacements for names of `select`, `selectors` and `os` ----
 
     def replacements(self) -> dict[str, dict[str, Any]]:
-        """Return what stands in for them, by module."""
+        """Return the replacements, by module."""
         ports = self
 
         class Poll:
@@ -202,7 +202,7 @@ class OpenPorts:
             if port is not None:
                 return _read_port(port[1], length)
             if ports._scheduler.is_here and ports._scheduler.tasks and os.get_blocking(descriptor):
-                # Another thread of the program may be the one that writes there.
+                # Another thread of the program may write there.
                 ports.wait({descriptor: READ}, None)
             return _real_read(descriptor, length)
 
@@ -222,7 +222,7 @@ class OpenPorts:
 
 
 def _read_port(port: Any, length: int) -> bytes:
-    """Return what has arrived, as a descriptor of a terminal has it: at least one character, however long it takes."""
+    """Read like a descriptor of a terminal: wait for at least one character, and return all that have arrived."""
     timeout, port.timeout = port.timeout, None
     try:
         first: bytes = port.read(1)
@@ -233,11 +233,11 @@ def _read_port(port: Any, length: int) -> bytes:
 
 
 def _descriptor(file: Any) -> int:
-    """Return a file's descriptor, as `select` finds it.
+    """Return a file's descriptor, like `select`.
 
     Raises:
-        ValueError: If it has none.
-        TypeError: If it is no file.
+        ValueError: If it is negative.
+        TypeError: If the object is no file.
     """
     descriptor = file if isinstance(file, int) else getattr(file, "fileno", lambda: None)()
     if not isinstance(descriptor, int):

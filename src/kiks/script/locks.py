@@ -1,4 +1,4 @@
-"""Locks and threads as `_thread` has them, for the threads of one program: all else of `threading` is made of these."""
+"""Locks and threads like those of `_thread`, for the threads of one program; `threading` builds on them."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ REAL_TYPES = (_thread.LockType, type(_thread.RLock()))
 
 
 ELSEWHERE_S = 0.001
-"""How often a thread that is none of the program's looks whether a lock is free [s]."""
+"""Period with which a thread that is not the program's polls a lock [s]."""
 
 
 LOCKS_IN_A_ROW = 1000
-"""How many free locks a thread may take before that costs what a question does."""
+"""Free locks that a thread may take before each costs as much as a poll."""
 
 
 class Lock:
-    """A lock; see `_thread.lock`. Who waits gets it in turn: to release it is to hand it over."""
+    """A lock; see `_thread.lock`. Threads get it in the order in which they began to wait: `release` hands it over."""
 
     scheduler: Scheduler
-    """Who lets threads wait; each program has a class of its own."""
+    """The scheduler; each program has a subclass with its own."""
 
     __slots__ = ("__weakref__", "_is_locked", "_waiters")
 
@@ -43,7 +43,7 @@ class Lock:
         self._waiters: deque[Task] | None = None
 
     def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:
-        """Take the lock; return whether that went."""
+        """Acquire the lock; return whether it was acquired."""
         if not self._is_locked:
             if blocking and timeout != -1:
                 _check_timeout(timeout)
@@ -65,7 +65,7 @@ class Lock:
         return self._wait(until_ns)
 
     def release(self) -> None:
-        """Give it back, or to the one that has waited longest."""
+        """Release the lock, or hand it to the thread that has waited longest."""
         if not self._is_locked:
             raise RuntimeError("release unlocked lock")
         waiters = self._waiters
@@ -75,7 +75,7 @@ class Lock:
         self._is_locked = False
 
     def locked(self) -> bool:
-        """Return whether anybody has it."""
+        """Return whether a thread holds it."""
         if self.scheduler.is_here:
             self.scheduler.poll()
         return self._is_locked
@@ -94,7 +94,7 @@ class Lock:
             self._is_locked = False
 
     def _is_owned(self) -> bool:
-        """Return whether anybody has it; `threading.Condition` asks so, and would else try to take it."""
+        """Return whether a thread holds it; without this method `threading.Condition` would try to acquire it."""
         return self._is_locked
 
     def _at_fork_reinit(self) -> None:
@@ -104,7 +104,7 @@ class Lock:
         return f"<{'locked' if self._is_locked else 'unlocked'} lock object at {id(self):#x}>"
 
     def _spin(self) -> None:
-        """Let others go on: a thread that looks at what is behind a lock again and again waits for them."""
+        """Let other threads go on: a thread that checks a value behind a lock in a loop waits for them."""
         if self.scheduler.is_here:
             self.scheduler.lock_count = 0
             self.scheduler.ask()
@@ -134,7 +134,7 @@ class Lock:
         return cause is self
 
     def _wait_elsewhere(self, until_ns: int) -> bool:
-        """Wait in a thread of this process that is none of the program's, such as one of a library in C."""
+        """Wait in a thread of this process that is not the program's, such as one of a library in C."""
         while self.scheduler.world.now_ns < until_ns:
             if not self._is_locked:
                 self._is_locked = True
@@ -151,7 +151,7 @@ def _check_timeout(timeout: float) -> None:
 
 
 def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
-    """Return what stands in for names of `_thread`, `threading` and `queue`, by module."""
+    """Return the replacements for names of `_thread`, `threading` and `queue`, by module."""
     own_lock = type("lock", (Lock,), {"scheduler": scheduler, "__slots__": (), "__module__": "_thread"})
     real_ident = _thread.get_ident
 
@@ -207,11 +207,11 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
             "_set_sentinel": set_sentinel,
             "get_ident": get_ident,
             "local": local,
-            # The first thread of a program is Thread-1, whatever ran in this process before.
+            # The first thread of a program is Thread-1, even if other threads ran in this process before.
             "_counter": itertools.count(1).__next__,
         },
         "threading.Event": {"is_set": is_set},
-        # What executors are at work: those of this process are none of the program's.
+        # Running executors: those of this process are not the program's.
         concurrent.futures.thread.__name__: {"_shutdown": False, "_threads_queues": weakref.WeakKeyDictionary()},
         "queue": {"SimpleQueue": queue._PySimpleQueue},  # type: ignore[attr-defined]
         "_queue": {"SimpleQueue": queue._PySimpleQueue},  # type: ignore[attr-defined]

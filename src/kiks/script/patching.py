@@ -1,4 +1,4 @@
-"""Names of modules that mean something else while a program runs."""
+"""Replaces names of modules while a program runs."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ _SWEPT = sys.stdlib_module_names | {"serial"}
 def replaced(
     replacements: Mapping[str, Mapping[str, Any]], new_lock: Callable[[], object] | None = None
 ) -> Iterator[None]:
-    """Let names mean something else, also where modules of Python and of pyserial have taken them from others.
+    """Replace names, also where modules of Python and pyserial have imported them from others.
 
-    What KiKS has imported beside these keeps what it has: it lives in real time.
+    Other modules that KiKS has imported keep the originals, because they live in real time.
 
     Args:
-        replacements: What stands in for names, by module, or module and class.
-        new_lock: Makes a lock that stands in for those that modules have made when they were imported; None: they stay.
+        replacements: The new values, by module, or module and class, and name.
+        new_lock: Makes locks that replace those which modules have created at their import; None to keep them.
     """
     undo: list[tuple[Any, str, Any]] = []
 
@@ -31,7 +31,7 @@ def replaced(
         undo.append((owner, name, vars(owner).get(name, _MISSING)))
         setattr(owner, name, value)
 
-    # The originals are held, so that no other object has the same id.
+    # References to the originals, so that no other object gets the same id.
     named: list[tuple[Any, str, Any]] = []
     stands_for: dict[int, tuple[Any, Any]] = {}
     for path, names in replacements.items():
@@ -43,7 +43,7 @@ def replaced(
             continue
         for name, value in names.items():
             original = vars(owner).get(name)
-            # What a module has from another one is replaced there alone.
+            # A name that a module has imported is replaced only in its own module.
             if callable(original) and getattr(original, "__module__", None) == path:
                 stands_for[id(original)] = (original, value)
             named.append((owner, name, value))
@@ -61,7 +61,7 @@ def replaced(
     try:
         yield
     finally:
-        # What was imported meanwhile has taken what stood in.
+        # Modules imported meanwhile have imported replacements.
         originals = {id(value): original for original, value in stands_for.values()}
         for name in sys.modules.keys() - before:
             for attribute, value in list(vars(sys.modules[name]).items()):

@@ -1,4 +1,4 @@
-"""A whole Python program, unchanged: simulated robots behind its serial ports, simulated time for all its threads."""
+"""Runs a whole Python program, unchanged: simulated robots at its serial ports, simulated time for all its threads."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ def run_here(sim: Simulation, program: Path, arguments: list[str], told: dict[st
     Args:
         sim: The simulation behind its ports.
         program: The Python file.
-        arguments: What it finds in `sys.argv` after its name.
+        arguments: Its arguments in `sys.argv`.
         told: Robots by port name.
 
     Raises:
-        ParameterError: If `told` names a robot that is not there.
+        ParameterError: If `told` names a robot that does not exist.
     """
     from kiks.ports.port_names import PortNames
     from kiks.ports.url import find_port
@@ -68,11 +68,11 @@ def run_program(
 
     Args:
         program: The Python file.
-        arguments: What it finds in `sys.argv` after its name.
+        arguments: Its arguments in `sys.argv`.
         line_of: Returns the line of a robot, from 1; that of robot 1 tells the time.
         find: Returns the robot behind a port's name, or a port of another world.
-        policy: What the program's thinking and asking cost.
-        offered: The port names that it finds when it looks for ports.
+        policy: The cost of the program's thinking and polling.
+        offered: The port names that it finds when it lists ports.
     """
     world = line_of(1)
     scheduler = Scheduler(world, policy, RealFiles())
@@ -146,17 +146,17 @@ def _merged(*parts: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
 
 
 class _AtExit:
-    """What the program has done when it ends, such as stopping the robot: while there still is one."""
+    """The exit handlers of the program, such as one that stops the robot; they run while the robot still exists."""
 
     def __init__(self) -> None:
         self._calls: list[tuple[Callable[..., object], tuple[Any, ...], dict[str, Any]]] = []
 
     def replacements(self) -> dict[str, dict[str, Any]]:
-        """Return what stands in for names of `atexit`."""
+        """Return the replacements for names of `atexit`."""
         return {"atexit": {"register": self._register, "unregister": self._unregister}}
 
     def run(self) -> None:
-        """Do it, what came last first."""
+        """Run the handlers, the last one first."""
         while self._calls:
             call, args, kwargs = self._calls.pop()
             try:
@@ -190,7 +190,7 @@ def _run_file(program: Path) -> int:
 
 
 def _wait_for_threads(scheduler: Scheduler) -> None:
-    """Wait for the threads that the program has left, as Python does when its main thread ends."""
+    """Wait for the threads that still run, as Python does when its main thread ends."""
     for call in reversed(getattr(threading, "_threading_atexits", [])):
         call()
     while left := [each for each in threading.enumerate() if each.ident in scheduler.tasks and not each.daemon]:
@@ -199,7 +199,7 @@ def _wait_for_threads(scheduler: Scheduler) -> None:
 
 
 def _forget_threads(scheduler: Scheduler) -> None:
-    """Let Python not wait for threads that have not ended: they never go on."""
+    """Make Python forget threads that have not ended, because they never go on."""
     for ident, task in scheduler.tasks.items():
         thread = threading._active.pop(ident, None)  # type: ignore[attr-defined]
         threading._shutdown_locks.discard(task.sentinel)  # type: ignore[attr-defined]
@@ -213,7 +213,7 @@ def _complain(text: str) -> int:
 
 
 def _print_program_trace(error: BaseException) -> None:
-    """Show the program's own error as Python would, without the frames of KiKS and runpy above and below it."""
+    """Print the program's error like Python, without the frames of KiKS and runpy."""
     report = traceback.TracebackException.from_exception(error)
     chain: list[traceback.TracebackException | None] = [report]
     while chain:
@@ -226,7 +226,7 @@ def _print_program_trace(error: BaseException) -> None:
 
 
 def _print_thread_trace(what: Any, /) -> None:
-    """Show what has ended a thread; see `threading.excepthook`."""
+    """Print the exception that has ended a thread; see `threading.excepthook`."""
     if what.exc_type is not SystemExit:
         print(f"Exception in thread {what.thread.name}:", file=sys.stderr)
         _print_program_trace(what.exc_value)

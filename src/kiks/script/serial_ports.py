@@ -51,7 +51,7 @@ def replacements(
                 raise serial.SerialException(
                     errno.EWOULDBLOCK, f"Could not exclusively lock port {self.port}: it is open already"
                 )
-            # As on a real one, a program may open a port twice; characters go to whoever reads first.
+            # As with a real port, a program may open a port twice; the first read gets the characters.
             if not others:
                 super()._take(port)
             others.append(self)
@@ -92,10 +92,10 @@ def replacements(
                 line.cancel_read()
 
         def cancel_write(self) -> None:
-            """Do nothing: what was written is on the line."""
+            """Do nothing: written characters are on the line."""
 
         def nonblocking(self) -> None:
-            """Do nothing: who waits with `select` reads what is there."""
+            """Do nothing: reads do not block after `select`."""
 
     def serial_for_url(url: str, *args: Any, do_not_open: bool = False, **settings: Any) -> Serial:
         port = Serial(None, *args, **settings)
@@ -121,7 +121,7 @@ def replacements(
         return sorted({*real_iglob(pathname, **options), *more})
 
     def stat(path: Any, *args: Any, **options: Any) -> os.stat_result:
-        # A port is there for whoever asks, by `os.path` or `pathlib`, and is a device as any terminal is.
+        # `os.path` and `pathlib` find a port, which is a device like any terminal.
         return real_stat(os.devnull if is_offered(path) else path, *args, **options)
 
     def access(path: Any, *args: Any, **options: Any) -> bool:
@@ -136,6 +136,6 @@ def replacements(
         "serial.tools.list_ports": {"comports": comports},
         "glob": {"glob": simulated_glob, "iglob": lambda *args, **options: iter(simulated_glob(*args, **options))},
         "os": {"stat": stat, "access": access},
-        # `kiks.Khepera` and `kiks.kopen` find their ports by this one.
+        # `kiks.Khepera` and `kiks.kopen` find their ports by this function.
         urls.__name__: {"find_port": open_port},
     }

@@ -1,4 +1,4 @@
-"""A robot's line as the threads of a program use it: one that waits there lets the others go on."""
+"""A robot's line for the threads of a program: a thread that waits there lets the others go on."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class SharedLine:
         self._scheduler = scheduler
         self._readers: list[Task] = []
         self._what = f"robot {robot}"
-        # What passes through as it is.
+        # Methods of the line without a wait.
         self.think = line.think
         self.arrived_count = line.arrived_count
         self.sent_ns = line.sent_ns
@@ -79,7 +79,7 @@ class SharedLine:
         return self._wait(size, terminator, NEVER_NS if timeout_ns is None else line.now_ns + timeout_ns)
 
     def _wait(self, size: int | None, terminator: bytes | None, deadline_ns: int) -> bytes:
-        """Let other threads go on until a read is complete, or up to a time [ns]; return what it has read."""
+        """Let other threads go on until a read is complete, or up to a time [ns]; return the characters."""
         line, scheduler, task = self._line, self._scheduler, self._scheduler.current
         self._readers.append(task)
         try:
@@ -96,18 +96,18 @@ class SharedLine:
                 if cause is SIGNALLED:
                     continue
                 data += line.read(*read[1:], 0, 0)
-                # Another thread may have taken characters first: then the wait goes on.
+                # If another thread has taken characters first, the wait goes on.
                 if cause is not COMPLETE or len(data) == size or (terminator is not None and data.endswith(terminator)):
                     return data
         finally:
             self._readers.remove(task)
 
     def cancel_read(self) -> None:
-        """Let the threads go on that wait for characters; they get what has arrived."""
+        """Wake the threads that wait for characters; they get those that have arrived."""
         for task in self._readers:
             self._scheduler.wake(task, self)
 
     def hang_up(self) -> None:
-        """Give the line back and forget what nobody read."""
+        """Release the line and drop unread characters."""
         self.cancel_read()
         self._line.hang_up()

@@ -1,4 +1,4 @@
-"""Signals of a program: its main thread deals with them, as ever; and an alarm clock that rings in simulated time."""
+"""Signals of a program: its main thread handles them, as in Python; alarms ring in simulated time."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from kiks.sim.read_completion import NEVER_NS
 from kiks.units import s_from_ns
 
 EXIT_OF_SIGNAL = 128
-"""What a shell adds to the number of the signal that ended a program."""
+"""Offset of the exit code of a program that a signal has ended, as in a shell."""
 
 _HERE = os.path.dirname(kiks.__file__)
 _ROOT = Scheduler.start.__code__.co_filename
@@ -27,7 +27,7 @@ _real_signal, _real_getsignal, _real_wakeup = signal.signal, signal.getsignal, s
 
 
 class Signals:
-    """What the program does when a signal comes.
+    """The signal handlers and the alarm of a program.
 
     Args:
         scheduler: The program's threads.
@@ -36,15 +36,15 @@ class Signals:
     def __init__(self, scheduler: Scheduler) -> None:
         self._scheduler = scheduler
         self._handlers: dict[int, Any] = {}
-        # What there was before the program began.
+        # The handlers from before the program.
         self._before: dict[int, Any] = {}
         self._wakeup = -1
-        # Which setting of the alarm clock counts, when it rings [ns], and how often after that [ns].
+        # Number of the present alarm, its time [ns], and its interval [ns].
         self._alarm = (0, NEVER_NS, 0)
 
     @contextmanager
     def taken(self) -> Iterator[None]:
-        """Let signals that raise KeyboardInterrupt raise it in the program's main thread, not in whichever runs."""
+        """Let KeyboardInterrupt be raised in the program's main thread, not in the running thread."""
         if threading.current_thread() is not threading.main_thread():
             yield
             return
@@ -62,7 +62,7 @@ class Signals:
                 _real_signal(changed, handler)
 
     def replacements(self) -> dict[str, dict[str, Any]]:
-        """Return what stands in for names of `signal`."""
+        """Return the replacements for names of `signal`."""
         return {
             "signal": {
                 "signal": self._set,
@@ -75,7 +75,7 @@ class Signals:
             }
         }
 
-    # ---- what the program says ----
+    # ---- calls of the program ----
 
     def _set(self, number: int, handler: Any, /) -> Any:
         before = self._get(number)
@@ -114,10 +114,10 @@ class Signals:
         while self._scheduler.wait("a signal") is not SIGNALLED:
             pass
 
-    # ---- they come ----
+    # ---- delivery ----
 
     def _set_alarm(self, seconds: float, interval_s: float) -> tuple[float, float]:
-        """Set the alarm clock [s], 0: never; return what was left of the one before [s], and its interval [s]."""
+        """Set the alarm [s], 0: never; return the remaining time of the previous alarm [s], and its interval [s]."""
         before = self._get_timer(signal.ITIMER_REAL)
         number, world = self._alarm[0] + 1, self._scheduler.world
         self._alarm = number, NEVER_NS, 0
@@ -127,7 +127,7 @@ class Signals:
         return before
 
     def _ring(self, number: int) -> None:
-        """Wait for the alarm, in a thread of its own, and let it ring."""
+        """Wait for the alarm, in a thread of its own, and raise its signal."""
         while True:
             self._scheduler.sleep_until(self._alarm[1])
             if self._alarm[0] != number:
@@ -139,7 +139,7 @@ class Signals:
                 return
 
     def _raise(self, number: int) -> None:
-        """Let a signal come that this computer knows nothing of."""
+        """Deliver a simulated signal."""
         handler = self._get(number)
         if self._wakeup >= 0:
             with contextlib.suppress(OSError):
@@ -150,13 +150,13 @@ class Signals:
             self._scheduler.interrupt(partial(handler, number, None), at_once=False)
 
     def _come(self, number: int, frame: FrameType | None) -> None:
-        """Take a signal from the operating system, in whichever thread runs."""
+        """Handle a signal of the operating system, in the running thread."""
         handler = self._handlers.get(number, signal.default_int_handler)
         self._scheduler.interrupt(partial(handler, number, frame), at_once=_is_in_program(frame))
 
 
 def _is_in_program(frame: FrameType | None) -> bool:
-    """Return whether a thread runs the program's own code: it may be stopped there, but not in that of KiKS."""
+    """Return whether a thread runs the program's own code: a signal may preempt it there, but not in KiKS."""
     while frame is not None:
         name = frame.f_code.co_filename
         if name.startswith(_HERE):

@@ -1,10 +1,10 @@
-"""The threads of a program in simulated time: one runs at a time, and another only where it waits.
+"""The scheduler of a program's threads in simulated time: one thread runs until it waits.
 
-Need: the same program does the same again, to the bit, however the operating system would share out its threads.
-Method: each thread is a greenlet of one thread of the operating system. It runs until it waits: for a lock, a time,
-characters on a line, a file. Then the next one that is ready goes on, in the order in which they became ready. When
-none is ready, simulated time passes to the earliest instant at which one may go on; several at the same instant go on
-in the order in which they began to wait.
+The same program must give the same run, to the bit, however the operating system would schedule its threads. So each
+thread is a greenlet of one thread of the operating system. It runs until it waits: for a lock, a time, characters on a
+line, or a file. Then the next ready thread goes on, in the order in which the threads became ready. When none is ready,
+simulated time passes to the earliest instant at which one may go on. Threads of the same instant go on in the order in
+which they began to wait.
 """
 
 from __future__ import annotations
@@ -29,24 +29,25 @@ from kiks.sim.read_completion import NEVER_NS, Read
 from kiks.units import wait_ns
 
 TASK_IDENT = 1 << 20
-"""What `threading.get_ident` says in the first thread that a program starts."""
+"""`threading.get_ident` of the first thread that a program starts."""
 
 
 SIGNALLED, COMPLETE, ALONE, STUCK = object(), object(), object(), object()
-"""Why a thread goes on: a signal has come; a read is complete; nobody else can go on before its read is; nobody can."""
+"""Reasons for which a thread goes on: a signal; a complete read; no other thread can go on before its read is complete;
+no thread can go on at all."""
 
 _KEPT: list[Scheduler] = []
-"""Those with threads that never end: one that were collected while it waits would run its `finally` then."""
+"""Schedulers with threads that never end: a waiting thread without a reference would be collected and run `finally`."""
 
 
 class Files(Protocol):
-    """The files of this computer that threads wait for: pipes, sockets, the keyboard."""
+    """The real files that threads wait for: pipes, sockets, the keyboard."""
 
     def ready(self, wanted: Mapping[int, int], *, block: bool) -> set[int]:
-        """Return the descriptors at which something has happened; with `block`, wait in real time until it has.
+        """Return the descriptors with an event; with `block`, wait for one in real time.
 
         Args:
-            wanted: The events that are waited for, as `select.poll` has them, by descriptor.
+            wanted: The events of interest, as in `select.poll`, by descriptor.
             block: Whether to wait.
         """
 
@@ -55,10 +56,10 @@ class Task:
     """A thread of the program.
 
     Attributes:
-        ident: What `threading.get_ident` says in it.
-        waits_for: What it waits for, in words for a person; empty while it does not wait.
-        waiting: What its questions cost.
-        sentinel: A lock that is released when it ends; None if nobody has asked for it.
+        ident: Its `threading.get_ident`.
+        waits_for: What it waits for, for messages; empty while it does not wait.
+        waiting: The cost of its polls.
+        sentinel: A lock that is released when it ends; None if no thread has asked for it.
     """
 
     def __init__(self, ident: int, run: Callable[[], object], hub: greenlet.greenlet) -> None:
@@ -73,7 +74,7 @@ class Task:
 
 
 class EndedError(Exception):
-    """The program has ended, with an exit code and what is to be said of it."""
+    """The program has ended, with an exit code and a message."""
 
     def __init__(self, code: int, message: str) -> None:
         super().__init__(message)
@@ -82,18 +83,18 @@ class EndedError(Exception):
 
 
 class Scheduler:
-    """Who of a program's threads runs, and how far simulated time goes.
+    """Decides which thread of a program runs, and how far simulated time goes.
 
     Args:
         world: A line of the program's world, for its time.
-        program: What thinking and asking cost.
-        files: The files that threads wait for.
+        program: The cost of thinking and polling.
+        files: The real files that threads wait for.
 
     Attributes:
-        current: The thread that runs.
-        tasks: Those that have been started and have not ended, by ident.
-        lock_count: How many free locks the thread that runs has taken since it went on.
-        carried: How to take and to put back what libraries keep for each thread of the operating system.
+        current: The running thread.
+        tasks: Started threads that have not ended, by ident.
+        lock_count: Number of free locks that the running thread has taken since it went on.
+        carried: Functions that save and restore values that libraries keep per thread of the operating system.
     """
 
     def __init__(self, world: Line, program: ProgramClock, files: Files) -> None:
@@ -106,11 +107,11 @@ class Scheduler:
         self._end: EndedError | None = None
         self._idents = count(TASK_IDENT)
         self._numbers = count(1)
-        # What the main thread has to call, for signals, and whether it is being found out who goes on.
+        # Functions that the main thread must call, for signals, and whether the next thread is being chosen.
         self._calls: deque[Callable[[], object]] = deque()
         self._is_choosing = False
         self._ready: deque[Task] = deque()
-        # When a wait ends at the latest [ns], its number, and whose it is; those that have ended before stay in it.
+        # Deadlines of waits [ns], with their numbers and threads; waits that have ended before stay in the heap.
         self._deadlines: list[tuple[int, int, Task]] = []
         self._readers: dict[Task, Sequence[Read]] = {}
         self._watchers: dict[Task, Mapping[int, int]] = {}
@@ -120,10 +121,10 @@ class Scheduler:
         self._main = Task(get_ident(), lambda: None, self._hub)
         self.current = self._main
 
-    # ---- the program begins and ends ----
+    # ---- start and end ----
 
     def run(self, main: Callable[[], int]) -> int:
-        """Run a program's main thread to its end, and all others meanwhile; return what it returns.
+        """Run a program's main thread to its end, and all others meanwhile; return its result.
 
         Raises:
             EndedError: If `end` has been called.
@@ -150,10 +151,10 @@ class Scheduler:
         return codes[0]
 
     def end(self, code: int, message: str = "") -> NoReturn:
-        """End the program where it stands: none of its threads goes on."""
+        """End the program at once: none of its threads goes on."""
         self._end = EndedError(code, message)
         self._hub.switch()
-        raise self._end  # never reached: nobody switches back
+        raise self._end  # never reached: no greenlet switches back
 
     def start(self, function: Callable[..., object], arguments: tuple[Any, ...], keywords: dict[str, Any]) -> int:
         """Start a thread, which goes on when this one waits; return its ident."""
@@ -164,12 +165,12 @@ class Scheduler:
             except SystemExit:
                 pass
             except Exception:
-                # `threading` keeps what a thread raises; this is one of `_thread`, which complains so, too.
+                # `threading` handles exceptions of its threads; this is a thread of `_thread`, which prints them.
                 traceback.print_exc()
             if task.sentinel is not None and task.sentinel.locked():
                 task.sentinel.release()
             del self.tasks[task.ident]
-            # The next one goes on where this greenlet ends.
+            # When a greenlet ends, its parent goes on: the next thread.
             self._is_choosing = True
             task.greenlet.parent = self._choose().greenlet
             self._is_choosing = False
@@ -179,35 +180,35 @@ class Scheduler:
         self._ready.append(task)
         return task.ident
 
-    # ---- who asks ----
+    # ---- queries ----
 
     @property
     def is_here(self) -> bool:
-        """Return whether the program asks, not another thread of this process, such as a server's."""
+        """Whether the caller is a thread of the program, not another thread of this process, such as a server's."""
         return get_ident() == self._os_thread
 
     @property
     def is_main(self) -> bool:
-        """Return whether the program's main thread runs."""
+        """Whether the program's main thread runs."""
         return self.current is self._main
 
     @property
     def is_alone(self) -> bool:
-        """Return whether no other thread goes on before this one, unless this one does something for it."""
+        """Whether no other thread can go on before this one does something for it."""
         return not (self._ready or self._readers or self._watchers) and self._next_deadline_ns() == NEVER_NS
 
     @property
     def has_timed(self) -> bool:
-        """Return whether another thread waits for a time or a robot; any thread of the process may ask."""
+        """Whether another thread waits for a time or a robot; from any thread of the process."""
         deadlines = [task for _, number, task in list(self._deadlines) if task.waits_for and task.number == number]
         return bool(self._readers or deadlines)
 
     def poll(self) -> None:
-        """Let a question to other threads, such as for a lock, cost what it costs; they may go on."""
+        """Charge a poll of other threads, such as of a lock; they may go on."""
         self._pay(self.program.poll())
 
     def ask(self) -> None:
-        """Let a question cost what one for the time does; others may go on."""
+        """Charge a poll of the time; other threads may go on."""
         self._pay(self.program.ask())
 
     def _pay(self, cost_ns: int) -> None:
@@ -217,7 +218,7 @@ class Scheduler:
     # ---- waits ----
 
     def sleep_until(self, time_ns: int) -> None:
-        """Let time pass up to an instant [ns]; others go on meanwhile."""
+        """Let time pass up to an instant [ns]; other threads go on meanwhile."""
         if self._ready or self._readers or self._watchers or self._next_deadline_ns() <= time_ns:
             while self.wait("a time", until_ns=time_ns) is SIGNALLED:
                 pass
@@ -225,7 +226,7 @@ class Scheduler:
             self.world.pass_to(time_ns)
 
     def give_way(self) -> None:
-        """Let those go on that are ready, then this thread."""
+        """Let ready threads go on, then this thread."""
         if self._ready:
             task = self.current
             task.waits_for = "its turn"
@@ -242,20 +243,20 @@ class Scheduler:
         may_go_alone: bool = False,
         when_stuck: bool = False,
     ) -> object:
-        """Let other threads go on until this one is woken, a read is complete, a file is ready, or it is late enough.
+        """Let other threads go on until a wake, a complete read, a ready file, or the deadline.
 
         Args:
-            what: What is waited for, in words for a person.
-            until_ns: When the wait ends at the latest [ns].
+            what: The reason of the wait, for messages.
+            until_ns: The deadline [ns].
             reads: Reads that end the wait.
             files: Events that end it, by descriptor.
-            may_go_alone: Whether it ends, too, when no other thread can go on before a read is complete or it is late
-                enough: the thread then waits for that itself, at less cost.
-            when_stuck: Whether it ends when all threads would wait for ever: a person may still do something.
+            may_go_alone: Whether it also ends when no other thread can go on before a read is complete or the deadline
+                is over: the thread then waits for that itself, at less cost.
+            when_stuck: Whether it ends when all threads would wait for ever; a person may still act.
 
         Returns:
-            What `wake` was called with; `COMPLETE` if a read is complete; `ALONE`; `STUCK`; None if it is late enough,
-            or a file is ready; `SIGNALLED` if a signal came, and was dealt with, while the main thread waited.
+            The argument of `wake`; `COMPLETE` if a read is complete; `ALONE`; `STUCK`; None if the deadline is over or
+            a file is ready; `SIGNALLED` if a signal came, and was handled, while the main thread waited.
         """
         task = self.current
         task.waits_for = what
@@ -281,7 +282,7 @@ class Scheduler:
         return task.cause
 
     def wake(self, task: Task, cause: object) -> bool:
-        """Let a thread go on that waits; return whether it did."""
+        """Wake a waiting thread; return whether it waited."""
         if not task.waits_for:
             return False
         task.waits_for = ""
@@ -290,11 +291,11 @@ class Scheduler:
         return True
 
     def interrupt(self, call: Callable[[], object], *, at_once: bool) -> None:
-        """Let the main thread call a function: at once if it runs, else where it waits.
+        """Let the main thread call a function: at once if it runs, otherwise where it waits.
 
         Args:
-            call: What it calls; if that raises, so does what it waits in.
-            at_once: Whether the thread that runs may be stopped here for it.
+            call: The function; an exception in it is raised from the wait.
+            at_once: Whether it may preempt the running thread here.
         """
         if greenlet.getcurrent() is self._main.greenlet:
             call()
@@ -309,7 +310,7 @@ class Scheduler:
     # ---- inside ----
 
     def _go_on(self, task: Task) -> None:
-        """Let the next thread go on; come back when it is the turn of this one."""
+        """Let the next thread go on; return when it is this thread's turn."""
         self.program.act_count += 1
         self.lock_count = 0
         thinks = self.program.thinks
@@ -329,7 +330,7 @@ class Scheduler:
             self._calls.popleft()()
 
     def _choose(self) -> Task:
-        """Return the thread that goes on next; time passes until one may."""
+        """Return the next thread; let time pass until one is ready."""
         while not self._ready:
             self._pass_time()
         task = self._ready.popleft()
@@ -338,7 +339,7 @@ class Scheduler:
         return task
 
     def _next_deadline_ns(self) -> int:
-        """Return when the next wait ends by its time [ns]."""
+        """Return the next deadline of a wait [ns]."""
         deadlines = self._deadlines
         while deadlines:
             deadline_ns, number, task = deadlines[0]
@@ -377,7 +378,7 @@ class Scheduler:
                 return
             if not self._watchers:
                 self.end_stuck()
-            # Only the world outside can go on, and simulated time stands still meanwhile.
+            # Only a real file can wake a thread; simulated time stands still meanwhile.
             self._look_at_files(block=True)
 
     def _look_at_files(self, *, block: bool) -> bool:
@@ -392,7 +393,7 @@ class Scheduler:
         return bool(woken)
 
     def end_stuck(self) -> NoReturn:
-        """End the program: none of its threads can ever go on."""
+        """End the program, because none of its threads can ever go on."""
         self.current.waits_for = self.current.waits_for or "a robot that was asked nothing"
         waiting = ", ".join(
             f"{_name_of(task)} for {task.waits_for}" for task in (self._main, *self.tasks.values()) if task.waits_for
@@ -405,7 +406,7 @@ class Scheduler:
 
 
 def timeout_ns(seconds: float) -> int:
-    """Return a time-out [s] as a time [ns]: none for what is over, for ever for what is longer than any run."""
+    """Return a timeout [s] as a time [ns]: 0 if it is negative, for ever if it is longer than any run."""
     if seconds <= 0:
         return 0
     return wait_ns(seconds) if seconds <= SECONDS_MAX else NEVER_NS

@@ -1,8 +1,8 @@
-"""What simulated time does not reach: found where it begins, so that no program ends with a wrong number.
+"""Detects calls that leave simulated time, so that no program ends with a wrong result.
 
-Python tells of calls that leave the program by its audit events (PEP 578). Sockets, processes of Python and devices
-that a program opens by itself would live in real time: one line says so and names `kiks serve`. Other programs, such as
-one that says a word aloud, take no simulated time: whoever starts one waits for its end.
+Python reports calls that leave the program by audit events (PEP 578). Sockets, Python processes and devices that a
+program opens by itself would live in real time: the program ends with one line that names `kiks serve`. Other programs,
+such as one that plays a sound, take no simulated time: the program that starts one waits for its end.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from typing import Any
 from kiks.script.thread_scheduler import Scheduler
 
 ADVICE = "run it on kiks serve, where time is real."
-"""What a program may do that cannot live in simulated time."""
+"""Advice for a program that cannot run in simulated time."""
 
 OURS = (str(Path(__file__).parent.parent), os.path.dirname(os.__file__))
-"""Folders of what is none of the program's: KiKS, and Python's own library, but for what has been installed there."""
+"""Folders of foreign code: KiKS, and Python's own library without installed packages."""
 
 _SOCKETS = frozenset(f"socket.{name}" for name in ("connect", "bind", "sendto", "sendmsg", "getaddrinfo"))
 _FORKS = frozenset({"os.fork", "os.forkpty"})
@@ -40,7 +40,7 @@ _watching: list[Scheduler] = []
 
 
 def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
-    """Return what stands in for names of `subprocess` and `multiprocessing`, by module."""
+    """Return the replacements for names of `subprocess` and `multiprocessing`, by module."""
     real_poll = subprocess.Popen.poll
 
     def start(process: Any) -> None:
@@ -67,7 +67,7 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
 
 @contextmanager
 def watched(scheduler: Scheduler) -> Iterator[None]:
-    """End the program where it leaves what is simulated."""
+    """End the program where it leaves simulated time."""
     _hook.install()
     _watching.append(scheduler)
     try:
@@ -77,7 +77,7 @@ def watched(scheduler: Scheduler) -> Iterator[None]:
 
 
 class _Hook:
-    """The hook; Python has no way to take one out again."""
+    """The audit hook; Python cannot remove one."""
 
     is_installed = False
 

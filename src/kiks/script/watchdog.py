@@ -1,8 +1,8 @@
-"""A look from outside at the thread of the operating system that runs a program: is it stuck, or waits in real time?
+"""The watchdog: checks from outside whether the thread that runs a program is stuck or waits in real time.
 
-Code in C may wait by itself, and a loop may ask for nothing at all. Neither gives way to other threads, and simulated
-time stands still meanwhile. A thread of ours looks a few times a second, and ends the program with one line that names
-where it is. It never changes what a run does that ends well.
+Code in C may wait by itself, and a loop may never call into the simulation. Neither lets other threads go on, and
+simulated time stands still meanwhile. The watchdog samples the thread some times per second, and ends the program with
+one line that names the place. It never changes a run that ends normally.
 """
 
 from __future__ import annotations
@@ -25,25 +25,25 @@ from kiks.script.thread_scheduler import Scheduler
 from kiks.script.unsupported import ADVICE, where
 
 SAMPLE_S = 0.05
-"""How often the thread is looked at [s of real time]."""
+"""Period of the samples [s of real time]."""
 
 WAITING_SAMPLES = 5
-"""In how many looks it may wait by itself."""
+"""Samples in which the thread may wait by itself."""
 
 LOCKED_S = 10.0
-"""How long it may wait for a lock of a library [s of real time]: one that computes on all processors does so, too."""
+"""Longest wait for a lock of a library [s of real time]; a library that computes on all processors waits, too."""
 
 SPINNING_S = 30.0
-"""How long a thread may compute while others wait for a time or a robot [s of processor time]."""
+"""Longest computation of a thread while others wait for a time or a robot [s of processor time]."""
 
 WARNING_SHARE = 0.2
-"""Share of that after which a person is told."""
+"""Share of that time after which a warning is printed."""
 
 GRACE_S = 5.0
-"""How long code in C may go on before the process is ended from outside [s of real time]."""
+"""Time after which the process of a program that stays in code in C is killed [s of real time]."""
 
 _MAY_WAIT = ("<", str(Path(__file__).parent.parent), subprocess.__file__)
-"""Whose code may wait in real time: imports, KiKS, and what waits for other programs."""
+"""Code that may wait in real time: imports, KiKS, and waits for other programs."""
 
 _SIGNAL = signal.SIGRTMAX - 1
 
@@ -65,7 +65,7 @@ def watched(scheduler: Scheduler) -> Iterator[None]:
 
 
 class _Watch:
-    """The thread that looks.
+    """The watchdog's thread.
 
     Args:
         scheduler: The threads of the program.
@@ -82,12 +82,12 @@ class _Watch:
         self._cpu_s, self._now_s = time.process_time, time.monotonic
 
     def start(self) -> None:
-        """Begin to look."""
-        # Unknown to `threading`: a program may count its threads, and wait until there is but one.
-        start_new_thread(self._look_on, ())
+        """Start to sample."""
+        # Unknown to `threading`: a program may count its threads, and wait until only one is left.
+        start_new_thread(self._run, ())
 
     def stop(self) -> None:
-        """Look no more."""
+        """Stop sampling."""
         self._is_over.set()
         self._has_ended.wait()
 
@@ -96,13 +96,13 @@ class _Watch:
         if not self._is_over.is_set():
             self._scheduler.end(1, self._message)
 
-    def _look_on(self) -> None:
+    def _run(self) -> None:
         try:
-            self._look_again_and_again()
+            self._sample()
         finally:
             self._has_ended.set()
 
-    def _look_again_and_again(self) -> None:
+    def _sample(self) -> None:
         waits, last, has_warned = 0, -1, False
         active_cpu_s = locked_cpu_s = self._cpu_s()
         locked_s = self._now_s()
@@ -130,13 +130,13 @@ class _Watch:
                 return
             if not has_warned:
                 has_warned = True
-                # Not by `logging`, which would make this thread one of those that a program may count.
+                # Not by `logging`, which would add this thread to those that a program may count.
                 print(
                     f"kiks: the program has {what}. If it computes, that is right; else press Ctrl-C.", file=sys.stderr
                 )
 
     def _waits_for(self) -> str:
-        """Return whether the thread waits for a 'time' or file, or a 'lock', in code that is none of ours."""
+        """Return 'time' if the thread waits for a time or file in foreign code, 'lock' for a lock, else ''."""
         try:
             state = (self._folder / "stat").read_text().rpartition(")")[2].split()[0]
             if state != "S":
@@ -167,7 +167,7 @@ class _Watch:
         with suppress(OSError):
             signal.pthread_kill(self._watched, _SIGNAL)
         if not self._is_over.wait(GRACE_S):
-            # Code in C does not come back to Python.
+            # Code in C does not return to Python.
             sys.stdout.flush()
             print(f"kiks: {self._message}", file=sys.stderr, flush=True)
             os._exit(1)
