@@ -1,1 +1,1 @@
-"""Many worlds at once: what is asked of one robot on a wire, asked of ten thousand."""
+"""Batches: many worlds at once, with the same bits as one robot on a wire."""

@@ -33,34 +33,34 @@ from kiks.model.robot import SENSOR_COUNT, RobotSpec
 from kiks.units import NS_PER_S, ns_from_s
 
 BLOCKS_PER_THREAD = 4
-"""Pieces that the worlds are cut into for each thread: no thread waits long for the slowest."""
+"""Blocks of worlds per thread: no thread waits long for the slowest."""
 
 EVER = 2**62
 """More half loops, and later [ns], than anything."""
 
 STEP_BLOCK = 64
-"""Fewest worlds that a thread is woken for when all of them do a single step, which takes some microseconds each."""
+"""Fewest worlds per thread for a single step, which takes some microseconds per world."""
 
 
 class Batch:
-    """Worlds of the same make, each with its own seed, start poses, robots and controllers.
+    """Worlds with the same shape, each with its own seed, start poses, robots and controllers.
 
     World w with the seed s is, to the bit, a `kiks.Simulation` of that seed whose robots `kiks.drive` drives at the
     pace of `timing`: the same readings, the same poses, the same hash.
 
     Args:
-        arena: Where they are: one arena for all worlds, or several, which the worlds take in turn. They must hold the
-            same number of balls and cylinders.
-        worlds: How many worlds.
-        robot: What the robots are: a kind for all, or one for each world (a family of robots that differ), or, with
-            several robots, lists of them; names of robot files or `kiks.RobotSpec`.
-        robots: How many robots are in each world.
-        seed: Seed of world 0, the next ones count up; or a seed for each, int64 [world].
-        starts: Where robots start: x_mm, y_mm, heading_rad, float64 [world, robot, 3] or anything that broadcasts to
-            it. Left out, they start where a simulation of the world's seed would put them.
-        senses: What `reset` and `step` return: 'proximity', 'ambient' or both. `run` goes by its controller.
-        measures: What is measured step by step: see `values`. `run` has its own.
-        timing: The pace of the loop that drives them.
+        arena: One arena for all worlds, or several, which the worlds take in turn. They must hold the same number of
+            balls and cylinders.
+        worlds: Number of worlds.
+        robot: Kind of the robots: one for all, or one for each world (a family of different robots), or, with several
+            robots, lists of them; names of robot files or `kiks.RobotSpec`.
+        robots: Number of robots in each world.
+        seed: Seed of world 0, and the others count up; or a seed for each, int64 [world].
+        starts: Start poses: x_mm, y_mm, heading_rad, float64 [world, robot, 3] or anything that broadcasts to it. Left
+            out, they are those of a simulation with the world's seed.
+        senses: Readings that `reset` and `step` return: 'proximity', 'ambient' or both. `run` uses its controller's.
+        measures: Measures for step-by-step use: see `values`. `run` has its own.
+        timing: Timing of the control loop.
         response: Response of the proximity sensors, if not that of the robots' files.
         threads: How many threads; the number of cores if left out. Results do not depend on it.
 
@@ -251,7 +251,7 @@ class Batch:
         self._do_halves(1, 3)
         return self._sensors.copy()
 
-    # ---- what there is ----
+    # ---- state ----
 
     @property
     def lamps(self) -> NDArray[np.float64]:
@@ -270,18 +270,18 @@ class Batch:
 
     @property
     def times_s(self) -> NDArray[np.float64]:
-        """When the present loop of each world began [s], float64 [world]."""
+        """Start time of the present loop of each world [s], float64 [world]."""
         return self._begins_ns / NS_PER_S
 
     @property
     def poses(self) -> NDArray[np.float64]:
-        """Where robots were at the end of the last tick, float64 [world, robot, 3]: x_mm, y_mm, heading_rad."""
+        """Poses of robots at the end of the last tick, float64 [world, robot, 3]: x_mm, y_mm, heading_rad."""
         robots = self.state.robots
         return np.stack([robots["x_mm"], robots["y_mm"], robots["heading_rad"]], axis=-1)
 
     @property
     def values(self) -> NDArray[np.float64]:
-        """What the measures say of the steps that were done, float64 [world, robot, measure]."""
+        """Values of the measures after the steps so far, float64 [world, robot, measure]."""
         return self._watching.values(self.notes)
 
     def state_hash(self, world: int) -> str:
@@ -300,7 +300,7 @@ class Batch:
     # ---- inside ----
 
     def _begin_again(self, chosen: NDArray[np.int64]) -> None:
-        """Put worlds back to their beginning."""
+        """Reset worlds to their initial state."""
         self._beginning.put_back(self.state, chosen, self._starts[chosen])
         for count in (self._ticks, self._begins_ns, self._watched_ns, self._sensed_ns, self._steps):
             count[chosen] = 0
@@ -328,7 +328,7 @@ class Batch:
         )
 
     def _do_halves(self, first: int, end: int, chosen: NDArray[np.int64] | None = None) -> None:
-        """Do halves of loops with the speeds that are given: even ones sense, odd ones act."""
+        """Do halves of loops with given speeds: even ones sense, odd ones act."""
         watchers = self._watching.watchers
         self._on_all_cores(
             self._worlds(), self.senses, (first, end), EVER, 0, watchers, chosen=chosen, least=STEP_BLOCK
@@ -365,7 +365,7 @@ class Batch:
         return ThreadPoolExecutor(self.threads)
 
     def _blocks(self, chosen: NDArray[np.int64], least: int) -> Iterator[tuple[Any, NDArray[np.int64]]]:
-        """Cut worlds into blocks, each of one arena."""
+        """Divide worlds into blocks, each of one arena."""
         length = max(-(-len(chosen) // (self.threads * BLOCKS_PER_THREAD)), least)
         length = -(-length // LANES) * LANES  # all lanes of the processor have a world
         for index, arena in enumerate(self.arenas):

@@ -1,4 +1,4 @@
-"""How the worlds of a batch begin: as simulations of their seeds would."""
+"""The initial state of the worlds of a batch: that of simulations with their seeds."""
 
 from __future__ import annotations
 
@@ -45,9 +45,9 @@ class Beginning:
 
     Args:
         arena: One arena, or several that the worlds take in turn.
-        worlds: How many worlds.
-        robot: What the robots are; see `kiks.Batch`.
-        robots: How many are in each world.
+        worlds: Number of worlds.
+        robot: Kind of the robots; see `kiks.Batch`.
+        robots: Number of robots in each world.
         response: Response of the proximity sensors, if not that of the robots' files.
 
     Attributes:
@@ -174,7 +174,7 @@ class Beginning:
         return poses
 
     def put_back(self, state: State, worlds: NDArray[np.int64], starts: NDArray[np.float64]) -> None:
-        """Put worlds of a state back to their beginning.
+        """Reset worlds of a state to their initial state.
 
         Args:
             state: The state; changed in place.

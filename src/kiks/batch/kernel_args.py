@@ -1,4 +1,4 @@
-"""What the kernels of a batch see: all its worlds, and the place that a block of them is in."""
+"""The arguments of a batch's kernels: all its worlds, and the place of a block of them."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ Worlds: Any = namedtuple(
 """
 
 Together: Any = namedtuple("Together", ("ground", "sight", "networks", "line", "sense_codes"))
-"""Where a block of worlds is, and that each holds several things that may meet.
+"""The place of a block of worlds in which things may collide.
 
 * ground, sight: the walls as contact and as rays see them (`kiks.sim.world`);
 * networks: what responses of the sensors need (`kiks.engine.sensing.thesis_networks`);
@@ -50,7 +50,7 @@ Together: Any = namedtuple("Together", ("ground", "sight", "networks", "line", "
 """
 
 Alone: Any = namedtuple("Alone", ("ground", "sight", "networks", "line", "sense_codes"))
-"""The same for worlds of one robot each and nothing else that moves."""
+"""The place of a block of worlds with one robot each and nothing else that moves."""
 
 PROXIMITY, AMBIENT = 0, 1
 """Senses in the order of `kiks.control.controller.SENSES`."""

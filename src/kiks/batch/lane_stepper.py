@@ -41,7 +41,7 @@ def take(place: Any, worlds: Any, numbers: Any) -> Any:
 
 @kernel
 def give_back(place: Any, worlds: Any, bunch: Any) -> Any:
-    """Copy the robots back; a world that fills up the bunch is written again, as it was."""
+    """Copy the robots back; a padding world is written unchanged."""
     numbers, eight = bunch[0], bunch[1]
     for k in range(LANES - 1, -1, -1):
         store_lane(eight[0], k, worlds.scene[0][numbers[k], 0])
@@ -84,7 +84,7 @@ def command(place: Any, bunch: Any, k: Any, robot: Any, left: Any, right: Any) -
 
 @kernel
 def show(place: Any, worlds: Any, bunch: Any, k: Any, robot: Any, state: Any) -> Any:
-    """Write where a robot is and has been."""
+    """Write the present and past poses of a robot."""
     numbers, eight = bunch[0], bunch[1]
     one, record = one_of(open_record8(eight[0]), k), worlds.scene[0][numbers[k], 0]
     state[0], state[1], state[2] = one.x_mm, one.y_mm, one.heading_rad

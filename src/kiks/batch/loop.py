@@ -1,7 +1,7 @@
-"""The loop of a batch: sense, decide, act, watch, wait; for a bunch of worlds at once, again and again.
+"""The control loop of a batch: sense, decide, act, measure, wait; for a bunch of worlds at once.
 
-The instants of a loop are those of a program on serial lines (`kiks.batch.loop_timing`). At each of them the same
-happens as in a `kiks.Simulation`: the ticks that have begun are done, then the robot reads or obeys.
+The instants of a loop are those of a program on serial lines (`kiks.batch.loop_timing`). At each of them the batch acts
+like a `kiks.Simulation`: it does the ticks that have begun, then the robot reads its sensors or executes a command.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ def length_for(wheels: Any, world: Any, robot: Any) -> Any:
 
 @kernel
 def in_turn(wheels: Any, world: Any, turn: Any) -> Any:
-    """Return the robot of a world before whose command so many are shorter; of equal ones the first comes first."""
+    """Return the index of the robot with the `turn`-th shortest command; ties by index."""
     robot_count = wheels.shape[1]
     if robot_count > 1:
         for robot in range(robot_count):
@@ -127,7 +127,7 @@ def in_turn(wheels: Any, world: Any, turn: Any) -> Any:
 
 @spliced
 def bunch_up(block: Any, first: Any, numbers: Any, is_on: Any) -> Any:
-    """Choose the worlds of the next bunch; one that is not full repeats its last world, which then takes no part."""
+    """Choose the worlds of the next bunch; an incomplete bunch is padded with its last world, which is masked."""
     for k in range(numbers.shape[0]):
         numbers[k] = block[min(first + k, block.shape[0] - 1)]
         is_on[k] = first + k < block.shape[0]
@@ -135,7 +135,7 @@ def bunch_up(block: Any, first: Any, numbers: Any, is_on: Any) -> Any:
 
 @spliced
 def goes_on(worlds: Any, numbers: Any, is_on: Any, until_ns: Any) -> Any:
-    """Let only those worlds of a bunch take part whose next loop begins before a time [ns]; return whether one does."""
+    """Mask the worlds of a bunch whose next loop begins at or after a time [ns]; return whether any is left."""
     left = 0
     for k in range(numbers.shape[0]):
         is_on[k] = is_on[k] and worlds.begins_ns[numbers[k]] < until_ns
@@ -147,7 +147,7 @@ def goes_on(worlds: Any, numbers: Any, is_on: Any, until_ns: Any) -> Any:
 def look_on(
     place: Any, worlds: Any, bunch: Any, numbers: Any, is_on: Any, times_ns: Any, state: Any, watchers: Any
 ) -> Any:
-    """Let the measures look at the robots of a bunch.
+    """Call the measures for the robots of a bunch.
 
     Args:
         place: Where the worlds are; this and the next ones as for `act`.

@@ -21,7 +21,7 @@ from kiks.model.robot import RobotSpec
 from kiks.units import character_ns, ns_from_s
 
 Line: Any = namedtuple("Line", ("character_ns", "processing_ns", "think_ns", "period_ns", "done_length"))
-"""What kernels know of it: times [ns], and the characters of the reply to D."""
+"""The timing for kernels: times [ns], and the characters of the reply to D."""
 
 Baud = Annotated[Whole, Field(ge=110, le=10_000_000, description="The Khepera knows 9600, 19200, 38400 and 57600.")]
 
@@ -71,7 +71,7 @@ class Timing:
 
 @kernel
 def digit_count(number: Any) -> Any:
-    """Return how many characters a whole number of at most four digits takes, with its sign."""
+    """Return the number of characters of a whole number of at most four digits, with its sign."""
     size = abs(number)
     return 1 + (size >= 10) + (size >= 100) + (size >= 1000) + (number < 0)
 

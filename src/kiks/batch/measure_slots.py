@@ -1,4 +1,4 @@
-"""Measures side by side: where each keeps its notes, and what they say in the end."""
+"""The notes of several measures, and their values."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class MeasureSlots:
 
     Args:
         measures: The measures.
-        senses: What those robots sense.
-        who: Who senses that, for the message.
+        senses: Senses of these robots.
+        who: The subject of messages: the object that senses.
 
     Attributes:
         measures: The measures.

@@ -1,4 +1,4 @@
-"""What came of a batch, and the table that shows it."""
+"""The results of a batch, and their table."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from kiks.errors import counted
 
 FIRST = 10
-"""How many robots a table shows before it sums up the others."""
+"""Number of robots that a table shows before it summarizes the others."""
 
 DIGITS = 4
 """Digits that a number has in a table, at least."""
@@ -86,7 +86,7 @@ class Rollouts:
         return [*index_names, "steps", *self.measures], rows, sums
 
     def _left_out(self) -> str:
-        """Say how many robots the table leaves out."""
+        """Return as text how many robots the table leaves out."""
         count = self.values.shape[0] * self.values.shape[1] - FIRST
         return f"{count} more" if count > 0 else ""
 
@@ -99,7 +99,7 @@ def _column(numbers: NDArray[np.float64]) -> tuple[list[str], list[str]]:
     places = max(DIGITS - 1 - (math.floor(math.log10(greatest)) if greatest else 0), 2)
     style = f".{places}f" if 1e-6 < greatest < 1e9 or not greatest else f".{DIGITS - 1}e"
     plain = ".0f" if is_whole and greatest < 1e9 else style
-    # Numbers that are none stay what they are, without a word from NumPy.
+    # NaN stays NaN, without a warning of NumPy.
     with np.errstate(all="ignore"):
         summed = [float(sum_up(numbers)) for _, sum_up in _SUMS]
     return (

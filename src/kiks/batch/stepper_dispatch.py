@@ -8,8 +8,8 @@ The type of `place` selects the steps: `kiks.batch.world_stepper` does one world
 * pass_to(place, worlds, bunch, times_ns) does the ticks that have begun up to a time of each world, int64 [W];
 * read(place, worlds, bunch, code, times_ns, robot, counts) reads a sense at these times into int64 [W, 8];
 * command(place, bunch, k, robot, left, right) sets the speeds of a robot in the bunch's world k;
-* show(place, worlds, bunch, k, robot, state) writes where it is and has been: what a `kiks.control.measure.Moment` has
-  from `x_mm` to `is_touching`, float64 [8].
+* show(place, worlds, bunch, k, robot, state) writes its present and past poses: the fields of a
+  `kiks.control.measure.Moment` from `x_mm` to `is_touching`, float64 [8].
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from kiks.engine.simd.f64x8 import LANES
 _overload: Any = extending.overload
 
 STEPS = {Together: world_stepper, Alone: lane_stepper}
-"""The modules whose steps these are, by the type of the place."""
+"""The modules of the steppers, by the type of the place."""
 
 
 def bunch_size(place: Any) -> int:
-    """Return how many worlds of a place are done at once."""
+    """Return the number of worlds in a bunch."""
     return LANES if isinstance(place, Alone) else 1
 
 
@@ -60,7 +60,7 @@ def command(place: Any, bunch: Any, k: Any, robot: Any, left: Any, right: Any) -
 
 
 def show(place: Any, worlds: Any, bunch: Any, k: Any, robot: Any, state: Any) -> Any:
-    """Write where a robot is and has been."""
+    """Write the present and past poses of a robot."""
 
 
 @_overload(take)

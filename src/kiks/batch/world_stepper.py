@@ -69,7 +69,7 @@ def command(place: Any, bunch: Any, k: Any, robot: Any, left: Any, right: Any) -
 
 @kernel
 def show(place: Any, worlds: Any, bunch: Any, k: Any, robot: Any, state: Any) -> Any:
-    """Write where a robot is and has been."""
+    """Write the present and past poses of a robot."""
     record = bunch[0][0][0, robot]
     state[0], state[1], state[2] = record.x_mm, record.y_mm, record.heading_rad
     state[3], state[4] = record.start_x_mm, record.start_y_mm

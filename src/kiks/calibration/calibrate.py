@@ -114,12 +114,12 @@ def calibrate(
 
     Args:
         robot: The robot.
-        placements: Who puts it where it has to be.
+        placements: Puts it where it has to be.
         base: The kind of robot that it is, for all that is not measured.
         baud: Speed of its line [bit/s].
         gaps_mm: Marked distances from wall to rim [mm], at least two; where it sees well if left out.
         run_up_mm: Marked gap from which it drives towards the wall [mm].
-        say: Takes a word on what is being done.
+        say: Called with a line of text about each step.
 
     Raises:
         ParameterError: If the gaps are not usable, or the response has directions of its own.

@@ -1,4 +1,4 @@
-"""Placements: who puts the robot where a measurement needs it, a person or, in a simulation, the program itself."""
+"""Placements: a person, or in a simulation the program itself, puts the robot where a measurement needs it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from kiks.sim.simulation import Simulation
 
 
 class Place(enum.Enum):
-    """Where a robot may have to stand."""
+    """Places for a measurement."""
 
     FREE = "free"
     WALL = "wall"
@@ -20,7 +20,7 @@ class Place(enum.Enum):
 
 @dataclass(frozen=True)
 class Instruction:
-    """What is to be done before a measurement.
+    """An instruction before a measurement.
 
     Attributes:
         place: In the open, or before a straight white wall, facing it.
@@ -34,13 +34,13 @@ class Instruction:
 
 
 class Placements(Protocol):
-    """Whoever carries out instructions."""
+    """Carries out instructions."""
 
     def place(self, instruction: Instruction) -> float:
-        """Put the robot there and return the gap that it really has [mm]."""
+        """Put the robot there and return its real gap [mm]."""
 
     def wants_repeat(self, finding: str, *, is_good: bool) -> bool:
-        """Show what was found; return True to do the placement and its measurement again."""
+        """Show a result; return True to repeat the placement and its measurement."""
 
 
 class SimPlacements:
@@ -76,7 +76,7 @@ class SimPlacements:
         return instruction.gap_mm
 
     def wants_repeat(self, finding: str, *, is_good: bool) -> bool:
-        """Return False: the same again would give the same again."""
+        """Return False: a repetition would give the same."""
         return False
 
     def _touching_mm(self, x_mm: float, free_mm: float) -> float:

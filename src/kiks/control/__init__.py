@@ -1,1 +1,1 @@
-"""What decides in a batch: controllers, from readings to speeds, and measures of how well they do."""
+"""Controllers, which map readings to speeds, and measures of their performance."""

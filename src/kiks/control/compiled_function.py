@@ -1,4 +1,4 @@
-"""A user's function, compiled: what controllers and measures have in common."""
+"""Compiled functions of the user: the common base of controllers and measures."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Compiled:
 
     Args:
         function: The function.
-        what: What it is called in messages.
+        what: Its name in messages.
         arguments: Names of the arguments that it is called with.
 
     Attributes:
@@ -52,7 +52,7 @@ class Compiled:
         self.kernel = kernel(function)
 
     def refused(self, error: Exception) -> ParameterError:
-        """Return what a person is told if Numba cannot compile it."""
+        """Return the message if Numba cannot compile it."""
         reasons = [line.strip() for line in str(error).splitlines() if line.strip()]
         reason = next((line for line in reasons if "Failed in" not in line), type(error).__name__)
         return ParameterError(
@@ -62,7 +62,7 @@ class Compiled:
 
 
 def address_of(function: Any, argument_types: tuple[Any, ...]) -> int:
-    """Return where the machine code of a kernel that returns nothing begins, for `caller_of`; good while it lives.
+    """Return the address of a kernel without a return value, for `caller_of`; valid while the kernel lives.
 
     Raises:
         numba.core.errors.NumbaError: If it cannot be compiled for these types, or returns something.

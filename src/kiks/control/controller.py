@@ -1,4 +1,4 @@
-"""Controllers: plain functions from what a robot senses to the speeds of its wheels.
+"""Controllers: plain functions from a robot's readings to the speeds of its wheels.
 
 The same function runs compiled in a batch and drives one robot on any port, simulated or real (`kiks.drive`).
 """
@@ -21,7 +21,7 @@ from kiks.model.checks import check_count, check_numbers
 from kiks.model.robot import SENSOR_COUNT
 
 SENSES = ("proximity", "ambient")
-"""What a controller may sense: eight counts each, by the commands N and O."""
+"""The senses of controllers: eight counts each, by the commands N and O."""
 
 ARGUMENTS = ("sensors", "memory", "parameters", "wheels")
 
@@ -34,11 +34,11 @@ class Controller(Compiled):
     right wheel [pulses/10 ms], which are rounded and cut to +-127 when they are sent.
 
     Attributes:
-        senses: What it senses, of `SENSES`.
-        memory_count: Numbers that it remembers.
-        parameter_count: Numbers that make one such controller differ from another; None if any count will do.
-        recipe: What a file says to make it again (`kiks.controllers.from_recipe`), of what JSON knows;
-            None for a function inside another, or one that was typed into a console.
+        senses: Its senses, of `SENSES`.
+        memory_count: Numbers in its memory.
+        parameter_count: Number of its parameters; None if any number will do.
+        recipe: The table that recreates it (`kiks.controllers.from_recipe`), of JSON values; None for a function inside
+            another, or one that was typed into a console.
 
     Example:
         >>> import numpy as np
@@ -71,7 +71,7 @@ class Controller(Compiled):
 
     @property
     def sensor_count(self) -> int:
-        """How many counts it senses."""
+        """Number of its readings."""
         return SENSOR_COUNT * len(self.senses)
 
     def __call__(
@@ -81,7 +81,7 @@ class Controller(Compiled):
         parameters: NDArray[np.float64],
         wheels: NDArray[np.float64],
     ) -> None:
-        """Decide once, by the same machine code as in a batch.
+        """Decide once, with the same machine code as in a batch.
 
         Raises:
             ParameterError: If Numba cannot compile the function.
@@ -142,7 +142,7 @@ def controller(
 
 @kernel
 def whole_speed(wanted: Any) -> Any:
-    """Return the speed that is sent for a wanted one [pulses/10 ms]: rounded, within what the robot takes."""
+    """Return the speed to send for a wanted one [pulses/10 ms]: rounded, within the robot's limits."""
     if math.isnan(wanted):
         return np.int64(0)
     return np.int64(np.rint(min(max(wanted, -float(SPEED_MAX)), float(SPEED_MAX))))
@@ -150,7 +150,7 @@ def whole_speed(wanted: Any) -> Any:
 
 @entry
 def whole_speeds(wheels: Any) -> Any:
-    """Return the speeds that are sent for two wanted ones [pulses/10 ms]."""
+    """Return the speeds to send for two wanted ones [pulses/10 ms]."""
     return whole_speed(wheels[0]), whole_speed(wheels[1])
 
 

@@ -1,4 +1,4 @@
-"""Recipes: what a file says of a controller, so that it can be made or found again.
+"""Recipes: tables in files from which controllers are created or imported.
 
 {"kind": "mlp", "hidden": [6]}          one that comes with KiKS, and its arguments
 {"function": "package.module:name"}     a name in a module that Python can import
@@ -22,7 +22,7 @@ from kiks.model.atomic_files import program_in
 from kiks.model.data_file import Number, Rule, Switch, Text, Whole, record
 
 SPEED_LIMIT = 10.0
-"""Speed that an output of 1 stands for, unless another is given [pulses/10 ms]: 80 mm/s."""
+"""Default speed of an output of 1 [pulses/10 ms]: 80 mm/s."""
 
 LAYERS_MAX, UNITS_MAX = 8, 256
 """Most hidden layers, and most units in one: scratch lies on the stack."""
@@ -109,7 +109,7 @@ Shape = Linear | Mlp | Ctrnn | Gru
 
 
 def _tag(given: Any) -> str | None:
-    """Return which recipe is meant."""
+    """Return the kind of a recipe."""
     if not isinstance(given, Mapping):
         return None
     return str(given["kind"]) if "kind" in given else next((key for key in ("function", "file") if key in given), None)
@@ -125,13 +125,13 @@ Recipe = Annotated[
     Discriminator(_tag),
     Rule("a table with a kind (linear, mlp, ctrnn or gru), or a function, or a file and a name"),
 ]
-"""What a file says of a controller."""
+"""The recipe of a controller in a file."""
 
 
 def recipe_of(function: Callable[..., Any]) -> dict[str, Any] | None:
     """Return the recipe of a function: by its module if others can import that, else by its file.
 
-    None if nobody can find it again: it was defined in another function, or typed into a console.
+    None if it cannot be imported: it was defined in another function, or typed into a console.
     """
     name = function.__qualname__
     if "<" in name:
@@ -194,7 +194,7 @@ def _run(path: Path, changed_ns: int) -> Any:
 
 
 def _named(module: Any, name: str, where: str) -> Any:
-    """Return what a dotted name stands for in a module."""
+    """Return the object with a dotted name in a module."""
     found = module
     for part in name.split("."):
         if not hasattr(found, part):

@@ -48,7 +48,7 @@ def linear(
     Parameters: 2 biases, a matrix [N, 2]; with feedback [N + 2, 2], the last two inputs being the last outputs.
 
     Args:
-        senses: What it senses: 'proximity', 'ambient' or both.
+        senses: Its senses: 'proximity', 'ambient' or both.
         speed_limit: The speed of an output of 1 [pulses/10 ms].
         feedback: Whether its last outputs are inputs.
 
@@ -78,7 +78,7 @@ def mlp(
 
     Args:
         hidden: Units of each hidden layer.
-        senses: What it senses: 'proximity', 'ambient' or both.
+        senses: Its senses: 'proximity', 'ambient' or both.
         speed_limit: The speed of an output of 1 [pulses/10 ms].
         feedback: Whether its last outputs are inputs, after the sensors.
 
@@ -111,10 +111,10 @@ def ctrnn(
     [neuron, neuron]. A neuron whose weight to itself is above 4 can hold what it has.
 
     Args:
-        neurons: How many, 2 at least.
+        neurons: Number of neurons, at least 2.
         period_s: The time that passes in a call [s]: the period of the control loop.
         time_constant_s: T of a parameter of 0 [s].
-        senses: What it senses: 'proximity', 'ambient' or both.
+        senses: Its senses: 'proximity', 'ambient' or both.
         speed_limit: The highest speed [pulses/10 ms].
 
     Raises:
@@ -140,8 +140,8 @@ def gru(*, units: int = 4, senses: Sequence[str] = ("proximity",), speed_limit: 
     units]; of the wheels, [1 + units, 2].
 
     Args:
-        units: How many.
-        senses: What it senses: 'proximity', 'ambient' or both.
+        units: Number of units.
+        senses: Its senses: 'proximity', 'ambient' or both.
         speed_limit: The highest speed [pulses/10 ms].
 
     Raises:

@@ -1,4 +1,4 @@
-"""Measures: functions that watch a robot in a batch and say how well, how far or where it went."""
+"""Measures: functions that observe a robot in a batch and return numbers about its run."""
 
 from __future__ import annotations
 
@@ -33,17 +33,17 @@ Moment: Any = namedtuple(
         "lamps",
     ),
 )
-"""What a measure sees of one robot in a control step, as its command takes effect.
+"""The input of a measure: one robot in a control step, when its command takes effect.
 
 * time_s: simulated time [s];
-* period_s: how long it was since the last time, the first counts from 0 [s];
-* sensors: what the controller was given, float64;
-* wheels: the speeds that were sent, left and right [pulses/10 ms], float64;
-* x_mm, y_mm, heading_rad: where the robot is;
-* start_x_mm, start_y_mm: where it began;
-* path_mm: how far it has driven so far, ahead and back together [mm];
-* contact_count: how often it has met something so far;
-* is_touching: whether it does now, or did within the last 0.2 s;
+* period_s: time since the last call, the first since 0 [s];
+* sensors: the readings of the controller, float64;
+* wheels: the sent speeds, left and right [pulses/10 ms], float64;
+* x_mm, y_mm, heading_rad: the robot's pose;
+* start_x_mm, start_y_mm: its start;
+* path_mm: its path so far, forwards and backwards together [mm];
+* contact_count: number of its contacts so far;
+* is_touching: whether it touches something, or did within the last 0.2 s;
 * bodies: records of `kiks.engine.state.BODY`, balls and cylinders of its world;
 * lamps: x [mm], y [mm], power [W] and 1 for on or 0 for off, float64 [lamp, 4].
 """
@@ -62,7 +62,7 @@ class Measure(Compiled):
     Attributes:
         note_count: Numbers that it keeps for each robot, zeros at the start.
         result: From the notes at the end, float64 [..., note], to the values, float64 [...].
-        senses: What it wants to find first in `moment.sensors`; controllers that sense otherwise are refused.
+        senses: The senses that must come first in `moment.sensors`; controllers with others are rejected.
 
     Raises:
         ParameterError: If it is no such function or an argument is out of range.
@@ -101,9 +101,9 @@ def measure(
 
     Args:
         function: A function `(moment, notes)`; see `Moment` for what it sees.
-        notes: How many numbers it keeps for each robot, zeros at the start.
+        notes: Numbers that it keeps for each robot, zeros at the start.
         result: From the notes at the end, float64 [..., note], to the values, float64 [...]; the first if left out.
-        senses: What it wants to find first in `moment.sensors`: 'proximity', 'ambient' or both.
+        senses: The senses that must come first in `moment.sensors`: 'proximity', 'ambient' or both.
 
     Raises:
         ParameterError: If it is no such function or an argument is out of range.

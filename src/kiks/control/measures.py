@@ -1,4 +1,4 @@
-"""The measures that come with KiKS: how far, how well and where a robot went.
+"""The measures that come with KiKS: distances, performance and places of a robot.
 
 Speeds are those that were sent, in pulses/10 ms; 1 pulse/10 ms is 8 mm/s. A mean is one over control steps. Functions
 in brackets return the same measure for the same arguments.
@@ -22,10 +22,10 @@ FULL_SPEED = 10.0
 """Speed that counts as 1 [pulses/10 ms]: 80 mm/s, at which Floreano and Mondada's robot drove at most."""
 
 FULL_SPEED_MM_S = 8.0 * FULL_SPEED
-"""The same for a robot that is watched from outside [mm/s]."""
+"""The same speed as seen from outside [mm/s]."""
 
 ROAMING_S = 2.0
-"""How far back a robot must have been elsewhere to be under way [s]."""
+"""Time within which a robot must have been elsewhere to count as moving [s]."""
 
 FULL_COUNT = 1023.0
 """Proximity that counts as 1 (khepera-protocol.md 8.4)."""
@@ -73,7 +73,7 @@ def speed_pulses(moment: Any, notes: Any) -> None:
 
 @measure
 def turned_pulses(moment: Any, notes: Any) -> None:
-    """What both wheels were told to turn, ahead or back [pulses]: a stand-in for the energy that it took."""
+    """Commanded path of both wheels, forwards or backwards [pulses]: an approximation of the energy used."""
     notes[0] += 100.0 * moment.period_s * (abs(moment.wheels[0]) + abs(moment.wheels[1]))
 
 

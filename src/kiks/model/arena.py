@@ -1,7 +1,7 @@
-"""What an arena is: a raster of brightness, how far every place is from a wall, and what stands in it.
+"""The arena: a raster of brightness, the distance of each cell from walls, and the objects in it.
 
-x points right, y up, and (0, 0) is the lower left corner of the raster. Pictures and arrays come with row 0 on top;
-`Arena.from_array` turns them over, and nobody else does.
+x points right, y up, and (0, 0) is the lower left corner of the raster. Pictures and arrays have row 0 on top;
+`Arena.from_array` flips them, and nothing else does.
 """
 
 from __future__ import annotations
@@ -52,8 +52,8 @@ class Arena:
         brightness: uint8 [row, column], row 0 at the bottom: 0 is floor, 1..255 a wall from black to white. Kept
             read-only; copied unless it already is.
         mm_per_cell: Edge of a cell [mm], at most 1.
-        name: What people call it.
-        starts: Where robots start, each on floor.
+        name: Its name.
+        starts: Starts of robots, each on floor.
         lamps: Lamps, each inside the raster.
         balls: Balls, each centre on floor.
         cylinders: Cylinders, each centre on floor.
@@ -132,10 +132,10 @@ class Arena:
         Args:
             brightness: Integers 0..255 [row, column] with row 0 on top, 0 = floor; or booleans, True = wall of 255.
             mm_per_pixel: Edge of a pixel [mm]. A pixel above 1 mm becomes k x k cells, k = ceil(mm_per_pixel).
-            name: What people call it.
+            name: Its name.
 
         Raises:
-            ParameterError: If the array is not of that kind or `mm_per_pixel` is out of range.
+            ParameterError: If the array has another type, or `mm_per_pixel` is out of range.
             ArenaError: If the arena would be too small, too large or without floor.
         """
         if not isinstance(brightness, np.ndarray) or brightness.ndim != 2 or brightness.dtype.kind not in "bui":
@@ -216,7 +216,7 @@ class Arena:
 
     @classmethod
     def maze(cls, *, columns: int = 4, rows: int = 4, path_mm: int = 120, wall_mm: int = 10, seed: int = 0) -> Arena:
-        """Return a random maze with white walls; exactly one way leads from each of its places to each other.
+        """Return a random maze with white walls; exactly one path connects any two of its places.
 
         The robot starts in the entrance, left of the top row, and a lamp hangs in the exit, right of the bottom row.
 
@@ -257,7 +257,7 @@ class Arena:
     @property
     def surface(self) -> npt.NDArray[np.uint8]:
         """Brightness with the border of the world around it: uint8 [row + 2 PAD, column + 2 PAD], border 255."""
-        # Computed on first use. Threads that race here compute the same array twice, and one of the two is kept.
+        # Computed on first use. Threads that race here compute the same array, and one of the two is kept.
         if self._surface is None:
             surface = np.pad(self.brightness, PAD, constant_values=255)
             surface.setflags(write=False)
@@ -280,7 +280,7 @@ class Arena:
 
     @property
     def leaps(self) -> npt.NDArray[np.int16]:
-        """How far one may go from anywhere in a cell in any direction [1/16 cells], and what walls look like.
+        """Free distance from any point of a cell in any direction [1/16 cells], and the brightness of walls.
 
         int16 [row + 2 PAD, column + 2 PAD], rounded down; wall cells have their brightness, negative.
         """
@@ -293,7 +293,7 @@ class Arena:
 
     @property
     def faces(self) -> npt.NDArray[np.int32]:
-        """Where the surface of the wall runs beside free cells that touch one, without the steps of the raster.
+        """The smooth surface of walls next to free cells, without the steps of the raster.
 
         int32 [row + 2 PAD, column + 2 PAD]: three numbers with signs in one (`kiks.model.raster.unpack_faces`), the
         first in the highest bits: x and y of a unit vector straight into the wall [1/1023], 11 bits each, and how far
@@ -307,7 +307,7 @@ class Arena:
         return self._faces
 
     def clearance_at_mm(self, x_mm: float, y_mm: float) -> float:
-        """Return how far a point is from the surface of the nearest wall [mm].
+        """Return the distance of a point from the surface of the nearest wall [mm].
 
         Interpolates `clearance` between cell centres and takes off half a cell. That is exact before a straight wall
         along the raster; before a corner it is up to 0.21 cells too much, half way between two walls up to half a
@@ -324,7 +324,7 @@ class Arena:
         return float(upright[0] + column_share * (upright[1] - upright[0]) - 0.5 * self.mm_per_cell)
 
     def free_for(self, x_mm: float, y_mm: float, radius_mm: float) -> bool:
-        """Tell whether a disc of `radius_mm` [mm] at a place [mm] touches no wall.
+        """Return whether a disc of `radius_mm` [mm] at a place [mm] touches no wall.
 
         Raises:
             ParameterError: If a coordinate is not finite or `radius_mm` is not positive and finite.
@@ -334,7 +334,7 @@ class Arena:
         return self.clearance_at_mm(x_mm, y_mm) >= radius_mm
 
     def find_start(self, radius_mm: float) -> Pose:
-        """Return where a robot of `radius_mm` [mm] starts.
+        """Return the start of a robot of `radius_mm` [mm].
 
         That is the first of `starts`. Without any it is the cell with most room, among equals the one nearest to
         the middle, heading up: the same one every time.
@@ -363,7 +363,7 @@ class Arena:
     def _widest_place(self) -> Pose:
         inside = self.clearance[PAD:-PAD, PAD:-PAD]
         rows, columns = np.nonzero(inside == inside.max())
-        # Twice the offset from the middle, in cells, stays a whole number: no rounding decides between equals.
+        # Twice the offset from the middle, in cells, is a whole number, so rounding cannot decide between equals.
         offset = (2 * rows + 1 - inside.shape[0]) ** 2 + (2 * columns + 1 - inside.shape[1]) ** 2
         best = int(offset.argmin())
         x_mm, y_mm = ((int(index[best]) + 0.5) * self.mm_per_cell for index in (columns, rows))

@@ -1,4 +1,4 @@
-"""The arena file: a picture or a box, and what stands in it, in a few lines of TOML (docs/arenas.md)."""
+"""The arena file: a picture or a box, and the objects in it, in a few lines of TOML (docs/arenas.md)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from kiks.model.picture import read_picture
 from kiks.model.raster import MM_PER_PIXEL_MAX, MM_PER_PIXEL_MIN
 
 THINGS_MAX = 1000
-"""Most starts, lamps, balls and cylinders of a file, of each."""
+"""Most starts, lamps, balls and cylinders of a file, each."""
 
 Pitch = Annotated[
     Number,
@@ -39,7 +39,7 @@ Size = Annotated[
 
 @record
 class StartEntry:
-    """Where a robot starts."""
+    """The start of a robot."""
 
     at_mm: At
     heading_deg: Annotated[Coordinate, Field(description="0 looks right, 90 up.")] = 90.0
@@ -56,7 +56,7 @@ class LampEntry:
 
 @record
 class BallEntry:
-    """A ball that rolls when it is kicked."""
+    """A ball that rolls after a kick."""
 
     at_mm: At
     radius_mm: Radius = 32.0
@@ -118,7 +118,7 @@ class Walls:
 
 @record
 class ArenaFile(Walls):
-    """An arena of KiKS: walls, and what stands between them."""
+    """An arena of KiKS: walls and objects."""
 
     name: Text | None = None
     picture: Annotated[Text, Field(description="A picture in the file's folder or below it.")] | None = None
@@ -158,8 +158,8 @@ def decode_arena(data: bytes, name: str = "arena", what: str = "The arena file")
 
     Args:
         data: The bytes.
-        name: What people call the arena if the file does not say.
-        what: What messages call the file.
+        name: Name of the arena if the file has none.
+        what: Name of the file in messages.
 
     Raises:
         ArenaError: If it is damaged, no arena, or has a picture.
@@ -185,7 +185,7 @@ def _picture_arena(picture: str, mm_per_pixel: float, folder: Path | None) -> Ar
 
 
 def places_of(file: Any) -> dict[str, Any]:
-    """Return what the entries of a file say of starts, lamps, balls and cylinders, for `dataclasses.replace`."""
+    """Return the starts, lamps, balls and cylinders of a file, for `dataclasses.replace`."""
 
     def at(kind: Callable[..., Any], entries: Iterable[Any], *names: str) -> tuple[Any, ...]:
         return tuple(kind(*each.at_mm, *(getattr(each, name) for name in names)) for each in entries)
@@ -245,7 +245,7 @@ def place_lines(arena: Arena) -> list[str]:
 
 
 def _degrees(angle_rad: float) -> float:
-    """Return an angle in the fewest digits that give it back."""
+    """Return an angle with the fewest digits that restore it."""
     angle_deg = math.degrees(angle_rad)
     short = (round(angle_deg, digits) for digits in range(13))
     return next((each for each in short if math.radians(each) == angle_rad), angle_deg)
@@ -256,6 +256,6 @@ def _at(place: Pose | Lamp | Ball | Cylinder) -> str:
 
 
 def quoted(text: str) -> str:
-    """Return a text as TOML has it."""
-    # TOML quotes as JSON does, save for one control character that JSON leaves bare.
+    """Return a text in TOML."""
+    # TOML quotes like JSON, except for one control character that JSON does not escape.
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

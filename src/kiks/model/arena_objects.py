@@ -1,4 +1,4 @@
-"""What an arena holds besides walls: where robots start, lamps, balls and cylinders, and whether they may be there."""
+"""The objects of an arena: starts, lamps, balls and cylinders, and the check of their places."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Power = Annotated[
 
 
 class Pose(NamedTuple):
-    """Where a robot stands and looks: position [mm], heading [rad] counter-clockwise from +x."""
+    """The pose of a robot: position [mm], heading [rad] counter-clockwise from +x."""
 
     x_mm: Coordinate
     y_mm: Coordinate
@@ -80,10 +80,10 @@ def checked_places(
     brightness: npt.NDArray[np.uint8],
     mm_per_cell: float,
 ) -> tuple[_Place, ...]:
-    """Return the entries as a tuple of `kind`, once each of them may be where it is.
+    """Return the entries as a tuple of `kind`, after a check of their places.
 
     Args:
-        label: What messages call an entry; "lamp" may hang over a wall, everything else stands on floor.
+        label: Name of an entry in messages; a "lamp" may hang over a wall, everything else stands on floor.
         kind: `Pose`, `Lamp`, `Ball` or `Cylinder`.
         entries: The entries, or plain tuples of the same values.
         brightness: The arena's raster, uint8 [row, column], row 0 at the bottom.

@@ -1,9 +1,9 @@
-"""Arrays from outside, of a file or of a caller: kind, shape, finite, range, and how many before memory is asked for.
+"""Checks of arrays from files and callers: type, shape, finite numbers, range, and size before memory is allocated.
 
-Need: no number reaches the engine that may not be there, and no file takes more memory than its numbers may have.
-Method: what an array must hold is declared as `Numbers`, and `check_array` is the gate. `read_arrays` reads an .npz: of
-each array first the head, and only then as many bytes as the head announces, if these are not too many.
-Source: NumPy's NEP 1 for the head: a mark, the version, a length, and a dict in ASCII, here as NumPy itself writes it.
+No invalid number reaches the engine, and no file takes more memory than its declared arrays may. `Numbers` declares an
+array, and `check_array` checks it. `read_arrays` reads an .npz: the header of each array first, and then as many bytes
+as the header announces, if that is not too many. Source: NumPy's NEP 1 for the head: a mark, the version, a length, and
+a dict in ASCII, here as NumPy itself writes it.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from kiks.errors import KiksError, ParameterError, shown
 from kiks.model.data_file import one_line, read_file
 
 NUMBERS_MAX = 1 << 24
-"""Most numbers in all the arrays of a file that says nothing else."""
+"""Default limit of numbers in all arrays of a file."""
 
 _EXACT_MAX = 2.0**53  # above it, floats leave whole numbers out
 _HEAD_BYTES_MAX = 1 << 10
@@ -36,14 +36,14 @@ _HEAD = re.compile(
 
 @dataclass(frozen=True)
 class Numbers:
-    """What an array must hold: finite numbers in a range, along axes.
+    """The rule of an array: finite numbers in a range, along axes.
 
     Args:
-        axes: Of each axis its length, or what it counts: arrays of a file are as long along axes of the same name.
+        axes: The length of each axis, or its name: arrays of a file have equal lengths along axes of the same name.
         low: Least number.
         high: Largest number.
         is_whole: Whether they must be whole numbers, of whatever type.
-        advice: The way out, for messages.
+        advice: The advice in messages.
 
     Example:
         >>> str(Numbers(("gap", 8), 0, 1023, is_whole=True))
@@ -64,13 +64,13 @@ class Numbers:
 
 
 def check_array(values: object, rule: Numbers, name: str, counts: dict[str, int] | None = None) -> npt.NDArray[Any]:
-    """Return an array that keeps a rule.
+    """Return an array after a check against a rule.
 
     Args:
-        values: An array, or anything that NumPy makes one of.
-        rule: What it must hold.
-        name: What messages call it.
-        counts: Lengths of axes with names that are known; the others are added.
+        values: An array, or anything that NumPy converts to one.
+        rule: The rule.
+        name: Name of the array in messages.
+        counts: Known lengths of named axes; the others are added.
 
     Returns:
         int64 for whole numbers, else float64; the array itself if it is of that type.
@@ -99,12 +99,12 @@ def check_array(values: object, rule: Numbers, name: str, counts: dict[str, int]
 def read_arrays(
     path: Path, rules: Mapping[str, Numbers], what: str, *, numbers_max: int = NUMBERS_MAX
 ) -> dict[str, npt.NDArray[Any]]:
-    """Return arrays of an .npz file; others that it holds are left alone.
+    """Return arrays of an .npz file; other arrays in it are ignored.
 
     Args:
         path: The file.
-        rules: What each array must hold.
-        what: What messages call the file.
+        rules: The rule of each array.
+        what: Name of the file in messages.
         numbers_max: Most numbers in all of them.
 
     Returns:
@@ -134,7 +134,7 @@ def read_arrays(
 def _array(
     archive: zipfile.ZipFile, name: str, rule: Numbers, counts: dict[str, int], numbers_max: int
 ) -> npt.NDArray[Any]:
-    """Return an array as it stands in the file.
+    """Return an array of the file without conversion.
 
     Raises:
         ParameterError: If it is missing, its type or shape breaks the rule, or it has too many numbers.

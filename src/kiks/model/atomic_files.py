@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all."""
+"""Atomic writing of files: completely or not at all."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ def replace_file(path: str | Path, data: bytes | str, what: str = "The file", *,
     A link stays one, an earlier file's rights stay; what is no file (a pipe, a terminal) is written to as it is.
 
     Args:
-        path: Where it goes.
-        data: What it holds; text becomes UTF-8.
-        what: What messages call it.
-        rights: Its rights, at most; those of the earlier file, or those that the umask leaves, if left out.
+        path: The file.
+        data: Its content; text becomes UTF-8.
+        what: Its name in messages.
+        rights: Its permissions, at most; those of the earlier file, or those of the umask, if left out.
 
     Raises:
         ParameterError: If it cannot be written; an earlier file is then as it was.
@@ -32,7 +32,7 @@ def replace_file(path: str | Path, data: bytes | str, what: str = "The file", *,
 
 
 def replace_files(files: Mapping[Path, bytes | str], what: str = "The file", *, rights: int | None = None) -> None:
-    """Write files that belong together as `replace_file` writes one: none is replaced before all are on the disk.
+    """Write files that belong together like `replace_file`: none is replaced before all are on the disk.
 
     Raises:
         ParameterError: If one of them cannot be written; the earlier ones are then as they were.
@@ -67,8 +67,8 @@ class GrowingFile:
     A disk that is full disturbs nobody who writes: `close` says so.
 
     Args:
-        path: Where it goes, as `replace_file` has it.
-        what: What messages call it.
+        path: The file, as for `replace_file`.
+        what: Its name in messages.
 
     Raises:
         ParameterError: If it cannot be written.
@@ -88,7 +88,7 @@ class GrowingFile:
             raise _unwritable(what, "file", path, error) from error
 
     def write(self, text: str) -> None:
-        """Write some more."""
+        """Append text."""
         if self._error is None:
             try:
                 self._file.write(text)
@@ -96,7 +96,7 @@ class GrowingFile:
                 self._error = error
 
     def close(self) -> None:
-        """Let it be the new file.
+        """Replace the old file.
 
         Raises:
             ParameterError: If it could not be written; an earlier file is then as it was.
@@ -129,15 +129,15 @@ def check_writable(path: str | Path, what: str, *, is_new: bool = False) -> None
     A file is made beside it and removed: rights do not tell of disks that are full or can be read only.
 
     Args:
-        path: Where it is to go.
-        what: What messages call it.
-        is_new: Whether an earlier file of that name must not be there.
+        path: The file.
+        what: Its name in messages.
+        is_new: Whether the file must not exist yet.
 
     Raises:
         ParameterError: If it cannot be written.
     """
     if is_new and os.path.lexists(path):
-        raise ParameterError(f"{what} must name a new file, but {str(path)!r} is there. Choose another name.")
+        raise ParameterError(f"{what} must name a new file, but {str(path)!r} exists. Choose another name.")
     try:
         target = _target(path_of(path, what))
         if not target.exists() or target.is_file():
@@ -164,7 +164,7 @@ def make_folder(path: str | Path, what: str) -> None:
 
 
 def _target(path: str | Path) -> Path:
-    """Return what a path leads to, through links; it may not be there.
+    """Return the target of a path, through links; it may not exist.
 
     Raises:
         OSError: If it is a folder, or a file that is protected from being written.
@@ -183,7 +183,7 @@ def _name_beside(target: Path) -> Path:
 
 
 def _write(path: Path, data: bytes, mode: int) -> None:
-    """Write a new file and see that it is on the disk."""
+    """Write a new file and flush it to the disk."""
     with open(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode), "wb") as file:
         file.write(data)
         file.flush()
@@ -191,13 +191,13 @@ def _write(path: Path, data: bytes, mode: int) -> None:
 
 
 def _take_rights(beside: Path, target: Path) -> None:
-    """Give a new file the rights of the one that it replaces, if there is one."""
+    """Give a new file the permissions of the one that it replaces, if there is one."""
     if target.exists():
         beside.chmod(stat.S_IMODE(target.stat().st_mode))
 
 
 def _settle(folder: Path) -> None:
-    """See that the names in a folder are on the disk, where the system has a way for that."""
+    """Flush a folder's entries to the disk, if the system supports that."""
     with suppress(OSError):
         descriptor = os.open(folder, os.O_RDONLY)
         try:
@@ -214,7 +214,7 @@ def _unwritable(what: str, kind: str, path: str | Path, error: Exception) -> Par
 
 
 def path_of(path: object, what: str = "path") -> Path:
-    """Return what names a file as a path.
+    """Return a file's name as a path.
 
     Args:
         path: A text or a path.
@@ -234,7 +234,7 @@ def path_of(path: object, what: str = "path") -> Path:
 
 
 def check_relative(text: object, what: str) -> None:
-    """Check that a path is one within a folder, on any computer, as far as the text says.
+    """Check by its text that a path stays within a folder, on any computer.
 
     Args:
         text: The path, with / between its parts.
@@ -268,7 +268,7 @@ def inside(folder: Path, text: str, what: str) -> Path:
 
 
 def within(folder: Path, text: str, what: str) -> Path:
-    """Return the path of a file in a folder or below it, wherever links may lead.
+    """Return the path of a file in a folder or below it, after following links.
 
     Raises:
         ParameterError: If it lies elsewhere.

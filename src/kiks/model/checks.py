@@ -20,7 +20,7 @@ CLOCK_END_NS = 4 * 10**18
 """Last time that a clock may be told to reach [ns]; four times `SECONDS_MAX`, and less than its 64 bits hold."""
 
 HEADING_KEPT_RAD = 1e6
-"""Headings up to this stay as they are: their sines are exact (`kiks.engine.numbers`), and turns may be counted."""
+"""Headings up to this are not wrapped: their sines are exact (`kiks.engine.numbers`), and turns can be counted."""
 
 
 def check_number(

@@ -1,9 +1,9 @@
-"""Data files: read within a limit of size, checked against a declared model, refused in one line.
+"""Data files: read within a limit of size, checked against a declared model, rejected in one line.
 
-Need: a file that people write or receive is read whole or not at all. Whatever is wrong with it, one line names the
-file, the key, the rule, the value and the way out. No file takes much more memory than it has bytes.
-Method: a model is a class under `record`, with the rules beside its fields (pydantic). `check` makes one of a table.
-The words of a message come from the declaration: the rule from type and bounds, the way out from the description.
+A file that users write or receive is read completely or not at all. For any error, one line names the file, the key,
+the rule, the value and what to do. No file takes much more memory than its size. A model is a class under `record`,
+with the rules beside its fields (pydantic). `check` creates one from a table. The declaration gives the words of a
+message: type and bounds give the rule, the description gives the advice.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from pydantic_core import core_schema
 from kiks.errors import SHOWN_MAX, KiksError, ParameterError, nearest, shown
 
 BYTES_MAX = 4 << 20
-"""Most bytes of a file that says nothing else."""
+"""Default limit of a file's size [bytes]."""
 
 TEXT_MAX = 1000
 """Most characters of a text in a file."""
@@ -51,7 +51,7 @@ COORDINATE_MAX = 1e9
 
 
 class Rule(NamedTuple):
-    """The words for what a field must be, where its type and bounds do not say it."""
+    """The words for a field's rule, if its type and bounds do not give them."""
 
     text: str
 
@@ -121,19 +121,19 @@ def check(
 
 @cache
 def adapter(model: Any) -> TypeAdapter[Any]:
-    """Return what validates a model and describes it as a JSON schema."""
+    """Return the object that validates a model and describes it as a JSON schema."""
     return TypeAdapter(model)
 
 
 def descriptions(kind: Any) -> dict[str, str]:
-    """Return what each field of a record must be, in words, and what it says of itself."""
+    """Return the rule and the description of each field of a record, as text."""
     places = {name: _declared(hint) for name, hint in _hints(kind).items()}
     texts = {name: f"{_rule(place)}. {place.description}".rstrip() for name, place in places.items()}
     return {name: text[0].upper() + text[1:] for name, text in texts.items()}
 
 
 def as_list(values: object) -> object:
-    """Return the numbers of an array as a list, anything else as it is: records hold no arrays."""
+    """Return an array as a list, anything else unchanged: records hold no arrays."""
     return values.tolist() if isinstance(values, np.ndarray) else values
 
 
@@ -196,7 +196,7 @@ def parse_toml(data: bytes, what: str, *, error: type[KiksError] = ParameterErro
 
 
 def parse_json(data: bytes, what: str, *, error: type[KiksError] = ParameterError) -> Any:
-    """Return what a JSON file holds.
+    """Return the content of a JSON file.
 
     Raises:
         KiksError: If the bytes are no JSON in UTF-8. It is an `error`.
@@ -227,7 +227,7 @@ def _check_keys_are_short(text: str) -> None:
 
 
 def one_line(failure: BaseException) -> str:
-    """Return what a foreign exception says, for the middle of a message."""
+    """Return the text of a foreign exception, for the middle of a message."""
     text = " ".join(str(failure).split())
     if isinstance(failure, RecursionError):
         return "it is nested too deeply"
@@ -236,11 +236,11 @@ def one_line(failure: BaseException) -> str:
     return text[:SHOWN_MAX].rstrip(".")
 
 
-# ---- what a message says of a broken rule ----
+# ---- messages about broken rules ----
 
 
 def _sentence(model: type[Any], error: ValidationError, advice: str = "", whole: str = "the file") -> str:
-    """Return rule, value and way out of the first rule that is broken; an unknown key comes before all others."""
+    """Return rule, value and advice for the first broken rule; an unknown key comes before all others."""
     found = error.errors(include_url=False)
     first = next((each for each in found if each["type"] in _UNKNOWN), found[0])
     kind, given = first["type"], first["input"]
@@ -269,7 +269,7 @@ _UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")
 
 
 class _Place(NamedTuple):
-    """What is declared at a place of a model: its type, bounds on it, and what the field says of itself."""
+    """The declaration at a place of a model: type, bounds and description."""
 
     base: Any
     bounds: tuple[Any, ...]
@@ -277,7 +277,7 @@ class _Place(NamedTuple):
 
 
 def _place(model: Any, loc: tuple[int | str, ...]) -> tuple[tuple[int | str, ...], _Place]:
-    """Return where a rule is broken, less the names of alternatives that pydantic puts there, and what is declared."""
+    """Return the place of a broken rule, without the names of alternatives that pydantic adds, and its declaration."""
     here = _declared(model)
     path: list[int | str] = []
     for part in loc:
@@ -302,7 +302,7 @@ def _place(model: Any, loc: tuple[int | str, ...]) -> tuple[tuple[int | str, ...
 
 
 def _declared(hint: Any) -> _Place:
-    """Return what an annotation declares; of an optional one, what it is if it is there."""
+    """Return the declaration of an annotation; for an optional one, that of its value."""
     if get_origin(hint) in (Union, types.UnionType):
         parts = [part for part in get_args(hint) if part is not type(None)]
         if len(parts) == 1:
@@ -331,7 +331,7 @@ def _hints(kind: Any) -> dict[str, Any]:
 
 
 def _named(model: Any, path: tuple[int | str, ...]) -> str:
-    """Return how messages name a place: 'body.diameter_mm', 'proximity.gain[4]', 'start 2: at_mm'."""
+    """Return the name of a place in messages: 'body.diameter_mm', 'proximity.gain[4]', 'start 2: at_mm'."""
     text = ""
     for depth, part in enumerate(path, start=1):
         if isinstance(part, str):
@@ -344,20 +344,20 @@ def _named(model: Any, path: tuple[int | str, ...]) -> str:
 
 
 def _entry_depth(model: Any, path: tuple[int | str, ...]) -> int:
-    """Return how many parts of a path lead to the innermost entry of a list of tables, 0 if it is in none."""
+    """Return the number of parts of a path up to the innermost entry of a list of tables; 0 without one."""
     depths = [depth for depth, part in enumerate(path, start=1) if isinstance(part, int)]
     return max((depth for depth in depths if _hints(_place(model, path[:depth])[1].base)), default=0)
 
 
 def _names(place: _Place) -> list[str]:
-    """Return the names to choose from, if that is what is declared."""
+    """Return the names to choose from, if the declaration is a choice."""
     if get_origin(place.base) is Literal:
         return [str(each) for each in get_args(place.base)]
     return [name for bound in place.bounds if isinstance(bound, OneOf) for name in bound.names]
 
 
 def _rule(place: _Place) -> str:
-    """Return in words what a value must be."""
+    """Return the rule of a value as text."""
     base, bounds, _ = place
     said = next((bound.text for bound in bounds if isinstance(bound, Rule)), None)
     if said is not None:

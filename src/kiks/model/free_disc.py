@@ -1,4 +1,4 @@
-"""Where there is room for a disc: beside a place, of which no more is looked at, and anywhere in an arena."""
+"""Free places for a disc: near a given place, and anywhere in an arena."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from kiks.model.arena import PAD, Arena
 from kiks.model.raster import between, clearance_mm
 
 OVERLAP_MM = 0.01
-"""How deep things may be put into each other [mm], so that what touches may be put back where it was."""
+"""Largest overlap of placed objects [mm], so that touching objects can be restored."""
 
 
 def room_mm(brightness: npt.NDArray[np.uint8], mm_per_cell: float, x_mm: float, y_mm: float, reach_mm: float) -> float:
-    """Return how far a place is from the nearest wall [mm], as `Arena.clearance_at_mm` does; infinite beyond a reach.
+    """Return the distance of a place from the nearest wall [mm], like `Arena.clearance_at_mm`; infinite beyond a reach.
 
     Args:
         brightness: The raster, uint8 [row, column], row 0 at the bottom.
         mm_per_cell: Edge of a cell [mm].
         x_mm: The place.
         y_mm: The place.
-        reach_mm: How far is looked.
+        reach_mm: The reach.
     """
     margin = math.ceil(reach_mm / mm_per_cell) + 3
     places = (y_mm / mm_per_cell, x_mm / mm_per_cell)
@@ -56,14 +56,14 @@ def free_place(
     near: tuple[float, float] | None,
     what: str,
 ) -> tuple[float, float]:
-    """Return the free place for a disc that is nearest to another, the roomiest one without.
+    """Return the free place for a disc that is nearest to a given one; without one, the place with most room.
 
     Args:
         arena: Walls.
-        discs: x, y and radius of what else is in the way [mm].
+        discs: x, y and radius of obstacles [mm].
         radius_mm: Radius of the disc [mm].
-        near: x and y of the place wished for [mm].
-        what: What messages call the disc.
+        near: x and y of the wanted place [mm].
+        what: Name of the disc in messages.
 
     Raises:
         ArenaError: If there is none.

@@ -1,8 +1,8 @@
 """Arena files of the Matlab KiKS, `.kad`: walls as rectangles in the variable `walls` of a MATLAB file.
 
 Source: kiks-behaviour.md, section 5. `walls` is width and height [mm], then for each piece: a count n of corners, their
-n columns and n rows, counted from 1 with row 1 on top and both ends included, and a grey. What else an arena has is in
-variables that the Matlab KiKS does not ask for: `starts`, `lamps`, `balls` and `cylinders`, a row for each, in the
+n columns and n rows, counted from 1 with row 1 on top and both ends included, and a grey. The objects of an arena are
+in variables that the Matlab KiKS does not read: `starts`, `lamps`, `balls` and `cylinders`, a row for each, in the
 order of the fields of `kiks.model.arena_objects` and with y upwards.
 """
 
@@ -31,7 +31,7 @@ WALLS_MAX = 2 + 10 * PIECES_MAX
 """Most numbers of `walls`."""
 
 PAINTED_MAX = 16
-"""How often all the pieces of a file together may paint over the whole arena."""
+"""Largest painted area of all pieces of a file together, in areas of the arena."""
 
 THINGS_MAX = 1000
 """Most starts, lamps, balls and cylinders, of each."""
@@ -119,10 +119,10 @@ def encode_kad(arena: Arena) -> bytes:
 def _walls(brightness: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint16]:
     """Return the numbers of `walls`: a row, in the order in which the Matlab KiKS writes them.
 
-    There the first cell that is not floor, column by column from the left and from the top, grows down while the grey
-    is the same, then right while all of that piece is, and goes; and so on. A piece never grows into cells that are
-    gone while its own are not, because those went with all between: so how far it grows right is to be read off the
-    picture as it was, and all pieces that begin in a column are found together.
+    The Matlab KiKS takes the first wall cell, column by column from the left and from the top, extends it down while
+    the grey is equal, then right while all of that column is, removes the piece, and repeats. A piece never extends
+    into removed cells while its own are there, because those were removed with all cells between. So the original
+    picture gives the extent to the right, and all pieces that begin in a column are found together.
     """
     height, width = brightness.shape
     columns = np.ascontiguousarray(brightness[::-1].T)
@@ -223,7 +223,7 @@ def _polygon(x: npt.NDArray[np.int64], y: npt.NDArray[np.int64], shape: tuple[in
         edge[y[level], min(x[level], x1[level]) : max(x[level], x1[level]) + 1] = 1
     sides = np.flatnonzero(y != y1)
     heights = abs(y1 - y)[sides] + 1
-    # So many sides at a time that all the places where they cross rows take little memory.
+    # Take few sides at a time, so their crossings with rows take little memory.
     parts = np.cumsum(heights) // _CROSSINGS
     for some in np.split(np.arange(len(sides)), np.flatnonzero(np.diff(parts)) + 1):
         side = np.repeat(sides[some], heights[some])

@@ -1,4 +1,4 @@
-"""Numbers in MATLAB files of level 5: one variable by its name, and never more memory than the file may ask for.
+"""Reads numeric variables of MATLAB files of level 5, with a limit on memory.
 
 Source: MATLAB's MAT-file format, level 5. A header of 128 bytes ends in the version and "MI" or "IM" for the order of
 bytes; elements follow, each a type, a count of bytes, and data padded to 8 bytes. A matrix is an element of elements:
@@ -21,7 +21,7 @@ from kiks.errors import ArenaError, shown
 from kiks.model.data_file import check_size, one_line
 
 FILE_BYTES_MAX = 48 << 20
-"""Most bytes of a file, and of what it unpacks to."""
+"""Most bytes of a file, and of its unpacked content."""
 
 _HEADER_BYTES = 128
 _MATRIX, _COMPRESSED = 14, 15

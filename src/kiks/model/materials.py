@@ -1,6 +1,6 @@
-"""What walls are made of: names for how much of a sensor's infra-red light they send back.
+"""Materials of walls: names for their reflectance of a sensor's infra-red light.
 
-Source: khepera-protocol.md 8.6, fitted by eye to the curves of the Khepera's manual (8.3); white sends back everything.
+Source: khepera-protocol.md 8.6, fitted by eye to the curves of the Khepera's manual (8.3); white reflects everything.
 
 Derivation: a surface of the brightness c, 1 to 255, reflects the share b = 0.02 + 0.98 c/255, so that of a reflectance
 b the brightness is c = 255 (b - 0.02)/0.98, at least 1, as 0 is floor.
@@ -13,7 +13,7 @@ from typing import Any
 from kiks.errors import ParameterError, nearest, shown
 
 BLACK_REFLECTANCE = 0.02
-"""What the darkest surface sends back, and brightness 0 would."""
+"""Reflectance of the darkest surface, at brightness 0."""
 
 REFLECTANCES = {
     "white": 1.0,
@@ -23,7 +23,7 @@ REFLECTANCES = {
     "grey": 0.1,
     "black": BLACK_REFLECTANCE,
 }
-"""Materials and the share of light that they send back."""
+"""Materials and their reflectances."""
 
 
 def brightness_of(material: Any) -> Any:

@@ -1,10 +1,10 @@
 """Random mazes of the sizes of the Matlab KiKS.
 
-Need: a maze in which every place can be reached, the same for the same seed on every computer.
-Method: Wilson's algorithm. Each cell that is not joined yet walks at random until it meets the maze, and its way there
-without the loops becomes passages. Every maze without loops is then as likely as any other.
-Difference: kiks_generate_maze walks at random too, but its mazes may have loops (kiks-behaviour.md, section 1.9). Here
-exactly one way leads from each place to each other, and a robot that follows either wall comes to the exit.
+Every place of a maze can be reached, and the same seed gives the same maze on every computer. The method is Wilson's
+algorithm: a random walk starts at each cell outside the maze and ends when it hits the maze; its path without loops
+becomes passages. So each maze without loops is equally likely. kiks_generate_maze uses random walks, too, but its mazes
+may have loops (kiks-behaviour.md, section 1.9). Here exactly one path connects any two places, and a robot that follows
+either wall reaches the exit.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def _passages(columns: int, rows: int, seed: int) -> Iterable[tuple[_Cell, _Cell
     draws = count()
     joined = {(columns - 1, rows - 1)}
     for first in product(range(columns), range(rows)):
-        # What a walk leaves behind at a cell is its last way out of it: following those, the loops are gone.
+        # A walk stores its last exit from each cell: the path along these has no loops.
         onward: dict[_Cell, _Cell] = {}
         cell = first
         while cell not in joined:

@@ -1,6 +1,6 @@
 """Pictures of arenas: any lossless picture becomes brightness, 0 for floor and 1..255 for walls.
 
-Black is floor. Whatever is not black must stay wall, so every conversion below keeps non-zero at least 1.
+Black is floor. Any other colour must stay wall, so each conversion below keeps non-zero values at least 1.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def decode_picture(data: bytes, mm_per_pixel: float, what: str = "The picture") 
     Args:
         data: The bytes of the picture's file.
         mm_per_pixel: Edge of a pixel [mm].
-        what: What messages call it.
+        what: Its name in messages.
 
     Raises:
         ParameterError: If `mm_per_pixel` is out of range.
@@ -69,7 +69,7 @@ def decode_picture(data: bytes, mm_per_pixel: float, what: str = "The picture") 
 
     check_size(data, what, bytes_max=PICTURE_BYTES_MAX, error=ArenaError)
     with warnings.catch_warnings():
-        # Pillow warns about large pictures and odd metadata: the size is checked here, and metadata do not matter.
+        # Pillow warns about large pictures and odd metadata: this function checks the size, and metadata do not matter.
         warnings.simplefilter("ignore")
         try:
             with Image.open(BytesIO(data)) as image:
@@ -85,7 +85,7 @@ def decode_picture(data: bytes, mm_per_pixel: float, what: str = "The picture") 
             raise ArenaError(f"{what} must have at most 64 million pixels, but has more. Draw a smaller one.") from None
         except UnidentifiedImageError:
             raise ArenaError(f"{what} must be a picture, but it is none or its header is damaged. {_SAVE_AS}") from None
-        except Exception as error:  # Pillow's decoders raise whatever they stumble over in a damaged file.
+        except Exception as error:  # Pillow's decoders raise many kinds of exceptions for a damaged file.
             raise ArenaError(f"{what} must be complete and readable, but: {one_line(error)}. {_SAVE_AGAIN}") from None
 
 
@@ -107,7 +107,7 @@ def _check_tiles(image: Image.Image) -> None:
 
 
 def _brightness(image: Image.Image) -> npt.NDArray[np.uint8]:
-    """Decode a picture, and turn it grey in bands of rows: a copy of a whole one in colours takes hundreds of MB."""
+    """Decode a picture, and convert it to grey in bands of rows: a whole copy in colours takes hundreds of MB."""
     image.load()
     rows = max(_BAND_PIXELS // image.width, 1)
     bands = [(top, min(top + rows, image.height)) for top in range(0, image.height, rows)]

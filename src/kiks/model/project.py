@@ -47,10 +47,10 @@ FILE_BYTES_MAX = 96 << 20
 """Most bytes of a project file."""
 
 TURRETS = ("k213", "gripper", "radio", "io", "battle")
-"""What a robot of a project may carry (docs/turrets.md)."""
+"""Turrets of a project's robots (docs/turrets.md)."""
 
 FASTEST = "fastest"
-"""What stands in a file for no speed: as fast as possible."""
+"""Value in a file for no speed limit."""
 
 _VERSION = 1
 _SETTINGS = ("seed", "thinking", "baud", "response", "noise", "speed")
@@ -87,11 +87,11 @@ class ProjectRobot:
 
     Args:
         kind: 'khepera', 'khepera_ii', or a robot file in the project's folder.
-        turrets: What it carries, of `TURRETS`.
-        name: What people call it; its number if empty.
+        turrets: Its turrets, of `TURRETS`.
+        name: Its name; its number if empty.
         program: A Python file in the project's folder, which drives it.
-        arguments: What the program finds in `sys.argv`.
-        brightness: How other robots see it, 1 black to 255 white; as its file says if None.
+        arguments: The program's arguments.
+        brightness: Its brightness for other robots' sensors, 1 black to 255 white; that of its file if None.
 
     Raises:
         ParameterError: If a name is unknown, a path leaves the folder, or the brightness is out of range.
@@ -121,12 +121,12 @@ class Project:
         arena: Walls, what stands in it, and where robots start, the first start for the first robot.
         robots: The robots.
         seed: Seed of all random numbers.
-        thinking: What programs' computing costs: 'none', 'fixed:MS', 'live', 'live:FACTOR' (another computer's), or
+        thinking: Thinking time of programs: 'none', 'fixed:MS', 'live', 'live:FACTOR' (another computer's), or
             'replay:FILE' with a file in the project's folder.
         baud: Speed of the serial lines [bit/s]; that of the robots' files if None.
-        response: What makes counts of proximity sensors' rays (docs/sensors.md); that of the robots' files if None.
-        noise: Whether chance has a say in what sensors read.
-        speed: Simulated seconds in a real one while a person watches; None for as fast as possible.
+        response: Response of the proximity sensors (docs/sensors.md); that of the robots' files if None.
+        noise: Whether sensors are noisy.
+        speed: Simulated seconds per real second on the desk; None for no limit.
 
     Raises:
         ParameterError: If a value is out of range, or a path leaves the folder.

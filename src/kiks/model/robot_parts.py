@@ -1,4 +1,4 @@
-"""What a robot is made of: a frozen record for each section of its file, and the choices and limits these have."""
+"""The parts of a robot: a frozen record for each section of its file, with choices and limits."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SENSOR_COUNT = 8
 """Infra-red sensors of a Khepera, clockwise from the left side (khepera-protocol.md 4.14)."""
 
 RESPONSES = ("reflection", "thesis", "fast", "standin", "curve")
-"""What makes counts of a sensor's rays (`kiks.engine.sensing.responses`)."""
+"""The responses (`kiks.engine.sensing.responses`)."""
 
 JITTER_POINT_LIMIT = 51
 """Most points of the distribution of the jitter."""
@@ -23,7 +23,7 @@ CURVE_POINT_LIMIT = 32
 """Most points of a measured curve of counts against distance."""
 
 AMBIENT_MODELS = ("flux", "thesis")
-"""How several lamps make one reading: their light adds up, or the thesis's formula for the strongest."""
+"""Models of several lamps: the sum of their light, or the thesis's formula for the strongest."""
 
 LAMP_POINT_LIMIT = 64
 """Most points of the curve of light against distance."""
@@ -42,7 +42,7 @@ _ONE_EACH = Field(min_length=SENSOR_COUNT, max_length=SENSOR_COUNT, description=
 class Body:
     """Shape and contact. `slip_ratio_min` and `_max` bound a blocked wheel's speed, as a share of its command.
 
-    `brightness` is how other robots see it: 1 black to 255 white.
+    `brightness` is its brightness for other robots' sensors: 1 black to 255 white.
     """
 
     diameter_mm: Annotated[Number, Field(ge=10, le=500)]
@@ -54,7 +54,7 @@ class Body:
     slip_ratio_max: Share
 
     def __post_init__(self) -> None:
-        # Wheels may stand out a little; calibration also tries robots that nobody would build.
+        # Wheels may stick out a little; calibration also tries unrealistic robots.
         must(self.wheel_base_mm <= 2 * self.diameter_mm, self, "wheel_base_mm", "at most twice the diameter")
         must(self.slip_ratio_min <= self.slip_ratio_max, self, "slip_ratio_min", "at most slip_ratio_max")
 
@@ -78,7 +78,7 @@ class Motor:
 
 @record
 class Reset:
-    """What the controllers hold after a reset: gains (Kp, Ki, Kd) and the speed profile."""
+    """Settings of the controllers after a reset: gains (Kp, Ki, Kd) and the speed profile."""
 
     speed_gains: Gains
     position_gains: Gains
@@ -88,12 +88,12 @@ class Reset:
 
 @record
 class Proximity:
-    """Where the eight infra-red sensors sit and look [deg, left positive], and how they answer [counts].
+    """Places and directions of the eight infra-red sensors [deg, left positive], and their response [counts].
 
     `response` is one of `RESPONSES`. With noise a reading r becomes r (1 + e u^n) or, as often, r (1 - d e u^n), with
     e from `noise_small` at 0 to `noise_large` at 1000 counts, the exponent n, `noise_down` d and u from 0 to 1.
-    `jitter_counts` come on top, whatever the reading: the distribution of what a sensor reads above and below its
-    baseline with nothing near, from its least to its largest value in equally probable steps.
+    `jitter_counts` are added to any reading: the distribution of a sensor's readings around its baseline with nothing
+    near, from the smallest to the largest value in equally probable steps.
     """
 
     response: Response
@@ -150,8 +150,8 @@ class Reflection:
 
     A ray of the length t that meets a surface with the reflectance b at the angle of incidence i brings the light
     b w (cos(i) / (t + behind))^3, where w falls with the angle off the sensor's axis as a Gaussian of `lobe_deg` does.
-    `light` is the middle ray's for a white surface, square to it, at 20 mm. Their sum L gives the share
-    (1 + threshold) L - threshold of the largest count, which is rounded off at both ends: at the lower one over
+    `light` is that of the middle ray for a white surface, square to it, at 20 mm. Their sum L gives the share
+    (1 + threshold) L - threshold of the largest count, which is rounded at both ends: at the lower one over
     `faint` and at the upper one over `bright`, shares too, to either side.
     """
 
@@ -193,7 +193,7 @@ class Ambient:
 
 @record
 class FirmwareSpec:
-    """What the robot's program says of itself, and how long it thinks about a command."""
+    """Versions of the robot's firmware, and its processing time per command."""
 
     banner: Text
     bios_version: Text
@@ -205,7 +205,7 @@ class FirmwareSpec:
 
 @record
 class Quirks:
-    """Deviations that single clients need (khepera-protocol.md 3.4 and 11.3). All off is the documented robot."""
+    """Deviations that some clients need (khepera-protocol.md 3.4 and 11.3). All off is the documented robot."""
 
     answer_empty_lines: Switch = False
     accept_lower_case: Switch = False
@@ -214,12 +214,12 @@ class Quirks:
 
 
 def must(holds: bool, part: object, key: str, rule: str) -> None:
-    """Raise a ParameterError unless a rule between fields holds; it names the section of a robot's file."""
+    """Raise a ParameterError that names the section of a robot's file if a rule between fields is broken."""
     if not holds:
         section = type(part).__name__.removesuffix("Spec").lower()
         raise ParameterError(f"{section}.{key} must be {rule}, but it was {shown(getattr(part, key))}.")
 
 
 def rises(values: tuple[float, ...]) -> bool:
-    """Tell whether no value is below the one before it."""
+    """Return whether no value is below the one before it."""
     return all(low <= high for low, high in pairwise(values))

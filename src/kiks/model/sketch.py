@@ -84,7 +84,7 @@ class Sketch:
 
     @property
     def arena_number(self) -> int:
-        """Number of the arena that was begun with; drawing in it does not change it."""
+        """Number of the arena at the beginning; drawing does not change it."""
         return self._canvas.number
 
     @property
@@ -99,21 +99,21 @@ class Sketch:
 
     @property
     def can_undo(self) -> bool:
-        """Whether there is a step to take back."""
+        """Whether there is a step to undo."""
         return bool(self._history.undoable)
 
     @property
     def can_redo(self) -> bool:
-        """Whether a step was taken back and nothing has been done since."""
+        """Whether there is a step to redo."""
         return bool(self._history.redoable)
 
     def of(self, kind: type[AnyThing]) -> dict[int, AnyThing]:
-        """Return all things of a kind by their numbers, in the order of these."""
+        """Return all things of a kind by their numbers, in order."""
         return {number: thing for number, thing in sorted(self.things.items()) if isinstance(thing, kind)}
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """What each robot is."""
+        """Kind of each robot."""
         return tuple(robot.kind for robot in self.of(SketchRobot).values())
 
     def arena(self) -> Arena:
@@ -132,10 +132,10 @@ class Sketch:
             cylinders=tuple(self.of(Cylinder).values()),
         )
 
-    # ---- all of it ----
+    # ---- the whole arena ----
 
     def picture(self, data: bytes, *, mm_per_pixel: float = 1.0, name: str = "picture") -> None:
-        """Begin with a picture; robots stay, where there is room. See `Arena.from_image`.
+        """Begin with a picture; robots stay where the floor is free. See `Arena.from_image`.
 
         Args:
             data: The bytes of a PNG, TIF, PGM or BMP file.
@@ -171,7 +171,7 @@ class Sketch:
         self._push(before)
 
     def _enter(self, arena: Arena, robots: dict[int, SketchRobot], wanted: dict[int, SketchRobot | str]) -> None:
-        """Put everything into an empty raster: robots, and those for which a place near another or any is wanted."""
+        """Put all robots into a raster without objects, each at its place or the nearest free one."""
         self.things.clear()
         self.things.update(robots)
         for thing in (*arena.bodies, *arena.lamps):
@@ -219,7 +219,7 @@ class Sketch:
         self._paint(stroke_cells(self._shape, points, width_mm / self._canvas.mm_per_cell), brightness)
 
     def clear(self) -> None:
-        """Make all of it floor; what stands in it stays."""
+        """Remove all walls; objects stay."""
         self.rectangle(0, 0, self.width_mm, self.height_mm, 0)
 
     @property
@@ -357,7 +357,7 @@ class Sketch:
         return checked
 
     def _obstacle(self, thing: Thing, but: int = 0) -> str | None:
-        """Say what is in the way of a thing, None if it may be there."""
+        """Return the obstacle of a thing as text; None if its place is free."""
         if isinstance(thing, Lamp):
             return None
         gap_mm = self._gap_mm(thing)
@@ -389,7 +389,7 @@ class Sketch:
         return self._swap(self._history.redoable, self._history.undoable)
 
     def take_back(self) -> None:
-        """Take the last step back for good: it was none."""
+        """Undo the last step without a redo."""
         if self.undo():
             self._history.redoable.pop()
 

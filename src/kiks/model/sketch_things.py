@@ -1,4 +1,4 @@
-"""What stands or hangs in a sketch."""
+"""The objects of a sketch."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from kiks.model.robot import RobotSpec
 
 
 class SketchRobot(NamedTuple):
-    """A robot that is going to start somewhere: its place [mm], heading [rad], and what `RobotSpec.load` calls it."""
+    """A robot at its start: place [mm], heading [rad], and kind for `RobotSpec.load`."""
 
     x_mm: float
     y_mm: float
@@ -28,19 +28,19 @@ _NAMES: dict[type, str] = {SketchRobot: "robot", Ball: "ball", Cylinder: "cylind
 
 
 def name_of(kind: type[Thing]) -> str:
-    """Return what people call a kind of thing."""
+    """Return the name of a kind of thing."""
     return _NAMES[kind]
 
 
 def numbered(things: Mapping[int, Thing], number: int) -> str:
-    """Return what people call one of many things: 'ball 2', the second of all balls."""
+    """Return the name of one of several things: 'ball 2', the second ball."""
     kind = type(things[number])
     alike = [each for each, thing in sorted(things.items()) if isinstance(thing, kind)]
     return f"{name_of(kind)} {alike.index(number) + 1}"
 
 
 def overlap_of(thing: SketchRobot | Ball | Cylinder, things: Mapping[int, Thing], but: int = 0) -> str | None:
-    """Say which of many things but one is inside what stands on the floor, None if none is."""
+    """Return as text which other thing overlaps a thing on the floor; None if none does."""
     for number, other in things.items():
         if number == but or isinstance(other, Lamp):
             continue
@@ -65,6 +65,6 @@ def robot_radius_mm(kind: str) -> float:
     """Return the radius of a kind of robot [mm].
 
     Raises:
-        ParameterError: If there is no such kind.
+        ParameterError: If the kind is unknown.
     """
     return RobotSpec.load(kind).body.radius_mm

@@ -1,4 +1,4 @@
-"""The thesis's response: one small neural network for each sensor, and the fans of rays they were trained on.
+"""The thesis's response: one small neural network for each sensor, and the rays that are its inputs.
 
 Source: thesis section 3.3, "7 input neurons, 13+7 neurons in 2 hidden layers, 1 linear output neuron". The weights of
 the file that comes with KiKS were trained by `tools/accuracy.py`; `responses/SOURCE.md` says on which data.
@@ -68,7 +68,7 @@ class NetworkResponse:
 
     @property
     def weights(self) -> tuple[Numbers, Numbers, Numbers]:
-        """The weights as the kernels take them: hidden [8, 13, 8], middle [8, 7, 14] and last [8, 8]."""
+        """The weights for the kernels: hidden [8, 13, 8], middle [8, 7, 14] and last [8, 8]."""
         return np.array(self.hidden), np.array(self.middle), np.array(self.last)
 
     @classmethod

@@ -1,4 +1,4 @@
-"""What a thinking policy is called: 'none', 'fixed:MS', 'live', 'live:FACTOR' or 'replay:FILE'."""
+"""The names of thinking policies: 'none', 'fixed:MS', 'live', 'live:FACTOR' or 'replay:FILE'."""
 
 from __future__ import annotations
 
