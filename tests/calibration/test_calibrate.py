@@ -243,7 +243,7 @@ class Flaky(SimPort):
 def test_a_robot_that_falls_silent_is_named() -> None:
     sim = kiks.Simulation()
     port = Flaky(sim, 500, kiks.LinkError("the cable fell out"))
-    with pytest.raises(kiks.LinkError, match=r"must come before the time-out|the cable fell out"):
+    with pytest.raises(kiks.LinkError, match=r"must come before the timeout|the cable fell out"):
         calibrate(kiks.Khepera(port), SimPlacements(sim), BASE)
     assert stands_still(sim)
 
@@ -294,19 +294,19 @@ def test_odometry_follows_a_spin() -> None:
 def test_unknowns_and_robots_are_two_names_of_one_thing() -> None:
     spec = hidden_robot(4, BASE)
     unknowns = wall_fit.unknowns_of(BASE, spec)
-    assert wall_fit.unknowns_of(BASE, wall_fit.robot_of(BASE, unknowns)) == pytest.approx(unknowns)
+    assert wall_fit.unknowns_of(BASE, wall_fit.apply_unknowns(BASE, unknowns)) == pytest.approx(unknowns)
     unknowns[-1] = 1.0
     with pytest.raises(CalibrationError, match="Name the right kind with --base"):
-        wall_fit.robot_of(BASE, unknowns)
+        wall_fit.apply_unknowns(BASE, unknowns)
 
 
 def test_a_heading_is_guessed_from_the_light() -> None:
-    stand = wall_fit.Stand(BASE)
+    model = wall_fit.WallModel(BASE)
     headings_rad = np.linspace(0.4, 0.4 + 2 * math.pi, 100)
     turned = (headings_rad - 0.4) * BASE.body.wheel_base_mm / BASE.body.pulse_mm / 2
-    counts = stand.readings(BASE, np.full(100, 10.0), headings_rad)
+    counts = model.readings(BASE, np.full(100, 10.0), headings_rad)
     run = Run(10.0, np.stack((-turned, turned), axis=1), counts, (0, 0))
-    assert wall_fit.guess_heading_rad(stand, BASE, run) == pytest.approx(0.4, abs=0.1)
+    assert wall_fit.guess_heading_rad(model, BASE, run) == pytest.approx(0.4, abs=0.1)
 
 
 def test_gaps_are_checked() -> None:

@@ -81,7 +81,7 @@ def test_silence_is_named() -> None:
         def close(self) -> None:
             pass
 
-    with pytest.raises(kiks.LinkError, match=r"must come before the time-out, but only b'h,1' came. Check the cable"):
+    with pytest.raises(kiks.LinkError, match=r"must come before the timeout, but only b'h,1' came. Check the cable"):
         kiks.Khepera(Dead()).encoders()
 
 

@@ -27,10 +27,8 @@ DIGITS_MAX = 13
 class Thinking(Protocol):
     """A policy: `enter` is called when the program calls a port, `leave` when the port returns."""
 
-    is_repeatable: bool
-
     def enter(self, *, is_command: bool) -> int:
-        """Return the time to charge at a call [ns]; `is_command`: the call sends, the first since a reply."""
+        """Return the time to charge at a call [ns]; `is_command`: whether it sends, as the first call since a reply."""
 
     def leave(self) -> None:
         """Note that the program goes on."""
@@ -38,8 +36,6 @@ class Thinking(Protocol):
 
 class ThinkingFixed:
     """The same time before every command; 0 is `none`."""
-
-    is_repeatable = True
 
     def __init__(self, time_ns: int) -> None:
         self.time_ns = time_ns
@@ -54,8 +50,6 @@ class ThinkingFixed:
 
 class ThinkingLive:
     """The measured time times a factor for another computer (2: half as fast as this one)."""
-
-    is_repeatable = False
 
     def __init__(self, factor: float) -> None:
         self.factor = factor
@@ -75,8 +69,6 @@ class ThinkingLive:
 
 class ThinkingReplay:
     """The times of an earlier run, in their order; 0 after the last."""
-
-    is_repeatable = True
 
     def __init__(self, measured_ns: list[int]) -> None:
         self._times = iter(measured_ns)
