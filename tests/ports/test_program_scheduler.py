@@ -94,12 +94,12 @@ class FakeProgram(Participant):
         world.answer_at(at_ns + answer_ns, self.rank)
         self.waits = True
 
-    def look(self) -> None:
+    def check_wait(self) -> None:
         if self.rank in self._world.answered:
             self._world.answered.remove(self.rank)
             self.waits = False
             end_ns = self._world.now_ns + ANSWER_NS
-            self._scheduler.see(end_ns)
+            self._scheduler.note_seen(end_ns)
             self.acts_from_ns = end_ns + self._think_ns + len(self._world.log) % 3
 
     def drop(self) -> None:

@@ -98,7 +98,7 @@ class Driven:
 
 @contextmanager
 def driven(sim: Simulation, commands: Sequence[Command] = (), **options: Any) -> Iterator[Driven]:
-    run = Driven(Programs(sim, commands, is_heard=True, **{"patience_s": GUARD_S, **options}))
+    run = Driven(Programs(sim, commands, keeps_output=True, **{"patience_s": GUARD_S, **options}))
     try:
         yield run
     finally:

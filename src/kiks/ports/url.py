@@ -50,8 +50,7 @@ def find_port(url: str) -> SimPort:
         known = "robot 1 only" if sim.robot_count == 1 else f"robots 1 to {sim.robot_count}"
         raise LinkError(
             f"a port must belong to an existing robot, but {shown(url)} names robot {robot} and the simulation has "
-            f"{known}. "
-            f"Open {sim.url(min(max(robot, 1), sim.robot_count))!r}, or create it with more robots."
+            f"{known}. Open {sim.url(min(max(robot, 1), sim.robot_count))!r}, or create it with more robots."
         )
     return SimPort(sim, robot)
 
