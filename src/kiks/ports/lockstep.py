@@ -89,6 +89,9 @@ class Lockstep:
         """Return whether all commands of a client that has gone have acted."""
         return self._clients[link.robot].has_left
 
+    def catch_up(self) -> None:
+        """Do nothing: time does not pass by itself."""
+
     def advance(self, links: Iterable[Link]) -> float:
         """Send the commands that are due, and hand over their replies."""
         wait_s = self._scheduler.advance()

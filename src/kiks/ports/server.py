@@ -99,8 +99,10 @@ class Server:
                     if link.channel is not None and link.channel.has_ahead and not self._timing.is_full(link):
                         self._exchange(link, selectors.EVENT_READ)
                     self._select_events(link)
-            for key, events in self._selector.select(wait_s):
-                with self.sim.lock:
+            ready = self._selector.select(wait_s)
+            with self.sim.lock:
+                self._timing.catch_up()
+                for key, events in ready:
                     key.data(events)
 
     def close(self) -> None:
