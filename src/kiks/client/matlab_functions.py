@@ -12,7 +12,8 @@ from typing import Any
 
 from kiks.client.port import Port, open_port
 from kiks.errors import LinkError, ParameterError, shown
-from kiks.model.checks import SECONDS_MAX, check_kind, check_number, check_numbers
+from kiks.model.array_checks import check_numbers
+from kiks.model.checks import SECONDS_MAX, check_kind, check_number
 from kiks.sim.port import VirtualPort
 
 

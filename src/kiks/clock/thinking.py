@@ -14,7 +14,6 @@ from typing import Protocol
 
 from kiks.errors import ParameterError
 from kiks.model.atomic_files import replace_file
-from kiks.model.data_file import read_file
 from kiks.model.thinking_policy import split_thinking
 
 FILE_BYTES_MAX = 64 << 20
@@ -111,6 +110,9 @@ def save_thinking(measured_ns: list[int], path: str | Path) -> None:
 
 
 def _read_times(path: Path) -> list[int]:
+    # Imported here, with its parser of data files: the processes of programs read none, and start fast.
+    from kiks.model.data_file import read_file
+
     what = f"replay file {str(path)!r}"
     lines = read_file(path, what, bytes_max=FILE_BYTES_MAX).splitlines()
     for number, line in enumerate(lines, 1):

@@ -20,6 +20,9 @@ RECEIVE_SIZE = 1 << 16
 WINDOW = 64
 """Requests that a program may send without an answer: it limits how far a program runs ahead of the world."""
 
+LATE, PUNCTUAL = "late", "punctual"
+"""How a program begins: when the world may have begun already, or with it."""
+
 _REQUEST = struct.Struct("<BHqIqqqqI")
 _ANSWER = struct.Struct("<I?qqqI")
 _READ = struct.Struct("<HqB")

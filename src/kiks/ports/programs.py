@@ -15,9 +15,10 @@ from kiks.clock.thinking import parse_thinking
 from kiks.ending import INTERRUPTED, noting_endings
 from kiks.errors import KiksError, ParameterError
 from kiks.ports.file_descriptors import opening
+from kiks.ports.messages import LATE, PUNCTUAL
 from kiks.ports.participant import LocalParticipant, RemoteParticipant
 from kiks.ports.port_names import PortNames
-from kiks.ports.program_process import LATE, PUNCTUAL, AnyProgram, Command, Labels, OutputLine, Permission, Process
+from kiks.ports.program_process import AnyProgram, Command, Labels, OutputLine, Permission, Process
 from kiks.ports.program_scheduler import PATIENCE_S, START_PATIENCE_S, VISIT_PATIENCE_S, ProgramScheduler
 from kiks.sim.ring_buffer import RingBuffer
 from kiks.sim.simulation import Simulation

@@ -12,8 +12,7 @@ from pathlib import Path
 from kiks.clock.program_clock import ProgramClock
 from kiks.clock.thinking import save_thinking
 from kiks.errors import KiksError
-from kiks.ports.messages import Kind
-from kiks.ports.program_process import LATE
+from kiks.ports.messages import LATE, Kind
 from kiks.ports.remote_link import RemoteLine, SocketConnection
 from kiks.script.runner import run_program
 
