@@ -112,7 +112,7 @@ def test_a_page_in_a_browser_drives_no_robot(
 # ---- floods ----
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 @given(command=st.sampled_from([b"N\n", b"H\n", b"D,5,5\n", b"B\n"]))
 @example(command=b"N\n")
 def test_flood_delays_the_next_client_by_two_seconds_at_most(command: bytes) -> None:
