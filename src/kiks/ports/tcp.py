@@ -167,7 +167,7 @@ class TcpChannel(Channel):
         return data
 
     def _receive(self) -> bytes | None:
-        """Return what has come, perhaps nothing; None when the connection is over."""
+        """Return the bytes that have arrived, perhaps none; None when the connection is over."""
         try:
             return self._connection.recv(READ_SIZE) or None
         except BlockingIOError:

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl, urlsplit
 
 from kiks.errors import LinkError, ParameterError, nearest, shown
-from kiks.sim.simulation import REGISTRY
 
 if TYPE_CHECKING:
     from kiks.sim.simulation import SimPort, Simulation
@@ -28,7 +27,7 @@ def find_port(url: str) -> SimPort:
         ParameterError: If an option is unknown or out of range.
         ArenaError: If the arena cannot be read.
     """
-    from kiks.sim.simulation import SimPort, Simulation
+    from kiks.sim.simulation import REGISTRY, SimPort, Simulation
 
     parts = urlsplit(url)
     path = parts.path.strip("/")
@@ -50,8 +49,7 @@ def find_port(url: str) -> SimPort:
         known = "robot 1 only" if sim.robot_count == 1 else f"robots 1 to {sim.robot_count}"
         raise LinkError(
             f"a port must belong to an existing robot, but {shown(url)} names robot {robot} and the simulation has "
-            f"{known}. "
-            f"Open {sim.url(min(max(robot, 1), sim.robot_count))!r}, or create it with more robots."
+            f"{known}. Open {sim.url(min(max(robot, 1), sim.robot_count))!r}, or create it with more robots."
         )
     return SimPort(sim, robot)
 
