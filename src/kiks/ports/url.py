@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import parse_qsl, urlsplit
 
 from kiks.errors import LinkError, ParameterError, nearest, shown
-from kiks.sim.simulation import REGISTRY
-
-if TYPE_CHECKING:
-    from kiks.sim.simulation import SimPort, Simulation
+from kiks.model.arena import Arena
+from kiks.sim.simulation import REGISTRY, SimPort, Simulation
 
 _OPTIONS = ("arena", "robots", "robot", "seed", "thinking")
 
 
 def find_port(url: str) -> SimPort:
-    """Return a new port on the line that a name stands for.
+    """Return a new port for a name.
 
     A number alone is a robot of the newest simulation, or of a new one in the default arena if there is none. Options
     after a question mark always create a new simulation.
@@ -28,8 +26,6 @@ def find_port(url: str) -> SimPort:
         ParameterError: If an option is unknown or out of range.
         ArenaError: If the arena cannot be read.
     """
-    from kiks.sim.simulation import SimPort, Simulation
-
     parts = urlsplit(url)
     path = parts.path.strip("/")
     name, number = (parts.netloc, path) if path else ("", parts.netloc)
@@ -40,7 +36,7 @@ def find_port(url: str) -> SimPort:
         )
     options = dict(parse_qsl(parts.query, keep_blank_values=True))
     if options:
-        sim = _fresh(options, url)
+        sim = _new_simulation(options, url)
     elif name:
         sim = REGISTRY.find(name)
     else:
@@ -55,10 +51,7 @@ def find_port(url: str) -> SimPort:
     return SimPort(sim, robot)
 
 
-def _fresh(options: dict[str, str], url: str) -> Simulation:
-    from kiks.model.arena import Arena
-    from kiks.sim.simulation import Simulation
-
+def _new_simulation(options: dict[str, str], url: str) -> Simulation:
     settings: dict[str, Any] = {}
     for key, value in options.items():
         if key not in _OPTIONS:
