@@ -51,6 +51,7 @@ def executor_for(where: str, work: Evaluation) -> Executor:
         ParameterError: If `where` is unknown, or the work has no method `evaluate`.
 
     Example:
+        >>> import numpy as np
         >>> class Squares:
         ...     def prepare(self):
         ...         pass

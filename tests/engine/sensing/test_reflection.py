@@ -247,7 +247,7 @@ def test_readings_are_those_of_geometry_however_cells_lie(
     samples = Samples("object", radius_mm, gaps_mm, np.broadcast_to(angles_deg, shape), np.zeros((*shape, 8), int))
     exact = predict(KHEPERA, samples)
     errors = []
-    for _ in range(share(2, 5)):
+    for _ in range(share(3, 5)):
         (x, y), turn = rng.uniform(-cell_mm, cell_mm, 2), rng.uniform(-math.pi, math.pi)
         ahead, aside = math.cos(turn), math.sin(turn)
         is_wall, behind_mm = math.isinf(radius_mm), 0.0 if math.isinf(radius_mm) else radius_mm
@@ -257,9 +257,9 @@ def test_readings_are_those_of_geometry_however_cells_lie(
             for j, angle in enumerate(angles_deg):
                 counts = read(sim, x - away_mm * ahead, y - away_mm * aside, turn + math.radians(angle))
                 errors.append(counts - exact[i, j])
-    both = np.array(errors), np.tile(exact.reshape(-1, 8), (share(2, 5), 1))
+    both = np.array(errors), np.tile(exact.reshape(-1, 8), (share(3, 5), 1))
     active = (both[1] > 20) & (both[1] < 1000)
-    assert active.sum() > 40 * share(2, 5)
+    assert active.sum() > 40 * share(3, 5)
     assert np.abs(both[0]).max() < largest
     assert np.sqrt(np.mean(both[0][active] ** 2)) < usual
 
