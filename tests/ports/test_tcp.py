@@ -73,13 +73,14 @@ def test_two_robots_have_their_own_clients() -> None:
 def test_unread_output_is_limited_and_logged(caplog: pytest.LogCaptureFixture) -> None:
     here, there = socket.socketpair()
     here.setblocking(False)
-    channel = TcpChannel("a test", here)
+    endpoint = TcpEndpoint(0)
+    channel = TcpChannel(here, endpoint)
     for _ in range(OUTPUT_LIMIT // 1000 + 2000):
         channel.write(b"x" * 1000)
     assert channel.has_unsent
     assert len(channel._unsent) <= OUTPUT_LIMIT
     assert warnings(caplog) == [
-        f"the client of a test must read its replies, but {len(channel._unsent)} characters wait for it; "
+        f"the client of {endpoint.name} must read its replies, but {len(channel._unsent)} characters wait for it; "
         "the rest is lost. Read a line after each command."
     ]
     there.close()
@@ -87,6 +88,7 @@ def test_unread_output_is_limited_and_logged(caplog: pytest.LogCaptureFixture) -
     assert len(channel._unsent) == 0
     assert channel.read() is None
     channel.close()
+    endpoint.close()
 
 
 def test_client_that_does_not_read_gets_all_its_replies_later() -> None:

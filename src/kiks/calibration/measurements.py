@@ -31,7 +31,7 @@ LEAD_S = 0.005
 (khepera-protocol.md 8.1 and 6.1)."""
 
 SETTLE_S = 0.4
-"""Time after a stop until the robot surely stands still [s]."""
+"""Time after a stop until the robot certainly stands still [s]."""
 
 JITTER_POINTS = 26
 """Number of quantiles that describe the distribution of the jitter: 4 % of the readings lie between two."""

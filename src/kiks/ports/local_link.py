@@ -173,18 +173,19 @@ class SharedLine(RemoteLine):
         robot: Number of the robot, from 1.
     """
 
+    _connection: LocalConnection
+
     def __init__(self, connection: LocalConnection, sim: Simulation, robot: int) -> None:
         super().__init__(connection, robot)
         self.lock = sim.lock
         self._sim = sim
-        self._local_connection = connection
         self._local_line = LocalLine(sim.loop, robot)
 
     def think(self, time_ns: int) -> None:
         """Let the thinking time of the program pass [ns]."""
-        if self._local_connection.is_alone:
+        if self._connection.is_alone:
             # `LocalConnection.live` may have let some of it pass already.
-            time_ns = max(time_ns - (self._sim.now_ns - self._local_connection.now_ns), 0)
+            time_ns = max(time_ns - (self._sim.now_ns - self._connection.now_ns), 0)
         self._act(self._local_line.think, super().think, time_ns)
 
     def pass_to(self, time_ns: int) -> None:
@@ -193,10 +194,10 @@ class SharedLine(RemoteLine):
         while now_ns + SLICE_NS < time_ns:
             now_ns += SLICE_NS
             self._act(self._local_line.pass_to, super().pass_to, now_ns)
-            if self._local_connection.is_alone:
+            if self._connection.is_alone:
                 # Simulate each slice here, not all of them when the state is read.
                 self._sim.sync()
-            self._local_connection.yield_world()
+            self._connection.yield_world()
         self._act(self._local_line.pass_to, super().pass_to, time_ns)
 
     def send(self, data: bytes) -> None:
@@ -213,8 +214,8 @@ class SharedLine(RemoteLine):
 
     def _act(self, alone: Callable[[*Given], Result], shared: Callable[[*Given], Result], *args: *Given) -> Result:
         """Call the method of the line that serves this program now."""
-        if not self._local_connection.is_alone:
+        if not self._connection.is_alone:
             return shared(*args)
         result = alone(*args)
-        self._local_connection.set_time(self._sim.now_ns)
+        self._connection.set_time(self._sim.now_ns)
         return result

@@ -2,7 +2,7 @@
 
 A command acts one thinking time after the previous reply, and the program waits for its own reply. Neither the way in
 which the operating system splits the bytes nor the real time that a program takes has an influence.
-`program_scheduler.py` tells how several programs share the world.
+`program_scheduler.py` describes how several programs share the world.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from collections.abc import Callable, Iterable
 from kiks.clock.patience import Patience
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.ports.live import IDLE_S, Link
-from kiks.ports.program_scheduler import PATIENCE_S, Participant, ProgramScheduler
+from kiks.ports.program_scheduler import Participant, ProgramScheduler
 from kiks.sim.simulation import Simulation
 from kiks.units import NS_PER_S
 
 TERMINATORS = (b"\r", b"\n")
 
 LEFT_BEHIND_COUNT = 50
-"""If a client leaves more commands behind, the next one waits so long that the log says so."""
+"""Number of remaining commands of a client above which the log says how long the next client waits."""
 
 REPLY_LENGTH = 64
 """Longest usual reply [characters]."""
@@ -41,7 +41,7 @@ class Lockstep:
         missing: Returns the names of the missing programs, for the log.
         when_silent: What happens to a program that is silent while others wait: 'wait', 'drop' or 'ignore'.
         patience_s: How long a program may be silent [s of real time].
-        new_patience: For tests: makes patiences with their own wall clock.
+        new_patience: Makes patiences with another wall clock.
 
     Raises:
         ParameterError: If the policy is unknown, or the patience is out of range.
@@ -54,11 +54,11 @@ class Lockstep:
         sim: Simulation,
         thinking_ns: int,
         *,
-        programs: int = 1,
-        missing: Callable[[], str] = lambda: "",
-        when_silent: str = "ignore",
-        patience_s: float = PATIENCE_S,
-        new_patience: Callable[[float], Patience] = Patience,
+        programs: int,
+        missing: Callable[[], str],
+        when_silent: str,
+        patience_s: float,
+        new_patience: Callable[[float], Patience],
     ) -> None:
         self._sim = sim
         self._thinking_ns = thinking_ns
@@ -182,7 +182,7 @@ class Client(Participant):
         wire, line = self._link.wire, self._link.wire.line
         if wire.pending:
             return
-        # The world stands at the instant at which the command has acted, or was sent if it was no command.
+        # The world is at the instant at which the command has acted, or was sent if it was no command.
         end_ns = max(self.acts_from_ns, self._sim.now_ns)
         count = len(line.waiting)
         if count:

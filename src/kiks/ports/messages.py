@@ -63,7 +63,7 @@ class Kind(IntEnum):
     WAIT = 15
     """Asks for an answer when one of the reads in `data` is complete, or at `second` [ns]; -1: without a limit."""
     END = 16
-    """Never sent: stands for the end of the connection."""
+    """Represents the end of the connection; never sent."""
 
 
 ASKING = frozenset(Kind) - {Kind.REACHED, Kind.HANG_UP, Kind.SEND, Kind.DROP, Kind.SET_BAUD, Kind.END}

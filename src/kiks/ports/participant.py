@@ -363,12 +363,8 @@ class LocalParticipant(ProgramParticipant):
         is_closed: Whether the world has ended.
     """
 
-    def __init__(
-        self, name: str, rank: int, robot: int, sim: Simulation, scheduler: ProgramScheduler, names: PortNames
-    ) -> None:
-        super().__init__(name, rank, robot, sim, scheduler, names)
-        self.answer: Answer | None = None
-        self.is_closed = False
+    answer: Answer | None = None
+    is_closed = False
 
     def close(self) -> None:
         """Mark the connection as closed."""

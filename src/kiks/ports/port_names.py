@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from kiks.errors import LinkError, shown
+from kiks.ports.url import find_port
 from kiks.sim.simulation import Simulation
 
 
@@ -71,8 +72,6 @@ class PortNames:
         return self._found[program, name]
 
     def _of_url(self, name: str) -> int:
-        from kiks.ports.url import find_port
-
         if "?" in name:
             raise LinkError(
                 f"a port's name must be without options where several programs share a world, but it was "

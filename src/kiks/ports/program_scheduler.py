@@ -118,7 +118,7 @@ class ProgramScheduler:
         is_once: Whether later programs act as soon as they come; otherwise `expected` programs begin together again.
         when_silent: What happens to a program that is silent while others wait: 'wait', 'drop' or 'ignore'.
         patience_s: How long a program may be silent [s of real time].
-        new_patience: For tests: makes patiences with their own wall clock.
+        new_patience: Makes patiences with another wall clock.
         start_patience_s: How long the world waits for the programs with which it begins [s of real time]; without a
             limit if `when_silent` is 'wait'.
 

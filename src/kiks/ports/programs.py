@@ -107,7 +107,7 @@ class Programs:
         say: Called with a line of text about each program that has ended.
         keeps_output: Whether the handles keep the output; otherwise it goes to the output of this process. If they do,
             child processes of a program end with it.
-        new_patience: Makes patiences with another wall clock: one that stands still while the world does.
+        new_patience: Makes patiences with another wall clock, such as one that stands still while the world does.
         visitors: Number of programs in threads of this process that begin together with these; see `admit`.
         labels: Prints the output with labels, if the handles do not keep it; None: the programs print it themselves.
 
@@ -199,7 +199,7 @@ class Programs:
             return "a program was started or stopped while the world was there"
         return "" if self._scheduler.is_repeatable else "the world did not wait for every program"
 
-    # ---- programs come and go ----
+    # ---- starting and stopping ----
 
     def start(self, command: Command, robot: int = 1) -> Handle:
         """Start a program; it takes part from the simulated time at which its first request comes.
@@ -271,7 +271,7 @@ class Programs:
             self._is_moving = False
             self._moved.notify_all()
 
-    def wait(self, seconds: float | None) -> None:
+    def wait(self, seconds: float) -> None:
         """Wait until a thread has moved the world, or for some time [s]; the caller holds the lock."""
         self._moved.wait(seconds)
 

@@ -14,7 +14,7 @@ _OPTIONS = ("arena", "robots", "robot", "seed", "thinking")
 
 
 def find_port(url: str) -> SimPort:
-    """Return a new port on the line that a name stands for.
+    """Return a new port for a name.
 
     A number alone is a robot of the newest simulation, or of a new one in the default arena if there is none. Options
     after a question mark always create a new simulation.
@@ -27,6 +27,7 @@ def find_port(url: str) -> SimPort:
         ParameterError: If an option is unknown or out of range.
         ArenaError: If the arena cannot be read.
     """
+    # Imported here: a program in a process of its own finds its ports by another function, and needs no simulation.
     from kiks.sim.simulation import REGISTRY, SimPort, Simulation
 
     parts = urlsplit(url)
@@ -39,7 +40,7 @@ def find_port(url: str) -> SimPort:
         )
     options = dict(parse_qsl(parts.query, keep_blank_values=True))
     if options:
-        sim = _fresh(options, url)
+        sim = _new_simulation(options, url)
     elif name:
         sim = REGISTRY.find(name)
     else:
@@ -54,7 +55,7 @@ def find_port(url: str) -> SimPort:
     return SimPort(sim, robot)
 
 
-def _fresh(options: dict[str, str], url: str) -> Simulation:
+def _new_simulation(options: dict[str, str], url: str) -> Simulation:
     from kiks.model.arena import Arena
     from kiks.sim.simulation import Simulation
 
