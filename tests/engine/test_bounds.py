@@ -30,10 +30,10 @@ def said_by_process(**environment: str) -> str:
     return done.stdout
 
 
-@pytest.mark.slow
+@nightly
 @pytest.mark.timeout(470)  # it compiles the engine
 def test_no_index_leaves_its_array_and_no_bit_depends_on_the_build_in_a_world_of_two_robots() -> None:
-    """Without LLVM's slowest optimisations, which take two thirds of the time."""
+    """`.ci/run` runs it, too: without LLVM's slowest optimisations, which take two thirds of the time."""
     assert record_of_process(**PLAIN_AND_CHECKED, NUMBA_OPT="1") == run_record()
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import typer
 from tools.accuracy import accuracy
+from tools.sensors import card as cards
 from tools.sensors import models
 from tools.sensors.card import (
     FOUND,
@@ -128,8 +129,15 @@ def run(command, *arguments):
     return CliRunner().invoke(app, list(arguments))
 
 
+@pytest.fixture
+def made_card(card, monkeypatch):
+    """Give the command the card that is made already: making one takes 10 s."""
+    monkeypatch.setattr(cards, "make_card", lambda tables: card)
+
+
 @needs_data
 @pytest.mark.slow
+@pytest.mark.usefixtures("made_card")
 def test_the_command_prints_json_and_draws(tmp_path):
     pytest.importorskip("matplotlib")
     result = run(accuracy, "--json", "--plots", str(tmp_path / "card"))
@@ -142,6 +150,7 @@ def test_the_command_prints_json_and_draws(tmp_path):
 
 @needs_data
 @pytest.mark.slow
+@pytest.mark.usefixtures("made_card")
 def test_the_command_prints_a_table(tmp_path):
     result = run(accuracy, "--page", str(tmp_path / "page.md"))
     assert "thesis networks" in result.stdout

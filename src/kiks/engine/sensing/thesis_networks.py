@@ -153,11 +153,12 @@ def pack_networks(response: NetworkResponse) -> NDArray[np.void]:
 
 @functools.cache
 def networks_for(*responses: str) -> NDArray[np.void]:
-    """Return what responses of robots' files need of the networks that come with KiKS, shape [1] or [0]."""
-    if set(responses).isdisjoint(NETWORK_RESPONSES):
-        return np.zeros(0, NETWORKS)
-    packed = pack_networks(NetworkResponse.load())
-    if "fast" in responses:
-        fill_table(packed, packed["table"][0])
+    """Return what responses of robots' files need of the networks that come with KiKS, shape [1] or [0]; read-only."""
+    packed = np.zeros(0, NETWORKS)
+    if not set(responses).isdisjoint(NETWORK_RESPONSES):
+        packed = pack_networks(NetworkResponse.load())
+        if "fast" in responses:
+            fill_table(packed, packed["table"][0])
+    # Both shapes are read-only: a kernel that takes arrays of two types is compiled twice.
     packed.setflags(write=False)
     return packed
