@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import inspect
 import math
-import os
 import random
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
+from contextlib import chdir, suppress
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cache, partial
 from typing import Any
@@ -434,8 +433,6 @@ def _prepare(make: Callable[[random.Random], Subject]) -> Play:
     """Return what plays a case of a subject, with everything compiled."""
     subject = make(random.Random(0))
     subject.check()
-    folder = tempfile.mkdtemp(prefix="kiks-torture-")
-    os.chdir(folder)
 
     def play(rng: random.Random) -> int:
         try:
@@ -443,11 +440,13 @@ def _prepare(make: Callable[[random.Random], Subject]) -> Play:
         except kiks.KiksError as error:
             raise RuntimeError("what is sound must not be refused") from error
         count = rng.randint(1, CALLS_PER_CASE)
-        for _ in range(count):
-            call, good = rng.choice(list(subject.calls.values()))
-            given = arguments(rng, call, good)
-            judge(partial(_tolerantly, call, given))
-        judge(subject.check)
+        # Calls may write files.
+        with tempfile.TemporaryDirectory(prefix="kiks-torture-") as folder, chdir(folder):
+            for _ in range(count):
+                call, good = rng.choice(list(subject.calls.values()))
+                given = arguments(rng, call, good)
+                judge(partial(_tolerantly, call, given))
+            judge(subject.check)
         return count
 
     return play

@@ -5,12 +5,11 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-import os
 import random
 import tempfile
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import chdir, contextmanager
 from dataclasses import fields
 from typing import Any
 
@@ -207,14 +206,14 @@ def _running() -> Iterator[Session]:
 
 
 def _prepare_session() -> Play:
-    os.chdir(tempfile.mkdtemp(prefix="kiks-torture-"))
     failures = _Failures()
     log = logging.getLogger("kiks.toolbox")
     log.handlers, log.propagate = [failures], False
     log.setLevel(logging.DEBUG)
 
     def play(rng: random.Random) -> int:
-        with _running() as session:
+        # Requests may name files.
+        with tempfile.TemporaryDirectory(prefix="kiks-torture-") as folder, chdir(folder), _running() as session:
             visitor = SessionClient(session, 1)
             lines = ["set thinking none", "world default", "open 1 9600", *(_request(rng) for _ in range(PER_CASE))]
             for line in lines:
