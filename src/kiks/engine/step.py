@@ -68,8 +68,8 @@ def advance_eight(eight: Any, parameters: Any, ground: Any, seeds: Any, until: A
     """Let time pass in eight worlds of one robot each.
 
     Args:
-        eight: The robots, an `Record8` of `EIGHT`.
-        parameters: Their constants, an `Record8` of `EIGHT_KINDS`.
+        eight: The robots, a `Record8` of `EIGHT`.
+        parameters: Their constants, a `Record8` of `EIGHT_KINDS`.
         ground: The arena, as in `advance`.
         seeds: Seeds of the eight worlds, `Words`; each is the first world of its seed.
         until: Final tick number of each world, `Lanes`; a world that has reached it does no tick.

@@ -83,7 +83,7 @@ class Company:
 
 
 @pytest.mark.parametrize("number", [*range(8), 95, 97])
-def test_in_a_pile_up_nobody_is_inside_anybody(number):
+def test_things_in_a_pile_up_do_not_overlap(number):
     """In 95 and 97 a robot once pushed a ball 4 mm deep into a post. All 1000: benchmarks/pileups.py."""
     pile = Pile.make(number)
     assert max(rush(pile, 5000)) <= DEEPEST_MM
@@ -159,8 +159,8 @@ def test_a_ball_does_not_get_through_a_wall_of_one_cell(offset, angle_deg):
 @pytest.mark.parametrize("what", ["robot", "ball", "cylinder"])
 @pytest.mark.parametrize("offset", np.linspace(-1.0, 1.0, 11).tolist())
 @pytest.mark.parametrize("start", [0.0, 3.3, 7.7])
-def test_a_fast_ball_meets_what_is_in_its_way(what, offset, start):
-    """Dead on and grazing: whatever it would have overlapped it hits, and never is inside it."""
+def test_a_fast_ball_hits_an_obstacle_in_its_way(what, offset, start):
+    """Dead on and grazing: the ball hits the obstacle and never overlaps it."""
     here = (1000.0, 1000.0)
     radius = {"robot": ROBOT_MM, "ball": BALL_MM, "cylinder": CYLINDER_MM}[what]
     aside = offset * (radius + BALL_MM - 2.0)
