@@ -15,10 +15,10 @@ from kiks.engine.scene import count_discs, enter_all
 from kiks.engine.simd.masks import anywhere, everywhere, opposite
 from kiks.engine.simd.records import (
     EIGHT,
+    copy_lanes,
     copy_record8,
     only,
     open_record8,
-    put_back,
     stack_record,
 )
 
@@ -86,7 +86,7 @@ def advance_eight(eight: Any, parameters: Any, ground: Any, seeds: Any, until: A
         advance_alone(eight, parameters, ground, (seeds, 0, 0, now))
         eight.tick_count = now + 1.0
         if not everywhere(is_due):
-            put_back(before, eight, opposite(is_due))
+            copy_lanes(before, eight, opposite(is_due))
 
 
 @kernel

@@ -92,7 +92,7 @@ def test_things_in_a_pile_up_do_not_overlap(number):
     assert moved <= SHOVED_MM
 
 
-def test_what_rests_rests():
+def test_a_ball_at_rest_stays_at_rest():
     """Once the last body has stopped, not a bit of a place changes."""
     pile = Pile.make(5)
     rush(pile, 1000)
@@ -289,7 +289,7 @@ def test_a_cylinder_keeps_no_speed_from_a_push():
 
 
 @pytest.mark.parametrize("speed", [1, 5, 40, 127])
-def test_what_gives_way_slows_no_robot(speed):
+def test_a_movable_thing_does_not_slow_a_robot(speed):
     """Pushing a cylinder, it comes exactly as far as alone, its wheels turn as fast, and it is one contact."""
     ends, wheels, contacts = [], [], []
     for cylinders in ([], [(600.0, 1000.0)]):
@@ -315,7 +315,7 @@ def test_a_ball_pushed_along_is_one_contact():
 
 @pytest.mark.parametrize("body", ["balls", "cylinders"])
 @pytest.mark.parametrize("speed", [5, 20, 100])
-def test_what_cannot_give_way_stops_a_robot(body, speed):
+def test_a_blocked_thing_stops_a_robot(body, speed):
     """Against a wall: it stands, its wheels turn at 10 to 15 %, and it drives out backwards unhindered."""
     radius = BALL_MM if body == "balls" else CYLINDER_MM
     x = 1990.0 - radius

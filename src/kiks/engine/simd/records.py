@@ -291,8 +291,8 @@ def copy_record8(typing: Any, source: Any, target: Any) -> Any:
 
 
 @_intrinsic
-def put_back(typing: Any, source: Any, target: Any, condition: Any) -> Any:
-    """Copy the lanes of a record of eights in which a condition holds to another one."""
+def copy_lanes(typing: Any, source: Any, target: Any, condition: Any) -> Any:
+    """Copy the lanes in which a condition holds from one `Record8` to another."""
     count = source.fields.size // (8 * LANES)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
