@@ -32,7 +32,7 @@ TOUCHING_MM = 62.0
 """Distance of the centre of a ball that touches the robot, with a small margin."""
 
 UNKNOWN_MM = 150.0
-"""Assumed distance of a ball of which only one edge is visible."""
+"""Assumed distance of a ball when only one of its edges is visible."""
 
 FLAT = 50.0
 """Largest difference of greys in a picture that the ball fills."""

@@ -31,7 +31,7 @@ NAMELESS = re.compile(
     r"^\s*- (?:button|link|textbox|combobox|spinbutton|slider|switch|checkbox|tab|radio|application)\b(?! \")",
     re.MULTILINE,
 )
-"""What can be pressed or filled in and has no name, in Playwright's words for what those hear who do not see."""
+"""Controls without an accessible name, in Playwright's notation for what a screen reader announces."""
 
 FAINT = """() => {
     const luminance = ([red, green, blue]) => [red, green, blue].map((part) => part / 255)

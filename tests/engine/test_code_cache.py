@@ -102,7 +102,7 @@ def test_a_damaged_file_is_thrown_away(number: int, tmp_path: Path, caplog: pyte
 
 
 @pytest.mark.parametrize("rights", [0o620, 0o602, 0o600])
-def test_what_others_may_have_written_is_not_run(
+def test_code_in_files_that_others_can_write_is_not_run(
     rights: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     call()
@@ -124,7 +124,7 @@ def test_what_others_may_have_written_is_not_run(
     monkeypatch.undo()
 
 
-def test_what_programs_wrote_at_once_is_all_there() -> None:
+def test_concurrent_writes_of_programs_are_all_kept() -> None:
     one, other = entry(double_of), entry(double_of)
     contexts = one.targetctx, other.targetctx
     whole, real = (numba.int64,), (numba.float64,)

@@ -211,7 +211,7 @@ def test_a_paused_world_does_not_keep_a_session_alive(tmp_path: Path) -> None:
         session.ask("set thinking none")
         session.ask("world default")
         session.ask("open 1 9600")
-        os.write(session.to, b"pause 100000\n")  # at real speed, with a window: longer than anybody waits
+        os.write(session.to, b"pause 100000\n")  # at real speed, with a window: longer than any client waits
         os.write(session.to, b"ask 1 N\n")
         session.hang_up()
         assert session.wait() == 0
@@ -276,7 +276,7 @@ def test_other_files_are_not_read_as_sessions(tmp_path: Path) -> None:
         os.mkfifo(pipe, 0o600)
         line = session.greeting.replace(f"session {session.process.pid}", "session 4")
         (folder / "session-4").write_text(line + "\n", encoding="ascii")
-        (folder / "session-4").chmod(0o600)  # nobody holds it
+        (folder / "session-4").chmod(0o600)  # no process holds it
         for number in (1, 2, 3, 4):
             done = ended("--where", str(number), folder=tmp_path)
             assert done.returncode == 2
@@ -355,7 +355,7 @@ def test_the_leave_line_ends_a_session_with_an_open_pipe(tmp_path: Path) -> None
         assert session.wait() == 0
 
 
-def test_a_leaving_client_is_told_that_the_session_goes_on(tmp_path: Path) -> None:
+def test_a_disconnecting_client_learns_that_the_session_continues(tmp_path: Path) -> None:
     with started(folder=tmp_path) as first:
         first.ask("world default")
         with started("--join", "0", folder=tmp_path) as second:

@@ -9,7 +9,7 @@ from kiks.client.khepera import Khepera
 CRUISE = 6
 """Speed with nothing in sight [pulses/10 ms]."""
 
-# What a full reading of each sensor, clockwise from the left, adds to the speed of the left and of the right wheel.
+# Speed that a full reading of each sensor, clockwise from the left, adds to the left and to the right wheel.
 LEFT = (5, 9, 14, -18, -12, -7, 2, 2)
 RIGHT = (-7, -12, -18, 9, 9, 5, 2, 2)
 

@@ -1,4 +1,4 @@
-"""What an evolution has found, at work."""
+"""Run the controller that an evolution has found."""
 
 from __future__ import annotations
 

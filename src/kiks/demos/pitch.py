@@ -23,7 +23,7 @@ WALL, LEFT_GOAL, RIGHT_GOAL, JERSEY, BALL = 40, 95, 150, 20, 255
 """Brightnesses."""
 
 FRICTION_MM_S2 = 60.0
-"""What felt takes off the speed of a ball, three times as much as a smooth floor: a shot comes half across."""
+"""Friction of felt: three times that of a smooth floor, so a shot rolls half across the pitch."""
 
 _CORNER_MM = 140
 

@@ -1,4 +1,4 @@
-"""What `kiks demo` shows."""
+"""The scenes of `kiks demo`."""
 
 from __future__ import annotations
 

@@ -3,8 +3,8 @@
 Need: Numba keeps machine code as pickles. A damaged one raises anything in the middle of a call, or ends the process,
 and one that another user has written runs that user's code.
 Method: each file holds one function for one signature, and the digests of what is in it. It is read only if it belongs
-to this user or the superuser and others cannot write it. What is damaged is thrown away and compiled again. The name
-of the folder is a digest of all that the code depends on, so that what another version has left is never read.
+to this user or the superuser and others cannot write it. A damaged file is deleted and its function compiled again.
+The name of the folder is a digest of all that the code depends on, so files of another version are never read.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _ENDING = ".code"
 
 
 class CodeCache:
-    """What Numba asks for the machine code of a function, in place of a cache of its own.
+    """The cache that Numba asks for the machine code of a function, in place of its own.
 
     Args:
         function: The function, of a module.
@@ -182,10 +182,10 @@ def _payload(path: Path, key: object) -> Any:
 
 
 def _make_own(folder: Path) -> None:
-    """Make a folder into which nobody else can write.
+    """Make a folder that no other user can write to.
 
     Raises:
-        OSError: If that cannot be.
+        OSError: If the folder cannot be made.
     """
     folder.parent.mkdir(parents=True, exist_ok=True)
     is_shared = str(folder.parent) != tempfile.gettempdir()

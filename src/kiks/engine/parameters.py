@@ -216,11 +216,11 @@ def _pack_reflection(robot: Any, reflection: Reflection, proximity: Proximity) -
 def _pack_curve(robot: Any, curve: Curve, proximity: Proximity) -> None:
     """Write a measured curve at evenly spread distances, and how much of it each ray brings.
 
-    Between the points that were measured the logarithm of the counts is a straight line over that of the distance;
-    before the first it goes on so, beyond the last it falls with the square of the distance. What would be left of it
-    at the end of the range is taken off, so that nothing jumps there. The weights are such that a white wall, square
-    to the axis of a sensor, gives what the curve says: its rays at the angle a are longer by 1/cos(a), and what comes
-    back along them is less by cos(a)^2.
+    Between the measured points, the logarithm of the counts is a straight line over that of the distance. This line
+    continues before the first point; beyond the last, the count falls with the square of the distance. The count at the
+    end of the range is subtracted, so the curve ends there without a jump. The weights are such that a white wall,
+    square to the axis of a sensor, gives what the curve says: its rays at the angle a are longer by 1/cos(a), and what
+    comes back along them is less by cos(a)^2.
     """
     points = list(zip(curve.distance_mm, curve.counts, strict=True))
     points.append((2.0 * points[-1][0], points[-1][1] / 4.0))

@@ -15,10 +15,10 @@ from kiks.engine.scene import count_discs, enter_all
 from kiks.engine.simd.masks import anywhere, everywhere, opposite
 from kiks.engine.simd.records import (
     EIGHT,
+    copy_lanes,
     copy_record8,
     only,
     open_record8,
-    put_back,
     stack_record,
 )
 
@@ -68,8 +68,8 @@ def advance_eight(eight: Any, parameters: Any, ground: Any, seeds: Any, until: A
     """Let time pass in eight worlds of one robot each.
 
     Args:
-        eight: The robots, an `Record8` of `EIGHT`.
-        parameters: Their constants, an `Record8` of `EIGHT_KINDS`.
+        eight: The robots, a `Record8` of `EIGHT`.
+        parameters: Their constants, a `Record8` of `EIGHT_KINDS`.
         ground: The arena, as in `advance`.
         seeds: Seeds of the eight worlds, `Words`; each is the first world of its seed.
         until: Final tick number of each world, `Lanes`; a world that has reached it does no tick.
@@ -86,7 +86,7 @@ def advance_eight(eight: Any, parameters: Any, ground: Any, seeds: Any, until: A
         advance_alone(eight, parameters, ground, (seeds, 0, 0, now))
         eight.tick_count = now + 1.0
         if not everywhere(is_due):
-            put_back(before, eight, opposite(is_due))
+            copy_lanes(before, eight, opposite(is_due))
 
 
 @kernel

@@ -44,7 +44,7 @@ class Typed:
 
 
 def type_lines(sim: Simulation, robot: int, text: str) -> list[Typed]:
-    r"""Send what a person has typed, on the robot's line, at the present time. Somebody else lets that time pass.
+    r"""Send what a person has typed, on the robot's line, at the present time. The caller lets that time pass.
 
     Args:
         sim: The world.

@@ -15,7 +15,7 @@ STEP_MM = 0.5
 """How far a thing goes before it is looked whether it is still free [mm], as in KiKS 2.2.0 (kiks-behaviour.md 1.5)."""
 
 STEPS_MAX = 2000
-"""Most steps of one move: who pulls farther pulls again."""
+"""Most steps of one move; a longer pull takes several moves."""
 
 SIDES_RAD = (0.0, *(sign * math.radians(degrees) for degrees in (25, 50, 75, 87) for sign in (1, -1)))
 """Directions beside the straight one in which a thing may give way: it never gets farther from where it is wanted."""
@@ -43,7 +43,7 @@ class Held:
 
 
 class Drags:
-    """The hands of all who look at a world; each has one.
+    """The hands of all viewers of a world; each viewer has one.
 
     What is held stays where the hand is, though its wheels turn and others push: `keep` puts it back, and has to be
     called again and again while time passes (`Gate.keep`). All of it is called with the simulation's lock held.
@@ -55,8 +55,8 @@ class Drags:
         >>> from kiks import Arena, Simulation
         >>> sim = Simulation(Arena.box(500, 500))
         >>> hands = Drags(sim)
-        >>> hands.grab("somebody", "robot", 0)
-        >>> hands.move("somebody", 900, 250)
+        >>> hands.grab("viewer", "robot", 0)
+        >>> hands.move("viewer", 900, 250)
         >>> [round(value) for value in sim.pose(1)[:2]]
         [462, 250]
     """
@@ -67,15 +67,15 @@ class Drags:
 
     @property
     def are_empty(self) -> bool:
-        """Whether nobody holds anything."""
+        """Whether no hand holds anything."""
         return not self._held
 
     def holds(self, what: str, index: int) -> bool:
-        """Return whether somebody holds a thing."""
+        """Return whether a hand holds a thing."""
         return any(held.what == what and held.index == index for held in self._held.values())
 
     def grab(self, owner: str, what: str, index: int) -> None:
-        """Take a thing in somebody's hand; what it held before falls.
+        """Take a thing in a viewer's hand; the hand drops the thing that it held before.
 
         Raises:
             ParameterError: If there is no such thing, or another hand has it.
@@ -137,7 +137,7 @@ class Drags:
                 continue
             found = self._found(held.what, held.index)
             if (found.x_mm, found.y_mm, found.heading_rad) != (held.x_mm, held.y_mm, held.heading_rad):
-                # Somebody may have driven to where the hand was.
+                # A robot may have driven to where the hand was.
                 held.x_mm, held.y_mm = self._slide(found, held.x_mm, held.y_mm)
                 self._put(held)
 
@@ -168,7 +168,7 @@ class Drags:
         return Held(what, index, float(self._sim.lamps[index, 0]), float(self._sim.lamps[index, 1]))
 
     def _slide(self, held: Held, x_mm: float, y_mm: float) -> tuple[float, float]:
-        """Return how far a thing gets towards a place, in small steps, none of which ends in something else."""
+        """Return how far a thing gets towards a place, in small steps that overlap nothing else."""
         is_free = self._freedom(held)
         x, y = held.x_mm, held.y_mm
         for _ in range(STEPS_MAX):

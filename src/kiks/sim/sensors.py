@@ -1,4 +1,4 @@
-"""What the proximity and light sensors of the robots in a world read."""
+"""Readings of the proximity and light sensors of the robots in a world."""
 
 from __future__ import annotations
 

@@ -732,7 +732,7 @@ REGISTRY: Registry[Simulation] = Registry()
 
 
 def check_kinds(kinds: object, response: object = None) -> None:
-    """Check what says of which kind robots are.
+    """Check the argument that gives the kinds of robots.
 
     Args:
         kinds: The name of a kind, a robot file or a `RobotSpec`, or a list of such.

@@ -1,4 +1,4 @@
-"""A snapshot for people who watch: where everything is and what all sensors see at an instant."""
+"""A snapshot for the viewers of a world: where everything is and what all sensors see at an instant."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ def numbers_text(values: Iterable[float]) -> str:
 
 
 def numbers_of(words: Sequence[str], count: int, what: str) -> list[float]:
-    """Convert words to numbers, of which `NaN` stands for a value that is not given.
+    """Convert words to numbers; `NaN` stands for a value that is not given.
 
     Raises:
         ParameterError: If there are not `count` of them, or one is not a number or beyond `NUMBER_MAX`.

@@ -83,7 +83,7 @@ class Company:
 
 
 @pytest.mark.parametrize("number", [*range(8), 95, 97])
-def test_in_a_pile_up_nobody_is_inside_anybody(number):
+def test_things_in_a_pile_up_do_not_overlap(number):
     """In 95 and 97 a robot once pushed a ball 4 mm deep into a post. All 1000: benchmarks/pileups.py."""
     pile = Pile.make(number)
     assert max(rush(pile, 5000)) <= DEEPEST_MM
@@ -92,7 +92,7 @@ def test_in_a_pile_up_nobody_is_inside_anybody(number):
     assert moved <= SHOVED_MM
 
 
-def test_what_rests_rests():
+def test_bodies_at_rest_stay_at_rest():
     """Once the last body has stopped, not a bit of a place changes."""
     pile = Pile.make(5)
     rush(pile, 1000)
@@ -159,8 +159,8 @@ def test_a_ball_does_not_get_through_a_wall_of_one_cell(offset, angle_deg):
 @pytest.mark.parametrize("what", ["robot", "ball", "cylinder"])
 @pytest.mark.parametrize("offset", np.linspace(-1.0, 1.0, 11).tolist())
 @pytest.mark.parametrize("start", [0.0, 3.3, 7.7])
-def test_a_fast_ball_meets_what_is_in_its_way(what, offset, start):
-    """Dead on and grazing: whatever it would have overlapped it hits, and never is inside it."""
+def test_a_fast_ball_hits_an_obstacle_in_its_way(what, offset, start):
+    """Dead on and grazing: the ball hits the obstacle and never overlaps it."""
     here = (1000.0, 1000.0)
     radius = {"robot": ROBOT_MM, "ball": BALL_MM, "cylinder": CYLINDER_MM}[what]
     aside = offset * (radius + BALL_MM - 2.0)
@@ -289,7 +289,7 @@ def test_a_cylinder_keeps_no_speed_from_a_push():
 
 
 @pytest.mark.parametrize("speed", [1, 5, 40, 127])
-def test_what_gives_way_slows_no_robot(speed):
+def test_a_movable_thing_does_not_slow_a_robot(speed):
     """Pushing a cylinder, it comes exactly as far as alone, its wheels turn as fast, and it is one contact."""
     ends, wheels, contacts = [], [], []
     for cylinders in ([], [(600.0, 1000.0)]):
@@ -315,7 +315,7 @@ def test_a_ball_pushed_along_is_one_contact():
 
 @pytest.mark.parametrize("body", ["balls", "cylinders"])
 @pytest.mark.parametrize("speed", [5, 20, 100])
-def test_what_cannot_give_way_stops_a_robot(body, speed):
+def test_a_blocked_thing_stops_a_robot(body, speed):
     """Against a wall: it stands, its wheels turn at 10 to 15 %, and it drives out backwards unhindered."""
     radius = BALL_MM if body == "balls" else CYLINDER_MM
     x = 1990.0 - radius

@@ -199,7 +199,7 @@ def test_holding_at_the_overflow_of_the_counters_stays_put(world, edge):
     world.tick(200)
     world.set_counters(edge, edge)
     before = world.robot["wheel_pulses"].copy()
-    world.robot["wheel_pulses"] += 3.0 * math.copysign(1.0, edge)  # somebody nudges the wheels
+    world.robot["wheel_pulses"] += 3.0 * math.copysign(1.0, edge)  # an outside push turns the wheels
     world.tick(300)
     assert np.abs(world.robot["wheel_pulses"] - before).max() <= 4.0
     world.robot["trajectory_pulses"] += 5.0 * math.copysign(1.0, edge)

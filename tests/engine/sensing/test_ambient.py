@@ -241,7 +241,7 @@ def test_the_robot_reports_what_its_sensors_see() -> None:
         ("angle_exponent", 0.0, "a number above 0 and at most 20"),
     ],
 )
-def test_what_is_wrong_is_named(key: str, value: Any, words: str) -> None:
+def test_an_error_names_the_wrong_parameter(key: str, value: Any, words: str) -> None:
     with pytest.raises(kiks.ParameterError, match=rf"ambient\.{key} must be .*, but it was") as caught:
         SPEC.with_changes(**{f"ambient__{key}": value})
     assert words in str(caught.value)

@@ -161,7 +161,7 @@ def test_a_darker_disc_reads_less_and_none_reads_more_than_white():
     assert readings[0] > 2 * readings[-1]
 
 
-def test_what_is_lifted_nobody_sees_or_meets():
+def test_a_lifted_thing_is_neither_seen_nor_hit():
     ball = Ball(480.0, 400.0)
     floor = replace(Arena.box(800, 800), starts=(Pose(400.0, 400.0, 0.0),), lamps=(Lamp(700.0, 400.0, 5.0),))
     alone, lifted = Simulation(floor), Simulation(replace(floor, balls=(ball,)))

@@ -93,7 +93,7 @@ def assert_equal_readings(arena, kinds, networks, count, rng):
 
 
 @pytest.mark.parametrize("response", RESPONSES)
-def test_eight_read_what_each_reads_alone(make_random_arena, response):
+def test_eight_lanes_read_the_same_as_single_robots(make_random_arena, response):
     kinds, networks = kinds_of(response)
     rng = np.random.default_rng(RESPONSES.index(response))
     for number in range(share(3, 12)):

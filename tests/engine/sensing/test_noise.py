@@ -106,7 +106,7 @@ def test_a_robot_may_have_no_noise() -> None:
         ("noise_down", 1.5, "a number from 0 to 1"),
     ],
 )
-def test_what_is_wrong_is_named(key: str, value: object, words: str) -> None:
+def test_an_error_names_the_wrong_parameter(key: str, value: object, words: str) -> None:
     with pytest.raises(kiks.ParameterError) as caught:
         KHEPERA.with_changes(**{f"proximity__{key}": value})
     assert f"proximity.{key} must be {words}, but it was {value!r}" in str(caught.value)

@@ -81,7 +81,7 @@ def test_rays_along_edges_and_diagonals(make_random_arena, number, draw):
 
 @settings(derandomize=True, max_examples=share(20, 60))
 @given(number=st.integers(0, 300), draw=st.integers(0, 2**32))
-def test_a_wall_more_never_lengthens_a_ray(make_random_arena, number, draw):
+def test_an_additional_wall_never_lengthens_a_ray(make_random_arena, number, draw):
     arena = make_random_arena(number)
     rng = np.random.default_rng(draw)
     more = arena.brightness.copy()

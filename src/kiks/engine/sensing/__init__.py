@@ -1,1 +1,1 @@
-"""What sensors measure: rays, and the proximity, light, range and camera sensors made of them."""
+"""Rays, and the proximity, light, range and camera sensors that use them."""

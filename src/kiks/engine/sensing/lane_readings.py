@@ -43,7 +43,7 @@ EIGHT_SENSES = record8_of(
 )
 """The constants of eight robots that readings use as lanes."""
 
-# Record8 robots have 64 sensors; sizes of stack arrays must be constants of their own.
+# Eight robots have 64 sensors; sizes of stack arrays must be constants of their own.
 _FANS = 64
 _WAYS_SIZE = _FANS * WAY_SIZE
 

@@ -1,4 +1,4 @@
-"""What rays meet of an arena: how far one goes to a wall, exact to a hundredth of a millimetre, and how bright that is.
+"""Rays in an arena: the distance to a wall, exact to a hundredth of a millimetre, and the brightness of that wall.
 
 Method: the clearance of a cell (distance from its centre to the nearest wall cell's centre), less the diagonal of a
 cell, is a distance that any point of the cell may go freely in any direction: empty space is crossed in a few leaps.

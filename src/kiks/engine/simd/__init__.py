@@ -1,1 +1,1 @@
-"""Record8 numbers in one instruction: vectors, masks and records of eight worlds, as types of the compiler."""
+"""SIMD types for the compiler: vectors and masks of eight numbers, and records of eight worlds."""

@@ -1,7 +1,7 @@
-"""Record8 float32 numbers at once: with what the rays of a sensor look for their way.
+"""Vectors of eight float32 numbers, for the steps of a sensor's rays.
 
-Need: most of a reading's time went into steps of rays, and a step need only find the right cell: how far it is to that
-is worked out once, at the end, in float64. Half as wide, eight numbers are one instruction on most processors.
+Need: steps of rays take most of the time of a reading. A step only has to find the right cell; the distance to it is
+calculated once, at the end, in float64. Most processors calculate with eight float32 numbers in one instruction.
 Method: a type of its own, `Narrow`, beside `Lanes` of `kiks.engine.simd.f64x8`. Places are counted from the cell that a
 ray begins in, so that float32 holds them to a millionth of a cell; look-ups are bare loads that nothing checks.
 """

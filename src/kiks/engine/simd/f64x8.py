@@ -1,6 +1,6 @@
-"""Record8 numbers at once: the rays of a sensor, or the robots of eight worlds, in vector code on every processor.
+"""Vectors of eight float64 numbers: the rays of a sensor, or the robots of eight worlds.
 
-Need: a loop over seven or eight rays the compiler unrolls, and what comes of that it no longer turns into vector code.
+Need: the compiler unrolls a loop over seven or eight rays, and does not turn the unrolled code into vector code.
 Method: a type of its own, `Lanes`, with the operators + - * /, square roots and choices. Each is one instruction for
 eight numbers, or two or four on older processors, with the roundings of the scalar one; so the bits are the same.
 `floor`, `abs`, `min`, `max` and `lane_of` are for a number as well: what is written with them and with
@@ -46,7 +46,7 @@ class Lanes(types.Type):  # type: ignore[misc, unused-ignore]
 
 
 LANES = 8
-"""How many they are: as many as the widest vectors hold; the rays of a proximity sensor, and one over."""
+"""SIMD width: seven rays plus one padding lane; as wide as the widest vector registers."""
 
 _LANES = Lanes()
 _INTEGER = ir.IntType(32)
@@ -89,7 +89,7 @@ def offer(symbol: Any, define: Any, fits: Callable[..., bool]) -> None:
 
     Args:
         symbol: The function or operator.
-        define: What `numba.extending.intrinsic` takes.
+        define: A function as `numba.extending.intrinsic` takes it.
         fits: Whether it is for these types of arguments.
     """
 
@@ -260,9 +260,9 @@ def greatest(typing: Any, lanes: Any) -> Any:
 
 
 def _cells(builder: Any, places: Any, count: Any) -> Any:
-    """Return the cells that places along an axis are in, of so many; beyond the ends, the outermost."""
+    """Return the cells that contain places along an axis of `count` cells; beyond its ends, the outermost cell."""
     nought, last = ir.Constant(_VECTOR, [0.0] * LANES), _splat(builder, builder.sub(count, ir.Constant(count.type, 1)))
-    # What is no number is not above 0 either.
+    # NaN is not above 0, and becomes 0.
     places = builder.select(builder.fcmp_ordered(">", places, nought), places, nought)
     places = builder.select(builder.fcmp_ordered("<", places, last), places, last)
     return builder.fptosi(places, _INTEGERS)

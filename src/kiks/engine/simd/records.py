@@ -1,10 +1,10 @@
-"""The robots of eight worlds at once: records whose every number is eight, and how kernels read and write them.
+"""Records of the robots of eight worlds, and how kernels read and write them.
 
-Need: a tick is a few hundred operations on one robot, each of which a processor could do for eight at the same time;
-but its formulas must stand in one place, for a robot alone and for eight.
+Need: a tick is a few hundred operations on one robot. A processor can do each of them for eight robots at the same
+time. The formulas must stand in one place, for one robot and for eight.
 Method: `EIGHT` has the numbers of `ROBOT` that a tick of a lone robot reads or writes, `EIGHT_KINDS` those of
 `PARAMETERS`, each as eight float64 side by side, which hold whole numbers below 2^53 exactly. For kernels such a record
-is an `Record8`: `robot.x_mm` are `Lanes`, `robot.trail[0, 1]` too. `only(robot, condition)` is one that is written only
+is a `Record8`: `robot.x_mm` are `Lanes`, `robot.trail[0, 1]` too. `only(robot, condition)` is one that is written only
 where a condition holds, `one_of(robot, lane)` is the robot of a lane, with the same names for single numbers.
 """
 
@@ -62,7 +62,7 @@ EIGHT = record8_of(
     ),
     "tick_count",
 )
-"""Record8 robots, each alone in its world, and the ticks that each has done."""
+"""Eight robots, each alone in its world, and the number of ticks that each has done."""
 
 EIGHT_KINDS = record8_of(
     PARAMETERS,
@@ -89,7 +89,7 @@ class Record8(_Numbers):
 
 
 class SomeOf(Record8):
-    """Numba's type of eight records of which some are written: those that a mask names."""
+    """Numba's type of eight records; writing changes only the lanes that a mask selects."""
 
 
 class OneOf(_Numbers):
@@ -116,7 +116,7 @@ def _kind_of(numbers: Any) -> Any:
 
 
 def _at(builder: Any, address: Any, offset: Any, content: Any) -> Any:
-    """Return the address of a content so many bytes behind another."""
+    """Return the address of a value at an offset [bytes] from another address."""
     return builder.bitcast(builder.gep(address, [offset], inbounds=True), content.as_pointer())
 
 
@@ -125,13 +125,13 @@ def _parts(context: Any, builder: Any, numbers: Any, value: Any) -> Any:
 
 
 def _read(context: Any, builder: Any, numbers: Any, value: Any, offset: Any) -> Any:
-    """Return what stands so many bytes from the beginning."""
+    """Return the value at an offset [bytes] from the beginning."""
     content = context.get_data_type(_kind_of(numbers))
     return builder.load(_at(builder, _parts(context, builder, numbers, value).address, offset, content), align=8)
 
 
 def _write(context: Any, builder: Any, numbers: Any, value: Any, offset: Any, kind: Any, new: Any) -> Any:
-    """Write what stands so many bytes from the beginning, in lanes that take part."""
+    """Write the value at an offset [bytes] from the beginning, in the selected lanes."""
     new = context.cast(builder, new, kind, _kind_of(numbers))
     place = _at(builder, _parts(context, builder, numbers, value).address, offset, new.type)
     if isinstance(numbers, SomeOf):
@@ -218,7 +218,7 @@ offer(operator.setitem, _set, _are_numbers)
 
 @_intrinsic
 def open_record8(typing: Any, record: Any) -> Any:
-    """Return a record of `EIGHT` or `EIGHT_KINDS` as an `Record8`."""
+    """Return a record of `EIGHT` or `EIGHT_KINDS` as a `Record8`."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         eight = _proxy(signature.return_type)(context, builder)
@@ -230,7 +230,7 @@ def open_record8(typing: Any, record: Any) -> Any:
 
 @_intrinsic
 def only(typing: Any, robot: Any, condition: Any) -> Any:
-    """Return an `Record8` that is written only where a condition holds; a robot alone as it is."""
+    """Return a `Record8` that is written only where a condition holds; a robot alone as it is."""
     result = SomeOf(robot.fields) if isinstance(robot, Record8) else robot
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -291,8 +291,8 @@ def copy_record8(typing: Any, source: Any, target: Any) -> Any:
 
 
 @_intrinsic
-def put_back(typing: Any, source: Any, target: Any, condition: Any) -> Any:
-    """Copy the lanes of a record of eights in which a condition holds to another one."""
+def copy_lanes(typing: Any, source: Any, target: Any, condition: Any) -> Any:
+    """Copy the lanes in which a condition holds from one `Record8` to another."""
     count = source.fields.size // (8 * LANES)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:

@@ -100,7 +100,7 @@ def element(typing: Any, pointer: Any, index: Any) -> Any:
 
 @_intrinsic
 def borrowed(typing: Any, value: Any) -> Any:
-    """Return arrays whose references nobody counts, in tuples as they were; whoever called the entry point holds them.
+    """Return arrays, or tuples of them, without reference counting; the caller of the entry point keeps them alive.
 
     Counting them at each call of a kernel that is not compiled into its caller would cost a sixth of a batch's time.
     """

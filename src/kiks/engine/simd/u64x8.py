@@ -1,4 +1,4 @@
-"""Record8 words of 64 bits at once, with ^ >> * and +: for the random numbers of eight worlds."""
+"""Vectors of eight 64-bit words, with ^ >> * and +, for the random numbers of eight worlds."""
 
 from __future__ import annotations
 
