@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 import kiks
 from kiks.calibration.calibrate import calibrate
 from kiks.calibration.placements import Instruction, SimPlacements
-from kiks.calibration.wall_fit import Stand
+from kiks.calibration.wall_fit import WallModel
 
 SEEDS = range(8)
 
@@ -53,8 +53,8 @@ def half_distances_mm(spec: kiks.RobotSpec, hidden: kiks.RobotSpec) -> list[floa
     distances = []
     for sensor, direction_deg in enumerate(hidden.proximity.direction_deg):
         headings_rad = np.full(len(gaps_mm), -math.radians(direction_deg))
-        half = Stand(hidden).readings(hidden, gaps_mm[:1], headings_rad[:1])[0, sensor] / 2
-        counts = Stand(spec).readings(spec, gaps_mm, headings_rad)[:, sensor]
+        half = WallModel(hidden).readings(hidden, gaps_mm[:1], headings_rad[:1])[0, sensor] / 2
+        counts = WallModel(spec).readings(spec, gaps_mm, headings_rad)[:, sensor]
         distances.append(float(np.interp(-half, -counts, gaps_mm)))
     return distances
 

@@ -5,6 +5,11 @@ from __future__ import annotations
 import signal
 
 import pytest
+from hypothesis import settings
+
+# The first example of a test may load the engine, and tests measure no time.
+settings.register_profile("kiks", deadline=None)
+settings.load_profile("kiks")
 
 # Programs to be run as processes, not modules to be imported.
 collect_ignore_glob = ["programs/*"]

@@ -1,4 +1,4 @@
-"""Calibration: hidden parameters of a simulated robot are found over the wire alone, and mistakes are named."""
+"""Calibration: finds the hidden parameters of a simulated robot over its line alone, and names mistakes."""
 
 from __future__ import annotations
 
@@ -26,13 +26,11 @@ app = typer.Typer()
 app.command()(command)
 
 BASE = kiks.RobotSpec.load("khepera")
-
-
 KHEPERA_II = kiks.RobotSpec.load("khepera_ii")
 
 
 def idle(spec: kiks.RobotSpec) -> tuple[list[float], float]:
-    """Return what each sensor reads in the open on average [counts], and the share of zeros in all readings."""
+    """Return the mean reading of each sensor in the open [counts], and the share of zeros in all readings."""
     sim = kiks.Simulation(robot=spec, seed=5)
     SimPlacements(sim).place(Instruction(Place.FREE, ""))
     counts = rest(kiks.Khepera(sim.port(1)), 300).counts
@@ -40,7 +38,7 @@ def idle(spec: kiks.RobotSpec) -> tuple[list[float], float]:
 
 
 def check(found: kiks.RobotSpec, hidden: kiks.RobotSpec) -> None:
-    """Fail unless one robot is the other, within what docs/calibration.md promises."""
+    """Fail unless the robots agree within the errors that docs/calibration.md promises."""
     assert found.proximity.direction_deg == pytest.approx(hidden.proximity.direction_deg, abs=2.0)
     assert half_distances_mm(found, hidden) == pytest.approx(half_distances_mm(hidden, hidden), abs=1.0)
     assert found.body.pulse_mm == pytest.approx(hidden.body.pulse_mm, rel=0.005)
@@ -61,7 +59,7 @@ def measured(hidden: kiks.RobotSpec, base: kiks.RobotSpec = BASE, seed: int = 0,
 @pytest.mark.parametrize(
     ("base", "seed"), [pytest.param(BASE, 2, marks=nightly), (KHEPERA_II, 3)], ids=["khepera", "khepera_ii"]
 )
-def test_any_hidden_parameters_are_found(base: kiks.RobotSpec, seed: int) -> None:
+def test_calibration_finds_hidden_parameters(base: kiks.RobotSpec, seed: int) -> None:
     hidden = hidden_robot(seed, base)
     found = measured(hidden, base, seed=seed, skew_rad=math.radians(6 * (-1) ** seed))
     check(found.spec, hidden)
@@ -71,14 +69,14 @@ def test_any_hidden_parameters_are_found(base: kiks.RobotSpec, seed: int) -> Non
 
 
 @nightly
-def test_a_robot_like_its_kind_reads_zero_as_often() -> None:
+def test_calibrated_robot_reads_zero_as_often_as_its_kind() -> None:
     zero_share = idle(measured(BASE).spec)[1]
     assert zero_share == pytest.approx(idle(BASE)[1], abs=0.05)
     assert zero_share > 0.4
 
 
 @pytest.mark.parametrize("response", ["thesis", "fast"])
-def test_a_response_with_directions_of_its_own_is_refused(response: str) -> None:
+def test_response_with_directions_of_its_own_is_rejected(response: str) -> None:
     placements = SimPlacements(kiks.Simulation())
     base = BASE.with_changes(proximity__response=response)
     with pytest.raises(
@@ -88,7 +86,7 @@ def test_a_response_with_directions_of_its_own_is_refused(response: str) -> None
 
 
 @pytest.mark.parametrize("name", ["khepera", "khepera_ii"])
-def test_the_guide_names_the_default_marks(name: str) -> None:
+def test_guide_lists_the_default_gaps(name: str) -> None:
     guide = (Path(__file__).parents[2] / "docs" / "calibration.md").read_text(encoding="utf-8")
     assert ", ".join(f"{gap:g}" for gap in default_gaps_mm(kiks.RobotSpec.load(name))) + " and" in guide
 
@@ -97,10 +95,10 @@ def test_the_guide_names_the_default_marks(name: str) -> None:
 
 
 @pytest.mark.slow
-def test_the_command_asks_measures_and_writes(tmp_path: Path) -> None:
+def test_command_measures_and_writes_a_robot_file(tmp_path: Path) -> None:
     hidden, out = hidden_robot(11, BASE), tmp_path / "mine.toml"
     sim = kiks.Simulation(robot=hidden)
-    # In the open: there, again, there, fine. At the nearest gap a typing error and a gap of no wall, then 6 mm.
+    # In the open: placed, repeated, placed, accepted. At the nearest gap: a typing error, a negative gap, then 6 mm.
     answers = ["", "y", "", "n", "six", "-1", "6", "n", *["", "n"] * 4]
     result = CliRunner().invoke(app, ["--port", sim.url(1), "--out", str(out)], input="\n".join(answers) + "\n")
     assert result.exit_code == 0, result.output + repr(result.exception)
@@ -113,10 +111,10 @@ def test_the_command_asks_measures_and_writes(tmp_path: Path) -> None:
     check(found, hidden)
     assert [path.name for path in tmp_path.iterdir()] == ["mine.toml"]
     assert "wheel base" in out.read_text().splitlines()[1]
-    sim.port(1).claim("the next one")
+    sim.port(1).claim("the next program")
 
 
-def test_the_command_refuses_before_it_measures(tmp_path: Path) -> None:
+def test_command_checks_its_options_before_it_measures(tmp_path: Path) -> None:
     out = tmp_path / "mine.toml"
     out.write_text("precious")
     sim = kiks.Simulation()
@@ -133,7 +131,7 @@ def test_the_command_refuses_before_it_measures(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["mine.toml"]
 
 
-def test_nothing_is_written_by_a_calibration_that_fails(tmp_path: Path) -> None:
+def test_failed_calibration_writes_nothing(tmp_path: Path) -> None:
     out = tmp_path / "mine.toml"
     sim = kiks.Simulation(kiks.Arena.box(500, 650), robot=BASE.with_changes(proximity__range_mm=2.0))
     result = CliRunner().invoke(app, ["--port", sim.url(1), "--out", str(out), "--yes"])
@@ -141,11 +139,11 @@ def test_nothing_is_written_by_a_calibration_that_fails(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-# ---- what goes wrong ----
+# ---- failures ----
 
 
 class Misplaced(SimPlacements):
-    """Somebody who puts the robot where it should not be."""
+    """Puts the robot at wrong gaps."""
 
     def __init__(self, sim: kiks.Simulation, errors_mm: dict[float, float]) -> None:
         super().__init__(sim)
@@ -176,7 +174,7 @@ def failure(placements: SimPlacements, gaps_mm: tuple[float, ...] = (5, 15)) -> 
     return str(caught.value)
 
 
-def test_a_wall_that_is_not_seen_is_named_and_asked_for_again() -> None:
+def test_wall_out_of_sight_raises_after_all_attempts() -> None:
     placements = Misplaced(kiks.Simulation(robot=BASE.with_changes(proximity__jitter_counts=(0.0,))), {5: 150})
     words = failure(placements)
     assert "some sensor must see the wall at 5 mm, but none reads more than 0 counts above its baseline" in words
@@ -184,7 +182,7 @@ def test_a_wall_that_is_not_seen_is_named_and_asked_for_again() -> None:
     assert placements.findings[-1] == words
 
 
-def test_a_run_up_that_meets_no_wall_is_named() -> None:
+def test_error_for_a_run_up_without_a_wall() -> None:
     class Backwards(Misplaced):
         def place(self, instruction: Instruction) -> float:
             gap_mm = super().place(instruction)
@@ -198,7 +196,7 @@ def test_a_run_up_that_meets_no_wall_is_named() -> None:
     assert stands_still(placements.sim)
 
 
-def test_something_near_in_the_open_is_named() -> None:
+def test_error_for_an_obstacle_in_the_open() -> None:
     class Cornered(Misplaced):
         def place(self, instruction: Instruction) -> float:
             return super().place(Instruction(Place.WALL, "", instruction.gap_mm or 5.0))
@@ -207,13 +205,13 @@ def test_something_near_in_the_open_is_named() -> None:
 
 
 @pytest.mark.slow
-def test_measurements_that_contradict_each_other_are_named() -> None:
+def test_error_for_contradictory_measurements() -> None:
     words = failure(Misplaced(kiks.Simulation(), {15: 12}), (5, 15, 25))
     assert "the measurements must agree with each other, but those at the" in words
     assert "Check the marks" in words
 
 
-def test_wheels_that_do_not_turn_are_named() -> None:
+def test_error_for_wheels_that_do_not_turn() -> None:
     class Stuck(SimPort):
         def write(self, data: bytes) -> int:
             return super().write(b"D,0,0\n" if data[:1] == b"D" else data)
@@ -224,7 +222,7 @@ def test_wheels_that_do_not_turn_are_named() -> None:
 
 
 class Flaky(SimPort):
-    """A port on which something happens at a certain question."""
+    """A port that raises an error at a certain reading, and is silent from then on."""
 
     def __init__(self, sim: kiks.Simulation, last: int, error: BaseException | None) -> None:
         super().__init__(sim, 1)
@@ -235,15 +233,15 @@ class Flaky(SimPort):
         self.last -= data[:1] == b"N"
         if self.last <= 0 and self.error is not None:
             error, self.error = self.error, None
-            super().write(data)  # the answer stays unread
+            super().write(data)  # the reply stays unread
             raise error
         return super().write(data) if self.last > 0 or self.error is not None or data[:1] == b"D" else len(data)
 
 
-def test_a_robot_that_falls_silent_is_named() -> None:
+def test_error_for_a_robot_that_stops_replying() -> None:
     sim = kiks.Simulation()
     port = Flaky(sim, 500, kiks.LinkError("the cable fell out"))
-    with pytest.raises(kiks.LinkError, match=r"must come before the time-out|the cable fell out"):
+    with pytest.raises(kiks.LinkError, match=r"must come before the timeout|the cable fell out"):
         calibrate(kiks.Khepera(port), SimPlacements(sim), BASE)
     assert stands_still(sim)
 
@@ -256,7 +254,7 @@ def test_ctrl_c_in_the_middle_of_a_spin_stops_the_robot() -> None:
 
 
 @pytest.mark.slow
-def test_a_person_may_measure_again() -> None:
+def test_placements_may_repeat_a_measurement() -> None:
     class Fussy(SimPlacements):
         asked = 0
 
@@ -270,11 +268,11 @@ def test_a_person_may_measure_again() -> None:
     assert found.spec.body.pulse_mm == pytest.approx(BASE.body.pulse_mm, rel=0.005)
 
 
-# ---- the parts ----
+# ---- parts ----
 
 
 @pytest.mark.parametrize("baud", [9600, 38400, 115200])
-def test_processing_time_is_what_the_line_does_not_explain(baud: int) -> None:
+def test_processing_time_excludes_the_time_on_the_line(baud: int) -> None:
     port = kiks.Simulation(robot=BASE.with_changes(firmware__processing_ms=3.5)).port(1)
     port.baudrate = baud
     assert processing_ms(kiks.Khepera(port), baud) == pytest.approx(3.5, abs=0.01)
@@ -291,22 +289,22 @@ def test_odometry_follows_a_spin() -> None:
     assert turned_rad == pytest.approx(sim.pose(1)[2], abs=0.01)
 
 
-def test_unknowns_and_robots_are_two_names_of_one_thing() -> None:
+def test_unknowns_and_robot_convert_into_each_other() -> None:
     spec = hidden_robot(4, BASE)
     unknowns = wall_fit.unknowns_of(BASE, spec)
-    assert wall_fit.unknowns_of(BASE, wall_fit.robot_of(BASE, unknowns)) == pytest.approx(unknowns)
+    assert wall_fit.unknowns_of(BASE, wall_fit.apply_unknowns(BASE, unknowns)) == pytest.approx(unknowns)
     unknowns[-1] = 1.0
     with pytest.raises(CalibrationError, match="Name the right kind with --base"):
-        wall_fit.robot_of(BASE, unknowns)
+        wall_fit.apply_unknowns(BASE, unknowns)
 
 
-def test_a_heading_is_guessed_from_the_light() -> None:
-    stand = wall_fit.Stand(BASE)
+def test_guessed_heading_is_close_to_the_true_one() -> None:
+    model = wall_fit.WallModel(BASE)
     headings_rad = np.linspace(0.4, 0.4 + 2 * math.pi, 100)
     turned = (headings_rad - 0.4) * BASE.body.wheel_base_mm / BASE.body.pulse_mm / 2
-    counts = stand.readings(BASE, np.full(100, 10.0), headings_rad)
+    counts = model.readings(BASE, np.full(100, 10.0), headings_rad)
     run = Run(10.0, np.stack((-turned, turned), axis=1), counts, (0, 0))
-    assert wall_fit.guess_heading_rad(stand, BASE, run) == pytest.approx(0.4, abs=0.1)
+    assert wall_fit.guess_heading_rad(model, BASE, run) == pytest.approx(0.4, abs=0.1)
 
 
 def test_gaps_are_checked() -> None:
@@ -320,14 +318,14 @@ def test_gaps_are_checked() -> None:
         parse_gaps("5;6")
 
 
-def test_a_placement_without_room_is_named() -> None:
+def test_error_for_an_arena_without_room() -> None:
     placements = SimPlacements(kiks.Simulation(kiks.Arena.box(300, 300)))
     with pytest.raises(kiks.ParameterError, match="the arena must have room for a robot 500 mm below"):
         placements.place(Instruction(Place.WALL, "", 500.0))
 
 
 @pytest.mark.parametrize("name", ["khepera", "khepera_ii"])
-def test_a_robot_file_is_read_back_as_it_was(name: str, tmp_path: Path) -> None:
+def test_robot_file_round_trip(name: str, tmp_path: Path) -> None:
     spec, path = kiks.RobotSpec.load(name), tmp_path / "robot.toml"
     path.write_text("old")
     save_robot(spec, path, comment="first\nsecond")
@@ -337,7 +335,7 @@ def test_a_robot_file_is_read_back_as_it_was(name: str, tmp_path: Path) -> None:
     assert [entry.name for entry in tmp_path.iterdir()] == ["robot.toml"]
 
 
-def test_a_robot_file_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+def test_error_for_a_robot_file_that_cannot_be_written(tmp_path: Path) -> None:
     with pytest.raises(kiks.ParameterError, match="a robot must go to a file that can be written"):
         save_robot(BASE, tmp_path / "no" / "robot.toml")
     (tmp_path / "folder").mkdir()

@@ -343,11 +343,11 @@ def test_a_program_learns_that_nobody_reads_it_any_more(tmp_path: Path) -> None:
 
 def test_what_kiks_says_begins_a_line_of_its_own(capfd: pytest.CaptureFixture[str]) -> None:
     labels = Labels(["a.py", "long.py"])
-    voice = labels.voice(1, "a.py")
-    assert not voice.ask(b"unfinished", is_error=False)  # no terminal: it waits until the line is whole
-    labels.write(b"go? ", is_error=True, is_begun=True)
+    writer = labels.writer(1, "a.py")
+    assert not writer.show_unfinished(b"unfinished", is_error=False)  # no terminal: it waits until the line is whole
+    labels.write(b"go? ", is_error=True, is_unfinished=True)
     labels.say("here I am")
-    voice.take([b"one", b"two"], is_error=False)
+    writer.take([b"one", b"two"], is_error=False)
     out, err = capfd.readouterr()
     assert out == "1 a.py    | one\n1 a.py    | two\n"
     assert err == "go? \nkiks: here I am\n"

@@ -1,4 +1,4 @@
-"""kiks.Khepera and the functions of the Matlab days."""
+"""kiks.Khepera and the functions of the Matlab KiKS."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_every_method(sim: kiks.Simulation) -> None:
         assert robot.time_s == pytest.approx(sim.time_s)
 
 
-def test_wheels_that_do_not_arrive_are_not_waited_for_for_ever() -> None:
+def test_move_to_fails_if_the_wheels_do_not_arrive() -> None:
     sim = kiks.Simulation(kiks.Arena.box(300, 300), seed=1)
     with kiks.Khepera(sim.port(1)) as robot:
         robot.set_profile(1, 1)
@@ -59,7 +59,7 @@ def test_wheels_that_do_not_arrive_are_not_waited_for_for_ever() -> None:
         assert 600 < sim.time_s < 602
 
 
-def test_a_surprising_reply_is_named(sim: kiks.Simulation) -> None:
+def test_error_shows_an_unexpected_reply(sim: kiks.Simulation) -> None:
     robot = kiks.Khepera(sim.port(1))
     sim.port(1).write(b"H\n")
     with pytest.raises(kiks.LinkError, match=r"reply to b'D,1,1\\n' must be that of a Khepera, but it was b'h,0,0"):
@@ -70,7 +70,7 @@ def test_a_surprising_reply_is_named(sim: kiks.Simulation) -> None:
         robot.send("N\nN")
 
 
-def test_silence_is_named() -> None:
+def test_error_shows_an_incomplete_reply() -> None:
     class Dead:
         def write(self, data: bytes) -> int:
             return len(data)
@@ -81,16 +81,16 @@ def test_silence_is_named() -> None:
         def close(self) -> None:
             pass
 
-    with pytest.raises(kiks.LinkError, match=r"must come before the time-out, but only b'h,1' came. Check the cable"):
+    with pytest.raises(kiks.LinkError, match=r"must come before the timeout, but only b'h,1' came. Check the cable"):
         kiks.Khepera(Dead()).encoders()
 
 
-def test_a_port_that_cannot_be_opened_is_named() -> None:
+def test_error_names_a_port_that_cannot_be_opened() -> None:
     with pytest.raises(kiks.LinkError, match=r"'/dev/ttyNOWHERE' must be one that can be opened"):
         kiks.Khepera("/dev/ttyNOWHERE")
 
 
-def test_the_old_functions(sim: kiks.Simulation) -> None:
+def test_functions_of_the_matlab_kiks(sim: kiks.Simulation) -> None:
     ref = kiks.kopen([-1, 19200, 1])
     assert tuple(ref) == (-1.0, -1.0, -1.0, -1.0)
     assert kiks.ksend("D,5,5\n", ref) == "d"
@@ -110,7 +110,7 @@ def test_the_old_functions(sim: kiks.Simulation) -> None:
         kiks.ksend("N\n", ref)
     with pytest.raises(kiks.ParameterError, match=r"settings must be \[port, baud, timeout\]"):
         kiks.kopen([])
-    # The counters survive; `[]` closes whatever simulated port is open.
+    # The counters survive; `[]` closes every simulated port.
     again = kiks.kopen([-1])
     assert int(kiks.ksend("H\n", again).split(",")[1]) > 900
     kiks.kclose([])
@@ -118,7 +118,7 @@ def test_the_old_functions(sim: kiks.Simulation) -> None:
     assert sim.time_s > 2
 
 
-def test_a_loop_that_only_asks_for_the_time_ends(sim: kiks.Simulation) -> None:
+def test_polling_the_time_lets_it_pass(sim: kiks.Simulation) -> None:
     ref = kiks.kopen([-1, 9600, 1])
     while kiks.ktime(-1) < 3.0:
         pass
@@ -127,12 +127,12 @@ def test_a_loop_that_only_asks_for_the_time_ends(sim: kiks.Simulation) -> None:
 
 
 @pytest.mark.parametrize("robots", [0, 1001, 1.5, "2"])
-def test_bad_settings_are_refused(robots: object) -> None:
+def test_number_of_robots_is_checked(robots: object) -> None:
     with pytest.raises(kiks.ParameterError, match="robots must be a whole number from 1 to 1000, but it was"):
         kiks.Simulation(robots=robots)  # type: ignore[arg-type]
 
 
-def test_placing(sim: kiks.Simulation) -> None:
+def test_place_checks_its_arguments(sim: kiks.Simulation) -> None:
     sim.place(1, 500.0, 400.0, math.pi / 3)
     assert sim.pose(1) == (500.0, 400.0, math.pi / 3)
     with pytest.raises(kiks.ParameterError, match=r"at \(20, 500\) mm a wall is 17.5 mm inside it"):
@@ -147,13 +147,13 @@ def test_placing(sim: kiks.Simulation) -> None:
         sim.run(-1)
 
 
-def test_an_arena_is_an_arena() -> None:
+def test_arena_must_be_an_arena() -> None:
     with pytest.raises(kiks.ParameterError, match=r"arena must be a kiks.Arena, but it was 'maze.png'. Read a file"):
         kiks.Simulation("maze.png")  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("least", [0, 1024], ids=["small", "large"])
-def test_descriptors_of_any_size_are_waited_for(least: int) -> None:
+def test_read_waits_on_descriptors_beyond_the_limit_of_select(least: int) -> None:
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     if 0 <= hard < 1100:
         pytest.skip("this computer gives no descriptor beyond 1024")

@@ -1,4 +1,4 @@
-"""The gate through which simulated time passes while somebody watches."""
+"""The gate: pauses and slows simulated time while a person watches."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ GUARD_S = 20.0
 
 
 class Wall:
-    """A wall clock that stands still but for what is slept."""
+    """A wall clock that only sleeping moves."""
 
     def __init__(self) -> None:
         self.now_ns = 0
@@ -42,7 +42,7 @@ class QuickGate(Gate):
 
 
 def course(sim: kiks.Simulation) -> str:
-    """Drive for a while, with a program that sleeps, asks and reads."""
+    """Drive with a program that sleeps and reads; return the state hash."""
     with kiks.Khepera(sim.port(1)) as robot:
         robot.set_speed(6, 3)
         for _ in range(20):
@@ -95,7 +95,7 @@ def test_time_keeps_the_pace() -> None:
     assert wall.now_ns == pytest.approx(5e8, rel=1e-3)
 
 
-def test_what_a_program_thinks_is_not_made_up_for() -> None:
+def test_thinking_time_is_not_caught_up() -> None:
     wall = Wall()
     gate = QuickGate(threading.RLock(), 1.0, wall)
     now_ns = gate.admit(0, 10**12)
@@ -123,7 +123,7 @@ def test_pause_step_and_go_on() -> None:
         assert sim.time_s == 1.0
 
 
-def test_requests_are_done_by_whoever_moves_the_world_or_at_once() -> None:
+def test_requests_run_at_once_or_in_the_thread_that_moves_the_world() -> None:
     sim = kiks.Simulation()
     gate = sim.gate = Gate(sim.lock, speed=None)
     assert gate.ask(lambda: threading.current_thread()).result(0) is threading.current_thread()
@@ -141,7 +141,7 @@ def test_requests_are_done_by_whoever_moves_the_world_or_at_once() -> None:
     assert not gate.is_up
 
 
-def test_waiting_is_nobodys_patience() -> None:
+def test_waiting_at_the_gate_does_not_use_up_patience() -> None:
     wall = Wall()
     gate = QuickGate(threading.RLock(), 0.1, wall)
     before_ns = gate.wall_ns()
@@ -155,7 +155,7 @@ def test_waiting_is_nobodys_patience() -> None:
     assert patience.left_s() > 0.5
 
 
-def test_pace_changes_without_a_leap() -> None:
+def test_pace_changes_without_a_jump() -> None:
     wall = Wall()
     pace = Pace(2.0, wall_ns=wall)
     pace.start(0)
@@ -174,7 +174,7 @@ def test_pace_changes_without_a_leap() -> None:
         pace.set_speed(0, 0)
 
 
-# ---- hands ----
+# ---- drags ----
 
 
 def world() -> kiks.Simulation:
@@ -186,57 +186,57 @@ def world() -> kiks.Simulation:
     return sim
 
 
-def test_held_things_slide_and_never_land_in_anything() -> None:
+def test_dragged_things_slide_along_obstacles() -> None:
     sim = world()
-    hands = Drags(sim)
-    hands.grab("a", "robot", 0)
-    hands.move("a", 1000, 1000)
+    drags = Drags(sim)
+    drags.grab("a", "robot", 0)
+    drags.move("a", 1000, 1000)
     x_mm, y_mm, _ = sim.pose(1)
     assert x_mm == pytest.approx(600 - 10 - 27.5, abs=1.5)
     assert y_mm == pytest.approx(400 - 10 - 27.5, abs=1.5)
-    hands.move("a", 300, 100)
+    drags.move("a", 300, 100)
     x_mm, y_mm, _ = sim.pose(1)
     assert ((x_mm - 300) ** 2 + (y_mm - 100) ** 2) ** 0.5 == pytest.approx(55, abs=0.6)
-    hands.turn("a", 1.5)
+    drags.turn("a", 1.5)
     assert sim.pose(1)[2] == 1.5
-    hands.drop("a")
-    hands.move("a", 100, 100)
+    drags.drop("a")
+    drags.move("a", 100, 100)
     assert sim.pose(1)[:2] == (x_mm, y_mm)
 
 
-def test_what_has_gone_is_held_no_longer() -> None:
+def test_drag_of_a_removed_thing_ends() -> None:
     sim = world()
-    hands = Drags(sim)
-    hands.grab("a", "body", len(sim.bodies()) - 1)
+    drags = Drags(sim)
+    drags.grab("a", "body", len(sim.bodies()) - 1)
     sim.remove_body(len(sim.bodies()))
-    hands.move("a", 100, 100)
-    assert hands.are_empty
+    drags.move("a", 100, 100)
+    assert drags.are_empty
 
 
-def test_two_hands_and_all_kinds_of_things() -> None:
+def test_several_drags_of_all_kinds() -> None:
     sim = world()
-    hands = Drags(sim)
-    hands.grab("a", "body", 0)
-    hands.grab("b", "lamp", 0)
-    hands.move("a", 200, 300)
-    hands.move("b", 5000, -3)
+    drags = Drags(sim)
+    drags.grab("a", "body", 0)
+    drags.grab("b", "lamp", 0)
+    drags.move("a", 200, 300)
+    drags.move("b", 5000, -3)
     assert (sim.bodies()["x_mm"][0], sim.bodies()["y_mm"][0]) == (200, 300)
     assert sim.lamps[0, :2].tolist() == [600, 0]
     with pytest.raises(ParameterError, match="one hand must let go"):
-        hands.grab("b", "body", 0)
-    assert not hands.holds("lamp", 0)
+        drags.grab("b", "body", 0)
+    assert not drags.holds("lamp", 0)
     for what, index in (("robot", 2), ("robot", -1), ("floor", 0), ("lamp", True + 1)):
         with pytest.raises(ParameterError, match="a hand must take one of"):
-            hands.grab("a", what, index)
-    assert hands.are_empty
+            drags.grab("a", what, index)
+    assert drags.are_empty
 
 
-def test_held_robot_stays_though_its_wheels_turn() -> None:
+def test_dragged_robot_stays_while_its_wheels_turn() -> None:
     sim = world()
     gate = sim.gate = Gate(sim.lock, speed=None)
-    hands = Drags(sim)
-    hands.grab("a", "robot", 0)
-    gate.keep(hands.keep)
+    drags = Drags(sim)
+    drags.grab("a", "robot", 0)
+    gate.keep(drags.keep)
     robot = kiks.Khepera(sim.port(1))
     robot.set_speed(20, 20)
     sim.run(1.0)
@@ -244,23 +244,23 @@ def test_held_robot_stays_though_its_wheels_turn() -> None:
     assert sim.pose(1) == (100, 100, 0)
     assert sim.travelled_mm(1) > 100
     sim.remove_body(1)
-    gate.leave(hands.keep)
-    hands.drop("a")
+    gate.leave(drags.keep)
+    drags.drop("a")
     sim.run(0.5)
     assert sim.pose(1)[0] > 150
 
 
-def test_others_may_press_upon_what_is_held() -> None:
+def test_other_robots_may_push_a_dragged_robot() -> None:
     starts = (Pose(200, 38, 0), Pose(140, 38, 0), Pose(260, 38, math.pi), Pose(200, 100, -math.pi / 2))
     sim = kiks.Simulation(replace(kiks.Arena.box(400, 400), starts=starts), robots=4, seed=1)
     for robot in range(1, 5):
         kiks.Khepera(sim.port(robot)).set_speed(20, 20)
     gate = sim.gate = Gate(sim.lock, speed=None)
-    hands = Drags(sim)
-    hands.grab("a", "robot", 0)
-    gate.keep(hands.keep)
+    drags = Drags(sim)
+    drags.grab("a", "robot", 0)
+    gate.keep(drags.keep)
     for step in range(100):
-        hands.move("a", 200 + step, 38)
-        hands.turn("a", step / 10)
+        drags.move("a", 200 + step, 38)
+        drags.turn("a", step / 10)
         sim.run(0.05)
     assert abs(sim.pose(1)[1] - 38) < 60

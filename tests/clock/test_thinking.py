@@ -1,4 +1,4 @@
-"""What the program's own computing costs."""
+"""Thinking time: the cost of the program's own computing."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_fixed_thinking_is_added_before_each_command() -> None:
     assert times[2] - times[0] == pytest.approx(10 * 0.0025, abs=1e-12)
 
 
-def test_a_burst_is_one_thought() -> None:
+def test_burst_of_commands_costs_one_thinking_time() -> None:
     sim = kiks.Simulation(thinking="fixed:5")
     port = sim.port(1)
     for piece in (b"N\n", b"H", b"\n"):
@@ -58,7 +58,7 @@ def test_live_thinking_charges_measured_time_and_replay_repeats_it(tmp_path: Pat
     assert replay.now_ns == live.now_ns
 
 
-def test_a_slower_computer_lets_more_time_pass() -> None:
+def test_factor_zero_costs_nothing() -> None:
     policy = ThinkingLive(0.0)
     policy.leave()
     assert policy.enter(is_command=True) == 0
@@ -84,7 +84,7 @@ def test_errors_name_the_rule_and_the_value(text: str, words: str) -> None:
 @pytest.mark.parametrize(
     "line", ["hunter2", "-1", "1.5", "1" * 19, "1" * 5000, "\u0663", "\u00b2", "", "1 2", "\0", "nan"]
 )
-def test_a_bad_line_of_a_replay_file_is_named_but_not_repeated(line: str, tmp_path: Path) -> None:
+def test_error_gives_the_number_of_a_bad_replay_line_but_not_its_text(line: str, tmp_path: Path) -> None:
     path = tmp_path / "times.txt"
     path.write_text(f"100\n{line}\n7\n", encoding="utf-8")
     with pytest.raises(kiks.ParameterError, match=r"line 2, must be a whole number of ns") as caught:

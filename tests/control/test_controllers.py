@@ -108,7 +108,7 @@ def test_ctrnn_of_any_time_constant_stays_in_its_bounds(logarithm: float) -> Non
     assert abs(outputs(controller, parameters, readings(controller, 200))).max() <= 10.0
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.floats(-6, 6))
 def test_exponential_between(x: float) -> None:
     assert exponential_between(x) == pytest.approx(np.exp(np.clip(x, -4, 4)), rel=1e-3)

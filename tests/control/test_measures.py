@@ -163,7 +163,7 @@ def after(measure: kiks.Measure, *moments: Any) -> float:
     return float(measure.result(notes[None])[0])
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(st.tuples(st.floats(0, 499), st.floats(0, 299)), max_size=80))
 def test_coverage_counts_each_square_once(places_mm: list[tuple[float, float]]) -> None:
     coverage = kiks.measures.coverage(kiks.Arena.box(500, 300), square_mm=25)
@@ -177,7 +177,7 @@ def test_coverage_of_everything_is_one() -> None:
     assert after(coverage, *places) == 1.0
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     st.tuples(st.integers(-127, 127), st.integers(-127, 127)), st.lists(st.integers(0, 1023), min_size=8, max_size=8)
 )

@@ -50,7 +50,7 @@ def test_names_outside_the_folder_are_refused(home, name):
     assert [path for path in snapshot(home.parent) if path not in before] == []
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.text(st.sampled_from("./\\ab~:\0 -"), max_size=12))
 def test_random_names_stay_in_the_folder(tmp_path_factory, name):
     base = tmp_path_factory.mktemp("base")

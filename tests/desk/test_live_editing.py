@@ -35,7 +35,7 @@ def desk(tmp_path: Path) -> Iterator[Desk]:
     hosts: list[Programs] = []
 
     def new_programs(sim: Simulation, _commands: object, gate: Gate) -> Programs:
-        hosts.append(Programs(sim, is_heard=True, new_patience=gate.patience))
+        hosts.append(Programs(sim, keeps_output=True, new_patience=gate.patience))
         return hosts[-1]
 
     sim = simulation_of(project, tmp_path)

@@ -12,7 +12,7 @@ from numba import njit
 
 from kiks.engine.numbers import exponential, logarithm, power, sin_cos, sinc, uniform
 
-LAW = settings(derandomize=True, deadline=None, max_examples=500)
+LAW = settings(derandomize=True, max_examples=500)
 
 
 @LAW
@@ -103,7 +103,7 @@ def test_arguments_do_not_stand_for_each_other():
     assert len(drawn) == 4**6
 
 
-@settings(derandomize=True, deadline=None, max_examples=200)
+@settings(derandomize=True, max_examples=200)
 @given(st.tuples(*[st.integers(0, 2**62)] * 6))
 def test_the_same_arguments_draw_the_same_number(arguments):
     drawn = uniform(*arguments)

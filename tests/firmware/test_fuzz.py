@@ -69,7 +69,7 @@ def answers(kind: str, data: bytes, cuts: list[int]) -> bytes:
     return bytes(output)
 
 
-@settings(max_examples=share(60, 150), deadline=None)
+@settings(max_examples=share(60, 150))
 @given(
     kind=st.sampled_from(["khepera", "khepera_ii"]),
     pairs=st.lists(st.tuples(LINES, ENDS), min_size=1, max_size=12),
@@ -81,7 +81,7 @@ def test_every_reply_is_allowed(kind: str, pairs: list[tuple[bytes, bytes]], cut
     assert first_violation(re.split(rb"[\r\n]", data), output, has_flash=kind == "khepera_ii") is None
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(
     pairs=st.lists(st.tuples(st.one_of(COMMANDS, MESSAGES), ENDS), min_size=1, max_size=8),
     cuts=st.lists(st.integers(0, 200)),

@@ -7,7 +7,7 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from tests.learn import works
 
@@ -99,7 +99,6 @@ class FakePool:
         self.pending = [(other, chunk) for other, chunk in self.pending if other != worker]
 
 
-@settings(deadline=None)
 @given(
     count=st.integers(1, 300),
     worker_count=st.integers(1, 9),

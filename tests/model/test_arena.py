@@ -63,7 +63,7 @@ def test_clearance_to_a_straight_wall_does_not_depend_on_the_cells():
         assert arena.clearance_at_mm(x_mm, 75) == pytest.approx(x_mm - 50, abs=1e-4)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 2**32), share=st.sampled_from([0.0, 0.0005, 0.01, 0.3, 0.98]))
 def test_clearance_is_the_exact_distance_to_the_nearest_wall_cell(seed, share):
     arena = Arena.from_array(random_picture(seed, share=share), mm_per_pixel=1.0)
@@ -75,7 +75,7 @@ def test_clearance_is_the_exact_distance_to_the_nearest_wall_cell(seed, share):
         assert arena.clearance[row, column] == np.float32(expected)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(seed=st.integers(0, 2**32))
 def test_clearance_never_changes_faster_than_the_place(seed):
     arena = Arena.from_array(random_picture(seed, (60, 70), 0.005), mm_per_pixel=1.75)

@@ -17,7 +17,8 @@ from kiks import controllers, measures
 from kiks.engine.numbers import FARTHEST_RAD, sin_cos
 from kiks.errors import SHOWN_MAX, KiksError
 from kiks.model.arena import Arena
-from kiks.model.checks import HEADING_KEPT_RAD, check_count, check_heading, check_number, check_numbers, wrapped
+from kiks.model.array_checks import check_numbers
+from kiks.model.checks import HEADING_KEPT_RAD, check_count, check_heading, check_number, wrapped
 from kiks.sim.drag import Drags
 from kiks.sim.simulation import Simulation
 

@@ -62,7 +62,7 @@ rough = st.tuples(st.integers(0, 2**32 - 1), st.sampled_from([2, 3, 17])).map(
 )
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(rough, st.integers(1, 8))
 def test_pieces_are_those_of_the_matlab_kiks(grain, scale):
     picture = np.kron(grain, np.ones((scale, scale), np.uint8))
@@ -75,7 +75,7 @@ def test_pieces_are_those_of_the_matlab_kiks(grain, scale):
     assert np.array_equal(decode_kad(data).brightness[::-1], picture)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     arrays(np.uint8, st.tuples(st.integers(100, 130), st.integers(100, 140)), elements=st.sampled_from([0, 0, 1, 255]))
 )
@@ -215,7 +215,7 @@ def test_files_that_are_none_are_refused(tmp_path):
         load_kad(tmp_path)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.data())
 def test_damaged_files_are_arenas_or_refused(data):
     compress = data.draw(st.booleans())
@@ -286,7 +286,7 @@ def test_a_polygon_takes_no_more_than_two_bytes_a_cell_beside_the_arena():
     assert peak_bytes[0] < 3 * 4000 * 4000 + 40e6
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(st.tuples(st.integers(0, 12), st.integers(0, 9)), min_size=1, max_size=9))
 def test_polygons_are_those_of_the_rule_cell_by_cell(corners):
     """An odd number of edges to the left, each with its lower and without its upper end; or on an edge."""

@@ -147,7 +147,7 @@ def test_large_pictures_take_ten_bytes_a_pixel_at_most(tmp_path: Path) -> None:
     assert memory_of_reading_mb(tmp_path) < 10 * 9
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=400)
 @given(st.data())
 def test_damaged_pictures_are_read_or_refused(data: st.DataObject) -> None:
     packing = data.draw(st.sampled_from([None, "tiff_lzw", "tiff_adobe_deflate", "packbits"]))

@@ -73,7 +73,7 @@ def same(one: Project, other: Project) -> bool:
     )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(projects())
 def test_files_come_back_as_they_were(project):
     again = Project.from_bytes(project.to_bytes())
@@ -81,7 +81,7 @@ def test_files_come_back_as_they_were(project):
     assert again.to_bytes() == project.to_bytes()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(100, 300), st.integers(100, 300), st.integers(0, 40), st.integers(0, 150), st.integers(1, 255))
 def test_a_box_is_kept_as_a_box(width, height, wall, rounded, brightness):
     try:
@@ -188,7 +188,7 @@ def test_bad_bytes_are_refused(tmp_path):
         Project().save(tmp_path / "none" / "a.kiks")
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(projects(), st.data())
 def test_damaged_files_are_projects_or_refused(project, data):
     whole = bytearray(project.to_bytes())
@@ -287,7 +287,7 @@ def test_a_robot_without_noise_reads_the_same_again():
     assert not spec.without_noise().is_noisy
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(st.integers(0, 10**6))
 def test_what_was_moved_is_kept(seed):
     rng = np.random.default_rng(seed)

@@ -54,7 +54,7 @@ def painted_or_unchanged(draw) -> np.ndarray:
     return sketch.brightness
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(points, points, widths)
 def test_a_line_covers_what_is_near_it(a, b, width):
     shown = painted_or_unchanged(lambda sketch: sketch.line([a, b], width_mm=width))
@@ -64,7 +64,7 @@ def test_a_line_covers_what_is_near_it(a, b, width):
             assert (shown[row, column] == 255) == is_near(x, y, a, b, width)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(points, points, widths)
 def test_lines_close_by_the_oracle_all_around(a, b, width):
     shown = painted_or_unchanged(lambda sketch: sketch.line([a, b], width_mm=width))
@@ -74,7 +74,7 @@ def test_lines_close_by_the_oracle_all_around(a, b, width):
         assert (shown[row, column] == 255) == is_near(x, y, a, b, width)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(points, points)
 def test_a_rectangle_covers_centres_in_it(a, b):
     shown = painted_or_unchanged(lambda sketch: sketch.rectangle(*a, *b, 77))
@@ -83,7 +83,7 @@ def test_a_rectangle_covers_centres_in_it(a, b):
     assert inside.all() or np.array_equal(shown == 77, inside)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(points, min_size=1, max_size=6), widths)
 def test_mirrored_strokes_are_mirror_images(stroke, width):
     mirrored = [(WIDTH - x, y) for x, y in stroke]
@@ -93,7 +93,7 @@ def test_mirrored_strokes_are_mirror_images(stroke, width):
     assert np.array_equal(shown[::-1, ::-1], painted_or_unchanged(lambda s: s.line(turned[::-1], width_mm=width)))
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.lists(points, min_size=2, max_size=5), widths)
 def test_a_stroke_is_its_segments_together(stroke, width):
     whole = painted_or_unchanged(lambda sketch: sketch.line(stroke, width_mm=width))

@@ -1,4 +1,4 @@
-"""The port in memory: what a program sees of time and bytes."""
+"""The port in memory: the bytes and times that a program sees."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from kiks.clock.serial_timing import OUTPUT_LIMIT
 from kiks.units import character_ns
 
 
-def test_an_exchange_takes_its_characters_and_one_millisecond() -> None:
+def test_exchange_takes_the_time_of_its_characters_plus_one_millisecond() -> None:
     sim = kiks.Simulation()
     port = sim.port(1)
     for baud in (9600, 38400, 115200):
@@ -38,7 +38,7 @@ def test_characters_arrive_one_after_the_other() -> None:
     assert first_ns - begin_ns <= character_ns(9600)
 
 
-def test_a_read_waits_for_its_time_out_and_keeps_the_rest() -> None:
+def test_read_returns_at_its_timeout_and_leaves_the_rest() -> None:
     sim = kiks.Simulation()
     port = sim.port(1)
     port.timeout = 0.25
@@ -53,13 +53,13 @@ def test_a_read_waits_for_its_time_out_and_keeps_the_rest() -> None:
     assert part + port.readline() == b"h,0,0\r\n"
 
 
-def test_a_read_that_can_never_end_says_so() -> None:
+def test_read_without_end_raises() -> None:
     port = kiks.Simulation().port(1)
     with pytest.raises(kiks.LinkError, match=r"robot 1 must have been asked.*would never end.*set a timeout"):
         port.read(1)
 
 
-def test_asking_in_vain_lets_time_pass() -> None:
+def test_polling_lets_time_pass() -> None:
     sim = kiks.Simulation()
     port = sim.port(1)
     port.timeout = 0
@@ -70,7 +70,7 @@ def test_asking_in_vain_lets_time_pass() -> None:
         assert sim.now_ns > before_ns + 10_000_000
 
 
-def test_waiting_for_a_reply_by_polling_ends() -> None:
+def test_polling_for_a_reply_ends() -> None:
     port = kiks.Simulation().port(1)
     port.write(b"K\n")
     while port.in_waiting < 15:
@@ -78,19 +78,19 @@ def test_waiting_for_a_reply_by_polling_ends() -> None:
     assert port.read(15) == b"k,0,0,0,0,0,0\r\n"
 
 
-def test_one_client_a_robot() -> None:
+def test_robot_has_one_client() -> None:
     sim = kiks.Simulation()
     first = kiks.Khepera(sim.url(1))
     with pytest.raises(kiks.LinkError, match=r"must be free to be opened, but robot 1 is in use by the program that"):
         kiks.Khepera(sim.url(1))
-    sim.port(1).close()  # the port that supervises is not the one that holds the line
+    sim.port(1).close()  # this port does not hold the line
     with pytest.raises(kiks.LinkError, match="must be free"):
         kiks.kopen([-1, 9600, 1])
     first.close()
     kiks.Khepera(sim.url(1)).stop()
 
 
-def test_replies_that_nobody_waits_for_any_more_are_dropped() -> None:
+def test_close_drops_replies_on_their_way() -> None:
     sim = kiks.Simulation()
     port = sim.port(1)
     port.write(b"N\nL,0,1\n")
@@ -102,7 +102,7 @@ def test_replies_that_nobody_waits_for_any_more_are_dropped() -> None:
     assert port.readline() == b"b,5.02,5.01\r\n"
 
 
-def test_hanging_up_drops_what_nobody_read_and_the_robot_drives_on() -> None:
+def test_close_drops_unread_replies_and_the_robot_drives_on() -> None:
     sim = kiks.Simulation(kiks.Arena.box(1000, 1000))
     port = sim.port(1)
     port.write(b"D,5,5\nN\nH")
@@ -117,7 +117,7 @@ def test_hanging_up_drops_what_nobody_read_and_the_robot_drives_on() -> None:
     assert port.read(1) == b""
 
 
-def test_output_that_nobody_reads_is_bounded() -> None:
+def test_unread_output_is_limited() -> None:
     sim = kiks.Simulation()
     port = sim.port(1)
     port.baudrate = 4_000_000
@@ -129,14 +129,14 @@ def test_output_that_nobody_reads_is_bounded() -> None:
     assert line.lost_count > 0
 
 
-def test_a_writer_faster_than_the_line_is_held_back() -> None:
+def test_write_waits_while_the_line_is_full() -> None:
     sim = kiks.Simulation()
     port = sim.port(1)
     port.write(b"D,1,1\n" * 10_000)
     assert sim.time_s > (60_000 - 2 * 4096) * character_ns(9600) * 1e-9
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=30, derandomize=True)
 @given(st.lists(st.integers(1, 7), min_size=1, max_size=20), st.integers(1, 5))
 def test_reading_in_any_pieces_gives_the_same_bytes_at_the_same_time(pieces: list[int], commands: int) -> None:
     whole, parts = kiks.Simulation().port(1), kiks.Simulation().port(1)
@@ -151,7 +151,7 @@ def test_reading_in_any_pieces_gives_the_same_bytes_at_the_same_time(pieces: lis
     assert parts.sim.now_ns == whole.sim.now_ns
 
 
-def test_two_threads_do_not_tear_the_simulation() -> None:
+def test_two_threads_may_drive_at_the_same_time() -> None:
     sim = kiks.Simulation(robots=2)
 
     def drive(number: int) -> None:

@@ -1,21 +1,18 @@
-"""What reaches a robot's port by mistake or malice: browsers, floods, too many clients, no descriptors."""
+"""Mistakes and attacks at a robot's port: browsers, floods, too many clients, no descriptors."""
 
 from __future__ import annotations
 
-import logging
 import os
-import resource
 import socket
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from tests.ports.test_server import Wall
+from tests.ports.helpers import WallClock, ask_socket, connect, no_descriptors, warnings
 from tests.served import GUARD_S, open_plain, read_line, served
 
 from kiks.clock.pace import Pace
@@ -30,26 +27,11 @@ from kiks.ports.rfc2217 import Rfc2217Endpoint
 from kiks.ports.tcp import FirstLine, TcpEndpoint
 from kiks.units import NS_PER_S
 
-
-def connect(endpoint: TcpEndpoint) -> socket.socket:
-    return socket.create_connection(("127.0.0.1", endpoint.port), timeout=GUARD_S)
-
-
-def ask(client: socket.socket, command: bytes) -> bytes:
-    client.sendall(command)
-    with client.makefile("rb") as lines:
-        return lines.readline()
-
-
-def warnings(caplog: pytest.LogCaptureFixture) -> list[str]:
-    return [record.getMessage() for record in caplog.records if record.levelno == logging.WARNING]
-
-
 # ---- browsers ----
 
 
 def is_http(data: bytes, cuts: list[int]) -> bool:
-    """Say whether a line that comes in pieces is taken for a request."""
+    """Return whether a line that comes in pieces is taken for a request."""
     line, places = FirstLine(), sorted({cut % (len(data) + 1) for cut in cuts})
     pieces = [data[first:last] for first, last in zip([0, *places], [*places, len(data)], strict=True)]
     return any(line.is_http(piece) for piece in pieces)
@@ -66,7 +48,7 @@ CUTS = st.lists(st.integers(0, 10_000), max_size=30)
     end=st.sampled_from([b"\r\n", b"\n"]),
     cuts=CUTS,
 )
-def test_each_request_is_known_however_it_is_cut(
+def test_request_is_detected_in_any_pieces(
     method: bytes, target: bytes, times: int, version: bytes, end: bytes, cuts: list[int]
 ) -> None:
     request = method + b" " + target * times + b" HTTP/" + version + end + b"Host: x\r\n\r\nD,10,10\n"
@@ -93,7 +75,7 @@ def test_no_program_is_taken_for_a_browser(lines: list[bytes], end: bytes, cuts:
     assert not is_http(end.join([*lines, b""]), cuts)
 
 
-def test_a_request_behind_the_first_line_is_the_robots() -> None:
+def test_only_the_first_line_counts_as_a_request() -> None:
     assert not is_http(b"H\nPOST / HTTP/1.1\r\n", [])
 
 
@@ -104,7 +86,9 @@ def test_a_page_in_a_browser_drives_no_robot(
 ) -> None:
     endpoint = kind(0)
     form = b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 18\r\n\r\nD,10,10\nG,7,7\n\n\n"
-    with served([endpoint], thinking=thinking, **({"pace": Pace(wall_ns=Wall())} if thinking == "live" else {})) as run:
+    with served(
+        [endpoint], thinking=thinking, **({"pace": Pace(wall_ns=WallClock())} if thinking == "live" else {})
+    ) as run:
         for pieces in ([form], [form[:3], form[3:20], form[20:]], [form[:17], form[17:]]):
             with connect(endpoint) as browser, suppress(OSError):
                 for piece in pieces:
@@ -118,7 +102,7 @@ def test_a_page_in_a_browser_drives_no_robot(
         assert not run.sim.wires[0].pending
         if kind is TcpEndpoint and thinking == "none":
             with connect(endpoint) as client:
-                assert ask(client, b"H\n") == b"h,0,0\r\n"
+                assert ask_socket(client, b"H\n") == b"h,0,0\r\n"
     assert warnings(caplog) == [
         f"a client of {endpoint.name} must speak as to a serial port, but one spoke HTTP and was disconnected: a page "
         "in a browser may have tried to drive the robot. Do not open this port in a browser."
@@ -128,17 +112,17 @@ def test_a_page_in_a_browser_drives_no_robot(
 # ---- floods ----
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 @given(command=st.sampled_from([b"N\n", b"H\n", b"D,5,5\n", b"B\n"]))
 @example(command=b"N\n")
-def test_a_flood_keeps_the_next_client_waiting_for_two_seconds_at_most(command: bytes) -> None:
-    wall, endpoint = Wall(), TcpEndpoint(0)
+def test_flood_delays_the_next_client_by_two_seconds_at_most(command: bytes) -> None:
+    wall, endpoint = WallClock(), TcpEndpoint(0)
     with served([endpoint], thinking="live", pace=Pace(wall_ns=wall)) as run:
         line = run.sim.wires[0].line
         with connect(endpoint) as flooder:
             flooder.sendall(command * (BACKLOG_LIMIT // len(command)))
             run.wait_for(lambda: line.sending_until_ns - run.sim.now_ns > 2 * LEFT_BEHIND_NS)
-            # Most of it acts, and its replies, of which each is longer than its command, wait for nobody.
+            # Most of it acts. Each reply is longer than its command, and the next client does not wait for replies.
             wall.pass_ns(NS_PER_S)
             run.wait_for(lambda: run.sim.now_ns >= NS_PER_S)
         run.wait_free()
@@ -161,9 +145,9 @@ def test_a_flood_keeps_the_next_client_waiting_for_two_seconds_at_most(command: 
             assert run.sim.now_ns - gone_ns <= LEFT_BEHIND_NS + NS_PER_S // 5
 
 
-def test_what_a_flood_has_left_behind_is_told(caplog: pytest.LogCaptureFixture) -> None:
+def test_dropped_commands_of_a_flood_are_logged(caplog: pytest.LogCaptureFixture) -> None:
     endpoint = TcpEndpoint(0)
-    with served([endpoint], thinking="live", pace=Pace(wall_ns=Wall())) as run:
+    with served([endpoint], thinking="live", pace=Pace(wall_ns=WallClock())) as run:
         with connect(endpoint) as flooder:
             flooder.sendall(b"D,1,1\n" * 600)
             run.wait_for(lambda: len(run.sim.wires[0].pending) == 600)
@@ -176,23 +160,23 @@ def test_what_a_flood_has_left_behind_is_told(caplog: pytest.LogCaptureFixture) 
     ]
 
 
-def test_a_flood_that_was_not_even_read_is_dropped_with_its_client(caplog: pytest.LogCaptureFixture) -> None:
+def test_unread_flood_is_dropped_with_its_client(caplog: pytest.LogCaptureFixture) -> None:
     endpoint = TcpEndpoint(0)
-    with served([endpoint], thinking="live", pace=Pace(wall_ns=Wall())) as run:
+    with served([endpoint], thinking="live", pace=Pace(wall_ns=WallClock())) as run:
         flooder = connect(endpoint)
         flooder.setblocking(False)
         flood = b"D,1,1\n" * (BACKLOG_LIMIT * 20)
         assert flooder.send(flood) > BACKLOG_LIMIT * 10
         run.wait_for(lambda: run.sim.wires[0].line.sending_until_ns > BACKLOG_LIMIT * NS_PER_S // 1000)
         flooder.close()
-        # The wall clock stands still: no character more is carried, and the port is free all the same.
+        # The wall clock stands still, so the line carries no more characters. Still the port becomes free.
         with connect(endpoint):
             run.wait_for(lambda: "the rest of them is dropped" in "".join(warnings(caplog)))
             run.wait_held()
 
 
-def test_a_flood_is_carried_whole_although_another_client_knocks() -> None:
-    wall, endpoint = Wall(), TcpEndpoint(0)
+def test_rejected_client_does_not_shorten_a_flood() -> None:
+    wall, endpoint = WallClock(), TcpEndpoint(0)
     with served([endpoint], thinking="live", pace=Pace(wall_ns=wall)) as run, connect(endpoint) as flooder:
         count = BACKLOG_LIMIT
         flooder.sendall(b"D,1,1\n" * count + b"D,3,4\n")
@@ -205,8 +189,8 @@ def test_a_flood_is_carried_whole_although_another_client_knocks() -> None:
             assert run.sim.now_ns < 2 * 6 * count * NS_PER_S // 960
 
 
-def test_a_few_commands_left_behind_all_act() -> None:
-    wall, endpoint = Wall(), TcpEndpoint(0)
+def test_remaining_commands_of_two_seconds_all_act() -> None:
+    wall, endpoint = WallClock(), TcpEndpoint(0)
     with served([endpoint], thinking="live", pace=Pace(wall_ns=wall)) as run:
         with connect(endpoint) as client:
             client.sendall(b"D,1,1\n" * 100 + b"D,3,4\n")
@@ -216,7 +200,7 @@ def test_a_few_commands_left_behind_all_act() -> None:
         run.wait_for(lambda: run.sim.world.state.robots[0, 0]["speed_setpoint"].tolist() == [3, 4])
 
 
-def test_lockstep_tells_how_long_the_next_one_waits(caplog: pytest.LogCaptureFixture) -> None:
+def test_lockstep_logs_how_long_the_next_client_waits(caplog: pytest.LogCaptureFixture) -> None:
     ways = {1: [TcpEndpoint(0)], 2: [TcpEndpoint(0)]}
     with served(ways, when_silent="wait") as run:
         flooder, other = connect(ways[1][0]), connect(ways[2][0])
@@ -227,78 +211,48 @@ def test_lockstep_tells_how_long_the_next_one_waits(caplog: pytest.LogCaptureFix
         flooder.close()
         run.wait_for(lambda: warnings(caplog))
         other.close()
-    (said,) = [text for text in warnings(caplog) if "left" in text]
-    assert said.startswith("the client of robot 1 has gone and left 99")
-    assert "the next client may come after that, at most" in said
+    (warning,) = [text for text in warnings(caplog) if "left" in text]
+    assert warning.startswith("the client of robot 1 has gone and left 99")
+    assert "the next client may come after that, at most" in warning
 
 
 # ---- descriptors ----
 
 
-@contextmanager
-def few_descriptors(left: int) -> Iterator[None]:
-    """Leave so many descriptors to this process."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    probes = [os.open(os.devnull, os.O_RDONLY) for _ in range(left)]
-    highest = max(probes)
-    for probe in probes:
-        os.close(probe)
-    # Numbers below that may be taken, and free ones in between are few.
-    resource.setrlimit(resource.RLIMIT_NOFILE, (highest + 1, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
-
-
-def test_without_descriptors_clients_are_turned_away_and_the_server_goes_on(caplog: pytest.LogCaptureFixture) -> None:
+def test_clients_are_rejected_without_descriptors_and_the_server_goes_on(caplog: pytest.LogCaptureFixture) -> None:
     RESERVE._has_warned = False
     ways: dict[int, list[Endpoint]] = {1: [TcpEndpoint(0)], 2: [TcpEndpoint(0)]}
     with served(ways) as run, ExitStack() as stack:
         first = stack.enter_context(connect(ways[1][0]))  # type: ignore[arg-type]
         run.wait_held(1)
-        # Their own ends are opened before nothing is left.
+        # The ends of the clients need descriptors, too.
         late = [stack.enter_context(socket.socket()) for _ in range(20)]
-        with few_descriptors(1):
-            hogs = [os.open(os.devnull, os.O_RDONLY)]
-            with suppress(OSError):
-                while True:
-                    hogs.append(os.open(os.devnull, os.O_RDONLY))
-            try:
-                for each in late:
-                    each.settimeout(GUARD_S)
-                    each.connect(("127.0.0.1", ways[2][0].port))  # type: ignore[attr-defined]
-                    assert each.recv(1) == b""
-                assert run.sim.wires[1].holder is None
-            finally:
-                for hog in hogs:
-                    os.close(hog)
+        with no_descriptors():
+            for each in late:
+                each.settimeout(GUARD_S)
+                each.connect(("127.0.0.1", ways[2][0].port))  # type: ignore[attr-defined]
+                assert each.recv(1) == b""
+            assert run.sim.wires[1].holder is None
         second = stack.enter_context(connect(ways[2][0]))  # type: ignore[arg-type]
         run.wait_held(2)
         first.sendall(b"H\n")
-        assert ask(second, b"H\n") == b"h,0,0\r\n"
+        assert ask_socket(second, b"H\n") == b"h,0,0\r\n"
         assert first.recv(1) == b"h"
-    (said,) = warnings(caplog)
-    assert "a client needs a file descriptor: this process may have" in said
-    assert "ulimit -n" in said
+    (warning,) = warnings(caplog)
+    assert "a client needs a file descriptor: this process may have" in warning
+    assert "ulimit -n" in warning
 
 
-def test_serial_ports_come_back_without_descriptors(tmp_path: Path) -> None:
+def test_pty_is_renewed_without_descriptors(tmp_path: Path) -> None:
     link = f"{tmp_path}/robot"
     with served([PtyEndpoint(link)]) as run:
         port = open_plain(link)
         os.write(port, b"H\n")
         assert read_line(port) == b"h,0,0\r\n"
-        hogs: list[int] = []
-        with few_descriptors(1):
-            with suppress(OSError):
-                while True:
-                    hogs.append(os.open(os.devnull, os.O_RDONLY))
+        with no_descriptors() as taken:
             os.close(port)
-            hogs.append(os.open(os.devnull, os.O_RDONLY))
+            taken.append(os.open(os.devnull, os.O_RDONLY))
             run.wait_free()
-            for hog in hogs:
-                os.close(hog)
         port = open_plain(link)
         os.write(port, b"H\n")
         assert read_line(port) == b"h,0,0\r\n"
@@ -306,40 +260,32 @@ def test_serial_ports_come_back_without_descriptors(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("what", ["a serial port", "a TCP port"])
-def test_a_port_that_cannot_be_opened_says_why(what: str, tmp_path: Path) -> None:
-    hogs: list[int] = []
-    with few_descriptors(1):
-        try:
-            with suppress(OSError):
-                while True:
-                    hogs.append(os.open(os.devnull, os.O_RDONLY))
-            with pytest.raises(LinkError, match=f"^{what} must be able to open, but it needs a file .*ulimit -n"):
-                PtyEndpoint(f"{tmp_path}/robot") if what == "a serial port" else TcpEndpoint(0)
-        finally:
-            for hog in hogs:
-                os.close(hog)
+def test_error_explains_why_a_port_cannot_be_opened(what: str, tmp_path: Path) -> None:
+    message = f"^{what} must be able to open, but it needs a file .*ulimit -n"
+    with no_descriptors(), pytest.raises(LinkError, match=message):
+        PtyEndpoint(f"{tmp_path}/robot") if what == "a serial port" else TcpEndpoint(0)
 
 
 @pytest.mark.slow
-def test_more_robots_than_descriptors_end_in_one_line(tmp_path: Path) -> None:
+def test_too_few_descriptors_for_all_robots_give_one_line(tmp_path: Path) -> None:
     words = f"{sys.executable} -m kiks serve --robots 40 --tcp 0 --link {tmp_path}/robot"
     done = subprocess.run(
         ["bash", "-c", f"ulimit -n 100; exec {words}"], capture_output=True, text=True, timeout=120, check=False
     )
     assert done.returncode == 2
-    (said,) = done.stderr.splitlines()
-    assert "this process may have 100" in said
+    (line,) = done.stderr.splitlines()
+    assert "this process may have 100" in line
     assert not list(os.scandir(str(tmp_path)))
 
 
-def test_hundreds_of_clients_leave_the_one_that_has_the_robot_alone() -> None:
+def test_hundreds_of_rejected_clients_do_not_disturb_the_client() -> None:
     endpoint = TcpEndpoint(0)
     with served([endpoint]) as run:
         client = connect(endpoint)
-        assert ask(client, b"H\n") == b"h,0,0\r\n"
+        assert ask_socket(client, b"H\n") == b"h,0,0\r\n"
         for _ in range(300):
             with connect(endpoint) as other:
                 assert other.recv(1) == b""
-        assert ask(client, b"H\n") == b"h,0,0\r\n"
+        assert ask_socket(client, b"H\n") == b"h,0,0\r\n"
         client.close()
         run.wait_free()

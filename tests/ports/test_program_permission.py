@@ -1,4 +1,4 @@
-"""Which programs a desk starts, whoever asks, and how: a project, another world, a restart, the page."""
+"""Which programs a desk may start for a project, another world, a restart, or the page."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def desk_of(folder: Path, *, may_run_programs: bool, granted: tuple[Command | No
 
 
 def program(folder: Path, name: str = "x.py") -> tuple[Path, Path]:
-    """Write a program that leaves a trace; return it, and where the trace is."""
+    """Write a program that creates a file; return the paths of both."""
     path = folder / name
     path.parent.mkdir(exist_ok=True, parents=True)
     path.write_text(TRACE)
@@ -50,8 +50,8 @@ def project_with(path: str, trace: Path) -> Project:
     return Project(Arena.box(300, 300), robots=(ProjectRobot(program=path, arguments=(str(trace),)),))
 
 
-def end_of_all(desk: Desk) -> None:
-    """Let all programs that have started come to their ends."""
+def wait_for_programs(desk: Desk) -> None:
+    """Wait until all started programs have ended."""
     for handle in desk.programs.handles:
         handle.process.wait()
 
@@ -66,13 +66,13 @@ def restart(desk: Desk, project: Project) -> None:
 
 
 def draw(desk: Desk, project: Project) -> None:
-    """Do what the page does that draws another robot."""
+    """Replace the project, as the page does when it draws another robot."""
     upload(desk, project)
     asyncio.run(desk.replace(replace(desk.project, seed=2)))
 
 
-def craft(desk: Desk, project: Project) -> None:
-    """Start it as the panel of programs would."""
+def start_from_panel(desk: Desk, project: Project) -> None:
+    """Start it as the panel of programs does."""
     (robot,) = project.robots
     assert robot.program is not None
     command = Command(desk.folder / robot.program, list(robot.arguments))
@@ -83,38 +83,40 @@ def craft(desk: Desk, project: Project) -> None:
             desk.programs.start(command)
 
 
-WAYS: tuple[Callable[[Desk, Project], None], ...] = (upload, restart, draw, craft)
+WAYS: tuple[Callable[[Desk, Project], None], ...] = (upload, restart, draw, start_from_panel)
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_a_desk_that_may_not_starts_no_program(way: Callable[[Desk, Project], None], tmp_path: Path) -> None:
+def test_desk_without_permission_starts_no_program(way: Callable[[Desk, Project], None], tmp_path: Path) -> None:
     _, trace = program(tmp_path)
     with desk_of(tmp_path, may_run_programs=False) as desk:
         way(desk, project_with("x.py", trace))
         assert not desk.programs.handles
-        _, said = desk.news.since(0)
-        assert way is craft or said[0].startswith("A program was left out: 'x.py' must be started at the terminal")
+        _, news = desk.news.since(0)
+        assert way is start_from_panel or news[0].startswith(
+            "A program was left out: 'x.py' must be started at the terminal"
+        )
     assert not trace.exists()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("way", WAYS)
-def test_a_desk_that_may_starts_it(way: Callable[[Desk, Project], None], tmp_path: Path) -> None:
+def test_desk_with_permission_starts_the_program(way: Callable[[Desk, Project], None], tmp_path: Path) -> None:
     _, trace = program(tmp_path)
     with desk_of(tmp_path, may_run_programs=True) as desk:
         way(desk, project_with("x.py", trace))
-        end_of_all(desk)
+        wait_for_programs(desk)
     assert trace.exists()
 
 
 @pytest.mark.slow
-def test_what_the_person_at_the_terminal_has_named_starts_over(tmp_path: Path) -> None:
+def test_program_named_at_the_terminal_restarts(tmp_path: Path) -> None:
     path, trace = program(tmp_path, ".hidden/tool")
     with desk_of(tmp_path, may_run_programs=False, granted=(Command(path, [str(trace)]),)) as desk:
-        end_of_all(desk)
+        wait_for_programs(desk)
         trace.unlink()
         asyncio.run(desk.start_over())
-        end_of_all(desk)
+        wait_for_programs(desk)
         assert trace.exists()
         with pytest.raises(ParameterError, match="must be started at the terminal"):
             desk.programs.start(Command(path, [str(trace), "more"]))
@@ -123,7 +125,7 @@ def test_what_the_person_at_the_terminal_has_named_starts_over(tmp_path: Path) -
 @pytest.mark.parametrize(
     "name", ["x.txt", "x", ".ssh/x.py", "a/.b/x.py", ".x.py", ".py", "x.py/secret", "x.PY", "link.py", "deep/link.py"]
 )
-def test_a_program_is_a_python_file_in_plain_sight(name: str, tmp_path: Path) -> None:
+def test_program_must_be_a_visible_python_file(name: str, tmp_path: Path) -> None:
     home, elsewhere = tmp_path / "home", tmp_path / "elsewhere"
     (home / "deep").mkdir(parents=True)
     program(elsewhere)
@@ -136,7 +138,7 @@ def test_a_program_is_a_python_file_in_plain_sight(name: str, tmp_path: Path) ->
         Permission(folders=[home], may_start_others=True).check(Command(home / name))
 
 
-def test_programs_lie_in_the_folder_or_among_the_examples(tmp_path: Path) -> None:
+def test_programs_must_lie_in_the_folder_or_the_examples(tmp_path: Path) -> None:
     permission = Permission(folders=[tmp_path, EXAMPLES], may_start_others=True)
     path, _ = program(tmp_path, "a/x.py")
     permission.check(Command(path))
@@ -146,7 +148,7 @@ def test_programs_lie_in_the_folder_or_among_the_examples(tmp_path: Path) -> Non
             permission.check(Command(other))
 
 
-def test_a_world_that_cannot_begin_leaves_the_one_that_is_there(tmp_path: Path) -> None:
+def test_failed_replacement_keeps_the_present_world(tmp_path: Path) -> None:
     _, trace = program(tmp_path)
     with desk_of(tmp_path, may_run_programs=True) as desk:
         before = desk.sim, desk.gate, desk.programs, desk.project

@@ -1,4 +1,4 @@
-"""The scheduler: what happens in simulated time does not depend on the order in which programs are heard."""
+"""The scheduler: the simulated run does not depend on the order in which requests arrive in real time."""
 
 from __future__ import annotations
 
@@ -18,19 +18,18 @@ from kiks.ports import program_scheduler
 from kiks.ports.program_scheduler import Participant, ProgramScheduler
 
 Steps = Sequence[tuple[int, int]]
-"""Commands of a program: the time that each takes to be answered, and the thinking time after the answer [ns]."""
+"""Commands of a program: for each one, the time until its answer and the thinking time after the answer [ns]."""
 
 Log = list[tuple[Any, ...]]
 Choose = Callable[[int], int]
-"""Returns a number from 0 up to below another one: what the operating system does next."""
-
+"""Chooses what the operating system does next: returns a number from 0 to below its argument."""
 
 ANSWER_NS = 4
-"""How long an answer is on its way when the program already knows that it comes [ns]."""
+"""Time from the answer's event until the program has the answer [ns]."""
 
 
 class FakeWorld:
-    """A world in which nothing happens but answers, some time after their commands."""
+    """A world whose only events are answers, some time after their commands."""
 
     def __init__(self) -> None:
         self.now_ns = 0
@@ -58,33 +57,33 @@ class FakeWorld:
 class FakeProgram(Participant):
     """A program that sends commands, waits for each answer, thinks, and leaves.
 
-    How long it thinks depends on all that has happened before, as far as it could see it.
+    Its thinking time depends on all earlier events.
     """
 
     def __init__(self, rank: int, steps: Steps, world: FakeWorld, scheduler: ProgramScheduler) -> None:
         super().__init__(f"program {rank}", rank)
         self.is_here = False
-        self.is_heard = False
+        self.has_sent = False
         self._steps = list(steps)
         self._think_ns = 0
         self._world, self._scheduler = world, scheduler
 
     @property
-    def may_speak(self) -> bool:
-        return not (self.is_heard or self.waits or self.has_left)
+    def can_send(self) -> bool:
+        return not (self.has_sent or self.waits or self.has_left)
 
-    def speak(self) -> None:
-        """Let the scheduler hear what the program does next."""
-        self.is_here = self.is_heard = True
+    def send(self) -> None:
+        """Send the next command of the program."""
+        self.is_here = self.has_sent = True
 
     def next_ns(self) -> int | None:
-        return max(self.acts_from_ns, self._world.now_ns) if self.is_heard else None
+        return max(self.acts_from_ns, self._world.now_ns) if self.has_sent else None
 
     def act(self) -> None:
         world = self._world
         at_ns = max(self.acts_from_ns, world.now_ns)
         world.advance_to(at_ns)
-        self.is_heard = False
+        self.has_sent = False
         if not self._steps:
             world.log.append(("leave", at_ns, self.rank))
             self.has_left = True
@@ -94,26 +93,26 @@ class FakeProgram(Participant):
         world.answer_at(at_ns + answer_ns, self.rank)
         self.waits = True
 
-    def look(self) -> None:
+    def check_wait(self) -> None:
         if self.rank in self._world.answered:
             self._world.answered.remove(self.rank)
             self.waits = False
             end_ns = self._world.now_ns + ANSWER_NS
-            self._scheduler.see(end_ns)
+            self._scheduler.note_seen(end_ns)
             self.acts_from_ns = end_ns + self._think_ns + len(self._world.log) % 3
 
     def drop(self) -> None:
-        raise AssertionError("the world has all the time it needs")
+        raise AssertionError("the policy is to wait")
 
 
 @pytest.fixture(autouse=True)
 def _one_step_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let programs be heard between any two things that the scheduler does."""
+    """Let requests arrive between any two events."""
     monkeypatch.setattr(program_scheduler, "STEPS", 1)
 
 
 def run(programs: Sequence[Steps], choose: Choose) -> Log:
-    """Run programs; return all that happens, and when the world ends."""
+    """Run programs; return all events, and the time at which the world ends."""
     world: Any = FakeWorld()
     scheduler = ProgramScheduler(
         world,
@@ -127,12 +126,12 @@ def run(programs: Sequence[Steps], choose: Choose) -> Log:
     for fake in fakes:
         scheduler.join(fake)
     may_advance = True
-    while thinking := [fake for fake in fakes if fake.may_speak] + [None] * may_advance:
+    while thinking := [fake for fake in fakes if fake.can_send] + [None] * may_advance:
         chosen = thinking[choose(len(thinking))]
         if chosen is None:
             may_advance = scheduler.advance() == 0.0
         else:
-            chosen.speak()
+            chosen.send()
             may_advance = True
     assert all(fake.has_left for fake in fakes)
     assert scheduler.is_repeatable
@@ -140,7 +139,7 @@ def run(programs: Sequence[Steps], choose: Choose) -> Log:
 
 
 def in_every_order(programs: Sequence[Steps]) -> Iterator[Log]:
-    """Run programs in each order in which the operating system can let them be heard."""
+    """Run programs in each order in which their requests can arrive."""
     path: list[int] = []
     while True:
         taken: list[tuple[int, int]] = []
@@ -178,7 +177,7 @@ TIMES_NS = st.integers(0, 12)
 PROGRAMS = st.lists(st.lists(st.tuples(TIMES_NS, TIMES_NS), max_size=6), min_size=1, max_size=5)
 
 
-@settings(max_examples=share(300, 3000), deadline=None)
+@settings(max_examples=share(300, 3000))
 @given(programs=PROGRAMS, orders=st.lists(st.randoms(use_true_random=False), min_size=2, max_size=6))
 def test_any_order_gives_the_same_run(programs: Sequence[Steps], orders: Sequence[Any]) -> None:
     first, *others = (run(programs, order.randrange) for order in orders)

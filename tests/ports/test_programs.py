@@ -18,7 +18,7 @@ from tests import forked
 from tests.at_length import nightly, share
 from tests.busy import busy_computer
 from tests.cli.test_cli import state_of
-from tests.ports.test_lockstep import said
+from tests.ports.helpers import warnings
 from tests.served import GUARD_S, PROGRAMS, fresh
 
 import kiks as package
@@ -56,7 +56,7 @@ open(sys.argv[1], 'w').close()
 
 
 def run(commands: Sequence[Sequence[str]], **options: Any) -> tuple[str, int, int, list[str], str]:
-    """Run programs; return state, time, exit code, what is said of their ends, and why it might not be repeatable."""
+    """Run programs; return state, time, exit code, reports of their ends, and why the run might not be repeatable."""
     sim = fresh(len(commands))
     ends: list[str] = []
     every = [Command(Path(program), arguments) for program, *arguments in commands]
@@ -73,7 +73,7 @@ def write(folder: Path, name: str, text: str) -> str:
 
 @contextmanager
 def started(*words: str) -> Iterator[tuple[subprocess.Popen[bytes], IO[bytes], IO[bytes]]]:
-    """Start the command; yield its process and what it says, and let nothing of it outlive the test."""
+    """Start the command; yield its process and output, and kill its process group at the end."""
     command = [sys.executable, "-m", "kiks", "run", *words]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     with subprocess.Popen(command, start_new_session=True, **pipes) as process:
@@ -86,7 +86,7 @@ def started(*words: str) -> Iterator[tuple[subprocess.Popen[bytes], IO[bytes], I
                 os.killpg(process.pid, signal.SIGKILL)
 
 
-# ---- the same as alone, the same again ----
+# ---- repeatability ----
 
 
 @pytest.mark.parametrize("thinking", ["none", "fixed:2.5"])
@@ -101,7 +101,7 @@ def started(*words: str) -> Iterator[tuple[subprocess.Popen[bytes], IO[bytes], I
     ],
     ids=lambda words: f"{Path(words[0]).stem} {' '.join(words[1:])}",
 )
-def test_program_in_a_process_of_its_own_sees_what_it_sees_in_ours(
+def test_program_gives_the_same_run_in_its_own_process_and_in_this_one(
     words: tuple[str, ...], thinking: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
     state, now_ns, code, _, doubt = run([words], thinking=thinking)
@@ -117,19 +117,19 @@ FOUR = ([DRIVE, "COM1", "40", "3", "7"], [DRIVE, "COM1", "25", "-4", "7"], [SLEE
 
 
 def run_and_read(commands: Sequence[Sequence[str]], folder: Path, **options: Any) -> tuple[object, ...]:
-    """Run programs; return how it ended, and what each of them has printed."""
+    """Run programs; return the end of the run, and the output of each."""
     files = [folder / str(number) for number in range(len(commands))]
     end = run([[INTO_FILE, str(file), *words] for file, words in zip(files, commands, strict=True)], **options)
     return end[:3], end[4], *(file.read_text() for file in files)
 
 
 @pytest.mark.parametrize("thinking", ["none", pytest.param("fixed:3.5", marks=nightly)])
-def test_programs_do_the_same_again_on_a_busy_computer(thinking: str, tmp_path: Path) -> None:
+def test_programs_repeat_on_a_busy_computer(thinking: str, tmp_path: Path) -> None:
     with busy_computer():
         assert len({run_and_read(FOUR, tmp_path, thinking=thinking) for _ in range(share(2, 4))}) == 1
 
 
-def test_two_programs_do_the_same_again(tmp_path: Path) -> None:
+def test_two_programs_repeat(tmp_path: Path) -> None:
     assert len({run_and_read(FOUR[1:3], tmp_path) for _ in range(2)}) == 1
 
 
@@ -140,7 +140,7 @@ def test_live_thinking_of_each_is_recorded_and_replayed(tmp_path: Path) -> None:
     assert run(FOUR[:2], thinking=f"replay:{times}")[:2] == live[:2]
 
 
-def test_one_program_alone_has_a_file_without_a_number(tmp_path: Path) -> None:
+def test_replay_file_of_one_program_has_no_number(tmp_path: Path) -> None:
     times = tmp_path / "times"
     live = run(FOUR[:1], thinking="live", record=times)
     assert times.exists()
@@ -150,12 +150,12 @@ def test_one_program_alone_has_a_file_without_a_number(tmp_path: Path) -> None:
     assert (sim.state_hash(), sim.now_ns) == live[:2]
 
 
-# ---- who ends, crashes, hangs or babbles ----
+# ---- programs that end, crash, hang or flood ----
 
 
-def silences(caplog: pytest.LogCaptureFixture) -> list[str]:
-    """Return what a person is told of the programs, but for who is late at the beginning: a busy computer is slow."""
-    return [text for text in said(caplog) if not text.startswith("the world begins when")]
+def program_warnings(caplog: pytest.LogCaptureFixture) -> list[str]:
+    """Return the warnings, except those about late programs at the start: a busy computer is slow."""
+    return [text for text in warnings(caplog) if not text.startswith("the world begins when")]
 
 
 @pytest.mark.parametrize(
@@ -167,7 +167,7 @@ def silences(caplog: pytest.LogCaptureFixture) -> list[str]:
         ("import os; os.kill(os.getpid(), 9)", 137, "by signal 9"),
     ],
 )
-def test_end_of_a_program_concerns_nobody_else(
+def test_end_of_a_program_does_not_affect_others(
     ending: str, code: int, how: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     program = write(tmp_path, "ends.py", f"import serial\nserial.Serial('COM1').write(b'L,0,1\\nH')\n{ending}\n")
@@ -198,10 +198,12 @@ def test_hanging_program_is_ignored(tmp_path: Path, caplog: pytest.LogCaptureFix
         "program 2 (ends.py) has ended with exit code 0.",
     ]
     assert doubt == "the world did not wait for every program"
-    assert silences(caplog)[0].startswith("program 1 (hangs.py) must act while others wait, but it did nothing for 0.")
+    assert program_warnings(caplog)[0].startswith(
+        "program 1 (hangs.py) must act while others wait, but it did nothing for 0."
+    )
 
 
-def test_program_that_is_left_hanging_is_named(tmp_path: Path) -> None:
+def test_warning_names_the_hanging_program(tmp_path: Path) -> None:
     with started("--patience", "0.2", write(tmp_path, "hangs.py", HANGS), WATCHER, "1") as (_, _, errors):
         told = b""
         while b"Ctrl-C" not in told:
@@ -215,25 +217,25 @@ def test_hanging_program_is_dropped(tmp_path: Path, caplog: pytest.LogCaptureFix
     assert code == 137
     assert ends == ["program 1 (hangs.py) has ended by signal 9.", "program 2 (drive.py) has ended with exit code 0."]
     assert doubt
-    assert silences(caplog) == [
+    assert program_warnings(caplog) == [
         "program 1 (hangs.py) must act within 1 s while others wait, but it did not: it is disconnected. "
         "--patience gives it more time."
     ]
 
 
-def test_babbling_program_hinders_nobody(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_flooding_program_does_not_delay_others(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     over = tmp_path / "over"
-    babbles = write(
+    floods = write(
         tmp_path,
-        "babbles.py",
+        "floods.py",
         f"import os, serial\nport = serial.Serial('COM1')\n"
         f"while not os.path.exists({str(over)!r}): port.write(b'H\\n' * 500)\n",
     )
-    _, _, code, ends, _ = run([[babbles], [write(tmp_path, "ends.py", ENDS), str(over)]])
+    _, _, code, ends, _ = run([[floods], [write(tmp_path, "ends.py", ENDS), str(over)]])
     assert code == 0
     assert len(ends) == 2
-    assert silences(caplog) == [
-        "program 1 (babbles.py) must wait for its replies, but it is more than 4096 characters ahead of robot 1; what "
+    assert program_warnings(caplog) == [
+        "program 1 (floods.py) must wait for its replies, but it is more than 4096 characters ahead of robot 1; what "
         "it sends now has to wait. Read a line after each command."
     ]
 
@@ -264,13 +266,13 @@ def test_no_program_outlives_a_killed_kiks(tmp_path: Path) -> None:
         watched = [os.pidfd_open(int(output.readline().partition(b"|")[2])) for _ in range(2)]
         process.kill()
         process.wait(GUARD_S)
-        # Nobody but its end has told them.
+        # They get no signal from KiKS: only its end can end them.
         for descriptor in watched:
             assert select.select([descriptor], [], [], GUARD_S)[0]
             os.close(descriptor)
 
 
-# ---- names, words and the command ----
+# ---- port names and the command line ----
 
 
 def test_each_program_has_the_robot_of_its_number() -> None:
@@ -288,7 +290,7 @@ def test_each_program_has_the_robot_of_its_number() -> None:
         PortNames(world, {}).robot(other.url(1))
 
 
-def test_names_of_kiks_mean_this_world(tmp_path: Path) -> None:
+def test_kiks_urls_mean_the_shared_world(tmp_path: Path) -> None:
     program = write(
         tmp_path,
         "names.py",
@@ -302,7 +304,7 @@ def test_names_of_kiks_mean_this_world(tmp_path: Path) -> None:
         assert "names robot 7 and the simulation has robots 1 to 2" in str(out)
 
 
-def test_words_are_programs_and_arguments(tmp_path: Path) -> None:
+def test_command_line_is_split_into_programs(tmp_path: Path) -> None:
     one, two, odd = (write(tmp_path, name, "") for name in ("a.py", "b.py", "my program"))
     assert parse_words([one, "1", "-x"]) == [Command(Path(one), ["1", "-x"])]
     assert parse_words([one, "1", two, "c.py"]) == [Command(Path(one), ["1"]), Command(Path(two), ["c.py"])]
@@ -335,7 +337,7 @@ def test_command_runs_two_programs() -> None:
         (("--map", "COM1=5"), "This simulation has robots 1 to 2"),
     ],
 )
-def test_mistakes_end_in_one_clear_line(words: tuple[str, ...], message: str) -> None:
+def test_mistakes_give_one_line(words: tuple[str, ...], message: str) -> None:
     result = forked.run("run", *words, WATCHER, "1", WATCHER, "1")
     assert result.returncode == 2
     assert message in result.stderr

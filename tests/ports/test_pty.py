@@ -47,7 +47,7 @@ def course_in_memory() -> tuple[str, Simulation]:
     return tell(b"H"), sim
 
 
-def test_pyserial_program_does_what_it_does_in_memory(link: str) -> None:
+def test_pyserial_program_gives_the_same_run_as_in_memory(link: str) -> None:
     counts, memory = course_in_memory()
     with served([PtyEndpoint(link)]) as run:
         assert run_python(PROGRAMS / "course.py", link).strip() == counts.strip()
@@ -55,7 +55,7 @@ def test_pyserial_program_does_what_it_does_in_memory(link: str) -> None:
         assert run.sim.now_ns == memory.now_ns
 
 
-def test_c_program_does_what_the_python_program_does(link: str, tmp_path: Path) -> None:
+def test_c_program_gives_the_same_run_as_the_python_program(link: str, tmp_path: Path) -> None:
     compiler = shutil.which("gcc")
     if compiler is None:
         pytest.skip("there is no gcc to compile the C program with")
@@ -81,7 +81,7 @@ def test_client_after_a_canonical_one_finds_a_raw_line_without_echo(link: str) -
         assert termios.tcgetattr(port)[0:2] == [0, 0]
         assert termios.tcgetattr(port)[3] == 0
         assert termios.tcgetattr(port)[4] == termios.B9600
-        # With an echo the robot would hear its own answers, and the second question got another one first.
+        # With an echo the robot would receive its own replies, and answer them before the second command.
         assert ask(port, b"H\n") == b"h,5,6\r\n"
         assert ask(port, b"B\r") == b"b,5.02,5.01\r\n"
         assert run.sim.wires[0].line.baud == 9600
@@ -114,7 +114,7 @@ def test_line_follows_the_speed_and_ignores_the_stop_bits(link: str, baud: int, 
         assert run.sim.wires[0].line.baud == 57600
 
 
-def test_hang_up_drops_what_was_not_read_and_half_a_command(link: str) -> None:
+def test_hang_up_drops_unread_replies_and_an_unfinished_command(link: str) -> None:
     with served([PtyEndpoint(link)]) as run:
         port = open_plain(link)
         assert ask(port, b"D,5,5\n") == b"d\r\n"
@@ -128,7 +128,7 @@ def test_hang_up_drops_what_was_not_read_and_half_a_command(link: str) -> None:
         os.close(port)
 
 
-def test_command_of_a_client_that_closes_at_once_is_carried_out(link: str) -> None:
+def test_command_of_a_client_that_closes_at_once_acts(link: str) -> None:
     with served([PtyEndpoint(link)]) as run:
         port = open_plain(link)
         os.write(port, b"G,7,8\n")
@@ -140,7 +140,7 @@ def test_command_of_a_client_that_closes_at_once_is_carried_out(link: str) -> No
         os.close(port)
 
 
-def test_link_lasts_as_long_as_the_server(link: str) -> None:
+def test_link_exists_while_the_server_runs(link: str) -> None:
     with served([PtyEndpoint(link)]):
         assert os.readlink(link).startswith("/dev/pts/")
     assert not os.path.lexists(link)
@@ -168,7 +168,7 @@ def test_a_folder_that_others_can_write_is_not_trusted(tmp_path: Path, monkeypat
     (runtime / "kiks").chmod(0o755)
     assert default_folder().stat().st_mode & 0o777 == 0o700
     runtime.chmod(0o777)
-    assert default_folder() == tmp_path / f"kiks-{os.getuid()}", "what is in that folder anybody could replace"
+    assert default_folder() == tmp_path / f"kiks-{os.getuid()}", "other users could replace what is in that folder"
     runtime.chmod(0o700)
     (tmp_path / "link").symlink_to(runtime)
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "link"))
@@ -182,7 +182,7 @@ def test_link_of_a_dead_server_is_replaced(link: str) -> None:
     endpoint.close()
 
 
-def test_link_of_a_living_server_is_refused(link: str) -> None:
+def test_link_of_a_running_server_is_rejected(link: str) -> None:
     endpoint = PtyEndpoint(link)
     target = os.readlink(link)
     with pytest.raises(LinkError, match=r"must be free, but a KiKS that is running has it\. Stop that one"):

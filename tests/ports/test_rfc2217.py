@@ -9,10 +9,8 @@ from tests.served import GUARD_S, PROGRAMS, run_python, served
 
 from kiks.ports.rfc2217 import Rfc2217Endpoint
 
-# pyserial's own client sets its thread up in the way of old Pythons.
 
-
-def test_stock_client_does_what_the_port_in_memory_does() -> None:
+def test_pyserial_client_gives_the_same_run_as_a_port_in_memory() -> None:
     counts, _ = course_in_memory()
     endpoint = Rfc2217Endpoint(0)
     with served([endpoint]):
@@ -44,7 +42,7 @@ def test_speed_purge_and_control_lines() -> None:
 
 
 @pytest.mark.parametrize("nonsense", [b"\xff\xf0", b"\xff\xfa\x2c\x01\xff\xf0", b"\xff\xfa" + b"x" * 10_000])
-def test_client_that_talks_nonsense_is_left(nonsense: bytes) -> None:
+def test_client_that_violates_the_protocol_is_disconnected(nonsense: bytes) -> None:
     endpoint = Rfc2217Endpoint(0)
     with served([endpoint]) as run:
         client = socket.create_connection(("127.0.0.1", endpoint.port), timeout=GUARD_S)

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import logging
 import os
 import signal
 import socket
@@ -9,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from tests.ports.helpers import WallClock, warnings
 from tests.served import GUARD_S, PROGRAMS, Served, ask, fresh, open_plain, read_line, run_python, served
 
 from kiks.clock.pace import Pace
@@ -19,19 +19,6 @@ from kiks.ports.pty import PtyEndpoint
 from kiks.ports.server import Server
 from kiks.ports.tcp import TcpEndpoint
 from kiks.units import NS_PER_S, character_ns
-
-
-class Wall:
-    """A wall clock that a test sets."""
-
-    def __init__(self) -> None:
-        self.time_ns = 5 * NS_PER_S
-
-    def __call__(self) -> int:
-        return self.time_ns
-
-    def pass_ns(self, time_ns: int) -> None:
-        self.time_ns += time_ns
 
 
 def play(link: str, run: Served, commands: list[bytes], how: str) -> tuple[str, int, list[bytes]]:
@@ -50,7 +37,7 @@ def play(link: str, run: Served, commands: list[bytes], how: str) -> tuple[str, 
 
 @pytest.mark.parametrize("end", [b"\n", b"\r", b"\r\n"])
 @pytest.mark.parametrize("thinking", ["none", "fixed:3.5"])
-def test_lockstep_does_not_see_how_bytes_are_cut(tmp_path: Path, end: bytes, thinking: str) -> None:
+def test_lockstep_does_not_depend_on_how_bytes_are_split(tmp_path: Path, end: bytes, thinking: str) -> None:
     commands = [command + end for command in (b"D,9,7", b"N", b"D,-2", b"N", b"x", b"N")]
     runs = []
     for how in ("lines", "bytes"):
@@ -87,8 +74,8 @@ def test_commands_in_one_write_are_answered_in_their_order(tmp_path: Path) -> No
         os.close(port)
 
 
-def test_live_reply_comes_when_the_clock_says_so(tmp_path: Path) -> None:
-    link, wall = str(tmp_path / "robot"), Wall()
+def test_live_reply_arrives_on_time(tmp_path: Path) -> None:
+    link, wall = str(tmp_path / "robot"), WallClock()
     with served([PtyEndpoint(link)], thinking="live", pace=Pace(2.0, wall_ns=wall)) as run:
         port = open_plain(link)
         os.write(port, b"H\n")
@@ -110,7 +97,7 @@ def test_live_reply_comes_when_the_clock_says_so(tmp_path: Path) -> None:
 
 
 def test_live_world_runs_without_a_client() -> None:
-    wall = Wall()
+    wall = WallClock()
     with served([TcpEndpoint(0)], thinking="live", pace=Pace(wall_ns=wall)) as run:
         run.wait_rounds(1)
         wall.pass_ns(NS_PER_S)
@@ -118,14 +105,14 @@ def test_live_world_runs_without_a_client() -> None:
 
 
 @pytest.mark.parametrize("length", [2, 1])
-def test_live_client_that_babbles_waits_for_the_line(tmp_path: Path, length: int) -> None:
-    link, wall = str(tmp_path / "robot"), Wall()
+def test_live_flooding_client_waits_for_the_line(tmp_path: Path, length: int) -> None:
+    link, wall = str(tmp_path / "robot"), WallClock()
     with served([PtyEndpoint(link)], thinking="live", pace=Pace(wall_ns=wall)) as run:
         port = open_plain(link)
         os.set_blocking(port, False)
         line = run.sim.wires[0].line
 
-        def babble() -> None:
+        def flood() -> None:
             try:
                 while True:
                     os.write(port, b"H\n"[:length] * 500)
@@ -136,10 +123,10 @@ def test_live_client_that_babbles_waits_for_the_line(tmp_path: Path, length: int
             return (line.sending_until_ns - run.sim.now_ns) // line.character_ns
 
         for _ in range(3):
-            babble()
+            flood()
             run.wait_for(lambda: backlog() > BACKLOG_LIMIT)
             run.wait_rounds(2)
-            babble()
+            flood()
             assert backlog() <= BACKLOG_LIMIT + READ_SIZE
             wall.pass_ns(10 * NS_PER_S)
         os.close(port)
@@ -162,15 +149,14 @@ def test_one_client_of_several_endpoints_has_the_robot(tmp_path: Path, caplog: p
         assert second.recv(1) == b""
         second.close()
         os.close(port)
-    said = [record.getMessage() for record in caplog.records if record.levelno == logging.WARNING]
-    assert said == [
+    assert warnings(caplog) == [
         f"robot 1 must have one client at a time, but another came to {came} while the client of {has} has it. "
         "Close that one first."
         for came, has in ((link, tcp.name), (tcp.name, link))
     ]
 
 
-def test_robot_that_somebody_else_holds_is_refused(caplog: pytest.LogCaptureFixture) -> None:
+def test_client_of_a_robot_in_use_is_rejected(caplog: pytest.LogCaptureFixture) -> None:
     sim, tcp = fresh(), TcpEndpoint(0)
     sim.wires[0].holder = "a program in this process"
     with served([tcp], sim=sim):
@@ -181,8 +167,8 @@ def test_robot_that_somebody_else_holds_is_refused(caplog: pytest.LogCaptureFixt
     assert sim.wires[0].holder == "a program in this process"
 
 
-def test_simulation_that_falls_behind_says_so_once(caplog: pytest.LogCaptureFixture) -> None:
-    wall = Wall()
+def test_lag_is_logged_once(caplog: pytest.LogCaptureFixture) -> None:
+    wall = WallClock()
     pace = Pace(4.0, wall_ns=wall)
     pace.start(0)
     wall.pass_ns(NS_PER_S)
@@ -190,13 +176,13 @@ def test_simulation_that_falls_behind_says_so_once(caplog: pytest.LogCaptureFixt
     assert not caplog.records
     for _ in range(2):
         pace.report(2_000_000_000)
-    assert [record.getMessage() for record in caplog.records] == [
+    assert warnings(caplog) == [
         "the simulation must keep up with 4 times real time, but it is 0.5 s behind. Ask for a lower speed; "
         "the robots do the same, only later."
     ]
 
 
-def test_values_out_of_range_are_refused() -> None:
+def test_arguments_are_checked() -> None:
     with pytest.raises(ParameterError, match=r"endpoints must be those of robots 1 to 1, but one was of robot 2"):
         Server(fresh(), {2: []})
     with pytest.raises(ParameterError, match=r"thinking of a server must be 'live', 'none' or 'fixed:MS', but it was"):

@@ -1,4 +1,4 @@
-"""The transcripts of tests/sessions, over every kind of port: the same bytes everywhere."""
+"""The transcripts of tests/sessions give the same bytes over every kind of port."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Programs that are started and stopped while the world is there, as the desk does."""
+"""Programs that start and stop in a running world, as on the desk."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ STUBBORN = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n" + FOR
 
 
 class Gate:
-    """Stands in for a person who lets the world stand still: `advance_to` waits, and the lock is released."""
+    """Pauses the world, as a person does: `advance_to` waits and releases the lock."""
 
     def __init__(self, sim: Simulation) -> None:
         self._changed = threading.Condition(sim.lock)
@@ -68,7 +68,7 @@ class Gate:
 
 
 class Driven:
-    """Programs whose rounds a thread does again and again."""
+    """Programs whose rounds run in a thread."""
 
     def __init__(self, programs: Programs) -> None:
         self.programs = programs
@@ -85,7 +85,7 @@ class Driven:
                 self._round.notify_all()
 
     def wait_for(self, fact: Callable[[], object]) -> None:
-        """Wait until something is so, looked at after each round."""
+        """Wait until a condition holds, checked after each round."""
         with self._round:
             assert self._round.wait_for(fact, GUARD_S), "it did not happen in time"
 
@@ -98,7 +98,7 @@ class Driven:
 
 @contextmanager
 def driven(sim: Simulation, commands: Sequence[Command] = (), **options: Any) -> Iterator[Driven]:
-    run = Driven(Programs(sim, commands, is_heard=True, **{"patience_s": GUARD_S, **options}))
+    run = Driven(Programs(sim, commands, keeps_output=True, **{"patience_s": GUARD_S, **options}))
     try:
         yield run
     finally:
@@ -120,7 +120,7 @@ def wheels(sim: Simulation, robot: int = 1) -> list[int]:
     return sim.world.state.robots["speed_setpoint"][0, robot - 1].tolist()
 
 
-def test_programs_that_begin_together_do_what_they_do_under_kiks_run() -> None:
+def test_programs_that_begin_together_give_the_run_of_kiks_run() -> None:
     alone, watched = fresh(2), fresh(2)
     assert Programs(alone, [DRIVE, SLEEPER]).run() == 0
     with driven(watched, [DRIVE, SLEEPER]) as run:
@@ -150,7 +150,7 @@ def test_program_joins_at_the_present_time(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("text", [FOR_EVER, STUBBORN], ids=["friendly", "stubborn"])
 @pytest.mark.parametrize("is_paused", [False, True], ids=["running", "paused"])
-def test_stopped_program_leaves_a_robot_that_stands_and_is_free(
+def test_robot_of_a_stopped_program_stands_still_and_is_free(
     text: str, is_paused: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "GRACE_S", 0.1)
@@ -180,7 +180,7 @@ def test_stopped_program_leaves_a_robot_that_stands_and_is_free(
         assert wheels(sim) == [0, 0]
 
 
-def test_what_a_program_has_started_ends_with_it(tmp_path: Path) -> None:
+def test_child_processes_end_with_their_program(tmp_path: Path) -> None:
     text = (
         "import subprocess, time\nchild = subprocess.Popen(['cat'], stdin=-1)\n"
         "print(child.pid)\ntime.sleep(1)\nopen('/dev/stdin').read()\n"
@@ -196,11 +196,11 @@ def test_what_a_program_has_started_ends_with_it(tmp_path: Path) -> None:
         os.close(child)
 
 
-def test_endless_output_hinders_nobody_and_stays_small(tmp_path: Path) -> None:
+def test_endless_output_is_limited_and_does_not_delay_others(tmp_path: Path) -> None:
     sim = fresh(2)
-    babbles = command(tmp_path, "number = 0\nwhile True:\n    print('x' * 3000, number)\n    number += 1\n")
+    floods = command(tmp_path, "number = 0\nwhile True:\n    print('x' * 3000, number)\n    number += 1\n")
     with driven(sim) as run:
-        handle = run.programs.start(babbles)
+        handle = run.programs.start(floods)
         other = run.programs.start(DRIVE, robot=2)
         assert handle.output is not None
         output = handle.output
@@ -211,7 +211,7 @@ def test_endless_output_hinders_nobody_and_stays_small(tmp_path: Path) -> None:
         assert max(len(line.text) for line in lines) <= 2000
 
 
-def test_output_and_errors_are_told_apart(tmp_path: Path) -> None:
+def test_output_and_errors_are_distinguished(tmp_path: Path) -> None:
     text = "import sys\nprint('grün')\nsys.stdout.write('no end')\n1 / 0\n"
     with driven(fresh()) as run:
         handle = run.programs.start(command(tmp_path, text))
@@ -226,7 +226,7 @@ def test_output_and_errors_are_told_apart(tmp_path: Path) -> None:
         assert (handle.code, handle.state) == (1, "ended with exit code 1")
 
 
-def test_nobody_loses_patience_while_the_world_stands_still(tmp_path: Path) -> None:
+def test_patience_does_not_run_out_while_the_world_is_paused(tmp_path: Path) -> None:
     sim = fresh(2)
     gate = Gate(sim)
     wall_ns = [0]
@@ -243,7 +243,7 @@ def test_nobody_loses_patience_while_the_world_stands_still(tmp_path: Path) -> N
         assert not run.programs.doubt
 
 
-def test_mistakes_are_told_before_anything_starts(tmp_path: Path) -> None:
+def test_mistakes_raise_before_a_program_starts(tmp_path: Path) -> None:
     with driven(fresh()) as run:
         with pytest.raises(ParameterError, match=r"must be a Python file, but there is none at"):
             run.programs.start(Command(tmp_path / "nothing.py"))

@@ -1,10 +1,10 @@
 from __future__ import annotations
 
-import logging
 import socket
 
 import pytest
 import serial
+from tests.ports.helpers import ask_socket, connect, warnings
 from tests.ports.test_pty import course_in_memory
 from tests.served import GUARD_S, PROGRAMS, run_python, served
 
@@ -13,19 +13,7 @@ from kiks.errors import LinkError, ParameterError
 from kiks.ports.tcp import TcpChannel, TcpEndpoint
 
 
-def connect(endpoint: TcpEndpoint) -> socket.socket:
-    return socket.create_connection(("127.0.0.1", endpoint.port), timeout=GUARD_S)
-
-
-def tell(client: socket.socket, command: bytes) -> bytes:
-    client.sendall(command)
-    line = b""
-    while not line.endswith(b"\n"):
-        line += client.recv(1)
-    return line
-
-
-def test_socket_url_does_what_the_port_in_memory_does() -> None:
+def test_socket_url_gives_the_same_run_as_a_port_in_memory() -> None:
     counts, memory = course_in_memory()
     endpoint = TcpEndpoint(0)
     with served([endpoint]) as run:
@@ -33,29 +21,28 @@ def test_socket_url_does_what_the_port_in_memory_does() -> None:
         assert run.sim.state_hash() == memory.state_hash()
 
 
-def test_second_client_is_turned_away_with_a_word(caplog: pytest.LogCaptureFixture) -> None:
+def test_second_client_is_rejected_with_a_warning(caplog: pytest.LogCaptureFixture) -> None:
     endpoint = TcpEndpoint(0)
     with served([endpoint]) as run:
         first = connect(endpoint)
-        assert tell(first, b"H\n") == b"h,0,0\r\n"
+        assert ask_socket(first, b"H\n") == b"h,0,0\r\n"
         for _ in range(2):
             second = connect(endpoint)
             assert second.recv(1) == b""
             second.close()
-        assert tell(first, b"H\n") == b"h,0,0\r\n"
+        assert ask_socket(first, b"H\n") == b"h,0,0\r\n"
         first.close()
         run.wait_free()
         third = connect(endpoint)
-        assert tell(third, b"H\n") == b"h,0,0\r\n"
+        assert ask_socket(third, b"H\n") == b"h,0,0\r\n"
         third.close()
-    said = [record.getMessage() for record in caplog.records if record.levelno == logging.WARNING]
-    assert said == [
+    assert warnings(caplog) == [
         f"robot 1 must have one client at a time, but another came to {endpoint.name} while the client of "
         f"{endpoint.name} has it. Close that one first."
     ]
 
 
-def test_client_that_vanishes_leaves_nothing_behind() -> None:
+def test_reset_connection_drops_an_unfinished_command() -> None:
     endpoint = TcpEndpoint(0)
     with served([endpoint]) as run:
         client = connect(endpoint)
@@ -66,7 +53,7 @@ def test_client_that_vanishes_leaves_nothing_behind() -> None:
         client.close()
         run.wait_free()
         client = connect(endpoint)
-        assert tell(client, b"H\n") == b"h,0,0\r\n"
+        assert ask_socket(client, b"H\n") == b"h,0,0\r\n"
         client.close()
 
 
@@ -83,16 +70,17 @@ def test_two_robots_have_their_own_clients() -> None:
             port.close()
 
 
-def test_unread_output_is_bounded_and_hinders_nobody(caplog: pytest.LogCaptureFixture) -> None:
+def test_unread_output_is_limited_and_logged(caplog: pytest.LogCaptureFixture) -> None:
     here, there = socket.socketpair()
     here.setblocking(False)
-    channel = TcpChannel("a test", here)
+    endpoint = TcpEndpoint(0)
+    channel = TcpChannel(here, endpoint)
     for _ in range(OUTPUT_LIMIT // 1000 + 2000):
         channel.write(b"x" * 1000)
     assert channel.has_unsent
     assert len(channel._unsent) <= OUTPUT_LIMIT
-    assert [record.getMessage() for record in caplog.records] == [
-        f"the client of a test must read its replies, but {len(channel._unsent)} characters wait for it; "
+    assert warnings(caplog) == [
+        f"the client of {endpoint.name} must read its replies, but {len(channel._unsent)} characters wait for it; "
         "the rest is lost. Read a line after each command."
     ]
     there.close()
@@ -100,6 +88,7 @@ def test_unread_output_is_bounded_and_hinders_nobody(caplog: pytest.LogCaptureFi
     assert len(channel._unsent) == 0
     assert channel.read() is None
     channel.close()
+    endpoint.close()
 
 
 def test_client_that_does_not_read_gets_all_its_replies_later() -> None:
@@ -108,7 +97,7 @@ def test_client_that_does_not_read_gets_all_its_replies_later() -> None:
         mute, other = connect(ways[1][0]), connect(ways[2][0])
         mute.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
         mute.sendall(b"N\n" * 3000)
-        assert tell(other, b"H\n") == b"h,0,0\r\n"
+        assert ask_socket(other, b"H\n") == b"h,0,0\r\n"
         mute.sendall(b"H\n")
         replies = mute.makefile("rb")
         for _ in range(3000):
@@ -121,14 +110,14 @@ def test_client_that_does_not_read_gets_all_its_replies_later() -> None:
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "192.168.1.5", "::", "example.com"])
-def test_host_that_others_reach_is_refused(host: str) -> None:
+def test_host_must_be_a_loopback_address(host: str) -> None:
     with pytest.raises(
         LinkError, match=r"host must be an address that only this computer reaches, but it was .*Use 127"
     ):
         TcpEndpoint(0, host=host)
 
 
-def test_port_must_be_free_and_a_port() -> None:
+def test_port_must_be_valid_and_free() -> None:
     endpoint = TcpEndpoint(0)
     with pytest.raises(LinkError, match=rf"port {endpoint.port} of 127\.0\.0\.1 must be free, but it is not \(Address"):
         TcpEndpoint(endpoint.port)

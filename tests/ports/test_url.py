@@ -1,4 +1,4 @@
-"""Simulated ports by name, through pyserial's own door."""
+"""Simulated ports by name, opened by pyserial."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def test_pyserial_opens_a_robot() -> None:
         port.write(b"N\n")
 
 
-def test_a_robot_is_busy_until_it_is_closed() -> None:
+def test_robot_is_busy_until_its_port_is_closed() -> None:
     sim = kiks.Simulation()
     port = serial.serial_for_url(sim.url(1), timeout=1)
     with pytest.raises(serial.SerialException, match="must be free to be opened, but robot 1 is in use by the program"):
@@ -37,7 +37,7 @@ def test_a_robot_is_busy_until_it_is_closed() -> None:
     serial.serial_for_url(sim.url(1)).close()
 
 
-def test_the_name_alone_means_the_newest_simulation() -> None:
+def test_number_alone_means_the_newest_simulation() -> None:
     older, newer = kiks.Simulation(), kiks.Simulation()
     for url, sim in (("kiks://1", newer), (older.url(1), older)):
         port = serial.serial_for_url(url, timeout=1)
@@ -47,7 +47,7 @@ def test_the_name_alone_means_the_newest_simulation() -> None:
         assert sim.time_s > 0
 
 
-def test_options_make_a_simulation() -> None:
+def test_options_create_a_simulation() -> None:
     url = f"kiks://2?arena={ARENAS / 'maze.toml'}&robots=2&seed=7&thinking=fixed:1&robot=khepera_ii"
     with serial.serial_for_url(url, timeout=1) as port:
         port.write(b"B\n")
@@ -67,7 +67,7 @@ def test_options_make_a_simulation() -> None:
         ("kiks://1?robot=kephera", "Did you mean 'khepera'"),
     ],
 )
-def test_bad_names_are_explained(url: str, words: str) -> None:
+def test_errors_explain_bad_names(url: str, words: str) -> None:
     sim = kiks.Simulation()
     with pytest.raises(serial.SerialException) as caught:
         serial.serial_for_url(url)

@@ -46,7 +46,7 @@ def run_threads(program: list[Any]) -> tuple[Trace, str]:
 
 
 @given(PROGRAMS)
-@settings(max_examples=share(60, 200), deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=share(60, 200), derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 def test_threads_do_what_a_plain_simulation_says(program: list[Any]) -> None:
     oracle = Oracle(world(), program)
     assert run_threads(program) == (oracle.trace, oracle.sim.state_hash())

@@ -28,7 +28,8 @@ from kiks.engine.simd.f64x8 import LANES
 from kiks.engine.state import State
 from kiks.errors import ParameterError, counted, shown
 from kiks.model.arena import PAD, Arena
-from kiks.model.checks import SECONDS_MAX, array_of, check_count, check_number, check_numbers
+from kiks.model.array_checks import array_of, check_numbers
+from kiks.model.checks import SECONDS_MAX, check_count, check_number
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
 from kiks.units import NS_PER_S, ns_from_s
 

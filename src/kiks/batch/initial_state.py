@@ -15,7 +15,8 @@ from kiks.engine.sensing.thesis_networks import networks_for
 from kiks.engine.state import State
 from kiks.errors import ParameterError, shown
 from kiks.model.arena import AnArena, Arena
-from kiks.model.checks import HEADING_KEPT_RAD, check_count, check_numbers, wrapped
+from kiks.model.array_checks import check_numbers
+from kiks.model.checks import HEADING_KEPT_RAD, check_count, wrapped
 from kiks.model.data_file import OneOf
 from kiks.model.robot import RobotSpec
 from kiks.sim.simulation import Simulation, check_kinds

@@ -1,4 +1,4 @@
-"""Calibration: what makes a robot an individual, measured over its line by a few placements before a white wall."""
+"""Calibration: measures the constants of one robot over its line, in a few placements in front of a white wall."""
 
 from __future__ import annotations
 
@@ -23,57 +23,57 @@ from kiks.calibration.measurements import (
     spin,
 )
 from kiks.calibration.placements import Instruction, Place, Placements
-from kiks.calibration.wall_fit import Fit, Stand, fit_runs, guess_pulse
+from kiks.calibration.wall_fit import Fit, WallModel, fit_runs, guess_pulse
 from kiks.client.khepera import Khepera
 from kiks.engine.sensing.thesis_networks import NETWORK_RESPONSES
 from kiks.errors import LinkError, ParameterError, shown
 from kiks.model.robot import RESPONSES, SENSOR_COUNT, RobotSpec
 
 GAP_SHARES, FAINT_SHARE = (0.15, 0.45, 0.7, 0.95), 0.03
-"""Gaps at which the robot spins, as shares of that at which the best sensor reads so little of the largest count."""
+"""Gaps at which the robot spins, as shares of the gap at which the best sensor reads `FAINT_SHARE` of the maximum."""
 
 ALONG_GAP = 1
-"""Which of the gaps is the one at which it drives along the wall: near enough to see well, far enough not to touch."""
+"""Index of the gap at which it drives along the wall: near enough to see it well, far enough not to touch it."""
 
 ALONG_MM = 100.0
-"""How far it drives along the wall [mm]."""
+"""Length of the drive along the wall [mm]."""
 
 RUN_UP_MM = 500.0
 """Marked gap from which it drives towards the wall [mm]."""
 
 FREE_SAMPLES, GAP_SAMPLES = 200, 100
-"""Readings at rest: in the open, and before each spin."""
+"""Number of readings at rest: in the open, and before each spin."""
 
 ATTEMPTS = 3
-"""How often a placement is tried at most."""
+"""Most attempts at a placement."""
 
 FRONT = slice(1, 5)
 """The sensors that look ahead."""
 
 NEAR_SHARE, TOUCHING_MM = 0.5, 2.0
-"""The robot stops before the wall when a front sensor reads this share of what the weakest one would there [mm]."""
+"""The robot stops when a front sensor reads this share of the weakest one's count at a gap of `TOUCHING_MM`."""
 
-SEEN_COUNTS, GLIMPSED_COUNTS = 50.0, 10.0
-"""What a sensor that sees a wall reads above its baseline at least [counts]: near by, and where little is expected."""
+SEEN_COUNTS, FAINT_COUNTS = 50.0, 10.0
+"""Smallest reading above the baseline that shows a wall [counts]: near the wall, and where little is expected."""
 
 GAP_ERROR_MAX_MM = 3.0
-"""Runs whose gaps the fit would rather change by more contradict the others [mm]."""
+"""Largest gap error of a run that agrees with the others [mm]."""
 
 MISFIT_MAX = 6.0
-"""Root mean square of the residuals above which the measurements are not those of such a robot."""
+"""Largest root mean square of the residuals for measurements of such a robot."""
 
-Found = TypeVar("Found")
+Result = TypeVar("Result")
 Say = Callable[[str], None]
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """What was found.
+    """Result of a calibration.
 
     Attributes:
         spec: The robot.
-        fit: How it was found, with uncertainties.
-        jitter_counts: By how much each sensor strays in the open, on average [counts].
+        fit: The fit, with uncertainties.
+        jitter_counts: Mean absolute deviation of each sensor in the open [counts].
     """
 
     spec: RobotSpec
@@ -110,20 +110,20 @@ def calibrate(
     run_up_mm: float = RUN_UP_MM,
     say: Say = lambda text: None,
 ) -> Calibration:
-    """Measure a robot; it stands still when this returns or raises.
+    """Measure a robot; it stands still when this function returns or raises.
 
     Args:
         robot: The robot.
-        placements: Puts it where it has to be.
-        base: The kind of robot that it is, for all that is not measured.
+        placements: Puts the robot where a measurement needs it.
+        base: The kind of robot; it gives all constants that are not measured.
         baud: Speed of its line [bit/s].
-        gaps_mm: Marked distances from wall to rim [mm], at least two; where it sees well if left out.
+        gaps_mm: Marked distances from wall to rim [mm], at least two; `default_gaps_mm` if left out.
         run_up_mm: Marked gap from which it drives towards the wall [mm].
         say: Called with a line of text about each step.
 
     Raises:
         ParameterError: If the gaps are not usable, or the response has directions of its own.
-        CalibrationError: If a measurement does not show what it should, or they contradict each other.
+        CalibrationError: If a measurement shows something unexpected, or measurements contradict each other.
         LinkError: If the robot does not answer.
     """
     check_response(base)
@@ -138,7 +138,7 @@ def calibrate(
 
 
 def check_response(base: RobotSpec) -> None:
-    """Raise if nothing that is measured would change what the simulated robot's sensors see.
+    """Check that the simulated robot's sensors depend on what is measured.
 
     Raises:
         ParameterError: If the response has directions of its own.
@@ -173,7 +173,7 @@ def checked_gaps(gaps_mm: Sequence[float] | None, run_up_mm: float, base: RobotS
 
 
 def default_gaps_mm(base: RobotSpec) -> list[float]:
-    """Return gaps at which such a robot sees a wall well [mm], nearest first."""
+    """Return the gaps at which such a robot sees a wall well [mm], nearest first."""
     tried_mm = np.arange(1.0, base.proximity.range_mm)
     faint = FAINT_SHARE * base.proximity.maximum_counts
     seen_mm = float(tried_mm[facing_counts(base, tried_mm).max(axis=1) >= faint].max(initial=10.0))
@@ -181,19 +181,19 @@ def default_gaps_mm(base: RobotSpec) -> list[float]:
 
 
 def facing_counts(spec: RobotSpec, gaps_mm: Sequence[float] | Array) -> Array:
-    """Return what each sensor reads above its baseline as it faces a wall at gaps [counts], shape [gap, 8]."""
-    stand, gaps = Stand(spec), np.asarray(gaps_mm, np.float64)
+    """Return the reading of each sensor above its baseline as it faces a wall [counts], shape [gap, 8]."""
+    model, gaps = WallModel(spec), np.asarray(gaps_mm, np.float64)
     above = np.empty((len(gaps), SENSOR_COUNT))
     for sensor, (direction_deg, baseline) in enumerate(
         zip(spec.proximity.direction_deg, spec.proximity.baseline_counts, strict=True)
     ):
         headings_rad = np.full(len(gaps), -math.radians(direction_deg))
-        above[:, sensor] = stand.readings(spec, gaps, headings_rad)[:, sensor] - baseline
+        above[:, sensor] = model.readings(spec, gaps, headings_rad)[:, sensor] - baseline
     return above
 
 
 class _Session:
-    """One calibration under way."""
+    """One calibration in progress."""
 
     def __init__(self, robot: Khepera, placements: Placements, base: RobotSpec, baud: int, say: Say) -> None:
         self.robot = robot
@@ -217,7 +217,7 @@ class _Session:
             runs += self._at(Instruction(Place.WALL, text, gap_mm), measure)
         text = f"Put the robot before the wall, facing it squarely, its rim at the {run_up_mm:g} mm mark."
         runs.append(self._at(Instruction(Place.WALL, text, run_up_mm), self._measure_run_up))
-        self.say("Working it out ...")
+        self.say("Fitting ...")
         guess = fit_runs(self.spec, [run.thinned(2) for run in runs[:-1]]).spec
         fit = fit_runs(self.spec, runs, guess_pulse(self.spec, guess, runs[-1]))
         _check_fit(fit, runs)
@@ -226,51 +226,52 @@ class _Session:
         spec = replace(spec, name=f"{self.spec.name} (calibrated)", proximity=replace(spec.proximity, **noise))
         return Calibration(_rounded(spec), fit, jitter)
 
-    def _at(self, instruction: Instruction, measure: Callable[[float], tuple[Found, str]]) -> Found:
-        """Have the robot placed and measure, again if that is wanted; return what was measured."""
+    def _at(self, instruction: Instruction, measure: Callable[[float], tuple[Result, str]]) -> Result:
+        """Have the robot placed and measure, again if a repetition is wanted; return the measurement."""
         for attempt in range(1, ATTEMPTS + 1):
             gap_mm = self.placements.place(instruction)
             rest_count = len(self.rests)
             try:
-                found, finding = measure(gap_mm)
+                result, finding = measure(gap_mm)
             except (CalibrationError, LinkError) as error:
                 halt(self.robot)
                 if attempt == ATTEMPTS or not self.placements.wants_repeat(str(error), is_good=False):
                     raise
             else:
                 if attempt == ATTEMPTS or not self.placements.wants_repeat(finding, is_good=True):
-                    return found
+                    return result
             del self.rests[rest_count:]
         raise AssertionError("the last attempt returns or raises")
 
     def _measure_in_the_open(self, _: float) -> tuple[tuple[float, ...], str]:
-        thinking_ms = processing_ms(self.robot, self.baud)
+        measured_ms = processing_ms(self.robot, self.baud)
         at_rest = rest(self.robot, FREE_SAMPLES)
         mean = at_rest.counts.mean(axis=0)
         if mean.max() > self.spec.proximity.maximum_counts / 3:
             raise CalibrationError(
                 f"the sensors must read little in the open, but sensor {int(mean.argmax())} reads "
-                f"{mean.max():.0f} counts. Move away what is near, and lamps with it."
+                f"{mean.max():.0f} counts. Remove objects and lamps near the robot."
             )
         jitter, deviation = at_rest.jitter(), at_rest.deviation()
         proximity = replace(
             self.spec.proximity, baseline_counts=tuple(mean.tolist()), jitter_counts=tuple(jitter.round(1).tolist())
         )
-        firmware = replace(self.spec.firmware, processing_ms=min(round(thinking_ms, 2), 1000.0))
+        firmware = replace(self.spec.firmware, processing_ms=min(round(measured_ms, 2), 1000.0))
         self.spec = replace(self.spec, proximity=proximity, firmware=firmware)
         baselines = ", ".join(f"{count:.0f}" for count in mean)
-        noise = f"jitter {deviation.mean():.1f} counts; the robot thinks for {thinking_ms:.2f} ms"
+        noise = f"jitter {deviation.mean():.1f} counts; a command takes {measured_ms:.2f} ms"
         return tuple(deviation.tolist()), f"Baselines {baselines}; {noise}."
 
     def _measure_before_the_wall(
         self, gap_mm: float, *, before: tuple[Run, ...], is_along: bool, is_nearest: bool
     ) -> tuple[list[Run], str]:
         self.rests.append(rest(self.robot, GAP_SAMPLES))
-        there = spin(self.robot, self.spec, gap_mm, SPIN_TURNS)
-        back = spin(self.robot, self.spec, gap_mm, -SPIN_TURNS)  # both ways, as readings are older than counters
-        runs = [there, replace(back, is_marked=False)]
+        # In both directions, because readings are older than counters.
+        left = spin(self.robot, self.spec, gap_mm, SPIN_TURNS)
+        right = spin(self.robot, self.spec, gap_mm, -SPIN_TURNS)
+        runs = [left, replace(right, is_marked=False)]
         above = np.concatenate([run.counts for run in runs]).max(axis=0) - np.array(self.spec.proximity.baseline_counts)
-        enough = min(max(facing_counts(self.spec, [gap_mm]).max() / 2, GLIMPSED_COUNTS), SEEN_COUNTS)
+        enough = min(max(facing_counts(self.spec, [gap_mm]).max() / 2, FAINT_COUNTS), SEEN_COUNTS)
         if above.max() < enough:
             raise CalibrationError(
                 f"some sensor must see the wall at {gap_mm:g} mm, but none reads more than {above.max():.0f} counts "
@@ -289,23 +290,24 @@ class _Session:
     def _drive_along(self, gap_mm: float, before: tuple[Run, ...], runs: list[Run]) -> list[Run]:
         """Drive along the wall and back, first with the left and then with the right side to it.
 
-        Where to turn comes from a first fit of the runs so far. A way is one run with the turn that led to it, the
-        first one with the spin too: readings while it turns tell how it stands, and counters from there where it goes.
+        A first fit of the runs so far gives the heading from which it turns. Each drive is one run with the turn before
+        it, and the first one with the last spin, too: the readings during a turn give the heading, and the counters
+        give the path from there.
 
         Returns:
-            The runs here, the ways there among them.
+            The runs at this gap, with the drives.
         """
         fit = fit_runs(self.spec, [run.thinned(3) for run in (*before, *runs)])
         body = fit.spec.body
         heading_rad = fit.end_heading_rad(len(before) + len(runs) - 1, runs[-1])
-        ways = []
+        drives = []
         for side_rad in (-math.pi / 2, math.pi / 2):
             turn_rad = math.remainder(side_rad - heading_rad, 2 * math.pi)
             turn = spin(self.robot, fit.spec, gap_mm, turn_rad / (2 * math.pi))
             heading_rad += turn.turned_pulses() * body.pulse_mm / body.wheel_base_mm
-            ways.append(turn.then(drive(self.robot, fit.spec, gap_mm, ALONG_MM)))
+            drives.append(turn.then(drive(self.robot, fit.spec, gap_mm, ALONG_MM)))
             drive(self.robot, fit.spec, gap_mm, -ALONG_MM)
-        return [*runs[:-1], runs[-1].then(ways[0]), replace(ways[1], is_marked=False)]
+        return [*runs[:-1], runs[-1].then(drives[0]), replace(drives[1], is_marked=False)]
 
     def _measure_run_up(self, gap_mm: float) -> tuple[Run, str]:
         touching = facing_counts(self.spec, [TOUCHING_MM])[0, FRONT].min()
@@ -322,18 +324,18 @@ class _Session:
                 f"sensors read {front}. Put the robot at the mark, facing the wall squarely."
             )
         finding = f"The wall was near after {sum(run.end_pulses) / 2:.0f} pulses."
-        # A few degrees askew shorten the way like a longer pulse: a spin tells how it stood.
+        # A heading that is a few degrees off shortens the path as a longer pulse does: a spin gives the heading.
         return run.then(spin(self.robot, self.spec, gap_mm, SPIN_TURNS)), finding
 
     def _noise_factor(self, spec: RobotSpec) -> float:
-        """Return by how much the relative noise of this robot is larger than that of its kind, at rest by the wall."""
+        """Return the ratio of this robot's relative noise to that of its kind, at rest near the wall."""
         proximity = spec.proximity
         shares = []
         for at_rest in self.rests:
             mean = at_rest.counts.mean(axis=0)
-            usual = proximity.noise_small - (proximity.noise_small - proximity.noise_large) * mean / 1000
-            usual_counts = mean * usual / (proximity.noise_exponent + 1)
-            # Far above the jitter, and where no noise is cut off by the converter's limit.
+            usual_share = proximity.noise_small - (proximity.noise_small - proximity.noise_large) * mean / 1000
+            usual_counts = mean * usual_share / (proximity.noise_exponent + 1)
+            # Only readings far above the jitter, and below the limit of the converter, which cuts off noise.
             clear = (mean > 100 + 10 * proximity.jitter_counts[-1]) & (
                 at_rest.counts.max(axis=0) < proximity.maximum_counts
             )
@@ -348,14 +350,14 @@ _NOISE = ("noise_small", "noise_large")
 
 
 def _check_fit(fit: Fit, runs: Sequence[Run]) -> None:
-    """Raise if measurements contradict each other."""
+    """Raise a CalibrationError if measurements contradict each other."""
     worst = int(np.abs(fit.gap_errors_mm).argmax())
     error_mm, marked_mm = float(fit.gap_errors_mm[worst]), runs[worst].gap_mm
     if abs(error_mm) > GAP_ERROR_MAX_MM:
         raise CalibrationError(
             f"the measurements must agree with each other, but those at the {marked_mm:g} mm mark look like "
-            f"{marked_mm + error_mm:.1f} mm beside the others. Check the marks, measured from the wall to the robot's "
-            "nearest rim, and that the wall is white all over; then start again."
+            f"{marked_mm + error_mm:.1f} mm compared with the others. Check the marks, measured from the wall to the "
+            "robot's nearest rim, and that the wall is white all over; then start again."
         )
     if fit.misfit > MISFIT_MAX:
         raise CalibrationError(
@@ -365,7 +367,7 @@ def _check_fit(fit: Fit, runs: Sequence[Run]) -> None:
 
 
 def _rounded(spec: RobotSpec) -> RobotSpec:
-    """Return the robot with its measured numbers rounded to what a file should show."""
+    """Return the robot with its measured numbers rounded for a file."""
     proximity, body = spec.proximity, spec.body
     digits = {"direction_deg": 2, "gain": 4, "baseline_counts": 1}
     changes: dict[str, Any] = {

@@ -1,7 +1,7 @@
-"""Measuring: what a robot does and notes down while it is calibrated.
+"""Measurements of a robot during its calibration.
 
-A run is a movement at constant wheel speeds in front of a straight wall, with the counters and the readings taken in
-turn all the way. Whether the robot spins, drives along the wall or comes towards it makes no difference to the fit.
+A run is a movement at constant wheel speeds in front of a straight wall, during which counters and sensors are read in
+turn. The fit treats all runs alike, whether the robot spins, drives along the wall or drives towards it.
 """
 
 from __future__ import annotations
@@ -21,39 +21,39 @@ from kiks.units import character_ns, s_from_ns
 Array = NDArray[np.float64]
 
 SPIN_TURNS = 2.5
-"""Turns of a spin: the wall comes by more than once, so that the wheel base shows, and readings go into a mean."""
+"""Turns of a spin: the robot faces the wall more than once, which shows the wheel base and averages readings."""
 
 SPIN_SPEED_PULSES, DRIVE_SPEED_PULSES = 4, 4
 """Wheel speeds [pulses/10 ms]: slow, as a reading is up to 20 ms old."""
 
 LEAD_S = 0.005
-"""How much older a reading is than counters asked for at the same instant [s]: 10 ms on average against 5
+"""Age of a reading minus age of counters read at the same instant [s]: 10 ms on average against 5
 (khepera-protocol.md 8.1 and 6.1)."""
 
 SETTLE_S = 0.4
-"""How long a robot takes to stand still after a stop [s], generously."""
+"""Time after a stop until the robot certainly stands still [s]."""
 
 JITTER_POINTS = 26
-"""Points that tell the distribution of the jitter: 4 % of the readings between two."""
+"""Number of quantiles that describe the distribution of the jitter: 4 % of the readings lie between two."""
 
 PULSES_PER_S = 100
 """Wheel speed 1 is a pulse every 10 ms."""
 
 
 class CalibrationError(KiksError):
-    """A measurement does not show what it should, or measurements contradict each other."""
+    """A measurement shows something unexpected, or measurements contradict each other."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """What was noted during one movement, or during several without a hand in between.
+    """The record of one movement, or of several without a new placement in between.
 
     Attributes:
         gap_mm: Distance from wall to rim at the start [mm].
         pulses: Counters at the instant of each reading, zero at the start [pulses], shape [sample, 2].
         counts: Proximity readings, shape [sample, 8].
         end_pulses: Counters after the robot had come to rest, left and right.
-        is_marked: True if a mark says what the gap was; else it is about that.
+        is_marked: Whether a mark gives the gap; otherwise it is approximate.
     """
 
     gap_mm: float
@@ -63,11 +63,11 @@ class Run:
     is_marked: bool = True
 
     def turned_pulses(self) -> int:
-        """Return the difference of the wheels over the whole run, positive to the left [pulses]."""
+        """Return the right minus the left counter at the end of the run [pulses]; positive for turns to the left."""
         return self.end_pulses[1] - self.end_pulses[0]
 
     def then(self, after: Run) -> Run:
-        """Return this run and the one that began where it ended as one."""
+        """Return this run and one that began where it ended as one run."""
         left, right = self.end_pulses
         return replace(
             self,
@@ -77,12 +77,12 @@ class Run:
         )
 
     def thinned(self, step: int) -> Run:
-        """Return the run with every `step`-th reading alone."""
+        """Return the run with every `step`-th reading only."""
         return replace(self, pulses=self.pulses[::step], counts=self.counts[::step])
 
 
 def halt(robot: Khepera) -> None:
-    """Stop the robot whatever was under way on the line: what is left of an earlier exchange costs an attempt."""
+    """Stop the robot, even if replies of earlier commands are still on the line: each of them costs an attempt."""
     for attempt in range(4):
         try:
             robot.stop()
@@ -100,18 +100,18 @@ def record(
     limit_pulses: float,
     is_done: Callable[[list[int]], bool] = lambda counts: False,
 ) -> Run:
-    """Let a robot move until a wheel has turned a given way, or until its readings say so.
+    """Let a robot move until a wheel has turned far enough, or a reading ends the run.
 
     Args:
         robot: The robot.
         gap_mm: Distance from wall to rim at the start [mm].
         left: Speed of the left wheel [pulses/10 ms].
         right: Speed of the right wheel [pulses/10 ms].
-        limit_pulses: How far a wheel turns at most [pulses].
-        is_done: Looks at each reading.
+        limit_pulses: Counter of a wheel at which the run ends [pulses].
+        is_done: Called with each reading; returns whether the run ends.
 
     Raises:
-        CalibrationError: If the wheels do not turn as they should.
+        CalibrationError: If the wheels do not turn far enough in time.
         LinkError: If the robot does not answer.
     """
     asked_s: list[float] = []
@@ -145,7 +145,7 @@ def record(
 
 
 def spin(robot: Khepera, spec: RobotSpec, gap_mm: float, turns: float) -> Run:
-    """Turn on the spot: turns to the left positive, their length by the wheel base that `spec` gives.
+    """Turn on the spot; positive turns are to the left. `spec` gives the wheel base.
 
     Raises:
         CalibrationError: If the wheels do not turn.
@@ -160,29 +160,29 @@ def drive(
     robot: Khepera,
     spec: RobotSpec,
     gap_mm: float,
-    way_mm: float,
+    distance_mm: float,
     is_done: Callable[[list[int]], bool] = lambda counts: False,
 ) -> Run:
-    """Drive straight on, backwards if the way is negative [mm], its length by the pulse that `spec` gives.
+    """Drive straight over a distance [mm], backwards if it is negative. `spec` gives the pulse length.
 
     Raises:
         CalibrationError: If the wheels do not turn.
         LinkError: If the robot does not answer.
     """
-    speed = DRIVE_SPEED_PULSES if way_mm > 0 else -DRIVE_SPEED_PULSES
-    return record(robot, gap_mm, speed, speed, abs(way_mm) / spec.body.pulse_mm, is_done)
+    speed = DRIVE_SPEED_PULSES if distance_mm > 0 else -DRIVE_SPEED_PULSES
+    return record(robot, gap_mm, speed, speed, abs(distance_mm) / spec.body.pulse_mm, is_done)
 
 
 @dataclass(frozen=True)
 class Rest:
-    """What a robot that stands still reads, shape [sample, 8]."""
+    """Readings of a robot that stands still [counts], shape [sample, 8]."""
 
     counts: Array
 
     def jitter(self) -> Array:
-        """Return how the readings of all sensors lie around the mean of each, least to largest, evenly [counts]."""
-        strayed = self.counts - self.counts.mean(axis=0)
-        jitter: Array = np.quantile(strayed, np.linspace(0.0, 1.0, JITTER_POINTS))
+        """Return evenly spaced quantiles of all readings minus the mean of their sensor, ascending [counts]."""
+        deviations = self.counts - self.counts.mean(axis=0)
+        jitter: Array = np.quantile(deviations, np.linspace(0.0, 1.0, JITTER_POINTS))
         return jitter
 
     def deviation(self) -> Array:
@@ -206,7 +206,7 @@ def rest(robot: Khepera, sample_count: int) -> Rest:
 
 
 def processing_ms(robot: Khepera, baud: int, exchange_count: int = 40) -> float:
-    """Return how long the robot thinks about a command, by the median of several exchanges [ms].
+    """Return the time that the robot takes to process a command, from the median of several exchanges [ms].
 
     Raises:
         LinkError: If the robot does not answer.

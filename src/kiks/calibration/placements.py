@@ -1,4 +1,4 @@
-"""Placements: a person, or in a simulation the program itself, puts the robot where a measurement needs it."""
+"""Placements: a person, or the program itself in a simulation, puts the robot where a measurement needs it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Instruction:
     """An instruction before a measurement.
 
     Attributes:
-        place: In the open, or before a straight white wall, facing it.
+        place: In the open, or in front of a straight white wall, facing it.
         text: The same in words, for a person.
         gap_mm: Marked distance from the wall to the robot's rim [mm]; 0 in the open.
     """
@@ -37,19 +37,19 @@ class Placements(Protocol):
     """Carries out instructions."""
 
     def place(self, instruction: Instruction) -> float:
-        """Put the robot there and return its real gap [mm]."""
+        """Put the robot there; return its real gap [mm]."""
 
     def wants_repeat(self, finding: str, *, is_good: bool) -> bool:
         """Show a result; return True to repeat the placement and its measurement."""
 
 
 class SimPlacements:
-    """Places a simulated robot before the upper wall of its arena, or in the middle.
+    """Places a simulated robot in front of the upper wall of its arena, or in the middle.
 
     Args:
         sim: The simulation.
         robot: Number of the robot, from 1.
-        skew_rad: How far from square it puts the robot down [rad], as a hand would.
+        skew_rad: Error of the heading at the wall [rad], as by a hand.
     """
 
     def __init__(self, sim: Simulation, robot: int = 1, *, skew_rad: float = 0.0) -> None:
@@ -61,7 +61,7 @@ class SimPlacements:
         """Put the robot there.
 
         Raises:
-            ParameterError: If the arena has no room for that.
+            ParameterError: If the arena has no room there.
         """
         arena, radius_mm = self.sim.arena, self.sim.spec.body.radius_mm
         x_mm, y_mm = arena.width_mm / 2, arena.height_mm / 2
@@ -76,7 +76,7 @@ class SimPlacements:
         return instruction.gap_mm
 
     def wants_repeat(self, finding: str, *, is_good: bool) -> bool:
-        """Return False: a repetition would give the same."""
+        """Return False: a repetition would give the same result."""
         return False
 
     def _touching_mm(self, x_mm: float, free_mm: float) -> float:

@@ -160,7 +160,7 @@ def run(
     labels = Labels(names) if len(names) > 1 else None
     host = partial(
         Programs,
-        told=mapping,
+        robots_by_name=mapping,
         thinking=thinking,
         record=record,
         when_silent=when_silent,

@@ -1,1 +1,1 @@
-"""For programs that drive a robot, simulated or real alike: they know a port, never the simulation."""
+"""For programs that drive a robot, simulated or real: they know its port, never the simulation."""

@@ -1,4 +1,4 @@
-"""A controller at the wheel of robots on ports, simulated or real: the loop that a batch does ten thousand times."""
+"""A controller drives robots on ports, simulated or real, in the same loop as a batch of worlds."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from kiks.model.robot import SENSOR_COUNT
 from kiks.units import ns_from_s, s_from_ns
 
 COMMANDS = {"proximity": b"N\n", "ambient": b"O\n"}
-"""What is sent for each sense of `kiks.control.controller.SENSES`."""
+"""Command for each sense of `kiks.control.controller.SENSES`."""
 
 
 def drive(
@@ -28,26 +28,26 @@ def drive(
     period_s: float = 0.1,
     baud: int = 9600,
 ) -> int:
-    """Let a controller drive: ask for what it senses, let it decide, send the speeds, wait; again and again.
+    """Let a controller drive: each loop reads the sensors, lets it decide, sends the speeds and waits.
 
-    In a batch of the same timing (`kiks.Timing`) the same controller drives a robot of the same seed the same way, to
-    the bit. The robots are stopped at the end, also after an error.
+    A batch with the same timing (`kiks.Timing`), controller and seed gives the same run, to the bit. The robots stop at
+    the end, also after an error.
 
     Args:
-        port: What `kiks.Khepera` takes: a simulation's port, a port's name, or an open port. Several of them are
-            driven by one program, each robot with its own memory.
+        port: As for `kiks.Khepera`: a simulation's port, a port's name, or an open port. One program drives several
+            ports; each robot has a memory of its own.
         controller: The controller.
         parameters: Its parameters, float64 [parameter], or [robot, parameter].
-        seconds: No loop begins later than this [s].
-        period_s: Time from the beginning of one loop to that of the next [s]; at once if a loop takes longer.
+        seconds: Time after which no loop begins [s].
+        period_s: Time from the beginning of one loop to that of the next [s]; a loop that takes longer delays the next.
         baud: Speed of ports that are opened by name [bit/s].
 
     Returns:
-        How many loops there were.
+        Number of loops.
 
     Raises:
         ParameterError: If a number is out of range.
-        LinkError: If a port cannot be opened, or a robot does not answer as it should.
+        LinkError: If a port cannot be opened, or a robot does not send the expected reply.
 
     Example:
         >>> import kiks
@@ -70,11 +70,11 @@ def drive(
 
 
 class Driver:
-    """A controller at the wheel, loop by loop; arguments as for `drive`.
+    """A controller that drives robots loop by loop; arguments as for `drive`.
 
     Attributes:
-        begin_ns: When the next loop begins, in the robots' time [ns].
-        loop_count: How many loops there were.
+        begin_ns: Time at which the next loop begins, by the robots' clock [ns].
+        loop_count: Number of loops so far.
 
     Raises:
         ParameterError: If a number is out of range.
@@ -105,7 +105,8 @@ class Driver:
         self._sensors = np.zeros((len(ports), controller.sensor_count))
         self._memory = np.zeros((len(ports), controller.memory_count))
         self._wheels = np.zeros((len(ports), 2))
-        for k in range(len(ports)):  # a controller that cannot be compiled is refused before a robot stirs
+        # Compiles the controller, so that a faulty one raises before a robot moves.
+        for k in range(len(ports)):
             controller(self._sensors[k], self._memory[k].copy(), self._given[k], self._wheels[k])
         self._wheels[:] = 0.0
         self._robots = [Khepera(each, baud=baud) for each in ports]
@@ -113,10 +114,10 @@ class Driver:
         self.loop_count = 0
 
     def step(self) -> None:
-        """Do a loop, and wait until it is over.
+        """Run one loop, and wait until its period is over.
 
         Raises:
-            LinkError: If a robot does not answer as it should.
+            LinkError: If a robot does not send the expected reply.
         """
         robots, sensors, wheels = self._robots, self._sensors, self._wheels
         for number, sense in enumerate(self._controller.senses):
@@ -124,13 +125,13 @@ class Driver:
             for robot in robots:
                 robot.port.write(COMMANDS[sense])
             for k, robot in enumerate(robots):
-                sensors[k, first : first + SENSOR_COUNT] = robot.hear_numbers(COMMANDS[sense], SENSOR_COUNT)
+                sensors[k, first : first + SENSOR_COUNT] = robot.read_numbers(COMMANDS[sense], SENSOR_COUNT)
         for k, robot in enumerate(robots):
             self._controller(sensors[k], self._memory[k], self._given[k], wheels[k])
             wheels[k] = whole_speeds(wheels[k])
             robot.port.write(b"D,%d,%d\n" % tuple(wheels[k]))
         for robot in robots:
-            robot.hear_done(b"D\n")
+            robot.read_confirmation(b"D\n")
         self.loop_count += 1
         now_ns = ns_from_s(robots[0].time_s)
         if self.begin_ns + self._period_ns > now_ns:

@@ -1,4 +1,4 @@
-"""A Khepera as an object: one method a command, the same for a simulated and a real robot."""
+"""A Khepera as an object: one method per command, the same for simulated and real robots."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from kiks.model.checks import SECONDS_MAX, check_count, check_kind, check_number
 from kiks.sim.port import VirtualPort
 
 ARRIVAL_MAX_S = 600.0
-"""Longest time that wheels are waited for [s]: at the usual speed a robot drives a hundred metres in it."""
+"""Longest wait for the wheels to arrive [s]: at the usual speed a robot drives a hundred metres in that time."""
 
 
 class Status(NamedTuple):
-    """What command K reports of one motor.
+    """Report of one motor (K).
 
     Attributes:
         on_target: True once a position move has ended.
@@ -35,12 +35,12 @@ class Khepera:
 
     Args:
         port: A port of a simulation (`sim.port(1)`), a name ('kiks://1', '/dev/ttyUSB0', 'socket://127.0.0.1:10020'),
-            or an open pyserial port with a time-out.
+            or an open pyserial port with a timeout.
         baud: Speed of a port that is opened by name [bit/s].
 
     Raises:
-        LinkError: If the port cannot be opened, or (every method) if the robot does not answer as it should.
-        ParameterError: If it is no port, or (every method) if a number is none that fits into a command.
+        LinkError: If the port cannot be opened; from every method, if the robot does not send the expected reply.
+        ParameterError: If `port` is not a port; from every method, if a number does not fit into a command.
 
     Example:
         >>> import kiks
@@ -81,11 +81,11 @@ class Khepera:
 
     @property
     def time_s(self) -> float:
-        """Time of the robot's world [s]: simulated, or the computer's own for a real robot."""
+        """Time of the robot's world [s]: simulated time, or the computer's clock for a real robot."""
         return self.port.time_s if isinstance(self.port, VirtualPort) else time.monotonic()
 
     def pause(self, seconds: float) -> None:
-        """Let time pass [s]: at no cost on a simulated robot, by waiting on a real one."""
+        """Let time pass [s]: simulated time for a simulated robot, real time for a real one."""
         if isinstance(self.port, VirtualPort):
             self.port.sleep(seconds)
         else:
@@ -94,31 +94,31 @@ class Khepera:
     # ---- motion ----
 
     def set_speed(self, left: float, right: float) -> None:
-        """Turn the wheels (D). Speeds [pulses/10 ms] are rounded; 1 is 8 mm/s, 127 the most."""
+        """Set the wheel speeds (D) [pulses/10 ms]. They are rounded; 1 is 8 mm/s, 127 is the largest."""
         speeds: tuple[float, float]
         try:
             speeds = round(left), round(right)
         except (TypeError, ValueError, OverflowError):
-            speeds = left, right  # What is no number is refused with the command.
-        self._order(request_of(b"D,%d,%d\n", *speeds))
+            speeds = left, right  # `_format_command` raises the error
+        self._command(_format_command(b"D,%d,%d\n", *speeds))
 
     def stop(self) -> None:
         """Set both speeds to 0."""
-        self._order(b"D,0,0\n")
+        self._command(b"D,0,0\n")
 
     def speed(self) -> tuple[int, int]:
         """Return the measured speeds, left and right [pulses/10 ms] (E)."""
-        left, right = self._ask(b"E\n", 2)
+        left, right = self._query(b"E\n", 2)
         return left, right
 
     def encoders(self) -> tuple[int, int]:
         """Return the position counters, left and right [pulses] (H). A pulse is 0.08 mm."""
-        left, right = self._ask(b"H\n", 2)
+        left, right = self._query(b"H\n", 2)
         return left, right
 
     def set_encoders(self, left: int = 0, right: int = 0) -> None:
         """Set the position counters [pulses] (G)."""
-        self._order(request_of(b"G,%d,%d\n", left, right))
+        self._command(_format_command(b"G,%d,%d\n", left, right))
 
     def move_to(self, left: int, right: int, *, wait: bool = False, poll_s: float = 0.02) -> None:
         """Move the wheels to counter readings [pulses] along a trapezoid of speed (C).
@@ -127,15 +127,15 @@ class Khepera:
             left: Target of the left wheel.
             right: Target of the right wheel.
             wait: True to return when both wheels report their arrival.
-            poll_s: Pause between two questions while waiting [s].
+            poll_s: Pause between two polls [s].
 
         Raises:
-            ParameterError: If an argument is no number, or out of range.
-            LinkError: If another reply comes, or the wheels do not arrive within `ARRIVAL_MAX_S`.
+            ParameterError: If an argument is not a number, or is out of range.
+            LinkError: If the reply is unexpected, or the wheels do not arrive within `ARRIVAL_MAX_S`.
         """
         if not isinstance(wait, int):
             raise ParameterError(f"wait must be True or False, but it was {shown(wait)}.")
-        self._order(request_of(b"C,%d,%d\n", left, right))
+        self._command(_format_command(b"C,%d,%d\n", left, right))
         end_s = self.time_s + ARRIVAL_MAX_S
         while wait and not all(motor.on_target for motor in self.status()):
             if self.time_s > end_s:
@@ -146,44 +146,44 @@ class Khepera:
 
     def set_profile(self, speed: int = 20, acceleration: int = 64) -> None:
         """Set the trapezoid of both wheels (J): speed [pulses/10 ms], acceleration [pulses/256 per (10 ms)^2]."""
-        self._order(request_of(b"J,%d,%d,%d,%d\n", speed, acceleration, speed, acceleration))
+        self._command(_format_command(b"J,%d,%d,%d,%d\n", speed, acceleration, speed, acceleration))
 
     def set_pwm(self, left: int, right: int) -> None:
-        """Feed the motors without control, -255 to 255 (P)."""
-        self._order(request_of(b"P,%d,%d\n", left, right))
+        """Set the PWM of the motors, -255 to 255, without a controller (P)."""
+        self._command(_format_command(b"P,%d,%d\n", left, right))
 
     def set_speed_gains(self, kp: int = 3800, ki: int = 800, kd: int = 100) -> None:
         """Set the gains of the speed controllers (A)."""
-        self._order(request_of(b"A,%d,%d,%d\n", kp, ki, kd))
+        self._command(_format_command(b"A,%d,%d,%d\n", kp, ki, kd))
 
     def set_position_gains(self, kp: int = 3000, ki: int = 20, kd: int = 4000) -> None:
         """Set the gains of the position controllers (F)."""
-        self._order(request_of(b"F,%d,%d,%d\n", kp, ki, kd))
+        self._command(_format_command(b"F,%d,%d,%d\n", kp, ki, kd))
 
     def status(self) -> tuple[Status, Status]:
-        """Return what the two controllers report, left and right (K)."""
-        t1, m1, e1, t2, m2, e2 = self._ask(b"K\n", 6)
+        """Return the reports of the two controllers, left and right (K)."""
+        t1, m1, e1, t2, m2, e2 = self._query(b"K\n", 6)
         return Status(bool(t1), m1, e1), Status(bool(t2), m2, e2)
 
     # ---- senses ----
 
     def proximity(self) -> list[int]:
         """Return the eight proximity readings, clockwise from the left; 1023 is near, 0 nothing (N)."""
-        return self._ask(b"N\n", 8)
+        return self._query(b"N\n", 8)
 
     def ambient(self) -> list[int]:
         """Return the eight light readings, clockwise from the left; about 450 is dark, 50 bright (O)."""
-        return self._ask(b"O\n", 8)
+        return self._query(b"O\n", 8)
 
     def analog(self, channel: int) -> int:
         """Return an analogue input [4 mV], channel 0 to 6 (I)."""
-        return self._ask(request_of(b"I,%d\n", channel), 1)[0]
+        return self._query(_format_command(b"I,%d\n", channel), 1)[0]
 
-    # ---- the rest ----
+    # ---- other commands ----
 
     def led(self, led: int, action: int) -> None:
         """Switch an LED (L): 0 lateral, 1 frontal; 0 off, 1 on, 2 toggle."""
-        self._order(request_of(b"L,%d,%d\n", led, action))
+        self._command(_format_command(b"L,%d,%d\n", led, action))
 
     def version(self) -> tuple[str, str]:
         """Return the versions of BIOS and protocol (B)."""
@@ -194,14 +194,14 @@ class Khepera:
 
     def read_bus(self, address: int) -> int:
         """Return a byte of the extension bus (R)."""
-        return self._ask(request_of(b"R,%d\n", address), 1)[0]
+        return self._query(_format_command(b"R,%d\n", address), 1)[0]
 
     def write_bus(self, data: int, address: int) -> None:
         """Write a byte to the extension bus (W)."""
-        self._order(request_of(b"W,%d,%d\n", data, address))
+        self._command(_format_command(b"W,%d,%d\n", data, address))
 
     def turret(self, number: int, order: str) -> list[int]:
-        """Pass an order such as 'N' or 'D,1' to a turret (T) and return the values of its answer."""
+        """Pass an order such as 'N' or 'D,1' to a turret (T); return the values of its reply."""
         if not isinstance(order, str):
             raise ParameterError(f"order must be a text such as 'N' or 'D,1', but it was {shown(order)}.")
         request = f"T,{check_count('number', number, 0, 99)},{order}"
@@ -228,7 +228,7 @@ class Khepera:
         return pixels
 
     def send(self, text: str) -> str:
-        """Send any line and return the first line of the reply, both without their ends."""
+        """Send any line and return the first line of the reply, both without line ends."""
         if not isinstance(text, str) or "\n" in text or "\r" in text or not text.isascii():
             raise ParameterError(
                 f"text must be one line of ASCII, but it was {shown(text)}. The line end is added here."
@@ -236,30 +236,30 @@ class Khepera:
         self.port.write(text.encode() + b"\n")
         reply = self.port.read_until(b"\n")
         if reply[-1:] != b"\n":
-            raise self._silence(text.encode(), reply)
+            raise self._timed_out(text.encode(), reply)
         return reply.rstrip(b"\r\n").decode("ascii", errors="replace")
 
-    # ---- replies, for who has sent a command to several robots before reading the first reply ----
+    # ---- replies, for a program that sends a command to several robots before it reads the first reply ----
 
-    def hear_done(self, request: bytes) -> None:
-        """Read the reply to a command whose reply is its bare letter.
+    def read_confirmation(self, request: bytes) -> None:
+        """Read the reply to a command that the robot confirms with its letter alone.
 
         Raises:
             ParameterError: If the request is not bytes.
-            LinkError: If another reply comes, or none.
+            LinkError: If the reply is unexpected, or does not come.
         """
         if request.__class__ is not bytes:
             check_kind("request", request, bytes)
         reply = self.port.read_until(b"\n")
         if reply != request[:1].lower() + b"\r\n":
-            raise self._surprise(request, reply)
+            raise self._unexpected(request, reply)
 
-    def hear_numbers(self, request: bytes, count: int) -> list[int]:
-        """Read the reply to a command whose reply is whole numbers, so many.
+    def read_numbers(self, request: bytes, count: int) -> list[int]:
+        """Read a reply of `count` whole numbers.
 
         Raises:
-            ParameterError: If the request is not bytes, or the count no whole number.
-            LinkError: If another reply comes, or none.
+            ParameterError: If the request is not bytes, or the count is not a whole number.
+            LinkError: If the reply is unexpected, or does not come.
         """
         if request.__class__ is not bytes or count.__class__ is not int:
             check_kind("request", request, bytes)
@@ -271,45 +271,45 @@ class Khepera:
                 return list(map(int, words[1:]))
             except ValueError:
                 pass
-        raise self._surprise(request, reply)
+        raise self._unexpected(request, reply)
 
     # ---- inside ----
 
-    def _order(self, request: bytes) -> None:
-        """Send a command whose reply is its bare letter."""
+    def _command(self, request: bytes) -> None:
+        """Send a command that the robot confirms with its letter alone."""
         self.port.write(request)
-        self.hear_done(request)
+        self.read_confirmation(request)
 
-    def _ask(self, request: bytes, count: int) -> list[int]:
+    def _query(self, request: bytes, count: int) -> list[int]:
         """Send a command whose reply is whole numbers."""
         self.port.write(request)
-        return self.hear_numbers(request, count)
+        return self.read_numbers(request, count)
 
-    def _surprise(self, request: bytes, reply: bytes) -> LinkError:
+    def _unexpected(self, request: bytes, reply: bytes) -> LinkError:
         if reply[-1:] != b"\n":
-            return self._silence(request, reply)
+            return self._timed_out(request, reply)
         return LinkError(
             f"the reply to {shown(request)} must be that of a Khepera, but it was {shown(reply)}. "
-            f"Was an earlier reply left unread, or is another program on the line?"
+            "Was an earlier reply left unread, or is another program on the line?"
         )
 
     @staticmethod
-    def _silence(request: bytes, reply: bytes) -> LinkError:
+    def _timed_out(request: bytes, reply: bytes) -> LinkError:
         return LinkError(
-            f"a reply to {shown(request)} must come before the time-out, but only {shown(reply)} came. "
-            f"Check the cable, the robot's switch and the baud rate."
+            f"a reply to {shown(request)} must come before the timeout, but only {shown(reply)} came. "
+            "Check the cable, the robot's switch and the baud rate."
         )
 
 
-def request_of(form: bytes, *numbers: float) -> bytes:
-    """Return a command with its numbers.
+def _format_command(form: bytes, *numbers: float) -> bytes:
+    """Insert numbers into a command.
 
     Args:
         form: The command, with `%d` for each number.
         *numbers: The numbers.
 
     Raises:
-        ParameterError: If one is no number, or the line would be longer than any that a robot takes.
+        ParameterError: If an argument is not a number, or the line is longer than the robot accepts.
     """
     try:
         request = form % numbers

@@ -1,4 +1,4 @@
-"""The functions of the Matlab days: `kopen`, `ksend`, `kclose`, `ktime` and `pause`.
+"""The functions of the Matlab KiKS: `kopen`, `ksend`, `kclose`, `ktime` and `pause`.
 
 A negative port is a simulated robot (-1 is robot 1, -2 robot 2 of the newest simulation), any other number a real
 serial port (0 is the first one). Source: thesis 3.3 ("The interface") and appendix A, kiks-behaviour.md 1.2.
@@ -12,34 +12,20 @@ from typing import Any
 
 from kiks.client.port import Port, open_port
 from kiks.errors import LinkError, ParameterError, shown
-from kiks.model.checks import SECONDS_MAX, check_kind, check_number, check_numbers
+from kiks.model.array_checks import check_numbers
+from kiks.model.checks import SECONDS_MAX, check_kind, check_number
 from kiks.sim.port import VirtualPort
 
 
 class Reference(tuple[float, ...]):
-    """What `kopen` returns: four numbers, as ever, with the open port behind them."""
+    """Result of `kopen`: four numbers, as in the Matlab KiKS, and the open port."""
 
     port: Port | None
     opened_s: float
 
-    @property
-    def number(self) -> int:
-        """The port's number."""
-        return int(self[0])
 
-
-class Openings:
-    """The references that are open, by port number: `ktime(-1)` names nothing but the number."""
-
-    def __init__(self) -> None:
-        self.by_number: dict[int, Reference] = {}
-
-    def latest(self) -> Reference | None:
-        """Return the reference opened last that is still open."""
-        return next(reversed(self.by_number.values()), None)
-
-
-_OPENINGS = Openings()
+_OPEN: dict[int, Reference] = {}
+"""The open references by port number, oldest first: `ktime(-1)` gives only the number."""
 
 
 def kopen(settings: Sequence[float]) -> Reference:
@@ -47,7 +33,7 @@ def kopen(settings: Sequence[float]) -> Reference:
 
     Args:
         settings: [port, baud, timeout]: port number (negative: simulated), line speed [bit/s] (9600 if left out) and
-            time-out [s] (1 if left out).
+            timeout [s] (1 if left out).
 
     Raises:
         ParameterError: If a number is missing or out of range.
@@ -70,7 +56,7 @@ def kopen(settings: Sequence[float]) -> Reference:
     number = int(values[0])
     baud = int(values[1]) if len(values) > 1 else 9600
     timeout_s = values[2] if len(values) > 2 else 1.0
-    if number in _OPENINGS.by_number:
+    if number in _OPEN:
         raise LinkError(
             f"port {number} must be closed before it is opened, but it is open. Call kclose(ref) or kclose([]) first."
         )
@@ -78,8 +64,8 @@ def kopen(settings: Sequence[float]) -> Reference:
     reference = Reference((float(number),) * 4)
     reference.port = port
     reference.opened_s = _now_s(port)
-    _OPENINGS.by_number[number] = reference
-    # As the old one did: the first exchange shows that somebody answers. A real robot may be switched on later.
+    _OPEN[number] = reference
+    # The Matlab KiKS exchanged a first command, too. A real robot that is off gives an empty reply.
     ksend("B\r", reference)
     return reference
 
@@ -89,18 +75,18 @@ def ksend(text: str, ref: Sequence[float], timeout: float | None = None) -> str:
 
     Args:
         text: The command with its terminator, LF or CR; empty to let time pass only.
-        ref: What `kopen` returned.
+        ref: Result of `kopen`.
         timeout: Longest time to wait for the reply [s], if it is not that of `kopen`.
 
     Returns:
-        The reply; what came of it if the time-out was over first.
+        The reply, or the part of it that arrived before the timeout.
 
     Raises:
-        ParameterError: If the text is none.
+        ParameterError: If `text` is not a string.
         LinkError: If the port is not open.
     """
     check_kind("text", text, str, r'Write ksend("N\n", ref).')
-    port = _opened(ref).port
+    port = _open_reference(ref).port
     assert port is not None
     if not text:
         _now_s(port)
@@ -119,13 +105,13 @@ def ksend(text: str, ref: Sequence[float], timeout: float | None = None) -> str:
 
 
 def kclose(ref: Sequence[float]) -> None:
-    """Close a port; `[]` closes every simulated one. It is no error if it is not open. The robot drives on."""
+    """Close a port; `[]` closes every simulated one. Does nothing if it is not open. The robot drives on."""
     if isinstance(ref, list | tuple) and not ref:
-        numbers = [number for number in _OPENINGS.by_number if number < 0]
+        numbers = [number for number in _OPEN if number < 0]
     else:
         numbers = [_number_of(ref)]
     for number in numbers:
-        reference = _OPENINGS.by_number.pop(number, None)
+        reference = _OPEN.pop(number, None)
         if reference is not None and reference.port is not None:
             reference.port.close()
             reference.port = None
@@ -135,9 +121,9 @@ def ktime(port: int | Sequence[float]) -> float | None:
     """Return the time since a port was opened [s], simulated or real; None if it is not open.
 
     Args:
-        port: The port's number, or what `kopen` returned.
+        port: The port's number, or the result of `kopen`.
     """
-    reference = _OPENINGS.by_number.get(_number_of(port))
+    reference = _OPEN.get(_number_of(port))
     if reference is None or reference.port is None:
         return None
     return _now_s(reference.port) - reference.opened_s
@@ -149,19 +135,19 @@ def pause(seconds: float) -> None:
     Raises:
         ParameterError: If the time is negative or not finite.
     """
-    reference = _OPENINGS.latest()
+    reference = next(reversed(_OPEN.values()), None)
     if reference is not None and isinstance(reference.port, VirtualPort):
         reference.port.sleep(seconds)
     else:
         time.sleep(check_number("seconds", seconds, 0, SECONDS_MAX, "Time never runs backwards."))
 
 
-def _opened(ref: Sequence[float]) -> Reference:
-    reference = _OPENINGS.by_number.get(_number_of(ref)) if isinstance(ref, list | tuple) and len(ref) >= 4 else None
+def _open_reference(ref: Sequence[float]) -> Reference:
+    reference = _OPEN.get(_number_of(ref)) if isinstance(ref, list | tuple) and len(ref) >= 4 else None
     if reference is None or reference.port is None:
         raise LinkError(
             f"ref must be what kopen returned and still be open, but it was {shown(ref)}. "
-            f"Open it with kopen([-1, 9600, 1])."
+            "Open it with kopen([-1, 9600, 1])."
         )
     return reference
 
@@ -170,7 +156,7 @@ def _number_of(ref: Any) -> int:
     """Return the number of the port that a reference, or the number itself, names.
 
     Raises:
-        ParameterError: If it names none.
+        ParameterError: If it holds no number.
     """
     numbers = check_numbers("ref", ref).ravel()
     if not len(numbers):
@@ -179,7 +165,7 @@ def _number_of(ref: Any) -> int:
 
 
 def _device(number: int) -> str:
-    """Return the name of a real serial port: 0 is COM1 or /dev/ttyS0, as it was."""
+    """Return the name of a real serial port: 0 is COM1 or /dev/ttyS0, as in the Matlab KiKS."""
     import os
 
     return f"COM{number + 1}" if os.name == "nt" else f"/dev/ttyS{number}"

@@ -1,4 +1,4 @@
-"""Monitoring: all readings of a robot again and again, and their log."""
+"""Monitoring: samples of all readings of a robot at a steady rate, and their log."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from kiks.model.robot import SENSOR_COUNT
 RATE_MIN_HZ, RATE_MAX_HZ = 0.01, 100.0
 
 RATE_WINDOW = 20
-"""Samples over which the achieved rate is taken."""
+"""Number of samples over which `RateMeter` averages."""
 
 
 class Sample(NamedTuple):
-    """Everything that a robot says of itself at one time.
+    """All readings of a robot at one time.
 
     Attributes:
-        time_s: Time since the start [s], when the first question was asked.
+        time_s: Time since the start at which the first command was sent [s].
         proximity: Reflected light, clockwise from the left [counts]; more is nearer.
         ambient: Ambient light [counts]; less is brighter.
         encoders: Position counters, left and right [pulses].
         speed: Measured speeds, left and right [pulses/10 ms].
-        status: What the two controllers report.
+        status: Reports of the two controllers.
     """
 
     time_s: float
@@ -54,18 +54,18 @@ COLUMNS = (
     "right_speed_pulses",
     *(f"{side}_{what}" for side in ("left", "right") for what in ("on_target", "mode", "error_pulses")),
 )
-"""Columns of the log. Speeds are in pulses/10 ms; so is a controller's error, but for pulses during a position move."""
+"""Columns of the log. Speeds and controllers' errors are in pulses/10 ms; errors of position moves are in pulses."""
 
 
 def samples(robot: Khepera, *, rate_hz: float = 10.0, seconds: float | None = None) -> Iterator[Sample]:
     """Yield samples at a steady rate, or as fast as the line allows if that is slower.
 
-    A round of questions takes 0.15 s at 9600 baud, so no more than 6 or 7 samples a second come through there.
+    The commands of one sample take 0.15 s at 9600 baud, so the rate there is at most 6 or 7 Hz.
 
     Args:
         robot: The robot.
-        rate_hz: Samples a second.
-        seconds: How long [s] of the robot's time; without end if left out.
+        rate_hz: Samples per second [Hz].
+        seconds: Duration by the robot's clock [s]; without end if left out.
 
     Raises:
         ParameterError: If a number is out of range.
@@ -92,12 +92,12 @@ def _samples(robot: Khepera, period_s: float, seconds: float) -> Iterator[Sample
             robot.pause(due_s - now_s)
             now_s = robot.time_s - start_s
         yield Sample(now_s, robot.proximity(), robot.ambient(), robot.encoders(), robot.speed(), robot.status())
-        # Who is late does not catch up: the next sample is due at once.
+        # After a late sample the next one is due at once; missed samples are not made up for.
         due_s = max(due_s + period_s, robot.time_s - start_s)
 
 
 class RateMeter:
-    """How many samples a second there were of late.
+    """Rate of the last samples.
 
     Example:
         >>> meter = RateMeter()
@@ -111,20 +111,20 @@ class RateMeter:
         self._times_s: list[float] = []
 
     def note(self, time_s: float) -> float:
-        """Take the time of a sample [s] and return the rate [Hz], 0 before the second one."""
+        """Note the time of a sample [s]; return the rate [Hz], 0 before the second sample."""
         self._times_s = [*self._times_s[-RATE_WINDOW:], time_s]
         span_s = time_s - self._times_s[0]
         return (len(self._times_s) - 1) / span_s if span_s > 0 else 0.0
 
 
 class CsvLog:
-    """A log file: a header that names columns and units, then a line a sample, each on the disk at once.
+    """A log file: a header with columns and units, then one line per sample, each written at once.
 
     Args:
-        path: A file that is not there yet.
+        path: A file that does not exist yet.
 
     Raises:
-        ParameterError: If it is there or cannot be written.
+        ParameterError: If the file exists, or cannot be written.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -146,7 +146,7 @@ class CsvLog:
 
     def close(self) -> None:
         """Close the file."""
-        # What a full disk did not take is said once, by `add`.
+        # `add` has reported a full disk already.
         with suppress(OSError):
             self._file.close()
 
@@ -162,7 +162,7 @@ class CsvLog:
 
 
 def logged(stream: Iterable[Sample], log: CsvLog | None) -> Iterator[Sample]:
-    """Yield samples, each written to the log, if there is one, before anybody else sees it."""
+    """Yield samples; each is written to the log first, if there is one."""
     for sample in stream:
         if log is not None:
             log.add(sample)

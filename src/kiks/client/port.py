@@ -1,4 +1,4 @@
-"""A port by its name, simulated or real, that reads lines quickly."""
+"""Opens ports by name, simulated or real, and reads lines from them quickly."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from typing import Any, Protocol
 from kiks.errors import LinkError, shown
 
 TIMEOUT_S = 2.0
-"""How long a reply may take [s]: the longest, 264 characters at 9600 baud, takes 0.3 s (khepera-protocol.md 2.2)."""
+"""Default timeout of a reply [s]: the longest, 264 characters at 9600 baud, takes 0.3 s (khepera-protocol.md 2.2)."""
 
-AWAKE_S = 0.0002
-"""How long a program stays awake for a reply [s]: a simulator's is there sooner than a sleeper is woken."""
+SPIN_S = 0.0002
+"""Time for which a read polls before it sleeps [s]: a simulator replies sooner than a sleeping process wakes up."""
 
 SELECT_END = 1024
-"""Descriptors from here on are too large for select(), which is a little quicker at a pseudo-terminal than poll()."""
+"""First descriptor too large for select(), which is a little faster than poll() on a pseudo-terminal."""
 
 
 class Port(Protocol):
-    """What is needed of a port; pyserial's and ours have it."""
+    """The methods of a port that clients use; pyserial's ports and simulated ports have them."""
 
     def write(self, data: bytes, /) -> int | None:
         """Send characters."""
 
     def read_until(self, expected: bytes = b"\n") -> bytes:
-        """Return a line, or less after the time-out."""
+        """Return a line, or the part of it that arrived before the timeout."""
 
     def close(self) -> None:
         """Hang up."""
@@ -39,10 +39,10 @@ def open_port(name: str, baud: int = 9600, timeout_s: float | None = TIMEOUT_S) 
     Args:
         name: 'kiks://1', '/dev/ttyUSB0', 'COM3', 'socket://host:port', 'rfc2217://host:port'.
         baud: Line speed [bit/s].
-        timeout_s: How long a read waits [s], None for ever.
+        timeout_s: Timeout of a read [s]; None for no limit.
 
     Raises:
-        LinkError: If there is no such port or it is busy.
+        LinkError: If the port does not exist, or is busy.
     """
     if name.startswith("kiks:"):
         from kiks.ports.url import find_port
@@ -63,11 +63,11 @@ def open_port(name: str, baud: int = 9600, timeout_s: float | None = TIMEOUT_S) 
         raise LinkError(
             f"port {shown(name)} must be one that can be opened, but: {why}. A simulated robot is 'kiks://1'."
         ) from None
-    # A simulated port, as under `kiks run`, has quick lines of its own.
-    return port if isinstance(port, protocol_kiks.Serial) else QuickLines(port)
+    # A simulated port, as under `kiks run`, reads lines quickly by itself.
+    return port if isinstance(port, protocol_kiks.Serial) else FastPort(port)
 
 
-class QuickLines:
+class FastPort:
     """A pyserial port that reads a line in a few system calls; pyserial's own `read_until` makes two for each byte."""
 
     def __init__(self, port: Any) -> None:
@@ -84,14 +84,14 @@ class QuickLines:
         return count
 
     def read_until(self, expected: bytes = b"\n") -> bytes:
-        """Return a line, or as much of it as came before the timeout.
+        """Return a line, or the part of it that arrived before the timeout.
 
         Raises:
-            LinkError: If the port is gone.
+            LinkError: If the port has been closed or removed.
         """
         data = self._read_ahead
         while (end := data.find(expected)) < 0:
-            more = self._some()
+            more = self._receive()
             if not more:
                 self._read_ahead = b""
                 return data
@@ -100,27 +100,27 @@ class QuickLines:
         self._read_ahead = data[end:]
         return data[:end]
 
-    def _some(self) -> bytes:
-        """Wait for the first character and return what is there, nothing after the time-out."""
+    def _receive(self) -> bytes:
+        """Wait for a character; return all that have arrived, none after the timeout."""
         try:
             if self._descriptor is None:
                 return bytes(self.port.read(max(1, self.port.in_waiting)))
             if not self._wait(self._descriptor):
                 return b""
-            some = os.read(self._descriptor, 4096)
+            received = os.read(self._descriptor, 4096)
         except (OSError, ValueError) as error:
             raise LinkError(
                 f"port {shown(self.port.port)} must stay open while it is used, but it is gone: {error}."
             ) from None
-        if not some:
+        if not received:
             raise LinkError(
                 f"port {shown(self.port.port)} must stay open while it is used, but the other end has closed it."
             )
-        return some
+        return received
 
     def _wait(self, descriptor: int) -> bool:
-        """Wait for a character; return whether one came before the time-out."""
-        until_s = time.perf_counter() + AWAKE_S
+        """Wait for a character; return whether one came before the timeout."""
+        until_s = time.perf_counter() + SPIN_S
         while time.perf_counter() < until_s:
             if _is_readable(descriptor, 0.0):
                 return True
@@ -132,7 +132,7 @@ class QuickLines:
 
 
 def _is_readable(descriptor: int, timeout_s: float | None) -> bool:
-    """Wait until a descriptor can be read; return whether it can before the time-out."""
+    """Wait until a descriptor is readable; return whether it became so before the timeout."""
     if descriptor < SELECT_END:
         return bool(select.select([descriptor], [], [], timeout_s)[0])
     ready = select.poll()

@@ -75,7 +75,7 @@ class Gate:
         self._keepers: list[Callable[[], None]] = []
         self._is_closed = False
         self.pace = Pace(speed, wall_ns=wall_ns)
-        self._settle()
+        self._update_is_up()
 
     # ---- for watchers; at any time, from any thread ----
 
@@ -96,22 +96,22 @@ class Gate:
             ParameterError: If it is out of range.
         """
         self.pace.set_speed(speed, now_ns)
-        self._settle()
+        self._update_is_up()
 
     def pause(self, now_ns: int) -> None:
         """Stop time at a simulated time [ns]."""
         self.pace.hold(now_ns)
-        self._settle()
+        self._update_is_up()
 
     def go_on(self) -> None:
         """Let time pass again."""
         self.pace.go_on()
-        self._settle()
+        self._update_is_up()
 
     def step(self, seconds: float) -> None:
         """Let some time pass [s], then stop again."""
         self.pace.hold(self.pace.now_ns() + round(seconds * NS_PER_S))
-        self._settle()
+        self._update_is_up()
 
     def ask(self, act: Callable[[], Done]) -> Future[Done]:
         """Call a function as soon as possible between two events; return its future result."""
@@ -132,21 +132,21 @@ class Gate:
                 self._changed.release()
 
     def keep(self, keeper: Callable[[], None]) -> None:
-        """Call a function after each slice of time, until `leave`; a drag holds a robot so."""
+        """Call a function after each slice of time, until `leave`; this is how a drag holds a robot."""
         self._keepers.append(keeper)
-        self._settle()
+        self._update_is_up()
 
     def leave(self, keeper: Callable[[], None]) -> None:
-        """Stop calling a function of `keep`."""
+        """Stop calling a function that `keep` has added."""
         if keeper in self._keepers:
             self._keepers.remove(keeper)
-        self._settle()
+        self._update_is_up()
 
     def close(self) -> None:
         """Let time pass freely from now on, and do the requests."""
         self._is_closed = True
         self._keepers.clear()
-        self._settle()
+        self._update_is_up()
         self.serve()
 
     def wall_ns(self) -> int:
@@ -164,7 +164,7 @@ class Gate:
     # ---- for the simulation ----
 
     def admit(self, now_ns: int, until_ns: int) -> int:
-        """Wait until time may pass; return how far it may go: `until_ns`, or less, and then ask again.
+        """Wait until time may pass; return the time up to which it may [ns]: `until_ns`, or less, and then ask again.
 
         The caller holds the lock; waiting releases it.
         """
@@ -192,7 +192,7 @@ class Gate:
 
     # ---- inside ----
 
-    def _settle(self) -> None:
+    def _update_is_up(self) -> None:
         self.is_up = not self._is_closed and bool(
             self._requests or self._keepers or self.pace.is_held or self.pace.speed is not None
         )
@@ -218,4 +218,4 @@ class Gate:
                 future.set_exception(error)
             else:
                 future.set_result(result)
-        self._settle()
+        self._update_is_up()

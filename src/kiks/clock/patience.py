@@ -46,7 +46,7 @@ class Patience:
         self._begin_ns: int | None = None
 
     def left_s(self, *, share: float = 1.0) -> float:
-        """Return the time left of it, or of a share of it [s]; the first call starts it."""
+        """Return the remaining time of it, or of a share of it [s]; the first call starts it."""
         now_ns = self._wall_ns()
         if self._begin_ns is None:
             self._begin_ns = now_ns

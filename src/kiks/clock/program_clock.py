@@ -15,15 +15,15 @@ FREE_POLLS = 100
 class PollCost:
     """The cost of consecutive polls (is a byte there? what time is it?).
 
-    Polling takes no time by itself, so a program that polls in a loop would spin while time stands still. So each
-    consecutive poll costs twice the last, from 1 us up to 1 ms. The first is free: a program that reads the clock once
-    per loop is not slowed.
+    Polling takes no simulated time by itself, so a program that polls in a loop would spin while time stands still.
+    Therefore each consecutive poll costs twice the last, from 1 us up to 1 ms. The first one is free, so a program that
+    reads the clock once per loop is not slowed.
 
     Example:
-        >>> waiting = PollCost()
-        >>> [waiting.ask() for _ in range(4)]
+        >>> cost = PollCost()
+        >>> [cost.ask() for _ in range(4)]
         [0, 1000, 2000, 4000]
-        >>> waiting.act(); waiting.ask()
+        >>> cost.act(); cost.ask()
         0
     """
 
@@ -40,7 +40,7 @@ class PollCost:
     def poll(self) -> int:
         """Return the cost of a poll [ns] that other threads answer: is the lock free?
 
-        The first hundred in a row are free: a program may look at some locks without losing time.
+        The first hundred in a row are free, so a program may check some locks without losing time.
         """
         self._poll_count += 1
         return self.ask() if self._poll_count > FREE_POLLS else 0
@@ -59,11 +59,11 @@ class ProgramClock:
     """The clock of one program, with one thinking policy for all its ports and clocks.
 
     Args:
-        thinking: A policy that `parse_thinking` knows.
+        thinking: A policy, as for `parse_thinking`.
 
     Attributes:
         thinks: Whether thinking costs time.
-        measures: Whether thinking costs as long as it really takes.
+        measures: Whether thinking costs the real time that it takes.
         waiting: The cost of polls of the running thread.
         act_count: Number of calls of ports and clocks.
 

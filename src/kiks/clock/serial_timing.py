@@ -46,19 +46,19 @@ class SerialTiming:
         return self.sending_until_ns - BACKLOG_LIMIT * self.character_ns
 
     def send(self, count: int, at_ns: int) -> int:
-        """Send characters to the robot; return when the first one starts [ns]."""
+        """Send characters to the robot; return the start of the first one [ns]."""
         start_ns = max(at_ns, self.sending_until_ns)
         self.sending_until_ns = start_ns + count * self.character_ns
         return start_ns
 
     def carry(self, count: int, at_ns: int) -> int:
-        """Send characters to the host that another object keeps; return when the first one starts [ns]."""
+        """Send characters to the host that another object stores; return the start of the first one [ns]."""
         start_ns = max(at_ns, self._answering_until_ns)
         self._answering_until_ns = start_ns + count * self.character_ns
         return start_ns
 
     def answer(self, data: bytes, at_ns: int) -> int | None:
-        """Send a reply to the host; return when it starts [ns], None if it is empty or lost."""
+        """Send a reply to the host; return its start [ns], None if it is empty or lost."""
         if not data:
             return None
         if len(self.waiting) + len(data) > OUTPUT_LIMIT:
@@ -72,18 +72,18 @@ class SerialTiming:
     def arrived_count(self, now_ns: int) -> int:
         """Return the number of waiting characters that have arrived."""
         count = 0
-        for start_ns, character, length in self._pieces:
-            if start_ns + length * character <= now_ns:
+        for start_ns, step_ns, length in self._pieces:
+            if start_ns + length * step_ns <= now_ns:
                 count += length
                 continue
-            return count + max((now_ns - start_ns) // character, 0)
+            return count + max((now_ns - start_ns) // step_ns, 0)
         return count
 
     def arrival_ns(self, count: int) -> int | None:
-        """Return when the first `count` waiting characters have arrived [ns]; None if there are not as many."""
-        for start_ns, character, length in self._pieces:
+        """Return the arrival time of the waiting character number `count` [ns]; None if fewer wait."""
+        for start_ns, step_ns, length in self._pieces:
             if count <= length:
-                return start_ns + count * character
+                return start_ns + count * step_ns
             count -= length
         return None
 

@@ -14,7 +14,6 @@ from typing import Protocol
 
 from kiks.errors import ParameterError
 from kiks.model.atomic_files import replace_file
-from kiks.model.data_file import read_file
 from kiks.model.thinking_policy import split_thinking
 
 FILE_BYTES_MAX = 64 << 20
@@ -27,10 +26,8 @@ DIGITS_MAX = 13
 class Thinking(Protocol):
     """A policy: `enter` is called when the program calls a port, `leave` when the port returns."""
 
-    is_repeatable: bool
-
     def enter(self, *, is_command: bool) -> int:
-        """Return the time to charge at a call [ns]; `is_command`: the call sends, the first since a reply."""
+        """Return the time to charge at a call [ns]; `is_command`: whether it sends, as the first call since a reply."""
 
     def leave(self) -> None:
         """Note that the program goes on."""
@@ -38,8 +35,6 @@ class Thinking(Protocol):
 
 class ThinkingFixed:
     """The same time before every command; 0 is `none`."""
-
-    is_repeatable = True
 
     def __init__(self, time_ns: int) -> None:
         self.time_ns = time_ns
@@ -54,8 +49,6 @@ class ThinkingFixed:
 
 class ThinkingLive:
     """The measured time times a factor for another computer (2: half as fast as this one)."""
-
-    is_repeatable = False
 
     def __init__(self, factor: float) -> None:
         self.factor = factor
@@ -75,8 +68,6 @@ class ThinkingLive:
 
 class ThinkingReplay:
     """The times of an earlier run, in their order; 0 after the last."""
-
-    is_repeatable = True
 
     def __init__(self, measured_ns: list[int]) -> None:
         self._times = iter(measured_ns)
@@ -119,6 +110,9 @@ def save_thinking(measured_ns: list[int], path: str | Path) -> None:
 
 
 def _read_times(path: Path) -> list[int]:
+    # Imported here, with its parser of data files: the processes of programs read none, and start fast.
+    from kiks.model.data_file import read_file
+
     what = f"replay file {str(path)!r}"
     lines = read_file(path, what, bytes_max=FILE_BYTES_MAX).splitlines()
     for number, line in enumerate(lines, 1):

@@ -17,7 +17,8 @@ from kiks.control.controller_spec import recipe_of
 from kiks.engine.compiling import entry, kernel
 from kiks.engine.physics.motor import SPEED_MAX
 from kiks.errors import ParameterError, nearest, shown
-from kiks.model.checks import check_count, check_numbers
+from kiks.model.array_checks import check_numbers
+from kiks.model.checks import check_count
 from kiks.model.robot import SENSOR_COUNT
 
 SENSES = ("proximity", "ambient")

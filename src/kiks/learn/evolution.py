@@ -22,7 +22,8 @@ from kiks.learn.evaluation import Executor
 from kiks.learn.evolution_log import Folder, Generation, Identity
 from kiks.learn.executors import executor_for
 from kiks.learn.task import Task
-from kiks.model.checks import check_count, check_kind, check_number, check_numbers
+from kiks.model.array_checks import check_numbers
+from kiks.model.checks import check_count, check_kind, check_number
 from kiks.version import __version__
 
 Floats = NDArray[np.float64]

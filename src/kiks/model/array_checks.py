@@ -63,6 +63,41 @@ class Numbers:
         return f"{kind}{span} [{', '.join(map(str, self.axes))}]"
 
 
+def check_numbers(name: str, numbers: Any, shape: tuple[int | None, ...] | None = None) -> npt.NDArray[np.float64]:
+    """Return finite numbers as a float64 array.
+
+    Args:
+        name: What they are called in the message.
+        numbers: An array, or a list of numbers.
+        shape: The shape that it must have, None for any length along an axis; any shape if left out.
+
+    Raises:
+        ParameterError: If one is no finite number, or the shape is another.
+    """
+    values = array_of(numbers)
+    if values is None or not np.isfinite(values).all():
+        raise ParameterError(f"{name} must be finite numbers, but they were {shown(numbers)}.")
+    if shape is not None and not _fits(values.shape, shape):
+        wanted = "[" + ", ".join("any" if length is None else str(length) for length in shape) + "]"
+        raise ParameterError(f"{name} must be numbers of the shape {wanted}, but their shape was {values.shape}.")
+    return values
+
+
+def array_of(numbers: Any) -> npt.NDArray[np.float64] | None:
+    """Return real numbers as a new float64 array, infinite ones and what is no number too; None if they are others."""
+    try:
+        given = np.asarray(numbers)
+        with np.errstate(over="ignore"):
+            return np.array(given, np.float64, order="C") if given.dtype.kind in "iuf" else None
+    except (TypeError, ValueError, OverflowError):
+        return None
+
+
+def _fits(given: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:
+    pairs = zip(given, wanted, strict=False)
+    return len(given) == len(wanted) and all(length in (None, there) for there, length in pairs)
+
+
 def check_array(values: object, rule: Numbers, name: str, counts: dict[str, int] | None = None) -> npt.NDArray[Any]:
     """Return an array after a check against a rule.
 

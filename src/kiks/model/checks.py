@@ -6,10 +6,8 @@ All that enters the engine from Python passes one of these checks, so no kernel 
 from __future__ import annotations
 
 import math
-from typing import Any, TypeVar
-
-import numpy as np
-from numpy.typing import NDArray
+from numbers import Integral, Real
+from typing import TypeVar
 
 from kiks.errors import ParameterError, shown
 
@@ -38,7 +36,7 @@ def check_number(
     Raises:
         ParameterError: If it is no number, not finite, or out of range.
     """
-    if isinstance(number, int | float | np.integer | np.floating) and not isinstance(number, bool):
+    if isinstance(number, int | float | Real) and not isinstance(number, bool):
         try:
             value = float(number)
         except OverflowError:  # a whole number of more than 308 digits
@@ -64,8 +62,8 @@ def check_count(name: str, count: object, least: int = 0, most: int = 1_000_000,
     Raises:
         ParameterError: If it is no whole number or out of range.
     """
-    if isinstance(count, int | np.integer) and not isinstance(count, bool) and least <= count <= most:
-        return int(count)
+    if isinstance(count, int | Integral) and not isinstance(count, bool) and least <= (whole := int(count)) <= most:
+        return whole
     raise ParameterError(
         f"{name} must be a whole number from {least} to {most}, but it was {shown(count)}.{advice and ' ' + advice}"
     )
@@ -112,38 +110,3 @@ def wrapped(heading_rad: float) -> float:
         (7.0, True)
     """
     return heading_rad if abs(heading_rad) <= HEADING_KEPT_RAD else math.remainder(heading_rad, 2 * math.pi)
-
-
-def check_numbers(name: str, numbers: Any, shape: tuple[int | None, ...] | None = None) -> NDArray[np.float64]:
-    """Return finite numbers as a float64 array.
-
-    Args:
-        name: What they are called in the message.
-        numbers: An array, or a list of numbers.
-        shape: The shape that it must have, None for any length along an axis; any shape if left out.
-
-    Raises:
-        ParameterError: If one is no finite number, or the shape is another.
-    """
-    values = array_of(numbers)
-    if values is None or not np.isfinite(values).all():
-        raise ParameterError(f"{name} must be finite numbers, but they were {shown(numbers)}.")
-    if shape is not None and not _fits(values.shape, shape):
-        wanted = "[" + ", ".join("any" if length is None else str(length) for length in shape) + "]"
-        raise ParameterError(f"{name} must be numbers of the shape {wanted}, but their shape was {values.shape}.")
-    return values
-
-
-def array_of(numbers: Any) -> NDArray[np.float64] | None:
-    """Return real numbers as a new float64 array, infinite ones and what is no number too; None if they are others."""
-    try:
-        given = np.asarray(numbers)
-        with np.errstate(over="ignore"):
-            return np.array(given, np.float64, order="C") if given.dtype.kind in "iuf" else None
-    except (TypeError, ValueError, OverflowError):
-        return None
-
-
-def _fits(given: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:
-    pairs = zip(given, wanted, strict=False)
-    return len(given) == len(wanted) and all(length in (None, there) for there, length in pairs)

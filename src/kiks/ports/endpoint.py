@@ -41,7 +41,7 @@ class Channel(ABC):
 
     @abstractmethod
     def _put(self, data: bytes | bytearray) -> int:
-        """Write bytes; return how many the operating system took, all of them if the client has gone."""
+        """Write bytes; return the number that the operating system took, or all if the client has gone."""
 
     @abstractmethod
     def close(self) -> None:
@@ -74,13 +74,13 @@ class Channel(ABC):
             )
 
     def warn(self, text: str) -> None:
-        """Log a mistake of the client: once, because one mistake mostly causes the next."""
+        """Log a mistake of the client, once, because one mistake often causes the next."""
         if not self._has_warned:
             self._has_warned = True
             _log.warning("%s", text)
 
     def flush(self) -> None:
-        """Send waiting bytes, as many as the client takes."""
+        """Send the waiting bytes that the client takes."""
         if self._unsent:
             del self._unsent[: self._put(self._unsent)]
 

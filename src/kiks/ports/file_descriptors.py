@@ -23,13 +23,13 @@ WANTED = 1 << 14
 """Descriptors that a process asks for at its start: enough for a thousand robots with three ports and a client each."""
 
 SHORTAGES = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
-"""Errors that mean that there are none left: of this process, of the computer, no memory for one."""
+"""Errors that mean that this process or the computer has none left, or no memory for one."""
 
 _log = logging.getLogger("kiks.ports")
 
 
 def raise_limit() -> None:
-    """Raise the limit of this process to as many descriptors as it may have, up to `WANTED`."""
+    """Raise the limit of descriptors of this process to the largest allowed one, up to `WANTED`."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = WANTED if hard == resource.RLIM_INFINITY else min(WANTED, hard)
     if soft != resource.RLIM_INFINITY and soft < wanted:
@@ -45,7 +45,7 @@ def shortage() -> str:
 
 @contextlib.contextmanager
 def opening(what: str) -> Iterator[None]:
-    """Turn an error of the operating system into one clear line.
+    """Turn an error of the operating system into a LinkError of one line.
 
     Args:
         what: The subject of the message.

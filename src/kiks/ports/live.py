@@ -83,8 +83,11 @@ class TimePolicy(Protocol):
     def has_left(self, link: Link) -> bool:
         """Return whether the next client may come."""
 
+    def catch_up(self) -> None:
+        """Let the time that is due pass; the server then reads what the clients have sent."""
+
     def advance(self, links: Iterable[Link]) -> float:
-        """Let due time pass, hand over characters that have arrived, return the time until the next event [s]."""
+        """Hand over the characters that have arrived; return the time until the next event [s of real time]."""
 
     def receive(self, link: Link, data: bytes) -> None:
         """Take characters of a client."""
@@ -101,6 +104,7 @@ class Live:
     def __init__(self, sim: Simulation, pace: Pace) -> None:
         self._sim = sim
         self._pace = pace
+        self._is_behind = False
 
     def start(self) -> None:
         """Bind the present simulated time to the present wall clock."""
@@ -124,19 +128,18 @@ class Live:
         """Return True: the next client's commands follow on the line."""
         return True
 
-    def _catch_up(self) -> bool:
-        """Let time pass up to now, at most one slice; return whether that was all."""
+    def catch_up(self) -> None:
+        """Let time pass up to now, at most one slice."""
         sim, due_ns = self._sim, self._pace.now_ns()
         until_ns = min(due_ns, sim.now_ns + SLICE_NS)
         sim.advance_to(until_ns)
         sim.sync()
-        return until_ns == due_ns
+        self._is_behind = until_ns < due_ns
+        self._pace.report(sim.now_ns)
 
     def advance(self, links: Iterable[Link]) -> float:
-        """Run up to the wall clock and deliver characters that have arrived."""
+        """Hand over the characters that have arrived."""
         sim, pace = self._sim, self._pace
-        has_caught_up = self._catch_up()
-        pace.report(sim.now_ns)
         next_ns = sim.next_event_ns()
         wait_s = IDLE_S if next_ns is None else min(pace.wall_wait_s(next_ns), IDLE_S)
         for link in links:
@@ -150,13 +153,12 @@ class Live:
                     wait_s = min(wait_s, COALESCE_S, pace.wall_wait_s(last_ns))
             if self.is_full(link):
                 wait_s = min(wait_s, pace.wall_wait_s(line.room_ns))
-        return wait_s if has_caught_up else 0.0
+        return 0.0 if self._is_behind else wait_s
 
     def receive(self, link: Link, data: bytes) -> None:
         """Send the characters now."""
-        self._catch_up()
         link.wire.send(data, self._sim.now_ns)
 
     def is_full(self, link: Link) -> bool:
-        """Return whether the line holds as many characters as a serial driver."""
+        """Return whether the line is as full as the buffer of a serial driver."""
         return link.wire.line.room_ns > self._sim.now_ns

@@ -15,7 +15,7 @@ from typing import Protocol, TypeVar, TypeVarTuple
 from kiks.errors import LinkError
 from kiks.ports.messages import Answer, Kind, Request
 from kiks.ports.programs import Programs
-from kiks.ports.remote_link import Connection, FarLine
+from kiks.ports.remote_link import Connection, RemoteLine
 from kiks.sim.local_line import LocalLine
 from kiks.sim.simulation import Simulation
 from kiks.units import NS_PER_S
@@ -35,7 +35,7 @@ class PendingAnswer(Protocol):
 
     Attributes:
         is_cancelled: Whether the program has stopped waiting.
-        is_held: Whether the program has not confirmed that it waits; then its pause must not go on.
+        is_held: Whether the program has yet to confirm that it waits; until then its pause must not go on.
     """
 
     is_cancelled: bool
@@ -72,11 +72,11 @@ class LocalConnection(Connection):
         self._participant = programs.admit(name, rank)
         self._is_resting = False
 
-    def _say(self, request: Request) -> None:
+    def _transmit(self, request: Request) -> None:
         with self._world:
             # The scheduler may have stopped waiting for this program because it was silent.
             self._participant.is_waited_for = not self._is_resting
-            self._participant.hear(request)
+            self._participant.add_request(request)
             # Other programs may wait for this alone.
             if self._programs.is_shared and request.kind is Kind.REACHED:
                 self._programs.move()
@@ -106,7 +106,7 @@ class LocalConnection(Connection):
             self._check_pending()
 
     def cancel(self) -> None:
-        """Make the program's thread check its pending answer at once, even if the world is paused; from any thread."""
+        """Make the program's thread check its pending answer at once, even in a paused world; for any thread."""
         gate = self._programs.sim.gate
         if gate is not None:
             gate.keep(self._check_at_gate)
@@ -140,7 +140,7 @@ class LocalConnection(Connection):
     def set_time(self, time_ns: int) -> None:
         """Set the program's time to that of the world [ns], after the program has moved the world itself."""
         self._now_ns = self._told_ns = self._participant.acts_from_ns = time_ns
-        self._is_to_meet = False
+        self._needs_time = False
 
     def rest(self) -> None:
         """Let the world run without this program until `wake`; earlier requests are still done."""
@@ -149,7 +149,7 @@ class LocalConnection(Connection):
             self._participant.is_waited_for = False
             self._programs.move()
         # Its next request takes the time from the world.
-        self._is_to_meet = True
+        self._needs_time = True
 
     def wake(self) -> None:
         """Make the world wait for this program again."""
@@ -164,8 +164,8 @@ class LocalConnection(Connection):
                 self._programs.move()
 
 
-class SharedLine(FarLine):
-    """A robot's line in a world of this process; see `Line`. It takes the shorter way while the program is alone.
+class SharedLine(RemoteLine):
+    """A robot's line in a world of this process; see `Line`. It is a line in memory while the program is alone.
 
     Args:
         connection: The program's connection to the world.
@@ -173,35 +173,36 @@ class SharedLine(FarLine):
         robot: Number of the robot, from 1.
     """
 
+    _connection: LocalConnection
+
     def __init__(self, connection: LocalConnection, sim: Simulation, robot: int) -> None:
         super().__init__(connection, robot)
         self.lock = sim.lock
         self._sim = sim
-        self._local = connection
-        self._alone = LocalLine(sim.loop, robot)
+        self._local_line = LocalLine(sim.loop, robot)
 
     def think(self, time_ns: int) -> None:
         """Let the thinking time of the program pass [ns]."""
-        if self._local.is_alone:
+        if self._connection.is_alone:
             # `LocalConnection.live` may have let some of it pass already.
-            time_ns = max(time_ns - (self._sim.now_ns - self._local.now_ns), 0)
-        self._act(self._alone.think, super().think, time_ns)
+            time_ns = max(time_ns - (self._sim.now_ns - self._connection.now_ns), 0)
+        self._act(self._local_line.think, super().think, time_ns)
 
     def pass_to(self, time_ns: int) -> None:
         """Let time pass up to a time [ns]."""
         now_ns = self.now_ns
         while now_ns + SLICE_NS < time_ns:
             now_ns += SLICE_NS
-            self._act(self._alone.pass_to, super().pass_to, now_ns)
-            if self._local.is_alone:
+            self._act(self._local_line.pass_to, super().pass_to, now_ns)
+            if self._connection.is_alone:
                 # Simulate each slice here, not all of them when the state is read.
                 self._sim.sync()
-            self._local.yield_world()
-        self._act(self._alone.pass_to, super().pass_to, time_ns)
+            self._connection.yield_world()
+        self._act(self._local_line.pass_to, super().pass_to, time_ns)
 
     def send(self, data: bytes) -> None:
         """Put characters on the line; wait while it is full."""
-        self._act(self._alone.send, super().send, data)
+        self._act(self._local_line.send, super().send, data)
 
     def read(self, size: int | None, terminator: bytes | None, timeout_ns: int | None, poll_ns: int) -> bytes:
         """Wait for `size` characters or a terminator; see `Line.read`.
@@ -209,12 +210,12 @@ class SharedLine(FarLine):
         Raises:
             LinkError: If it could wait for ever.
         """
-        return self._act(self._alone.read, super().read, size, terminator, timeout_ns, poll_ns)
+        return self._act(self._local_line.read, super().read, size, terminator, timeout_ns, poll_ns)
 
     def _act(self, alone: Callable[[*Given], Result], shared: Callable[[*Given], Result], *args: *Given) -> Result:
-        """Call the method of the line that serves this program at present."""
-        if not self._local.is_alone:
+        """Call the method of the line that serves this program now."""
+        if not self._connection.is_alone:
             return shared(*args)
         result = alone(*args)
-        self._local.set_time(self._sim.now_ns)
+        self._connection.set_time(self._sim.now_ns)
         return result

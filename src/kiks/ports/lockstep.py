@@ -1,8 +1,8 @@
-"""Lockstep: real programs on real ports, each of which the world waits for.
+"""Lockstep: the world waits for each of the programs on real ports.
 
 A command acts one thinking time after the previous reply, and the program waits for its own reply. Neither the way in
 which the operating system splits the bytes nor the real time that a program takes has an influence.
-`program_scheduler.py` tells how several programs share the world.
+`program_scheduler.py` describes how several programs share the world.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from collections.abc import Callable, Iterable
 from kiks.clock.patience import Patience
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.ports.live import IDLE_S, Link
-from kiks.ports.program_scheduler import PATIENCE_S, Participant, ProgramScheduler
+from kiks.ports.program_scheduler import Participant, ProgramScheduler
 from kiks.sim.simulation import Simulation
 from kiks.units import NS_PER_S
 
 TERMINATORS = (b"\r", b"\n")
 
 LEFT_BEHIND_COUNT = 50
-"""If a client leaves more commands behind, the next one waits so long that the log says so."""
+"""Number of remaining commands of a client above which the log says how long the next client waits."""
 
 REPLY_LENGTH = 64
 """Longest usual reply [characters]."""
@@ -41,7 +41,7 @@ class Lockstep:
         missing: Returns the names of the missing programs, for the log.
         when_silent: What happens to a program that is silent while others wait: 'wait', 'drop' or 'ignore'.
         patience_s: How long a program may be silent [s of real time].
-        new_patience: For tests: makes patiences with their own wall clock.
+        new_patience: Makes patiences with another wall clock.
 
     Raises:
         ParameterError: If the policy is unknown, or the patience is out of range.
@@ -54,11 +54,11 @@ class Lockstep:
         sim: Simulation,
         thinking_ns: int,
         *,
-        programs: int = 1,
-        missing: Callable[[], str] = lambda: "",
-        when_silent: str = "ignore",
-        patience_s: float = PATIENCE_S,
-        new_patience: Callable[[float], Patience] = Patience,
+        programs: int,
+        missing: Callable[[], str],
+        when_silent: str,
+        patience_s: float,
+        new_patience: Callable[[float], Patience],
     ) -> None:
         self._sim = sim
         self._thinking_ns = thinking_ns
@@ -89,6 +89,9 @@ class Lockstep:
         """Return whether all commands of a client that has gone have acted."""
         return self._clients[link.robot].has_left
 
+    def catch_up(self) -> None:
+        """Do nothing: time does not pass by itself."""
+
     def advance(self, links: Iterable[Link]) -> float:
         """Send the commands that are due, and hand over their replies."""
         wait_s = self._scheduler.advance()
@@ -112,31 +115,31 @@ class Client(Participant):
         self._sim = sim
         self._scheduler = scheduler
         self._thinking_ns = thinking_ns
-        self._kept = bytearray()
+        self._stored = bytearray()
         self._next = b""
-        self._last = b"\n"
+        self._last_end = b"\n"
         self._is_leaving = False
         self._go_on(sim.now_ns)
 
     @property
     def is_full(self) -> bool:
-        """Whether as many characters wait as a line holds."""
-        return len(self._kept) >= BACKLOG_LIMIT
+        """Whether the stored characters would fill a line."""
+        return len(self._stored) >= BACKLOG_LIMIT
 
     def receive(self, data: bytes) -> None:
         """Store characters until their turn."""
-        self._kept += data
+        self._stored += data
         self.patience.renew()
-        self._cut()
+        self._take_command()
 
     def leave(self) -> None:
         """Let complete commands act, and drop the rest."""
         self._is_leaving = True
         self._update_has_left()
-        count = len(_TERMINATOR.findall(self._kept))
+        count = len(_TERMINATOR.findall(self._stored))
         if count > LEFT_BEHIND_COUNT:
             # No command is dropped: which ones had come when the server noticed the end depends on real time.
-            most_ns = (len(self._kept) + count * REPLY_LENGTH) * self._link.wire.line.character_ns
+            most_ns = (len(self._stored) + count * REPLY_LENGTH) * self._link.wire.line.character_ns
             _log.warning(
                 "%s has gone and left %d commands behind, which still act: the next client may come after that, at "
                 "most %.0f s of simulated time from now.",
@@ -153,33 +156,33 @@ class Client(Participant):
     # ---- events ----
 
     def next_ns(self) -> int | None:
-        """Return when the next complete command is sent [ns]; None without one."""
+        """Return the time at which the next complete command is sent [ns]; None without one."""
         return max(self.acts_from_ns, self._sim.now_ns) if self._next else None
 
     def act(self) -> None:
         """Send a command, and wait until its reply is known."""
         wire, line = self._link.wire, self._link.wire.line
         at_ns = max(self.acts_from_ns, self._sim.now_ns)
-        last, piece = self._last, self._next
-        self._last, self._next = piece[-1:], b""
-        self._cut()
+        last_end, piece = self._last_end, self._next
+        self._last_end, self._next = piece[-1:], b""
+        self._take_command()
         self.acts_from_ns = at_ns
-        if piece in TERMINATORS and last in TERMINATORS and not wire.firmware.spec.quirks.answer_empty_lines:
+        if piece in TERMINATORS and last_end in TERMINATORS and not wire.firmware.spec.quirks.answer_empty_lines:
             # The robot does not answer an empty line, so it costs no thinking time and no wait. The LF of CR LF left
             # right behind the CR.
-            wire.send(piece, line.sending_until_ns if last + piece == b"\r\n" else self._free_ns)
+            wire.send(piece, line.sending_until_ns if last_end + piece == b"\r\n" else self._free_ns)
             self._go_on(self._free_ns)
         else:
             wire.send(piece, at_ns)
             self.waits = True
-            self.look()
+            self.check_wait()
 
-    def look(self) -> None:
+    def check_wait(self) -> None:
         """Hand over the reply and go on, if every command has acted."""
         wire, line = self._link.wire, self._link.wire.line
         if wire.pending:
             return
-        # The world stands at the instant at which the command has acted, or was sent if it was no command.
+        # The world is at the instant at which the command has acted, or was sent if it was no command.
         end_ns = max(self.acts_from_ns, self._sim.now_ns)
         count = len(line.waiting)
         if count:
@@ -188,7 +191,7 @@ class Client(Participant):
             if self._link.channel is not None:
                 self._link.channel.write(reply)
         self.waits = False
-        self._scheduler.see(end_ns)
+        self._scheduler.note_seen(end_ns)
         self._go_on(end_ns)
 
     # ---- inside ----
@@ -203,18 +206,18 @@ class Client(Participant):
     def _update_has_left(self) -> None:
         self.has_left = self._is_leaving and not self._next and not self.waits
 
-    def _cut(self) -> None:
+    def _take_command(self) -> None:
         """Take the next command from the stored characters, if it is complete."""
         if self._next:
             return
-        kept = self._kept
-        match = _TERMINATOR.search(kept, 0, BACKLOG_LIMIT)
+        stored = self._stored
+        match = _TERMINATOR.search(stored, 0, BACKLOG_LIMIT)
         if match is not None:
             end = match.end()
-        elif len(kept) >= BACKLOG_LIMIT:
+        elif len(stored) >= BACKLOG_LIMIT:
             # No command is this long: send it for the robot to drop.
             end = BACKLOG_LIMIT
         else:
             return
-        self._next = bytes(kept[:end])
-        del kept[:end]
+        self._next = bytes(stored[:end])
+        del stored[:end]

@@ -20,6 +20,9 @@ RECEIVE_SIZE = 1 << 16
 WINDOW = 64
 """Requests that a program may send without an answer: it limits how far a program runs ahead of the world."""
 
+LATE, PUNCTUAL = "late", "punctual"
+"""How a program begins: when the world may have begun already, or with it."""
+
 _REQUEST = struct.Struct("<BHqIqqqqI")
 _ANSWER = struct.Struct("<I?qqqI")
 _READ = struct.Struct("<HqB")
@@ -41,14 +44,14 @@ class Kind(IntEnum):
     SEND = 6
     """Sends the characters in `data`."""
     SEND_AND_MEET = 7
-    """The same, and asks for an answer when the line has taken them."""
+    """Sends the characters in `data`, and asks for an answer when the line has taken them."""
     READ = 8
     """Asks for `first` characters (-1: any number) or up to the terminator in `data`; `second`: timeout [ns], -1 for
     none; `third`: cost of a read without result [ns]."""
     COUNT = 9
     """Asks for the number of characters that have arrived."""
     DROP = 10
-    """Drops these."""
+    """Drops the characters that have arrived."""
     SENT = 11
     """Asks when all characters will have been sent [ns]."""
     SET_BAUD = 12
@@ -60,7 +63,7 @@ class Kind(IntEnum):
     WAIT = 15
     """Asks for an answer when one of the reads in `data` is complete, or at `second` [ns]; -1: without a limit."""
     END = 16
-    """Never sent: stands for the end of the connection."""
+    """Represents the end of the connection; never sent."""
 
 
 ASKING = frozenset(Kind) - {Kind.REACHED, Kind.HANG_UP, Kind.SEND, Kind.DROP, Kind.SET_BAUD, Kind.END}

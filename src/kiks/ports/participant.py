@@ -1,4 +1,4 @@
-"""Programs that keep their own time, as the scheduler sees them; `remote_link.py` is the other end of their line."""
+"""Programs that keep their own time, as the scheduler sees them; `remote_link.py` is their end of the connection."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class ProgramParticipant(Participant):
 
     Attributes:
         is_silenced: Whether it was disconnected because it was silent.
-        is_stopped: Whether a person has stopped it: then its robots stop, too, when it has left.
+        is_stopped: Whether a person has stopped it; then its robots stop when it has left.
     """
 
     def __init__(
@@ -47,11 +47,11 @@ class ProgramParticipant(Participant):
         self._scheduler = scheduler
         self._names = names
         self._requests: deque[Request] = deque()
-        self._read: Request | None = None
+        self._pending_read: Request | None = None
         self._robots: set[int] = set()
         self._used: set[int] = set()
         self._ticket = 0
-        self._has_made_room = False
+        self._has_waited_for_room = False
         self._has_been_warned = False
 
     @abstractmethod
@@ -59,26 +59,26 @@ class ProgramParticipant(Participant):
         """Close the connection."""
 
     @abstractmethod
-    def tell(self, answer: Answer) -> None:
+    def reply(self, answer: Answer) -> None:
         """Send an answer to the program."""
 
     # ---- requests ----
 
     def leave(self) -> None:
         """Disconnect the program after its requests are done."""
-        self.hear(Request(Kind.END, 0, self.acts_from_ns))
+        self.add_request(Request(Kind.END, 0, self.acts_from_ns))
 
     def disconnect(self) -> None:
         """Disconnect the program at once, and drop its requests that are not done yet."""
         if self.has_left:
             return
         self._requests.clear()
-        self._read = None
+        self._pending_read = None
         self.waits = False
         self._free_robots()
         self.has_left = True
 
-    def hear(self, request: Request) -> None:
+    def add_request(self, request: Request) -> None:
         """Take a request of the program."""
         if self.has_left:
             return
@@ -101,14 +101,14 @@ class ProgramParticipant(Participant):
     # ---- events ----
 
     def next_ns(self) -> int | None:
-        """Return when its next request is done [ns]."""
+        """Return the time at which its next request is done [ns]."""
         if not self._requests:
             return None
         return max(self._requests[0].at_ns, self.acts_from_ns, self._sim.now_ns)
 
     @property
     def is_held_up(self) -> bool:
-        """Whether it waits for an answer: it does whenever it has asked for one."""
+        """Whether it waits for an answer, which it does after each request that asks for one."""
         return self.waits or bool(self._requests and self._requests[-1].kind in ASKING)
 
     def act(self) -> None:
@@ -116,26 +116,26 @@ class ProgramParticipant(Participant):
         at_ns = self.next_ns()
         assert at_ns is not None
         request = self._requests[0]
-        if not self._has_made_room:
+        if not self._has_waited_for_room:
             self._note_thinking(request)
         self.acts_from_ns = at_ns
         if request.kind in (Kind.SEND, Kind.SEND_AND_MEET) and not self._has_room(request.robot):
             return
         self._requests.popleft()
         self._ticket = request.ticket
-        self._has_made_room = False
+        self._has_waited_for_room = False
         try:
-            self._do(request)
+            self._execute(request)
         except KiksError as error:
             self._answer(at_ns, is_good=False, data=str(error).encode())
 
-    def look(self) -> None:
-        """Answer a read, or a wait for several, if its end is known."""
-        request = self._read
+    def check_wait(self) -> None:
+        """Answer a read, or a wait for several reads, if its end is known."""
+        request = self._pending_read
         if request is None:
             return
         if request.kind is Kind.WAIT:
-            self._look_at_all(request)
+            self._check_wait_for_all(request)
             return
         wire = self._sim.wires[request.robot - 1]
         deadline_ns = NEVER_NS if request.second < 0 else self.acts_from_ns + request.second
@@ -148,7 +148,7 @@ class ProgramParticipant(Participant):
         )
         if end is None:
             return
-        self._read = None
+        self._pending_read = None
         self.waits = False
         end_ns, count = end
         if end_ns == NEVER_NS:
@@ -157,28 +157,28 @@ class ProgramParticipant(Participant):
             end_ns = max(end_ns, self.acts_from_ns)
             self._answer(end_ns, robot=request.robot, data=wire.line.take(count))
 
-    def _look_at_all(self, request: Request) -> None:
+    def _check_wait_for_all(self, request: Request) -> None:
         wires, reads = self._sim.wires, unpack_reads(request.data)
         end_ns, is_known = end_of_wait(wires, reads, NEVER_NS if request.second < 0 else request.second)
         if not is_known:
             return
-        self._read = None
+        self._pending_read = None
         self.waits = False
         now_ns = self.acts_from_ns if end_ns == NEVER_NS else max(end_ns, self.acts_from_ns)
         self._answer(now_ns, data=bytes(is_complete(wires[read.robot - 1], read, now_ns) for read in reads))
 
     def _has_room(self, robot: int) -> bool:
-        """Return whether the line has room; if not, try again when it has."""
+        """Return whether the line has room; if not, the program acts again when it has."""
         room_ns = self._sim.wires[robot - 1].line.room_ns
-        if room_ns <= self.acts_from_ns or self._has_made_room:
+        if room_ns <= self.acts_from_ns or self._has_waited_for_room:
             return True
         self.acts_from_ns = room_ns
-        self._has_made_room = True
-        self._warn_of_flood(robot)
+        self._has_waited_for_room = True
+        self._warn_of_backlog(robot)
         return False
 
-    def _warn_of_flood(self, robot: int) -> None:
-        """Log that the program sends faster than the line carries."""
+    def _warn_of_backlog(self, robot: int) -> None:
+        """Log that the program sends faster than the line carries, once."""
         if not self._has_been_warned:
             self._has_been_warned = True
             _log.warning(
@@ -196,24 +196,24 @@ class ProgramParticipant(Participant):
             for robot in self._robots:
                 self._sim.wires[robot - 1].think(self.acts_from_ns, until_ns)
 
-    def _do(self, request: Request) -> None:
-        """Do a request, at the instant at which the program acts."""
+    def _execute(self, request: Request) -> None:
+        """Execute a request, at the instant at which the program acts."""
         at_ns, kind, robot = self.acts_from_ns, request.kind, request.robot
         if kind is Kind.END:
             self._end()
         elif kind is Kind.MEET:
             self._answer(at_ns)
         elif kind is Kind.WAIT:
-            self._read = request
+            self._pending_read = request
             self.waits = True
-            self.look()
+            self.check_wait()
         elif kind is Kind.FIND:
             self._answer(at_ns, number=self._names.robot(request.data.decode(), self.robot))
         elif kind is not Kind.REACHED:
-            self._use(request, robot, at_ns)
+            self._use_line(request, robot, at_ns)
 
-    def _use(self, request: Request, robot: int, at_ns: int) -> None:
-        """Do a request that concerns a robot's line."""
+    def _use_line(self, request: Request, robot: int, at_ns: int) -> None:
+        """Execute a request that concerns a robot's line."""
         wire, kind = self._sim.wires[robot - 1], request.kind
         line = wire.line
         if kind is Kind.SEND or kind is Kind.SEND_AND_MEET:
@@ -221,9 +221,9 @@ class ProgramParticipant(Participant):
             if kind is Kind.SEND_AND_MEET:
                 self._answer(at_ns, robot=robot)
         elif kind is Kind.READ:
-            self._read = request
+            self._pending_read = request
             self.waits = True
-            self.look()
+            self.check_wait()
         elif kind is Kind.COUNT:
             self._answer(at_ns, robot=robot, number=line.arrived_count(at_ns))
         elif kind is Kind.DROP:
@@ -232,7 +232,7 @@ class ProgramParticipant(Participant):
             self._answer(at_ns, robot=robot, number=max(at_ns, line.sending_until_ns))
         elif kind is Kind.ROOM:
             if line.room_ns > at_ns:
-                self._warn_of_flood(robot)
+                self._warn_of_backlog(robot)
             self._answer(at_ns, robot=robot, number=max(at_ns, line.room_ns))
         elif kind is Kind.SET_BAUD:
             wire.set_baud(request.first)
@@ -250,9 +250,9 @@ class ProgramParticipant(Participant):
             wire.hang_up()
 
     def _end(self) -> None:
-        """Hang up for the program, which has left."""
+        """Release the robots of the program, which has left, and close the connection."""
         self._free_robots()
-        self._scheduler.see(self.acts_from_ns)
+        self._scheduler.note_seen(self.acts_from_ns)
         self.close()
         self.has_left = True
 
@@ -269,20 +269,20 @@ class ProgramParticipant(Participant):
                     wires[robot - 1].halt(self._sim.now_ns)
 
     def _answer(self, now_ns: int, *, robot: int = 0, number: int = 0, is_good: bool = True, data: bytes = b"") -> None:
-        """Answer a request: the program goes on."""
+        """Answer a request, so the program goes on."""
         ahead_count = 0
         if robot:
             line = self._sim.wires[robot - 1].line
             ahead_count = max(-((now_ns - line.sending_until_ns) // line.character_ns), 0)
         self.acts_from_ns = now_ns
-        self.tell(Answer(self._ticket, is_good, now_ns, number, ahead_count, data))
+        self.reply(Answer(self._ticket, is_good, now_ns, number, ahead_count, data))
 
 
 class RemoteParticipant(ProgramParticipant):
     """A program in a process of its own.
 
     Args:
-        here: This end of the socket to it.
+        connection: This end of the socket to it.
         name: Its name in messages.
         rank: Its number, from 1.
         robot: Number of its own robot.
@@ -296,7 +296,7 @@ class RemoteParticipant(ProgramParticipant):
 
     def __init__(
         self,
-        here: socket.socket,
+        connection: socket.socket,
         name: str,
         rank: int,
         robot: int,
@@ -306,23 +306,23 @@ class RemoteParticipant(ProgramParticipant):
     ) -> None:
         super().__init__(name, rank, robot, sim, scheduler, names)
         self.has_hung_up = False
-        self._here = here
-        self._here.setblocking(False)
+        self._socket = connection
+        self._socket.setblocking(False)
         self._received = bytearray()
         self._unsent = bytearray()
 
     def close(self) -> None:
         """Close the connection."""
-        self._here.close()
+        self._socket.close()
 
     def fileno(self) -> int:
         """Return the socket's descriptor."""
-        return self._here.fileno()
+        return self._socket.fileno()
 
     def receive(self) -> bool:
-        """Take requests that have come; return False when the program has hung up."""
+        """Take the requests that have arrived; return False when the program has hung up."""
         try:
-            received = self._here.recv(RECEIVE_SIZE)
+            received = self._socket.recv(RECEIVE_SIZE)
         except BlockingIOError:
             return True
         except OSError:
@@ -332,10 +332,10 @@ class RemoteParticipant(ProgramParticipant):
             return False
         self._received += received
         while (request := take_request(self._received)) is not None:
-            self.hear(request)
+            self.add_request(request)
         return True
 
-    def tell(self, answer: Answer) -> None:
+    def reply(self, answer: Answer) -> None:
         """Send an answer; bytes that the program does not take yet wait."""
         self._unsent += answer.pack()
         self.flush()
@@ -346,9 +346,9 @@ class RemoteParticipant(ProgramParticipant):
         return bool(self._unsent)
 
     def flush(self) -> None:
-        """Send waiting bytes, as many as the program takes."""
+        """Send the waiting bytes that the program takes."""
         try:
-            del self._unsent[: self._here.send(self._unsent)]
+            del self._unsent[: self._socket.send(self._unsent)]
         except BlockingIOError:
             pass
         except OSError:
@@ -363,17 +363,13 @@ class LocalParticipant(ProgramParticipant):
         is_closed: Whether the world has ended.
     """
 
-    def __init__(
-        self, name: str, rank: int, robot: int, sim: Simulation, scheduler: ProgramScheduler, names: PortNames
-    ) -> None:
-        super().__init__(name, rank, robot, sim, scheduler, names)
-        self.answer: Answer | None = None
-        self.is_closed = False
+    answer: Answer | None = None
+    is_closed = False
 
     def close(self) -> None:
         """Mark the connection as closed."""
         self.is_closed = True
 
-    def tell(self, answer: Answer) -> None:
+    def reply(self, answer: Answer) -> None:
         """Store the answer."""
         self.answer = answer

@@ -3,35 +3,36 @@
 from __future__ import annotations
 
 from kiks.errors import LinkError, shown
+from kiks.ports.url import find_port
 from kiks.sim.simulation import Simulation
 
 
 class PortNames:
-    """Robots by port name: as told, and otherwise in the order in which programs open new names.
+    """Robots by port name: as given; other names get robots in the order in which programs open them.
 
     The first new name of a program gets its own robot. Further names get robots that belong to no program.
 
     Args:
         sim: The simulation.
-        told: Robots by port name, for all programs.
+        by_name: Robots by port name, for all programs.
         programs: Number of programs; the first owns robot 1, and so on.
 
     Raises:
-        ParameterError: If `told` names a robot that does not exist.
+        ParameterError: If `by_name` names a robot that does not exist.
     """
 
-    def __init__(self, sim: Simulation, told: dict[str, int], programs: int = 1) -> None:
-        for robot in told.values():
+    def __init__(self, sim: Simulation, by_name: dict[str, int], programs: int = 1) -> None:
+        for robot in by_name.values():
             sim.port(robot)
         self._sim = sim
-        self._told = dict(told)
+        self._by_name = dict(by_name)
         self._own = set(range(1, programs + 1))
         self._found: dict[tuple[int, str], int] = {}
 
     def offered(self) -> list[str]:
         """Return the port names for a program that lists ports: one for its robot, and one for each free robot."""
         count = 1 + sum(robot not in self._own for robot in range(1, self._sim.robot_count + 1))
-        return [*self._told, *(f"/dev/ttyUSB{number}" for number in range(count))][:count]
+        return [*self._by_name, *(f"/dev/ttyUSB{number}" for number in range(count))][:count]
 
     def own(self, robot: int) -> None:
         """Give a robot to a new program as its own, and forget the names of the program that had it."""
@@ -55,14 +56,14 @@ class PortNames:
         """
         if name.startswith("kiks:"):
             return self._of_url(name)
-        if name in self._told:
-            return self._told[name]
+        if name in self._by_name:
+            return self._by_name[name]
         if (program, name) not in self._found:
-            taken = {*self._told.values(), *self._found.values()}
+            taken = {*self._by_name.values(), *self._found.values()}
             others = (robot for robot in range(1, self._sim.robot_count + 1) if robot not in self._own)
             free = [robot for robot in (program, *others) if robot not in taken]
             if not free:
-                known = self._told | {found: robot for (of, found), robot in self._found.items() if of == program}
+                known = self._by_name | {found: robot for (of, found), robot in self._found.items() if of == program}
                 raise LinkError(
                     f"a port must belong to a robot, but {shown(name)} is one more than there are robots: {known}. "
                     f"Run it with --robots {self._sim.robot_count + 1}, or map two names to one robot with --map."
@@ -71,13 +72,10 @@ class PortNames:
         return self._found[program, name]
 
     def _of_url(self, name: str) -> int:
-        from kiks.ports.url import find_port
-
         if "?" in name:
             raise LinkError(
                 f"a port's name must be without options where several programs share a world, but it was "
-                f"{shown(name)}. "
-                f"Give the options to kiks run."
+                f"{shown(name)}. Give the options to kiks run."
             )
         port = find_port(name)
         if port.sim is not self._sim:

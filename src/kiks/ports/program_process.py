@@ -21,8 +21,7 @@ from kiks.model.atomic_files import program_in
 from kiks.model.project import Project
 from kiks.sim.ring_buffer import RingBuffer
 
-LATE, PUNCTUAL = "late", "punctual"
-"""Whether a program was started after the world had begun, or before."""
+"""Argument of a program's process: whether it starts after the world has begun, or before."""
 
 OUTPUT_LIMIT = 1000
 """Number of lines of a program's output that a handle keeps."""
@@ -30,16 +29,16 @@ OUTPUT_LIMIT = 1000
 LINE_LIMIT = 2000
 """Longest line of output [bytes]; a longer one is cut."""
 
-ENDING_S = 10.0
+END_WAIT_S = 10.0
 """Longest wait for the end of a killed process [s of real time]."""
 
-LAST_WORDS_S = 1.0
+OUTPUT_WAIT_S = 1.0
 """Longest wait for the last output of an ended process [s of real time]: other processes may hold its pipes."""
 
-QUESTION_S = 0.2
-"""Pause after which a terminal shows an unfinished line [s of real time]: it may be a question."""
+PROMPT_S = 0.2
+"""Pause after which a terminal shows an unfinished line [s of real time]: it may be a prompt."""
 
-_PIECE = 1 << 16
+_READ_SIZE = 1 << 16
 _STREAMS = {False: 1, True: 2}
 _COLOURS = (36, 33, 35, 32, 34, 31)
 
@@ -89,13 +88,13 @@ class Process:
     (`child_main.py`), so that thread must live as long.
 
     Args:
-        words: Arguments of `kiks.script.child_main` before the program.
+        arguments: Arguments of `kiks.script.child_main` before the program.
         command: The program.
-        there: Its end of the socket.
-        is_heard: Whether to keep its output. Such a program has no keyboard and a process group of its own: processes
-            that it starts end with it. Otherwise it has the terminal.
-        voice: Writes its output on the terminal, if it is not kept; None: the program writes itself.
-        ended: Called by that thread after the end.
+        connection: Its end of the socket.
+        keeps_output: Whether to keep its output. Such a program has no keyboard, and a process group of its own: its
+            child processes end with it. Otherwise it has the terminal.
+        writer: Writes its output to the terminal, if the output is not kept; None: the program writes it itself.
+        on_end: Called by that thread after the end.
 
     Attributes:
         output: Its output; None if it is not kept.
@@ -106,37 +105,37 @@ class Process:
 
     def __init__(
         self,
-        words: Sequence[str],
+        arguments: Sequence[str],
         command: Command,
-        there: socket.socket,
+        connection: socket.socket,
         *,
-        is_heard: bool,
-        voice: Voice | None = None,
-        ended: Callable[[], None],
+        keeps_output: bool,
+        writer: OutputWriter | None = None,
+        on_end: Callable[[], None],
     ) -> None:
-        self.output: RingBuffer[OutputLine] | None = RingBuffer(OUTPUT_LIMIT) if is_heard else None
-        self._voice = _Keeper(self.output) if self.output is not None else voice
-        self._ended = ended
+        self.output: RingBuffer[OutputLine] | None = RingBuffer(OUTPUT_LIMIT) if keeps_output else None
+        self._writer = _OutputKeeper(self.output) if self.output is not None else writer
+        self._on_end = on_end
         self._popen: subprocess.Popen[bytes] | None = None
         self._is_over = threading.Event()
         has_started = threading.Event()
         failures: list[OSError] = []
         # -P: the program must not import from the folder in which KiKS was started.
-        line = [sys.executable, "-P", "-m", "kiks.script.child_main", str(there.fileno()), *words]
+        line = [sys.executable, "-P", "-m", "kiks.script.child_main", str(connection.fileno()), *arguments]
         line += [str(command.program), *command.arguments]
 
-        def attend() -> None:
+        def run() -> None:
             try:
-                self._popen = self._start(line, there)
+                self._popen = self._start(line, connection)
             except OSError as error:
                 failures.append(error)
                 self._is_over.set()
                 return
             finally:
                 has_started.set()
-            self._attend(self._popen)
+            self._wait_for_end(self._popen)
 
-        threading.Thread(target=attend, name=f"kiks: {command.program.name}", daemon=True).start()
+        threading.Thread(target=run, name=f"kiks: {command.program.name}", daemon=True).start()
         has_started.wait()
         if failures:
             raise KiksError(
@@ -157,45 +156,45 @@ class Process:
         self._signal(signal.SIGKILL)
 
     def wait(self) -> None:
-        """Wait until it has ended and its output has been read, at most `ENDING_S`."""
-        self._is_over.wait(ENDING_S)
+        """Wait until it has ended and its output has been read, at most `END_WAIT_S`."""
+        self._is_over.wait(END_WAIT_S)
 
     # ---- inside ----
 
-    def _start(self, line: list[str], there: socket.socket) -> subprocess.Popen[bytes]:
-        if self._voice is None:
-            return subprocess.Popen(line, pass_fds=[there.fileno()])
+    def _start(self, line: list[str], connection: socket.socket) -> subprocess.Popen[bytes]:
+        if self._writer is None:
+            return subprocess.Popen(line, pass_fds=[connection.fileno()])
         # Unbuffered: each line of output comes at once.
         environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
-        is_kept = self.output is not None
-        if is_kept:
+        keeps_output = self.output is not None
+        if keeps_output:
             environment["PYTHONIOENCODING"] = "utf-8:backslashreplace"
         return subprocess.Popen(
             line,
-            pass_fds=[there.fileno()],
-            stdin=subprocess.DEVNULL if is_kept else None,
+            pass_fds=[connection.fileno()],
+            stdin=subprocess.DEVNULL if keeps_output else None,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             env=environment,
-            start_new_session=is_kept,
+            start_new_session=keeps_output,
         )
 
-    def _attend(self, popen: subprocess.Popen[bytes]) -> None:
-        if self._voice is None:
+    def _wait_for_end(self, popen: subprocess.Popen[bytes]) -> None:
+        if self._writer is None:
             popen.wait()
         else:
             assert popen.stdout is not None
             assert popen.stderr is not None
             pipes = {popen.stdout: False, popen.stderr: True}
-            listener = threading.Thread(target=_listen, args=(pipes, self._voice), daemon=True)
-            listener.start()
+            reader = threading.Thread(target=_read_output, args=(pipes, self._writer), daemon=True)
+            reader.start()
             popen.wait()
             if self.output is not None:
                 with contextlib.suppress(ProcessLookupError, PermissionError):
                     os.killpg(popen.pid, signal.SIGKILL)
-            listener.join(LAST_WORDS_S)
+            reader.join(OUTPUT_WAIT_S)
         self._is_over.set()
-        self._ended()
+        self._on_end()
 
     def _signal(self, number: int) -> None:
         popen = self._popen
@@ -208,12 +207,12 @@ class Process:
                 os.killpg(popen.pid, number)
 
 
-class Voice(Protocol):
+class OutputWriter(Protocol):
     """Takes the output of a program, line by line.
 
     Attributes:
         longest: Longest line [bytes]; a longer one is split.
-        pause_s: Pause after which `ask` is called [s of real time]; None for never.
+        pause_s: Pause after which `show_unfinished` is called [s of real time]; None for never.
     """
 
     longest: int
@@ -226,12 +225,12 @@ class Voice(Protocol):
             OSError: If the reader has gone.
         """
 
-    def ask(self, begun: bytes, is_error: bool) -> bool:
-        """Take an unfinished line after a pause, such as a question; return whether it was taken."""
+    def show_unfinished(self, text: bytes, is_error: bool) -> bool:
+        """Take an unfinished line after a pause, such as a prompt; return whether it was taken."""
 
 
-class _Keeper:
-    """Keeps the newest lines, as a `Voice`; it never waits for readers."""
+class _OutputKeeper:
+    """Keeps the newest lines, as an `OutputWriter`; it never waits for readers."""
 
     longest = LINE_LIMIT
     pause_s: float | None = None
@@ -241,46 +240,46 @@ class _Keeper:
 
     def take(self, lines: list[bytes], is_error: bool) -> None:
         skipped = max(len(lines) - OUTPUT_LIMIT, 0)
-        self._output.add([_line(each, is_error) for each in lines[skipped:]], skipped=skipped)
+        self._output.add([_output_line(each, is_error) for each in lines[skipped:]], skipped=skipped)
 
-    def ask(self, begun: bytes, is_error: bool) -> bool:
+    def show_unfinished(self, text: bytes, is_error: bool) -> bool:
         return False
 
 
 class Labels:
-    """Prints the output of several programs, line by line, each line with a label of its program.
+    """Prints the output of several programs, line by line, each line with the label of its program.
 
     Labels are coloured on a terminal, unless NO_COLOR is set. A terminal also shows an unfinished line, such as a
-    question, after a pause; elsewhere only complete lines are printed.
+    prompt, after a pause; elsewhere only complete lines are printed.
 
     Args:
-        names: Names of the programs, the first one first; all labels have one width.
+        names: Names of the programs in their order; all labels have the same width.
     """
 
     def __init__(self, names: Sequence[str]) -> None:
         self._lock = threading.Lock()
-        self._is_begun = False
+        self._has_unfinished = False
         self._width = max(len(_label(number, name)) for number, name in enumerate(names, 1))
         self.are_terminals = {is_error: os.isatty(stream) for is_error, stream in _STREAMS.items()}
 
-    def voice(self, number: int, name: str) -> Voice:
+    def writer(self, number: int, name: str) -> OutputWriter:
         """Return the writer for a program's output."""
-        return _Labelled(self, number, _label(number, name).ljust(self._width))
+        return _LabelledWriter(self, number, _label(number, name).ljust(self._width))
 
     def say(self, text: str) -> None:
-        """Write a line of KiKS between theirs."""
+        """Print a line of KiKS between those of the programs."""
         with contextlib.suppress(OSError):
             self.write(f"kiks: {text}\n".encode(errors="replace"), is_error=True)
 
-    def write(self, data: bytes, *, is_error: bool, is_begun: bool = False) -> None:
+    def write(self, data: bytes, *, is_error: bool, is_unfinished: bool = False) -> None:
         """Write lines, or the beginning of one.
 
         Raises:
             OSError: If the reader has gone.
         """
         with self._lock:
-            data = b"\n" * self._is_begun + data
-            self._is_begun = is_begun
+            data = b"\n" * self._has_unfinished + data
+            self._has_unfinished = is_unfinished
             stream = _STREAMS[is_error]
             while data:
                 try:
@@ -289,14 +288,14 @@ class Labels:
                     select.select([], [stream], [])
 
 
-class _Labelled:
-    """Writes the output of one program, as a `Voice`."""
+class _LabelledWriter:
+    """Writes the output of one program, as an `OutputWriter`."""
 
     longest = 1 << 16
 
     def __init__(self, labels: Labels, number: int, label: str) -> None:
         self._labels = labels
-        self.pause_s = QUESTION_S if any(labels.are_terminals.values()) else None
+        self.pause_s = PROMPT_S if any(labels.are_terminals.values()) else None
         plain, colour = label.encode(errors="replace"), _COLOURS[(number - 1) % len(_COLOURS)]
         has_colours = not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
         self._heads = {
@@ -308,9 +307,9 @@ class _Labelled:
         head = self._heads[is_error]
         self._labels.write(b"".join(head + line + b"\n" for line in lines), is_error=is_error)
 
-    def ask(self, begun: bytes, is_error: bool) -> bool:
+    def show_unfinished(self, text: bytes, is_error: bool) -> bool:
         if self._labels.are_terminals[is_error]:
-            self._labels.write(self._heads[is_error] + begun, is_error=is_error, is_begun=True)
+            self._labels.write(self._heads[is_error] + text, is_error=is_error, is_unfinished=True)
         return self._labels.are_terminals[is_error]
 
 
@@ -318,37 +317,38 @@ def _label(number: int, name: str) -> str:
     return f"{number} {name}"
 
 
-def _listen(pipes: dict[IO[bytes], bool], voice: Voice) -> None:
-    """Read the output of a process up to its end."""
+def _read_output(pipes: dict[IO[bytes], bool], writer: OutputWriter) -> None:
+    """Read the output of a process until its end."""
     with selectors.DefaultSelector() as selector:
-        rests = {}
+        unfinished = {}
         for pipe, is_error in pipes.items():
             selector.register(pipe, selectors.EVENT_READ, is_error)
-            rests[is_error] = b""
+            unfinished[is_error] = b""
         while selector.get_map():
-            ready = selector.select(voice.pause_s if any(rests.values()) else None)
+            ready = selector.select(writer.pause_s if any(unfinished.values()) else None)
             if not ready:
-                taken = [is_error for is_error, rest in rests.items() if rest and voice.ask(rest, is_error)]
-                rests |= dict.fromkeys(taken, b"")
+                for is_error, rest in unfinished.items():
+                    if rest and writer.show_unfinished(rest, is_error):
+                        unfinished[is_error] = b""
             for key, _ in ready:
                 is_error = key.data
-                piece = os.read(key.fd, _PIECE)
-                *lines, rest = (rests[is_error] + piece).split(b"\n")
-                if not piece or len(rest) > voice.longest:
+                piece = os.read(key.fd, _READ_SIZE)
+                *lines, rest = (unfinished[is_error] + piece).split(b"\n")
+                if not piece or len(rest) > writer.longest:
                     lines += [rest] if rest else []
                     rest = b""
-                rests[is_error] = rest
+                unfinished[is_error] = rest
                 try:
-                    voice.take(lines, is_error)
+                    writer.take(lines, is_error)
                 except OSError:
-                    # The reader has gone. Closing the pipe tells the program so.
+                    # The reader has gone. Closing the pipe reports that to the program.
                     piece = b""
                 if not piece:
                     selector.unregister(key.fileobj)
                     key.fileobj.close()  # type: ignore[union-attr]
 
 
-def _line(line: bytes, is_error: bool) -> OutputLine:
+def _output_line(line: bytes, is_error: bool) -> OutputLine:
     return OutputLine(line[:LINE_LIMIT].decode(errors="replace").rstrip("\r"), is_error)
 
 
@@ -393,8 +393,8 @@ class Permission:
         raise ParameterError(f"{name!r} must lie in the desk's folder, but it is elsewhere. Copy it there.")
 
 
-class Anything(Permission):
+class AnyProgram(Permission):
     """The permission of the person at the terminal, and of a program that uses KiKS."""
 
     def check(self, command: Command) -> None:
-        """Let it start."""
+        """Allow it to start."""

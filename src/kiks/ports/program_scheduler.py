@@ -33,7 +33,7 @@ from kiks.errors import ParameterError, nearest, shown
 from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.simulation import Simulation
 
-START_WORD_S = 1.0
+START_WARNING_S = 1.0
 """Wait for the start after which the log names missing programs [s of real time]."""
 
 START_PATIENCE_S = 10.0
@@ -46,8 +46,8 @@ PATIENCE_S = 2.0
 """Default wait for a silent program [s of real time]."""
 
 IMPATIENT_SHARE = 0.1
-"""Share of the patience for a program that holds up one for which the world does not wait. Both may be one program,
-which holds several ports and uses them in turn."""
+"""Share of the patience for a program that delays one for which the world does not wait. Both may be the same program,
+which has several ports open and uses them in turn."""
 
 POLICIES = ("wait", "drop", "ignore")
 """Policies for a program that is silent while others wait."""
@@ -69,8 +69,8 @@ class Participant(ABC):
         is_here: Whether it has joined the run.
         is_waited_for: Whether the world waits for it while it thinks.
         has_left: Whether it has gone and all its requests are done.
-        has_been_named: Whether the log has said that the world waits for it.
-        patience: Measures for how long it holds up others in real time; set by `ProgramScheduler.join`.
+        has_been_reported: Whether the log has said that the world waits for it.
+        patience: Measures the real time for which it delays others; set by `ProgramScheduler.join`.
     """
 
     patience: Patience
@@ -83,7 +83,7 @@ class Participant(ABC):
         self.is_here = True
         self.is_waited_for = True
         self.has_left = False
-        self.has_been_named = False
+        self.has_been_reported = False
 
     @abstractmethod
     def next_ns(self) -> int | None:
@@ -91,7 +91,7 @@ class Participant(ABC):
 
     @property
     def is_held_up(self) -> bool:
-        """Whether it cannot go on in real time until the world does."""
+        """Whether it can go on only when the world does."""
         return self.waits or self.next_ns() is not None
 
     @abstractmethod
@@ -99,7 +99,7 @@ class Participant(ABC):
         """Do its next event; the world has reached its time."""
 
     @abstractmethod
-    def look(self) -> None:
+    def check_wait(self) -> None:
         """Go on if the event that it waits for has happened."""
 
     @abstractmethod
@@ -115,10 +115,10 @@ class ProgramScheduler:
         expected: Number of programs that begin together; 0: the world has begun already.
         missing: Returns the names of the missing programs, for the log.
         log: The log.
-        is_once: Whether later programs act as soon as they come; otherwise as many begin together again.
+        is_once: Whether later programs act as soon as they come; otherwise `expected` programs begin together again.
         when_silent: What happens to a program that is silent while others wait: 'wait', 'drop' or 'ignore'.
         patience_s: How long a program may be silent [s of real time].
-        new_patience: For tests: makes patiences with their own wall clock.
+        new_patience: Makes patiences with another wall clock.
         start_patience_s: How long the world waits for the programs with which it begins [s of real time]; without a
             limit if `when_silent` is 'wait'.
 
@@ -157,8 +157,8 @@ class ProgramScheduler:
         self._new_patience = new_patience
         self._log = log
         self._start_patience_s = start_patience_s
-        self._start = new_patience(start_patience_s)
-        self._has_named_missing = False
+        self._start_timeout = new_patience(start_patience_s)
+        self._has_reported_missing = False
         self._seen_ns = 0
 
     def join(self, participant: Participant) -> None:
@@ -174,7 +174,7 @@ class ProgramScheduler:
             for participant in self.participants
         )
 
-    def see(self, time_ns: int) -> None:
+    def note_seen(self, time_ns: int) -> None:
         """Note that a program has seen an instant [ns]."""
         self._seen_ns = max(self._seen_ns, time_ns)
 
@@ -250,7 +250,7 @@ class ProgramScheduler:
         sim.advance_to(first[0])
         for participant in self.participants:
             if participant.waits:
-                participant.look()
+                participant.check_wait()
         return False, []
 
     def _thinking(self) -> list[Participant]:
@@ -272,27 +272,27 @@ class ProgramScheduler:
             # The next programs begin together, too, unless one alone may begin.
             self.has_begun = self._is_once or self._expected <= 1
 
-    # ---- programs that keep others waiting ----
+    # ---- programs that delay others ----
 
     def _wait_for_all(self) -> float | None:
-        """Begin when all programs are there or the wait is over; return the time in which nothing will happen [s]."""
+        """Begin when all programs are there or the wait is over; return the time until the next check [s]."""
         self.participants = [participant for participant in self.participants if not participant.has_left]
         if not self.participants:
-            self._start.renew()
-            self._has_named_missing = False
+            self._start_timeout.renew()
+            self._has_reported_missing = False
             return None
-        here = sum(participant.is_here for participant in self.participants)
-        if here >= self._expected:
+        present_count = sum(participant.is_here for participant in self.participants)
+        if present_count >= self._expected:
             self.has_begun = True
             return 0.0
-        left_s = self._start.left_s()
-        word_s = left_s - (self._start_patience_s - START_WORD_S)
-        if word_s > 0:
-            return word_s
+        left_s = self._start_timeout.left_s()
+        warning_s = left_s - (self._start_patience_s - START_WARNING_S)
+        if warning_s > 0:
+            return warning_s
         waits_on = self._when_silent == "wait"
         if left_s > 0 or waits_on:
-            if not self._has_named_missing:
-                self._has_named_missing = True
+            if not self._has_reported_missing:
+                self._has_reported_missing = True
                 self._log.warning(
                     "the world begins when %d programs are there, but %s is missing. %s",
                     self._expected,
@@ -314,7 +314,7 @@ class ProgramScheduler:
         return 0.0
 
     def _check_patience(self, holders: list[Participant]) -> float | None:
-        """Give up programs that have kept others waiting for too long; return when the next may be given up [s]."""
+        """Give up programs that have delayed others for too long; return the time until the next check [s]."""
         held_up = [participant for participant in self.participants if participant.is_held_up]
         if not held_up:
             holders = []
@@ -331,8 +331,8 @@ class ProgramScheduler:
             elif self._when_silent != "wait":
                 self._give_up(participant, participant.patience.waited_s())
                 wait_s = 0.0
-            elif not participant.has_been_named:
-                participant.has_been_named = True
+            elif not participant.has_been_reported:
+                participant.has_been_reported = True
                 self._log.warning(
                     "the world waits for %s: it has done nothing for %.1f s while others wait. Continue it, or end it.",
                     participant.name,

@@ -15,9 +15,10 @@ from kiks.clock.thinking import parse_thinking
 from kiks.ending import INTERRUPTED, noting_endings
 from kiks.errors import KiksError, ParameterError
 from kiks.ports.file_descriptors import opening
+from kiks.ports.messages import LATE, PUNCTUAL
 from kiks.ports.participant import LocalParticipant, RemoteParticipant
 from kiks.ports.port_names import PortNames
-from kiks.ports.program_process import LATE, PUNCTUAL, Anything, Command, Labels, OutputLine, Permission, Process
+from kiks.ports.program_process import AnyProgram, Command, Labels, OutputLine, Permission, Process
 from kiks.ports.program_scheduler import PATIENCE_S, START_PATIENCE_S, VISIT_PATIENCE_S, ProgramScheduler
 from kiks.sim.ring_buffer import RingBuffer
 from kiks.sim.simulation import Simulation
@@ -38,25 +39,25 @@ class Handle:
         self.number = participant.rank
         self.robot = participant.robot
         self.name = participant.name
-        self.has_been_noticed = False
+        self.has_been_reported = False
         self.has_ended = threading.Event()
         self.participant = participant
         self.process: Process
 
     @property
     def is_running(self) -> bool:
-        """Whether it still runs. After its end its output is complete, and its robots are free if it was stopped."""
+        """Whether it still runs. After its end, its output is complete, and its robots are free if it was stopped."""
         return not self.has_ended.is_set()
 
     @property
     def code(self) -> int | None:
-        """Its exit code, 128 plus the number of the signal that ended it; None while it runs."""
+        """Its exit code, or 128 plus the number of the signal that ended it; None while it runs."""
         code = None if self.is_running else self.process.code
         return code if code is None or code >= 0 else 128 - code
 
     @property
     def output(self) -> RingBuffer[OutputLine] | None:
-        """Its output; None if the terminal shows that."""
+        """Its output; None if it is not kept."""
         return self.process.output
 
     @property
@@ -78,7 +79,7 @@ class Handle:
 
 
 IDLE_S = 0.05
-"""Longest sleep [s]: a second Ctrl-C is noticed within it."""
+"""Longest wait of a round [s of real time]: KiKS notices a second Ctrl-C within it."""
 
 GRACE_S = 1.0
 """Time that a program has to end after Ctrl-C [s of real time]."""
@@ -94,21 +95,21 @@ class Programs:
 
     Args:
         sim: The world.
-        commands: Programs that begin together, with `begin` or `run`; the first one drives robot 1, whatever port it
-            opens, and so on. None where a robot has none.
-        told: Robots by port name, for all programs.
+        commands: Programs that begin together, with `begin` or `run`: the first one drives robot 1, and so on,
+            independent of the ports that they open. None for a robot without one.
+        robots_by_name: Robots by port name, for all programs.
         thinking: Thinking time of each: 'none', 'fixed:MS', 'live', 'live:FACTOR', or 'replay:FILE'; if several begin
-            together, with the number of the program appended: FILE.1.
+            together, the number of the program is appended: FILE.1.
         record: File for the thinking times of live runs, with the same numbers appended.
         when_silent: What happens to a program that is silent while others wait: 'wait', 'drop' (its process is ended)
             or 'ignore'.
         patience_s: How long a program may be silent [s of real time].
         say: Called with a line of text about each program that has ended.
-        is_heard: Whether the handles keep the output; otherwise it goes to the output of this process. Processes that
-            such a program has started end with it.
-        new_patience: Makes patiences with another wall clock: one that stands still while the world does.
+        keeps_output: Whether the handles keep the output; otherwise it goes to the output of this process. If they do,
+            child processes of a program end with it.
+        new_patience: Makes patiences with another wall clock, such as one that stands still while the world does.
         visitors: Number of programs in threads of this process that begin together with these; see `admit`.
-        labels: Prints the output with labels, if the handles do not keep it; None: the programs print themselves.
+        labels: Prints the output with labels, if the handles do not keep it; None: the programs print it themselves.
 
     Attributes:
         handles: The programs; of ended ones, the last one of each robot.
@@ -116,7 +117,7 @@ class Programs:
 
     Raises:
         ParameterError: If a value is out of range or unknown.
-        KiksError: If the computer has no file descriptors left for it.
+        KiksError: If the operating system has no file descriptors left.
     """
 
     def __init__(
@@ -124,33 +125,33 @@ class Programs:
         sim: Simulation,
         commands: Sequence[Command | None] = (),
         *,
-        told: dict[str, int] | None = None,
+        robots_by_name: dict[str, int] | None = None,
         thinking: str = "none",
         record: Path | None = None,
         when_silent: str = "ignore",
         patience_s: float = PATIENCE_S,
         say: Callable[[str], None] = lambda text: None,
-        is_heard: bool = False,
+        keeps_output: bool = False,
         new_patience: Callable[[float], Patience] = Patience,
         visitors: int = 0,
         labels: Labels | None = None,
     ) -> None:
         self.sim = sim
-        self.permission: Permission = Anything()
+        self.permission: Permission = AnyProgram()
         self.handles: list[Handle] = []
         self._visitors: list[LocalParticipant] = []
         self._is_moving = False
         self._moved = threading.Condition(sim.lock)
         self._say, self._thinking, self._record = say, thinking, record
-        self._is_heard, self._labels = is_heard, labels
+        self._keeps_output, self._labels = keeps_output, labels
         self._signals, self._count, self._was_touched, self._is_closed = 0, 0, False, False
-        self._beginners = [(robot, command) for robot, command in enumerate(commands, 1) if command is not None]
-        self._are_numbered = len(self._beginners) > 1
-        for number in range(1, len(self._beginners) + 1):
+        self._first_programs = [(robot, command) for robot, command in enumerate(commands, 1) if command is not None]
+        self._are_numbered = len(self._first_programs) > 1
+        for number in range(1, len(self._first_programs) + 1):
             parse_thinking(self._policy(number))
         self._scheduler = ProgramScheduler(
             sim,
-            expected=len(self._beginners) + visitors,
+            expected=len(self._first_programs) + visitors,
             missing=self._missing,
             log=_log,
             is_once=True,
@@ -159,8 +160,8 @@ class Programs:
             new_patience=new_patience,
             start_patience_s=VISIT_PATIENCE_S if visitors else START_PATIENCE_S,
         )
-        self._names = PortNames(sim, told or {}, 0)
-        for robot, _ in self._beginners:
+        self._names = PortNames(sim, robots_by_name or {}, 0)
+        for robot, _ in self._first_programs:
             self._names.own(robot)
         with opening("the programs of a world"):
             self._wake_receiver, self._wake_sender = socket.socketpair()
@@ -173,12 +174,12 @@ class Programs:
         """Start the programs that begin together; does nothing if they have been started.
 
         Raises:
-            KiksError: If the computer does not let one start.
+            KiksError: If the operating system does not start one.
         """
         with self.sim.lock:
-            beginners, self._beginners = self._beginners, []
+            first_programs, self._first_programs = self._first_programs, []
             try:
-                for robot, command in beginners:
+                for robot, command in first_programs:
                     self._add(command, robot)
             except KiksError:
                 self.close()
@@ -191,32 +192,32 @@ class Programs:
 
     @property
     def doubt(self) -> str:
-        """Why the run might not repeat; empty if it does, apart from live thinking."""
+        """Why the run might not be repeatable; empty if it is, apart from live thinking."""
         if self._signals:
             return "it was interrupted"
         if self._was_touched:
             return "a program was started or stopped while the world was there"
         return "" if self._scheduler.is_repeatable else "the world did not wait for every program"
 
-    # ---- programs come and go ----
+    # ---- starting and stopping ----
 
     def start(self, command: Command, robot: int = 1) -> Handle:
         """Start a program; it takes part from the simulated time at which its first request comes.
 
         Args:
             command: The program.
-            robot: Number of its own robot, whatever port it opens.
+            robot: Number of its own robot, independent of the port that it opens.
 
         Raises:
             ParameterError: If it may not start, the file or the robot does not exist, or another program has the robot.
-            KiksError: If the computer does not let it start.
+            KiksError: If the operating system does not start it.
         """
         command.check_file()
         with self.sim.lock:
             self._check_open(command.program.name)
             self.sim.index_of(robot)
-            there = [handle for handle in self.handles if handle.robot == robot]
-            for handle in there:
+            earlier = [handle for handle in self.handles if handle.robot == robot]
+            for handle in earlier:
                 if handle.is_running:
                     raise ParameterError(
                         f"robot {robot} must be free for another program, but {handle.name} has it. Stop that one "
@@ -229,7 +230,7 @@ class Programs:
                     self._names.disown(each.robot)
             self._names.own(robot)
             handle = self._add(command, robot)
-            self.handles = [each for each in self.handles if each not in there or not each.has_been_noticed]
+            self.handles = [each for each in self.handles if each not in earlier or not each.has_been_reported]
             self._was_touched = True
         self._wake()
         return handle
@@ -260,7 +261,7 @@ class Programs:
 
     def move(self) -> float | None:
         """Call `ProgramScheduler.advance`, unless another thread is in it. Needs the lock."""
-        # The gate may make a thread wait in the middle, and then releases the lock for others.
+        # The gate may make a thread wait inside, and then releases the lock for others.
         if self._is_moving:
             return None
         self._is_moving = True
@@ -270,7 +271,7 @@ class Programs:
             self._is_moving = False
             self._moved.notify_all()
 
-    def wait(self, seconds: float | None) -> None:
+    def wait(self, seconds: float) -> None:
         """Wait until a thread has moved the world, or for some time [s]; the caller holds the lock."""
         self._moved.wait(seconds)
 
@@ -281,9 +282,9 @@ class Programs:
         """
         if not handle.is_running:
             return
-        is_tidying, handle.participant.is_stopped = handle.participant.is_stopped, True
+        was_interrupted, handle.participant.is_stopped = handle.participant.is_stopped, True
         self._was_touched = True
-        if is_tidying or not handle.participant.is_here:
+        if was_interrupted or not handle.participant.is_here:
             handle.process.kill()
             return
         handle.process.interrupt()
@@ -295,14 +296,14 @@ class Programs:
         """Run until the last program has ended; return the first exit code that is not 0, else 0.
 
         Raises:
-            KiksError: If the computer does not let one start.
+            KiksError: If the operating system does not start one.
         """
         self.begin()
         try:
             self._grace = Patience(GRACE_S)
             # The programs get the signal, too, and may still stop their robots.
             with noting_endings(self._note_signal):
-                while any(not handle.has_been_noticed for handle in self.handles) or self._scheduler.participants:
+                while any(not handle.has_been_reported for handle in self.handles) or self._scheduler.participants:
                     if self._signals and (self._signals > 1 or self._grace.left_s() == 0):
                         return INTERRUPTED
                     self.round(IDLE_S)
@@ -329,15 +330,15 @@ class Programs:
                     key.data.flush()
                 if key.data is not None and events & selectors.EVENT_READ and not key.data.receive():
                     self._hang_up(key.data)
-            heard = [key.data for key, _ in ready]
+            handled = [key.data for key, _ in ready]
             for participant in over:
-                # A process that it has started may still hold the connection.
-                if participant not in heard and not participant.has_hung_up:
+                # A child process of the program may still hold the connection.
+                if participant not in handled and not participant.has_hung_up:
                     participant.leave()
                     self._hang_up(participant)
-            noticed = self._notice_ends()
-        for handle in noticed:
-            self._tell_end(handle)
+            ended = self._new_ends()
+        for handle in ended:
+            self._report_end(handle)
 
     def close(self) -> None:
         """End all processes, report how programs have ended, and close the connections."""
@@ -346,8 +347,8 @@ class Programs:
             if handle.participant.has_hung_up:
                 handle.has_ended.wait(GRACE_S)  # the process ends by itself and will have an exit code
             handle.process.kill()
-        for handle in self._notice_ends():
-            self._tell_end(handle)
+        for handle in self._new_ends():
+            self._report_end(handle)
         for handle in self.handles:
             handle.process.wait()
             handle.participant.close()
@@ -369,7 +370,7 @@ class Programs:
         return self._thinking + (self._suffix(number) if self._thinking.startswith("replay:") else "")
 
     def _suffix(self, number: int) -> str:
-        """Return the suffix of files that each program has for itself."""
+        """Return the suffix of a program's own files."""
         return f".{number}" if self._are_numbered else ""
 
     def _add(self, command: Command, robot: int) -> Handle:
@@ -388,9 +389,9 @@ class Programs:
                     [lateness, self._policy(number), record, " ".join(self._names.offered())],
                     command,
                     there,
-                    is_heard=self._is_heard,
-                    voice=None if self._labels is None else self._labels.voice(number, command.program.name),
-                    ended=lambda: self._end(handle),
+                    keeps_output=self._keeps_output,
+                    writer=None if self._labels is None else self._labels.writer(number, command.program.name),
+                    on_end=lambda: self._end(handle),
                 )
             except KiksError:
                 participant.close()
@@ -439,15 +440,18 @@ class Programs:
         if participant.has_left:
             participant.close()
 
-    def _notice_ends(self) -> list[Handle]:
-        """Return the programs that have ended since the last time."""
-        there = [handle for handle in self.handles if handle.participant.has_hung_up and not handle.is_running]
-        noticed = [handle for handle in there if not handle.has_been_noticed]
-        for handle in noticed:
-            handle.has_been_noticed = True
-        return noticed
+    def _new_ends(self) -> list[Handle]:
+        """Return the programs that have ended since the last call."""
+        ended = [
+            handle
+            for handle in self.handles
+            if handle.participant.has_hung_up and not handle.is_running and not handle.has_been_reported
+        ]
+        for handle in ended:
+            handle.has_been_reported = True
+        return ended
 
-    def _tell_end(self, handle: Handle) -> None:
+    def _report_end(self, handle: Handle) -> None:
         """Report how a program has ended."""
         self._say(f"{handle.name} {'was stopped' if handle.participant.is_stopped else f'has ended {handle.how}'}.")
         left = [other.participant for other in self.handles if other.is_running and other.participant.is_here]

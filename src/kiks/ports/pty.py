@@ -30,7 +30,7 @@ from kiks.ports.endpoint import READ_SIZE, Channel, Endpoint
 from kiks.ports.file_descriptors import opening
 
 TCGETS2 = 0x802C542A
-"""Linux request for terminal settings with the speed as a number, whatever it is (asm-generic/ioctls.h)."""
+"""Linux request for terminal settings with any speed, as a number (asm-generic/ioctls.h)."""
 
 SETTINGS2 = struct.Struct("4I20s2I")
 """Four flag words, line discipline and control characters, speed in, speed out [bit/s] (asm-generic/termbits.h)."""
@@ -197,7 +197,7 @@ def _is_own(folder: Path) -> bool:
 
 
 def _claim(path: str) -> socket.socket:
-    """Reserve a link's name until this process ends, in whatever way: an abstract socket leaves no file behind."""
+    """Reserve a link's name until this process ends: an abstract socket leaves no file behind, even after a crash."""
     folder, name = os.path.split(path)
     # An abstract name holds 107 bytes; a path may be longer.
     digest = hashlib.sha256(os.fsencode(os.path.join(os.path.realpath(folder), name))).hexdigest()

@@ -22,7 +22,7 @@ from kiks.sim.read_completion import NEVER_NS, Read
 from kiks.units import TICK_NS
 
 TELL_NS = TICK_NS
-"""Time by which a program runs on before it reports its time to the scheduler [ns]."""
+"""Simulated time after which a program reports its time to the scheduler [ns]."""
 
 
 class Connection(ABC):
@@ -35,14 +35,14 @@ class Connection(ABC):
     def __init__(self, *, is_late: bool = False) -> None:
         self.lock = threading.RLock()
         self._now_ns = 0
-        self._is_to_meet = is_late
+        self._needs_time = is_late
         self._told_ns = 0
         self._thought_ns = 0
         self._unanswered_count = 0
         self._ticket = 0
 
     @abstractmethod
-    def _say(self, request: Request) -> None:
+    def _transmit(self, request: Request) -> None:
         """Send a request."""
 
     @abstractmethod
@@ -52,7 +52,7 @@ class Connection(ABC):
     @property
     def now_ns(self) -> int:
         """The program's time [ns]."""
-        if self._is_to_meet:
+        if self._needs_time:
             self.ask(Kind.MEET)
         return self._now_ns
 
@@ -83,13 +83,13 @@ class Connection(ABC):
         Raises:
             LinkError: If the answer is an error.
         """
-        # The answer to a request that Ctrl-C has interrupted may still come: it has another ticket.
+        # The answer to a request that Ctrl-C has interrupted may still come, with another ticket.
         self._ticket = (self._ticket + 1) % (1 << 32)
         self._send(Request(kind, robot, self._now_ns, self._ticket, first, second, third, self._thought_ns, data))
         answer = self._wait(self._ticket)
         self._unanswered_count = 0
         self._now_ns = self._told_ns = answer.now_ns
-        self._is_to_meet = False
+        self._needs_time = False
         if not answer.is_good:
             raise LinkError(answer.data.decode())
         return answer
@@ -97,27 +97,27 @@ class Connection(ABC):
     def _send(self, request: Request) -> None:
         self._told_ns = self._now_ns
         self._thought_ns = 0
-        self._say(request)
+        self._transmit(request)
 
 
 class SocketConnection(Connection):
     """The connection to a world in another process.
 
     Args:
-        there: The socket to it.
+        connection: The socket to it.
         is_late: Whether the world may have begun already.
     """
 
-    def __init__(self, there: socket.socket, *, is_late: bool = False) -> None:
+    def __init__(self, connection: socket.socket, *, is_late: bool = False) -> None:
         super().__init__(is_late=is_late)
-        self._there = there
+        self._socket = connection
         self._received = bytearray()
 
-    def _say(self, request: Request) -> None:
+    def _transmit(self, request: Request) -> None:
         try:
-            self._there.sendall(request.pack())
+            self._socket.sendall(request.pack())
         except OSError:
-            # At its end Python clears objects in any order: a port may be closed after this socket.
+            # While it exits, Python clears objects in any order: a port may be closed after this socket.
             if not sys.is_finalizing():
                 _end()
 
@@ -129,7 +129,7 @@ class SocketConnection(Connection):
 
     def _receive(self) -> None:
         try:
-            received = self._there.recv(RECEIVE_SIZE)
+            received = self._socket.recv(RECEIVE_SIZE)
         except OSError:
             received = b""
         if not received:
@@ -137,7 +137,7 @@ class SocketConnection(Connection):
         self._received += received
 
 
-class FarLine:
+class RemoteLine:
     """A robot's line in a shared world; see `Line`."""
 
     def __init__(self, connection: Connection, robot: int) -> None:
@@ -190,11 +190,11 @@ class FarLine:
         return self._ask(Kind.COUNT).number
 
     def sent_ns(self) -> int:
-        """Return when all characters will have been sent [ns]."""
+        """Return the time at which all characters will have been sent [ns]."""
         return self._ask(Kind.SENT).number
 
     def room_ns(self) -> int:
-        """Return when the line takes more characters [ns]."""
+        """Return the time at which the line takes more characters [ns]."""
         return self.now_ns if self._ahead_count <= BACKLOG_LIMIT else self._ask(Kind.ROOM).number
 
     def wait_for(self, reads: Sequence[Read], until_ns: int) -> list[bool]:
@@ -236,6 +236,6 @@ class FarLine:
 
 
 def _end() -> None:
-    """End at once: the world has gone, so the program cannot do anything useful."""
+    """Exit at once: without the world the program cannot do anything useful."""
     sys.stdout.flush()
     os._exit(1)

@@ -24,7 +24,7 @@ class Rfc2217Endpoint(TcpEndpoint):
     def accept(self) -> Rfc2217Channel | None:
         """Accept the client and begin to negotiate."""
         connection = self._connect()
-        return None if connection is None else Rfc2217Channel(self.name, connection, self)
+        return None if connection is None else Rfc2217Channel(connection, self)
 
 
 class _Settings:
@@ -50,7 +50,7 @@ class _Settings:
         self._channel.forget()
 
     def reset_output_buffer(self) -> None:
-        pass  # written characters are on the line already
+        pass  # written characters are already on the line
 
 
 class _Answers:
@@ -66,10 +66,10 @@ class _Answers:
 class Rfc2217Channel(TcpChannel):
     """A client that speaks RFC 2217."""
 
-    def __init__(self, name: str, connection: socket.socket, endpoint: TcpEndpoint | None = None) -> None:
+    def __init__(self, connection: socket.socket, endpoint: TcpEndpoint) -> None:
         from serial import rfc2217
 
-        super().__init__(name, connection, endpoint)
+        super().__init__(connection, endpoint)
         settings: Any = _Settings(self)
         answers: Any = _Answers(self)
         self._manager: Any = rfc2217.PortManager(settings, answers)
@@ -86,7 +86,7 @@ class Rfc2217Channel(TcpChannel):
             is_sound = False
         if not is_sound:
             _log.warning(
-                "the client of %s must speak RFC 2217, but it sent no request of that. Use the plain TCP port.",
+                "the client of %s must speak RFC 2217, but it sent something else. Use the plain TCP port.",
                 self.name,
             )
             return None

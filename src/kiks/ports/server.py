@@ -7,6 +7,7 @@ import selectors
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from itertools import chain
 
 from kiks.clock.pace import Pace
 from kiks.clock.patience import Patience
@@ -37,7 +38,7 @@ class Server:
             'drop': it is disconnected; 'ignore': the world no longer waits for it (not live).
         patience_s: How long a program may be silent [s of real time].
         pace: A pace to share, instead of `speed`.
-        new_patience: Makes patiences with another wall clock: one that stands still while the world does.
+        new_patience: Makes patiences with another wall clock, such as one that stands still while the world does.
 
     Raises:
         ParameterError: If there is no such robot, or a value is out of range.
@@ -77,11 +78,10 @@ class Server:
                 new_patience=new_patience,
             )
         self._links = {robot: Link(robot, sim.wires[_index(sim, robot)]) for robot in endpoints}
-        self._endpoints = {robot: list(ways) for robot, ways in endpoints.items()}
+        self._endpoints = {robot: list(each) for robot, each in endpoints.items()}
         self._selector = selectors.DefaultSelector()
-        for robot, ways in self._endpoints.items():
-            for endpoint in ways:
-                self._listen(self._links[robot], endpoint)
+        for link in self._links.values():
+            self._listen(link)
 
     def serve(self, until: threading.Event | Callable[[], bool] | None = None) -> None:
         """Serve until an event is set, a function returns True, or Ctrl-C; checked at least every 50 ms."""
@@ -93,14 +93,16 @@ class Server:
                 wait_s = self._timing.advance(links)
                 for link in links:
                     if link.is_dropped:
-                        self._leave(link)
+                        self._disconnect(link)
                     if link.is_leaving and self._timing.has_left(link):
                         self._free(link)
                     if link.channel is not None and link.channel.has_ahead and not self._timing.is_full(link):
                         self._exchange(link, selectors.EVENT_READ)
-                    self._wait_for(link)
-            for key, events in self._selector.select(wait_s):
-                with self.sim.lock:
+                    self._select_events(link)
+            ready = self._selector.select(wait_s)
+            with self.sim.lock:
+                self._timing.catch_up()
+                for key, events in ready:
                     key.data(events)
 
     def close(self) -> None:
@@ -108,27 +110,28 @@ class Server:
         with self.sim.lock:
             for link in self._links.values():
                 if link.channel is not None:
-                    self._leave(link)
+                    self._disconnect(link)
                 if link.is_leaving:
                     self._free(link)
         self._selector.close()
-        for ways in self._endpoints.values():
-            for endpoint in ways:
-                endpoint.close()
+        for endpoint in chain.from_iterable(self._endpoints.values()):
+            endpoint.close()
         self._endpoints.clear()
 
-    # ---- clients come and go ----
+    # ---- clients ----
 
-    def _listen(self, link: Link, endpoint: Endpoint) -> None:
-        self._selector.register(endpoint.fileno(), selectors.EVENT_READ, partial(self._enter, link, endpoint))
+    def _listen(self, link: Link) -> None:
+        """Wait for a client at all endpoints of a robot."""
+        for endpoint in self._endpoints[link.robot]:
+            self._selector.register(endpoint.fileno(), selectors.EVENT_READ, partial(self._accept, link, endpoint))
 
-    def _enter(self, link: Link, endpoint: Endpoint, _events: int) -> None:
+    def _accept(self, link: Link, endpoint: Endpoint, _events: int) -> None:
         """Accept a client if the robot has none."""
         wire = link.wire
         if link.is_leaving:
             return
         if self._has_gone_unnoticed(link):
-            self._leave(link)
+            self._disconnect(link)
             return
         if wire.holder is not None:
             endpoint.reject()
@@ -152,9 +155,9 @@ class Server:
         wire.enter_client(f"the client of {endpoint.name}", self.sim.now_ns)
         self._timing.enter(link)
         _log.info("robot %d has a client at %s", link.robot, endpoint.name)
-        self._wait_for(link)
+        self._select_events(link)
 
-    def _leave(self, link: Link) -> None:
+    def _disconnect(self, link: Link) -> None:
         """Disconnect a client. The next one waits until its commands have acted."""
         channel = link.channel
         if channel is None:
@@ -175,7 +178,7 @@ class Server:
             self._free(link)
 
     def _has_gone_unnoticed(self, link: Link) -> bool:
-        """Return whether a client has gone that is so far ahead of its robot that the server has not read its end."""
+        """Return whether a client has gone whose end the server has not read, because the line is full."""
         channel = link.channel
         return channel is not None and self._timing.forgets and self._timing.is_full(link) and channel.find_end()
 
@@ -183,15 +186,14 @@ class Server:
         """Free the link for the next client."""
         link.clear()
         link.wire.leave_client(self.sim.now_ns)
-        for endpoint in self._endpoints[link.robot]:
-            self._listen(link, endpoint)
+        self._listen(link)
 
     def _missing(self) -> str:
         """Return the names of the missing programs."""
         robots = [str(link.robot) for link in self._links.values() if link.channel is None and not link.is_leaving]
         return f"that of robot {' or '.join(robots)}"
 
-    # ---- bytes come and go ----
+    # ---- bytes ----
 
     def _exchange(self, link: Link, events: int) -> None:
         """Read or write, as the channel's descriptor is ready for it."""
@@ -203,7 +205,7 @@ class Server:
         if events & selectors.EVENT_READ:
             data = channel.read()
             if data is None:
-                self._leave(link)
+                self._disconnect(link)
                 return
             baud = channel.baud
             if baud is not None and baud != link.wire.line.baud and BAUD_MIN <= baud <= BAUD_MAX:
@@ -211,7 +213,7 @@ class Server:
             if data:
                 self._timing.receive(link, data)
 
-    def _wait_for(self, link: Link) -> None:
+    def _select_events(self, link: Link) -> None:
         """Select the events of the channel: reading if the line has room, writing if characters wait.
 
         A descriptor that is registered with no event would still report a hang-up, again and again: it is removed.

@@ -68,7 +68,7 @@ class TcpEndpoint(Endpoint):
     def accept(self) -> TcpChannel | None:
         """Accept the client."""
         connection = self._connect()
-        return None if connection is None else TcpChannel(self.name, connection, self)
+        return None if connection is None else TcpChannel(connection, self)
 
     def _connect(self) -> socket.socket | None:
         try:
@@ -137,13 +137,12 @@ class TcpChannel(Channel):
     """A client on a connection.
 
     Args:
-        name: Name of the endpoint.
         connection: The connection.
         endpoint: The endpoint, which logs that a client is a browser.
     """
 
-    def __init__(self, name: str, connection: socket.socket, endpoint: TcpEndpoint | None = None) -> None:
-        super().__init__(name)
+    def __init__(self, connection: socket.socket, endpoint: TcpEndpoint) -> None:
+        super().__init__(endpoint.name)
         self._connection = connection
         self._endpoint = endpoint
         self._first_line = FirstLine()
@@ -161,13 +160,12 @@ class TcpChannel(Channel):
         else:
             data = self._receive()
         if data and self._first_line.is_http(data):
-            if self._endpoint is not None:
-                self._endpoint.refuse_http()
+            self._endpoint.refuse_http()
             return None
         return data
 
     def _receive(self) -> bytes | None:
-        """Return what has come, perhaps nothing; None when the connection is over."""
+        """Return the bytes that have arrived, perhaps none; None when the connection is over."""
         try:
             return self._connection.recv(READ_SIZE) or None
         except BlockingIOError:

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl, urlsplit
 
 from kiks.errors import LinkError, ParameterError, nearest, shown
-from kiks.sim.simulation import REGISTRY
 
 if TYPE_CHECKING:
     from kiks.sim.simulation import SimPort, Simulation
@@ -15,7 +14,7 @@ _OPTIONS = ("arena", "robots", "robot", "seed", "thinking")
 
 
 def find_port(url: str) -> SimPort:
-    """Return a new port on the line that a name stands for.
+    """Return a new port for a name.
 
     A number alone is a robot of the newest simulation, or of a new one in the default arena if there is none. Options
     after a question mark always create a new simulation.
@@ -28,7 +27,8 @@ def find_port(url: str) -> SimPort:
         ParameterError: If an option is unknown or out of range.
         ArenaError: If the arena cannot be read.
     """
-    from kiks.sim.simulation import SimPort, Simulation
+    # Imported here: a program in a process of its own finds its ports by another function, and needs no simulation.
+    from kiks.sim.simulation import REGISTRY, SimPort, Simulation
 
     parts = urlsplit(url)
     path = parts.path.strip("/")
@@ -40,7 +40,7 @@ def find_port(url: str) -> SimPort:
         )
     options = dict(parse_qsl(parts.query, keep_blank_values=True))
     if options:
-        sim = _fresh(options, url)
+        sim = _new_simulation(options, url)
     elif name:
         sim = REGISTRY.find(name)
     else:
@@ -50,13 +50,12 @@ def find_port(url: str) -> SimPort:
         known = "robot 1 only" if sim.robot_count == 1 else f"robots 1 to {sim.robot_count}"
         raise LinkError(
             f"a port must belong to an existing robot, but {shown(url)} names robot {robot} and the simulation has "
-            f"{known}. "
-            f"Open {sim.url(min(max(robot, 1), sim.robot_count))!r}, or create it with more robots."
+            f"{known}. Open {sim.url(min(max(robot, 1), sim.robot_count))!r}, or create it with more robots."
         )
     return SimPort(sim, robot)
 
 
-def _fresh(options: dict[str, str], url: str) -> Simulation:
+def _new_simulation(options: dict[str, str], url: str) -> Simulation:
     from kiks.model.arena import Arena
     from kiks.sim.simulation import Simulation
 

@@ -12,9 +12,8 @@ from pathlib import Path
 from kiks.clock.program_clock import ProgramClock
 from kiks.clock.thinking import save_thinking
 from kiks.errors import KiksError
-from kiks.ports.messages import Kind
-from kiks.ports.program_process import LATE
-from kiks.ports.remote_link import FarLine, SocketConnection
+from kiks.ports.messages import LATE, Kind
+from kiks.ports.remote_link import RemoteLine, SocketConnection
 from kiks.script.runner import run_program
 
 DIE_WITH_PARENT = 1
@@ -50,7 +49,7 @@ def main(
         return run_program(
             program,
             arguments,
-            lambda robot: FarLine(connection, robot),
+            lambda robot: RemoteLine(connection, robot),
             lambda name: connection.ask(Kind.FIND, data=name.encode()).number,
             policy,
             offered,

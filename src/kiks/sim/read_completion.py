@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from kiks.errors import LinkError
-from kiks.sim.wire import Wire
+
+if TYPE_CHECKING:
+    from kiks.sim.wire import Wire
 
 NEVER_NS = 1 << 63
 """A time that no simulation reaches [ns]."""

@@ -11,7 +11,8 @@ from kiks.engine.parameters import RAY_COUNT
 from kiks.engine.sensing import observe
 from kiks.engine.state import BALL
 from kiks.errors import ParameterError
-from kiks.model.checks import check_numbers, wrapped
+from kiks.model.array_checks import check_numbers
+from kiks.model.checks import wrapped
 from kiks.model.robot import SENSOR_COUNT
 from kiks.sim.world import World
 

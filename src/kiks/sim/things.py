@@ -13,7 +13,8 @@ from kiks.engine.scene import enter_all_worlds
 from kiks.engine.state import BALL, BODY, CYLINDER
 from kiks.errors import ArenaError, KiksError, ParameterError, shown
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp
-from kiks.model.checks import check_heading, check_number, check_numbers
+from kiks.model.array_checks import check_numbers
+from kiks.model.checks import check_heading, check_number
 from kiks.model.free_disc import OVERLAP_MM
 from kiks.sim.free_space import PRESSED_MM
 from kiks.sim.world import World

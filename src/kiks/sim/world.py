@@ -21,7 +21,8 @@ from kiks.engine.sensing.thesis_networks import networks_for
 from kiks.engine.state import State
 from kiks.errors import ParameterError, shown
 from kiks.model.arena import Arena
-from kiks.model.checks import check_heading, check_number, check_numbers, wrapped
+from kiks.model.array_checks import check_numbers
+from kiks.model.checks import check_heading, check_number, wrapped
 from kiks.model.free_disc import OVERLAP_MM
 from kiks.model.robot import RobotSpec
 from kiks.sim.free_space import FreeSpace

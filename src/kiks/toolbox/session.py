@@ -235,7 +235,7 @@ class Session:
             commands,
             thinking=sim.thinking,
             say=self._say,
-            is_heard=True,
+            keeps_output=True,
             new_patience=gate.patience,
             visitors=self.settings.programs if self.settings.programs > 1 else 0,
         )

@@ -55,14 +55,14 @@ def check_laws(make_world, arena, draw, ticks):
         pose, asked = np.array(world.pose), world.asked
 
 
-@settings(derandomize=True, deadline=None, max_examples=25)
+@settings(derandomize=True, max_examples=25)
 @given(number=st.integers(0, 10_000), draw=st.integers(0, 2**32))
 def test_no_penetration_and_no_energy_from_walls(make_world, make_random_arena, number, draw):
     check_laws(make_world, make_random_arena(number), draw, 300)
 
 
 @nightly
-@settings(derandomize=True, deadline=None, max_examples=250)
+@settings(derandomize=True, max_examples=250)
 @given(number=st.integers(0, 1_000_000), draw=st.integers(0, 2**32))
 def test_no_penetration_and_no_energy_from_walls_at_length(make_world, make_random_arena, number, draw):
     check_laws(make_world, make_random_arena(number), draw, 500)

@@ -84,7 +84,7 @@ def test_power_follows_the_closed_form_of_the_lag(make_world):
         assert world.pose[2] == pytest.approx((path[1] - path[0]) * PULSE / BASE, abs=1e-9)
 
 
-@settings(derandomize=True, deadline=None, max_examples=share(100, 200))
+@settings(derandomize=True, max_examples=share(100, 200))
 @given(left=PATHS, right=PATHS, heading=st.floats(-50.0, 50.0))
 def test_there_and_back_again(make_world, left, right, heading):
     world = make_world(FLOOR).place(2000.0, 2000.0, heading)
@@ -92,7 +92,7 @@ def test_there_and_back_again(make_world, left, right, heading):
     assert world.pose == pytest.approx((2000.0, 2000.0, heading), rel=0, abs=1e-9)
 
 
-@settings(derandomize=True, deadline=None, max_examples=share(100, 200))
+@settings(derandomize=True, max_examples=share(100, 200))
 @given(left=PATHS, right=PATHS, heading=st.floats(-50.0, 50.0), share=st.floats(0.0, 1.0))
 def test_a_moment_within_a_tick_is_where_a_part_of_the_paths_leads(make_world, left, right, heading, share):
     whole = make_world(FLOOR).place(2000.0, 2000.0, heading)
@@ -102,7 +102,7 @@ def test_a_moment_within_a_tick_is_where_a_part_of_the_paths_leads(make_world, l
     assert _between(whole.state.robots, 0, share) == pytest.approx(part.pose, rel=0, abs=1e-9)
 
 
-@settings(derandomize=True, deadline=None, max_examples=100)
+@settings(derandomize=True, max_examples=100)
 @given(paths=st.lists(st.tuples(PATHS, PATHS), min_size=3, max_size=3), ticks_ago=st.integers(0, 2))
 def test_both_ends_of_a_tick_are_exact(make_world, paths, ticks_ago):
     world = make_world(FLOOR).place(2000.0, 2000.0, 0.4)
@@ -115,7 +115,7 @@ def test_both_ends_of_a_tick_are_exact(make_world, paths, ticks_ago):
     assert _between(world.state.robots, ticks_ago, 1.0) == pytest.approx(end, rel=0, abs=1e-12)
 
 
-@settings(derandomize=True, deadline=None, max_examples=100)
+@settings(derandomize=True, max_examples=100)
 @given(left=PATHS, right=PATHS)
 def test_pieces_near_a_wall_add_up_to_the_same_arc(make_world, left, right):
     """The arc is cut where a wall is near; without a contact that changes nothing."""

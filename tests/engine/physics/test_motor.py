@@ -29,7 +29,7 @@ def spin(world, ticks):
             world.place(1000.0, 1000.0, world.pose[2])
 
 
-@settings(derandomize=True, deadline=None, max_examples=40)
+@settings(derandomize=True, max_examples=40)
 @given(left=SPEEDS, right=SPEEDS)
 def test_speed_reaches_its_command_in_about_five_ticks_and_on_average_exactly(make_world, left, right):
     # Near full power there is nothing left to control with.
@@ -49,7 +49,7 @@ def test_speed_reaches_its_command_in_about_five_ticks_and_on_average_exactly(ma
         assert (after - before) / 400 == pytest.approx(command, abs=0.02)
 
 
-@settings(derandomize=True, deadline=None, max_examples=30)
+@settings(derandomize=True, max_examples=30)
 @given(left=SPEEDS, right=SPEEDS, mode=st.sampled_from(["speed", "pwm", "position"]))
 def test_mirror_symmetry_to_the_bit(make_world, left, right, mode):
     one, other = make_world(FAR).place(1000.0, 1000.0), make_world(FAR).place(1000.0, 1000.0)
@@ -63,7 +63,7 @@ def test_mirror_symmetry_to_the_bit(make_world, left, right, mode):
         assert one.pose[2] == -other.pose[2]
 
 
-@settings(derandomize=True, deadline=None, max_examples=30)
+@settings(derandomize=True, max_examples=30)
 @given(left=st.integers(-255, 255), right=st.integers(-255, 255))
 def test_power_drives_backwards_as_it_drives_forwards(make_world, left, right):
     one, other = make_world(FAR).place(1000.0, 1000.0), make_world(FAR).place(1000.0, 1000.0)
@@ -111,7 +111,7 @@ def test_status_tells_mode_and_arrival(world):
 
 
 @pytest.mark.parametrize("mode", ["speed", "pwm", "position"])
-@settings(derandomize=True, deadline=None, max_examples=15)
+@settings(derandomize=True, max_examples=15)
 @given(first=st.integers(-60, 60), target=st.integers(-3000, 3000), ticks=st.integers(0, 80))
 def test_a_move_arrives_whatever_ran_before(make_world, mode, first, target, ticks):
     world = make_world(FAR).place(1000.0, 1000.0)

@@ -42,7 +42,7 @@ def meet_by_quadratic(discs, x, y, angle, reach):
     return first
 
 
-@settings(derandomize=True, deadline=None, max_examples=300)
+@settings(derandomize=True, max_examples=300)
 @given(draw=st.integers(0, 2**32), count=st.integers(0, 20))
 def test_rays_meet_the_first_disc(draw, count):
     """Also from within a disc, in lanes as one by one."""
@@ -88,7 +88,7 @@ def test_a_disc_reads_like_the_same_disc_drawn_as_a_wall(radius_mm, gap_mm):
         assert with_ball.proximity(1) == pytest.approx(with_wall.proximity(1), rel=0.05, abs=15)
 
 
-@settings(derandomize=True, deadline=None, max_examples=share(8, 20))
+@settings(derandomize=True, max_examples=share(8, 20))
 @given(draw=st.integers(0, 2**32))
 def test_a_camera_sees_discs_as_it_sees_walls(draw):
     rng = np.random.default_rng(draw)

@@ -57,7 +57,7 @@ def check_ray(arena, x, y, angle, reach, length, brightness):
         assert brightness == 0
 
 
-@settings(derandomize=True, deadline=None, max_examples=share(30, 60))
+@settings(derandomize=True, max_examples=share(30, 60))
 @given(number=st.integers(0, 300), draw=st.integers(0, 2**32))
 def test_rays_end_where_the_first_wall_begins(make_random_arena, number, draw):
     arena = make_random_arena(number)
@@ -66,7 +66,7 @@ def test_rays_end_where_the_first_wall_begins(make_random_arena, number, draw):
         check(arena, rng.uniform(1, arena.width_mm - 1), rng.uniform(1, arena.height_mm - 1), rng.uniform(-7, 7))
 
 
-@settings(derandomize=True, deadline=None, max_examples=30)
+@settings(derandomize=True, max_examples=30)
 @given(number=st.integers(0, 300), draw=st.integers(0, 2**32))
 def test_rays_along_edges_and_diagonals(make_random_arena, number, draw):
     """From corners of cells and along their edges, where a rounding error decides between two cells."""
@@ -79,7 +79,7 @@ def test_rays_along_edges_and_diagonals(make_random_arena, number, draw):
         check(arena, x, y, rng.integers(8) * math.pi / 4 + rng.uniform(-1e-3, 1e-3))
 
 
-@settings(derandomize=True, deadline=None, max_examples=share(20, 60))
+@settings(derandomize=True, max_examples=share(20, 60))
 @given(number=st.integers(0, 300), draw=st.integers(0, 2**32))
 def test_a_wall_more_never_lengthens_a_ray(make_random_arena, number, draw):
     arena = make_random_arena(number)
@@ -96,7 +96,7 @@ def test_a_wall_more_never_lengthens_a_ray(make_random_arena, number, draw):
         assert cast(fuller, x, y, angle)[0] <= cast(arena, x, y, angle)[0] + TOLERANCE_MM
 
 
-@settings(derandomize=True, deadline=None, max_examples=30)
+@settings(derandomize=True, max_examples=30)
 @given(number=st.integers(0, 300), draw=st.integers(0, 2**32), count=st.integers(8, 100))
 def test_rays_in_lanes_are_rays_one_by_one(make_random_arena, number, draw, count):
     """To the bit, from floor, from walls and from outside, along the axes too."""
@@ -117,7 +117,7 @@ def test_rays_in_lanes_are_rays_one_by_one(make_random_arena, number, draw, coun
     assert list(zip(lengths * cell, brightnesses, strict=True)) == alone
 
 
-@settings(derandomize=True, deadline=None, max_examples=share(20, 60))
+@settings(derandomize=True, max_examples=share(20, 60))
 @given(number=st.integers(0, 300), draw=st.integers(0, 2**32))
 def test_the_rays_of_a_sensor_end_where_the_first_wall_begins(make_random_arena, number, draw):
     """From floor, from walls and from corners of cells, along the axes and diagonals, too."""

@@ -170,7 +170,7 @@ class Desk:
 
     def _usual_programs(self, sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
         return Programs(
-            sim, commands, thinking=self.project.thinking, say=self.say, is_heard=True, new_patience=gate.patience
+            sim, commands, thinking=self.project.thinking, say=self.say, keeps_output=True, new_patience=gate.patience
         )
 
     def _permission(self) -> Permission:
