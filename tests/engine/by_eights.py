@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kiks.batch.kernel_args import Alone, Worlds
+from kiks.batch.kernel_args import LonePlace, Worlds
 from kiks.batch.lane_stepper import give_back, pass_to, read, take
 from kiks.engine.compiling import entry
 from kiks.engine.simd.f64x8 import LANES
@@ -27,7 +27,7 @@ def read_after(scene, ground, sight, networks, lamps, seeds, ticks, times_ns, co
     order = np.minimum(np.arange(-(-world_count // LANES) * LANES), world_count - 1)
     nothing, none = np.zeros((world_count, 1, 0)), np.zeros(world_count, np.int64)
     worlds = Worlds(scene, lamps, seeds, ticks.copy(), *[none] * 4, *[nothing] * 5)
-    place = Alone(ground, sight, networks, None, np.zeros(1, np.int64))
+    place = LonePlace(ground, sight, networks, None, np.zeros(1, np.int64))
     counts = np.empty((len(order), 8), np.int64)
     pass_and_read(place, worlds, order, times_ns[order], code, counts)
     return counts[:world_count]

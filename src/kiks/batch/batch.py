@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kiks.batch.callbacks import DECIDER, decider_of
-from kiks.batch.initial_state import Beginning
-from kiks.batch.kernel_args import Alone, Together, Worlds
+from kiks.batch.initial_state import InitialState
+from kiks.batch.kernel_args import CollidingPlace, LonePlace, Worlds
 from kiks.batch.loop import roll_out
 from kiks.batch.loop_timing import Timing
 from kiks.batch.measure_slots import MeasureSlots
@@ -34,39 +34,39 @@ from kiks.model.robot import SENSOR_COUNT, RobotSpec
 from kiks.units import NS_PER_S, ns_from_s
 
 BLOCKS_PER_THREAD = 4
-"""Blocks of worlds per thread: no thread waits long for the slowest."""
+"""Blocks of worlds per thread: with several, no thread waits long for the slowest one."""
 
-EVER = 2**62
-"""More half loops, and later [ns], than anything."""
+UNLIMITED = 2**62
+"""More half loops than a run has, and a time [ns] after its end."""
 
 STEP_BLOCK = 64
 """Fewest worlds per thread for a single step, which takes some microseconds per world."""
 
 
 class Batch:
-    """Worlds with the same shape, each with its own seed, start poses, robots and controllers.
+    """Many worlds with the same number of robots, each with its own seed, start poses and kinds of robots.
 
-    World w with the seed s is, to the bit, a `kiks.Simulation` of that seed whose robots `kiks.drive` drives at the
-    pace of `timing`: the same readings, the same poses, the same hash.
+    A world agrees to the bit with a `kiks.Simulation` of the same seed whose robots `kiks.drive` drives with the same
+    `timing`: the same readings, the same poses, the same hash.
 
     Args:
-        arena: One arena for all worlds, or several, which the worlds take in turn. They must hold the same number of
-            balls and cylinders.
+        arena: One arena for all worlds, or several, which the worlds take in turn. All arenas must hold the same number
+            of balls and cylinders.
         worlds: Number of worlds.
-        robot: Kind of the robots: one for all, or one for each world (a family of different robots), or, with several
-            robots, lists of them; names of robot files or `kiks.RobotSpec`.
+        robot: Kind of the robots: one for all, one for each world (such as a family), or, with several robots in a
+            world, a list for each world. A kind is the name of a robot file or a `kiks.RobotSpec`.
         robots: Number of robots in each world.
-        seed: Seed of world 0, and the others count up; or a seed for each, int64 [world].
-        starts: Start poses: x_mm, y_mm, heading_rad, float64 [world, robot, 3] or anything that broadcasts to it. Left
-            out, they are those of a simulation with the world's seed.
+        seed: Seed of world 0, from which the other seeds count up; or a seed for each world, int64 [world].
+        starts: Start poses: x_mm, y_mm, heading_rad, float64 [world, robot, 3] or anything that broadcasts to it; the
+            start poses of a simulation with the world's seed if left out.
         senses: Readings that `reset` and `step` return: 'proximity', 'ambient' or both. `run` uses its controller's.
-        measures: Measures for step-by-step use: see `values`. `run` has its own.
+        measures: Measures for step-by-step use, see `values`; `run` has an argument of its own.
         timing: Timing of the control loop.
         response: Response of the proximity sensors, if not that of the robots' files.
-        threads: How many threads; the number of cores if left out. Results do not depend on it.
+        threads: Number of threads; the number of cores if left out. Results do not depend on it.
 
     Attributes:
-        notes: What the measures have noted step by step, one after the other, float64 [world, robot, note].
+        notes: State slots of the measures for step-by-step use, float64 [world, robot, note].
 
     Raises:
         ParameterError: If an argument is out of range or a start is not free.
@@ -101,20 +101,20 @@ class Batch:
         self.timing = Timing() if timing is None else timing
         if not isinstance(self.timing, Timing):
             raise ParameterError(f"timing must be a kiks.Timing, but it was {shown(timing)}.")
-        self._beginning = beginning = Beginning(arena, worlds, robot, robots, response)
-        self.arenas, self.arena_indices = beginning.arenas, beginning.arena_indices
-        self.specs, self.networks = beginning.specs, beginning.networks
-        self.world_count, self.robot_count = beginning.state.robots.shape
+        self._initial_state = initial = InitialState(arena, worlds, robot, robots, response)
+        self.arenas, self.arena_indices = initial.arenas, initial.arena_indices
+        self.specs, self.networks = initial.specs, initial.networks
+        self.world_count, self.robot_count = initial.state.robots.shape
         self.threads = check_count("threads", (os.cpu_count() or 1) if threads is None else threads, 1, 4096)
         self.senses = check_senses(senses)
-        self.state = beginning.state
-        self._lamps = beginning.lamps.copy()
-        self.seeds = beginning.seeds_of(seed)
-        self._starts = beginning.starts_of(self.seeds, starts)
+        self.state = initial.state
+        self._lamps = initial.lamps.copy()
+        self.seeds = initial.seeds_of(seed)
+        self._starts = initial.starts_of(self.seeds, starts)
         widths_mm, heights_mm = zip(*((each.width_mm, each.height_mm) for each in self.arenas), strict=True)
-        self._scene = make_scene(self.state, beginning.kinds, max(widths_mm), max(heights_mm))
+        self._scene = make_scene(self.state, initial.kinds, max(widths_mm), max(heights_mm))
         self._line = self.timing.line(self.specs[0])
-        self._place = Alone if self.robot_count == 1 and not self.state.bodies.size else Together
+        self._place = LonePlace if self.robot_count == 1 and not self.state.bodies.size else CollidingPlace
         self._ticks, self._begins_ns, self._watched_ns, self._sensed_ns, self._steps = (
             np.zeros(self.world_count, np.int64) for _ in range(5)
         )
@@ -123,7 +123,7 @@ class Batch:
         self._watching = MeasureSlots(measures, self.senses, "the batch")
         self.notes = np.zeros((self.world_count, self.robot_count, self._watching.note_count))
         self._is_sensed = False
-        self._begin_again(np.arange(self.world_count))
+        self._reset_worlds(np.arange(self.world_count))
 
     def __repr__(self) -> str:
         robots = counted(self.robot_count, "robot")
@@ -139,14 +139,14 @@ class Batch:
         seconds: float,
         measures: Sequence[Measure] = (),
     ) -> Rollouts:
-        """Let a controller drive all robots from their start on.
+        """Reset all worlds, let a controller drive all robots, and return the values of the measures.
 
         Args:
             controller: The controller.
             parameters: Its parameters: float64 [parameter] for all robots, [world, parameter] for all of a world, or
                 [world, robot, parameter].
-            seconds: No loop begins later than this [s].
-            measures: What is measured.
+            seconds: Simulated time after which no loop begins [s].
+            measures: The measures.
 
         Raises:
             ParameterError: If an argument is out of range, or Numba cannot compile the controller or a measure.
@@ -169,7 +169,7 @@ class Batch:
                 f"parameters must be [parameter], [world, parameter] or [world, robot, parameter] with {shape[0]} "
                 f"worlds and {shape[1]} robots, but their shape was {np.shape(parameters)}."
             ) from None
-        self._begin_again(np.arange(self.world_count))
+        self._reset_worlds(np.arange(self.world_count))
         self._is_sensed = False
         worlds = self._worlds(
             sensors=np.zeros((*shape, controller.sensor_count)),
@@ -179,7 +179,7 @@ class Batch:
         )
         decider = decider_of(controller)
         address = address_of(decider, DECIDER)
-        self._on_all_cores(worlds, controller.senses, (0, EVER), until_ns, address, watching.watchers)
+        self._on_all_cores(worlds, controller.senses, (0, UNLIMITED), until_ns, address, watching.watchers)
         names = tuple(each.name for each in watching.measures)
         return Rollouts(watching.values(worlds.notes), worlds.steps.copy(), names)
 
@@ -192,15 +192,15 @@ class Batch:
         seeds: ArrayLike | None = None,
         starts: ArrayLike | None = None,
     ) -> NDArray[np.float64]:
-        """Put worlds back to their beginning and let their robots sense for the first time.
+        """Reset worlds to their initial state, and let their robots sense for the first time.
 
         Args:
-            worlds: Which: numbers, or a bool for each; all if left out.
-            seeds: New seeds for these worlds, int64 [those worlds].
-            starts: New start poses for them, float64 [those worlds, robot, 3].
+            worlds: Indices of the worlds, or a bool for each world; all if left out.
+            seeds: New seeds of these worlds, int64 [chosen world].
+            starts: New start poses of their robots, float64 [chosen world, robot, 3].
 
         Returns:
-            What all robots of all worlds sensed last, float64 [world, robot, sensor]; a copy.
+            The last readings of all robots of all worlds, float64 [world, robot, sensor]; a copy.
 
         Raises:
             ParameterError: If an argument is out of range or a start is not free.
@@ -218,10 +218,10 @@ class Batch:
                     f"{shown(worlds)}."
                 )
         if seeds is not None:
-            self.seeds[chosen] = self._beginning.check_seeds(seeds, len(chosen))
+            self.seeds[chosen] = self._initial_state.check_seeds(seeds, len(chosen))
         if starts is not None or seeds is not None:
-            self._starts[chosen] = self._beginning.starts_of(self.seeds[chosen], starts, chosen)
-        self._begin_again(chosen)
+            self._starts[chosen] = self._initial_state.starts_of(self.seeds[chosen], starts, chosen)
+        self._reset_worlds(chosen)
         if len(chosen) and (self._is_sensed or worlds is None):
             self._do_halves(0, 1, chosen)
             self._is_sensed = self._is_sensed or worlds is None
@@ -235,10 +235,10 @@ class Batch:
                 +-127 when they are sent.
 
         Returns:
-            What the robots sensed, float64 [world, robot, sensor]; a copy.
+            The readings of the robots, float64 [world, robot, sensor]; a copy.
 
         Raises:
-            ParameterError: If the shape is another, one is no number, or `reset` was not called before.
+            ParameterError: If the shape is wrong, a speed is NaN, or `reset` was not called before.
         """
         given = array_of(wheels)
         if given is None or given.shape != self._wheels.shape:
@@ -258,10 +258,10 @@ class Batch:
     def lamps(self) -> NDArray[np.float64]:
         """The lamps: x_mm, y_mm, power_w, and 1 for on or 0 for off, float64 [world, lamp, 4].
 
-        Write to it to move or switch them; a lamp at a place that is no number is nowhere.
+        Write to the array to move or switch lamps; a lamp with a place of NaN lights nothing.
 
         Raises:
-            ParameterError: If it is set to anything but finite numbers of that shape.
+            ParameterError: If the new value is not an array of finite numbers of that shape.
         """
         return self._lamps
 
@@ -286,30 +286,30 @@ class Batch:
         return self._watching.values(self.notes)
 
     def state_hash(self, world: int) -> str:
-        """Return 16 hexadecimal digits that agree with those of a simulation in the same state.
+        """Return the hash of a world's state, 16 hexadecimal digits; a simulation in the same state has the same hash.
 
         Raises:
             ParameterError: If there is no such world.
         """
         world = check_count("world", world, 0, self.world_count - 1)
         robots: Any = self.state.robots[world : world + 1].copy()
-        # A simulation numbers the kinds of its own robots alone.
+        # A simulation numbers only the kinds of its own robots.
         kinds = robots["kind"][0].tolist()
         robots["kind"] = [list(dict.fromkeys(kinds)).index(kind) for kind in kinds]
         return State(robots, self.state.bodies[world : world + 1], int(self._ticks[world])).hash()
 
     # ---- inside ----
 
-    def _begin_again(self, chosen: NDArray[np.int64]) -> None:
+    def _reset_worlds(self, chosen: NDArray[np.int64]) -> None:
         """Reset worlds to their initial state."""
-        self._beginning.put_back(self.state, chosen, self._starts[chosen])
+        self._initial_state.reset(self.state, chosen, self._starts[chosen])
         for count in (self._ticks, self._begins_ns, self._watched_ns, self._sensed_ns, self._steps):
             count[chosen] = 0
         self.notes[chosen] = 0.0
         enter_worlds(self._scene, chosen)
 
     def _worlds(self, **given: NDArray[np.float64]) -> Any:
-        """Return all worlds as kernels see them."""
+        """Return the kernels' argument for all worlds, with some arrays replaced."""
         nothing = np.zeros((self.world_count, self.robot_count, 0))
         arrays = {"sensors": self._sensors, "memory": nothing, "parameters": nothing, "notes": self.notes} | given
         return Worlds(
@@ -329,10 +329,10 @@ class Batch:
         )
 
     def _do_halves(self, first: int, end: int, chosen: NDArray[np.int64] | None = None) -> None:
-        """Do halves of loops with given speeds: even ones sense, odd ones act."""
+        """Do halves of control loops with the speeds in `_wheels`: even halves sense, odd halves act."""
         watchers = self._watching.watchers
         self._on_all_cores(
-            self._worlds(), self.senses, (first, end), EVER, 0, watchers, chosen=chosen, least=STEP_BLOCK
+            self._worlds(), self.senses, (first, end), UNLIMITED, 0, watchers, chosen=chosen, least=STEP_BLOCK
         )
 
     def _on_all_cores(
@@ -343,21 +343,21 @@ class Batch:
         chosen: NDArray[np.int64] | None = None,
         least: int = LANES,
     ) -> None:
-        """Let threads do `roll_out` on blocks of worlds, of so many worlds at least."""
+        """Run `roll_out` in threads on blocks of at least `least` worlds."""
         codes = np.array([SENSES.index(sense) for sense in senses], np.int64)
         blocks = list(self._blocks(np.arange(self.world_count) if chosen is None else chosen, least))
         left = iter(blocks)
 
-        def work_off() -> None:
+        def work() -> None:
             # Threads take blocks from one list until it is empty: an iterator gives each to one of them.
             for (ground, sight), numbers in left:
                 place = self._place(ground, sight, self.networks, self._line, codes)
                 roll_out(place, worlds, bunch_size(place), numbers, *more)
 
-        helpers = [self._pool.submit(work_off) for _ in range(min(self.threads, len(blocks)) - 1)]
-        work_off()
+        helpers = [self._pool.submit(work) for _ in range(min(self.threads, len(blocks)) - 1)]
+        work()
         for helper in helpers:
-            # One that has not begun by now finds nothing left, and never begins in a forked process.
+            # All blocks are taken. A helper that has not begun has no work, and in a forked process it never begins.
             if not helper.cancel():
                 helper.result()
 
@@ -366,9 +366,9 @@ class Batch:
         return ThreadPoolExecutor(self.threads)
 
     def _blocks(self, chosen: NDArray[np.int64], least: int) -> Iterator[tuple[Any, NDArray[np.int64]]]:
-        """Divide worlds into blocks, each of one arena."""
+        """Yield blocks of worlds: the walls of their common arena, and the indices of the worlds."""
         length = max(-(-len(chosen) // (self.threads * BLOCKS_PER_THREAD)), least)
-        length = -(-length // LANES) * LANES  # all lanes of the processor have a world
+        length = -(-length // LANES) * LANES  # so that no lane is padding
         for index, arena in enumerate(self.arenas):
             walls = (arena.clearance, float(arena.mm_per_cell), PAD), sight_of(arena)
             here = chosen[self.arena_indices[chosen] == index]

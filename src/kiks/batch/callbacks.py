@@ -1,9 +1,9 @@
 """Controllers and measures as the loop of a batch calls them: machine code at an address.
 
-Need: the loop and all of the engine in it take half a minute to compile; a user's controller must not start that anew,
-nor a new choice of measures compile them all again.
-Method: the loop is compiled once for all and lies in the cache. What it calls is compiled by itself: each measure, and
-for a controller a small function around it, which is called once for a whole bunch of worlds.
+Compiling the loop with the whole engine in it takes half a minute. A new controller or another choice of measures must
+not cost that again. So the loop is compiled once, stays in the cache, and calls functions by address. Each measure is
+compiled by itself. For a controller, a small function around it is compiled, which the loop calls once per bunch of
+worlds.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def _array(element: Any, dimensions: int) -> Any:
 _EACH, _ROW, _NUMBER = _array(types.float64, 3), _array(types.float64, 1), types.float64
 
 DECIDER = (_array(types.int64, 1), _array(types.boolean, 1), _EACH, _EACH, _EACH, _EACH)
-"""Types of numbers of worlds [W], which of them take part [W], sensors, memory, parameters and wheels of all worlds."""
+"""Types of indices of worlds [W], their mask [W], and sensors, memory, parameters and wheels of all worlds."""
 
 _MOMENT = (
     *(_NUMBER, _NUMBER, _ROW, _ROW, *(_NUMBER,) * 7, types.boolean),
@@ -47,10 +47,10 @@ call_decider, call_measure = caller_of(DECIDER), caller_of(MEASURE)
 
 @functools.lru_cache(maxsize=256)
 def decider_of(controller: Controller) -> Any:
-    """Return the kernel that calls a controller for all robots of a bunch; its address is good while it lives.
+    """Return the kernel that calls a controller for all robots of a bunch; its address is valid while the kernel lives.
 
     Raises:
-        ParameterError: If it cannot be compiled.
+        ParameterError: If Numba cannot compile the controller.
     """
     decide = controller.kernel
 
@@ -70,10 +70,10 @@ def decider_of(controller: Controller) -> Any:
 
 
 def watchers_of(measures: tuple[Measure, ...]) -> NDArray[np.int64]:
-    """Return for each measure its address, its first note and the one behind its last, int64 [measure, 3].
+    """Return the address of each measure and the range of its notes, int64 [measure, 3]: address, begin, end.
 
     Raises:
-        ParameterError: If one of them cannot be compiled.
+        ParameterError: If Numba cannot compile a measure.
     """
     watchers, begin = np.zeros((len(measures), 3), np.int64), 0
     for each, row in zip(measures, watchers, strict=True):

@@ -1,4 +1,4 @@
-"""The initial state of the worlds of a batch: that of simulations with their seeds."""
+"""The initial state of the worlds of a batch, which is that of simulations with the same seeds."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from kiks.model.robot import RobotSpec
 from kiks.sim.simulation import Simulation, check_kinds
 
 ARENAS_LIMIT = 10_000
-"""Most arenas that worlds share."""
+"""Most arenas of a batch."""
 
 WORLDS_LIMIT = 10_000_000
 """Most worlds in a batch: their robots alone would fill the memory of any computer."""
@@ -33,16 +33,16 @@ def _listed(arenas: object) -> object:
 
 
 Arenas = Annotated[tuple[AnArena, ...], BeforeValidator(_listed), Field(min_length=1, max_length=ARENAS_LIMIT)]
-"""Arenas that worlds take in turn; one alone may be given as it is."""
+"""Arenas that worlds take in turn; a single arena needs no list."""
 
 Starts = Annotated[str, OneOf(("random", "arena"))]
 """Where robots start: at random places, or where the arena puts them."""
 
 
-class Beginning:
-    """The state in which the worlds of a batch begin, and how to return to it.
+class InitialState:
+    """The initial state of the worlds of a batch.
 
-    A simulation of each arena is made once; each world of that arena begins as a copy of it.
+    It holds one simulation of each arena; each world of that arena begins as a copy of it.
 
     Args:
         arena: One arena, or several that the worlds take in turn.
@@ -53,12 +53,12 @@ class Beginning:
 
     Attributes:
         arenas: The arenas.
-        arena_indices: Which of them each world has, int64 [world].
+        arena_indices: Index of each world's arena, int64 [world].
         specs: The kinds of robots.
         kinds: Their constants, records of `PARAMETERS`, shape [kind].
-        networks: What their responses need (`kiks.engine.sensing.thesis_networks`).
-        state: A state of so many worlds.
-        lamps: float64 [world, lamp, 4]; worlds of arenas with fewer lamps have some that are off.
+        networks: The tables for their responses (`kiks.engine.sensing.thesis_networks`).
+        state: A state with room for all worlds.
+        lamps: The lamps, float64 [world, lamp, 4]; arenas with fewer lamps are padded with lamps that are off.
 
     Raises:
         ParameterError: If an argument is out of range.
@@ -113,7 +113,7 @@ class Beginning:
         """Return seeds as int64 [count].
 
         Raises:
-            ParameterError: If they are no whole numbers from 0 to 2^63 - 1, or not so many.
+            ParameterError: If they are not `count` whole numbers from 0 to 2^63 - 1.
         """
         try:
             given = np.asarray(seeds)
@@ -127,10 +127,10 @@ class Beginning:
         return given.astype(np.int64)
 
     def seeds_of(self, seed: int | ArrayLike) -> NDArray[np.int64]:
-        """Return a seed for each world: those given, or counted up from one.
+        """Return a seed for each world: the given seeds, or seeds that count up from the given one.
 
         Raises:
-            ParameterError: If they are no seeds, or not as many as there are worlds.
+            ParameterError: If they are not valid seeds, one for each world.
         """
         world_count = len(self.arena_indices)
         if isinstance(seed, int | np.integer) and 0 <= seed < 2**63 - world_count:
@@ -143,15 +143,15 @@ class Beginning:
         starts: ArrayLike | None,
         worlds: NDArray[np.int64] | None = None,
     ) -> NDArray[np.float64]:
-        """Return start poses, float64 [those worlds, robot, 3].
+        """Return start poses, float64 [chosen world, robot, 3].
 
         Args:
             seeds: Seeds of the worlds.
-            starts: Given poses, or anything that broadcasts to them; None for those that simulations would have.
-            worlds: Numbers of the worlds; all if left out.
+            starts: Given poses, or anything that broadcasts to them; None for the start poses of simulations.
+            worlds: Indices of the worlds; all if left out.
 
         Raises:
-            ParameterError: If the shape is another, or a start is not free.
+            ParameterError: If the shape is wrong, or a start is not free.
             ArenaError: If there is no free place for a robot.
         """
         chosen = np.arange(len(self.arena_indices)) if worlds is None else worlds
@@ -174,13 +174,13 @@ class Beginning:
             self._models[self.arena_indices[world]].world.free_space.check_start_poses(poses[k], f"of world {world}")
         return poses
 
-    def put_back(self, state: State, worlds: NDArray[np.int64], starts: NDArray[np.float64]) -> None:
+    def reset(self, state: State, worlds: NDArray[np.int64], starts: NDArray[np.float64]) -> None:
         """Reset worlds of a state to their initial state.
 
         Args:
             state: The state; changed in place.
-            worlds: Numbers of the worlds.
-            starts: Where their robots start, float64 [those worlds, robot, 3].
+            worlds: Indices of the worlds.
+            starts: Start poses of their robots, float64 [chosen world, robot, 3].
         """
         for index, model in enumerate(self._models):
             here = worlds[self.arena_indices[worlds] == index]
@@ -201,10 +201,10 @@ class Beginning:
 def _kinds_of(
     robot: str | RobotSpec | Sequence[Any], worlds: int, robots: int, response: str | None
 ) -> list[tuple[RobotSpec, ...]]:
-    """Return the robots of each world, or of all of them in one row.
+    """Return the kinds of the robots, one row for each world, or one row for all worlds.
 
     Raises:
-        ParameterError: If they are no kinds, or not as many as there are worlds or robots.
+        ParameterError: If one is no kind, or their number is not that of the worlds or robots.
     """
 
     def spec_of(kind: Any) -> RobotSpec:
@@ -216,7 +216,7 @@ def _kinds_of(
         if isinstance(row, str | RobotSpec):
             return (spec_of(row),) * robots
         if not isinstance(row, Sequence):
-            raise ParameterError(f"robot must name the robots of each world, but for one it was {shown(row)}.")
+            raise ParameterError(f"robot must name the robots of each world, but one of its entries was {shown(row)}.")
         if len(row) != robots:
             raise ParameterError(f"robot must name {robots} robots for a world, but it named {len(row)}.")
         return tuple(spec_of(each) for each in row)
@@ -235,17 +235,17 @@ def _kinds_of(
 def random_starts(
     arena: Arena, count: int, *, seed: int, radius_mm: float = 27.5, clear_mm: float = 5.0
 ) -> NDArray[np.float64]:
-    """Return free poses in an arena, evenly spread over it at random, float64 [count, 3]: x_mm, y_mm, heading_rad.
+    """Return random free poses, uniformly distributed over an arena, float64 [count, 3]: x_mm, y_mm, heading_rad.
 
     Args:
         arena: The arena.
-        count: How many.
-        seed: Seed of the choice.
+        count: Number of poses.
+        seed: Seed of the random generator.
         radius_mm: Radius of the robot [mm].
-        clear_mm: How far its edge must be from walls, balls and cylinders [mm].
+        clear_mm: Least distance of its edge from walls, balls and cylinders [mm].
 
     Raises:
-        ParameterError: If there is hardly a free place.
+        ParameterError: If the arena has too few free places.
     """
     rng = np.random.default_rng(seed)
     poses: list[NDArray[np.float64]] = []

@@ -1,4 +1,4 @@
-"""The arguments of a batch's kernels: all its worlds, and the place of a block of them."""
+"""The arguments of a batch's kernels: all its worlds, and what the worlds of a block share."""
 
 from __future__ import annotations
 
@@ -30,27 +30,27 @@ Worlds: Any = namedtuple(
 * seeds: int64 [world];
 * ticks: ticks done, int64 [world];
 * begins_ns: when the present loop began [ns], int64 [world];
-* watched_ns: when measures last looked [ns], int64 [world];
+* watched_ns: when measures were last called [ns], int64 [world];
 * sensed_ns: when the last reply of the present loop had arrived [ns], int64 [world];
 * steps: loops done, int64 [world];
-* sensors: what was sensed last, float64 [world, robot, sensor];
-* wheels: speeds that were sent last [pulses/10 ms], float64 [world, robot, 2];
-* memory: of the controllers, float64 [world, robot, number];
-* parameters: of the controllers, float64 [world, robot, number];
-* notes: of the measures, float64 [world, robot, note].
+* sensors: the last readings, float64 [world, robot, sensor];
+* wheels: the last sent speeds [pulses/10 ms], float64 [world, robot, 2];
+* memory: memory of the controllers, float64 [world, robot, number];
+* parameters: parameters of the controllers, float64 [world, robot, number];
+* notes: state slots of the measures, float64 [world, robot, note].
 """
 
-Together: Any = namedtuple("Together", ("ground", "sight", "networks", "line", "sense_codes"))
-"""The place of a block of worlds in which things may collide.
+CollidingPlace: Any = namedtuple("CollidingPlace", ("ground", "sight", "networks", "line", "sense_codes"))
+"""What the worlds of a block share, if things in them may collide.
 
 * ground, sight: the walls as contact and as rays see them (`kiks.sim.world`);
-* networks: what responses of the sensors need (`kiks.engine.sensing.thesis_networks`);
+* networks: the tables for the responses of the sensors (`kiks.engine.sensing.thesis_networks`);
 * line: the serial lines (`kiks.batch.loop_timing.Line`);
-* sense_codes: what is sensed, `PROXIMITY` or `AMBIENT`, int64 [sense].
+* sense_codes: the senses, `PROXIMITY` or `AMBIENT`, int64 [sense].
 """
 
-Alone: Any = namedtuple("Alone", ("ground", "sight", "networks", "line", "sense_codes"))
-"""The place of a block of worlds with one robot each and nothing else that moves."""
+LonePlace: Any = namedtuple("LonePlace", ("ground", "sight", "networks", "line", "sense_codes"))
+"""What the worlds of a block share, if each holds one robot and nothing else that moves."""
 
 PROXIMITY, AMBIENT = 0, 1
 """Senses in the order of `kiks.control.controller.SENSES`."""

@@ -1,7 +1,7 @@
-"""Worlds of one robot each and nothing else that moves, eight at once in the lanes of the processor.
+"""The stepper for worlds with one robot and nothing else that moves: eight worlds at once, one per lane.
 
-What these functions do is said in `kiks.batch.stepper_dispatch`. Here a bunch holds the records of eight robots, their
-constants for moving and for sensing, which kinds they are, the seeds of their worlds, and room for a number of each.
+`kiks.batch.stepper_dispatch` documents these functions. A bunch holds the records of eight robots, their constants for
+moving and for sensing, the numbers of their kinds, the seeds of their worlds, and a buffer of one number per lane.
 """
 
 from __future__ import annotations
@@ -28,21 +28,22 @@ def take(place: Any, worlds: Any, numbers: Any) -> Any:
     """Copy the robots of eight worlds into lanes."""
     robots, _, kinds, _ = worlds.scene
     eight, constants, senses = np.empty(1, EIGHT), np.empty(1, EIGHT_KINDS), np.empty(1, EIGHT_SENSES)
-    which, seeds, room = np.empty(LANES, np.int64), np.empty(LANES, np.int64), np.empty(LANES)
+    kind_numbers, seeds, buffer = np.empty(LANES, np.int64), np.empty(LANES, np.int64), np.empty(LANES)
     for k in range(LANES):
         robot = robots[numbers[k], 0]
-        which[k], seeds[k] = robot.kind, worlds.seeds[numbers[k]]
+        kind_numbers[k], seeds[k] = robot.kind, worlds.seeds[numbers[k]]
         load_lane(eight[0], k, robot)
-        load_lane(constants[0], k, kinds[which[k]])
-        load_lane(senses[0], k, kinds[which[k]])
+        load_lane(constants[0], k, kinds[kind_numbers[k]])
+        load_lane(senses[0], k, kinds[kind_numbers[k]])
         eight[0].tick_count[k] = worlds.ticks[numbers[k]]
-    return numbers, eight, constants, senses, which, seeds, room
+    return numbers, eight, constants, senses, kind_numbers, seeds, buffer
 
 
 @kernel
 def give_back(place: Any, worlds: Any, bunch: Any) -> Any:
-    """Copy the robots back; a padding world is written unchanged."""
+    """Copy the robots back."""
     numbers, eight = bunch[0], bunch[1]
+    # Backwards: padding repeats the last world, so the first of its lanes, which took part, is written last.
     for k in range(LANES - 1, -1, -1):
         store_lane(eight[0], k, worlds.scene[0][numbers[k], 0])
         worlds.ticks[numbers[k]] = np.int64(eight[0].tick_count[k])
@@ -50,23 +51,23 @@ def give_back(place: Any, worlds: Any, bunch: Any) -> Any:
 
 @kernel
 def pass_to(place: Any, worlds: Any, bunch: Any, times_ns: Any) -> Any:
-    """Do the ticks that have begun up to a time of each world."""
-    _, eight, constants, _, _, seeds, room = bunch
+    """Do the ticks that have begun before the time of each world."""
+    _, eight, constants, _, _, seeds, buffer = bunch
     for k in range(LANES):
-        room[k] = -(-times_ns[k] // TICK_NS)
-    advance_eight(open_record8(eight[0]), open_record8(constants[0]), place.ground, load_words(seeds), load(room))
+        buffer[k] = -(-times_ns[k] // TICK_NS)
+    advance_eight(open_record8(eight[0]), open_record8(constants[0]), place.ground, load_words(seeds), load(buffer))
 
 
 @kernel
 def read(place: Any, worlds: Any, bunch: Any, code: Any, times_ns: Any, robot: Any, counts: Any) -> Any:
-    """Let the eight robots read their sensors."""
-    numbers, eight, _, senses, which, seeds, room = bunch
+    """Read a sense of the eight robots."""
+    numbers, eight, _, senses, kind_numbers, seeds, buffer = bunch
     if code == PROXIMITY:
         for k in range(LANES):
-            room[k] = times_ns[k]
+            buffer[k] = times_ns[k]
         eights = open_record8(eight[0]), open_record8(senses[0])
         kinds, networks = worlds.scene[2], place.networks
-        read_eight(*eights, which, kinds, place.sight, networks, load(room), load_words(seeds), counts)
+        read_eight(*eights, kind_numbers, kinds, place.sight, networks, load(buffer), load_words(seeds), counts)
         return
     for k in range(LANES):
         world = numbers[k]
@@ -78,7 +79,7 @@ def read(place: Any, worlds: Any, bunch: Any, code: Any, times_ns: Any, robot: A
 
 @kernel
 def command(place: Any, bunch: Any, k: Any, robot: Any, left: Any, right: Any) -> Any:
-    """Set a robot's speeds."""
+    """Set the speeds of a robot."""
     command_speed(one_of(open_record8(bunch[1][0]), k), left, right)
 
 

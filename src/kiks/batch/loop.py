@@ -1,7 +1,7 @@
-"""The control loop of a batch: sense, decide, act, measure, wait; for a bunch of worlds at once.
+"""The control loop of a batch, for a bunch of worlds at once: sense, decide, act, measure, wait.
 
-The instants of a loop are those of a program on serial lines (`kiks.batch.loop_timing`). At each of them the batch acts
-like a `kiks.Simulation`: it does the ticks that have begun, then the robot reads its sensors or executes a command.
+The instants of a loop are those of a program on serial lines (`kiks.batch.loop_timing`). At each instant
+the batch does what a `kiks.Simulation` does: first the ticks that have begun, then the reading or the command.
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ from kiks.model.robot import SENSOR_COUNT
 from kiks.units import NS_PER_S
 
 STATE_SIZE = 8
-"""Numbers in which a robot's part of a `Moment` is handed to those who watch."""
+"""Numbers of a `Moment` that `show` writes: the poses and contacts of a robot."""
 
-_READINGS = LANES * SENSOR_COUNT  # sizes of stack arrays must be constants of their own
+_READINGS = LANES * SENSOR_COUNT  # the size of a stack array must be a constant
 
 
 @spliced
 def sense(place: Any, worlds: Any, bunch: Any, numbers: Any, is_on: Any, times_ns: Any, counts: Any) -> Any:
-    """Let the programs ask all robots for all that they sense, and wait for their replies.
+    """Read all senses of all robots, and note when the last reply has arrived.
 
     Args:
-        place: Where the worlds are.
+        place: What the worlds of the block share.
         worlds: All worlds.
-        bunch: Those that are done at once.
-        numbers: Their numbers, int64 [W].
-        is_on: Which of them take part, bool [W].
-        times_ns: Room for a time of each, int64 [W].
-        counts: Room for a reading of each, int64 [W, 8].
+        bunch: The worlds that are stepped at once.
+        numbers: Their indices, int64 [W].
+        is_on: Their mask, bool [W].
+        times_ns: Buffer for the time of each world [ns], int64 [W].
+        counts: Buffer for a reading of each world, int64 [W, 8].
     """
     robot_count = worlds.sensors.shape[1]
     for k in range(numbers.shape[0]):
@@ -64,10 +64,10 @@ def sense(place: Any, worlds: Any, bunch: Any, numbers: Any, is_on: Any, times_n
 
 @spliced
 def act(place: Any, worlds: Any, bunch: Any, numbers: Any, is_on: Any, times_ns: Any) -> Any:
-    """Let the programs send all robots their speeds, and note when the next loop begins; arguments as for `sense`.
+    """Set the speeds of all robots, and note when the next loop begins; arguments as for `sense`.
 
-    The shorter a command the sooner it acts, and each must find its world as those before have left it. In `times_ns`
-    stands in the end when the last one acted.
+    A shorter command acts sooner, so the commands of a world act in the order of their lengths. At the end, `times_ns`
+    holds the time at which the last command of each world acted.
     """
     line, wheels = place.line, worlds.wheels
     for k in range(numbers.shape[0]):
@@ -79,12 +79,12 @@ def act(place: Any, worlds: Any, bunch: Any, numbers: Any, is_on: Any, times_ns:
     for turn in range(wheels.shape[1]):
         for k in range(numbers.shape[0]):
             if is_on[k]:
-                length = length_for(wheels, numbers[k], in_turn(wheels, numbers[k], turn))
+                length = command_length(wheels, numbers[k], robot_at_turn(wheels, numbers[k], turn))
                 times_ns[k] = acts_at(line, worlds.sensed_ns[numbers[k]], length)
         pass_to(place, worlds, bunch, times_ns)
         for k in range(numbers.shape[0]):
             if is_on[k]:
-                robot = in_turn(wheels, numbers[k], turn)
+                robot = robot_at_turn(wheels, numbers[k], turn)
                 left, right = wheels[numbers[k], robot, 0], wheels[numbers[k], robot, 1]
                 command(place, bunch, k, robot, np.int64(left), np.int64(right))
     for k in range(numbers.shape[0]):
@@ -96,8 +96,8 @@ def act(place: Any, worlds: Any, bunch: Any, numbers: Any, is_on: Any, times_ns:
 
 
 @spliced
-def settle(place: Any, worlds: Any, bunch: Any, numbers: Any, times_ns: Any) -> Any:
-    """Let time pass up to the beginning of the next loop, and end the bunch; arguments as for `sense`."""
+def finish_bunch(place: Any, worlds: Any, bunch: Any, numbers: Any, times_ns: Any) -> Any:
+    """Do the ticks before the next loop, and write the bunch back; arguments as for `sense`."""
     for k in range(numbers.shape[0]):
         times_ns[k] = worlds.begins_ns[numbers[k]]
     pass_to(place, worlds, bunch, times_ns)
@@ -105,20 +105,20 @@ def settle(place: Any, worlds: Any, bunch: Any, numbers: Any, times_ns: Any) -> 
 
 
 @kernel
-def length_for(wheels: Any, world: Any, robot: Any) -> Any:
-    """Return the characters of the command that gives a robot its speeds."""
+def command_length(wheels: Any, world: Any, robot: Any) -> Any:
+    """Return the number of characters of the command that sets the speeds of a robot."""
     return order_length(np.int64(wheels[world, robot, 0]), np.int64(wheels[world, robot, 1]))
 
 
 @kernel
-def in_turn(wheels: Any, world: Any, turn: Any) -> Any:
+def robot_at_turn(wheels: Any, world: Any, turn: Any) -> Any:
     """Return the index of the robot with the `turn`-th shortest command; ties by index."""
     robot_count = wheels.shape[1]
     if robot_count > 1:
         for robot in range(robot_count):
-            length, before = length_for(wheels, world, robot), 0
+            length, before = command_length(wheels, world, robot), 0
             for other in range(robot_count):
-                other_length = length_for(wheels, world, other)
+                other_length = command_length(wheels, world, other)
                 before += other_length < length or (other_length == length and other < robot)
             if before == turn:
                 return robot
@@ -126,15 +126,15 @@ def in_turn(wheels: Any, world: Any, turn: Any) -> Any:
 
 
 @spliced
-def bunch_up(block: Any, first: Any, numbers: Any, is_on: Any) -> Any:
-    """Choose the worlds of the next bunch; an incomplete bunch is padded with its last world, which is masked."""
+def fill_bunch(block: Any, first: Any, numbers: Any, is_on: Any) -> Any:
+    """Choose the worlds of the next bunch; the last world pads an incomplete bunch, and the mask hides the padding."""
     for k in range(numbers.shape[0]):
         numbers[k] = block[min(first + k, block.shape[0] - 1)]
         is_on[k] = first + k < block.shape[0]
 
 
 @spliced
-def goes_on(worlds: Any, numbers: Any, is_on: Any, until_ns: Any) -> Any:
+def mask_ended(worlds: Any, numbers: Any, is_on: Any, until_ns: Any) -> Any:
     """Mask the worlds of a bunch whose next loop begins at or after a time [ns]; return whether any is left."""
     left = 0
     for k in range(numbers.shape[0]):
@@ -144,19 +144,19 @@ def goes_on(worlds: Any, numbers: Any, is_on: Any, until_ns: Any) -> Any:
 
 
 @spliced
-def look_on(
+def call_measures(
     place: Any, worlds: Any, bunch: Any, numbers: Any, is_on: Any, times_ns: Any, state: Any, watchers: Any
 ) -> Any:
     """Call the measures for the robots of a bunch.
 
     Args:
-        place: Where the worlds are; this and the next ones as for `act`.
+        place: What the worlds of the block share.
         worlds: All worlds.
-        bunch: Those that are done at once.
-        numbers: Their numbers.
-        is_on: Which of them take part.
-        times_ns: When the last command acted.
-        state: Room for where a robot is and has been, float64 [`STATE_SIZE`].
+        bunch: The worlds that are stepped at once.
+        numbers: Their indices, int64 [W].
+        is_on: Their mask, bool [W].
+        times_ns: When the last command of each world acted [ns], int64 [W].
+        state: Buffer for the output of `show`, float64 [`STATE_SIZE`].
         watchers: The measures (`kiks.batch.callbacks.watchers_of`).
     """
     for k in range(numbers.shape[0]):
@@ -191,17 +191,17 @@ def look_on(
 def roll_out(
     place: Any, worlds: Any, size: Any, block: Any, halves: Any, until_ns: Any, decider: Any, watchers: Any
 ) -> Any:
-    """Do loops of the worlds of a block: all that begin before a time, or so many halves of them.
+    """Do control loops, or halves of them, in the worlds of a block.
 
     Args:
-        place: Where the worlds are.
+        place: What the worlds of the block share.
         worlds: All worlds.
-        size: How many of them are done at once.
-        block: Numbers of the worlds, int64 [world].
-        halves: Number of the first half to do, and of the first one not to do: even ones sense, odd ones act.
-        until_ns: The time [ns].
-        decider: Address of what calls a controller for each world of a bunch (`kiks.batch.callbacks`); 0 if the speeds
-            are given.
+        size: Number of worlds in a bunch.
+        block: Indices of the worlds, int64 [world].
+        halves: Number of the first half to do, and of the first one not to do: even halves sense, odd halves act.
+        until_ns: Time at and after which no loop begins [ns].
+        decider: Address of the kernel that calls a controller for each world of a bunch (`kiks.batch.callbacks`); 0 if
+            `worlds.wheels` holds the speeds already.
         watchers: The measures (`kiks.batch.callbacks.watchers_of`).
     """
     place, worlds, watchers = borrowed(place), borrowed(worlds), borrowed(watchers)
@@ -209,11 +209,11 @@ def roll_out(
     is_on, state = stack_booleans(LANES)[:size], stack_floats(STATE_SIZE)
     counts = stack_integers(_READINGS).reshape((LANES, SENSOR_COUNT))[:size]
     for first in range(0, block.shape[0], size):
-        bunch_up(block, first, numbers, is_on)
+        fill_bunch(block, first, numbers, is_on)
         bunch = take(place, worlds, numbers)
         for half in range(halves[0], halves[1]):
             if half % 2 == 0:
-                if not goes_on(worlds, numbers, is_on, until_ns):
+                if not mask_ended(worlds, numbers, is_on, until_ns):
                     break
                 sense(place, worlds, bunch, numbers, is_on, times_ns, counts)
                 if decider != 0:
@@ -221,5 +221,5 @@ def roll_out(
                     call_decider(decider, (numbers, is_on, *given))
             else:
                 act(place, worlds, bunch, numbers, is_on, times_ns)
-                look_on(place, worlds, bunch, numbers, is_on, times_ns, state, watchers)
-        settle(place, worlds, bunch, numbers, times_ns)
+                call_measures(place, worlds, bunch, numbers, is_on, times_ns, state, watchers)
+        finish_bunch(place, worlds, bunch, numbers, times_ns)

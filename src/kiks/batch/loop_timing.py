@@ -1,10 +1,10 @@
-"""When a program that drives robots over serial lines senses and acts: the milliseconds of every exchange.
+"""The timing of a program that drives robots over serial lines, exchange by exchange.
 
-A loop of that program: it sends each sense's command to all its robots and reads all replies; decides; sends each robot
-its speeds and reads the replies; and waits until its period is over, if it is not already.
+In each loop, the program sends the command of each sense to all its robots and reads all replies. It decides, sends
+each robot its speeds and reads the replies. Then it waits until its period is over, if it is not over already.
 
-A command acts when its last character has arrived and been processed; its reply begins then. A character takes 11 bit
-times, so how long a loop takes depends on what the robots say: `n,0,...` is shorter than `n,1023,...`.
+A command acts when its last character has arrived and the robot has processed it; then its reply begins. A character
+takes 11 bit times, so the duration of a loop depends on the replies: `n,0,...` is shorter than `n,1023,...`.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from kiks.model.robot import RobotSpec
 from kiks.units import character_ns, ns_from_s
 
 Line: Any = namedtuple("Line", ("character_ns", "processing_ns", "think_ns", "period_ns", "done_length"))
-"""The timing for kernels: times [ns], and the characters of the reply to D."""
+"""The timing for kernels: times [ns], and the number of characters of the reply to D."""
 
 Baud = Annotated[Whole, Field(ge=110, le=10_000_000, description="The Khepera knows 9600, 19200, 38400 and 57600.")]
 
 Milliseconds = Annotated[Number, Field(ge=0, le=1e6)]
 
 ASK_LENGTH = 2
-"""Characters of a sense's command: its letter and a line feed."""
+"""Number of characters of the command that reads a sense: its letter and a line feed."""
 
 
 @record
@@ -36,10 +36,10 @@ class Timing:
     """The pace of a control loop.
 
     Args:
-        period_s: Time from the beginning of one loop to that of the next [s]; a loop that takes longer is followed by
-            the next one at once.
+        period_s: Time from the beginning of one loop to that of the next [s]; after a loop that takes longer, the next
+            one begins at once.
         baud: Speed of the lines [bit/s]; None for a robot that senses and acts at once, without a line.
-        think_s: What the program needs before each command [s], as thinking 'fixed' has it.
+        think_s: Thinking time of the program before each command [s], like the thinking policy 'fixed'.
 
     Raises:
         ParameterError: If a number is out of range.
@@ -58,7 +58,7 @@ class Timing:
             raise ParameterError(f"period_s must be at least 0.01 without a line, but it was {self.period_s:g}.")
 
     def line(self, spec: RobotSpec) -> Any:
-        """Return what kernels need to know of the line to a robot of a kind."""
+        """Return the timing of the line to a robot of a kind, for kernels."""
         has_line = self.baud is not None
         return Line(
             character_ns(self.baud) if self.baud is not None else 0,
@@ -78,7 +78,7 @@ def digit_count(number: Any) -> Any:
 
 @kernel
 def answer_length(counts: Any) -> Any:
-    """Return the characters of a sense's reply: its letter, a comma before each count, and CR LF."""
+    """Return the number of characters of a sense's reply: its letter, a comma before each count, and CR LF."""
     length = 3 + counts.shape[0]
     for k in range(counts.shape[0]):
         length += digit_count(counts[k])
@@ -87,11 +87,11 @@ def answer_length(counts: Any) -> Any:
 
 @kernel
 def order_length(left: Any, right: Any) -> Any:
-    """Return the characters of `D,left,right` and a line feed."""
+    """Return the number of characters of `D,left,right` and a line feed."""
     return 4 + digit_count(left) + digit_count(right)
 
 
 @kernel
 def acts_at(line: Any, now_ns: Any, length: Any) -> Any:
-    """Return when a command of so many characters acts, if the program begins to think of it now [ns]."""
+    """Return the time at which a command of `length` characters acts, if the program starts thinking now [ns]."""
     return now_ns + line.think_ns + length * line.character_ns + line.processing_ns

@@ -1,4 +1,4 @@
-"""The notes of several measures, and their values."""
+"""State slots of several measures, and their values."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ class MeasureSlots:
     Args:
         measures: The measures.
         senses: Senses of these robots.
-        who: The subject of messages: the object that senses.
+        subject: Subject of messages: the object that senses.
 
     Attributes:
         measures: The measures.
-        note_count: Numbers that all of them keep for each robot.
+        note_count: Number of state slots of all measures together, for each robot.
 
     Raises:
-        ParameterError: If one is no measure, or wants to find other senses.
+        ParameterError: If one is no measure, or needs senses that these robots do not have.
     """
 
-    def __init__(self, measures: Sequence[Measure], senses: Sequence[str], who: str) -> None:
+    def __init__(self, measures: Sequence[Measure], senses: Sequence[str], subject: str) -> None:
         if not isinstance(measures, Sequence):
             raise ParameterError(f"measures must be a list of measures, but they were {shown(measures)}.")
         self.measures = tuple(measures)
@@ -44,22 +44,22 @@ class MeasureSlots:
                 raise ParameterError(
                     f"the measure {shown(each.name)} must find {' and '.join(each.senses)} first among what is "
                     "sensed, but "
-                    f"{who} senses {', '.join(senses)}. Let it sense that, too."
+                    f"{subject} senses {', '.join(senses)}. Let it sense that, too."
                 )
         self._ends = list(accumulate((each.note_count for each in self.measures), initial=0))
         self.note_count = self._ends[-1]
 
     @functools.cached_property
     def watchers(self) -> NDArray[np.int64]:
-        """How the loop of a batch calls them (`kiks.batch.callbacks.watchers_of`).
+        """Addresses and slots of the measures, for the loop of a batch (`kiks.batch.callbacks.watchers_of`).
 
         Raises:
-            ParameterError: If one cannot be compiled.
+            ParameterError: If Numba cannot compile one.
         """
         return watchers_of(self.measures)
 
     def values(self, notes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return what the measures say of notes [world, robot, note], float64 [world, robot, measure]."""
+        """Return the values of the measures for notes [world, robot, note], float64 [world, robot, measure]."""
         values = np.zeros((*notes.shape[:2], len(self.measures)))
         for k, (begin, end) in enumerate(pairwise(self._ends)):
             values[:, :, k] = self.measures[k].result(notes[:, :, begin:end])

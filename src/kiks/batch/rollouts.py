@@ -15,21 +15,21 @@ FIRST = 10
 """Number of robots that a table shows before it summarizes the others."""
 
 DIGITS = 4
-"""Digits that a number has in a table, at least."""
+"""Least number of digits of a number in a table."""
 
 _SUMS = (("mean", np.mean), ("std", np.std), ("min", np.min), ("max", np.max))
 
 
 @dataclass(frozen=True, repr=False)
 class Rollouts:
-    """What came of letting controllers drive.
+    """The results of `Batch.run`.
 
-    Printed, it is a table of the first robots, by their indices in `values`, and of the mean, standard deviation, least
-    and greatest of all; a notebook shows that table, too.
+    `print` and notebooks show a table: the first robots, by their indices in `values`, then the mean, the standard
+    deviation, the minimum and the maximum over all robots.
 
     Attributes:
-        values: What the measures say, float64 [world, robot, measure].
-        step_counts: Control steps done, int64 [world].
+        values: Values of the measures, float64 [world, robot, measure].
+        step_counts: Number of control steps, int64 [world].
         measures: Names of the measures.
 
     Example:
@@ -71,7 +71,7 @@ class Rollouts:
         )
 
     def _table(self) -> tuple[list[str], list[list[str]], list[list[str]]]:
-        """Return the head of the table, the rows of the first robots, and those that sum up all of them."""
+        """Return the head of the table, the rows of the first robots, and the rows with the statistics of all."""
         world_count, robot_count, measure_count = self.values.shape
         index_names = ["world", "robot"] if robot_count > 1 else ["world"]
         steps = np.repeat(self.step_counts, robot_count).astype(np.float64)
@@ -86,13 +86,13 @@ class Rollouts:
         return [*index_names, "steps", *self.measures], rows, sums
 
     def _left_out(self) -> str:
-        """Return as text how many robots the table leaves out."""
+        """Return a text with the number of robots that the table leaves out, or an empty text."""
         count = self.values.shape[0] * self.values.shape[1] - FIRST
         return f"{count} more" if count > 0 else ""
 
 
 def _column(numbers: NDArray[np.float64]) -> tuple[list[str], list[str]]:
-    """Return how the first numbers of a column are shown, and what sums up all of them."""
+    """Return the first numbers of a column and the statistics of all of them, formatted."""
     finite = np.abs(numbers[np.isfinite(numbers)])
     is_whole = bool((finite == np.rint(finite)).all())
     greatest = float(finite.max(initial=0.0))

@@ -1,6 +1,6 @@
-"""Worlds one by one, each with all that meets in it: the steps of the engine for robots in company.
+"""The stepper for worlds in which things may collide: one world at a time.
 
-What these functions do is said in `kiks.batch.stepper_dispatch`. Here a bunch is one world: its scene and its number.
+`kiks.batch.stepper_dispatch` documents these functions. A bunch is one world: its scene and its index.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from kiks.units import TICK_NS
 
 @kernel
 def scene_of(worlds: Any, world: Any) -> Any:
-    """Return the scene of a world alone: world 0 of its own, as in a `kiks.Simulation`."""
+    """Return the scene of one world, which is world 0 in it, as in a `kiks.Simulation`."""
     robots, bodies, kinds, (begins, entries, spots, widest) = worlds.scene
     end = world + 1
     return (
@@ -31,18 +31,18 @@ def scene_of(worlds: Any, world: Any) -> Any:
 
 @kernel
 def take(place: Any, worlds: Any, numbers: Any) -> Any:
-    """Return the scene of a world, and its number."""
+    """Return the scene of a world, and its index."""
     return scene_of(worlds, numbers[0]), numbers[0]
 
 
 @kernel
 def give_back(place: Any, worlds: Any, bunch: Any) -> Any:
-    """Do nothing: the scene is the state itself."""
+    """Do nothing: the scene is a view of the state."""
 
 
 @kernel
 def pass_to(place: Any, worlds: Any, bunch: Any, times_ns: Any) -> Any:
-    """Do the ticks that have begun up to a time."""
+    """Do the ticks that have begun before a time."""
     scene, world = bunch
     ticks = -(-times_ns[0] // TICK_NS) - worlds.ticks[world]
     if ticks > 0:
@@ -52,7 +52,7 @@ def pass_to(place: Any, worlds: Any, bunch: Any, times_ns: Any) -> Any:
 
 @kernel
 def read(place: Any, worlds: Any, bunch: Any, code: Any, times_ns: Any, robot: Any, counts: Any) -> Any:
-    """Let a robot read its sensors."""
+    """Read a sense of a robot."""
     scene, world = bunch
     tick, seed = worlds.ticks[world], worlds.seeds[world]
     if code == PROXIMITY:
@@ -63,7 +63,7 @@ def read(place: Any, worlds: Any, bunch: Any, code: Any, times_ns: Any, robot: A
 
 @kernel
 def command(place: Any, bunch: Any, k: Any, robot: Any, left: Any, right: Any) -> Any:
-    """Set a robot's speeds."""
+    """Set the speeds of a robot."""
     command_speed(bunch[0][0][0, robot], left, right)
 
 
