@@ -180,6 +180,7 @@ def test_numbers_that_are_none_are_shown_so() -> None:
     assert lines[1].split()[3] == "1.000e+12"
 
 
+@pytest.mark.slow
 def test_without_measures_there_are_still_steps() -> None:
     nothing = Rollouts(np.zeros((2, 1, 0)), np.array([3, 4]), ())
     assert repr(nothing) == "<Rollouts: 2 worlds of 1 robot, no measures>"

@@ -12,6 +12,8 @@ from typing import Any
 import pytest
 from tests.at_length import nightly, share
 
+pytestmark = pytest.mark.slow
+
 TOOL = Path(__file__).parents[1] / "tools" / "torture.py"
 
 
@@ -88,27 +90,23 @@ def test_a_few_hostile_bytes() -> None:
     check("--only", "wire", "--cases", "2", "--seed", "11")
 
 
-@pytest.mark.slow
 @pytest.mark.timeout(470)  # campaigns of many cases, in processes of their own
 def test_hostile_cases() -> None:
     check("--only", "files", "--only", "calls", "--only", "messages", "--cases", share("1", "4"), "--seed", "12")
 
 
-@pytest.mark.slow
 @pytest.mark.timeout(470)  # campaigns of many cases, in processes of their own
 def test_files_are_whole() -> None:
     scenes = (f"--only=faults.{scene}" for scene in ("kill_writer", "fill_disk", "no_descriptors"))
     check(*scenes, "--cases", "4", "--seed", "13")
 
 
-@pytest.mark.slow
 @pytest.mark.timeout(470)  # a campaign in processes of its own
 @pytest.mark.parametrize("scene", ["server", pytest.param("desk", marks=nightly)])
 def test_another_process_takes_the_place_of_a_killed_one(scene: str) -> None:
     check("--only", f"faults.kill_{scene}", "--cases", "1", "--seed", "14")
 
 
-@pytest.mark.slow
 @pytest.mark.timeout(470)  # a campaign in processes of its own
 @pytest.mark.parametrize("group", ["serve", pytest.param("session", marks=nightly)])
 def test_robots_answer_while_many_clients_connect(group: str) -> None:

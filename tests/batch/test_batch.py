@@ -60,6 +60,7 @@ def expected() -> list[str]:
     return hashes(make(threads=1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("threads", [2, 5])
 def test_threads_do_not_matter(expected: list[str], threads: int) -> None:
     assert hashes(make(threads=threads)) == expected

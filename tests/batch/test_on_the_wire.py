@@ -62,6 +62,7 @@ def drive_alone(
     return loops, hashes[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "timing",
     [kiks.Timing(0.1, 9600), kiks.Timing(0.0, 9600), kiks.Timing(0.05, 38400, 0.0031)],
@@ -78,6 +79,7 @@ def test_batch_and_wire_agree_to_the_bit(timing: kiks.Timing, controller: kiks.C
         assert (loops, state_hash) == (rollouts.step_counts[world], batch.state_hash(world))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("response", ["thesis", "fast", "standin"])
 def test_every_response_is_that_of_the_wire(response: str) -> None:
     timing = kiks.Timing(0.1, 9600)

@@ -60,6 +60,7 @@ def test_champions_run_and_are_shown(folder: Path, tmp_path: Path) -> None:
     assert "10 loops" in kiks("drive", champion, "--port", "kiks://1", "--seconds", 1).output
 
 
+@pytest.mark.slow
 def test_the_tasks_are_listed() -> None:
     assert "touch nothing" in kiks("evolve", "--list").output
 

@@ -57,6 +57,7 @@ def test_a_schema_is_whole(kind: str) -> None:
     assert '"null"' not in json.dumps(schema)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", GOOD)
 def test_good_files_are_accepted_and_each_broken_key_is_not(kind: str) -> None:
     good = GOOD[kind]

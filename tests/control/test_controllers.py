@@ -69,6 +69,7 @@ def test_linear(feedback: bool) -> None:
     assert abs(expected).min() < 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("hidden", "senses", "feedback"),
     [((6,), "proximity", False), ((), "proximity", True), ((5, 3), BOTH, True)],
@@ -83,6 +84,7 @@ def test_mlp(hidden: tuple[int, ...], senses: Any, feedback: bool) -> None:
     np.testing.assert_allclose(outputs(controller, parameters, sensors), expected, atol=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("time_constant_s", [0.02, 0.4, 5.0])
 def test_ctrnn(time_constant_s: float) -> None:
     controller = kiks.controllers.ctrnn(neurons=3, period_s=0.1, time_constant_s=time_constant_s, senses=BOTH)
@@ -150,6 +152,7 @@ def test_each_parameter_matters(controller: kiks.Controller) -> None:
         parameters[k] -= 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("controller", READY_MADE, ids=lambda each: each.name)
 def test_batch_and_wire_agree(controller: kiks.Controller) -> None:
     arena = kiks.Arena.box(300, 300)

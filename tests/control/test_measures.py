@@ -63,6 +63,7 @@ class Trace:
         return np.hypot(self.places_mm[..., 0] - x_mm, self.places_mm[..., 1] - y_mm)
 
 
+@pytest.mark.slow
 def test_how_far() -> None:
     names = ("path_mm", "net_mm", "straightness", "speed_pulses", "turned_pulses", "final_x_mm", "final_y_mm")
     trace = Trace(*(getattr(kiks.measures, name) for name in names))
@@ -97,6 +98,7 @@ def test_how_well() -> None:
     np.testing.assert_array_equal(trace.values[3], trace.batch.state.robots["contact_count"][:, 0])
 
 
+@pytest.mark.slow
 def test_where() -> None:
     radius_mm = 120.0
     trace = Trace(

@@ -154,6 +154,7 @@ def test_a_notebook_of_another_site_gets_a_partitioned_cookie() -> None:
     assert status(come(**within)) == 403
 
 
+@pytest.mark.slow
 @given(path=st.text(max_size=30).map(lambda text: f"/{text}"), query=st.binary(max_size=30))
 def test_redirect_with_the_cookie_leads_to_the_desk(path: str, query: bytes) -> None:
     answers = come(path=path, query=b"token=a-secret&" + query)

@@ -170,6 +170,7 @@ def test_an_authenticated_connection_does_not_time_out(shown: Shown, monkeypatch
 # ---- an authenticated browser that misbehaves ----
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "frames",
     [
@@ -204,6 +205,7 @@ def test_malformed_websocket_frames_close_the_socket(shown: Shown, said: list[st
     assert not said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "message",
     [

@@ -153,6 +153,7 @@ def test_two_browsers_may_drag_at_once(shown: Shown) -> None:
         pass
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "text",
     [
@@ -200,6 +201,7 @@ def course(sim: kiks.Simulation) -> str:
     return sim.state_hash()
 
 
+@pytest.mark.slow
 def test_fifty_browsers_do_not_change_a_run() -> None:
     alone = course(kiks.Simulation(robots=3, seed=4))
     sim = kiks.Simulation(robots=3, seed=4)

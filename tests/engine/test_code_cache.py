@@ -90,6 +90,7 @@ def damages() -> list[Damage]:
     return whole + [cut(share) for share in (0, 0.001, 0.1, 0.5, 0.999)] + [flipped(seed) for seed in range(20)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", range(len(damages())))
 def test_a_damaged_file_is_thrown_away(number: int, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     call()

@@ -81,6 +81,7 @@ def test_twice_in_one_process(record: str) -> None:
     assert run_record() == record
 
 
+@pytest.mark.slow
 def test_in_another_process(record: str) -> None:
     assert record_of_process() == record
 

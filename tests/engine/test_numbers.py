@@ -76,6 +76,7 @@ def _sample(seed, world, robot, stream, instant, index, axis, count):
 AXES = ("seed", "world", "robot", "stream", "instant", "index")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", range(6), ids=AXES)
 def test_uniform_is_flat_along_each_argument(axis):
     count, bins = 100_000, 100

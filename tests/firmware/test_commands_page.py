@@ -3,12 +3,15 @@
 import runpy
 from pathlib import Path
 
+import pytest
+
 from kiks.firmware.commands import COMMANDS
 from kiks.firmware.tools import SUMMARY
 
 DOCS = Path(__file__).parents[2] / "docs"
 
 
+@pytest.mark.slow
 def test_the_page_is_up_to_date() -> None:
     page = runpy.run_path(str(DOCS / "make_commands.py"))["page"]()
     written = (DOCS / "commands.md").read_text(encoding="utf-8")

@@ -29,6 +29,7 @@ def a_robot(robot: str = "khepera_ii", **changes: object) -> Firmware:
 # ---- lines -----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sizes", [[1000], [1] * 1000, [255, 1, 1, 743], [256, 744], [300, 300, 400]])
 def test_a_line_may_be_as_long_as_the_limit(sizes: list[int]) -> None:
     for length, reply in ((LINE_LIMIT, b"d\r\n"), (LINE_LIMIT + 1, UNKNOWN), (900, UNKNOWN)):
@@ -80,6 +81,7 @@ WRONG = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("line", WRONG)
 def test_an_error_changes_nothing(line: bytes) -> None:
     sim = a_simulation()
@@ -94,6 +96,7 @@ def test_an_error_changes_nothing(line: bytes) -> None:
     assert robot.demo_wakes_ns is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("line", "field", "values"),
     [
@@ -190,6 +193,7 @@ def test_a_turret_gets_numbers_that_fit_64_bits() -> None:
 # ---- tools -----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("letter", "ABCDEFGHIJKLMNOPQRSTUVWXYZ")
 def test_help_for_every_letter(letter: str) -> None:
     names = {command.letter: command.name for command in COMMANDS}

@@ -69,6 +69,7 @@ def answers(kind: str, data: bytes, cuts: list[int]) -> bytes:
     return bytes(output)
 
 
+@pytest.mark.slow
 @settings(max_examples=share(60, 150))
 @given(
     kind=st.sampled_from(["khepera", "khepera_ii"]),
@@ -81,6 +82,7 @@ def test_every_reply_is_allowed(kind: str, pairs: list[tuple[bytes, bytes]], cut
     assert first_violation(re.split(rb"[\r\n]", data), output, has_flash=kind == "khepera_ii") is None
 
 
+@pytest.mark.slow
 @settings(max_examples=20)
 @given(
     pairs=st.lists(st.tuples(st.one_of(COMMANDS, MESSAGES), ENDS), min_size=1, max_size=8),

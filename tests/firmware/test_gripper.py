@@ -424,6 +424,7 @@ def test_it_does_not_matter_how_often_one_looks() -> None:
 # ---- laws ----
 
 
+@pytest.mark.slow
 @settings(max_examples=12)
 @given(seed=st.integers(0, 10_000))
 def test_nothing_overlaps_and_nothing_is_lost(seed: int) -> None:

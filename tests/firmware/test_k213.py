@@ -76,6 +76,7 @@ def test_other_orders_are_a_protocol_error(order: str) -> None:
     assert robot.send(f"T,2,{order}") == "z,Protocol error"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("letter", "ABCDEFGHIJKLMNOPQRSTUVWXYZ")
 def test_no_number_breaks_it(letter: str) -> None:
     firmware = scene().wires[0].firmware
@@ -164,6 +165,7 @@ def test_edges_are_darker() -> None:
     assert image[32] == pytest.approx(0.9 * 235 + 12.75, abs=3)
 
 
+@pytest.mark.slow
 def test_near_is_sharp_and_far_is_blurred() -> None:
     steps = []
     for far in (100, 200, 250, 300, 400, 600, 900, 1700):
@@ -379,6 +381,7 @@ def test_vector_26() -> None:
     assert all(0 <= int(word) <= 255 for word in reply.strip().split(b",")[3:])
 
 
+@pytest.mark.slow
 def test_no_place_is_too_narrow_or_too_wide() -> None:
     rng = np.random.default_rng(2)
     for arena in (kiks.Arena.box(100, 100, wall_mm=0), kiks.Arena.box(3000, 3000), kiks.Arena.default()):

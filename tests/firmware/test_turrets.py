@@ -166,6 +166,7 @@ def test_general_io_minds_its_numbers(call: Any, words: str) -> None:
 # ---- of one's own ----
 
 
+@pytest.mark.slow
 def test_the_example_runs() -> None:
     path = ROOT / "examples" / "turrets" / "compass.py"
     done = subprocess.run([sys.executable, str(path)], capture_output=True, text=True, check=True)

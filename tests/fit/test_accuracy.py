@@ -49,6 +49,7 @@ def card():
     return make_card(load_tables(FOLDER))
 
 
+@pytest.mark.slow
 @needs_data
 def test_the_page_tells_the_truth(card):
     written, found = PAGE.read_text(encoding="utf-8"), page(card)
@@ -92,6 +93,7 @@ def test_the_default_is_true_to_the_real_robot(card):
         assert np.abs(card.half_distances_mm(name, "default") - card.half_distances_mm(name)).max() <= 1.0
 
 
+@pytest.mark.slow
 @needs_data
 def test_the_robot_of_the_file_is_the_one_that_is_found(card):
     """The constants of the robot's file are a minimum of the fit, or as good as one."""
@@ -188,6 +190,7 @@ def test_fit_reads_files_and_writes_a_robot(tmp_path):
     assert RobotSpec.load(tmp_path / "mine.toml").reflection != RobotSpec.load("khepera").reflection
 
 
+@pytest.mark.slow
 def test_networks_are_trained_and_written(tmp_path):
     samples = made_up()
     folder = tmp_path / "samples"

@@ -179,6 +179,7 @@ def test_active_readings():
     assert is_active(np.array([0, 19, 20, 1000, 1001, 1023])).tolist() == [False, False, True, True, False, False]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("radius_mm", [math.inf, 27.0, 3.0])
 @pytest.mark.parametrize("places", sorted(PLACES))
 def test_rays_are_those_of_the_engine(radius_mm, places):

@@ -41,6 +41,7 @@ def random_actions(*shape: int) -> Any:
     return np.random.default_rng(5).uniform(-1, 1, (*shape, 2)).astype(np.float32)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", IDS)
 @pytest.mark.filterwarnings("error")
 def test_environments_pass_the_checks_of_gymnasium(name: str) -> None:
@@ -50,6 +51,7 @@ def test_environments_pass_the_checks_of_gymnasium(name: str) -> None:
     check_env(env.unwrapped)
 
 
+@pytest.mark.slow
 def test_a_module_in_the_name_registers_the_environments() -> None:
     code = "import gymnasium; print(gymnasium.make('kiks.learn.gymnasium_envs:kiks/Avoid-v0').unwrapped)"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
@@ -61,6 +63,7 @@ def test_import_kiks_does_not_import_gymnasium() -> None:
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("missing", "module"), [("gymnasium", "kiks.learn.gymnasium_envs"), ("pettingzoo", "kiks.learn.pettingzoo_env")]
 )

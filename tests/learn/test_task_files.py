@@ -72,6 +72,7 @@ def test_the_digest_depends_on_the_file_and_its_arenas(folder: Path) -> None:
     assert load(folder, text).digest() != first
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "message"),
     [

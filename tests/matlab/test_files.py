@@ -16,7 +16,7 @@ from kiks.model.arena import Arena
 from kiks.model.kad import save_kad
 from kiks.model.project import Project
 
-pytestmark = needs_octave
+pytestmark = [needs_octave, pytest.mark.slow]
 
 BOTH_WAYS = """
 arena = zeros(200, 300);

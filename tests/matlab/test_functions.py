@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from tests.matlab.octave import TOOLBOX, needs_octave, run
 
-pytestmark = needs_octave
+pytestmark = [needs_octave, pytest.mark.slow]
 
 # kiks-behaviour.md: 1.1, 1.2, 1.4, 4.2; and what stands in kMatlab's place for files and real robots.
 NAMES = re.findall(

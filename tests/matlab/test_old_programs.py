@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 from tests.matlab.octave import needs_octave, run
 
-pytestmark = needs_octave
+pytestmark = [needs_octave, pytest.mark.slow]
 
 # ---- programs of one loop, ended by the clock, with conditions on vectors ----
 

@@ -12,7 +12,7 @@ import pytest
 from tests.matlab.octave import GUARD_S, Octave, need_tcp, needs_octave, run
 from tests.matlab.test_functions import NAMES
 
-pytestmark = needs_octave
+pytestmark = [needs_octave, pytest.mark.slow]
 
 # ---- the line ----
 

@@ -148,6 +148,7 @@ def test_hostile_files_are_refused_for_next_to_no_memory(tmp_path: Path, name: s
     assert peak_bytes < 1e6
 
 
+@pytest.mark.slow
 @settings(max_examples=400)
 @given(st.data())
 def test_damaged_files_are_read_or_refused(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:

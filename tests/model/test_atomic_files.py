@@ -149,7 +149,7 @@ def test_a_check_leaves_nothing_and_changes_nothing(tmp_path: Path) -> None:
     assert content(tmp_path) == {}
     (tmp_path / "old").write_text("old")
     check_writable(tmp_path / "old", "--out")
-    with pytest.raises(ParameterError, match=r"--out must name a new file, but .*old' is there"):
+    with pytest.raises(ParameterError, match=r"--out must name a new file, but .*old' exists"):
         check_writable(tmp_path / "old", "--out", is_new=True)
     with pytest.raises(ParameterError, match="ends like no picture"):
         check_picture(tmp_path / "x.nothing")

@@ -74,6 +74,7 @@ def longest_shared(message: str, content: str) -> int:
     return longest
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", KINDS)
 def test_a_damaged_file_ends_in_one_short_line(name: str, tmp_path: Path) -> None:
     write, read = KINDS[name]

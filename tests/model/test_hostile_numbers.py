@@ -113,6 +113,7 @@ def of_simulation(sim: Simulation, h: Any) -> dict[str, Callable[[], Any]]:
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hostile", HOSTILE, ids=NAMES)
 def test_a_simulation_stays_sane(hostile: Any) -> None:
     sim = furnished()
@@ -159,6 +160,7 @@ def of_client(sim: Simulation, h: Any) -> dict[str, Callable[[], Any]]:
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hostile", HOSTILE, ids=NAMES)
 def test_a_client_stays_sane(hostile: Any) -> None:
     sim = furnished()
@@ -220,6 +222,7 @@ def of_batch(batch: kiks.Batch, h: Any) -> dict[str, Callable[[], Any]]:
     }
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(470)  # the first one may compile the batch
 @pytest.mark.parametrize("hostile", HOSTILE, ids=NAMES)
 def test_a_batch_stays_sane(hostile: Any) -> None:
@@ -231,6 +234,7 @@ def test_a_batch_stays_sane(hostile: Any) -> None:
     assert np.isfinite(batch.poses).all()
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(470)  # the first one may compile the batch
 @pytest.mark.parametrize("hostile", HOSTILE, ids=NAMES)
 def test_environments_stay_sane(hostile: Any) -> None:

@@ -215,6 +215,7 @@ def test_files_that_are_none_are_refused(tmp_path):
         load_kad(tmp_path)
 
 
+@pytest.mark.slow
 @settings(max_examples=150)
 @given(st.data())
 def test_damaged_files_are_arenas_or_refused(data):
@@ -268,6 +269,7 @@ def hostile() -> dict[str, bytes]:
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", hostile())
 def test_files_that_would_take_endless_memory_are_refused(name):
     data = encode_kad(Arena.box(150, 120))[:128] + hostile()[name]
@@ -302,6 +304,7 @@ def test_polygons_are_those_of_the_rule_cell_by_cell(corners):
     assert np.array_equal(_polygon(x, y, expected.shape), expected)
 
 
+@pytest.mark.slow
 def test_what_does_not_fit_is_refused(tmp_path):
     with pytest.raises(ArenaError, match=r"Save it as \.kiks"):
         encode_kad(Arena.from_array(np.zeros((200, 200), np.uint8), mm_per_pixel=0.7))

@@ -47,6 +47,7 @@ def open_doors(arena: Arena, columns: int, rows: int, path_mm: int = 120, wall_m
     return frozenset(doors)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", SIZES, ids=str)
 @pytest.mark.parametrize("seed", range(12))
 def test_a_khepera_reaches_every_cell_from_the_start(size, seed):

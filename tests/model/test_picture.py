@@ -38,6 +38,7 @@ def noise(mode: str, width: int, height: int) -> Image.Image:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 def test_a_picture_is_what_its_parts_are(mode: str) -> None:
     whole = noise(mode, 1000, 2300)
@@ -129,6 +130,7 @@ def test_hostile_pictures_are_refused(name: str) -> None:
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.slow
 @on_linux
 def test_hostile_pictures_take_little_memory(tmp_path: Path) -> None:
     for name, data in HOSTILE.items():
@@ -136,6 +138,7 @@ def test_hostile_pictures_take_little_memory(tmp_path: Path) -> None:
     assert memory_of_reading_mb(tmp_path) < 150
 
 
+@pytest.mark.slow
 @on_linux
 def test_large_pictures_take_ten_bytes_a_pixel_at_most(tmp_path: Path) -> None:
     size = (3000, 3000)
@@ -147,6 +150,7 @@ def test_large_pictures_take_ten_bytes_a_pixel_at_most(tmp_path: Path) -> None:
     assert memory_of_reading_mb(tmp_path) < 10 * 9
 
 
+@pytest.mark.slow
 @settings(max_examples=400)
 @given(st.data())
 def test_damaged_pictures_are_read_or_refused(data: st.DataObject) -> None:

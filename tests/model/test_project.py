@@ -73,6 +73,7 @@ def same(one: Project, other: Project) -> bool:
     )
 
 
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(projects())
 def test_files_come_back_as_they_were(project):
@@ -188,6 +189,7 @@ def test_bad_bytes_are_refused(tmp_path):
         Project().save(tmp_path / "none" / "a.kiks")
 
 
+@pytest.mark.slow
 @settings(max_examples=80)
 @given(projects(), st.data())
 def test_damaged_files_are_projects_or_refused(project, data):
@@ -287,6 +289,7 @@ def test_a_robot_without_noise_reads_the_same_again():
     assert not spec.without_noise().is_noisy
 
 
+@pytest.mark.slow
 @settings(max_examples=8)
 @given(st.integers(0, 10**6))
 def test_what_was_moved_is_kept(seed):

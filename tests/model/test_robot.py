@@ -29,6 +29,7 @@ def test_ours_differ_where_the_robots_do() -> None:
     assert first.reset == second.reset
 
 
+@pytest.mark.slow
 def test_a_robot_of_ones_own_drives(tmp_path: Path) -> None:
     path = changed(tmp_path, "pulse_mm = 0.08 ", "pulse_mm = 0.12 ")
     far = kiks.Simulation(kiks.Arena.box(2000, 2000), robot=path)

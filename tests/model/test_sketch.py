@@ -54,6 +54,7 @@ def painted_or_unchanged(draw) -> np.ndarray:
     return sketch.brightness
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(points, points, widths)
 def test_a_line_covers_what_is_near_it(a, b, width):
@@ -172,6 +173,7 @@ def test_what_changes_nothing_is_no_step():
     assert not sketch.can_undo
 
 
+@pytest.mark.slow
 def test_two_hundred_steps_in_a_large_arena_fit_in_memory():
     rng = np.random.default_rng(1)
     noise = rng.integers(0, 2, (1000, 1000)).astype(np.uint8)

@@ -400,6 +400,7 @@ def flooding(client: Client, data: bytes) -> Iterator[list[int]]:
         thread.join(GUARD_S)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("thinking", ["none", "live"])
 @pytest.mark.parametrize("data", [b"H\n", b"x", b"\n", b"\r\n"])
 def test_flooding_client_does_not_delay_others(thinking: str, data: bytes, caplog: pytest.LogCaptureFixture) -> None:

@@ -136,6 +136,7 @@ def test_write_waits_while_the_line_is_full() -> None:
     assert sim.time_s > (60_000 - 2 * 4096) * character_ns(9600) * 1e-9
 
 
+@pytest.mark.slow
 @settings(max_examples=30, derandomize=True)
 @given(st.lists(st.integers(1, 7), min_size=1, max_size=20), st.integers(1, 5))
 def test_reading_in_any_pieces_gives_the_same_bytes_at_the_same_time(pieces: list[int], commands: int) -> None:

@@ -192,6 +192,7 @@ def test_arguments_are_checked() -> None:
             Server(fresh(), {1: []}, speed=speed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", [signal.SIGTERM, signal.SIGINT])
 def test_serve_command(tmp_path: Path, ending: signal.Signals) -> None:
     link = str(tmp_path / "robot")

@@ -90,6 +90,7 @@ def test_threads_sleep_at_once_and_end_in_their_order(run: Run, capsys: pytest.C
     assert capsys.readouterr().out.split() == ["t4", "1.0", "t3", "2.0", "t2", "3.0", "t1", "4.0", "t0", "5.0"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "loop",
     [

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import hypothesis.strategies as st
+import pytest
 from hypothesis import HealthCheck, given, settings
 from tests.at_length import share
 from tests.script import seen
@@ -45,6 +46,7 @@ def run_threads(program: list[Any]) -> tuple[Trace, str]:
     return seen.trace, seen.sim.state_hash()
 
 
+@pytest.mark.slow
 @given(PROGRAMS)
 @settings(max_examples=share(60, 200), derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 def test_threads_do_what_a_plain_simulation_says(program: list[Any]) -> None:

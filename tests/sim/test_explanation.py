@@ -38,6 +38,7 @@ def as_read(why, expected_counts: float) -> float:
     return min(max(steps * why.step_counts, 0), why.maximum_counts)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("response", RESPONSES)
 def test_the_parts_make_the_count(response):
     met = set()
@@ -147,6 +148,7 @@ def test_lengths_and_angles_are_those_of_geometry():
     assert np.isinf(sim.rays(1)).sum() + seen == 56
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("response", RESPONSES)
 def test_views_show_exact_rays_whatever_the_response(response):
     """The table strides; a person sees where rays end. Its wall is at 10 mm from the edge."""

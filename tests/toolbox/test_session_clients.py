@@ -258,6 +258,7 @@ def test_a_new_world_closes_ports_with_an_error(session: Session) -> None:
     assert ask("ask 1 N").startswith("n,")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("request_", ["ask 1 N", "pause 5", "time 1", "pose 1", "close 1", "listen 1"])
 def test_requests_to_a_paused_world_can_be_cancelled(session: Session, request_: str) -> None:
     awaited = AwaitedAnswer()
@@ -338,6 +339,7 @@ def test_two_programs_drive_two_robots_in_one_world(session: Session) -> None:
     assert runs[0] == runs[1] == runs[2]
 
 
+@pytest.mark.slow
 def test_a_client_that_leaves_frees_its_robot(session: Session) -> None:
     first = begun(session)
     first("open 1 9600")
@@ -468,6 +470,7 @@ REFUSED: Sequence[str] = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("request_", REFUSED)
 def test_bad_requests_get_an_error(session: Session, request_: str) -> None:
     ask = begun(session)
@@ -492,6 +495,7 @@ HOSTILE = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", sorted({*REQUESTS, "nothing", "", "x" * 70_000, "\ufffd", "\0"}), ids=lambda name: name[:20]
 )

@@ -82,6 +82,7 @@ class Company:
 # ---- pile-ups ----
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [*range(8), 95, 97])
 def test_things_in_a_pile_up_do_not_overlap(number):
     """In 95 and 97 a robot once pushed a ball 4 mm deep into a post. All 1000: benchmarks/pileups.py."""
@@ -109,6 +110,7 @@ def test_bodies_at_rest_stay_at_rest():
 # ---- bodies alone ----
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "friction"), [("balls", 20.0), ("cylinders", 160.0)])
 @pytest.mark.parametrize("speed", [10.0, 37.0, 170.0, 400.0])
 def test_a_body_rolls_as_far_as_its_friction_lets_it(kind, friction, speed):

@@ -109,6 +109,7 @@ def images(make_world, arena):
     )
 
 
+@pytest.mark.slow
 def test_mirror_and_quarter_turn(make_world, make_random_arena):
     """12 s with contacts stay symmetric; a pinch may decide by a rounding error, but hardly ever does."""
     errors, contacts = [], 0

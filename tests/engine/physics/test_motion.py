@@ -49,6 +49,7 @@ def arc(pose, left, right):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(share(1, 4)))
 def test_thousands_of_ticks_follow_the_closed_form(make_world, seed):
     """Within 1e-6 mm and 1e-9 rad."""
@@ -92,6 +93,7 @@ def test_there_and_back_again(make_world, left, right, heading):
     assert world.pose == pytest.approx((2000.0, 2000.0, heading), rel=0, abs=1e-9)
 
 
+@pytest.mark.slow
 @settings(derandomize=True, max_examples=share(100, 200))
 @given(left=PATHS, right=PATHS, heading=st.floats(-50.0, 50.0), share=st.floats(0.0, 1.0))
 def test_a_moment_within_a_tick_is_where_a_part_of_the_paths_leads(make_world, left, right, heading, share):

@@ -59,6 +59,7 @@ def test_the_published_curve_is_reproduced() -> None:
             assert reading == pytest.approx(published, abs=1.5 + 1e-6)
 
 
+@pytest.mark.slow
 def test_nearer_and_stronger_is_brighter() -> None:
     readings = [dark_room(beside(2, distance)).ambient(1)[2] for distance in np.linspace(0.01, 600, 121)]
     assert np.all(np.diff(readings) >= 0)
@@ -90,6 +91,7 @@ def test_the_angle_curves_are_those_of_the_manual() -> None:
     assert np.mean(np.abs(errors["thesis"])) > 45
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sensor", range(8))
 def test_half_of_the_light_comes_from_within_50_degrees(sensor: int) -> None:
     """khepera-protocol.md 9.2: the half width is about 50 degrees; from 90 on there is nothing."""

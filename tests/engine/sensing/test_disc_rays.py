@@ -75,6 +75,7 @@ def drawn(arena: Arena, discs) -> Arena:
     return Arena(picture, cell, "drawn")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("radius_mm", [10.0, 16.0, 32.0, 100.0])
 @pytest.mark.parametrize("gap_mm", [2.0, 8.0, 20.0])
 def test_a_disc_reads_like_the_same_disc_drawn_as_a_wall(radius_mm, gap_mm):
@@ -88,6 +89,7 @@ def test_a_disc_reads_like_the_same_disc_drawn_as_a_wall(radius_mm, gap_mm):
         assert with_ball.proximity(1) == pytest.approx(with_wall.proximity(1), rel=0.05, abs=15)
 
 
+@pytest.mark.slow
 @settings(derandomize=True, max_examples=share(8, 20))
 @given(draw=st.integers(0, 2**32))
 def test_a_camera_sees_discs_as_it_sees_walls(draw):

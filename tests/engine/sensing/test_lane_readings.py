@@ -92,6 +92,7 @@ def assert_equal_readings(arena, kinds, networks, count, rng):
     return together
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("response", RESPONSES)
 def test_eight_lanes_read_the_same_as_single_robots(make_random_arena, response):
     kinds, networks = kinds_of(response)

@@ -74,6 +74,7 @@ def test_noise_is_small_seldom_large_and_without_bias() -> None:
     assert np.abs(relative.mean()) < 0.004
 
 
+@pytest.mark.slow
 def test_mid_range_noise_stays_at_what_was_measured() -> None:
     """README of the Khepera samples: 26 counts within one reading are an upper bound."""
     gaps_mm = [gap for gap in range(10, 35) if 200 <= expected(KHEPERA, gap)[2] <= 800]

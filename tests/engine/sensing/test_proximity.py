@@ -40,6 +40,7 @@ def test_nothing_near_reads_nothing() -> None:
     assert sim.proximity(1) == [0.0] * 8
 
 
+@pytest.mark.slow
 def test_nearer_is_more_and_the_front_sees_it() -> None:
     rows = np.array([sim.proximity(1) for sim in map(at_wall, np.linspace(60, 0, share(16, 61)))])
     assert np.all(np.diff(rows[:, 1:5], axis=0) >= -1e-9)
@@ -122,6 +123,7 @@ def test_ambient_is_dark() -> None:
     assert len(set(readings)) > 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("response", ["reflection", "fast"])
 def test_readings_from_many_poses_are_those_of_a_robot_that_is_put_there(response: str) -> None:
     sim = kiks.Simulation(kiks.Arena.box(400, 400, wall_mm=0), robots=3, seed=3, response=response)

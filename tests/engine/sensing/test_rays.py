@@ -57,6 +57,7 @@ def check_ray(arena, x, y, angle, reach, length, brightness):
         assert brightness == 0
 
 
+@pytest.mark.slow
 @settings(derandomize=True, max_examples=share(30, 60))
 @given(number=st.integers(0, 300), draw=st.integers(0, 2**32))
 def test_rays_end_where_the_first_wall_begins(make_random_arena, number, draw):
@@ -66,6 +67,7 @@ def test_rays_end_where_the_first_wall_begins(make_random_arena, number, draw):
         check(arena, rng.uniform(1, arena.width_mm - 1), rng.uniform(1, arena.height_mm - 1), rng.uniform(-7, 7))
 
 
+@pytest.mark.slow
 @settings(derandomize=True, max_examples=30)
 @given(number=st.integers(0, 300), draw=st.integers(0, 2**32))
 def test_rays_along_edges_and_diagonals(make_random_arena, number, draw):
@@ -79,6 +81,7 @@ def test_rays_along_edges_and_diagonals(make_random_arena, number, draw):
         check(arena, x, y, rng.integers(8) * math.pi / 4 + rng.uniform(-1e-3, 1e-3))
 
 
+@pytest.mark.slow
 @settings(derandomize=True, max_examples=share(20, 60))
 @given(number=st.integers(0, 300), draw=st.integers(0, 2**32))
 def test_an_additional_wall_never_lengthens_a_ray(make_random_arena, number, draw):
@@ -96,6 +99,7 @@ def test_an_additional_wall_never_lengthens_a_ray(make_random_arena, number, dra
         assert cast(fuller, x, y, angle)[0] <= cast(arena, x, y, angle)[0] + TOLERANCE_MM
 
 
+@pytest.mark.slow
 @settings(derandomize=True, max_examples=30)
 @given(number=st.integers(0, 300), draw=st.integers(0, 2**32), count=st.integers(8, 100))
 def test_rays_in_lanes_are_rays_one_by_one(make_random_arena, number, draw, count):
@@ -117,6 +121,7 @@ def test_rays_in_lanes_are_rays_one_by_one(make_random_arena, number, draw, coun
     assert list(zip(lengths * cell, brightnesses, strict=True)) == alone
 
 
+@pytest.mark.slow
 @settings(derandomize=True, max_examples=share(20, 60))
 @given(number=st.integers(0, 300), draw=st.integers(0, 2**32))
 def test_the_rays_of_a_sensor_end_where_the_first_wall_begins(make_random_arena, number, draw):

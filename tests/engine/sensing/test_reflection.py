@@ -119,6 +119,7 @@ def test_no_reading_leaves_the_converters_range() -> None:
 # ---- more light is more ----
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cell_mm", [0.25, 1.0])
 @pytest.mark.parametrize("sensor", range(SENSOR_COUNT))
 def test_straight_towards_a_wall_a_reading_rises_to_saturation(sensor: int, cell_mm: float) -> None:
@@ -158,6 +159,7 @@ def test_a_brighter_surface_never_reads_less() -> None:
         assert (np.array(rows[-1]) - np.array(rows[0])).max() > 200
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("cell_mm", "tolerance"), [(0.25, 1.0), (1.0, 15.0)])
 def test_a_post_that_grows_never_reads_less(cell_mm: float, tolerance: float) -> None:
     """Each ray meets it nearer and more squarely."""
@@ -188,6 +190,7 @@ def beside_walls(cell_mm: float) -> tuple[np.ndarray, np.ndarray]:
     return away_mm, counts
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cell_mm", [0.25, 1.0])
 def test_posts_and_corners_are_less_than_a_wall_that_is_as_near(cell_mm: float) -> None:
     """Seen from a sensor. What a robot with its sensors inside a surface would read is not asked."""
@@ -226,6 +229,7 @@ def test_nothing_jumps_while_a_robot_turns_past_a_post(cell_mm: float, largest: 
 # ---- how cells lie ----
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("radius_mm", "cell_mm", "largest", "usual"),
     [

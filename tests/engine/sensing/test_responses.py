@@ -137,6 +137,7 @@ def measured_means() -> np.ndarray:
     return np.array([[np.mean(sums[sensor, step]) for step in range(9)] for sensor in range(8)])
 
 
+@pytest.mark.slow
 def test_the_khepera_ii_reads_what_a_real_one_did() -> None:
     try:
         measured = measured_means()

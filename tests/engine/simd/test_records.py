@@ -78,6 +78,7 @@ class Worlds:
             assert self.lanes[name].tobytes() == self.alone[name].tobytes(), name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", range(6))
 @pytest.mark.parametrize(("name", "most"), [("set_speed", 20), ("set_speed", 127), ("set_pwm", 255)])
 def test_drives_are_those_of_robots_alone(make_random_arena, number, name, most):
