@@ -20,6 +20,8 @@ from kiks.engine.state import State
 from kiks.model.arena import PAD
 from kiks.model.robot import RESPONSES, RobotSpec
 
+pytestmark = pytest.mark.slow  # they compile the kernels for eight robots
+
 TICKS = 1000
 NO_LAMPS = np.zeros((0, 4))
 
@@ -92,7 +94,6 @@ def assert_equal_readings(arena, kinds, networks, count, rng):
     return together
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("response", RESPONSES)
 def test_eight_lanes_read_the_same_as_single_robots(make_random_arena, response):
     kinds, networks = kinds_of(response)

@@ -18,6 +18,8 @@ from kiks.model.arena import PAD
 from kiks.model.robot import RobotSpec
 from kiks.units import TICK_NS
 
+pytestmark = pytest.mark.slow  # they compile the kernels for eight robots
+
 KINDS = (
     {},
     {"body__wheel_base_mm": 48.0, "body__diameter_mm": 58.0, "body__wall_friction": 0.1, "motor__left_gain": 0.94},
@@ -78,7 +80,6 @@ class Worlds:
             assert self.lanes[name].tobytes() == self.alone[name].tobytes(), name
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("number", range(6))
 @pytest.mark.parametrize(("name", "most"), [("set_speed", 20), ("set_speed", 127), ("set_pwm", 255)])
 def test_drives_are_those_of_robots_alone(make_random_arena, number, name, most):
