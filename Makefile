@@ -7,6 +7,9 @@ BIN    := $(VENV)/bin
 WORKERS = $(shell $(BIN)/python -c 'import os; print(os.cpu_count() + 1)')
 PYTEST = $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
+# The tests start hundreds of Python processes: Python keeps the bytecode of the modules, whatever the environment says.
+export PYTHONDONTWRITEBYTECODE =
+
 .PHONY: demo test quick nightly checked setup system lint types docs benchmarks clean
 
 demo: setup

@@ -66,6 +66,7 @@ def test_threads_do_not_matter(expected: list[str], threads: int) -> None:
     assert hashes(make(threads=threads)) == expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lanes", [8, 24, 1000])
 def test_blocks_do_not_matter(expected: list[str], monkeypatch: pytest.MonkeyPatch, lanes: int) -> None:
     monkeypatch.setattr(batch_module, "LANES", lanes)

@@ -90,6 +90,7 @@ def test_every_response_is_that_of_the_wire(response: str) -> None:
         assert found == (rollouts.step_counts[world], batch.state_hash(world))
 
 
+@pytest.mark.slow
 def test_one_program_with_three_robots() -> None:
     timing = kiks.Timing(0.1, 19200)
     batch = kiks.Batch(arena(ball=True), worlds=2, robots=3, seed=5, timing=timing)

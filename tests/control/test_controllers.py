@@ -102,6 +102,7 @@ def test_ctrnn(time_constant_s: float) -> None:
     np.testing.assert_allclose(outputs(controller, parameters, sensors), expected, atol=5e-2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("logarithm", [-1000.0, 1000.0])
 def test_ctrnn_of_any_time_constant_stays_in_its_bounds(logarithm: float) -> None:
     controller = kiks.controllers.ctrnn(neurons=3, time_constant_s=0.4)
@@ -116,6 +117,7 @@ def test_exponential_between(x: float) -> None:
     assert exponential_between(x) == pytest.approx(np.exp(np.clip(x, -4, 4)), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_gru() -> None:
     controller = kiks.controllers.gru(units=3)
     parameters = kiks.controllers.random_parameters(controller, 1, seed=4)[0]
@@ -140,6 +142,7 @@ READY_MADE = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("controller", READY_MADE, ids=lambda each: each.name)
 def test_each_parameter_matters(controller: kiks.Controller) -> None:
     assert controller.parameter_count is not None

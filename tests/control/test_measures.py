@@ -80,6 +80,7 @@ def test_how_far() -> None:
     np.testing.assert_allclose(trace.periods_s.sum(axis=1), trace.times_s[:, -1])
 
 
+@pytest.mark.slow
 def test_how_well() -> None:
     following = kiks.measures.wall_following("right", counts=200)
     trace = Trace(kiks.measures.avoidance, following, kiks.measures.touching_share, kiks.measures.contacts)
@@ -189,6 +190,7 @@ def test_scores_lie_between_none_and_one(wheels: tuple[int, int], sensors: list[
         assert 0.0 <= after(measure, now, now) <= 1.0
 
 
+@pytest.mark.slow
 def test_who_shuttles_or_spins_does_not_roam() -> None:
     """Ahead at 64 mm/s for half a minute, the same to and fro, and around on the spot."""
 

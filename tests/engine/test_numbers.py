@@ -88,6 +88,7 @@ def test_uniform_is_flat_along_each_argument(axis):
     assert 45 < chi_square < 175  # 99 degrees of freedom: 5.4 standard deviations to each side
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", range(6), ids=AXES)
 @pytest.mark.parametrize("lag", [1, 2, 8, 64])
 def test_neighbours_do_not_know_each_other(axis, lag):

@@ -6,6 +6,7 @@ import pytest
 from tests.session_player import FOLDER, Pieces, Session, Step, load, play, sessions, simulation
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pieces", ["lines", "bytes", "one write"])
 @pytest.mark.parametrize("session", sessions(), ids=lambda session: session.name)
 def test_session_in_memory(session: Session, pieces: Pieces) -> None:

@@ -20,6 +20,7 @@ def port_at(baud: int) -> SimPort:
     return port
 
 
+@pytest.mark.slow
 @BAUDS
 @pytest.mark.parametrize("command", [b"D,0,0\n", b"N\n", b"H\r", b"B\n", b"M\n", b"T,1,B\n", b"D,5\n"])
 def test_a_single_command(baud: int, command: bytes) -> None:

@@ -226,6 +226,7 @@ def test_scores():
     assert (score.median, score.mean, score.max) == (2.0, 2.0, 3.0)
 
 
+@pytest.mark.slow
 def test_published_formulas():
     """One wall straight ahead of a sensor that looks at it: the formulas' own values."""
     wall = Samples("wall", math.inf, np.array([0.0]), np.array([[-45.0]]), np.zeros((1, 1, 8), np.int64))

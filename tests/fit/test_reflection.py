@@ -48,6 +48,7 @@ def made_up():
     return spec, rigs, tables
 
 
+@pytest.mark.slow
 def test_a_robot_and_its_rig_are_found(made_up):
     spec, rigs, tables = made_up
     found = fit_reflection(tables, BASE)

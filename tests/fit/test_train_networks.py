@@ -58,6 +58,7 @@ def error_of(network, inputs, counts):
     return float(np.mean(np.abs(network(inputs) - counts)))
 
 
+@pytest.mark.slow
 def test_training_reduces_the_error():
     inputs, counts = made_up()
     layers = train_networks.SIZES[train_networks.THESIS_SIZE]
@@ -70,6 +71,7 @@ def test_training_reduces_the_error():
     assert error_of(thesis, inputs, counts) < 0.5 * error_of(linear, inputs, counts)
 
 
+@pytest.mark.slow
 def test_the_same_seed_trains_the_same_network():
     inputs, counts = made_up(150)
     one, two, other = (
@@ -86,6 +88,7 @@ def test_too_few_samples():
         train_networks.train(np.zeros((9, 7)), np.zeros(9), train_networks.SIZES["7 linear"], seed=0)
 
 
+@pytest.mark.slow
 def test_sensors_are_trained_on_samples_and_saved(tmp_path):
     angles = np.tile(np.arange(0.0, 360.0, 10.0), (5, 1))
     counts = np.random.default_rng(0).integers(0, 1024, (5, 36, 8))

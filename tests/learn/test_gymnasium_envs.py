@@ -73,6 +73,7 @@ def test_the_error_names_a_missing_package(missing: str, module: str) -> None:
     assert "pip install '.[learn]'" in found.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["kiks/Avoid-v0", "kiks/Maze-v0"])
 def test_single_and_vector_environments_have_the_same_episodes(name: str) -> None:
     many = gymnasium.make_vec(name, num_envs=9, max_episode_steps=7, threads=2)

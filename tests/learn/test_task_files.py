@@ -105,6 +105,7 @@ def test_wrong_files_are_errors_of_one_short_line(text: str, message: str, folde
     assert len(str(caught.value).replace(str(folder), "")) < 400
 
 
+@pytest.mark.slow
 def test_an_evolution_resumes_only_with_the_same_task_file(folder: Path) -> None:
     pytest.importorskip("pyarrow")
     text = 'base = "avoid"\nseconds = 0.5\nworlds = 1\narenas = ["room.toml"]\n'

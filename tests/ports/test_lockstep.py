@@ -360,6 +360,7 @@ def test_program_with_four_ports_costs_one_patience() -> None:
                 assert port.ask(b"N\n").startswith(b"n,")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("thinking", ["none", "live"])
 def test_dead_client_does_not_delay_others(thinking: str, caplog: pytest.LogCaptureFixture) -> None:
     with clients(thinking=thinking) as (run, (one, dying), wall):

@@ -157,6 +157,7 @@ def in_every_order(programs: Sequence[Steps]) -> Iterator[Log]:
         path[-1] += 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "programs",
     [

@@ -85,6 +85,7 @@ def test_a_thing_comes_and_goes_and_keeps_its_number(sim):
     assert sim.bodies()[["number", "x_mm"]].tolist() == [(2, 200.0), (3, 100.0)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("act", "words"),
     [

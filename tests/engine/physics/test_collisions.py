@@ -93,6 +93,7 @@ def test_things_in_a_pile_up_do_not_overlap(number):
     assert moved <= SHOVED_MM
 
 
+@pytest.mark.slow
 def test_bodies_at_rest_stay_at_rest():
     """Once the last body has stopped, not a bit of a place changes."""
     pile = Pile.make(5)

@@ -72,6 +72,7 @@ def test_thousands_of_ticks_follow_the_closed_form(make_world, seed):
     assert world.robot["wheel_pulses"] == pytest.approx(paths.sum(axis=0), abs=1e-6)
 
 
+@pytest.mark.slow
 def test_power_follows_the_closed_form_of_the_lag(make_world):
     """A step of power: w(t) = u (1 - exp(-t/T)), path u (t - T (1 - exp(-t/T))) (khepera-protocol.md 6.4)."""
     world = make_world(FLOOR).place(2000.0, 2000.0)
@@ -85,6 +86,7 @@ def test_power_follows_the_closed_form_of_the_lag(make_world):
         assert world.pose[2] == pytest.approx((path[1] - path[0]) * PULSE / BASE, abs=1e-9)
 
 
+@pytest.mark.slow
 @settings(derandomize=True, max_examples=share(100, 200))
 @given(left=PATHS, right=PATHS, heading=st.floats(-50.0, 50.0))
 def test_there_and_back_again(make_world, left, right, heading):

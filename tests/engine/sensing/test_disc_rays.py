@@ -184,6 +184,7 @@ def test_a_lifted_thing_is_neither_seen_nor_hit():
     assert lifted.contacts(1) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["robot", "ball", "cylinder"])
 def test_robots_balls_and_cylinders_hide_lamps(what):
     """A lamp is hidden from a sensor if the straight line to it leads through a disc, and only then."""

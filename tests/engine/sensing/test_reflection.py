@@ -134,6 +134,7 @@ def test_straight_towards_a_wall_a_reading_rises_to_saturation(sensor: int, cell
     assert 17 < gaps_mm[np.argmax(counts > 511)] < 29
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("radius_mm", [12.0, 27.0])
 @pytest.mark.parametrize("cell_mm", [0.25, 1.0])
 def test_straight_towards_a_post_too(cell_mm: float, radius_mm: float) -> None:
@@ -279,6 +280,7 @@ def normals(arena: Arena) -> tuple[np.ndarray, np.ndarray]:
     return places[inner], unpack_faces(arena.faces)[row[inner], column[inner], :2]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cell_mm", [0.25, 1.0])
 @pytest.mark.parametrize("radius_mm", [6.0, 12.0, 27.0])
 def test_normals_of_a_disc_point_to_its_middle(radius_mm: float, cell_mm: float) -> None:
