@@ -60,7 +60,7 @@ def half_distances_mm(spec: kiks.RobotSpec, hidden: kiks.RobotSpec) -> list[floa
 
 
 class ByHand(SimPlacements):
-    """Somebody who takes care, but has no better eyes than others."""
+    """A careful person with ordinary eyes."""
 
     def __init__(self, sim: kiks.Simulation, seed: int) -> None:
         super().__init__(sim)

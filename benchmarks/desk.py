@@ -9,8 +9,8 @@ second, without a GPU, on this computer, which it shares with the server; `desk.
 socket.
 
 `desk.slowdown_percent` is what an open desk takes off the speed of a simulation at full acceleration: a program follows
-a wall at 9600 baud through the port in memory, with and without a desk to which somebody listens who acknowledges each
-frame; both take turns, and it is the median of the ratios. `desk.slowdown_20_percent` is the same in a world of 20
+a wall at 9600 baud through the port in memory, with and without a desk whose client acknowledges each frame; both take
+turns, and it is the median of the ratios. `desk.slowdown_20_percent` is the same in a world of 20
 robots. `desk.first_picture_s` is the time from the command `kiks desk` to the first picture on the screen, warm.
 """
 

@@ -1,9 +1,9 @@
 """Pile-ups by the thousand: 8 robots, 8 balls and 8 cylinders in a box, 60 s each, and the worst of every tick of them.
 
 Run: python benchmarks/pileups.py [--count 1000] [--jobs 2] [--json]. Robots go at full speed and change their minds now
-and then for 50 s; then they are switched off, and all bodies roll out from up to 1 m/s. Exit code 1: somebody was
-deeper in somebody else or in a wall than 0.5 mm, bodies gained energy, or a robot that was switched off went farther
-than its share of what was left of an overlap. The oracle is `tests/piles.py`.
+and then for 50 s; then they are switched off, and all bodies roll out from up to 1 m/s. Exit code 1: a disc overlapped
+another one or a wall by more than 0.5 mm, bodies gained energy, or a robot that was switched off went farther than its
+share of the rest of an overlap. The oracle is `tests/piles.py`.
 """
 
 from __future__ import annotations

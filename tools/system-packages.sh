@@ -1,7 +1,7 @@
 #!/bin/sh
 # What KiKS needs of the system: Python's venv module, and for the tests a C compiler (a robot is driven from C),
-# Chromium (the desk is used in a real browser), Octave (the toolbox) and a screen that nobody sees (programs with
-# windows): system-packages.sh [tests].
+# Chromium (the desk is used in a real browser), Octave (the toolbox) and a virtual screen (programs with windows):
+# system-packages.sh [tests].
 # As root on Debian this installs what is missing; otherwise it names it.
 set -eu
 

@@ -83,13 +83,13 @@ def test_a_world_is_the_same_among_others_and_alone(expected: list[str]) -> None
         assert alone.state_hash(0) == expected[world]
 
 
-def test_running_again_begins_again(expected: list[str]) -> None:
+def test_a_second_run_starts_from_the_initial_state(expected: list[str]) -> None:
     batch = make(threads=1)
     hashes(batch, seconds=1.0)
     assert hashes(batch) == expected
 
 
-def test_worlds_can_be_put_back_one_by_one() -> None:
+def test_worlds_can_be_reset_one_by_one() -> None:
     batch = make(10)
     first = batch.reset()
     wheels = np.full((10, 1, 2), 8.0)
@@ -162,7 +162,7 @@ def test_a_family_differs_and_repeats() -> None:
         ({"senses": ("smell",)}, "senses must be some of"),
     ],
 )
-def test_what_is_wrong_is_said(options: dict[str, Any], words: str) -> None:
+def test_wrong_arguments_are_errors(options: dict[str, Any], words: str) -> None:
     with pytest.raises(kiks.ParameterError, match=words):
         kiks.Batch(arenas()[0], **{"worlds": 4} | options)
 
@@ -184,13 +184,13 @@ def test_arenas_must_hold_as_many_bodies() -> None:
         ({"measures": [5]}, "measures must be made by"),
     ],
 )
-def test_a_run_says_what_is_wrong(arguments: dict[str, Any], words: str) -> None:
+def test_a_run_rejects_wrong_arguments(arguments: dict[str, Any], words: str) -> None:
     given: dict[str, Any] = {"controller": vehicle, "parameters": [1.0, 0.0], "seconds": 1.0} | arguments
     with pytest.raises(kiks.ParameterError, match=words):
         make(4).run(given.pop("controller"), given.pop("parameters"), **given)
 
 
-def test_steps_say_what_is_wrong() -> None:
+def test_steps_reject_wrong_arguments() -> None:
     batch = make(2)
     with pytest.raises(kiks.ParameterError, match=r"reset\(\) must be called"):
         batch.step(np.zeros((2, 1, 2)))
@@ -210,7 +210,7 @@ def test_a_controller_that_numba_refuses() -> None:
         make(2).run(impossible, seconds=1.0)
 
 
-def test_speeds_that_are_no_numbers_are_nought() -> None:
+def test_speeds_of_nan_are_zero() -> None:
     @kiks.controller
     def wild(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
         wheels[0], wheels[1] = np.nan, 1e300

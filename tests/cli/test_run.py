@@ -326,7 +326,7 @@ def test_no_color_is_heeded(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_program_learns_that_nobody_reads_it_any_more(tmp_path: Path) -> None:
+def test_a_program_gets_an_error_when_its_output_is_closed(tmp_path: Path) -> None:
     (tmp_path / "talks.py").write_text("while True: print('more')\n")
     (tmp_path / "silent.py").write_text("")
     command = [*KIKS, "run", "talks.py", "silent.py"]

@@ -66,7 +66,7 @@ def test_a_module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert kiks.controllers.recipe_for(found, tmp_path) == recipe
 
 
-def test_nobody_finds_what_is_inside_a_function() -> None:
+def test_a_controller_inside_a_function_cannot_be_named() -> None:
     @kiks.controller
     def inner(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
         wheels[0] = 1.0
@@ -118,7 +118,7 @@ def test_nobody_finds_what_is_inside_a_function() -> None:
         ({"file": "link.py", "name": "shy"}, "must lie in the folder of the file that names it"),
     ],
 )
-def test_what_is_no_recipe(recipe: Any, message: str, tmp_path: Path) -> None:
+def test_wrong_recipes_are_errors(recipe: Any, message: str, tmp_path: Path) -> None:
     folder, elsewhere = tmp_path / "folder", tmp_path / "elsewhere"
     for place in (elsewhere, folder / ".git"):
         place.mkdir(parents=True)

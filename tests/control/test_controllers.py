@@ -192,7 +192,7 @@ def test_random_parameters() -> None:
         kiks.controllers.random_parameters(free, 3, seed=1)
 
 
-def test_wild_speeds_are_cut_and_what_is_no_number_is_none() -> None:
+def test_speeds_are_clamped_and_nan_is_zero() -> None:
     assert whole_speeds(np.array([np.nan, 1e300])) == (0, 127)
     assert whole_speeds(np.array([-np.inf, 2.5])) == (-127, 2)
 

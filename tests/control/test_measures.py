@@ -64,7 +64,7 @@ class Trace:
 
 
 @pytest.mark.slow
-def test_how_far() -> None:
+def test_distance_measures() -> None:
     names = ("path_mm", "net_mm", "straightness", "speed_pulses", "turned_pulses", "final_x_mm", "final_y_mm")
     trace = Trace(*(getattr(kiks.measures, name) for name in names))
     found = dict(zip(names, trace.values, strict=True))
@@ -81,7 +81,7 @@ def test_how_far() -> None:
 
 
 @pytest.mark.slow
-def test_how_well() -> None:
+def test_scores_of_drives() -> None:
     following = kiks.measures.wall_following("right", counts=200)
     trace = Trace(kiks.measures.avoidance, following, kiks.measures.touching_share, kiks.measures.contacts)
     shares = trace.wheels / 10.0
@@ -100,7 +100,7 @@ def test_how_well() -> None:
 
 
 @pytest.mark.slow
-def test_where() -> None:
+def test_place_measures() -> None:
     radius_mm = 120.0
     trace = Trace(
         kiks.measures.coverage(arena(), square_mm=50),
@@ -191,7 +191,7 @@ def test_scores_lie_between_none_and_one(wheels: tuple[int, int], sensors: list[
 
 
 @pytest.mark.slow
-def test_who_shuttles_or_spins_does_not_roam() -> None:
+def test_shuttling_or_spinning_is_not_roaming() -> None:
     """Ahead at 64 mm/s for half a minute, the same to and fro, and around on the spot."""
 
     @kiks.controller(parameters=2, memory=1)
@@ -229,7 +229,7 @@ def test_lamps_that_do_not_burn_are_none() -> None:
     assert after(kiks.measures.light_mm, moment(lamps=lamps[:1])) == np.inf
 
 
-def test_nothing_seen_is_nothing() -> None:
+def test_measures_of_a_drive_without_steps_are_zero() -> None:
     for measure in (kiks.measures.avoidance, kiks.measures.straightness, kiks.measures.touching_share):
         assert after(measure) == 0.0
     assert after(kiks.measures.spread_mm, moment()) == 0.0

@@ -100,7 +100,7 @@ def test_the_race_is_fast_and_touches_nothing() -> None:
 
 
 @pytest.mark.slow
-def test_the_swarm_spreads_out_and_nobody_touches_anybody() -> None:
+def test_the_robots_of_a_swarm_spread_out_and_do_not_touch() -> None:
     runs = [scenes.SwarmScene(seed=seed) for seed in range(share(2, 5))]
     for scene in runs:
         scene.run()
@@ -131,7 +131,7 @@ def test_a_program_runs_by_itself_on_a_port() -> None:
     assert (result.returncode, result.stdout, result.stderr) == (0, "", "")
 
 
-def test_the_swarm_asks_everybody_before_it_listens_to_anybody() -> None:
+def test_the_swarm_sends_all_requests_before_it_reads_replies() -> None:
     log: list[str] = []
 
     class Line:

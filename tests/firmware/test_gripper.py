@@ -264,7 +264,7 @@ def test_who_pushes_the_load_aside_turns_the_robot() -> None:
 # ---- lifted ----
 
 
-def test_what_is_lifted_is_neither_seen_nor_met() -> None:
+def test_a_lifted_thing_is_neither_seen_nor_hit() -> None:
     sim = a_simulation(robots=2)
     sim.place(2, 300 + TOUCHING_MM + 1 + CYLINDER_MM + RIM_MM + 10, 300, math.pi)
     sim.fit(2, "k213")

@@ -71,7 +71,7 @@ def test_bytes_beyond_the_length_are_not_sent_and_only_eight_bits_count() -> Non
 
 
 @pytest.mark.parametrize("to", [0, 1, 3, 9, -1, 10**30])
-def test_where_nobody_listens_it_fails_after_its_repeats(to: int) -> None:
+def test_a_message_without_a_receiver_fails_after_its_repeats(to: int) -> None:
     sim = a_simulation()  # robot 3 has no radio
     send(sim, 1, to, [1, 2, 3])
     run_ns(sim, ATTEMPTS * attempt_ns(3) - 1)
@@ -113,7 +113,7 @@ def test_overrun_the_older_message_stays_and_the_sender_learns_it() -> None:
     assert status(sim, 3) == READY
 
 
-def test_who_speaks_does_not_hear_and_both_get_through_in_the_end() -> None:
+def test_a_sending_radio_does_not_receive_and_both_messages_arrive_in_the_end() -> None:
     arrivals = 0
     for seed in range(10):
         sim = a_simulation(seed=seed)

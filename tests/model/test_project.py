@@ -292,7 +292,7 @@ def test_a_robot_without_noise_reads_the_same_again():
 @pytest.mark.slow
 @settings(max_examples=8)
 @given(st.integers(0, 10**6))
-def test_what_was_moved_is_kept(seed):
+def test_moved_things_are_kept(seed):
     rng = np.random.default_rng(seed)
     sim = Simulation(Arena.box(350, 350, rounded_mm=120), robots=5, seed=seed)
     for _ in range(4):

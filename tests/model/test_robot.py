@@ -75,7 +75,7 @@ def test_a_robot_of_ones_own_drives(tmp_path: Path) -> None:
         ("range_mm = 60.0", "range_mm = 0", "proximity.range_mm must be a number from 1 to 1000"),
     ],
 )
-def test_what_is_wrong_is_named(before: str, after: str, words: str, tmp_path: Path) -> None:
+def test_an_error_names_the_wrong_parameter(before: str, after: str, words: str, tmp_path: Path) -> None:
     with pytest.raises(kiks.ParameterError, match="must") as caught:
         RobotSpec.load(changed(tmp_path, before, after))
     assert words in str(caught.value)

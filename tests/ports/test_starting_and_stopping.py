@@ -247,7 +247,7 @@ def test_mistakes_raise_before_a_program_starts(tmp_path: Path) -> None:
     with driven(fresh()) as run:
         with pytest.raises(ParameterError, match=r"must be a Python file, but there is none at"):
             run.programs.start(Command(tmp_path / "nothing.py"))
-        with pytest.raises(ParameterError, match=r"robot must be the number of one there is, but it was 2"):
+        with pytest.raises(ParameterError, match=r"robot must be the number of an existing robot, but it was 2"):
             run.programs.start(DRIVE, robot=2)
         assert run.programs.handles == []
     with pytest.raises(KiksError, match=r"must have a world, but that of drive.py has ended"):

@@ -40,7 +40,7 @@ print(stat.S_ISCHR(os.stat("/dev/ttyUSB0").st_mode), Path("/dev/ttyUSB77").exist
 """
 
 
-def test_offered_port_is_there_for_whoever_looks(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+def test_programs_find_an_offered_port(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(LOOKS) == 0
     assert capsys.readouterr().out == "/dev/ttyUSB0 True True True\n" * 2 + "True False\n"
 

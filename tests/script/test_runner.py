@@ -104,7 +104,7 @@ def test_threads_sleep_at_once_and_end_in_their_order(run: Run, capsys: pytest.C
         "while lines.empty(): pass",
     ],
 )
-def test_thread_that_only_asks_gives_way(run: Run, loop: str) -> None:
+def test_thread_that_only_polls_yields(run: Run, loop: str) -> None:
     code, time_s, _ = run(f"""
         import datetime, queue, serial, threading, time
         port = serial.Serial('COM1')
@@ -134,7 +134,7 @@ def test_threads_that_wait_for_ever_end_with_one_line(run: Run, capsys: pytest.C
     assert said.count("\n") == 1
 
 
-def test_main_thread_waits_for_others_but_for_daemons(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+def test_main_thread_waits_for_all_threads_except_daemons(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
     code, time_s, _ = run("""
         import atexit, threading, time
         atexit.register(lambda: print('last', time.monotonic()))
@@ -303,7 +303,7 @@ def test_file_waits_end_when_a_character_comes_or_the_time_is_over(
     assert capsys.readouterr().out == "False 0.5\nb'h,0,0\\r\\n' True\n"
 
 
-def test_pipe_between_threads_wakes_who_waits_for_it(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+def test_pipe_wakes_the_thread_that_waits_for_it(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("""
         import os, select, threading, time
         here, there = os.pipe()
@@ -318,7 +318,7 @@ def test_pipe_between_threads_wakes_who_waits_for_it(run: Run, capsys: pytest.Ca
 # ---- ports ----
 
 
-def test_ports_are_found_by_those_who_look(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_programs_that_list_ports_find_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert (
         Run(tmp_path, robots=2)("""
         import glob, os, serial

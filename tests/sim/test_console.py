@@ -94,5 +94,5 @@ def test_full_line_is_told() -> None:
         type_lines(sim, 1, "\n".join(["D,1,1"] * 100))
     sim.run(5)
     assert len(type_lines(sim, 1, "D,0,0")) == 1
-    with pytest.raises(ParameterError, match=r"robot must be the number of one there is"):
+    with pytest.raises(ParameterError, match=r"robot must be the number of an existing robot"):
         type_lines(sim, 2, "D,0,0")

@@ -226,10 +226,10 @@ def test_plain_words():
     assert "That is the most that it can read: 1023." in replace(near, count=1023).text()
 
 
-def test_errors_say_what_there_is():
+def test_errors_name_the_robots_that_exist():
     sim = Simulation(Arena.box(300, 300))
     for ask in (sim.explain, sim.explain_light):
-        with pytest.raises(ParameterError, match="robot must be the number of one there is, but it was 2"):
+        with pytest.raises(ParameterError, match="robot must be the number of an existing robot, but it was 2"):
             ask(2, 0)
         with pytest.raises(ParameterError, match="sensor must be a whole number from 0 to 7, but it was 8"):
             ask(1, 8)

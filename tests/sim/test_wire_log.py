@@ -103,7 +103,7 @@ def test_log_stays_small_and_knows_since_when_it_is_whole() -> None:
     assert shares(sim).window_ns == sim.now_ns - log.since_ns
 
 
-def test_nothing_is_remembered_when_nobody_watches_any_longer() -> None:
+def test_an_unwatched_wire_keeps_no_log() -> None:
     wire = fresh().wires[0]
     log = wire.watch(0)
     assert wire.watch(0) is log

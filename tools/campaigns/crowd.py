@@ -72,7 +72,7 @@ def crowd(rng: random.Random, port: int, said: tuple[bytes, ...]) -> None:
     """Let clients come to a port; some go at once, some stay until all have come.
 
     Raises:
-        Broken: If nobody is let in any more.
+        Broken: If the port accepts no more clients.
     """
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, min(hard, CLIENTS + 300)), hard))
@@ -84,10 +84,10 @@ def crowd(rng: random.Random, port: int, said: tuple[bytes, ...]) -> None:
         try:
             client = socket.create_connection(("127.0.0.1", port), timeout=LATE_S)
         except TimeoutError:
-            break  # It lets them wait, which is its right; who means it comes later.
+            break  # A server may let clients wait.
         except OSError as error:
             if error.errno in (errno.ECONNREFUSED, errno.EMFILE):
-                raise Broken("death", f"nobody listens at the port any more: {error}", "a crowd") from None
+                raise Broken("death", f"the port accepts no more clients: {error}", "a crowd") from None
             continue
         client.settimeout(0.05)
         with suppress(OSError):

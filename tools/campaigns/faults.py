@@ -262,7 +262,7 @@ def _evolving(folder: str, executor: str) -> subprocess.Popen[str]:
 
 
 def _check_evolution(found: kiks.Evolution) -> None:
-    """Check that what is there is what an evolution finds that nobody has disturbed."""
+    """Check that an interrupted evolution has the same generations as an uninterrupted one."""
     whole = kiks.Evolution(found.task, "ga", population=8, seed=3)
     whole.run(generations=len(found.generations), executor="threads:1")
     for one, other in zip(found.generations, whole.generations, strict=True):

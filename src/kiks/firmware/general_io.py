@@ -41,7 +41,7 @@ class GeneralIO(Turret):
 
     @property
     def inputs(self) -> int:
-        """What the program reads, a byte; write to it.
+        """The byte that the program reads; write to it.
 
         Raises:
             ParameterError: If it is set to anything but a whole number from 0 to 255.

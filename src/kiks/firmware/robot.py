@@ -13,7 +13,7 @@ from kiks.units import SENSOR_SLOT_NS
 
 
 class Robot:
-    """What the commands of one robot act on: its record of the state, its sensors, turrets and line.
+    """The parts of one robot that commands act on: its record of the state, its sensors, turrets and line.
 
     Args:
         spec: What kind of robot it is.

@@ -45,7 +45,7 @@ class Shape:
 
 @dataclass(frozen=True)
 class Met:
-    """What a ray met.
+    """The hit of a ray.
 
     Attributes:
         distance_mm: From the robot's centre [mm].
@@ -61,7 +61,7 @@ class Met:
 
 
 class Site(Protocol):
-    """What a turret may ask of the robot that it sits on, and of the world."""
+    """The view that a turret has of its robot and of the world."""
 
     @property
     def robot(self) -> int:

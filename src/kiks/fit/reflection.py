@@ -74,7 +74,7 @@ _SHARED_ROOM = np.array([2.0, 2.0, 2.0])
 
 @dataclass(frozen=True)
 class ReflectionFit:
-    """What was found.
+    """The result of a fit.
 
     Attributes:
         spec: The robot.

@@ -62,9 +62,9 @@ def replace_files(files: Mapping[Path, bytes | str], what: str = "The file", *, 
 
 
 class GrowingFile:
-    """A text file that is written bit by bit, and is the whole new one when it is closed; until then the old one.
+    """A text file that grows beside the old one and replaces it when it is closed.
 
-    A disk that is full disturbs nobody who writes: `close` says so.
+    If the disk is full, `write` raises nothing: `close` does.
 
     Args:
         path: The file, as for `replace_file`.

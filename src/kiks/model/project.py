@@ -115,7 +115,7 @@ Speed = Annotated[Number, Field(ge=1e-3, le=1e3, description="1 is real time.")]
 
 @record
 class Project:
-    """What a world is built from; `dataclasses.replace` makes a changed copy.
+    """All parts of a world; `dataclasses.replace` makes a changed copy.
 
     Args:
         arena: Walls, what stands in it, and where robots start, the first start for the first robot.

@@ -120,7 +120,7 @@ def wall_faces(
 
     The way into the wall is the gradient of how much wall is around, and the distance to its surface is that at which a
     straight one would fill as much of a smaller surrounding; so a disc drawn in cells is round. Cells much smaller than
-    a millimetre are taken together in blocks, of which it counts how much of each is wall.
+    a millimetre are combined in blocks; the share of wall in each block counts.
 
     Returns:
         What `Arena.faces` is.
@@ -151,7 +151,7 @@ def wall_faces(
     length = np.hypot(gradient[:, 0], gradient[:, 1])
     # In the middle of a gap as narrow as a cell both sides are as near: any way is as good.
     vectors = gradient / np.where(length > 1e-9, length, np.inf)[:, None]
-    # Beyond two cells nobody asks how far it is.
+    # No kernel uses distances beyond two cells.
     distance = np.clip(_distance_of_share(filled / whole) * block, -1.99, 1.99)
     whole_numbers = np.rint(np.column_stack([vectors, distance]) * FACE_UNITS).astype(np.int32)
     packed = np.zeros(len(rows), np.int32)

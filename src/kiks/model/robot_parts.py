@@ -122,7 +122,7 @@ class Proximity:
 
 @record
 class Curve:
-    """What the response 'curve' knows: counts above the baseline of a sensor that looks straight at a white wall.
+    """Constants of the response 'curve': counts above the baseline of a sensor that looks straight at a white wall.
 
     `distance_mm` rises, `counts` fall; `ray_weight` says how much a ray counts, from the middle one to the edge.
     All counts are multiplied by `scale`.
@@ -146,7 +146,7 @@ class Curve:
 
 @record
 class Reflection:
-    """What the response 'reflection' knows: how much light a sensor gets back, and what it makes of that.
+    """Constants of the response 'reflection': from the light that a sensor gets back to its count.
 
     A ray of the length t that meets a surface with the reflectance b at the angle of incidence i brings the light
     b w (cos(i) / (t + behind))^3, where w falls with the angle off the sensor's axis as a Gaussian of `lobe_deg` does.

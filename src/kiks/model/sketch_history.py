@@ -26,7 +26,7 @@ Things = MutableMapping[int, Any]
 
 @dataclass
 class Canvas:
-    """What is painted on.
+    """The rasters that a brush paints on.
 
     Attributes:
         brightness: uint8 [row, column], row 0 at the bottom.
@@ -42,7 +42,7 @@ class Canvas:
 
 
 class Patch(Protocol):
-    """What was somewhere before."""
+    """The content of a rectangle before a step."""
 
     @property
     def size(self) -> int:

@@ -38,7 +38,7 @@ def replacements(
     holders: dict[int, list[Serial]] = {}
 
     class Serial(protocol_kiks.Serial):
-        """What a program gets that asks for a serial port."""
+        """The port that a program gets when it opens a serial port."""
 
         _descriptor: int | None = None
 

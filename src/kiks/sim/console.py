@@ -28,7 +28,7 @@ class Typed:
 
     @property
     def reply(self) -> str | None:
-        """What the robot has answered, without the line's end; None as long as it has not arrived."""
+        """The robot's answer without the line's end; None until it has arrived."""
         if self._arrival_ns is None or self._sim.now_ns < self._arrival_ns:
             return None
         return self._reply.decode("latin-1").replace("\r\n", "\n").rstrip("\n")

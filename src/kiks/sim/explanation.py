@@ -95,7 +95,7 @@ class Explanation:
 
     @property
     def expected_counts(self) -> float:
-        """What the sensor reads on average here, before noise and rounding."""
+        """The sensor's mean reading here, before noise and rounding."""
         return self.baseline_counts + self.response_counts
 
     def text(self) -> str:

@@ -13,7 +13,7 @@ from kiks.errors import LinkError, shown
 
 
 class Named(Protocol):
-    """What a registry holds."""
+    """An object that a registry holds."""
 
     name: str
 

@@ -159,12 +159,12 @@ class Simulation:
 
     @property
     def specs(self) -> list[RobotSpec]:
-        """What each robot is."""
+        """The kind of each robot."""
         return self.world.specs
 
     @property
     def spec(self) -> RobotSpec:
-        """What robot 1 is."""
+        """The kind of robot 1."""
         return self.world.specs[0]
 
     @property

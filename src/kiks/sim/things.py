@@ -120,7 +120,7 @@ class Things:
         numbers = self._world.state.bodies["number"][0].tolist()
         if not isinstance(body, int) or body not in numbers:
             raise ParameterError(
-                f"body must be the number of one there is, but it was {shown(body)}. There are {shown(numbers)}."
+                f"body must be the number of an existing body, but it was {shown(body)}. There are {shown(numbers)}."
             )
         return int(numbers.index(body))
 

@@ -116,7 +116,7 @@ class RobotSite:
 
     @property
     def spec(self) -> RobotSpec:
-        """What kind of robot it is."""
+        """The kind of the robot."""
         return self._world.specs[self._index]
 
     @property

@@ -148,7 +148,8 @@ class World:
         if not isinstance(robot, int | np.integer) or not 1 <= robot <= self.robot_count:
             numbers = "robot 1" if self.robot_count == 1 else f"robots 1 to {self.robot_count}"
             raise ParameterError(
-                f"robot must be the number of one there is, but it was {shown(robot)}. This simulation has {numbers}."
+                f"robot must be the number of an existing robot, but it was {shown(robot)}. This simulation "
+                f"has {numbers}."
             )
         return int(robot) - 1
 

@@ -17,7 +17,7 @@ BLINK_S = 0.02
 
 
 class Host(NamedTuple):
-    """What an adapter works with: the program's threads, and a port of its world for the time."""
+    """The parts that an adapter works with: the program's threads, and a port of its world for the time."""
 
     scheduler: Scheduler
     clock: VirtualPort

@@ -18,7 +18,7 @@ _DONT_WAIT = 1 << 1
 
 
 class _Timers:
-    """What is due, and the threads that wait for it in a main loop."""
+    """The queue of due callbacks, and the threads that wait for them in a main loop."""
 
     def __init__(self, host: Host) -> None:
         self._host = host
