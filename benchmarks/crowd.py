@@ -61,7 +61,7 @@ def drive(
             for wheel in range(2):
                 speed_cm_s = 8.0
                 for sensor in range(8):
-                    # 1200 is the full scale of Enki's sensors, of which this is half.
+                    # Half of 1200, the full scale of Enki's sensors.
                     speed_cm_s += weights[wheel, sensor] * min(out[sensor] / 600.0, 1.0)
                 robot.speed_setpoint[wheel] = np.int32(speed_cm_s * 0.1 / kinds[robot.kind].pulse_mm)
         step.advance(scene, ground, 1, tick, TICKS_PER_STEP)

@@ -23,7 +23,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 from urllib.parse import urlsplit
@@ -95,13 +95,18 @@ def chromium() -> Iterator[Any]:
         browser.close()
 
 
+def address_in(lines: Iterable[str]) -> str:
+    """Return the address that a desk prints."""
+    return next(word for line in lines for word in line.split() if word.startswith("http"))
+
+
 def measure_view() -> list[tuple[str, float, str]]:
     """Measure a server with and without a browser."""
     with subprocess.Popen(
         [sys.executable, "-c", SERVER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as server:
         assert server.stdout is not None
-        url = server.stdout.readline().strip()
+        url = address_in(server.stdout)
         time.sleep(1)
         idle = cpu_percent(server.pid)
         with chromium() as page:
@@ -164,7 +169,7 @@ def first_picture_s() -> float:
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
             assert process.stdout is not None
             threading.Timer(60, process.kill).start()
-            url = next(word for line in process.stdout for word in line.split() if word.startswith("http"))
+            url = address_in(process.stdout)
             page.goto(url)
             page.wait_for_function("window.kiksDesk && window.kiksDesk.stats().frames_drawn > 0")
             took_s = time.perf_counter() - start_s

@@ -1,4 +1,4 @@
-"""What all tests share: an engine compiled before the workers of xdist start, each of which would do it anew."""
+"""Setup for all tests: the engine is compiled once, before the workers of xdist start."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ def signed(limit: int) -> bytes:
 
 
 def within(limit: int) -> bytes:
-    """Return an expression for a number of a request from 0 to a limit, as anybody may write it."""
+    """Return an expression for a number of a request from 0 to a limit, in any spelling that the robot accepts."""
     return rb"[ \t]*(?:\+?0*" + at_most(limit) + rb"|-0+)[ \t]*"
 
 

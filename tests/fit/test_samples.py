@@ -72,7 +72,7 @@ def test_text_files_are_read(tmp_path, text):
         (GOOD.replace("1023", "1024", 1), 3, "from 0 to 1023, but it was 1024"),
         (GOOD.replace("2 3 4", "2 -3 4", 1), 3, "from 0 to 1023, but it was -3"),
         (GOOD.replace("9 9 9 9 9 9 9 9\n", ""), 9, "the end of the file"),
-        (GOOD + ROW, 11, "must come nothing"),
+        (GOOD + ROW, 11, "Nothing may follow the"),
     ],
 )
 def test_broken_text_files_are_told_by_their_line(tmp_path, text, line, words):

@@ -1,4 +1,4 @@
-"""A screen for programs with windows, which nobody sees."""
+"""A virtual screen for programs with windows."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 
 @contextmanager
 def display() -> Iterator[dict[str, str]]:
-    """Yield an environment with a screen that nobody sees."""
+    """Yield an environment with a virtual screen."""
     if shutil.which("Xvfb") is None:
         pytest.skip("there is no Xvfb for the program with a window")
     ours, theirs = os.pipe()

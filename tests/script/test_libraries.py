@@ -153,7 +153,7 @@ def run(folder: Path, text: str, environment: Mapping[str, str] | None = None, *
 
 
 def on_terminal(folder: Path, text: str) -> tuple[int, str]:
-    """Run a program on a terminal with nobody at the keys."""
+    """Run a program on a terminal without keyboard input."""
     return run(folder, text, None, sys.executable, str(PROGRAMS / "on_terminal.py"))[:2]
 
 

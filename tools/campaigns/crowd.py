@@ -203,7 +203,7 @@ def _many_robots(rng: random.Random) -> int:
 SCENES: dict[str, tuple[Callable[[random.Random], int], int]] = {
     "serve": (_serve, 8), "desk": (_desk, 8), "session": (_session, 8), "many_robots": (_many_robots, 6),
 }  # fmt: skip
-"""Who is visited, and how often."""
+"""The servers under test, and the number of cases for each."""
 
 
 def _ready(scene: Callable[[random.Random], int]) -> Play:

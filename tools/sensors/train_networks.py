@@ -72,7 +72,7 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True, eq=False)
 class Network:
-    """A trained network: for each layer its weights, of which the last column is the bias, and whether it is tanh.
+    """A trained network: for each layer its weights (the last column is the bias), and whether it is tanh.
 
     Example:
         >>> Network((np.array([[2.0, 0.5]]),), (False,))(np.array([[1.0], [3.0]]))
@@ -155,7 +155,7 @@ def train(inputs: Floats, counts: Floats, layers: Layers, *, seed: int, starts: 
         counts: Readings, shape [samples].
         layers: The network's size.
         seed: The same seed, the same network.
-        starts: Random starts, of which the best is kept.
+        starts: Number of random starts; the best is kept.
 
     Raises:
         ParameterError: If there are fewer than ten samples or no starts.

@@ -104,7 +104,7 @@ def serve(
     compile_everything()  # or load it, so that the first program does not wait for it
     ports = _Ports(sim, pty, link, tcp, rfc2217, host, say)
     server = None
-    shown = _show(sim, speed) if desk else None
+    shown = _show_desk(sim, speed) if desk else None
     gate = None if shown is None else shown.desk.gate
     end_as_with_ctrl_c()  # so that the links are removed
     try:
@@ -120,7 +120,7 @@ def serve(
             pace=None if gate is None else gate.pace,
             new_patience=Patience if gate is None else gate.patience,
         )
-        say(_what_is_repeatable(thinking, speed, sim.robot_count if programs is None else programs))
+        say(_repeatability(thinking, speed, sim.robot_count if programs is None else programs))
         server.serve()
     except KeyboardInterrupt:
         state = "" if thinking == "live" else f" State {sim.state_hash()}."
@@ -170,7 +170,7 @@ class _Ports:
             endpoints.append(self._open_tcp(number))
             self.say(f"  TCP          socket://{endpoints[-1].name}")
             if self.rfc2217 is not None:
-                endpoints.append(Rfc2217Endpoint(_of_robot(self.rfc2217, number), host=self.host))
+                endpoints.append(Rfc2217Endpoint(_tcp_port_of(self.rfc2217, number), host=self.host))
                 self.say(f"  RFC 2217     rfc2217://{endpoints[-1].name}")
 
     def close(self) -> None:
@@ -191,22 +191,22 @@ class _Ports:
         from kiks.ports.tcp import TcpEndpoint
 
         if self.tcp is not None:
-            return TcpEndpoint(_of_robot(self.tcp, number), host=self.host)
+            return TcpEndpoint(_tcp_port_of(self.tcp, number), host=self.host)
         try:
-            return TcpEndpoint(_of_robot(TCP_PORT, number), host=self.host)
+            return TcpEndpoint(_tcp_port_of(TCP_PORT, number), host=self.host)
         except LinkError:
             # The user did not ask for this number, so a free one will do. An invalid host fails again.
             endpoint = TcpEndpoint(0, host=self.host)
-            self.say(f"  TCP port {_of_robot(TCP_PORT, number)} is busy; a free one takes its place.")
+            self.say(f"  TCP port {_tcp_port_of(TCP_PORT, number)} is busy; a free one takes its place.")
             return endpoint
 
 
-def _of_robot(first: int, number: int) -> int:
+def _tcp_port_of(first: int, number: int) -> int:
     """Return the TCP port of a robot, given that of robot 1; 0 stays 0."""
     return first + number - 1 if first else 0
 
 
-def _show(sim: Simulation, speed: float) -> Shown:
+def _show_desk(sim: Simulation, speed: float) -> Shown:
     """Show the world in a browser, where people may pause it or change its speed."""
     from kiks.desk.server.desk import Desk
     from kiks.desk.server.show import Shown
@@ -217,7 +217,7 @@ def _show(sim: Simulation, speed: float) -> Shown:
     return shown
 
 
-def _what_is_repeatable(thinking: str, speed: float, programs: int) -> str:
+def _repeatability(thinking: str, speed: float, programs: int) -> str:
     if thinking == "live":
         return (
             f"The world runs at {speed:g} times real time. Not repeatable, because the time of a program's bytes "

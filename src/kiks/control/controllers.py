@@ -1,4 +1,4 @@
-"""Controllers that come with KiKS: shapes whose parameters evolution or a person fills in.
+"""Built-in controllers, whose parameters are evolved or set by hand.
 
 Parameters are numbers of about 1: normally distributed around 0 with a deviation of 1 they are a sensible start.
 Sensors come in as shares of 1023 counts, speeds go out as shares of `speed_limit`. `N` inputs are those of the senses:

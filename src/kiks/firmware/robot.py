@@ -17,8 +17,8 @@ class Robot:
 
     Args:
         spec: What kind of robot it is.
-        state: The world's state, of which the robot owns one record.
-        number: Which record, counted from 0.
+        state: The world's state, which has a record for each robot.
+        number: Index of the robot's record.
         sense_proximity: Returns the eight counts latched at this time.
         sense_ambient: The same for light.
 

@@ -1,1 +1,1 @@
-"""From measured samples to the sensors' response: readers, training, and the card that tells how good it is."""
+"""From measured samples to the sensors' response: readers of samples, and the fit."""

@@ -198,7 +198,7 @@ def _read_table(path: Path, what: str) -> tuple[Floats, Floats, NDArray[np.int64
 
 def _read_text(path: Path, what: str) -> tuple[Floats, Floats, NDArray[np.int64]]:
     """Return gaps, angles and readings of a text file."""
-    lines = _Lines(read_file(path, what), what)
+    lines = _TextReader(read_file(path, what), what)
     sensors, angles, distances, first_mm, step_mm = lines.numbers(_HEADER, 5)
     if sensors != SENSOR_COUNT:
         raise lines.wrong(f"The first number must be {SENSOR_COUNT}, the sensors of a Khepera", str(sensors))
@@ -221,12 +221,12 @@ def _read_text(path: Path, what: str) -> tuple[Floats, Floats, NDArray[np.int64]
     return gap_mm, np.arange(angles, dtype=np.float64) * (360.0 / angles), counts
 
 
-def _told(text: str) -> str:
+def _quoted(text: str) -> str:
     """Return how a message shows a line or a word: whatever file was named by mistake, its content stays there."""
     return shown(text) if re.fullmatch(r"(TURN )?[-+.,\d ]*|END", text) else "something else"
 
 
-class _Lines:
+class _TextReader:
     """The lines of a text file one after the other, and whose number an error names."""
 
     def __init__(self, data: bytes, what: str) -> None:
@@ -258,7 +258,7 @@ class _Lines:
         words = self.next(expected).split()
         for word in words:
             if not word.removeprefix("-").isdigit() or len(word) > 9:
-                raise self.wrong(f"A line here must hold {expected}, whole numbers", _told(word))
+                raise self.wrong(f"A line here must hold {expected}, whole numbers", _quoted(word))
         if len(words) != count:
             raise self.wrong(f"A line here must hold {expected}", f"{len(words)} numbers")
         return [int(word) for word in words]
@@ -267,7 +267,7 @@ class _Lines:
         """Go past the line that opens a block."""
         expected = f"'TURN {number}'"
         if self.next(expected).split() != ["TURN", str(number)]:
-            raise self.wrong(f"A line here must be {expected}", _told(self.text))
+            raise self.wrong(f"A line here must be {expected}", _quoted(self.text))
 
     def finish(self, blocks: int) -> None:
         """Make sure that nothing but 'END' is left."""
@@ -275,5 +275,5 @@ class _Lines:
             self.number, self.text = number, text
             if text != "END":
                 raise self.wrong(
-                    f"After the {blocks} blocks that the first line tells must come nothing", _told(self.text)
+                    f"Nothing may follow the {blocks} blocks that the first line announces", _quoted(self.text)
                 )

@@ -102,10 +102,10 @@ def checked_places(
             f"{label}s must be a list, and each of them a list of its values, but they were {shown(entries)}."
         ) from None
     for number, entry in enumerate(given, start=1):
-        who = f"{label} {number}"
+        entry_label = f"{label} {number}"
         values = [value.item() if isinstance(value, np.generic) else value for value in entry]
-        place = check(model, dict(zip(model._fields, values, strict=False)), who)
-        _check_position(who, place[0], place[1], brightness, mm_per_cell)
+        place = check(model, dict(zip(model._fields, values, strict=False)), entry_label)
+        _check_position(entry_label, place[0], place[1], brightness, mm_per_cell)
         places.append(place)
     return tuple(places)
 

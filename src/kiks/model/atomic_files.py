@@ -124,7 +124,7 @@ class GrowingFile:
 
 
 def check_writable(path: str | Path, what: str, *, is_new: bool = False) -> None:
-    """Raise, before the work whose result goes there, if a file could not be written.
+    """Raise if a file could not be written; for use before a long computation whose result goes there.
 
     A file is made beside it and removed: rights do not tell of disks that are full or can be read only.
 

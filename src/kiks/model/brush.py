@@ -2,7 +2,7 @@
 
 Need: what is drawn mirrored comes out mirrored, to the cell, and a stroke over 8 m must not take the memory of 8 x 8 m.
 Method: everything is counted in whole 64ths of a cell, so that no rounding decides about a centre on the border; and a
-stroke is cut into pieces of a few rows, of which only the columns near the stroke are looked at.
+stroke is cut into pieces of a few rows, and only columns near the stroke are examined.
 """
 
 from __future__ import annotations

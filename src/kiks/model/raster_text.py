@@ -53,7 +53,7 @@ def box_keys_of(arena: Arena) -> dict[str, Any] | None:
     wall = int(np.argmax(raster[:, width // 2] == 0))
     corner = int(np.argmax(raster[wall, wall:] == 0))
     for rounded in range(corner, min(width, height) // 2 - wall + 1):
-        # A circle of that radius leaves so many cells of its first row outside.
+        # The number of cells of the first row that are outside a circle of that radius.
         from_centre = rounded - 0.5
         outside = sum(
             1

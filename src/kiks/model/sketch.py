@@ -48,8 +48,8 @@ class Sketch:
     """An arena that is drawn.
 
     Args:
-        arena: What there is to begin with.
-        kinds: What each robot is; those beyond the arena's starts are put where there is room.
+        arena: The initial arena.
+        kinds: The kind of each robot; robots beyond the arena's starts are put where there is room.
 
     Attributes:
         things: What stands or hangs in it, by numbers that stay the same; numbers rise with time.

@@ -118,7 +118,7 @@ class History:
         return sum(patch.size for patch in (*self.undoable, *self.redoable))
 
     def push(self, patch: Patch) -> None:
-        """Note a step by what it replaced; what was taken back before can no longer be done again."""
+        """Record a step by the content that it replaced, and clear the redo list."""
         self.redoable.clear()
         self.undoable.append(patch)
         while len(self.undoable) > 1 and (len(self.undoable) > STEPS_MAX or self.size > BYTES_MAX):

@@ -19,7 +19,6 @@ from kiks.sim.read_completion import NEVER_NS
 
 REAL_LOCK = _thread.allocate_lock
 REAL_SLEEP = time.sleep
-REAL_TYPES = (_thread.LockType, type(_thread.RLock()))
 
 
 ELSEWHERE_S = 0.001

@@ -188,11 +188,6 @@ class Scheduler:
         return get_ident() == self._os_thread
 
     @property
-    def is_main(self) -> bool:
-        """Whether the program's main thread runs."""
-        return self.current is self._main
-
-    @property
     def is_alone(self) -> bool:
         """Whether no other thread can go on before this one does something for it."""
         return not (self._ready or self._readers or self._watchers) and self._next_deadline_ns() == NEVER_NS

@@ -13,7 +13,7 @@ from kiks.sim.read_completion import NEVER_NS
 
 NS_PER_MS = 1_000_000
 FPS_FRAMES = 10
-"""Frames of which `Clock.get_fps` is the average."""
+"""Number of frames that `Clock.get_fps` averages."""
 
 _real_sleep = time.sleep
 _waiting: list[Task] = []
