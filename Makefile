@@ -3,8 +3,8 @@
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV   := .venv
 BIN    := $(VENV)/bin
-# Many tests wait for processes that they start. One worker more than processors keeps all processors busy.
-WORKERS = $(shell $(BIN)/python -c 'import os; print(os.cpu_count() + 1)')
+# Many tests wait for processes that they start. Two workers for each processor keep all processors busy.
+WORKERS = $(shell $(BIN)/python -c 'import os; print(2 * os.cpu_count())')
 PYTEST = $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
 # The tests start hundreds of Python processes: Python keeps the bytecode of the modules, whatever the environment says.

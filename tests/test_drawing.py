@@ -39,7 +39,7 @@ def test_everything_is_where_it_is() -> None:
     assert pixel(image, 211, 220)[0] < 200  # the cylinder
     assert pixel(image, 300, 220)[2] < 100  # the lamp
     assert pixel(image, 300, 280)[2] < FLOOR[2]  # its light
-    assert min(pixel(image, 121, 100)) > 240  # noses, of which one looks right and the other up
+    assert min(pixel(image, 121, 100)) > 240  # noses: one points right, the other up
     assert min(pixel(image, 300, 121)) > 240
     one, other = pixel(image, 100, 120), pixel(image, 320, 107)
     assert max(one) < 200

@@ -287,7 +287,7 @@ def test_each_line_says_which_program_it_is_from(tmp_path: Path) -> None:
 
 
 def at_a_terminal(folder: Path, **environment: str) -> str:
-    """Run two programs, one of which asks something, at a terminal; return what stands there at the end."""
+    """Run two programs, one of which asks something, at a terminal; return all that the terminal shows at the end."""
     (folder / "asks.py").write_text("print('got', input('go? '))\n")
     (folder / "b.py").write_text("print('here')\n")
     ours, theirs = pty.openpty()
@@ -300,7 +300,7 @@ def at_a_terminal(folder: Path, **environment: str) -> str:
         while True:
             try:
                 text += os.read(ours, 1 << 16).decode()
-            except OSError:  # how Linux says that nobody is at the other end any more
+            except OSError:  # Linux says so when the other end is closed
                 break
             if "go? " in text and not has_answered:
                 has_answered = True

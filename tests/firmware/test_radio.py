@@ -1,4 +1,4 @@
-"""The radio: messages between robots, their times, and what becomes of those that nobody takes."""
+"""The radio: messages between robots, their times, and what happens to those that no program reads."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def test_overrun_the_older_message_stays_and_the_sender_learns_it() -> None:
     assert status(sim, 3) == READY | FAILED
     assert read(sim, 2)[:3] == [1, 1, 1]
     assert read(sim, 2)[0] == 0
-    # Who reads in time gets what is being repeated.
+    # A program that reads in time gets the message that is being repeated.
     send(sim, 1, 2, [1])
     sim.run(0.1)
     send(sim, 3, 2, [3])

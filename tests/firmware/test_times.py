@@ -29,7 +29,7 @@ def test_a_single_command(baud: int, command: bytes) -> None:
     reply = port.readline()
     count = len(command) + len(reply)
     assert port.sim.now_ns == count * character_ns(baud) + PROCESSING_NS
-    # The formula, of which each character may lose a part of a nanosecond.
+    # The formula; rounding may take a part of a nanosecond from each character.
     formula_ns = Fraction(11 * count * 10**9, baud) + PROCESSING_NS
     assert formula_ns - count <= port.sim.now_ns <= formula_ns
 

@@ -61,7 +61,7 @@ def execute(sim: kiks.Simulation, line: str, robot: int = 1) -> str:
 
 
 def test_records_have_no_gaps() -> None:
-    """The hash takes their bytes, and bytes between the fields are nobody's."""
+    """The hash covers their bytes, and padding bytes between the fields would have any value."""
     for record in (ROBOT, BODY):
         assert sum(record[name].itemsize for name in record.names or ()) == record.itemsize
 

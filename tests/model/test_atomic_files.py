@@ -54,7 +54,7 @@ WRITERS: dict[str, Callable[[Path], object]] = {
 
 @contextmanager
 def full_disk(bytes_left: int) -> Iterator[None]:
-    """Let no file grow beyond so many bytes, as on a disk that is full."""
+    """Limit the size of files, as a full disk does."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (bytes_left, before[1]))
     try:

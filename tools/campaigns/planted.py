@@ -42,7 +42,7 @@ def _refuses(rng: random.Random) -> None:
 
 
 def _third(act: Play) -> Callable[[], Play]:
-    """Return what plays cases of which some are sound, so that it is seen that the others are played."""
+    """Return a player of cases, a third of which have the planted fault: the report must count the others, too."""
 
     def play(rng: random.Random) -> None:
         if rng.random() < 1 / 3:

@@ -1,6 +1,6 @@
 """Plays cases in child processes: a case that dies, hangs or eats memory ends alone, and is named.
 
-Need: a million cases, some of which kill their process; every one can be played again alone.
+It plays a million cases, some of which kill their process; each can be played again alone.
 Method: a case is a campaign's name, a seed and a number, nothing else. Children are forks of this process, which has
 loaded and compiled everything. Each writes into shared memory what it is at, so its parent knows what it died of; a
 fault or a hang leaves the Python stack in the child's error output, by `faulthandler`.

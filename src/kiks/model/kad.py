@@ -173,14 +173,14 @@ def _raster(walls: npt.NDArray[np.int64]) -> npt.NDArray[np.uint8]:
     picture = np.zeros((height, width), np.uint8)
     budget = PAINTED_MAX * picture.size
     for number, (x, y, grey) in enumerate(_pieces(walls), start=1):
-        who = f"piece {number} of walls"
+        piece = f"piece {number} of walls"
         if number > PIECES_MAX:
             raise ArenaError(f"walls must have at most {PIECES_MAX} pieces, but it has more. Draw a simpler arena.")
         left, right, top, bottom = (int(end) for end in (x.min(), x.max(), y.min(), y.max()))
         if left < 1 or right > width or top < 1 or bottom > height or grey > 255:
             raise ArenaError(
-                f"{who} must lie within {width} x {height} mm and have a grey up to 255, but its columns are {left} to "
-                f"{right}, its rows {top} to {bottom}, its grey {grey}. Save the arena again."
+                f"{piece} must lie within {width} x {height} mm and have a grey up to 255, but its columns are {left} "
+                f"to {right}, its rows {top} to {bottom}, its grey {grey}. Save the arena again."
             )
         box = picture[top - 1 : bottom, left - 1 : right]
         corners = {(column, row) for column in (left, right) for row in (top, bottom)}
@@ -188,7 +188,9 @@ def _raster(walls: npt.NDArray[np.int64]) -> npt.NDArray[np.uint8]:
         crossings = 0 if is_rectangle else int(abs(np.roll(y, -1) - y).sum()) + len(y)
         budget -= box.size + _CROSSING_COST * crossings
         if budget < 0:
-            raise ArenaError(f"walls must not be painted over again and again, but up to {who} it was. Save it again.")
+            raise ArenaError(
+                f"walls must not be painted over again and again, but up to {piece} it was. Save it again."
+            )
         box[...] = grey
         if not is_rectangle:
             box *= _polygon(x - left, y - top, box.shape)

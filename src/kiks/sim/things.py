@@ -119,9 +119,8 @@ class Things:
     def _index_of(self, body: int) -> int:
         numbers = self._world.state.bodies["number"][0].tolist()
         if not isinstance(body, int) or body not in numbers:
-            raise ParameterError(
-                f"body must be the number of an existing body, but it was {shown(body)}. There are {shown(numbers)}."
-            )
+            existing = f"The numbers are {shown(numbers)}" if numbers else "There is none"
+            raise ParameterError(f"body must be the number of an existing body, but it was {shown(body)}. {existing}.")
         return int(numbers.index(body))
 
     # ---- lamps ----
