@@ -132,6 +132,11 @@ def worlds(arena: kiks.Arena, count: int, *, response: str | None = None, **opti
     )
 
 
+def swarm(size_mm: int, robots: int, count: int) -> kiks.Batch:
+    """Return worlds of one thread with many robots in a square without walls inside."""
+    return kiks.Batch(kiks.Arena.box(size_mm, size_mm), count, robots=robots, timing=IDEAL, threads=1, seed=1)
+
+
 def megabytes() -> float:
     """Return the largest memory that this process has had [MB]."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
@@ -176,10 +181,17 @@ def main() -> None:
             "fast": rate(worlds(arena, count, response="fast"), seconds),
             "link": rate(worlds(arena, count, timing=kiks.Timing(0.1, 9600)), 2 * seconds),
             "bodies10": rate(worlds(box(1000, 10), 64), seconds / 4),
+            "swarm10": rate(swarm(1000, 10, 8), seconds / 4),
+            "swarm100": rate(swarm(3000, 100, 2), seconds / 8),
+            "swarm1000": rate(swarm(7000, 1000, 1), seconds / 40),
         },
     )
     rows += [(f"batch.{name}_steps_per_s_core", value, "robot-steps/CPU s") for name, value in found.items()]
     full = found["full"]
+    rows += [
+        (f"batch.{name}_over_full", found[name] / full, "times") for name in ("fast", "bodies10", "swarm10", "swarm100")
+    ]
+    rows.append(("batch.swarm1000_costs", found["swarm100"] / found["swarm1000"], "times a robot among 100"))
 
     if arguments.kheperax is not None:
         measure = kheperax(arguments.kheperax)

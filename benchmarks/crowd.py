@@ -30,6 +30,7 @@ from numba import njit
 import kiks
 from calibration import calibration_loops_per_s, report
 from kiks.engine import step
+from kiks.engine.scene import open_scene
 from kiks.engine.sensing import proximity
 from kiks.units import TICK_NS
 
@@ -49,14 +50,12 @@ WIRE_WEIGHTS = WEIGHTS.tolist()
 
 
 @njit(error_model="numpy", nogil=True)  # type: ignore[untyped-decorator, unused-ignore]
-def drive(
-    scene: Any, ground: Any, sight: Any, networks: Any, weights: Any, tick: int, step_count: int, out: Any
-) -> None:
+def drive(scene: Any, weights: Any, tick: int, step_count: int, out: Any) -> None:
     """Let all robots go their ways for some steps."""
-    robots, _, kinds, _ = scene
+    robots, kinds = open_scene(scene[0]).robots, open_scene(scene[0]).kinds
     for _ in range(step_count):
         for number in range(robots.shape[1]):
-            proximity.read_proximity(scene, sight, networks, tick, tick * TICK_NS, 1, number, True, out)
+            proximity.read_proximity(scene, number, tick, tick * TICK_NS, True, out)
             robot = robots[0, number]
             for wheel in range(2):
                 speed_cm_s = 8.0
@@ -64,7 +63,7 @@ def drive(
                     # Half of 1200, the full scale of Enki's sensors.
                     speed_cm_s += weights[wheel, sensor] * min(out[sensor] / 600.0, 1.0)
                 robot.speed_setpoint[wheel] = np.int32(speed_cm_s * 0.1 / kinds[robot.kind].pulse_mm)
-        step.advance(scene, ground, 1, tick, TICKS_PER_STEP)
+        step.advance(scene, tick, TICKS_PER_STEP)
         tick += TICKS_PER_STEP
 
 
@@ -129,8 +128,7 @@ class Crowd:
 
     def run(self, step_count: int) -> None:
         """Do some steps."""
-        world = self.sim.world
-        drive(world.scene, world.ground, world.sight, world.networks, WEIGHTS, self.tick, step_count, self._out)
+        drive(self.sim.world.scene, WEIGHTS, self.tick, step_count, self._out)
         self.tick += step_count * TICKS_PER_STEP
 
     def step_s(self) -> float:

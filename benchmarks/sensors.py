@@ -21,15 +21,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 import kiks
 from calibration import calibration_loops_per_s, report
 from kiks.demos.avoid import Avoid
 from kiks.demos.follow import Follow
 from kiks.engine.parameters import pack
-from kiks.engine.scene import Scene, make_scene
-from kiks.engine.sensing import ambient, camera, proximity
+from kiks.engine.scene import Scene
+from kiks.engine.sensing import ambient, camera, observe, proximity
 from kiks.engine.sensing.thesis_networks import networks_for
 from kiks.engine.state import PIXEL_COUNT
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
@@ -47,15 +46,18 @@ PLACES, NEAREST_MM, FARTHEST_MM = 1000, 2.0, 25.0
 """Robots in one call, and how far they are from a wall."""
 
 
+def scene_of(sim: kiks.Simulation, spec: RobotSpec) -> Scene:
+    """Return a scene of its own of a simulation's present state, with a robot of some kind."""
+    networks = networks_for(spec.proximity.response)
+    return Scene(sim.world.state.snapshot(), pack(spec), [sim.arena], networks, sim.lamps[None], [1])
+
+
 @dataclass(frozen=True)
 class Ride:
     """Moments of one robot's ride, each a scene of its own with a record of the state."""
 
     name: str
     scenes: list[Scene]
-    sight: Any
-    networks: Any
-    lamps: Any
 
     @staticmethod
     def drive(arena: str, behaviour: type[Follow] | type[Avoid]) -> Ride:
@@ -67,30 +69,26 @@ class Ride:
             for _ in range(LOOPS_BETWEEN):
                 program.step(robot)
             sim.sync()
-            scenes.append(
-                make_scene(sim.world.state.snapshot(), pack(sim.spec), sim.arena.width_mm, sim.arena.height_mm)
-            )
-        name = f"{arena}_{behaviour.__name__.lower()}"
-        networks = networks_for(sim.spec.proximity.response)
-        return Ride(name, scenes, sim.world.sight, networks, sim.lamps)
+            scenes.append(scene_of(sim, sim.spec))
+        return Ride(f"{arena}_{behaviour.__name__.lower()}", scenes)
 
 
 def read_proximity(ride: Ride) -> None:
     out = np.zeros(SENSOR_COUNT, np.int64)
     for scene in ride.scenes:
-        proximity.read_proximity(scene, ride.sight, ride.networks, TICK, TICK * TICK_NS, 1, 0, True, out)
+        proximity.read_proximity(scene.record, 0, TICK, TICK * TICK_NS, True, out)
 
 
 def read_ambient(ride: Ride) -> None:
     out = np.zeros(SENSOR_COUNT, np.int64)
     for scene in ride.scenes:
-        ambient.read_ambient(scene, ride.sight, ride.lamps, TICK, TICK * TICK_NS, 1, 0, True, out)
+        ambient.read_ambient(scene.record, 0, TICK, TICK * TICK_NS, True, out)
 
 
 def take_images(ride: Ride) -> None:
     out = np.zeros(PIXEL_COUNT, np.float64)
     for scene in ride.scenes:
-        camera.take_image(scene, ride.sight, TICK, TICK * TICK_NS, 1, 0, True, out)
+        camera.take_image(scene.record, 0, TICK, TICK * TICK_NS, True, out)
 
 
 @dataclass(frozen=True)
@@ -117,17 +115,6 @@ def readings_s(case: Case, ride: Ride) -> float:
     return (time.perf_counter() - start_s) / MOMENTS
 
 
-@njit(error_model="numpy")  # type: ignore[untyped-decorator, unused-ignore]
-def expect_all(sight: Any, networks: Any, kinds: Any, poses: Any, out: Any) -> None:
-    """Write what all sensors expect at each pose into `out`, shape [pose, 8]."""
-    tracks, now = np.empty(0), (0, 0.0)
-    for k in range(poses.shape[0]):
-        for sensor in range(out.shape[1]):
-            x, y, heading = poses[k, 0], poses[k, 1], poses[k, 2]
-            count = proximity.expected_count(sight, networks, kinds[0], tracks, 0, now, x, y, heading, sensor)
-            out[k, sensor] = count
-
-
 def poses_by_walls(arena: kiks.Arena, radius_mm: float) -> Any:
     """Return poses of robots near walls, x, y [mm] and heading [rad], shape [pose, 3]."""
     rng = np.random.default_rng(1)
@@ -143,15 +130,15 @@ def response_rows(repeats: int) -> list[tuple[str, float, str]]:
     """Return what a reading costs with each response."""
     sim = kiks.Simulation(kiks.Arena.box(300, 300, rounded_mm=100))
     poses, out = poses_by_walls(sim.arena, sim.spec.body.radius_mm), np.zeros((PLACES, SENSOR_COUNT))
-    robots = [(networks_for(each), pack(RobotSpec.load("khepera", response=each))) for each in RESPONSES]
+    scenes = [scene_of(sim, RobotSpec.load("khepera", response=each)) for each in RESPONSES]
 
-    def reading_ns(networks: Any, kinds: Any) -> float:
+    def reading_ns(scene: Scene) -> float:
         start_s = time.perf_counter()
-        expect_all(sim.world.sight, networks, kinds, poses, out)
+        observe.read_from(scene.record, 0, 0, 0, poses, out)
         return (time.perf_counter() - start_s) / out.size * 1e9
 
-    reading_ns(*robots[0])  # compiles
-    rounds = [[reading_ns(*robot) for robot in robots] for _ in range(repeats)]
+    reading_ns(scenes[0])  # compiles
+    rounds = [[reading_ns(scene) for scene in scenes] for _ in range(repeats)]
     reference_ns, *others_ns = zip(*rounds, strict=True)
     rows = [(f"sensors.response_{RESPONSES[0]}_ns", statistics.median(reference_ns), "ns a reading")]
     for response, times_ns in zip(RESPONSES[1:], others_ns, strict=True):

@@ -10,6 +10,8 @@ import pytest
 import kiks
 from kiks.batch import batch as batch_module
 from kiks.batch.initial_state import random_starts
+from kiks.batch.loop import sort_commands
+from kiks.batch.loop_timing import LENGTHS
 from kiks.model.arena_objects import Ball, Lamp
 from kiks.model.family import family
 
@@ -218,3 +220,14 @@ def test_speeds_of_nan_are_zero() -> None:
     batch = make(1)
     batch.run(wild, seconds=0.5)
     assert batch.state.robots["speed_setpoint"].tolist() == [[[0, 127]]]
+
+
+def test_commands_act_in_the_order_of_their_lengths() -> None:
+    """The counting sort is that of Python: by length, and by number where lengths are equal."""
+    wheels = np.random.default_rng(1).choice([-127.0, -10.0, -9.0, 0.0, 7.0, 55.0, 127.0], (2, 300, 2))
+    turns = np.zeros((2, 300), np.int64)
+    sort_commands(wheels, 1, turns)
+    lengths = [len(f"D,{left:.0f},{right:.0f}\n") for left, right in wheels[1]]
+    assert max(lengths) == LENGTHS - 1
+    assert turns[1].tolist() == sorted(range(300), key=lambda robot: lengths[robot])
+    assert not turns[0].any()

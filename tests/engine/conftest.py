@@ -10,7 +10,8 @@ import pytest
 from kiks.engine import step
 from kiks.engine.parameters import pack
 from kiks.engine.physics import motor
-from kiks.engine.scene import make_scene
+from kiks.engine.scene import Scene
+from kiks.engine.sensing.thesis_networks import networks_for
 from kiks.engine.state import State
 from kiks.model.arena import PAD, Arena
 from kiks.model.robot import RobotSpec
@@ -31,7 +32,8 @@ class World:
         self.robot["position_gains"] = self.spec.reset.position_gains
         self.robot["profile_speed"] = self.spec.reset.profile_speed_pulses
         self.robot["profile_acceleration"] = self.spec.reset.profile_acceleration
-        self.scene = make_scene(self.state, self.kinds, arena.width_mm, arena.height_mm)
+        networks = networks_for(self.spec.proximity.response)
+        self.scene = Scene(self.state, self.kinds, [arena], networks, np.zeros((1, 0, 4)), [seed])
         self.radius = self.spec.body.radius_mm
 
     def place(self, x_mm: float, y_mm: float, heading_rad: float = 0.0) -> World:
@@ -53,7 +55,7 @@ class World:
 
     def tick(self, count: int = 1) -> None:
         now = self.state.tick_count
-        step.advance(self.scene, (self.arena.clearance, self.cell, PAD), self.seed, now, count)
+        step.advance(self.scene.record, now, count)
         self.state.tick_count = now + count
 
     @property

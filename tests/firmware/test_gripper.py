@@ -81,7 +81,7 @@ def deepest_overlap_mm(sim: kiks.Simulation) -> float:
     discs = [(r["x_mm"], r["y_mm"], spec.body.radius_mm) for r, spec in zip(robots, sim.specs, strict=True)]
     discs += [(b["x_mm"], b["y_mm"], b["radius_mm"]) for b in bodies[bodies["is_lifted"] == 0]]
     for k, (x, y, radius) in enumerate(discs):
-        deepest = max(deepest, -contact.clearance_of_disc(*sim.world.ground, x, y, radius))
+        deepest = max(deepest, -contact.clearance_of_disc(*sim.world.free_space.ground, x, y, radius))
         for other_x, other_y, other_radius in discs[:k]:
             deepest = max(deepest, radius + other_radius - math.hypot(x - other_x, y - other_y))
     return deepest

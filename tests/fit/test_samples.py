@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from tools.sensors.train_networks import PLACES
 
-from kiks.engine.sensing.rays import cast_ray, sight_of
+from kiks.engine.sensing.rays import cast_ray, walls_of
 from kiks.errors import ParameterError
 from kiks.fit.samples import (
     BODY_RADIUS_MM,
@@ -197,7 +197,7 @@ def test_rays_are_those_of_the_engine(radius_mm, places):
     else:
         inside = np.hypot(x - edge - radius_mm, x[:, None] - middle) <= radius_mm
     arena = Arena(inside.astype(np.uint8) * 255, cell, "object")
-    sight = sight_of(arena)
+    walls = walls_of(arena)
     checked = 0
     for i, gap in enumerate(gaps):
         for j, angle in enumerate(angles):
@@ -209,7 +209,7 @@ def test_rays_are_those_of_the_engine(radius_mm, places):
                     direction = heading + fan.direction_rad[sensor, ray]
                     cosine, sine = math.cos(direction), math.sin(direction)
                     length = lengths[i, j, sensor, ray]
-                    found, _ = cast_ray(sight, ox, oy, cosine, sine, 50.0)
+                    found, _ = cast_ray(walls, ox, oy, cosine, sine, 50.0)
                     if length < 50.0:
                         # How steeply the ray meets the surface: a raster moves a grazing hit far along the ray.
                         hit = np.array([ox + length * cosine, oy + length * sine])

@@ -110,7 +110,7 @@ def test_reflections_contributions_are_those_of_its_formula():
     """The light of all rays but one, and the rounded share of it above the threshold (docs/sensors.md)."""
     sim = Simulation(Arena.box(400, 400))
     sim.place(1, 58.0, 200.0, math.pi)
-    (parameters,) = sim.world.scene[2]
+    (parameters,) = sim.world.kinds
 
     def expect(rays, sensor: int) -> float:
         light = 0.0
@@ -155,7 +155,7 @@ def test_views_show_exact_rays_whatever_the_response(response):
     kind = "khepera_ii" if response == "curve" else "khepera"
     sim = Simulation(Arena.box(400, 400), robot=kind, response=response)
     sim.place(1, 55.0, 200.0, math.pi)
-    (parameters,) = sim.world.scene[2]
+    (parameters,) = sim.world.kinds
     lengths_mm, met = sim.look().lengths_mm[0], sim.look().met[0]
     assert (lengths_mm == sim.rays(1)).all()
     for sensor in (1, 2, 3, 4):

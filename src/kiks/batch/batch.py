@@ -13,21 +13,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from kiks.batch.callbacks import DECIDER, decider_of
 from kiks.batch.initial_state import InitialState
-from kiks.batch.kernel_args import CollidingPlace, LonePlace, Worlds
+from kiks.batch.kernel_args import Worlds
 from kiks.batch.loop import roll_out
 from kiks.batch.loop_timing import Timing
 from kiks.batch.measure_slots import MeasureSlots
 from kiks.batch.rollouts import Rollouts
-from kiks.batch.stepper_dispatch import bunch_size
 from kiks.control.compiled_function import address_of
 from kiks.control.controller import SENSES, Controller, check_senses
 from kiks.control.measure import Measure
-from kiks.engine.scene import enter_worlds, make_scene
-from kiks.engine.sensing.rays import sight_of
+from kiks.engine.bunch import worlds_in_bunch
+from kiks.engine.scene import Scene, enter_worlds
 from kiks.engine.simd.f64x8 import LANES
 from kiks.engine.state import State
 from kiks.errors import ParameterError, counted, shown
-from kiks.model.arena import PAD, Arena
+from kiks.model.arena import Arena
 from kiks.model.array_checks import array_of, check_numbers
 from kiks.model.checks import SECONDS_MAX, check_count, check_number
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
@@ -111,15 +110,15 @@ class Batch:
         self._lamps = initial.lamps.copy()
         self.seeds = initial.seeds_of(seed)
         self._starts = initial.starts_of(self.seeds, starts)
-        widths_mm, heights_mm = zip(*((each.width_mm, each.height_mm) for each in self.arenas), strict=True)
-        self._scene = make_scene(self.state, initial.kinds, max(widths_mm), max(heights_mm))
+        scene = Scene(self.state, initial.kinds, self.arenas, self.networks, self._lamps, self.seeds)
+        self._scenes = [scene.in_arena(arena) for arena in self.arenas]
         self._line = self.timing.line(self.specs[0])
-        self._place = LonePlace if self.robot_count == 1 and not self.state.bodies.size else CollidingPlace
         self._ticks, self._begins_ns, self._watched_ns, self._sensed_ns, self._steps = (
             np.zeros(self.world_count, np.int64) for _ in range(5)
         )
         self._sensors = np.zeros((self.world_count, self.robot_count, SENSOR_COUNT * len(self.senses)))
         self._wheels = np.zeros((self.world_count, self.robot_count, 2))
+        self._turns = np.zeros((self.world_count, self.robot_count), np.int64)
         self._watching = MeasureSlots(measures, self.senses, "the batch")
         self.notes = np.zeros((self.world_count, self.robot_count, self._watching.note_count))
         self._is_sensed = False
@@ -172,6 +171,7 @@ class Batch:
         self._reset_worlds(np.arange(self.world_count))
         self._is_sensed = False
         worlds = self._worlds(
+            controller.senses,
             sensors=np.zeros((*shape, controller.sensor_count)),
             memory=np.zeros((*shape, controller.memory_count)),
             parameters=each_given,
@@ -179,7 +179,7 @@ class Batch:
         )
         decider = decider_of(controller)
         address = address_of(decider, DECIDER)
-        self._on_all_cores(worlds, controller.senses, (0, UNLIMITED), until_ns, address, watching.watchers)
+        self._on_all_cores(worlds, (0, UNLIMITED, until_ns), (address, watching.watchers))
         names = tuple(each.name for each in watching.measures)
         return Rollouts(watching.values(worlds.notes), worlds.steps.copy(), names)
 
@@ -268,6 +268,8 @@ class Batch:
     @lamps.setter
     def lamps(self, lamps: ArrayLike) -> None:
         self._lamps = check_numbers("lamps", lamps, (self.world_count, None, 4))
+        for scene in self._scenes:
+            scene.set_lamps(self._lamps)
 
     @property
     def times_s(self) -> NDArray[np.float64]:
@@ -306,16 +308,15 @@ class Batch:
         for count in (self._ticks, self._begins_ns, self._watched_ns, self._sensed_ns, self._steps):
             count[chosen] = 0
         self.notes[chosen] = 0.0
-        enter_worlds(self._scene, chosen)
+        enter_worlds(self._scenes[0].record, chosen)
 
-    def _worlds(self, **given: NDArray[np.float64]) -> Any:
-        """Return the kernels' argument for all worlds, with some arrays replaced."""
+    def _worlds(self, senses: Sequence[str], **given: NDArray[np.float64]) -> Any:
+        """Return what the loop knows of all worlds, with some arrays replaced."""
         nothing = np.zeros((self.world_count, self.robot_count, 0))
         arrays = {"sensors": self._sensors, "memory": nothing, "parameters": nothing, "notes": self.notes} | given
         return Worlds(
-            self._scene,
-            self._lamps,
-            self.seeds,
+            self._line,
+            np.array([SENSES.index(sense) for sense in senses], np.int64),
             self._ticks,
             self._begins_ns,
             self._watched_ns,
@@ -323,6 +324,7 @@ class Batch:
             self._steps,
             arrays["sensors"],
             self._wheels,
+            self._turns,
             arrays["memory"],
             arrays["parameters"],
             arrays["notes"],
@@ -330,29 +332,26 @@ class Batch:
 
     def _do_halves(self, first: int, end: int, chosen: NDArray[np.int64] | None = None) -> None:
         """Do halves of control loops with the speeds in `_wheels`: even halves sense, odd halves act."""
-        watchers = self._watching.watchers
-        self._on_all_cores(
-            self._worlds(), self.senses, (first, end), UNLIMITED, 0, watchers, chosen=chosen, least=STEP_BLOCK
-        )
+        span, callbacks = (first, end, UNLIMITED), (0, self._watching.watchers)
+        self._on_all_cores(self._worlds(self.senses), span, callbacks, chosen=chosen, least=STEP_BLOCK)
 
     def _on_all_cores(
         self,
         worlds: Any,
-        senses: Sequence[str],
-        *more: Any,
+        span: tuple[int, int, int],
+        callbacks: tuple[int, NDArray[np.int64]],
+        *,
         chosen: NDArray[np.int64] | None = None,
         least: int = LANES,
     ) -> None:
         """Run `roll_out` in threads on blocks of at least `least` worlds."""
-        codes = np.array([SENSES.index(sense) for sense in senses], np.int64)
         blocks = list(self._blocks(np.arange(self.world_count) if chosen is None else chosen, least))
         left = iter(blocks)
 
         def work() -> None:
             # Threads take blocks from one list until it is empty: an iterator gives each to one of them.
-            for (ground, sight), numbers in left:
-                place = self._place(ground, sight, self.networks, self._line, codes)
-                roll_out(place, worlds, bunch_size(place), numbers, *more)
+            for scene, numbers in left:
+                roll_out(scene.record, worlds, worlds_in_bunch(self.robot_count), numbers, span, callbacks)
 
         helpers = [self._pool.submit(work) for _ in range(min(self.threads, len(blocks)) - 1)]
         work()
@@ -365,12 +364,11 @@ class Batch:
     def _pool(self) -> ThreadPoolExecutor:
         return ThreadPoolExecutor(self.threads)
 
-    def _blocks(self, chosen: NDArray[np.int64], least: int) -> Iterator[tuple[Any, NDArray[np.int64]]]:
-        """Yield blocks of worlds: the walls of their common arena, and the indices of the worlds."""
+    def _blocks(self, chosen: NDArray[np.int64], least: int) -> Iterator[tuple[Scene, NDArray[np.int64]]]:
+        """Yield blocks of worlds: the scene with their common arena, and the indices of the worlds."""
         length = max(-(-len(chosen) // (self.threads * BLOCKS_PER_THREAD)), least)
         length = -(-length // LANES) * LANES  # so that no lane is padding
-        for index, arena in enumerate(self.arenas):
-            walls = (arena.clearance, float(arena.mm_per_cell), PAD), sight_of(arena)
+        for index, scene in enumerate(self._scenes):
             here = chosen[self.arena_indices[chosen] == index]
             for first in range(0, len(here), length):
-                yield walls, np.ascontiguousarray(here[first : first + length])
+                yield scene, np.ascontiguousarray(here[first : first + length])

@@ -11,97 +11,130 @@ from typing import Any
 import numpy as np
 
 from kiks.batch.callbacks import call_decider, call_measure
-from kiks.batch.loop_timing import ASK_LENGTH, acts_at, answer_length, order_length
-from kiks.batch.stepper_dispatch import command, give_back, pass_to, read, show, take
+from kiks.batch.kernel_args import PROXIMITY
+from kiks.batch.loop_timing import ASK_LENGTH, LENGTHS, acts_at, answer_length, order_length
 from kiks.control.controller import whole_speed
 from kiks.control.measure import Moment
-from kiks.engine.compiling import entry, kernel, spliced
+from kiks.engine.bunch import give_back, make_lanes, make_room, robot_in, show_tracks, take
+from kiks.engine.compiling import entry, inlined, kernel, spliced
+from kiks.engine.physics.motor import command_speed
+from kiks.engine.scene import open_scene
+from kiks.engine.sensing.ambient import sense_ambient
+from kiks.engine.sensing.proximity import READERS, make_readers, sense_proximity
 from kiks.engine.simd.f64x8 import LANES
-from kiks.engine.simd.stack_arrays import borrowed, stack_booleans, stack_floats, stack_integers
+from kiks.engine.simd.stack_arrays import borrowed, keep_alive, stack_booleans, stack_integers
+from kiks.engine.step import advance_bunch
 from kiks.model.robot import SENSOR_COUNT
-from kiks.units import NS_PER_S
+from kiks.units import NS_PER_S, TICK_NS
 
-STATE_SIZE = 8
-"""Numbers of a `Moment` that `show` writes: the poses and contacts of a robot."""
-
-_READINGS = LANES * SENSOR_COUNT  # the size of a stack array must be a constant
+_READINGS = READERS * SENSOR_COUNT  # the size of a stack array must be a constant
 
 
 @spliced
-def sense(place: Any, worlds: Any, bunch: Any, numbers: Any, is_on: Any, times_ns: Any, counts: Any) -> Any:
+def sense(scene: Any, worlds: Any, bunch: Any, is_on: Any, times_ns: Any, readers: Any, counts: Any) -> Any:
     """Read all senses of all robots, and note when the last reply has arrived.
 
     Args:
-        place: What the worlds of the block share.
-        worlds: All worlds.
-        bunch: The worlds that are stepped at once.
-        numbers: Their indices, int64 [W].
+        scene: The scene (`kiks.engine.scene.open_scene`).
+        worlds: What the loop knows of all worlds (`kiks.batch.kernel_args.Worlds`).
+        bunch: The worlds that are stepped together (`kiks.engine.bunch`).
         is_on: Their mask, bool [W].
         times_ns: Buffer for the time of each world [ns], int64 [W].
-        counts: Buffer for a reading of each world, int64 [W, 8].
+        readers: Buffer for the robots that are read together (`kiks.engine.sensing.proximity.Readers`).
+        counts: Buffer for their readings, int64 [`READERS`, 8].
     """
-    robot_count = worlds.sensors.shape[1]
+    line, numbers = worlds.line, bunch.worlds
     for k in range(numbers.shape[0]):
         times_ns[k] = worlds.begins_ns[numbers[k]]
         if is_on[k]:
             worlds.sensed_ns[numbers[k]] = times_ns[k]
-    for number in range(place.sense_codes.shape[0]):
+    for place in range(worlds.sense_codes.shape[0]):
         for k in range(numbers.shape[0]):
             if is_on[k]:
-                times_ns[k] = acts_at(place.line, worlds.sensed_ns[numbers[k]], ASK_LENGTH)
-        pass_to(place, worlds, bunch, times_ns)
-        first = number * SENSOR_COUNT
-        for robot in range(robot_count):
-            read(place, worlds, bunch, place.sense_codes[number], times_ns, robot, counts)
-            for k in range(numbers.shape[0]):
-                if is_on[k]:
-                    world = numbers[k]
-                    for sensor in range(SENSOR_COUNT):
-                        worlds.sensors[world, robot, first + sensor] = counts[k, sensor]
-                    heard_ns = times_ns[k] + answer_length(counts[k]) * place.line.character_ns
-                    worlds.sensed_ns[world] = max(worlds.sensed_ns[world], heard_ns)
+                times_ns[k] = acts_at(line, worlds.sensed_ns[numbers[k]], ASK_LENGTH)
+        pass_to(scene, bunch, times_ns)
+        show_tracks(scene, bunch)
+        first, count = place * SENSOR_COUNT, 0
+        for k in range(numbers.shape[0]):
+            for robot in range(worlds.sensors.shape[1] if is_on[k] else 0):
+                readers.worlds[count], readers.robots[count] = numbers[k], robot
+                readers.ticks[count], readers.times_ns[count] = bunch.ticks[k], times_ns[k]
+                count += 1
+                if count == READERS:
+                    read_sense(scene, worlds, worlds.sense_codes[place], first, readers, count, counts)
+                    count = 0
+        read_sense(scene, worlds, worlds.sense_codes[place], first, readers, count, counts)
+
+
+@inlined
+def read_sense(scene: Any, worlds: Any, code: Any, first: Any, readers: Any, count: Any, counts: Any) -> Any:
+    """Read a sense of some robots, and note when their replies have arrived.
+
+    Args:
+        scene: The scene.
+        worlds: What the loop knows of all worlds.
+        code: The sense, `PROXIMITY` or `AMBIENT`.
+        first: Place of its first reading among the sensors of a robot.
+        readers: Which robots, and when (`kiks.engine.sensing.proximity.Readers`).
+        count: Their number.
+        counts: Buffer for readings, int64 [`READERS`, 8].
+    """
+    if code == PROXIMITY:
+        sense_proximity(scene, readers, count, True, counts)
+    for k in range(count):
+        world, robot, time_ns = readers.worlds[k], readers.robots[k], readers.times_ns[k]
+        if code != PROXIMITY:
+            sense_ambient(scene, world, robot, readers.ticks[k], time_ns, True, counts[k])
+        for sensor in range(SENSOR_COUNT):
+            worlds.sensors[world, robot, first + sensor] = counts[k, sensor]
+        heard_ns = time_ns + answer_length(counts[k]) * worlds.line.character_ns
+        worlds.sensed_ns[world] = max(worlds.sensed_ns[world], heard_ns)
+
+
+@kernel
+def pass_to(scene: Any, bunch: Any, times_ns: Any) -> Any:
+    """Do the ticks that have begun before the time of each world of a bunch."""
+    until = stack_integers(LANES)[: times_ns.shape[0]]
+    is_any = False
+    for k in range(times_ns.shape[0]):
+        until[k] = -(-times_ns[k] // TICK_NS)
+        is_any = is_any or until[k] > bunch.ticks[k]
+    if is_any:
+        advance_bunch(scene, bunch, until)
 
 
 @spliced
-def act(place: Any, worlds: Any, bunch: Any, numbers: Any, is_on: Any, times_ns: Any) -> Any:
+def act(scene: Any, worlds: Any, bunch: Any, is_on: Any, times_ns: Any) -> Any:
     """Set the speeds of all robots, and note when the next loop begins; arguments as for `sense`.
 
     A shorter command acts sooner, so the commands of a world act in the order of their lengths. At the end, `times_ns`
     holds the time at which the last command of each world acted.
     """
-    line, wheels = place.line, worlds.wheels
+    line, wheels, numbers = worlds.line, worlds.wheels, bunch.worlds
     for k in range(numbers.shape[0]):
         times_ns[k] = worlds.begins_ns[numbers[k]]
         if is_on[k]:
             for robot in range(wheels.shape[1]):
                 for wheel in range(2):
                     wheels[numbers[k], robot, wheel] = whole_speed(wheels[numbers[k], robot, wheel])
+            sort_commands(wheels, numbers[k], worlds.turns)
     for turn in range(wheels.shape[1]):
         for k in range(numbers.shape[0]):
             if is_on[k]:
-                length = command_length(wheels, numbers[k], robot_at_turn(wheels, numbers[k], turn))
+                length = command_length(wheels, numbers[k], worlds.turns[numbers[k], turn])
                 times_ns[k] = acts_at(line, worlds.sensed_ns[numbers[k]], length)
-        pass_to(place, worlds, bunch, times_ns)
+        pass_to(scene, bunch, times_ns)
         for k in range(numbers.shape[0]):
             if is_on[k]:
-                robot = robot_at_turn(wheels, numbers[k], turn)
+                robot = worlds.turns[numbers[k], turn]
                 left, right = wheels[numbers[k], robot, 0], wheels[numbers[k], robot, 1]
-                command(place, bunch, k, robot, np.int64(left), np.int64(right))
+                command_speed(robot_in(scene, bunch, k, robot)[0], np.int64(left), np.int64(right))
     for k in range(numbers.shape[0]):
         if is_on[k]:
             world = numbers[k]
             done_ns = times_ns[k] + line.done_length * line.character_ns
             worlds.begins_ns[world] = max(done_ns, worlds.begins_ns[world] + line.period_ns)
             worlds.steps[world] += 1
-
-
-@spliced
-def finish_bunch(place: Any, worlds: Any, bunch: Any, numbers: Any, times_ns: Any) -> Any:
-    """Do the ticks before the next loop, and write the bunch back; arguments as for `sense`."""
-    for k in range(numbers.shape[0]):
-        times_ns[k] = worlds.begins_ns[numbers[k]]
-    pass_to(place, worlds, bunch, times_ns)
-    give_back(place, worlds, bunch)
 
 
 @kernel
@@ -111,26 +144,21 @@ def command_length(wheels: Any, world: Any, robot: Any) -> Any:
 
 
 @kernel
-def robot_at_turn(wheels: Any, world: Any, turn: Any) -> Any:
-    """Return the index of the robot with the `turn`-th shortest command; ties by index."""
-    robot_count = wheels.shape[1]
-    if robot_count > 1:
-        for robot in range(robot_count):
-            length, before = command_length(wheels, world, robot), 0
-            for other in range(robot_count):
-                other_length = command_length(wheels, world, other)
-                before += other_length < length or (other_length == length and other < robot)
-            if before == turn:
-                return robot
-    return 0
+def sort_commands(wheels: Any, world: Any, turns: Any) -> Any:
+    """Write a world's robots into its row of `turns` in the order of their commands' lengths; ties by index.
 
-
-@spliced
-def fill_bunch(block: Any, first: Any, numbers: Any, is_on: Any) -> Any:
-    """Choose the worlds of the next bunch; the last world pads an incomplete bunch, and the mask hides the padding."""
-    for k in range(numbers.shape[0]):
-        numbers[k] = block[min(first + k, block.shape[0] - 1)]
-        is_on[k] = first + k < block.shape[0]
+    A counting sort: commands have few lengths, and worlds may have a thousand robots.
+    """
+    ends = stack_integers(LENGTHS)
+    ends[:] = 0
+    for robot in range(wheels.shape[1]):
+        ends[command_length(wheels, world, robot)] += 1
+    for length in range(1, LENGTHS):
+        ends[length] += ends[length - 1]
+    for robot in range(wheels.shape[1] - 1, -1, -1):
+        length = command_length(wheels, world, robot)
+        ends[length] -= 1
+        turns[world, ends[length]] = robot
 
 
 @spliced
@@ -144,43 +172,39 @@ def mask_ended(worlds: Any, numbers: Any, is_on: Any, until_ns: Any) -> Any:
 
 
 @spliced
-def call_measures(
-    place: Any, worlds: Any, bunch: Any, numbers: Any, is_on: Any, times_ns: Any, state: Any, watchers: Any
-) -> Any:
+def call_measures(scene: Any, worlds: Any, bunch: Any, is_on: Any, times_ns: Any, watchers: Any) -> Any:
     """Call the measures for the robots of a bunch.
 
     Args:
-        place: What the worlds of the block share.
-        worlds: All worlds.
-        bunch: The worlds that are stepped at once.
-        numbers: Their indices, int64 [W].
+        scene: The scene.
+        worlds: What the loop knows of all worlds.
+        bunch: The worlds that are stepped together.
         is_on: Their mask, bool [W].
         times_ns: When the last command of each world acted [ns], int64 [W].
-        state: Buffer for the output of `show`, float64 [`STATE_SIZE`].
         watchers: The measures (`kiks.batch.callbacks.watchers_of`).
     """
-    for k in range(numbers.shape[0]):
+    for k in range(bunch.worlds.shape[0]):
         if is_on[k]:
-            world = numbers[k]
+            world = bunch.worlds[k]
             period_s = (times_ns[k] - worlds.watched_ns[world]) / NS_PER_S
             worlds.watched_ns[world] = times_ns[k]
             for robot in range(worlds.sensors.shape[1] if watchers.shape[0] > 0 else 0):
-                show(place, worlds, bunch, k, robot, state)
+                one, record = robot_in(scene, bunch, k, robot)
                 moment = Moment(
                     times_ns[k] / NS_PER_S,
                     period_s,
                     worlds.sensors[world, robot],
                     worlds.wheels[world, robot],
-                    state[0],
-                    state[1],
-                    state[2],
-                    state[3],
-                    state[4],
-                    state[5],
-                    state[6],
-                    state[7] > 0.0,
-                    worlds.scene[1][world],
-                    worlds.lamps[world],
+                    one.x_mm,
+                    one.y_mm,
+                    one.heading_rad,
+                    record.start_x_mm,
+                    record.start_y_mm,
+                    one.forwards_mm + one.backwards_mm,
+                    1.0 * one.contact_count,
+                    one.is_touching > 0.0,
+                    scene.bodies[world],
+                    scene.lamps[world],
                 )
                 for number in range(watchers.shape[0]):
                     notes = worlds.notes[world, robot, watchers[number, 1] : watchers[number, 2]]
@@ -188,38 +212,48 @@ def call_measures(
 
 
 @entry
-def roll_out(
-    place: Any, worlds: Any, size: Any, block: Any, halves: Any, until_ns: Any, decider: Any, watchers: Any
-) -> Any:
+def roll_out(scene: Any, worlds: Any, size: Any, block: Any, span: Any, callbacks: Any) -> Any:
     """Do control loops, or halves of them, in the worlds of a block.
 
     Args:
-        place: What the worlds of the block share.
-        worlds: All worlds.
+        scene: The scene of the block (`kiks.engine.scene.Scene.record`).
+        worlds: What the loop knows of all worlds (`kiks.batch.kernel_args.Worlds`).
         size: Number of worlds in a bunch.
         block: Indices of the worlds, int64 [world].
-        halves: Number of the first half to do, and of the first one not to do: even halves sense, odd halves act.
-        until_ns: Time at and after which no loop begins [ns].
-        decider: Address of the kernel that calls a controller for each world of a bunch (`kiks.batch.callbacks`); 0 if
-            `worlds.wheels` holds the speeds already.
-        watchers: The measures (`kiks.batch.callbacks.watchers_of`).
+        span: Number of the first half of a loop to do, and of the first one not to do: even halves sense, odd halves
+            act; time at and after which no loop begins [ns].
+        callbacks: Address of the kernel that calls a controller for each world of a bunch (`kiks.batch.callbacks`), 0
+            if `worlds.wheels` holds the speeds already; and the measures (`kiks.batch.callbacks.watchers_of`).
     """
-    place, worlds, watchers = borrowed(place), borrowed(worlds), borrowed(watchers)
-    numbers, times_ns = stack_integers(LANES)[:size], stack_integers(LANES)[:size]
-    is_on, state = stack_booleans(LANES)[:size], stack_floats(STATE_SIZE)
-    counts = stack_integers(_READINGS).reshape((LANES, SENSOR_COUNT))[:size]
+    scene, worlds = open_scene(scene[0]), borrowed(worlds)
+    first_half, end_half, until_ns = span
+    decider, watchers = callbacks[0], borrowed(callbacks[1])
+    all_numbers, all_times_ns, all_on = stack_integers(LANES), stack_integers(LANES), stack_booleans(LANES)
+    ticks = stack_integers(LANES)
+    readers, counts = make_readers(), stack_integers(_READINGS).reshape((READERS, SENSOR_COUNT))
+    lanes, room = make_lanes(size * scene.robots.shape[1]), make_room(scene, size)
     for first in range(0, block.shape[0], size):
-        fill_bunch(block, first, numbers, is_on)
-        bunch = take(place, worlds, numbers)
-        for half in range(halves[0], halves[1]):
+        count = min(size, block.shape[0] - first)
+        numbers, times_ns, is_on = all_numbers[:count], all_times_ns[:count], all_on[:count]
+        numbers[:], is_on[:] = block[first : first + count], True
+        for k in range(count):
+            ticks[k] = worlds.ticks[numbers[k]]
+        bunch = borrowed(take(scene, numbers, ticks[:count], borrowed(lanes), borrowed(room)))
+        for half in range(first_half, end_half):
             if half % 2 == 0:
                 if not mask_ended(worlds, numbers, is_on, until_ns):
                     break
-                sense(place, worlds, bunch, numbers, is_on, times_ns, counts)
+                sense(scene, worlds, bunch, is_on, times_ns, readers, counts)
                 if decider != 0:
                     given = worlds.sensors, worlds.memory, worlds.parameters, worlds.wheels
                     call_decider(decider, (numbers, is_on, *given))
             else:
-                act(place, worlds, bunch, numbers, is_on, times_ns)
-                call_measures(place, worlds, bunch, numbers, is_on, times_ns, state, watchers)
-        finish_bunch(place, worlds, bunch, numbers, times_ns)
+                act(scene, worlds, bunch, is_on, times_ns)
+                call_measures(scene, worlds, bunch, is_on, times_ns, watchers)
+        for k in range(count):
+            times_ns[k] = worlds.begins_ns[numbers[k]]
+        pass_to(scene, bunch, times_ns)
+        give_back(scene, bunch)
+        for k in range(count):
+            worlds.ticks[numbers[k]] = ticks[k]
+    keep_alive(lanes, room)

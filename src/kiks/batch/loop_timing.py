@@ -30,6 +30,9 @@ Milliseconds = Annotated[Number, Field(ge=0, le=1e6)]
 ASK_LENGTH = 2
 """Number of characters of the command that reads a sense: its letter and a line feed."""
 
+LENGTHS = 13
+"""One more than the most characters of a command that sets speeds: `D,-127,-127` and a line feed."""
+
 
 @record
 class Timing:

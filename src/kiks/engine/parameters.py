@@ -68,10 +68,14 @@ PARAMETERS = np.dtype(
         ("ray_y_mm", "f8", (SENSOR_COUNT,)),
         ("ray_cos", "f8", (SENSOR_COUNT, LANES)),  # the lane over repeats the last ray
         ("ray_sin", "f8", (SENSOR_COUNT, LANES)),
+        ("edge_cos", "f8", (2, SENSOR_COUNT)),  # the directions of the leftmost and of the rightmost rays once more
+        ("edge_sin", "f8", (2, SENSOR_COUNT)),
         ("reach_mm", "f8"),  # longest length of a ray
         ("watch_x_mm", "f8", (SENSOR_COUNT,)),  # a circle around all places where a wall makes a sensor respond
         ("watch_y_mm", "f8", (SENSOR_COUNT,)),
         ("watch_mm", "f8", (SENSOR_COUNT,)),
+        ("watch_reach_mm", "f8"),  # radius of a circle around the robot's centre with all those circles in it
+        ("ray_reach_mm", "f8"),  # and of one that no ray leaves
         ("ray_weight", "f8", (SENSOR_COUNT, LANES)),  # 0 for the lane over
         ("curve_counts", "f4", (CURVE_POINT_COUNT,)),
         ("behind_mm", "f8"),
@@ -169,6 +173,7 @@ def _pack_response(robot: Any, spec: RobotSpec) -> None:
             sine, cosine = sin_cos(math.radians(geometry.direction_deg[sensor] + offset_deg))
             robot["ray_cos"][sensor, ray:] = cosine
             robot["ray_sin"][sensor, ray:] = sine
+    robot["edge_cos"], robot["edge_sin"] = (robot[name][:, [0, RAY_COUNT - 1]].T for name in ("ray_cos", "ray_sin"))
     if proximity.response == "curve" and spec.curve is not None:
         _pack_curve(robot, spec.curve, proximity)
     near_mm = [reach_mm] * SENSOR_COUNT
@@ -200,6 +205,10 @@ def _pack_watch(robot: Any, geometry: Proximity | NetworkResponse, near_mm: Sequ
         robot["watch_x_mm"][sensor] = robot["ray_x_mm"][sensor] + out_mm * robot["ray_cos"][sensor, AHEAD]
         robot["watch_y_mm"][sensor] = robot["ray_y_mm"][sensor] + out_mm * robot["ray_sin"][sensor, AHEAD]
         robot["watch_mm"][sensor] = (radius + _ROUNDINGS) * near_mm[sensor]
+        offset_mm = math.sqrt(robot["watch_x_mm"][sensor] ** 2 + robot["watch_y_mm"][sensor] ** 2)
+        robot["watch_reach_mm"] = max(robot["watch_reach_mm"], offset_mm + robot["watch_mm"][sensor])
+        origin_mm = math.sqrt(robot["ray_x_mm"][sensor] ** 2 + robot["ray_y_mm"][sensor] ** 2)
+        robot["ray_reach_mm"] = max(robot["ray_reach_mm"], origin_mm + robot["reach_mm"])
 
 
 def _pack_reflection(robot: Any, reflection: Reflection, proximity: Proximity) -> None:

@@ -4,116 +4,138 @@ from __future__ import annotations
 
 from typing import Any
 
-from kiks.engine.compiling import entry, inlined, kernel
-from kiks.engine.physics.balls import remember_place
-from kiks.engine.physics.collisions import make_room, move_together
-from kiks.engine.physics.grasp import carry_lifted
-from kiks.engine.physics.gripper import move_gripper, tend_grippers
-from kiks.engine.physics.motion import draw_slip, move, note_contact, remember_pose
-from kiks.engine.physics.motor import control_motors, latch_encoders, turn_motors
-from kiks.engine.scene import count_discs, enter_all
-from kiks.engine.simd.masks import anywhere, everywhere, opposite
-from kiks.engine.simd.records import (
-    EIGHT,
-    copy_lanes,
-    copy_record8,
-    only,
-    open_record8,
-    stack_record,
+from kiks.engine.bunch import (
+    copy_motion,
+    give_back,
+    make_lanes,
+    make_room,
+    robot_in,
+    set_end,
+    show_poses,
+    take,
+    wake_all,
+    whose,
 )
+from kiks.engine.compiling import entry, inlined, kernel
+from kiks.engine.physics.collisions import collide_near_things, find_near_things, remember_places
+from kiks.engine.physics.grasp import carry_lifted
+from kiks.engine.physics.gripper import tend_grippers
+from kiks.engine.physics.motion import move, note_contact, remember_pose
+from kiks.engine.physics.motor import control_motors, latch_encoders, turn_motors
+from kiks.engine.scene import open_scene
+from kiks.engine.simd.f64x8 import LANES
+from kiks.engine.simd.masks import anywhere, everywhere, holds, opposite
+from kiks.engine.simd.records import copy_lanes, copy_record8, one_of, open_record8
+from kiks.engine.simd.stack_arrays import borrowed, keep_alive, stack_integers
+from kiks.engine.simd.u64x8 import load_words
 
 
 @entry
-def advance(scene: Any, ground: Any, seed: Any, tick: Any, tick_count: Any) -> Any:
-    """Let time pass.
+def advance(scene: Any, tick: Any, tick_count: Any) -> Any:
+    """Let time pass in the first world of a scene.
 
     Args:
-        scene: The scene (`kiks.engine.scene`); changed in place.
-        ground: Distance of cells to the nearest wall [mm], shape [rows, columns]; edge of a cell [mm]; cells of the
-            border around the arena.
-        seed: Seed of the run.
+        scene: The scene (`kiks.engine.scene.Scene.record`); its world is changed.
         tick: Number of the first tick.
         tick_count: Ticks to do.
     """
-    for world in range(scene[0].shape[0]):
-        if count_discs(scene)[1] == 1:
-            advance_one(scene, ground, seed, world, tick, tick_count)
-        else:
-            advance_many(scene, ground, seed, world, tick, tick_count)
+    scene = open_scene(scene[0])
+    worlds, ticks, until = stack_integers(1), stack_integers(1), stack_integers(1)
+    worlds[0], ticks[0], until[0] = 0, tick, tick + tick_count
+    lanes, room = make_lanes(scene.robots.shape[1]), make_room(scene, 1)
+    bunch = borrowed(take(scene, worlds, ticks, borrowed(lanes), borrowed(room)))
+    advance_bunch(scene, bunch, until)
+    give_back(scene, bunch)
+    keep_alive(lanes, room)
 
 
 @kernel
-def advance_one(scene: Any, ground: Any, seed: Any, world: Any, tick: Any, tick_count: Any) -> Any:
-    """Let time pass in a world with one robot and nothing else."""
-    robot = scene[0][world, 0]
-    parameters = scene[2][robot.kind]
-    for now in range(tick, tick + tick_count):
-        advance_alone(robot, parameters, ground, (seed, world, 0, now))
-
-
-@inlined
-def advance_alone(robot: Any, parameters: Any, ground: Any, chance: Any) -> Any:
-    """Let a tick pass for a lone robot, or for eight, each in its own world."""
-    field, cell, pad = ground
-    left, right = turn_wheels(robot, parameters)
-    has_gripper = robot.has_gripper != 0
-    if anywhere(has_gripper):
-        move_gripper(only(robot, has_gripper), 0.0)
-    is_touching = move(field, cell, pad, robot, parameters, left, right, chance)
-    note_contact(robot, is_touching)
-
-
-@kernel
-def advance_eight(eight: Any, parameters: Any, ground: Any, seeds: Any, until: Any) -> Any:
-    """Let time pass in eight worlds of one robot each.
+def advance_bunch(scene: Any, bunch: Any, until: Any) -> Any:
+    """Let time pass in the worlds of a bunch.
 
     Args:
-        eight: The robots, a `Record8` of `EIGHT`.
-        parameters: Their constants, a `Record8` of `EIGHT_KINDS`.
-        ground: The arena, as in `advance`.
-        seeds: Seeds of the eight worlds, `Words`; each is the first world of its seed.
-        until: Final tick number of each world, `Lanes`; a world that has reached it does no tick.
+        scene: The scene (`kiks.engine.scene.open_scene`).
+        bunch: The bunch (`kiks.engine.bunch`).
+        until: The tick that each of its worlds is to reach, int64; a world that has reached it does no tick.
     """
-    before = open_record8(stack_record(EIGHT))
-    while True:
-        now = eight.tick_count
-        is_due = now < until
-        if not anywhere(is_due):
-            break
-        # Some finish a tick or two before the others: restoring them costs less than masking each operation.
-        if not everywhere(is_due):
-            copy_record8(eight, before)
-        advance_alone(eight, parameters, ground, (seeds, 0, 0, now))
-        eight.tick_count = now + 1.0
-        if not everywhere(is_due):
-            copy_lanes(before, eight, opposite(is_due))
-
-
-@kernel
-def advance_many(scene: Any, ground: Any, seed: Any, world: Any, tick: Any, tick_count: Any) -> Any:
-    """Let time pass in a world with several discs."""
-    robots, bodies, kinds, _ = scene
-    room = make_room(scene)
-    neighbour_count, slack_mm = 0, -1.0
-    for now in range(tick, tick + tick_count):
-        for number in range(robots.shape[1]):
-            robot = robots[world, number]
-            parameters = kinds[robot.kind]
-            room.ways[number, 0], room.ways[number, 1] = turn_wheels(robot, parameters)
-            room.ways[number, 2] = draw_slip(parameters, seed, world, number, now)
-        for number in range(bodies.shape[1]):
-            remember_place(bodies[world, number])
-        if tend_grippers(scene, ground, world):
-            slack_mm = -1.0
-        neighbour_count, slack_mm = move_together(scene, ground, world, room, neighbour_count, slack_mm)
-        carry_lifted(scene, world)
-    enter_all(scene, world)
+    set_end(scene, bunch, until)
+    while turn_wheels(bunch):
+        for k in range(until.shape[0]):
+            if bunch.ticks[k] < until[k] and (bunch.has_company or bunch.has_grippers):
+                meet_others(scene, bunch, k)
+        move_freely(scene, bunch)
+        if bunch.has_company:
+            show_poses(scene, bunch)
+        for k in range(until.shape[0]):
+            if bunch.ticks[k] < until[k]:
+                if bunch.has_grippers:
+                    carry_lifted(scene, bunch.worlds[k])
+                bunch.ticks[k] += 1
 
 
 @inlined
-def turn_wheels(robot: Any, parameters: Any) -> Any:
-    """Do the phases of a robot before it moves; return the paths of its wheels [pulses]."""
-    remember_pose(robot)
-    latch_encoders(robot)
-    control_motors(robot, parameters)
-    return turn_motors(robot, parameters, 0), turn_motors(robot, parameters, 1)
+def turn_wheels(bunch: Any) -> Any:
+    """Phases: the motors of all robots turn their wheels; return whether any robot has a tick to do."""
+    is_any = False
+    for place in range(bunch.robots.shape[0]):
+        eight, parameters = open_record8(bunch.robots[place]), open_record8(bunch.kinds[place])
+        is_due = eight.tick_count < eight.until
+        if anywhere(is_due):
+            is_any = True
+            # Some finish a tick or two before the others: restoring them costs less than masking each operation.
+            if not everywhere(is_due):
+                copy_record8(eight, open_record8(bunch.before[place]))
+            remember_pose(eight)
+            latch_encoders(eight)
+            control_motors(eight, parameters)
+            left, right = turn_motors(eight, parameters, 0), turn_motors(eight, parameters, 1)
+            eight.left_pulses, eight.right_pulses = left, right
+            eight.way_mm = max(abs(left), abs(right)) * parameters.pulse_mm
+    return is_any
+
+
+@inlined
+def meet_others(scene: Any, bunch: Any, k: Any) -> Any:
+    """Phases: grippers move, and the things of a world that may collide move; the other robots have not moved yet."""
+    world, room = bunch.worlds[k], bunch.room
+    remember_places(scene, world, room, k)
+    if bunch.has_grippers and tend_grippers(scene, world):
+        scene.grid.crowds[world].slack_mm = -1.0
+        wake_all(scene, room, k)
+    near_count, pair_count, longest_mm = find_near_things(scene, bunch, k)
+    robot_count = scene.robots.shape[1]
+    for place in range(near_count):
+        if room.near[place] < robot_count:
+            one, robot = robot_in(scene, bunch, k, room.near[place])
+            copy_motion(one, robot)
+    if near_count > 0:
+        collide_near_things(scene, world, room, near_count, pair_count, longest_mm)
+    for place in range(near_count):
+        if room.near[place] < robot_count:
+            one, _ = robot_in(scene, bunch, k, room.near[place])
+            one.is_near, one.is_touching_discs = 1.0, room.discs[room.near[place]].is_touching
+
+
+@inlined
+def move_freely(scene: Any, bunch: Any) -> Any:
+    """Phases: the robots that can touch nothing but walls move; the contacts of all are counted."""
+    for place in range(bunch.robots.shape[0]):
+        eight, parameters = open_record8(bunch.robots[place]), open_record8(bunch.kinds[place])
+        is_due = eight.tick_count < eight.until
+        if not anywhere(is_due):
+            continue
+        chance = load_words(bunch.seeds[LANES * place :]), eight.number, eight.tick_count
+        is_near = eight.is_near > 0.0
+        # Those that have met others move, too, and then get back where collisions have brought them.
+        is_touching = move(scene.ground, eight, parameters, eight.left_pulses, eight.right_pulses, chance)
+        if anywhere(is_near):
+            for lane in range(LANES):
+                if holds(is_near, lane):
+                    k, number = whose(scene, LANES * place + lane)
+                    copy_motion(scene.robots[bunch.worlds[k], number], one_of(eight, lane))
+            is_touching = (is_near & (eight.is_touching_discs > 0.0)) | (opposite(is_near) & is_touching)
+            eight.is_near = 0.0
+        note_contact(eight, is_touching)
+        eight.tick_count = eight.tick_count + 1.0
+        if not everywhere(is_due):
+            copy_lanes(open_record8(bunch.before[place]), eight, opposite(is_due))

@@ -72,14 +72,5 @@ class Cameras:
 
     def _kernel(self, index: int, time_ns: int, *, is_noisy: bool) -> int:
         world = self._world
-        light: int = camera.take_image(
-            world.scene,
-            world.sight,
-            world.state.tick_count,
-            time_ns,
-            world.seed,
-            index,
-            is_noisy,
-            self._pixels,
-        )
+        light: int = camera.take_image(world.scene, index, world.state.tick_count, time_ns, is_noisy, self._pixels)
         return light

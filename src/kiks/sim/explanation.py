@@ -218,11 +218,12 @@ def explain_proximity(world: World, robot: int, sensor: int) -> Explanation:
     """
     index = world.index_of(robot)
     _check_sensor(sensor)
-    rays, met, without = np.empty((3, RAY_COUNT)), np.empty(RAY_COUNT, np.int64), np.empty(RAY_COUNT)
+    all_rays, without = np.empty((SENSOR_COUNT, 3, RAY_COUNT)), np.empty(RAY_COUNT)
+    all_met = np.empty((SENSOR_COUNT, RAY_COUNT), np.int64)
     sampled_ns, expected, scattered, jitter, count = explain.explain_proximity(
-        *(world.scene, world.sight, world.networks, world.state.tick_count, world.now_ns, world.seed, index, sensor),
-        *(rays, met, without),
+        world.scene, index, sensor, world.state.tick_count, world.now_ns, (all_rays, all_met, without)
     )
+    rays, met = all_rays[sensor], all_met[sensor]
     parameters = _parameters(world, index)
     angles_deg = np.degrees(np.arctan2(parameters["ray_sin"][sensor], parameters["ray_cos"][sensor])).tolist()
     seen = tuple(
@@ -266,8 +267,7 @@ def explain_ambient(world: World, robot: int, sensor: int) -> LightExplanation:
     _check_sensor(sensor)
     facts, why = np.empty((len(world.lamps), 3)), np.empty((len(world.lamps), 2), np.int64)
     sampled_ns, expected, noise, count, unlit = explain.explain_ambient(
-        *(world.scene, world.sight, world.lamps, world.state.tick_count, world.now_ns, world.seed, index, sensor),
-        *(facts, why),
+        world.scene, index, sensor, world.state.tick_count, world.now_ns, (facts, why)
     )
     parameters = _parameters(world, index)
     lamps = tuple(
@@ -297,7 +297,7 @@ def explain_ambient(world: World, robot: int, sensor: int) -> LightExplanation:
 
 
 def _parameters(world: World, index: int) -> Any:
-    return world.scene[2][int(world.state.robots["kind"][0, index])]
+    return world.kinds[int(world.state.robots["kind"][0, index])]
 
 
 def _check_sensor(sensor: int) -> None:

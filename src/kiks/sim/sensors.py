@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kiks.engine.sensing import ambient, proximity
 from kiks.errors import ParameterError, shown
@@ -28,26 +27,16 @@ class Sensors:
 
     def proximity(self, index: int, is_noisy: bool = True) -> list[Any]:
         """Return what a robot's proximity sensors read now: counts with noise, or what is expected without it."""
-        return self._read(proximity.read_proximity, self._world.networks, index, is_noisy)
+        return self._read(proximity.read_proximity, index, is_noisy)
 
     def ambient(self, index: int, is_noisy: bool = True) -> list[Any]:
         """Return what a robot's light sensors read now: counts with noise, or what is expected without it."""
-        return self._read(ambient.read_ambient, self._world.lamps, index, is_noisy)
+        return self._read(ambient.read_ambient, index, is_noisy)
 
-    def _read(self, kernel: Callable[..., Any], given: NDArray[Any], index: int, is_noisy: bool) -> list[Any]:
+    def _read(self, kernel: Callable[..., Any], index: int, is_noisy: bool) -> list[Any]:
         if not isinstance(is_noisy, bool):
             raise ParameterError(f"noise must be True or False, but it was {shown(is_noisy)}.")
         world = self._world
         out = self._counts if is_noisy else self._expected
-        kernel(
-            world.scene,
-            world.sight,
-            given,
-            world.state.tick_count,
-            world.now_ns,
-            world.seed,
-            index,
-            is_noisy,
-            out,
-        )
+        kernel(world.scene, index, world.state.tick_count, world.now_ns, is_noisy, out)
         return out.tolist()

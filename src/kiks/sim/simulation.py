@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from kiks.clock.gate import Gate
 from kiks.clock.program_clock import ProgramClock
-from kiks.engine.sensing.rays import sight_of
+from kiks.engine.sensing.rays import walls_of
 from kiks.errors import ParameterError, counted, shown
 from kiks.firmware.khepera import Firmware
 from kiks.firmware.turret import Turret
@@ -416,7 +416,7 @@ class Simulation:
         _check_arena(arena)
         # These take a while: they are computed before other threads have to wait.
         free_space = FreeSpace(arena, self.world.specs, self.world.state)
-        sight_of(arena)
+        walls_of(arena)
         with self._changing() as world:
             world.set_arena(free_space)
 

@@ -51,9 +51,7 @@ def look(world: World) -> Snapshot:
     observe.places_at(world.scene, ticks, now_ns, poses, places)
     lengths_mm, cosines, brightnesses, met = trace_rays(world, 0, robots)
     proximity, ambient = (np.empty((robots, SENSOR_COUNT), np.int64) for _ in range(2))
-    observe.read_all(
-        world.scene, world.sight, world.networks, world.lamps, ticks, now_ns, world.seed, proximity, ambient
-    )
+    observe.read_all(world.scene, ticks, now_ns, proximity, ambient)
     return Snapshot(poses, places, lengths_mm, cosines, brightnesses, met, proximity, ambient)
 
 
@@ -63,7 +61,7 @@ def trace_rays(
     """Return lengths [mm], cosines, brightnesses and what was met (`Snapshot`) of `count` robots from `first`."""
     rays = np.empty((count, SENSOR_COUNT, 3, RAY_COUNT))
     met = np.empty((count, SENSOR_COUNT, RAY_COUNT), np.int64)
-    observe.gaze(world.scene, world.sight, world.state.tick_count, world.now_ns, first, rays, met)
+    observe.gaze(world.scene, world.state.tick_count, world.now_ns, first, rays, met)
     lengths_mm = np.where(met == observe.NOTHING, np.inf, rays[:, :, 0])
     return lengths_mm, rays[:, :, 1], rays[:, :, 2], met
 
@@ -87,7 +85,7 @@ def proximity_at(world: World, index: int, poses: NDArray[np.float64]) -> NDArra
         raise ParameterError(f"poses must be in the arena, {size_mm[0]:g} x {size_mm[1]:g} mm, but one was not.")
     poses[:, 2] = [wrapped(heading_rad) for heading_rad in poses[:, 2].tolist()]
     counts, state = np.empty((len(poses), SENSOR_COUNT)), world.state
-    observe.read_from(world.scene, world.sight, world.networks, state.tick_count, world.now_ns, index, poses, counts)
+    observe.read_from(world.scene, index, state.tick_count, world.now_ns, poses, counts)
     return counts
 
 

@@ -156,7 +156,7 @@ class RobotSite:
         self._sync()
         ticks, now_ns = world.state.tick_count, world.now_ns
         angle_rad = check_heading("angle_rad", angle_rad)
-        distance_mm, disc, brightness = probe(world.scene, world.sight, ticks, now_ns, self._index, angle_rad)
+        distance_mm, disc, brightness = probe(world.scene, self._index, ticks, now_ns, angle_rad)
         if disc < 0:
             return Met(distance_mm, brightness)
         if disc < world.robot_count:

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 
 from kiks.engine import step
 from kiks.engine.parameters import PARAMETERS, pack
-from kiks.engine.scene import enter_all_worlds, make_scene
+from kiks.engine.scene import Scene, enter_all_worlds
 from kiks.engine.sensing import proximity
-from kiks.engine.sensing.rays import sight_of
 from kiks.engine.sensing.thesis_networks import networks_for
 from kiks.engine.state import State
 from kiks.errors import ParameterError, shown
@@ -82,21 +81,21 @@ class World:
     @lamps.setter
     def lamps(self, lamps: NDArray[np.float64]) -> None:
         self._lamps = check_numbers("lamps", lamps, (None, 4))
+        self._scene.set_lamps(self._lamps[None])
 
     def _pack_specs(self) -> None:
         """Pack the constants of all kinds of robots for the engine, and note the kind of each robot."""
         kinds = list(dict.fromkeys(self.specs))
         self.state.robots["kind"][0] = [kinds.index(spec) for spec in self.specs]
         # Of that very type, not of an equal one: compiled functions would compare the two field by field at each call.
-        self._kinds = np.zeros(len(kinds), PARAMETERS)
+        self.kinds = np.zeros(len(kinds), PARAMETERS)
         for kind, spec in enumerate(kinds):
-            self._kinds[kind : kind + 1] = pack(spec)
-        self.networks = networks_for(*(spec.proximity.response for spec in self.specs))
+            self.kinds[kind : kind + 1] = pack(spec)
+        self._networks = networks_for(*(spec.proximity.response for spec in self.specs))
 
     def _take_walls(self, free_space: FreeSpace) -> None:
         self.free_space = free_space
-        self.arena, self.ground = free_space.arena, free_space.ground
-        self.sight = sight_of(self.arena)
+        self.arena = free_space.arena
 
     def set_arena(self, free_space: FreeSpace) -> None:
         """Replace the walls by those of another arena.
@@ -119,8 +118,9 @@ class World:
 
     def rebuild_scene(self) -> None:
         """Arrange the state for the engine again: needed when its arrays were replaced."""
-        self.scene = make_scene(self.state, self._kinds, self.arena.width_mm, self.arena.height_mm)
-        enter_all_worlds(self.scene)
+        lamps, seeds = self._lamps[None], [self.seed]
+        self._scene = Scene(self.state, self.kinds, [self.arena], self._networks, lamps, seeds)
+        self.scene = self._scene.record
 
     # ---- time ----
 
@@ -131,7 +131,7 @@ class World:
             count = ticks if ticks < TICKS_AT_ONCE else TICKS_AT_ONCE
             for watcher in self.watchers:
                 count = min(count, watcher.ticks_left(self.state.tick_count))
-            step.advance(self.scene, self.ground, self.seed, self.state.tick_count, count)
+            step.advance(self.scene, self.state.tick_count, count)
             self.state.tick_count += count
             ticks -= count
             for watcher in self.watchers:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from numba import njit
 from tests.at_length import share
 
+from kiks.engine.physics.contact import Ground
 from kiks.engine.physics.motion import move, pose_between, remember_pose
 from kiks.model.arena import PAD, Arena
 
@@ -23,7 +24,7 @@ PATHS = st.floats(-130.0, 130.0)
 def _drive(robots, kinds, field, paths):
     for tick in range(paths.shape[0]):
         remember_pose(robots[0, 0])
-        move(field, 1.0, PAD, robots[0, 0], kinds[0], paths[tick, 0], paths[tick, 1], 0.1)
+        move(Ground(field, 1.0, PAD), robots[0, 0], kinds[0], paths[tick, 0], paths[tick, 1], 0.1)
 
 
 @njit

@@ -200,7 +200,7 @@ def test_robots_balls_and_cylinders_hide_lamps(what):
     alone.lamps[0, 3] = 0.0
     dark = alone.ambient(1)
     alone.lamps[0, 3] = 1.0
-    parameters = alone.world.scene[2][0]
+    parameters = alone.world.kinds[0]
     cosine, sine = math.cos(start.heading_rad), math.sin(start.heading_rad)
     for _ in range(150):
         lamp = rng.uniform(100, 900, 2)

@@ -1,70 +1,44 @@
-"""Record8 lone robots read what each of them reads alone, to the bit."""
+"""Sensors in lanes read what one sensor and one ray at a time read, to the bit."""
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 import pytest
 from tests.at_length import share
-from tests.engine.by_eights import read_after
+from tests.engine.one_by_one import read_one_by_one
 
-from kiks.batch.kernel_args import AMBIENT, PROXIMITY
 from kiks.engine.parameters import pack
-from kiks.engine.scene import make_scene
-from kiks.engine.sensing.ambient import read_ambient
+from kiks.engine.scene import Scene
 from kiks.engine.sensing.proximity import read_proximity
-from kiks.engine.sensing.rays import sight_of
 from kiks.engine.sensing.thesis_networks import networks_for
 from kiks.engine.state import State
-from kiks.model.arena import PAD
 from kiks.model.robot import RESPONSES, RobotSpec
 
-pytestmark = pytest.mark.slow  # they compile the kernels for eight robots
+pytestmark = pytest.mark.slow  # they compile the sensors once more
 
 TICKS = 1000
-NO_LAMPS = np.zeros((0, 4))
 
 
-class Worlds:
-    """Lone robots in one arena, each in a world of its own, driving; each reads at a time of its own."""
-
-    def __init__(self, arena, kinds, count, rng):
-        self.sight = sight_of(arena)
-        self.ground = arena.clearance, float(arena.mm_per_cell), PAD
-        self.state = State.empty(world_count=count, robot_count=1)
-        robots = self.state.robots[:, 0]
-        robots["x_mm"] = rng.uniform(0.0, arena.width_mm, count)
-        robots["y_mm"] = rng.uniform(0.0, arena.height_mm, count)
-        robots["heading_rad"] = rng.uniform(-9.0, 9.0, count)
-        pose = np.stack([robots[name] for name in ("x_mm", "y_mm", "heading_rad")], axis=1)
-        moves = rng.normal(0.0, (3.0, 3.0, 0.2), (count, 3, 3))
-        moves[::4, :, 2] *= 1e-6
+def random_world(arena, kinds, networks, robots, bodies, rng):
+    """Return a scene of things anywhere, also in each other and in walls, with tracks as if they had moved."""
+    state = State.empty(world_count=1, robot_count=robots, body_count=bodies)
+    for records, poses in ((state.robots, 3), (state.bodies, 2)):
+        things = records[0]
+        size = len(things)
+        things["x_mm"] = rng.uniform(0.0, arena.width_mm, size)
+        things["y_mm"] = rng.uniform(0.0, arena.height_mm, size)
+        names = ("x_mm", "y_mm", "heading_rad")[:poses]
+        if poses == 3:
+            things["heading_rad"] = rng.uniform(-9.0, 9.0, size)
+            things["kind"] = rng.integers(len(kinds), size=size)
+        else:
+            things["radius_mm"] = rng.uniform(10.0, 40.0, size)
+            things["brightness"] = rng.integers(1, 256, size)
+        pose = np.stack([things[name] for name in names], axis=1)
+        moves = rng.normal(0.0, (3.0, 3.0, 0.2)[:poses], (size, 3, poses))
         moves[1::4] = 0.0
-        robots["trail"] = pose[:, None] + np.cumsum(moves, axis=1)
-        robots["kind"] = rng.integers(len(kinds), size=count)
-        self.scene = make_scene(self.state, kinds, arena.width_mm, arena.height_mm)
-        self.ticks = rng.integers(0, TICKS, count)
-        self.ticks[0] = 0
-        self.times_ns = np.maximum(self.ticks * 10_000_000 - rng.integers(0, 10_000_000, count), 0)
-        self.times_ns[-1] = self.ticks[-1] * 10_000_000
-        self.seeds = rng.integers(0, 2**40, count)
-
-    def alone(self, world):
-        """Return the scene of one world."""
-        robots, bodies, kinds, (begins, entries, spots, widest_mm) = self.scene
-        it = slice(world, world + 1)
-        return robots[it], bodies[it], kinds, (begins[it], entries[it], spots[it], widest_mm)
-
-    def read(self, code, networks, lamps=NO_LAMPS):
-        """Return what all robots read."""
-        lamps = np.broadcast_to(lamps, (len(self.ticks), *lamps.shape)).copy()
-        return read_after(
-            self.scene, self.ground, self.sight, networks, lamps, self.seeds, self.ticks, self.times_ns, code
-        )
-
-    def moment(self, world):
-        return int(self.ticks[world]), int(self.times_ns[world]), int(self.seeds[world]), 0, True
+        things["trail"] = pose[:, None] + np.cumsum(moves, axis=1)
+    return Scene(state, kinds, [arena], networks, np.zeros((1, 0, 4)), [int(rng.integers(2**40))])
 
 
 def kinds_of(*responses):
@@ -85,37 +59,32 @@ def kinds_of(*responses):
     return kinds, networks_for(*responses)
 
 
-def assert_equal_readings(arena, kinds, networks, count, rng):
-    worlds = Worlds(arena, kinds, count, rng)
-    together, one_by_one = worlds.read(PROXIMITY, networks), np.empty((count, 8), np.int64)
-    for world in range(count):
-        read_proximity(worlds.alone(world), worlds.sight, networks, *worlds.moment(world), one_by_one[world])
+def assert_equal_readings(scene, robots, rng):
+    """Return all readings, at some time in the last tick."""
+    tick = int(rng.integers(TICKS))
+    time_ns = max(tick * 10_000_000 - int(rng.integers(10_000_000)), 0)
+    together, one_by_one = np.empty((robots, 8), np.int64), np.empty((robots, 8), np.int64)
+    for robot in range(robots):
+        read_proximity(scene.record, robot, tick, time_ns, True, together[robot])
+        read_one_by_one(scene.record, 0, robot, tick, time_ns, one_by_one[robot])
     np.testing.assert_array_equal(together, one_by_one)
     return together
 
 
 @pytest.mark.parametrize("response", RESPONSES)
-def test_eight_lanes_read_the_same_as_single_robots(make_random_arena, response):
+@pytest.mark.parametrize(("robots", "bodies"), [(1, 0), (9, 0), (6, 12)])
+def test_lanes_read_the_same_as_single_sensors(make_random_arena, response, robots, bodies):
+    """Alone, with other robots, and with balls as well."""
     kinds, networks = kinds_of(response)
-    rng = np.random.default_rng(RESPONSES.index(response))
-    for number in range(share(3, 12)):
-        readings = assert_equal_readings(make_random_arena(number), kinds, networks, 43, rng)
-        assert readings.max() > 100
+    rng, highest = np.random.default_rng([RESPONSES.index(response), robots]), 0
+    for number in range(share(6, 20)):
+        for _ in range(1 if robots > 1 else 20):
+            scene = random_world(make_random_arena(number), kinds, networks, robots, bodies, rng)
+            highest = max(highest, assert_equal_readings(scene, robots, rng).max())
+    assert highest > 100
 
 
-@pytest.mark.parametrize("count", [1, 7, 8, 9, 16])
-def test_any_number_of_worlds_with_all_responses_among_them(make_random_arena, count):
+def test_all_responses_in_one_world(make_random_arena):
     kinds, networks = kinds_of(*RESPONSES)
-    assert_equal_readings(make_random_arena(count), kinds, networks, count, np.random.default_rng(count))
-
-
-def test_light_readings_of_many_worlds(make_random_arena):
-    arena, rng = make_random_arena(3), np.random.default_rng(1)
-    kinds = kinds_of("reflection")[0]
-    worlds = Worlds(arena, kinds, 20, rng)
-    lamps = np.array([[60.0, 60.0, 1.0, 1.0], [0.7 * arena.width_mm, 100.0, 2.0, 1.0]])
-    together, alone = worlds.read(AMBIENT, networks_for("reflection"), lamps), np.empty(8, np.int64)
-    for world in range(20):
-        read_ambient(worlds.alone(world), worlds.sight, lamps, *worlds.moment(world), alone)
-        assert together[world].tolist() == alone.tolist()
-    assert not math.isclose(together.min(), together.max())
+    rng = np.random.default_rng(3)
+    assert_equal_readings(random_world(make_random_arena(4), kinds, networks, 40, 10, rng), 40, rng)

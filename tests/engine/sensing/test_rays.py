@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from tests.at_length import share
 
 from kiks.engine.sensing.ray_packets import cast_eight
-from kiks.engine.sensing.rays import cast_ray, cast_rays, sight_of
+from kiks.engine.sensing.rays import cast_ray, cast_rays, walls_of
 from kiks.model.arena import PAD, Arena
 
 TOLERANCE_MM = 0.02
@@ -19,8 +19,8 @@ CLIPPED_MM = 0.003  # a ray that cuts less than this off a corner may pass it by
 
 
 def cast(arena, x, y, angle, reach=200.0):
-    sight = sight_of(arena)
-    return cast_ray(sight, x, y, math.cos(angle), math.sin(angle), reach)
+    walls = walls_of(arena)
+    return cast_ray(walls, x, y, math.cos(angle), math.sin(angle), reach)
 
 
 def crossings(arena, x, y, angle, *, shrink_mm=0.0):
@@ -113,11 +113,11 @@ def test_rays_in_lanes_are_rays_one_by_one(make_random_arena, number, draw, coun
     straight = (cosine == 0.0) == (sine == 0.0)
     cosine[straight], sine[straight] = 0.0, -1.0
     cell = arena.mm_per_cell
-    sight = sight_of(arena)
+    walls = walls_of(arena)
     columns, rows = x * (1.0 / cell) + PAD, y * (1.0 / cell) + PAD
     lengths, brightnesses = np.empty(count), np.empty(count)
-    cast_rays(sight, columns, rows, cosine, sine, lengths, brightnesses)
-    alone = [cast_ray(sight, *ray, 1e6) for ray in zip(x, y, cosine, sine, strict=True)]
+    cast_rays(walls, columns, rows, cosine, sine, lengths, brightnesses)
+    alone = [cast_ray(walls, *ray, 1e6) for ray in zip(x, y, cosine, sine, strict=True)]
     assert list(zip(lengths * cell, brightnesses, strict=True)) == alone
 
 
@@ -129,7 +129,7 @@ def test_the_rays_of_a_sensor_end_where_the_first_wall_begins(make_random_arena,
     arena = make_random_arena(number)
     rng = np.random.default_rng(draw)
     cell = arena.mm_per_cell
-    sight = sight_of(arena)
+    walls = walls_of(arena)
     for where in range(6):
         x, y = rng.uniform(1, arena.width_mm - 1), rng.uniform(1, arena.height_mm - 1)
         angle = rng.uniform(-math.pi, math.pi, 8)
@@ -138,7 +138,7 @@ def test_the_rays_of_a_sensor_end_where_the_first_wall_begins(make_random_arena,
             angle = np.arange(8) * math.pi / 4 + (where == 3) * rng.uniform(-1e-3, 1e-3, 8)
         reach, out = float(rng.uniform(0.0, 200.0)), np.empty((2, 8))
         directions = np.array([np.cos(angle), np.sin(angle)])
-        cast_eight(sight, x * (1.0 / cell) + PAD, y * (1.0 / cell) + PAD, directions, reach / cell, out)
+        cast_eight(walls, x * (1.0 / cell) + PAD, y * (1.0 / cell) + PAD, directions, reach / cell, out)
         for ray in range(8):
             length = out[0, ray] * cell if out[1, ray] > 0.0 else reach
             check_ray(arena, x, y, angle[ray], reach, length, out[1, ray])
@@ -146,11 +146,11 @@ def test_the_rays_of_a_sensor_end_where_the_first_wall_begins(make_random_arena,
 
 def test_a_sensor_in_a_wall_sees_it():
     arena = Arena.box(300, 300, brightness=77)
-    sight = sight_of(arena)
+    walls = walls_of(arena)
     directions = np.array([np.cos(np.arange(8)), np.sin(np.arange(8))])
     for x, y, brightness in ((5.0, 150.0, 77.0), (-50.0, 150.0, 255.0), (150.0, 900.0, 255.0)):
         out = np.empty((2, 8))
-        cast_eight(sight, x + PAD, y + PAD, directions, 60.0, out)
+        cast_eight(walls, x + PAD, y + PAD, directions, 60.0, out)
         assert out.tolist() == [[0.0] * 8, [brightness] * 8]
 
 

@@ -197,7 +197,7 @@ def describe_scene(sim: Simulation, scene: int, names: Sequence[str] | None = No
 
 def _describe_robot(sim: Simulation, index: int, name: str) -> dict[str, Any]:
     spec, turrets = sim.specs[index], sim.turrets(index + 1)
-    parameters = sim.world.scene[2][int(sim.world.state.robots["kind"][0, index])]
+    parameters = sim.world.kinds[int(sim.world.state.robots["kind"][0, index])]
     # More than 0.001 mm and 1e-5 rad would only make the message longer.
     angles_rad = np.arctan2(parameters["ray_sin"], parameters["ray_cos"])[:, :RAY_COUNT].round(5).tolist()
     x_mm, y_mm = (parameters[name].round(3).tolist() for name in ("ray_x_mm", "ray_y_mm"))

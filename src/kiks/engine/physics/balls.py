@@ -40,7 +40,7 @@ def speed_of(body: Any) -> Any:
 
 
 @kernel
-def roll(field: Any, cell: Any, pad: Any, body: Any, duration_s: Any) -> Any:
+def roll(ground: Any, body: Any, duration_s: Any) -> Any:
     """Let a body roll or slide with friction, and bounce off a wall."""
     speed = speed_of(body)
     if speed == 0.0:
@@ -53,9 +53,9 @@ def roll(field: Any, cell: Any, pad: Any, body: Any, duration_s: Any) -> Any:
     wanted_x, wanted_y = x + way * body.velocity_x / speed, y + way * body.velocity_y / speed
     body.velocity_x *= slower / speed
     body.velocity_y *= slower / speed
-    if clearance_mm(field, cell, pad, wanted_x, wanted_y) < body.radius_mm - SETTLED_MM:
-        nx, ny = outward(field, cell, pad, wanted_x, wanted_y)
-        wanted_x, wanted_y = push_out(field, cell, pad, body.radius_mm, x, y, wanted_x, wanted_y)
+    if clearance_mm(ground, wanted_x, wanted_y) < body.radius_mm - SETTLED_MM:
+        nx, ny = outward(ground, wanted_x, wanted_y)
+        wanted_x, wanted_y = push_out(ground, body.radius_mm, x, y, wanted_x, wanted_y)
         towards = body.velocity_x * nx + body.velocity_y * ny
         if towards < 0.0:
             body.velocity_x -= (1.0 + WALL_BOUNCE) * towards * nx

@@ -13,19 +13,18 @@ which was free. Speeds change in hits only (`kiks.engine.physics.balls`), so res
 from __future__ import annotations
 
 import math
-from collections import namedtuple
 from typing import Any
 
 import numpy as np
 
+from kiks.engine.bunch import robot_in
 from kiks.engine.compiling import kernel
-from kiks.engine.physics.balls import collide, kick, roll, speed_of
+from kiks.engine.grid import disc_at, list_pairs
+from kiks.engine.physics.balls import collide, kick, remember_place, roll, speed_of
 from kiks.engine.physics.contact import PIECES_MAX, clearance_mm, outward
-from kiks.engine.physics.grasp import begin_holds, carry_along, keep_holds, return_held, turn_back, way_of_held
-from kiks.engine.physics.motion import give_way, move, note_contact
-from kiks.engine.scene import count_discs, disc_at, enter_all, find_near, is_on_floor
+from kiks.engine.physics.grasp import REACH, carry_along, is_dragged, keep_holds, return_held, turn_back
+from kiks.engine.physics.motion import draw_slip, give_way, move
 from kiks.engine.simd.f64x8 import floor
-from kiks.engine.simd.stack_arrays import stack_integers
 from kiks.units import NS_PER_S, TICK_NS
 
 PIECE_MM = 2.0
@@ -46,208 +45,180 @@ SWEEPS = 60
 YIELDING_SWEEPS = 6
 """Sweeps in which a body gives way to a robot by all of the overlap."""
 
-NEAR_LIMIT = 64
-"""Most discs that are near enough to one to collide with it within a tick."""
-
-PAIRS_PER_DISC = 32
-"""Space for pairs per disc: discs that do not overlap cannot have as many neighbours of their own size or larger."""
-
 TICK_S = TICK_NS / NS_PER_S
 
-SLACK_MM = 10.0
-"""Distance by which two discs may approach before neighbours are searched again [mm]."""
+SLACK_TICKS, SLACK_MM = 8.0, (10.0, 30.0)
+"""Ticks after which neighbours are searched again, and limits of the approach up to which they are known [mm]."""
 
 HASTE = 4.0
 """Largest approach of two discs in a tick, in paths of the fastest: a disc that is hit may be faster than that."""
 
-Room: Any = namedtuple(
-    "Room",
-    ("ways", "starts", "moved", "neighbours", "pairs", "is_near", "is_touching", "is_driven", "is_pushed", "is_back"),
-)
-"""Scratch memory of a tick.
 
-* ways: paths of the left and right wheel [pulses] and slip ratio, float64 [robot_count, 3];
-* starts: places at the start of a piece [mm], float64 [disc_count, 2];
-* moved: places to which wheels and speeds have moved the discs [mm], float64 [disc_count, 2];
-* neighbours: pairs of discs, the lower number first, that may collide before the next search, int64 [pair, 2];
-* pairs: those of them that may collide in this tick, int64 [pair, 2];
-* is_near: whether a disc may collide in this tick, or rolls, bool [disc_count];
-* is_touching: whether it has touched something, bool [disc_count];
-* is_driven: whether a wheel drives it, directly or through other discs, bool [disc_count];
-* is_pushed: whether it was pushed since the last check for walls, bool [disc_count];
-* is_back: whether it has returned to where the piece began, bool [disc_count].
-"""
+@kernel
+def remember_places(scene: Any, world: Any, room: Any, k: Any) -> Any:
+    """Phase: store the places of bodies at this tick boundary.
+
+    A body falls asleep when it rests and its whole track is where it is: then nothing about it changes.
+    """
+    kept, first = 0, scene.bodies.shape[1] * k
+    for place in range(first, first + room.awake_counts[k]):
+        row = room.awake[place]
+        body = scene.bodies[world, row]
+        remember_place(body)
+        is_awake = body.velocity_x != 0.0 or body.velocity_y != 0.0 or body.holder != 0
+        for ago in range(1, body.trail.shape[0]):
+            is_awake = is_awake or body.trail[ago, 0] != body.x_mm or body.trail[ago, 1] != body.y_mm
+        if is_awake:
+            room.awake[first + kept] = row
+            kept += 1
+    room.awake_counts[k] = kept
 
 
 @kernel
-def make_room(scene: Any) -> Any:
-    """Return scratch memory for the discs of a world."""
-    robot_count, disc_count = count_discs(scene)
-    return Room(
-        np.empty((robot_count, 3)),
-        np.empty((disc_count, 2)),
-        np.empty((disc_count, 2)),
-        np.empty((PAIRS_PER_DISC * disc_count, 2), np.int64),
-        np.empty((PAIRS_PER_DISC * disc_count, 2), np.int64),
-        np.zeros(disc_count, np.bool_),
-        np.zeros(disc_count, np.bool_),
-        np.zeros(disc_count, np.bool_),
-        np.zeros(disc_count, np.bool_),
-        np.zeros(disc_count, np.bool_),
-    )
-
-
-@kernel
-def move_alone(scene: Any, ground: Any, world: Any, number: Any, left: Any, right: Any, slip_ratio: Any) -> Any:
-    """Phase: drive a robot that can collide with walls only; return whether it touched one."""
-    field, cell, pad = ground
-    robot = scene[0][world, number]
-    return move(field, cell, pad, robot, scene[2][robot.kind], left, right, slip_ratio)
-
-
-@kernel
-def move_together(scene: Any, ground: Any, world: Any, room: Any, neighbour_count: Any, slack_mm: Any) -> Any:
-    """Phase: drive and roll, collide, and count the contacts.
+def find_near_things(scene: Any, bunch: Any, k: Any) -> Any:
+    """Phase: find the things that may collide in a tick, or roll.
 
     Args:
         scene: The scene.
-        ground: The arena's clearance, as contact sees it.
-        world: Index of the world.
-        room: Scratch memory.
-        neighbour_count: Number of neighbour pairs in it.
-        slack_mm: Distance by which discs may approach before neighbours are searched again; below 0 at first.
+        bunch: The bunch (`kiks.engine.bunch`).
+        k: A world of it.
 
     Returns:
-        `neighbour_count` and `slack_mm` for the next tick.
+        The numbers of near discs and of pairs, and the longest path of any of them [mm].
     """
-    robots = scene[0]
-    robot_count, disc_count = count_discs(scene)
-    fastest_mm = 0.0
-    for disc in range(disc_count):
-        way = way_of(scene, world, room, disc)
-        fastest_mm = max(fastest_mm, way)
-        room.is_near[disc] = disc >= robot_count and way > 0.0
-        if disc < robot_count:
-            room.is_driven[disc] = way > 0.0
-        else:
-            holder = scene[1][world, disc - robot_count].holder
-            room.is_driven[disc] = holder > 0 and room.is_driven[holder - 1]
-        room.is_touching[disc] = False
-    held_mm = way_of_held(scene, world, room)
+    world, room = bunch.worlds[k], bunch.room
+    robots, bodies, crowd = scene.robots, scene.bodies, scene.grid.crowds[world]
+    robot_count = robots.shape[1]
+    fastest_mm, held_mm, near_count = 0.0, 0.0, 0
+    awake = room.awake[bodies.shape[1] * k :][: room.awake_counts[k]]
+    for number in range(robot_count):
+        fastest_mm = max(fastest_mm, robot_in(scene, bunch, k, number)[0].way_mm)
+    for row in awake:
+        body = bodies[world, row]
+        fastest_mm = max(fastest_mm, speed_of(body) * TICK_S)
+        if is_dragged(body):
+            held_mm = max(held_mm, REACH * robot_in(scene, bunch, k, body.holder - 1)[0].way_mm)
     fastest_mm = max(fastest_mm, held_mm)
     nearer_mm = HASTE * fastest_mm + TOUCHING_MM
-    if slack_mm < nearer_mm:
-        slack_mm = max(SLACK_MM, nearer_mm)
-        neighbour_count = find_neighbours(scene, world, room, slack_mm)
-    slack_mm -= nearer_mm
-    pair_count = find_pairs(scene, world, room, neighbour_count, nearer_mm)
-    begin_holds(scene, world, room)
-    fastest_mm = 0.0
-    for disc in range(disc_count):
-        if room.is_near[disc]:
-            fastest_mm = max(fastest_mm, way_of(scene, world, room, disc))
-        elif disc < robot_count:
-            left, right, slip_ratio = room.ways[disc, 0], room.ways[disc, 1], room.ways[disc, 2]
-            room.is_touching[disc] = move_alone(scene, ground, world, disc, left, right, slip_ratio)
-    fastest_mm = max(fastest_mm, held_mm)
-    pieces = np.int64(min(max(1.0, -floor(-fastest_mm / PIECE_MM)), PIECES_MAX))
-    for _ in range(pieces):
-        drive_and_roll(scene, ground, world, room, pieces)
-        carry_along(scene, world, room, TICK_S / pieces)
-        hit(scene, world, room, pair_count, TICK_S / pieces)
-        if not resolve_overlaps(scene, ground, world, room, pair_count):
-            return_stuck(scene, ground, world, room, pair_count)
-        for number in range(robot_count):
-            if room.is_near[number]:
-                robot = robots[world, number]
-                dx, dy = robot.x_mm - room.moved[number, 0], robot.y_mm - room.moved[number, 1]
-                if dx != 0.0 or dy != 0.0:
-                    parameters = scene[2][robot.kind]
-                    give_way(robot, parameters, dx, dy, room.ways[number, :2] / pieces, room.ways[number, 2])
-        turn_back(scene, world, room, pieces)
-    for number in range(robot_count):
-        note_contact(robots[world, number], room.is_touching[number])
-    return neighbour_count, slack_mm
-
-
-@kernel
-def way_of(scene: Any, world: Any, room: Any, disc: Any) -> Any:
-    """Return the path of a disc in this tick without obstacles [mm]; that of the faster wheel for a robot."""
-    robots, bodies, kinds, _ = scene
-    if disc < robots.shape[1]:
-        pulse = kinds[robots[world, disc].kind].pulse_mm
-        return max(abs(room.ways[disc, 0]), abs(room.ways[disc, 1])) * pulse
-    return speed_of(bodies[world, disc - robots.shape[1]]) * TICK_S
-
-
-@kernel
-def find_neighbours(scene: Any, world: Any, room: Any, reach_mm: Any) -> Any:
-    """List all pairs of discs with a gap of at most `reach_mm`; return their number.
-
-    The pairs are in the order of the discs' numbers, so the time of the search does not matter.
-    """
-    enter_all(scene, world)
-    found = stack_integers(NEAR_LIMIT)
-    neighbour_count = 0
-    for disc in range(count_discs(scene)[1]):
-        if is_on_floor(scene, world, disc):
-            x, y, radius = disc_at(scene, world, disc)
-            count = find_near(scene, world, x, y, radius + reach_mm, disc, found)
-            put_in_order(found, count)
-            for k in range(count):
-                if found[k] > disc and neighbour_count < room.neighbours.shape[0]:
-                    room.neighbours[neighbour_count, 0], room.neighbours[neighbour_count, 1] = disc, found[k]
-                    neighbour_count += 1
-    return neighbour_count
-
-
-@kernel
-def put_in_order(numbers: Any, count: Any) -> Any:
-    """Sort the first `count` numbers."""
-    for k in range(1, count):
-        number, place = numbers[k], k
-        while place > 0 and numbers[place - 1] > number:
-            numbers[place] = numbers[place - 1]
-            place -= 1
-        numbers[place] = number
-
-
-@kernel
-def find_pairs(scene: Any, world: Any, room: Any, neighbour_count: Any, reach_mm: Any) -> Any:
-    """List the neighbours with a gap of at most `reach_mm` and mark them as near; return the number of pairs."""
-    robot_count = scene[0].shape[1]
+    if crowd.slack_mm < nearer_mm:
+        list_pairs(scene, world, max(min(max(SLACK_TICKS * nearer_mm, SLACK_MM[0]), SLACK_MM[1]), nearer_mm))
+    crowd.slack_mm -= nearer_mm
+    crowd.moved_mm += nearer_mm
+    for row in awake:
+        body = bodies[world, row]
+        if speed_of(body) > 0.0 or is_dragged(body):
+            near_count = add_near(scene, bunch, k, robot_count + row, near_count)
+        if is_dragged(body):
+            near_count = add_near(scene, bunch, k, body.holder - 1, near_count)
+            robots[world, body.holder - 1].piece_headings[0] = robots[world, body.holder - 1].heading_rad
     pair_count = 0
-    for k in range(neighbour_count):
-        first, second = room.neighbours[k, 0], room.neighbours[k, 1]
+    for place in range(crowd.pair_count):
+        first, second = scene.grid.pairs[world, place, 0], scene.grid.pairs[world, place, 1]
         x, y, radius = disc_at(scene, world, first)
         other_x, other_y, other_radius = disc_at(scene, world, second)
-        dx, dy, apart = other_x - x, other_y - y, radius + other_radius + reach_mm
+        dx, dy, apart = other_x - x, other_y - y, radius + other_radius + nearer_mm
         if dx * dx + dy * dy < apart * apart:
-            room.is_near[first] = room.is_near[second] = True
+            near_count = add_near(scene, bunch, k, first, near_count)
+            near_count = add_near(scene, bunch, k, second, near_count)
             # A robot and the body that it holds do not push each other.
-            if second < robot_count or scene[1][world, second - robot_count].holder != first + 1:
-                room.pairs[pair_count, 0], room.pairs[pair_count, 1] = first, second
+            if second < robot_count or bodies[world, second - robot_count].holder != first + 1:
+                room.pairs[2 * pair_count], room.pairs[2 * pair_count + 1] = first, second
                 pair_count += 1
-    return pair_count
+    longest_mm = held_mm
+    for place in range(near_count):
+        disc = room.near[place]
+        if disc >= robot_count:
+            longest_mm = max(longest_mm, speed_of(bodies[world, disc - robot_count]) * TICK_S)
+        else:
+            longest_mm = max(longest_mm, robot_in(scene, bunch, k, disc)[0].way_mm)
+    wake(scene, room, k, near_count)
+    return near_count, pair_count, longest_mm
 
 
 @kernel
-def drive_and_roll(scene: Any, ground: Any, world: Any, room: Any, pieces: Any) -> Any:
+def add_near(scene: Any, bunch: Any, k: Any, disc: Any, near_count: Any) -> Any:
+    """Add a disc to those that are near, if it is not among them; return their number."""
+    room = bunch.room
+    noted = room.discs[disc]
+    if noted.is_near:
+        return near_count
+    room.near[near_count] = disc
+    noted.is_near, noted.is_touching = True, False
+    if disc < scene.robots.shape[1]:
+        one, robot = robot_in(scene, bunch, k, disc)
+        noted.left, noted.right, noted.is_driven = one.left_pulses, one.right_pulses, one.way_mm > 0.0
+        noted.slip_ratio = draw_slip(scene.kinds[robot.kind], scene.seeds[bunch.worlds[k]], disc, bunch.ticks[k])
+    else:
+        holder = scene.bodies[bunch.worlds[k], disc - scene.robots.shape[1]].holder
+        noted.is_driven = holder > 0 and robot_in(scene, bunch, k, holder - 1)[0].way_mm > 0.0
+    return near_count + 1
+
+
+@kernel
+def wake(scene: Any, room: Any, k: Any, near_count: Any) -> Any:
+    """Wake the bodies that are near: they may move."""
+    robot_count, first = scene.robots.shape[1], scene.bodies.shape[1] * k
+    for place in range(near_count):
+        row = room.near[place] - robot_count
+        if row >= 0:
+            is_awake = False
+            for other in range(room.awake_counts[k]):
+                is_awake = is_awake or room.awake[first + other] == row
+            if not is_awake:
+                room.awake[first + room.awake_counts[k]] = row
+                room.awake_counts[k] += 1
+
+
+@kernel
+def collide_near_things(scene: Any, world: Any, room: Any, near_count: Any, pair_count: Any, longest_mm: Any) -> Any:
+    """Phase: drive, roll and collide, of the things that are near; none is near afterwards.
+
+    Args:
+        scene: The scene.
+        world: Index of the world.
+        room: Scratch memory.
+        near_count: Number of near discs.
+        pair_count: Number of pairs.
+        longest_mm: Longest path of a near thing [mm].
+    """
+    robot_count = scene.robots.shape[1]
+    pieces = np.int64(min(max(1.0, -floor(-longest_mm / PIECE_MM)), PIECES_MAX))
+    for _ in range(pieces):
+        drive_and_roll(scene, world, room, near_count, pieces)
+        carry_along(scene, world, room, TICK_S / pieces)
+        hit(scene, world, room, pair_count, TICK_S / pieces)
+        if not resolve_overlaps(scene, world, room, near_count, pair_count):
+            return_stuck(scene, world, room, near_count, pair_count)
+        for place in range(near_count):
+            number = room.near[place]
+            if number < robot_count:
+                robot = scene.robots[world, number]
+                dx, dy = robot.x_mm - room.discs[number].moved_x, robot.y_mm - room.discs[number].moved_y
+                if dx != 0.0 or dy != 0.0:
+                    parameters = scene.kinds[robot.kind]
+                    disc = room.discs[number]
+                    wheels = disc.left / pieces, disc.right / pieces
+                    give_way(robot, parameters, dx, dy, wheels, disc.slip_ratio)
+        turn_back(scene, world, room, pieces)
+    for place in range(near_count):
+        room.discs[room.near[place]].is_near = False
+
+
+@kernel
+def drive_and_roll(scene: Any, world: Any, room: Any, near_count: Any, pieces: Any) -> Any:
     """Move all near discs by one piece, with walls as the only obstacles."""
-    field, cell, pad = ground
-    bodies = scene[1]
-    robot_count, disc_count = count_discs(scene)
-    for disc in range(disc_count):
-        if not room.is_near[disc]:
-            continue
-        room.starts[disc, 0], room.starts[disc, 1], _ = disc_at(scene, world, disc)
+    robot_count = scene.robots.shape[1]
+    for place in range(near_count):
+        disc = room.near[place]
+        room.discs[disc].start_x, room.discs[disc].start_y, _ = disc_at(scene, world, disc)
         if disc < robot_count:
-            left, right, slip_ratio = room.ways[disc, 0] / pieces, room.ways[disc, 1] / pieces, room.ways[disc, 2]
-            if move_alone(scene, ground, world, disc, left, right, slip_ratio):
-                room.is_touching[disc] = True
+            robot = scene.robots[world, disc]
+            left, right = room.discs[disc].left / pieces, room.discs[disc].right / pieces
+            if move(scene.ground, robot, scene.kinds[robot.kind], left, right, room.discs[disc].slip_ratio):
+                room.discs[disc].is_touching = True
         else:
-            roll(field, cell, pad, bodies[world, disc - robot_count], TICK_S / pieces)
-        room.moved[disc, 0], room.moved[disc, 1], _ = disc_at(scene, world, disc)
+            roll(scene.ground, scene.bodies[world, disc - robot_count], TICK_S / pieces)
+        room.discs[disc].moved_x, room.discs[disc].moved_y, _ = disc_at(scene, world, disc)
 
 
 @kernel
@@ -268,10 +239,10 @@ def overlap_of(scene: Any, world: Any, first: Any, second: Any) -> Any:
 @kernel
 def hit(scene: Any, world: Any, room: Any, pair_count: Any, duration_s: Any) -> Any:
     """Change the speeds of bodies that touch something."""
-    robots, bodies, _, _ = scene
+    robots, bodies = scene.robots, scene.bodies
     robot_count = robots.shape[1]
     for pair in range(pair_count):
-        first, second = room.pairs[pair, 0], room.pairs[pair, 1]
+        first, second = room.pairs[2 * pair], room.pairs[2 * pair + 1]
         if second < robot_count:
             continue
         overlap, nx, ny = overlap_of(scene, world, first, second)
@@ -279,8 +250,8 @@ def hit(scene: Any, world: Any, room: Any, pair_count: Any, duration_s: Any) -> 
             continue
         body = bodies[world, second - robot_count]
         if first < robot_count:
-            dx = room.moved[first, 0] - room.starts[first, 0]
-            dy = room.moved[first, 1] - room.starts[first, 1]
+            dx = room.discs[first].moved_x - room.discs[first].start_x
+            dy = room.discs[first].moved_y - room.discs[first].start_y
             kick(body, (dx * nx + dy * ny) / duration_s, nx, ny)
         else:
             collide(bodies[world, first - robot_count], body, nx, ny)
@@ -289,7 +260,7 @@ def hit(scene: Any, world: Any, room: Any, pair_count: Any, duration_s: Any) -> 
 @kernel
 def shift(scene: Any, world: Any, disc: Any, dx: Any, dy: Any) -> Any:
     """Move a disc by (dx, dy) [mm]."""
-    robots, bodies, _, _ = scene
+    robots, bodies = scene.robots, scene.bodies
     if disc < robots.shape[1]:
         robot = robots[world, disc]
         robot.x_mm += dx
@@ -301,27 +272,27 @@ def shift(scene: Any, world: Any, disc: Any, dx: Any, dy: Any) -> Any:
 
 
 @kernel
-def resolve_overlaps(scene: Any, ground: Any, world: Any, room: Any, pair_count: Any) -> Any:
+def resolve_overlaps(scene: Any, world: Any, room: Any, near_count: Any, pair_count: Any) -> Any:
     """Resolve all overlaps in sweeps; return whether all discs are free."""
-    field, cell, pad = ground
-    disc_count = count_discs(scene)[1]
-    room.is_pushed[:] = False
+    for place in range(near_count):
+        room.discs[room.near[place]].is_pushed = False
     for sweep in range(SWEEPS):
         worst = 0.0
         for pair in range(pair_count):
-            first, second = room.pairs[pair, 0], room.pairs[pair, 1]
+            first, second = room.pairs[2 * pair], room.pairs[2 * pair + 1]
             overlap, nx, ny = overlap_of(scene, world, first, second)
             if overlap > 0.0:
                 separate(scene, world, room, sweep, first, second, overlap * nx, overlap * ny)
                 worst = max(worst, overlap)
-        worst = max(worst, keep_holds(scene, ground, world, room))
-        for disc in range(disc_count):
-            if room.is_pushed[disc]:
+        worst = max(worst, keep_holds(scene, world, room))
+        for place in range(near_count):
+            disc = room.near[place]
+            if room.discs[disc].is_pushed:
                 x, y, radius = disc_at(scene, world, disc)
-                depth = radius - clearance_mm(field, cell, pad, x, y)
-                room.is_pushed[disc] = depth > 0.0
+                depth = radius - clearance_mm(scene.ground, x, y)
+                room.discs[disc].is_pushed = depth > 0.0
                 if depth > 0.0:
-                    nx, ny = outward(field, cell, pad, x, y)
+                    nx, ny = outward(scene.ground, x, y)
                     shift(scene, world, disc, depth * nx, depth * ny)
                     worst = max(worst, depth)
         if worst <= RESOLVED_MM:
@@ -338,11 +309,11 @@ def separate(
     Each gives way by half. A body gives way to a robot by all of it: in the first sweeps, and in all sweeps if no wheel
     drives either of them, because a rolling body does not move a standing robot.
     """
-    robot_count = scene[0].shape[1]
-    room.is_touching[first] = room.is_touching[second] = True
-    room.is_pushed[first] = room.is_pushed[second] = True
-    is_driven = room.is_driven[first] or room.is_driven[second]
-    room.is_driven[first] = room.is_driven[second] = is_driven
+    robot_count = scene.robots.shape[1]
+    room.discs[first].is_touching = room.discs[second].is_touching = True
+    room.discs[first].is_pushed = room.discs[second].is_pushed = True
+    is_driven = room.discs[first].is_driven or room.discs[second].is_driven
+    room.discs[first].is_driven = room.discs[second].is_driven = is_driven
     is_yielding = first < robot_count and second >= robot_count and (sweep < YIELDING_SWEEPS or not is_driven)
     back = 0.0 if is_yielding else 0.5
     shift(scene, world, first, -back * overlap_x, -back * overlap_y)
@@ -350,23 +321,23 @@ def separate(
 
 
 @kernel
-def return_stuck(scene: Any, ground: Any, world: Any, room: Any, pair_count: Any) -> Any:
+def return_stuck(scene: Any, world: Any, room: Any, near_count: Any, pair_count: Any) -> Any:
     """Return stuck discs to where the piece began, and discs that are in their way there, too."""
-    field, cell, pad = ground
-    disc_count = count_discs(scene)[1]
-    room.is_back[:] = False
+    for place in range(near_count):
+        room.discs[room.near[place]].is_back = False
     is_done = False
     while not is_done:
         is_done = True
-        for disc in range(disc_count):
-            if room.is_near[disc] and not room.is_back[disc]:
+        for place in range(near_count):
+            disc = room.near[place]
+            if not room.discs[disc].is_back:
                 x, y, radius = disc_at(scene, world, disc)
-                if radius - clearance_mm(field, cell, pad, x, y) > STUCK_MM:
+                if radius - clearance_mm(scene.ground, x, y) > STUCK_MM:
                     return_disc(scene, world, room, disc)
                     is_done = False
         for pair in range(pair_count):
-            first, second = room.pairs[pair, 0], room.pairs[pair, 1]
-            if room.is_back[first] and room.is_back[second]:
+            first, second = room.pairs[2 * pair], room.pairs[2 * pair + 1]
+            if room.discs[first].is_back and room.discs[second].is_back:
                 continue
             if overlap_of(scene, world, first, second)[0] > STUCK_MM:
                 return_disc(scene, world, room, first)
@@ -380,8 +351,8 @@ def return_stuck(scene: Any, ground: Any, world: Any, room: Any, pair_count: Any
 def return_disc(scene: Any, world: Any, room: Any, disc: Any) -> Any:
     """Return a disc to where the piece began, at rest."""
     x, y, _ = disc_at(scene, world, disc)
-    shift(scene, world, disc, room.starts[disc, 0] - x, room.starts[disc, 1] - y)
-    room.is_back[disc] = True
-    if disc >= scene[0].shape[1]:
-        body = scene[1][world, disc - scene[0].shape[1]]
+    shift(scene, world, disc, room.discs[disc].start_x - x, room.discs[disc].start_y - y)
+    room.discs[disc].is_back = True
+    if disc >= scene.robots.shape[1]:
+        body = scene.bodies[world, disc - scene.robots.shape[1]]
         body.velocity_x = body.velocity_y = 0.0

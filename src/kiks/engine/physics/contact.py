@@ -19,10 +19,19 @@ An impulse T along t changes the displacement by T t and the turn by -R T/h^2, h
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 from typing import Any
 
 from kiks.engine.compiling import entry, kernel
 from kiks.engine.simd.f64x8 import corners, floor
+
+Ground: Any = namedtuple("Ground", ("clearance", "cell_mm", "pad"))
+"""The walls as contact sees them.
+
+* clearance: distance of cells to the nearest wall [mm], float32 [rows, columns];
+* cell_mm: edge of a cell [mm];
+* pad: cells of the border around the arena.
+"""
 
 PIECE_MM = 1.0
 """Longest piece of a motion near a wall [mm]: short against the radius, so the robot does not jump over walls."""
@@ -45,8 +54,9 @@ farther."""
 
 
 @kernel
-def clearance_mm(field: Any, cell: Any, pad: Any, x: Any, y: Any) -> Any:
+def clearance_mm(ground: Any, x: Any, y: Any) -> Any:
     """Return the distance from a point to the nearest wall's surface [mm], interpolated between cell centres."""
+    field, cell, pad = ground
     column = min(max(0.0, x / cell + (pad - 0.5)), field.shape[1] - 1.001)
     row = min(max(0.0, y / cell + (pad - 0.5)), field.shape[0] - 1.001)
     i = floor(column)
@@ -60,19 +70,20 @@ def clearance_mm(field: Any, cell: Any, pad: Any, x: Any, y: Any) -> Any:
 
 
 @kernel
-def outward(field: Any, cell: Any, pad: Any, x: Any, y: Any) -> Any:
+def outward(ground: Any, x: Any, y: Any) -> Any:
     """Return the unit vector away from the nearest wall; (0, 0) without one."""
-    nx, ny, _ = slope(field, cell, pad, x, y)
+    nx, ny, _ = slope(ground, x, y)
     return nx, ny
 
 
 @kernel
-def slope(field: Any, cell: Any, pad: Any, x: Any, y: Any) -> Any:
+def slope(ground: Any, x: Any, y: Any) -> Any:
     """Return the unit vector away from the nearest wall, and the gain of clearance per path along it.
 
     The gain is 1 at a wall, less between two walls, and 0 without a wall, with the vector (0, 0). It is the difference
     over one cell, from half a cell on one side to half a cell on the other; these places lie within 3 x 3 cells.
     """
+    field, cell, pad = ground
     column = min(max(0.0, x / cell + (pad - 1.0)), field.shape[1] - 2.001)
     row = min(max(0.0, y / cell + (pad - 1.0)), field.shape[0] - 2.001)
     i = floor(column)
@@ -98,7 +109,7 @@ def slope(field: Any, cell: Any, pad: Any, x: Any, y: Any) -> Any:
 
 
 @kernel
-def push_out(field: Any, cell: Any, pad: Any, radius: Any, from_x: Any, from_y: Any, x: Any, y: Any) -> Any:
+def push_out(ground: Any, radius: Any, from_x: Any, from_y: Any, x: Any, y: Any) -> Any:
     """Return the free place nearest to (x, y), which a disc has entered from the free place (from_x, from_y).
 
     Each step goes along the gradient by the depth. With straight walls such a step never increases the distance to a
@@ -107,26 +118,26 @@ def push_out(field: Any, cell: Any, pad: Any, radius: Any, from_x: Any, from_y: 
     this may fail; then the disc goes back along its path.
     """
     allowed = distance(from_x, from_y, x, y) * ROUND_A_CORNER
-    depth = radius - clearance_mm(field, cell, pad, x, y)
+    depth = radius - clearance_mm(ground, x, y)
     for _ in range(PUSHES):
         if depth <= SETTLED_MM:
             break
-        nx, ny, gain = slope(field, cell, pad, x, y)
+        nx, ny, gain = slope(ground, x, y)
         push = depth / max(gain, LEAST_GAIN)
         x += push * nx
         y += push * ny
-        depth = radius - clearance_mm(field, cell, pad, x, y)
+        depth = radius - clearance_mm(ground, x, y)
     way = distance(from_x, from_y, x, y)
     if depth <= SETTLED_MM and way <= allowed:
         return x, y
-    allowed += max(radius - clearance_mm(field, cell, pad, from_x, from_y), 0.0)
+    allowed += max(radius - clearance_mm(ground, from_x, from_y), 0.0)
     if depth <= SETTLED_MM and way <= allowed:
         return x, y
     low, high = 0.0, allowed / way if way > allowed else 1.0
     for _ in range(24):
         middle = 0.5 * (low + high)
         px, py = from_x + middle * (x - from_x), from_y + middle * (y - from_y)
-        if clearance_mm(field, cell, pad, px, py) >= radius - SETTLED_MM:
+        if clearance_mm(ground, px, py) >= radius - SETTLED_MM:
             low = middle
         else:
             high = middle
@@ -140,18 +151,18 @@ def distance(x0: Any, y0: Any, x1: Any, y1: Any) -> Any:
 
 
 @kernel
-def is_free(field: Any, cell: Any, pad: Any, parameters: Any, x: Any, y: Any) -> Any:
+def is_free(ground: Any, parameters: Any, x: Any, y: Any) -> Any:
     """Return whether a robot touches no wall at (x, y)."""
-    return clearance_mm(field, cell, pad, x, y) >= parameters.radius_mm - SETTLED_MM
+    return clearance_mm(ground, x, y) >= parameters.radius_mm - SETTLED_MM
 
 
 @kernel
-def slide(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, u: Any, v: Any, q: Any) -> Any:
+def slide(ground: Any, robot: Any, parameters: Any, u: Any, v: Any, q: Any) -> Any:
     """Move a touching robot by (u, v) as far as walls allow; return the displacement and the turn."""
     radius = parameters.radius_mm
     x, y = robot.x_mm, robot.y_mm
     wanted_x, wanted_y = x + u, y + v
-    free_x, free_y = push_out(field, cell, pad, radius, x, y, wanted_x, wanted_y)
+    free_x, free_y = push_out(ground, radius, x, y, wanted_x, wanted_y)
     push_x, push_y = free_x - wanted_x, free_y - wanted_y
     normal = math.sqrt(push_x * push_x + push_y * push_y)
     du, dv = free_x - x, free_y - y
@@ -165,13 +176,13 @@ def slide(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, u: Any, 
         du += friction * tx
         dv += friction * ty
         q -= radius * friction / (gyration * gyration)
-        free_x, free_y = push_out(field, cell, pad, radius, x, y, x + du, y + dv)
+        free_x, free_y = push_out(ground, radius, x, y, x + du, y + dv)
         du, dv = free_x - x, free_y - y
     robot.x_mm, robot.y_mm = free_x, free_y
     return du, dv, q
 
 
 @entry
-def clearance_of_disc(field: Any, cell: Any, pad: Any, x: Any, y: Any, radius: Any) -> Any:
+def clearance_of_disc(clearance: Any, cell_mm: Any, pad: Any, x: Any, y: Any, radius: Any) -> Any:
     """Return the gap between a disc at (x, y) and the nearest wall [mm], negative inside one."""
-    return clearance_mm(field, cell, pad, x, y) - radius
+    return clearance_mm(Ground(clearance, cell_mm, pad), x, y) - radius

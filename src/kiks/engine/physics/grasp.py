@@ -40,35 +40,9 @@ def is_dragged(body: Any) -> Any:
 
 
 @kernel
-def way_of_held(scene: Any, world: Any, room: Any) -> Any:
-    """Return the longest path of bodies held on the floor in this tick [mm], without obstacles."""
-    robots, bodies, kinds, _ = scene
-    longest_mm = 0.0
-    for row in range(bodies.shape[1]):
-        body = bodies[world, row]
-        if is_dragged(body):
-            number = body.holder - 1
-            wheel = max(abs(room.ways[number, 0]), abs(room.ways[number, 1]))
-            longest_mm = max(longest_mm, REACH * wheel * kinds[robots[world, number].kind].pulse_mm)
-    return longest_mm
-
-
-@kernel
-def begin_holds(scene: Any, world: Any, room: Any) -> Any:
-    """Mark bodies held on the floor and their robots as near, so they move in pieces in this tick."""
-    robots, bodies, _, _ = scene
-    for row in range(bodies.shape[1]):
-        body = bodies[world, row]
-        if is_dragged(body):
-            robot = robots[world, body.holder - 1]
-            room.is_near[body.holder - 1] = room.is_near[robots.shape[1] + row] = True
-            robot.piece_headings[0] = robot.heading_rad
-
-
-@kernel
 def carry_along(scene: Any, world: Any, room: Any, duration_s: Any) -> Any:
     """Move held bodies with their robots by one piece, without regard to obstacles, and set their speeds."""
-    robots, bodies, _, _ = scene
+    robots, bodies = scene.robots, scene.bodies
     for row in range(bodies.shape[1]):
         body = bodies[world, row]
         if is_dragged(body):
@@ -76,15 +50,14 @@ def carry_along(scene: Any, world: Any, room: Any, duration_s: Any) -> Any:
             robot.piece_headings[1] = robot.heading_rad
             disc = robots.shape[1] + row
             body.x_mm, body.y_mm = held_place(robot, body)
-            body.velocity_x = (body.x_mm - room.starts[disc, 0]) / duration_s
-            body.velocity_y = (body.y_mm - room.starts[disc, 1]) / duration_s
+            body.velocity_x = (body.x_mm - room.discs[disc].start_x) / duration_s
+            body.velocity_y = (body.y_mm - room.discs[disc].start_y) / duration_s
 
 
 @kernel
-def keep_holds(scene: Any, ground: Any, world: Any, room: Any) -> Any:
+def keep_holds(scene: Any, world: Any, room: Any) -> Any:
     """Bring robots and held bodies together again after pushes; return the largest deviation [mm]."""
-    field, cell, pad = ground
-    robots, bodies, kinds, _ = scene
+    robots, bodies, kinds = scene.robots, scene.bodies, scene.kinds
     worst = 0.0
     for row in range(bodies.shape[1]):
         body = bodies[world, row]
@@ -92,15 +65,15 @@ def keep_holds(scene: Any, ground: Any, world: Any, room: Any) -> Any:
             continue
         body.velocity_x = body.velocity_y = 0.0
         robot = robots[world, body.holder - 1]
-        depth = body.radius_mm - clearance_mm(field, cell, pad, body.x_mm, body.y_mm)
+        depth = body.radius_mm - clearance_mm(scene.ground, body.x_mm, body.y_mm)
         if depth > 0.0:
-            nx, ny = outward(field, cell, pad, body.x_mm, body.y_mm)
+            nx, ny = outward(scene.ground, body.x_mm, body.y_mm)
             body.x_mm += depth * nx
             body.y_mm += depth * ny
         error = pull_together(robot, kinds[robot.kind], body)
         if error > SETTLED_MM:
-            room.is_touching[body.holder - 1] = True
-            room.is_pushed[body.holder - 1] = room.is_pushed[robots.shape[1] + row] = True
+            room.discs[body.holder - 1].is_touching = True
+            room.discs[body.holder - 1].is_pushed = room.discs[robots.shape[1] + row].is_pushed = True
             worst = max(worst, error)
     return worst
 
@@ -136,7 +109,7 @@ def return_held(scene: Any, world: Any, room: Any, stuck_mm: Any) -> Any:
     Returns:
         Whether any of them returned.
     """
-    robots, bodies, _, _ = scene
+    robots, bodies = scene.robots, scene.bodies
     has_gone = False
     for row in range(bodies.shape[1]):
         body = bodies[world, row]
@@ -146,12 +119,12 @@ def return_held(scene: Any, world: Any, room: Any, stuck_mm: Any) -> Any:
         robot = robots[world, number]
         x, y = held_place(robot, body)
         dx, dy = body.x_mm - x, body.y_mm - y
-        is_back = room.is_back[number] and room.is_back[disc]
-        if room.is_back[number] or room.is_back[disc] or dx * dx + dy * dy > stuck_mm * stuck_mm:
+        is_back = room.discs[number].is_back and room.discs[disc].is_back
+        if room.discs[number].is_back or room.discs[disc].is_back or dx * dx + dy * dy > stuck_mm * stuck_mm:
             robot.heading_rad = robot.piece_headings[0]
-            robot.x_mm, robot.y_mm = room.starts[number, 0], room.starts[number, 1]
-            body.x_mm, body.y_mm = room.starts[disc, 0], room.starts[disc, 1]
-            room.is_back[number] = room.is_back[disc] = True
+            robot.x_mm, robot.y_mm = room.discs[number].start_x, room.discs[number].start_y
+            body.x_mm, body.y_mm = room.discs[disc].start_x, room.discs[disc].start_y
+            room.discs[number].is_back = room.discs[disc].is_back = True
             has_gone = has_gone or not is_back
     return has_gone
 
@@ -162,7 +135,7 @@ def turn_back(scene: Any, world: Any, room: Any, pieces: Any) -> Any:
 
     As in `kiks.engine.physics.motion.give_way`: a wheel loses at most its path, and turns on by its slip ratio.
     """
-    robots, bodies, kinds, _ = scene
+    robots, bodies, kinds = scene.robots, scene.bodies, scene.kinds
     for row in range(bodies.shape[1]):
         body = bodies[world, row]
         if not is_dragged(body):
@@ -173,21 +146,22 @@ def turn_back(scene: Any, world: Any, room: Any, pieces: Any) -> Any:
         turn = robot.heading_rad - robot.piece_headings[1]
         rim = 0.5 * turn * parameters.wheel_base_mm / parameters.pulse_mm
         sine, cosine = sin_cos(robot.heading_rad)
-        dx, dy = robot.x_mm - room.moved[number, 0], robot.y_mm - room.moved[number, 1]
+        disc = room.discs[number]
+        dx, dy = robot.x_mm - disc.moved_x, robot.y_mm - disc.moved_y
         pushed = (dx * cosine + dy * sine) / parameters.pulse_mm
         for wheel in range(2):
-            path = room.ways[number, wheel] / pieces
+            path = (disc.left if wheel == 0 else disc.right) / pieces
             gone = between_nought_and(path, -pushed)  # the loss that `give_way` has counted
             lost = between_nought_and(path, gone + (rim if wheel == 0 else -rim)) - gone
-            robot.wheel_pulses[wheel] -= (1.0 - room.ways[number, 2]) * lost
-            robot.slip_pulses[wheel] += (1.0 - room.ways[number, 2]) * lost
+            robot.wheel_pulses[wheel] -= (1.0 - disc.slip_ratio) * lost
+            robot.slip_pulses[wheel] += (1.0 - disc.slip_ratio) * lost
         robot.piece_headings[0] = robot.heading_rad
 
 
 @kernel
 def carry_lifted(scene: Any, world: Any) -> Any:
     """Phase: move lifted bodies with their robots."""
-    robots, bodies, _, _ = scene
+    robots, bodies = scene.robots, scene.bodies
     for row in range(bodies.shape[1]):
         body = bodies[world, row]
         if body.holder != 0 and body.is_lifted != 0:

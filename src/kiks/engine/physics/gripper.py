@@ -22,10 +22,11 @@ import math
 from typing import Any
 
 from kiks.engine.compiling import entry, kernel
+from kiks.engine.grid import count_discs, disc_at, is_on_floor
 from kiks.engine.numbers import sin_cos
 from kiks.engine.physics.contact import clearance_mm
 from kiks.engine.physics.grasp import held_place
-from kiks.engine.scene import count_discs, disc_at, is_on_floor
+from kiks.engine.scene import open_scene
 from kiks.engine.simd.masks import choose
 
 ARM_MAX = 255.0
@@ -83,9 +84,9 @@ def move_gripper(robot: Any, least_jaws: Any) -> Any:
 
 
 @kernel
-def tend_grippers(scene: Any, ground: Any, world: Any) -> Any:
+def tend_grippers(scene: Any, world: Any) -> Any:
     """Phase: move all grippers; grip, lift, put down and let go. Return whether any body changed holder or level."""
-    robots, bodies, _, _ = scene
+    robots, bodies = scene.robots, scene.bodies
     has_any = False
     for number in range(robots.shape[1]):
         robots[world, number].held_row = 0
@@ -96,7 +97,7 @@ def tend_grippers(scene: Any, ground: Any, world: Any) -> Any:
     for row in range(bodies.shape[1]):
         holder = bodies[world, row].holder
         if holder > 0:
-            if not is_in_its_place(scene, world, row) and put_down(scene, ground, world, row):
+            if not is_in_its_place(scene, world, row) and put_down(scene, world, row):
                 has_changed = True
             else:
                 robots[world, holder - 1].held_row = row + 1
@@ -105,7 +106,7 @@ def tend_grippers(scene: Any, ground: Any, world: Any) -> Any:
         if robot.has_gripper == 0:
             continue
         if robot.held_row > 0:
-            has_changed = tend_held(scene, ground, world, number) or has_changed
+            has_changed = tend_held(scene, world, number) or has_changed
         else:
             before = half_gap_mm(robot.jaws)
             move_gripper(robot, 0.0)
@@ -115,12 +116,12 @@ def tend_grippers(scene: Any, ground: Any, world: Any) -> Any:
 
 
 @kernel
-def tend_held(scene: Any, ground: Any, world: Any, number: Any) -> Any:
+def tend_held(scene: Any, world: Any, number: Any) -> Any:
     """Move a gripper that holds a body; return whether the body was let go, lifted or put on the floor."""
-    robot = scene[0][world, number]
-    body = scene[1][world, robot.held_row - 1]
+    robot = scene.robots[world, number]
+    body = scene.bodies[world, robot.held_row - 1]
     row = robot.held_row - 1
-    if robot.is_closing == 0 and put_down(scene, ground, world, row):
+    if robot.is_closing == 0 and put_down(scene, world, row):
         robot.held_row = 0
         move_gripper(robot, 0.0)
         return True
@@ -139,7 +140,7 @@ def tend_held(scene: Any, ground: Any, world: Any, number: Any) -> Any:
         return has_changed
     if body.is_lifted == 0:
         return False
-    if is_free(scene, ground, world, row):
+    if is_free(scene, world, row):
         body.is_lifted = 0
         return True
     robot.arm = min(arm, ARM_DOWN - ARM_STEP)
@@ -149,10 +150,10 @@ def tend_held(scene: Any, ground: Any, world: Any, number: Any) -> Any:
 @kernel
 def centre(scene: Any, world: Any, number: Any, body: Any) -> Any:
     """Let closing jaws move the held body to their middle, without pushing it into the robot."""
-    robot = scene[0][world, number]
+    robot = scene.robots[world, number]
     most = max(half_gap_mm(robot.jaws) - body.radius_mm, 0.0)
     body.hold_aside_mm = min(max(body.hold_aside_mm, -most), most)
-    apart = scene[2][robot.kind].radius_mm + body.radius_mm + GAP_TO_ROBOT_MM
+    apart = scene.kinds[robot.kind].radius_mm + body.radius_mm + GAP_TO_ROBOT_MM
     square = apart * apart - body.hold_aside_mm * body.hold_aside_mm
     body.hold_ahead_mm = max(body.hold_ahead_mm, math.sqrt(square))
 
@@ -176,7 +177,7 @@ def is_between_jaws(robot: Any, parameters: Any, body: Any) -> Any:
 @kernel
 def grip(scene: Any, world: Any, number: Any, half_gap_before: Any) -> Any:
     """Grip the first body that the jaws have touched in this tick; return whether there was one."""
-    robots, bodies, kinds, _ = scene
+    robots, bodies, kinds = scene.robots, scene.bodies, scene.kinds
     robot = robots[world, number]
     for row in range(bodies.shape[1]):
         body = bodies[world, row]
@@ -196,7 +197,7 @@ def grip(scene: Any, world: Any, number: Any, half_gap_before: Any) -> Any:
 @kernel
 def is_in_its_place(scene: Any, world: Any, row: Any) -> Any:
     """Return whether a held body is where its gripper holds it."""
-    robots, bodies, _, _ = scene
+    robots, bodies = scene.robots, scene.bodies
     body = bodies[world, row]
     robot = robots[world, body.holder - 1]
     if robot.has_gripper == 0:
@@ -209,10 +210,10 @@ def is_in_its_place(scene: Any, world: Any, row: Any) -> Any:
 
 
 @kernel
-def put_down(scene: Any, ground: Any, world: Any, row: Any) -> Any:
+def put_down(scene: Any, world: Any, row: Any) -> Any:
     """Let a held body go, at rest; return False if the floor is not free."""
-    body = scene[1][world, row]
-    if body.is_lifted != 0 and not is_free(scene, ground, world, row):
+    body = scene.bodies[world, row]
+    if body.is_lifted != 0 and not is_free(scene, world, row):
         return False
     body.holder = body.is_lifted = 0
     body.velocity_x = body.velocity_y = 0.0
@@ -220,12 +221,11 @@ def put_down(scene: Any, ground: Any, world: Any, row: Any) -> Any:
 
 
 @kernel
-def is_free(scene: Any, ground: Any, world: Any, row: Any) -> Any:
+def is_free(scene: Any, world: Any, row: Any) -> Any:
     """Return whether the floor under a lifted body is free."""
-    field, cell, pad = ground
     robot_count, disc_count = count_discs(scene)
     x, y, radius = disc_at(scene, world, robot_count + row)
-    if clearance_mm(field, cell, pad, x, y) < radius - FREE_MM:
+    if clearance_mm(scene.ground, x, y) < radius - FREE_MM:
         return False
     for disc in range(disc_count):
         if disc != robot_count + row and is_on_floor(scene, world, disc):
@@ -242,7 +242,8 @@ def is_free(scene: Any, ground: Any, world: Any, row: Any) -> Any:
 @entry
 def find_object(scene: Any, number: Any) -> Any:
     """Return the row of the body that a robot's gripper holds or has between its jaws, from 0; -1 for none."""
-    robots, bodies, kinds, _ = scene
+    scene = open_scene(scene[0])
+    robots, bodies, kinds = scene.robots, scene.bodies, scene.kinds
     robot = robots[0, number]
     found = -1
     for row in range(bodies.shape[1]):

@@ -19,6 +19,7 @@ from kiks.engine.simd.f64x8 import floor, greatest, lane_of, with_lane
 from kiks.engine.simd.masks import anywhere, choose, everywhere, holds, lane_count, opposite
 from kiks.engine.simd.records import one_of, only
 from kiks.engine.state import TRAIL_LENGTH
+from kiks.units import TICK_NS
 
 STREAM_SLIP = 1
 """Random stream of the slip ratios (`kiks.engine.sensing.proximity` has the next)."""
@@ -39,13 +40,11 @@ def remember_pose(robot: Any) -> Any:
 
 
 @inlined
-def move(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, left: Any, right: Any, chance: Any) -> Any:
+def move(ground: Any, robot: Any, parameters: Any, left: Any, right: Any, chance: Any) -> Any:
     """Phase: drive along the arc that the wheels command, as far as walls allow; count the paths of the rims.
 
     Args:
-        field: Distance of cells to the nearest wall [mm], shape [rows, columns].
-        cell: Edge of a cell [mm].
-        pad: Cells of the border around the arena.
+        ground: The walls as contact sees them.
         robot: Record of the robot, or of eight.
         parameters: Record of its constants.
         left: Path of the left wheel without a wall [pulses].
@@ -60,11 +59,11 @@ def move(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, left: Any
     arc = 0.5 * (left + right) * pulse
     turn = (right - left) * pulse / parameters.wheel_base_mm
     # Between cell centres the error of the clearance is below one and a half cells: farther away no wall is touched.
-    room = clearance_mm(field, cell, pad, robot.x_mm, robot.y_mm)
-    is_near = room < parameters.radius_mm + travel + 2.0 * cell
+    room = clearance_mm(ground, robot.x_mm, robot.y_mm)
+    is_near = room < parameters.radius_mm + travel + 2.0 * ground.cell_mm
     if anywhere(is_near):
         pieces = choose(is_near, min(max(1.0, -floor(-travel / PIECE_MM)), PIECES_MAX), 1.0)
-        return move_near(field, cell, pad, robot, parameters, (left, right), (arc, turn), pieces, chance)
+        return move_near(ground, robot, parameters, (left, right), (arc, turn), pieces, chance)
     x, y, _, _ = end_of_arc(robot, arc * sinc(0.5 * turn), turn)
     drive(robot, x, y, turn, arc)
     robot.wheel_pulses[0] += left
@@ -73,15 +72,11 @@ def move(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, left: Any
 
 
 @kernel
-def move_near(
-    field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, paths: Any, whole: Any, pieces: Any, chance: Any
-) -> Any:
+def move_near(ground: Any, robot: Any, parameters: Any, paths: Any, whole: Any, pieces: Any, chance: Any) -> Any:
     """Drive along an arc in pieces, with contact.
 
     Args:
-        field: Distance of cells to the nearest wall [mm], shape [rows, columns].
-        cell: Edge of a cell [mm].
-        pad: Cells of the border around the arena.
+        ground: The walls as contact sees them.
         robot: Record of the robot, or of eight.
         parameters: Record of its constants.
         paths: Paths of the wheels without a wall [pulses].
@@ -106,7 +101,7 @@ def move_near(
     for piece in range(np.int64(greatest(pieces))):
         is_moving = piece < pieces
         x, y, sine, cosine = end_of_arc(robot, chord, turn)
-        is_going = is_moving & is_free(field, cell, pad, parameters, x, y)
+        is_going = is_moving & is_free(ground, parameters, x, y)
         if anywhere(is_going):
             drive(only(robot, is_going), x, y, turn, arc)
             made_left += choose(is_going, rim_left, 0.0)
@@ -120,7 +115,7 @@ def move_near(
                     arc_of_it = lane_of(chord, lane), lane_of(sine, lane), lane_of(cosine, lane), lane_of(turn, lane)
                     ways = lane_of(way_left, lane), lane_of(way_right, lane)
                     slip_ratio = slip_ratio_of(chance, its, lane)
-                    rims = scrape(field, cell, pad, one, its, arc_of_it, ways, slip_ratio)
+                    rims = scrape(ground, one, its, arc_of_it, ways, slip_ratio)
                     made_left = with_lane(made_left, lane, lane_of(made_left, lane) + rims[0])
                     made_right = with_lane(made_right, lane, lane_of(made_right, lane) + rims[1])
     robot.slip_pulses[0] += left - made_left
@@ -147,13 +142,11 @@ def drive(robot: Any, x: Any, y: Any, turn: Any, arc: Any) -> Any:
 
 
 @kernel
-def scrape(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, piece: Any, ways: Any, slip_ratio: Any) -> Any:
+def scrape(ground: Any, robot: Any, parameters: Any, piece: Any, ways: Any, slip_ratio: Any) -> Any:
     """Drive a piece of an arc that leads into a wall; return the paths of the wheels' rims [pulses].
 
     Args:
-        field: Distance of cells to the nearest wall [mm], shape [rows, columns].
-        cell: Edge of a cell [mm].
-        pad: Cells of the border around the arena.
+        ground: The walls as contact sees them.
         robot: Record of the robot.
         parameters: Record of its constants.
         piece: The chord [mm], sine and cosine of its direction, and the turn [rad].
@@ -162,7 +155,7 @@ def scrape(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, piece: 
     """
     chord, sine, cosine, turn = piece
     base = parameters.wheel_base_mm
-    u, v, q = slide(field, cell, pad, robot, parameters, chord * cosine, chord * sine, turn)
+    u, v, q = slide(ground, robot, parameters, chord * cosine, chord * sine, turn)
     robot.heading_rad += q
     along = u * cosine + v * sine
     count_path(robot, math.sqrt(u * u + v * v) if along > 0.0 else -math.sqrt(u * u + v * v))
@@ -173,14 +166,14 @@ def scrape(field: Any, cell: Any, pad: Any, robot: Any, parameters: Any, piece: 
 
 
 @kernel
-def draw_slip(parameters: Any, seed: Any, world: Any, number: Any, tick: Any) -> Any:
+def draw_slip(parameters: Any, seed: Any, number: Any, tick: Any) -> Any:
     """Return the share of its command at which a blocked wheel of a robot turns in a tick."""
-    drawn = uniform(seed, world, number, STREAM_SLIP, tick, 0)
+    drawn = uniform(seed, 0, number, STREAM_SLIP, tick, 0)
     return parameters.slip_ratio_min + drawn * (parameters.slip_ratio_max - parameters.slip_ratio_min)
 
 
 def slip_ratio_of(chance: Any, parameters: Any, lane: Any) -> Any:
-    """Return a given slip ratio, or draw one from a seed, a world, a robot's number and a tick."""
+    """Return a given slip ratio, or draw one from the seeds, the numbers and the ticks of eight robots."""
     raise NotImplementedError("only kernels can call this")
 
 
@@ -190,8 +183,8 @@ def _overload_slip_ratio_of(chance: Any, parameters: Any, lane: Any) -> Any:
         return chance
 
     def drawn(chance: Any, parameters: Any, lane: Any) -> Any:
-        seed, world, number, tick = chance
-        return draw_slip(parameters, lane_of(seed, lane), world, number, lane_of(tick, lane))
+        seeds, numbers, tick = chance
+        return draw_slip(parameters, lane_of(seeds, lane), lane_of(numbers, lane), lane_of(tick, lane))
 
     return given if isinstance(chance, types.Float) else drawn
 
@@ -251,6 +244,18 @@ def give_way(robot: Any, parameters: Any, dx: Any, dy: Any, wheels: Any, slip_ra
 def slip(floor_path: Any, wanted_path: Any, slip_ratio: Any) -> Any:
     """Return the path of a rim that slips on the floor."""
     return floor_path + slip_ratio * (wanted_path - floor_path)
+
+
+@kernel
+def moment_of(tick_count: Any, time_ns: Any) -> Any:
+    """Return the tick of a time at most 20 ms before the end of the last tick, and the place of the time in it.
+
+    Returns:
+        The number of ticks since that tick ended, and its share, 0..1, after the time; for `Lanes`, lanes.
+    """
+    age_ns = max(1.0 * tick_count * TICK_NS - time_ns, 0.0)
+    ticks_ago = min(floor(age_ns * (1.0 / TICK_NS)), TRAIL_LENGTH - 1.0)
+    return ticks_ago, min((age_ns - ticks_ago * TICK_NS) * (1.0 / TICK_NS), 1.0)
 
 
 @kernel

@@ -22,10 +22,11 @@ import numpy as np
 
 from kiks.engine.compiling import entry, inlined, kernel
 from kiks.engine.numbers import power, sin_cos, uniform
-from kiks.engine.scene import moment_of
-from kiks.engine.sensing.disc_rays import ALL_AROUND, other_tracks, see
+from kiks.engine.physics.motion import moment_of
+from kiks.engine.scene import open_scene
+from kiks.engine.sensing.disc_rays import other_tracks, see_all
 from kiks.engine.sensing.proximity import quantize, sampled_pose
-from kiks.engine.sensing.rays import is_lit, scale
+from kiks.engine.sensing.rays import is_lit
 
 STREAM_AMBIENT = 3
 """Random stream of the noise on light readings."""
@@ -57,7 +58,7 @@ def curve(parameters: Any, distance_mm: Any) -> Any:
 
 @kernel
 def expected_ambient(
-    sight: Any,
+    walls: Any,
     lamps: Any,
     parameters: Any,
     seen: Any,
@@ -70,7 +71,7 @@ def expected_ambient(
     """Return the mean count of a sensor of a robot at a pose.
 
     Args:
-        sight: The arena as rays see it.
+        walls: The walls as rays see them.
         lamps: x [mm], y [mm], power [W] and 1 for on or 0 for off, shape [lamp, 4].
         parameters: Record of the robot's constants.
         seen: Discs that may hide a lamp (`kiks.engine.sensing.disc_rays`).
@@ -88,7 +89,7 @@ def expected_ambient(
         is_facing, distance, cos_angle = face(mount, lamps, number)
         if is_facing != FACING or not is_burning(lamps, number):
             continue
-        if not is_lit(sight, seen, seen_count, mount[0], mount[1], lamps[number, 0], lamps[number, 1]):
+        if not is_lit(walls, seen, seen_count, mount[0], mount[1], lamps[number, 0], lamps[number, 1]):
             continue
         if parameters.ambient_model == MODEL_THESIS:
             on_axis = curve(parameters, distance / math.sqrt(watts))
@@ -133,40 +134,33 @@ def is_burning(lamps: Any, number: Any) -> Any:
     return lamps[number, 3] > 0.0 and lamps[number, 2] > 0.0
 
 
-@entry
-def read_ambient(
-    scene: Any,
-    sight: Any,
-    lamps: Any,
-    tick_count: Any,
-    time_ns: Any,
-    seed: Any,
-    robot: Any,
-    is_noisy: Any,
-    out: Any,
-) -> Any:
+@kernel
+def sense_ambient(scene: Any, world: Any, robot: Any, tick_count: Any, time_ns: Any, is_noisy: Any, out: Any) -> Any:
     """Write the eight counts that command O returns at a time into `out`, each sampled at its own instant.
 
     Args:
-        scene: The scene (`kiks.engine.scene`).
-        sight: The arena as rays see it (`kiks.engine.sensing.rays`).
-        lamps: x [mm], y [mm], power [W] and 1 for on or 0 for off, shape [lamp, 4].
+        scene: The scene (`kiks.engine.scene.open_scene`).
+        world: Index of the world.
+        robot: Index of the robot.
         tick_count: Ticks done.
         time_ns: Time of the reading [ns].
-        seed: Seed of the run.
-        robot: Index of the robot.
         is_noisy: False for the expected counts at the present pose, without rounding.
         out: int64, or float64 for expected counts, shape [8].
     """
-    robots, _, kinds, _ = scene
-    state = robots[0, robot]
-    parameters = kinds[state.kind]
-    tracks, count, seen = other_tracks(scene, 0, robot)
+    state, lamps = scene.robots[world, robot], scene.lamps[world]
+    parameters = scene.kinds[state.kind]
+    tracks, count, seen = other_tracks(scene, world, robot)
     for sensor in range(out.shape[0]):
-        turn, instant_ns, x, y, heading = sampled_pose(state, tick_count, time_ns, sensor, is_noisy)
-        seen_count = see(tracks, count, moment_of(tick_count, instant_ns), scale(sight), ALL_AROUND, seen)
-        counts = expected_ambient(sight, lamps, parameters, seen, seen_count, x, y, heading, sensor)
+        turn, instant_ns, x, y, heading = sampled_pose(state, tick_count, 1.0 * time_ns, sensor, is_noisy)
+        see_all(scene.walls, tracks, count, moment_of(tick_count, instant_ns), seen)
+        counts = expected_ambient(scene.walls, lamps, parameters, seen, count, x, y, heading, sensor)
         if is_noisy:
-            jitter = uniform(seed, 0, robot, STREAM_AMBIENT, turn, sensor)
+            jitter = uniform(scene.seeds[world], 0, robot, STREAM_AMBIENT, turn, sensor)
             counts = quantize(parameters, counts + parameters.dark_noise_counts * (2.0 * jitter - 1.0))
         out[sensor] = counts
+
+
+@entry
+def read_ambient(scene: Any, robot: Any, tick_count: Any, time_ns: Any, is_noisy: Any, out: Any) -> Any:
+    """Call `sense_ambient` for the first world of a scene."""
+    sense_ambient(open_scene(scene[0]), 0, robot, tick_count, time_ns, is_noisy, out)

@@ -26,10 +26,11 @@ import numpy as np
 
 from kiks.engine.compiling import entry, kernel
 from kiks.engine.numbers import at_instant, draw, sin_cos, stream_of
-from kiks.engine.scene import moment_of
-from kiks.engine.sensing.disc_rays import ALL_AROUND, meet_disc, other_tracks, see
+from kiks.engine.physics.motion import moment_of
+from kiks.engine.scene import open_scene
+from kiks.engine.sensing.disc_rays import meet_disc, other_tracks, see_all
 from kiks.engine.sensing.proximity import pose_at
-from kiks.engine.sensing.rays import cast, cast_many, free_cells, scale
+from kiks.engine.sensing.rays import cast, cast_many, free_cells
 from kiks.engine.simd.stack_arrays import stack_floats
 from kiks.engine.state import PIXEL_COUNT
 from kiks.units import TICK_NS
@@ -88,12 +89,12 @@ def smear(grey: Any, half_width: Any) -> Any:
 
 
 @kernel
-def look(sight: Any, seen: Any, seen_count: Any, x: Any, y: Any, heading: Any, grey: Any, distance_mm: Any) -> Any:
+def look(walls: Any, seen: Any, seen_count: Any, x: Any, y: Any, heading: Any, grey: Any, distance_mm: Any) -> Any:
     """Write the grey of the surface that each pixel sees, and its distance from the robot's centre [mm]."""
-    cell, pad = scale(sight)
+    cell, pad = walls.cell_mm, walls.pad
     per_cell = 1.0 / cell
     column, row = x * per_cell + pad, y * per_cell + pad
-    begin = max(_BEGIN_MM * per_cell, free_cells(sight, column, row))
+    begin = max(_BEGIN_MM * per_cell, free_cells(walls, column, row))
     begin_columns, begin_rows = stack_floats(PIXEL_COUNT), stack_floats(PIXEL_COUNT)
     rays_x, rays_y = stack_floats(PIXEL_COUNT), stack_floats(PIXEL_COUNT)
     lengths, brightnesses = stack_floats(PIXEL_COUNT), stack_floats(PIXEL_COUNT)
@@ -105,12 +106,12 @@ def look(sight: Any, seen: Any, seen_count: Any, x: Any, y: Any, heading: Any, g
         begin_columns[p], begin_rows[p] = column + begin * ray_x, row + begin * ray_y
         # Clockwise to the next pixel.
         ray_x, ray_y = ray_x * _PIXEL_COS + ray_y * _PIXEL_SIN, ray_y * _PIXEL_COS - ray_x * _PIXEL_SIN
-    cast_many(sight, begin_columns, begin_rows, rays_x, rays_y, lengths, brightnesses)
+    cast_many(walls, begin_columns, begin_rows, rays_x, rays_y, lengths, brightnesses)
     for p in range(PIXEL_COUNT):
         start, length, brightness = begin, lengths[p], brightnesses[p]
         if length == 0.0:  # the view begins inside a wall: the pixel sees its surface
             start = 0.0
-            length, brightness = cast(sight, column, row, rays_x[p], rays_y[p], _ANYWHERE)
+            length, brightness = cast(walls, column, row, rays_x[p], rays_y[p], _ANYWHERE)
         if seen_count > 0:
             to_disc, _, shade = meet_disc(seen, seen_count, column, row, rays_x[p], rays_y[p], start + length)
             if shade > 0.0:
@@ -140,30 +141,27 @@ def darken_edges(grey: Any, noise: Any) -> Any:
 @entry
 def take_image(
     scene: Any,
-    sight: Any,
+    robot: Any,
     tick_count: Any,
     time_ns: Any,
-    seed: Any,
-    robot: Any,
     is_noisy: Any,
     out: Any,
 ) -> Any:
     """Write the image of a robot's camera at a time into `out` and return its light level.
 
     Args:
-        scene: The scene (`kiks.engine.scene`).
-        sight: The arena as rays see it (`kiks.engine.sensing.rays`).
+        scene: The scene (`kiks.engine.scene.Scene.record`).
+        robot: Index of the robot.
         tick_count: Ticks done.
         time_ns: Time [ns], at most 10 ms before the end of the last tick.
-        seed: Seed of the run.
-        robot: Index of the robot.
         is_noisy: False for the expected image, without rounding; motion smears that, too.
         out: float64, shape [64]: greys 0..255, the leftmost pixel first.
 
     Returns:
         The reading of the light detector, larger for a darker scene.
     """
-    state = scene[0][0, robot]
+    scene = open_scene(scene[0])
+    state = scene.robots[0, robot]
     x, y, heading = pose_at(state, tick_count, time_ns)
     x_before, y_before, heading_before = pose_at(state, tick_count, time_ns - TICK_NS)
     sine, cosine = sin_cos(heading)
@@ -174,7 +172,7 @@ def take_image(
     chance = np.full((3, PIXEL_COUNT), 0.5)
     flicker = 0.5
     if is_noisy:
-        origin = at_instant(stream_of(seed, 0, robot, STREAM_CAMERA), time_ns)
+        origin = at_instant(stream_of(scene.seeds[0], 0, robot, STREAM_CAMERA), time_ns)
         flicker = draw(origin, 3 * PIXEL_COUNT)
         for kind in range(3):
             for p in range(PIXEL_COUNT):
@@ -182,8 +180,8 @@ def take_image(
 
     distance_mm, half_width = stack_floats(PIXEL_COUNT), stack_floats(PIXEL_COUNT)
     tracks, count, seen = other_tracks(scene, 0, robot)
-    seen_count = see(tracks, count, moment_of(tick_count, time_ns), scale(sight), ALL_AROUND, seen)
-    look(sight, seen, seen_count, x, y, heading, out, distance_mm)
+    see_all(scene.walls, tracks, count, moment_of(tick_count, 1.0 * time_ns), seen)
+    look(scene.walls, seen, count, x, y, heading, out, distance_mm)
     for p in range(PIXEL_COUNT):
         half_width[p] = 0.5 + _DEFOCUS_PIXELS * max(1.0 - _SHARP_MM / distance_mm[p], 0.0)
     if distance_mm.max() > _SHARP_MM:

@@ -5,8 +5,8 @@ of the two there. The ray enters a disc of radius r at b - w with w^2 = r^2 - h^
 and the disc's normal has the cosine w/r.
 
 A reading first lists the tracks of nearby discs: their places at the last tick boundaries. Each sensor has an instant
-of its own, and lists from the tracks the discs that it sees: four numbers for each, column, row and radius [cells], and
-brightness.
+of its own, and from the tracks it gets the discs that it sees: four numbers for each, column, row and radius [cells],
+and brightness.
 """
 
 from __future__ import annotations
@@ -16,24 +16,29 @@ from typing import Any
 
 import numpy as np
 
-from kiks.engine.compiling import entry, kernel
-from kiks.engine.scene import count_discs, find_near
-from kiks.engine.simd.f64x8 import load, root, store, where_less
+from kiks.engine.compiling import entry, inlined, kernel
+from kiks.engine.grid import count_discs, find_near
+from kiks.engine.simd.f64x8 import LANES, load, root, splat, store, where_less
+from kiks.engine.simd.masks import anywhere, choose, holds
+from kiks.engine.simd.stack_arrays import stack_floats
 from kiks.engine.state import TRAIL_LENGTH
 
-SEEN_LIMIT = 64
-"""Most discs that a proximity sensor takes into account: more than fit within its range."""
+SEEN_LIMIT = 96
+"""Most discs that proximity sensors take into account: more than fit within their range."""
 
 PER_DISC = 4
 """Numbers per visible disc."""
 
-SEEN_SIZE = 256
-"""Numbers for `SEEN_LIMIT` discs."""
+SEEN_SIZE = 384
+"""Numbers for the discs that a sensor sees."""
+
+ALL_SEEN_SIZE = 3072
+"""Numbers for those that eight sensors see: the first `SEEN_SIZE` are of the first sensor."""
 
 PER_TRACK = 2 * (TRAIL_LENGTH + 1) + 3
 """Numbers of a track: x and y [mm] now and at the past tick boundaries, radius [mm], brightness, and the disc."""
 
-TRACKS_SIZE = 704
+TRACKS_SIZE = 1056
 """Numbers for `SEEN_LIMIT` tracks."""
 
 _ANYWHERE_MM = 1e6
@@ -42,13 +47,10 @@ _NEVER = 1e30  # cells
 
 _RADIUS, _BRIGHTNESS, _DISC = (2 * (TRAIL_LENGTH + 1) + k for k in range(3))
 
-ALL_AROUND = (0.0, 0.0, (0.0, 0.0), (0.0, 0.0), _ANYWHERE_MM)
-"""The view in all directions."""
-
 
 @kernel
 def follow(scene: Any, world: Any, found: Any, count: Any, x: Any, y: Any, reach_mm: Any, tracks: Any) -> Any:
-    """List the tracks of discs that were ever within reach of a place; return their number.
+    """List the tracks of discs that may have been within reach of a place; return their number.
 
     Args:
         scene: The scene.
@@ -58,22 +60,25 @@ def follow(scene: Any, world: Any, found: Any, count: Any, x: Any, y: Any, reach
         x: The place [mm].
         y: The place [mm].
         reach_mm: Largest distance of an edge [mm].
-        tracks: float64 [`PER_TRACK` * `count` at least].
+        tracks: float64 [`PER_TRACK` per track]; further discs are left out.
     """
-    robots, bodies, kinds, _ = scene
-    track_count = 0
+    robots, bodies, kinds = scene.robots, scene.bodies, scene.kinds
+    track_count, limit = 0, tracks.shape[0] // PER_TRACK
     for k in range(count):
+        if track_count == limit:
+            break
         disc, place = found[k], PER_TRACK * track_count
         if disc < robots.shape[1]:
             robot = robots[world, disc]
             radius, brightness = kinds[robot.kind].radius_mm, np.float64(kinds[robot.kind].brightness)
-            nearest = note_track(robot, x, y, place, tracks)
+            moved_mm = note_track(robot, place, tracks)
         else:
             body = bodies[world, disc - robots.shape[1]]
             radius, brightness = body.radius_mm, np.float64(body.brightness)
-            nearest = note_track(body, x, y, place, tracks)
+            moved_mm = note_track(body, place, tracks)
         tracks[place + _RADIUS], tracks[place + _BRIGHTNESS], tracks[place + _DISC] = radius, brightness, disc
-        track_count += nearest < (reach_mm + radius) * (reach_mm + radius)
+        dx, dy, far = tracks[place] - x, tracks[place + 1] - y, reach_mm + radius + moved_mm
+        track_count += dx * dx + dy * dy < far * far
     return track_count
 
 
@@ -83,50 +88,92 @@ def disc_of(tracks: Any, k: Any) -> Any:
     return np.int64(tracks[PER_TRACK * k + _DISC])
 
 
-@kernel
-def note_track(thing: Any, x: Any, y: Any, place: Any, tracks: Any) -> Any:
-    """Write the track of a robot or body into `tracks`; return the smallest square of its distances [mm^2]."""
+@inlined
+def note_track(thing: Any, place: Any, tracks: Any) -> Any:
+    """Write the track of a robot or body into `tracks`; return how far from its place it has ever been [mm]."""
     tracks[place], tracks[place + 1] = thing.x_mm, thing.y_mm
-    nearest = (thing.x_mm - x) * (thing.x_mm - x) + (thing.y_mm - y) * (thing.y_mm - y)
     for k in range(TRAIL_LENGTH):
-        then_x, then_y = thing.trail[k, 0], thing.trail[k, 1]
-        tracks[place + 2 * k + 2], tracks[place + 2 * k + 3] = then_x, then_y
-        nearest = min(nearest, (then_x - x) * (then_x - x) + (then_y - y) * (then_y - y))
-    return nearest
+        tracks[place + 2 * k + 2], tracks[place + 2 * k + 3] = thing.trail[k, 0], thing.trail[k, 1]
+    return moved_of(thing)
+
+
+@inlined
+def moved_of(thing: Any) -> Any:
+    """Return a distance from its place within which a robot or body has been since its track begins [mm]."""
+    farthest = 0.0
+    for k in range(TRAIL_LENGTH):
+        dx, dy = thing.trail[k, 0] - thing.x_mm, thing.trail[k, 1] - thing.y_mm
+        farthest = max(farthest, abs(dx) + abs(dy))
+    return farthest
+
+
+@inlined
+def place_then(tracks: Any, k: Any, moment: Any) -> Any:
+    """Return where the disc of a track was at a moment, x and y [mm]; at eight of them, `Lanes`."""
+    ticks_ago, back = moment
+    track = PER_TRACK * k
+    later_x, later_y = 0.0 * back + tracks[track], 0.0 * back + tracks[track + 1]
+    earlier_x, earlier_y = 0.0 * back + tracks[track + 2], 0.0 * back + tracks[track + 3]
+    for ago in range(1, TRAIL_LENGTH):
+        place = track + 2 * ago
+        is_then = ticks_ago == ago
+        later_x = choose(is_then, tracks[place], later_x)
+        later_y = choose(is_then, tracks[place + 1], later_y)
+        earlier_x = choose(is_then, tracks[place + 2], earlier_x)
+        earlier_y = choose(is_then, tracks[place + 3], earlier_y)
+    return later_x + back * (earlier_x - later_x), later_y + back * (earlier_y - later_y)
+
+
+@inlined
+def note_disc(walls: Any, tracks: Any, k: Any, x: Any, y: Any, place: Any, seen: Any) -> Any:
+    """Write the disc of a track, which was at (x, y) [mm], into `seen`."""
+    per_cell = 1.0 / walls.cell_mm
+    seen[place], seen[place + 1] = x * per_cell + walls.pad, y * per_cell + walls.pad
+    seen[place + 2] = tracks[PER_TRACK * k + _RADIUS] * per_cell
+    seen[place + 3] = tracks[PER_TRACK * k + _BRIGHTNESS]
 
 
 @kernel
-def see(tracks: Any, count: Any, moment: Any, scale: Any, view: Any, seen: Any) -> Any:
-    """List the discs in view at a moment; return their number.
+def see_all(walls: Any, tracks: Any, count: Any, moment: Any, seen: Any) -> Any:
+    """List where all discs were at a moment; `seen` is float64 [`PER_DISC` * `count` at least]."""
+    for k in range(count):
+        x, y = place_then(tracks, k, moment)
+        note_disc(walls, tracks, k, x, y, PER_DISC * k, seen)
+
+
+@kernel
+def see(walls: Any, tracks: Any, first: Any, end: Any, moments: Any, view: Any, seen: Any, counts: Any) -> Any:
+    """List the discs that each of eight sensors sees.
 
     Args:
+        walls: The walls as rays see them, for their scale.
         tracks: Tracks of discs (`follow`).
-        count: Number of discs.
-        moment: The time (`kiks.engine.scene.moment_of`).
-        scale: Edge of a cell [mm] and cells of the border around the arena.
-        view: The place of the sensor, x and y [mm]; the directions, cosine and sine, of the leftmost and of the
-            rightmost ray, (0, 0) for all directions; the range [mm].
-        seen: float64 [`PER_DISC` * `count` at least].
+        first: The first of the tracks to look at.
+        end: The first one not to look at.
+        moments: The time of each sensor, `Lanes` (`kiks.engine.physics.motion.moment_of`).
+        view: The places of the sensors, x and y [mm]; the directions, cosine and sine, of the leftmost and of the
+            rightmost rays; all `Lanes`; and the range [mm] (`kiks.engine.sensing.proximity.view_of`).
+        seen: Output: a list of discs for each sensor, float64 [`ALL_SEEN_SIZE`].
+        counts: Output: their numbers, float64 [8].
     """
-    ticks_ago, back = np.int64(moment[0]), moment[1]
-    cell, pad = scale
-    x, y, left, right, reach_mm = view
-    per_cell = 1.0 / cell
-    seen_count = 0
-    for k in range(count):
-        place = PER_TRACK * k
-        later, earlier, radius = place + 2 * ticks_ago, place + 2 * ticks_ago + 2, tracks[place + _RADIUS]
-        disc_x = tracks[later] + back * (tracks[earlier] - tracks[later])
-        disc_y = tracks[later + 1] + back * (tracks[earlier + 1] - tracks[later + 1])
+    x, y, left, right, reach_mm = view[:5]
+    store(counts, splat(0.0))
+    xs, ys = stack_floats(LANES), stack_floats(LANES)
+    for k in range(first, end):
+        disc_x, disc_y = place_then(tracks, k, moments)
+        radius = tracks[PER_TRACK * k + _RADIUS]
         dx, dy, far = disc_x - x, disc_y - y, reach_mm + radius
         # Distances of the centre beyond the edges of the view, which covers at most half a circle.
         beyond_left, beyond_right = dy * left[0] - dx * left[1], dx * right[1] - dy * right[0]
-        if dx * dx + dy * dy < far * far and max(beyond_left, beyond_right) < radius:
-            place = PER_DISC * seen_count
-            seen[place], seen[place + 1] = disc_x * per_cell + pad, disc_y * per_cell + pad
-            seen[place + 2], seen[place + 3] = radius * per_cell, tracks[PER_TRACK * k + _BRIGHTNESS]
-            seen_count += 1
-    return seen_count
+        is_seen = (dx * dx + dy * dy < far * far) & (max(beyond_left, beyond_right) < radius)
+        if anywhere(is_seen):
+            store(xs, disc_x)
+            store(ys, disc_y)
+            for sensor in range(counts.shape[0]):
+                if holds(is_seen, sensor):
+                    place = SEEN_SIZE * sensor + PER_DISC * np.int64(counts[sensor])
+                    note_disc(walls, tracks, k, xs[sensor], ys[sensor], place, seen)
+                    counts[sensor] += 1.0
 
 
 @kernel

@@ -9,26 +9,30 @@ import numpy as np
 from kiks.engine.compiling import entry, kernel
 from kiks.engine.numbers import stream_of, uniform
 from kiks.engine.parameters import RAY_COUNT
-from kiks.engine.scene import moment_of
+from kiks.engine.physics.motion import moment_of
+from kiks.engine.scene import open_scene
 from kiks.engine.sensing.ambient import STREAM_AMBIENT, expected_ambient, face, is_burning, mount_of
-from kiks.engine.sensing.disc_rays import ALL_AROUND, PER_TRACK, SEEN_SIZE, TRACKS_SIZE, disc_of, other_tracks, see
-from kiks.engine.sensing.observe import WALL, find_met, gaze_sensor, keep
+from kiks.engine.sensing.disc_rays import PER_DISC, PER_TRACK, disc_of, other_tracks, see_all
+from kiks.engine.sensing.observe import WALL, gaze_robot
 from kiks.engine.sensing.proximity import (
+    NOT_NEAR,
     STREAM_PROXIMITY,
+    begin_rays,
     chances,
-    expected_count,
-    follow_near,
+    end_rays,
+    expected_counts,
+    follow_rays,
     jitter_of,
+    make_tracing,
     quantize,
     sampled_pose,
     scatter,
-    survey,
-    trace,
-    view_of,
+    sensors_in_lanes,
+    track_around,
 )
-from kiks.engine.sensing.rays import is_lit, scale
-from kiks.engine.sensing.responses import respond
-from kiks.engine.simd.f64x8 import LANES, load, store
+from kiks.engine.sensing.rays import is_lit
+from kiks.engine.sensing.responses import REFLECTION, respond
+from kiks.engine.simd.f64x8 import LANES, lane_of, load, store
 from kiks.engine.simd.stack_arrays import stack_floats
 
 SHINING, BEHIND, BEHIND_BODY, HIDDEN, OFF = 0, 1, 2, 3, 4
@@ -36,140 +40,104 @@ SHINING, BEHIND, BEHIND_BODY, HIDDEN, OFF = 0, 1, 2, 3, 4
 
 
 @kernel
-def respond_without(
-    networks: Any,
-    parameters: Any,
-    sensor: Any,
-    lengths_mm: Any,
-    cosines: Any,
-    brightnesses: Any,
-    ray: Any,
-) -> Any:
+def respond_without(scene: Any, parameters: Any, sensor: Any, hits: Any, ray: Any) -> Any:
     """Return the expected counts above the baseline if one ray hit nothing."""
-    far, square, bright = stack_floats(LANES), stack_floats(LANES), stack_floats(LANES)
-    store(far, lengths_mm)
-    store(square, cosines)
-    store(bright, brightnesses)
-    far[ray], square[ray], bright[ray] = parameters.reach_mm, 1.0, 0.0
-    return respond(networks, parameters, sensor, load(far), load(square), load(bright))
+    parts = stack_floats(LANES), stack_floats(LANES), stack_floats(LANES)
+    for part in range(3):
+        store(parts[part], hits[part])
+    parts[0][ray], parts[1][ray], parts[2][ray] = parameters.reach_mm, 1.0, 0.0
+    return respond(scene.networks, parameters, sensor, load(parts[0]), load(parts[1]), load(parts[2]))
 
 
 @entry
-def explain_proximity(
-    scene: Any,
-    sight: Any,
-    networks: Any,
-    tick_count: Any,
-    time_ns: Any,
-    seed: Any,
-    robot: Any,
-    sensor: Any,
-    rays: Any,
-    met: Any,
-    without: Any,
-) -> Any:
+def explain_proximity(scene: Any, robot: Any, sensor: Any, tick_count: Any, time_ns: Any, out: Any) -> Any:
     """Explain the count that command N returns at a time for one sensor.
 
     Args:
-        scene: The scene (`kiks.engine.scene`).
-        sight: The arena as rays see it (`kiks.engine.sensing.rays`).
-        networks: As `kiks.engine.sensing.proximity.read_proximity` takes them.
-        tick_count: Ticks done.
-        time_ns: Time of the reading [ns].
-        seed: Seed of the run.
+        scene: The scene (`kiks.engine.scene.Scene.record`).
         robot: Index of the robot.
         sensor: Index of the sensor.
-        rays: Output, float64 [3, 7]: lengths [mm], cosines of the angles of incidence, brightnesses. Lengths and
-            brightnesses are those that the response uses.
-        met: Output: hits of the rays, as in `kiks.engine.sensing.observe`, int64 [7].
-        without: Output: expected count if one ray hit nothing, float64 [7].
+        tick_count: Ticks done.
+        time_ns: Time of the reading [ns].
+        out: Output: lengths [mm] of the rays of all sensors, cosines of the angles of incidence and brightnesses,
+            float64 [8, 3, 7]; lengths and brightnesses are those that the response uses, if anything is near enough to
+            the sensor. What the rays hit, as in `kiks.engine.sensing.observe`, int64 [8, 7]. Expected count of the
+            sensor if one of its rays hit nothing, float64 [7].
 
     Returns:
         Time of the sample [ns]; expected count; proportional noise; constant noise; count.
     """
-    robots, _, kinds, _ = scene
-    state = robots[0, robot]
-    parameters = kinds[state.kind]
-    tracks = stack_floats(TRACKS_SIZE)
-    track_count = follow_near(scene, robot, tracks)
-    turn, instant_ns, x, y, heading = sampled_pose(state, tick_count, time_ns, sensor, True)
-    moment = moment_of(tick_count, instant_ns)
-    gaze_sensor(sight, parameters, tracks, track_count, moment, (x, y, heading), sensor, rays, met)
+    scene, (rays, met, without) = open_scene(scene[0]), out
+    tracing, counts, cosines = make_tracing(), stack_floats(LANES), stack_floats(LANES)
+    walls, state = scene.walls, scene.robots[0, robot]
+    parameters = scene.kinds[state.kind]
+    turns, instants_ns, x, y, heading = sampled_pose(state, tick_count, 1.0 * time_ns, sensors_in_lanes(), True)
+    moments, poses = moment_of(tick_count, instants_ns), (x, y, heading)
+    gaze_robot(scene, robot, True, tick_count, instants_ns, poses, tracing, rays, met)
+    disc_count = track_around(scene, 0, robot, state.x_mm, state.y_mm, tracing.tracks)
+    follow_rays(walls, tracing, begin_rays(walls, parameters, False, moments, poses, disc_count, tracing, 0, 0))
+    expected_counts(scene, parameters, disc_count, tracing, 0, counts)
+    expected = counts[sensor]
     without[:] = parameters.baseline_counts[sensor]
-    view = view_of(parameters, x, y, heading, sensor)
-    seen = stack_floats(SEEN_SIZE)
-    is_near, seen_count = survey(sight, parameters, tracks, track_count, moment, view, seen)
-    if is_near:
-        lengths_mm, cosines, brightnesses = trace(
-            sight, parameters.response, view, parameters.reach_mm, seen, seen_count
-        )
-        keep(lengths_mm, rays[0])
-        keep(brightnesses, rays[2])
-        find_met(sight, parameters, tracks, track_count, moment, view, lengths_mm, brightnesses, met)
+    if tracing.packet_of[sensor] != NOT_NEAR:
+        has_faces = parameters.response == REFLECTION
+        hits = end_rays(walls, parameters, has_faces, disc_count, tracing, 0, sensor)
         for ray in range(RAY_COUNT):
-            without[ray] += respond_without(networks, parameters, sensor, lengths_mm, cosines, brightnesses, ray)
-    expected = expected_count(sight, networks, parameters, tracks, track_count, moment, x, y, heading, sensor)
-    sign, size, chance = chances(stream_of(seed, 0, robot, STREAM_PROXIMITY), turn, sensor)
+            without[ray] += respond_without(scene, parameters, sensor, hits, ray)
+            cosines[ray] = rays[sensor, 1, ray]
+        # Angles are shown as they are on the smooth surface, even if the response does not use them.
+        gaze_robot(scene, robot, has_faces, tick_count, instants_ns, poses, tracing, rays, met)
+        for ray in range(RAY_COUNT):
+            rays[sensor, 1, ray] = cosines[ray]
+    stream = stream_of(scene.seeds[0], 0, robot, STREAM_PROXIMITY)
+    sign, size, chance = chances(stream, lane_of(turns, sensor), sensor)
     scattered, jitter = scatter(parameters, expected, sign, size), jitter_of(parameters, chance)
-    return instant_ns, expected, scattered - expected, jitter, np.int64(quantize(parameters, scattered + jitter))
+    count = np.int64(quantize(parameters, scattered + jitter))
+    return lane_of(instants_ns, sensor), expected, scattered - expected, jitter, count
 
 
 @kernel
-def find_hider(sight: Any, tracks: Any, track_count: Any, moment: Any, mount: Any, lamp_x: Any, lamp_y: Any) -> Any:
+def find_hider(walls: Any, tracks: Any, track_count: Any, moment: Any, mount: Any, lamp_x: Any, lamp_y: Any) -> Any:
     """Return the disc that hides a hidden lamp from a sensor, `WALL` if a wall does."""
-    alone = stack_floats(SEEN_SIZE)
+    alone = stack_floats(PER_DISC)
     x, y = mount[0], mount[1]
-    if not is_lit(sight, alone, 0, x, y, lamp_x, lamp_y):
+    if not is_lit(walls, alone, 0, x, y, lamp_x, lamp_y):
         return WALL
     hider = WALL
     for k in range(track_count):
-        count = see(tracks[PER_TRACK * k :], 1, moment, scale(sight), ALL_AROUND, alone)
-        if hider == WALL and not is_lit(sight, alone, count, x, y, lamp_x, lamp_y):
+        see_all(walls, tracks[PER_TRACK * k :], 1, moment, alone)
+        if hider == WALL and not is_lit(walls, alone, 1, x, y, lamp_x, lamp_y):
             hider = disc_of(tracks, k)
     return hider
 
 
 @entry
-def explain_ambient(
-    scene: Any,
-    sight: Any,
-    lamps: Any,
-    tick_count: Any,
-    time_ns: Any,
-    seed: Any,
-    robot: Any,
-    sensor: Any,
-    facts: Any,
-    reasons: Any,
-) -> Any:
+def explain_ambient(scene: Any, robot: Any, sensor: Any, tick_count: Any, time_ns: Any, out: Any) -> Any:
     """Explain the count that command O returns at a time for one sensor.
 
     Args:
-        scene: The scene.
-        sight: The arena as rays see it.
-        lamps: As `kiks.engine.sensing.ambient.read_ambient` takes them, shape [lamp, 4].
-        tick_count: Ticks done.
-        time_ns: Time of the reading [ns].
-        seed: Seed of the run.
+        scene: The scene (`kiks.engine.scene.Scene.record`).
         robot: Index of the robot.
         sensor: Index of the sensor.
-        facts: Output, float64 [lamp, 3]: distance of a lamp from the sensor [mm], cosine of its angle off the sensor's
-            axis, and the expected count without it.
-        reasons: Output, int64 [lamp, 2]: effect of a lamp on the sensor (`SHINING`, ...), and the disc that hides it,
-            `WALL` for a wall.
+        tick_count: Ticks done.
+        time_ns: Time of the reading [ns].
+        out: Output: distance of a lamp from the sensor [mm], cosine of its angle off the sensor's axis, and the
+            expected count without it, float64 [lamp, 3]. Effect of a lamp on the sensor (`SHINING`, ...), and the disc
+            that hides it, `WALL` for a wall, int64 [lamp, 2].
 
     Returns:
         Time of the sample [ns]; expected count; noise; count; expected count without lamps.
     """
-    robots, _, kinds, _ = scene
-    state = robots[0, robot]
-    parameters = kinds[state.kind]
+    scene, (facts, reasons) = open_scene(scene[0]), out
+    walls, lamps = scene.walls, scene.lamps[0]
+    state = scene.robots[0, robot]
+    parameters = scene.kinds[state.kind]
     tracks, count, seen = other_tracks(scene, 0, robot)
-    turn, instant_ns, x, y, heading = sampled_pose(state, tick_count, time_ns, sensor, True)
+    turn, instant_ns, x, y, heading = sampled_pose(state, tick_count, 1.0 * time_ns, sensor, True)
     moment = moment_of(tick_count, instant_ns)
-    seen_count = see(tracks, count, moment, scale(sight), ALL_AROUND, seen)
+    see_all(walls, tracks, count, moment, seen)
     mount = mount_of(parameters, x, y, heading, sensor)
-    expected = expected_ambient(sight, lamps, parameters, seen, seen_count, x, y, heading, sensor)
+    expected = expected_ambient(walls, lamps, parameters, seen, count, x, y, heading, sensor)
     others = lamps.copy()
     for number in range(lamps.shape[0]):
         how, facts[number, 0], facts[number, 1] = face(mount, lamps, number)
@@ -178,14 +146,14 @@ def explain_ambient(
             how = OFF
         elif how == SHINING:
             lamp_x, lamp_y = lamps[number, 0], lamps[number, 1]
-            if not is_lit(sight, seen, seen_count, mount[0], mount[1], lamp_x, lamp_y):
+            if not is_lit(walls, seen, count, mount[0], mount[1], lamp_x, lamp_y):
                 how = HIDDEN
-                reasons[number, 1] = find_hider(sight, tracks, count, moment, mount, lamp_x, lamp_y)
+                reasons[number, 1] = find_hider(walls, tracks, count, moment, mount, lamp_x, lamp_y)
         reasons[number, 0] = how
         others[number, 3] = 0.0
-        facts[number, 2] = expected_ambient(sight, others, parameters, seen, seen_count, x, y, heading, sensor)
+        facts[number, 2] = expected_ambient(walls, others, parameters, seen, count, x, y, heading, sensor)
         others[number, 3] = lamps[number, 3]
-    dark = expected_ambient(sight, others[:0], parameters, seen, seen_count, x, y, heading, sensor)
-    jitter = uniform(seed, 0, robot, STREAM_AMBIENT, turn, sensor)
+    dark = expected_ambient(walls, others[:0], parameters, seen, count, x, y, heading, sensor)
+    jitter = uniform(scene.seeds[0], 0, robot, STREAM_AMBIENT, turn, sensor)
     noise = parameters.dark_noise_counts * (2.0 * jitter - 1.0)
     return instant_ns, expected, noise, np.int64(quantize(parameters, expected + noise)), dark

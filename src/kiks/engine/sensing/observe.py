@@ -10,25 +10,27 @@ from typing import Any
 
 import numpy as np
 
-from kiks.engine.compiling import entry, inlined, kernel
+from kiks.engine.compiling import entry, kernel
 from kiks.engine.parameters import RAY_COUNT
-from kiks.engine.scene import moment_of
-from kiks.engine.sensing.ambient import read_ambient
-from kiks.engine.sensing.disc_rays import PER_TRACK, SEEN_SIZE, TRACKS_SIZE, disc_of, meet_discs, see
+from kiks.engine.physics.motion import moment_of
+from kiks.engine.scene import open_scene
+from kiks.engine.sensing.ambient import sense_ambient
+from kiks.engine.sensing.disc_rays import SEEN_SIZE, disc_of, meet_discs, see
 from kiks.engine.sensing.proximity import (
-    expected_count,
-    follow_around,
-    follow_near,
+    READERS,
+    begin_rays,
+    end_rays,
+    expected_counts,
+    follow_rays,
+    make_readers,
+    make_tracing,
     pose_at,
-    read_proximity,
-    survey,
-    trace,
+    rays_of,
+    sense_proximity,
+    track_around,
     view_of,
 )
-from kiks.engine.sensing.rays import scale
-from kiks.engine.sensing.responses import REFLECTION
-from kiks.engine.simd.f64x8 import LANES, lane_of, splat, store
-from kiks.engine.simd.stack_arrays import stack_floats
+from kiks.engine.simd.f64x8 import lane_of, splat
 
 NOTHING, WALL = -2, -1
 """Hits of a ray that hit no disc; discs are numbered as in `kiks.engine.scene`."""
@@ -37,144 +39,117 @@ _FAR_MM = 1e6
 
 
 @kernel
-def find_met(
-    sight: Any,
-    parameters: Any,
-    tracks: Any,
-    track_count: Any,
-    moment: Any,
-    view: Any,
-    lengths_mm: Any,
-    brightnesses: Any,
-    met: Any,
-) -> Any:
-    """Write the hits of a sensor's rays into `met`, shape [7], from their lengths and brightnesses."""
-    x, y, rays_x, rays_y, _ = view
-    cell, pad = scale(sight)
-    per_cell = 1.0 / cell
-    for ray in range(RAY_COUNT):
-        met[ray] = WALL if lane_of(brightnesses, ray) > 0.0 else NOTHING
-    left = lane_of(rays_x, 0), lane_of(rays_y, 0)
-    right = lane_of(rays_x, RAY_COUNT - 1), lane_of(rays_y, RAY_COUNT - 1)
-    seen = stack_floats(SEEN_SIZE)
-    for k in range(track_count):
-        track = tracks[PER_TRACK * k :]
-        if see(track, 1, moment, (cell, pad), (x, y, left, right, parameters.reach_mm), seen) == 0:
-            continue
-        alone, _, shades = meet_discs(
-            seen, 1, x * per_cell + pad, y * per_cell + pad, rays_x, rays_y, splat(_FAR_MM), splat(1.0), splat(0.0)
-        )
-        for ray in range(RAY_COUNT):
-            is_this = lane_of(alone, ray) * cell <= lane_of(lengths_mm, ray)
-            if is_this and lane_of(shades, ray) > 0.0 and met[ray] != NOTHING:
-                met[ray] = disc_of(tracks, k)
-
-
-@inlined
-def keep(lanes: Any, out: Any) -> Any:
-    """Write the seven rays of a sensor into `out`, shape [7]."""
-    room = stack_floats(LANES)
-    store(room, lanes)
-    for ray in range(RAY_COUNT):
-        out[ray] = room[ray]
-
-
-@kernel
-def gaze_sensor(
-    sight: Any,
-    parameters: Any,
-    tracks: Any,
-    track_count: Any,
-    moment: Any,
-    pose: Any,
-    sensor: Any,
+def gaze_robot(
+    scene: Any,
+    robot: Any,
+    has_faces: Any,
+    tick_count: Any,
+    instants_ns: Any,
+    poses: Any,
+    tracing: Any,
     rays: Any,
     met: Any,
 ) -> Any:
-    """Write the hits of a sensor's rays: `rays` [3, 7] holds lengths, cosines and brightnesses, `met` [7] the discs."""
-    view = view_of(parameters, pose[0], pose[1], pose[2], sensor)
-    seen = stack_floats(SEEN_SIZE)
-    _, seen_count = survey(sight, parameters, tracks, track_count, moment, view, seen)
-    lengths_mm, cosines, brightnesses = trace(sight, REFLECTION, view, parameters.reach_mm, seen, seen_count)
-    keep(lengths_mm, rays[0])
-    keep(cosines, rays[1])
-    keep(brightnesses, rays[2])
-    find_met(sight, parameters, tracks, track_count, moment, view, lengths_mm, brightnesses, met)
+    """Write the hits of all rays of a robot's sensors, each at an instant [ns] and from a pose of its own, `Lanes`.
+
+    Args:
+        scene: The scene (`kiks.engine.scene.open_scene`).
+        robot: Index of the robot in the first world.
+        has_faces: Whether walls have smooth surfaces.
+        tick_count: Ticks done.
+        instants_ns: The instants.
+        poses: The robot's x and y [mm] and heading [rad] then.
+        tracing: Scratch memory (`kiks.engine.sensing.proximity.make_tracing`).
+        rays: float64 [8, 3, 7]: lengths [mm], cosines of the angles of incidence, brightnesses 0..255.
+        met: int64 [8, 7]: which disc, `WALL` or `NOTHING`.
+    """
+    walls, state = scene.walls, scene.robots[0, robot]
+    parameters, moments = scene.kinds[state.kind], moment_of(tick_count, instants_ns)
+    disc_count = track_around(scene, 0, robot, state.x_mm, state.y_mm, tracing.tracks)
+    follow_rays(walls, tracing, begin_rays(walls, parameters, True, moments, poses, disc_count, tracing, 0, 0))
+    for sensor in range(met.shape[0]):
+        hits = end_rays(walls, parameters, has_faces, disc_count, tracing, 0, sensor)
+        for ray in range(RAY_COUNT):
+            for part in range(3):
+                rays[sensor, part, ray] = lane_of(hits[part], ray)
+            met[sensor, ray] = WALL if rays[sensor, 2, ray] > 0.0 else NOTHING
+    view, nothing = view_of(parameters, poses), (splat(_FAR_MM), splat(1.0), splat(0.0))
+    for k in range(disc_count):
+        see(walls, tracing.tracks, k, k + 1, moments, view, tracing.seen, tracing.seen_counts)
+        for sensor in range(met.shape[0]):
+            if tracing.seen_counts[sensor] > 0.0:
+                origin, directions = rays_of(walls, parameters, tracing, 0, sensor)
+                alone, _, shades = meet_discs(tracing.seen[SEEN_SIZE * sensor :], 1, *origin, *directions, *nothing)
+                for ray in range(RAY_COUNT):
+                    is_this = lane_of(alone, ray) * walls.cell_mm <= rays[sensor, 0, ray]
+                    if is_this and lane_of(shades, ray) > 0.0 and met[sensor, ray] != NOTHING:
+                        met[sensor, ray] = disc_of(tracing.tracks, k)
 
 
 @entry
-def gaze(scene: Any, sight: Any, tick_count: Any, time_ns: Any, first: Any, rays: Any, met: Any) -> Any:
+def gaze(scene: Any, tick_count: Any, time_ns: Any, first: Any, rays: Any, met: Any) -> Any:
     """Write the hits of all rays of some robots' proximity sensors at the present time and poses.
 
     Args:
-        scene: The scene (`kiks.engine.scene`).
-        sight: The arena as rays see it (`kiks.engine.sensing.rays`).
+        scene: The scene (`kiks.engine.scene.Scene.record`).
         tick_count: Ticks done.
         time_ns: The present time.
         first: Index of the first of the robots.
         rays: float64 [robot, 8, 3, 7]: lengths [mm], cosines of the angles of incidence, brightnesses 0..255.
         met: int64 [robot, 8, 7]: which disc, `WALL` or `NOTHING`.
     """
-    robots, _, kinds, _ = scene
-    tracks, moment = stack_floats(TRACKS_SIZE), moment_of(tick_count, time_ns)
+    scene, tracing = open_scene(scene[0]), make_tracing()
     for k in range(met.shape[0]):
-        state = robots[0, first + k]
-        parameters = kinds[state.kind]
-        track_count = follow_near(scene, first + k, tracks)
-        pose = pose_at(state, tick_count, time_ns)
-        for sensor in range(met.shape[1]):
-            room, names = rays[k, sensor], met[k, sensor]
-            gaze_sensor(sight, parameters, tracks, track_count, moment, pose, sensor, room, names)
+        x, y, heading = pose_at(scene.robots[0, first + k], tick_count, time_ns)
+        poses = splat(x), splat(y), splat(heading)
+        gaze_robot(scene, first + k, True, tick_count, splat(1.0 * time_ns), poses, tracing, rays[k], met[k])
 
 
 @entry
-def read_all(
-    scene: Any,
-    sight: Any,
-    networks: Any,
-    lamps: Any,
-    tick_count: Any,
-    time_ns: Any,
-    seed: Any,
-    proximity: Any,
-    ambient: Any,
-) -> Any:
+def read_all(scene: Any, tick_count: Any, time_ns: Any, proximity: Any, ambient: Any) -> Any:
     """Write the counts that commands N and O of all robots return at a time.
 
     Args:
-        scene: The scene.
-        sight: The arena as rays see it.
-        networks: As `kiks.engine.sensing.proximity.read_proximity` takes them.
-        lamps: As `kiks.engine.sensing.ambient.read_ambient` takes them.
+        scene: The scene (`kiks.engine.scene.Scene.record`).
         tick_count: Ticks done.
         time_ns: When the robots read.
-        seed: Seed of the run.
         proximity: int64 [robot, 8].
         ambient: int64 [robot, 8].
     """
+    scene = open_scene(scene[0])
+    readers = make_readers()
+    for first in range(0, proximity.shape[0], READERS):
+        count = min(READERS, proximity.shape[0] - first)
+        for k in range(count):
+            readers.worlds[k], readers.robots[k], readers.ticks[k], readers.times_ns[k] = (
+                0,
+                first + k,
+                tick_count,
+                time_ns,
+            )
+        sense_proximity(scene, readers, count, True, proximity[first : first + READERS])
     for robot in range(proximity.shape[0]):
-        read_proximity(scene, sight, networks, tick_count, time_ns, seed, robot, True, proximity[robot])
-        read_ambient(scene, sight, lamps, tick_count, time_ns, seed, robot, True, ambient[robot])
+        sense_ambient(scene, 0, robot, tick_count, time_ns, True, ambient[robot])
 
 
 @entry
 def places_at(scene: Any, tick_count: Any, time_ns: Any, poses: Any, places: Any) -> Any:
-    """Write where everybody is at a time.
+    """Write where everything is at a time.
 
     Args:
-        scene: The scene.
+        scene: The scene (`kiks.engine.scene.Scene.record`).
         tick_count: Ticks done.
         time_ns: When.
         poses: Of robots, x and y [mm] and heading [rad], float64 [robot, 3].
         places: Of balls and cylinders, x and y [mm], float64 [body, 2].
     """
-    robots, bodies, _, _ = scene
+    scene = open_scene(scene[0])
     for robot in range(poses.shape[0]):
-        poses[robot, 0], poses[robot, 1], poses[robot, 2] = pose_at(robots[0, robot], tick_count, time_ns)
+        poses[robot, 0], poses[robot, 1], poses[robot, 2] = pose_at(scene.robots[0, robot], tick_count, time_ns)
     ticks, back = moment_of(tick_count, time_ns)
     ticks_ago = np.int64(ticks)
     for k in range(places.shape[0]):
-        body = bodies[0, k]
+        body = scene.bodies[0, k]
         for axis in range(2):
             now = body.x_mm if axis == 0 else body.y_mm
             later = now if ticks_ago == 0 else body.trail[ticks_ago - 1, axis]
@@ -182,27 +157,27 @@ def places_at(scene: Any, tick_count: Any, time_ns: Any, poses: Any, places: Any
 
 
 @entry
-def read_from(
-    scene: Any, sight: Any, networks: Any, tick_count: Any, time_ns: Any, robot: Any, poses: Any, out: Any
-) -> Any:
+def read_from(scene: Any, robot: Any, tick_count: Any, time_ns: Any, poses: Any, out: Any) -> Any:
     """Write the counts that a robot would read on average now if it stood elsewhere.
 
     Args:
-        scene: The robots, balls and cylinders (`kiks.engine.scene`).
-        sight: The arena as rays see it.
-        networks: As `kiks.engine.sensing.proximity.read_proximity` takes them.
+        scene: The scene (`kiks.engine.scene.Scene.record`).
+        robot: Index of the robot.
         tick_count: Ticks done.
         time_ns: The present time.
-        robot: Index of the robot.
         poses: float64 [pose, 3]: x [mm] and y [mm], in the arena, and heading [rad].
         out: float64 [pose, 8].
     """
-    robots, _, kinds, _ = scene
-    parameters = kinds[robots[0, robot].kind]
-    tracks, moment = stack_floats(TRACKS_SIZE), moment_of(tick_count, time_ns)
+    scene = open_scene(scene[0])
+    parameters = scene.kinds[scene.robots[0, robot].kind]
+    tracing = make_tracing()
+    moments = moment_of(tick_count, splat(1.0 * time_ns))
     for k in range(out.shape[0]):
         x, y, heading = poses[k, 0], poses[k, 1], poses[k, 2]
-        track_count = follow_around(scene, robot, x, y, tracks)
+        disc_count = track_around(scene, 0, robot, x, y, tracing.tracks)
+        pose = splat(x), splat(y), splat(heading)
+        packet_count = begin_rays(scene.walls, parameters, False, moments, pose, disc_count, tracing, 0, 0)
+        follow_rays(scene.walls, tracing, packet_count)
+        expected_counts(scene, parameters, disc_count, tracing, 0, out[k])
         for sensor in range(out.shape[1]):
-            count = expected_count(sight, networks, parameters, tracks, track_count, moment, x, y, heading, sensor)
-            out[k, sensor] = min(count, parameters.maximum_counts)
+            out[k, sensor] = min(out[k, sensor], parameters.maximum_counts)

@@ -1,46 +1,87 @@
 """The eight proximity sensors: the instants of their samples, their seven rays, and the noise of their counts.
 
+All eight are read at once, one lane each; the rays of each are a packet of eight lanes of their own.
+
 Source: thesis section 3.3 ("Proximity sensors", "noise model"), khepera-protocol.md 8.1 (sampling) and
 kiks-behaviour.md 3.1 (rays, noise). The responses themselves are in `kiks.engine.sensing.responses`.
 """
 
 from __future__ import annotations
 
+from collections import namedtuple
 from typing import Any
 
 import numpy as np
 
-from kiks.engine.compiling import entry, inlined, kernel
+from kiks.engine.compiling import entry, inlined, kernel, spliced
+from kiks.engine.grid import find_near
 from kiks.engine.numbers import at_instant, draw, sin_cos, stream_of
-from kiks.engine.parameters import RAY_COUNT
-from kiks.engine.physics.motion import pose_between
-from kiks.engine.scene import find_near, moment_of
-from kiks.engine.sensing.disc_rays import SEEN_LIMIT, SEEN_SIZE, TRACKS_SIZE, follow, meet_discs, see
-from kiks.engine.sensing.ray_packets import cast_fan
-from kiks.engine.sensing.rays import leap_at, scale
+from kiks.engine.physics.motion import moment_of, pose_between
+from kiks.engine.scene import open_scene
+from kiks.engine.sensing.disc_rays import ALL_SEEN_SIZE, SEEN_SIZE, TRACKS_SIZE, follow, meet_discs, moved_of, see
+from kiks.engine.sensing.ray_packets import WAY_SIZE, enter, met, nothing_met, step_all
+from kiks.engine.sensing.rays import leap_at
 from kiks.engine.sensing.responses import REFLECTION, respond
-from kiks.engine.simd.f64x8 import floor, greatest, lane_of, load
-from kiks.engine.simd.masks import choose
-from kiks.engine.simd.stack_arrays import stack_floats, stack_integers
+from kiks.engine.simd.f64x8 import LANES, floor, greatest, lane_of, load, pick, store
+from kiks.engine.simd.masks import anywhere, choose
+from kiks.engine.simd.stack_arrays import stack_floats, stack_integers, stack_narrow
+from kiks.model.robot import SENSOR_COUNT
 from kiks.units import SENSOR_ROUND_NS, SENSOR_SLOT_NS
 
 STREAM_PROXIMITY = 2
 """Random stream of the noise; each purpose has a number of its own."""
 
 MOVED_MM = 30.0
-"""Longest path of a robot or body between the first sensor's sample and a reading: 20 ms at 1.5 m/s."""
+"""Longest path of a disc between the first sensor's sample and a reading: 20 ms at 1.5 m/s."""
+
+READERS = 8
+"""Most robots whose sensors are read together."""
+
+Readers: Any = namedtuple("Readers", ("worlds", "robots", "ticks", "times_ns"))
+"""The robots that are read together: indices of their worlds and of the robots, the ticks that their worlds have done,
+and the times of the readings [ns]; each int64 [`READERS`]."""
+
+NOT_NEAR, NO_WALL = -2.0, -1.0
+"""In place of a packet: nothing is near the sensor; or no wall, so only discs are to be looked for."""
+
+Tracing: Any = namedtuple(
+    "Tracing", ("packets", "origins", "under_way", "views", "packet_of", "tracks", "seen", "seen_counts")
+)
+"""Scratch memory for the rays of several robots at once.
+
+* packets, origins, under_way: the ray packets (`kiks.engine.sensing.ray_packets`);
+* views: what `view_of` returns for each robot, without the edges, float64 [`_VIEW_SIZE` per robot];
+* packet_of: the packet of each sensor of each robot, `NO_WALL` or `NOT_NEAR`, float64 [8 per robot];
+* tracks: tracks of the discs near one of the robots (`kiks.engine.sensing.disc_rays`);
+* seen, seen_counts: the discs that the sensors of that robot see.
+"""
+
+_FOUND_LIMIT = 256
+_DIAGONAL = 1.4142135623730951
+_PACKET_COUNT = READERS * SENSOR_COUNT
+_PACKETS_SIZE = _PACKET_COUNT * WAY_SIZE
+_VIEW_SIZE = 4 * LANES
+_VIEWS_SIZE = READERS * _VIEW_SIZE
+_TURNS_SIZE = READERS * LANES
+_SENSORS = np.arange(float(SENSOR_COUNT))
 
 
 @kernel
 def sample_instant(time_ns: Any, sensor: Any) -> Any:
     """Return the round in which a sensor was last sampled, and the time of that sample [ns].
 
-    Times are float64, or eight of them: whole nanoseconds are exact for a hundred days.
+    Times are float64: whole nanoseconds are exact for a hundred days. For `Lanes` of sensors the results are lanes.
     """
     slot_ns = 1.0 * sensor * SENSOR_SLOT_NS
     turn = floor((time_ns - slot_ns) / SENSOR_ROUND_NS)
     is_sampled = turn >= 0.0
     return choose(is_sampled, turn + 1.0, 0.0), choose(is_sampled, turn * SENSOR_ROUND_NS + slot_ns, 0.0)
+
+
+@inlined
+def sensors_in_lanes() -> Any:
+    """Return the indices of the sensors, `Lanes`."""
+    return load(_SENSORS)
 
 
 @kernel
@@ -52,124 +93,198 @@ def pose_at(robot: Any, tick_count: Any, time_ns: Any) -> Any:
 
 @kernel
 def sampled_pose(robot: Any, tick_count: Any, time_ns: Any, sensor: Any, is_sampled: Any) -> Any:
-    """Return a sensor's round, its instant [ns], and x, y and heading then; without sampling, those of now."""
+    """Return a sensor's round, its instant [ns], and x, y and heading then; without sampling, those of now.
+
+    For `Lanes` of sensors, lanes.
+    """
     turn, instant_ns = sample_instant(time_ns, sensor)
     if not is_sampled:
-        turn, instant_ns = 0.0 * time_ns, 1.0 * time_ns
+        turn, instant_ns = 0.0 * sensor, 0.0 * sensor + time_ns
     x, y, heading = pose_at(robot, tick_count, instant_ns)
     return turn, instant_ns, x, y, heading
 
 
+@spliced
+def make_readers() -> Any:
+    """Return space for the readings of some robots on the stack."""
+    return Readers(stack_integers(READERS), stack_integers(READERS), stack_integers(READERS), stack_integers(READERS))
+
+
+@spliced
+def make_tracing() -> Any:
+    """Return scratch memory on the stack."""
+    return Tracing(
+        stack_narrow(_PACKETS_SIZE),
+        stack_integers(_PACKET_COUNT),
+        stack_integers(_PACKET_COUNT),
+        stack_floats(_VIEWS_SIZE),
+        stack_floats(_PACKET_COUNT),
+        stack_floats(TRACKS_SIZE),
+        stack_floats(ALL_SEEN_SIZE),
+        stack_floats(LANES),
+    )
+
+
 @kernel
-def expected_count(
-    sight: Any,
-    networks: Any,
+def begin_rays(
+    walls: Any,
     parameters: Any,
-    tracks: Any,
-    track_count: Any,
-    moment: Any,
-    x: Any,
-    y: Any,
-    heading: Any,
-    sensor: Any,
+    is_all: Any,
+    moments: Any,
+    poses: Any,
+    disc_count: Any,
+    tracing: Any,
+    k: Any,
+    first: Any,
 ) -> Any:
-    """Return the mean count of a sensor of a robot at a pose, without an upper limit.
+    """Begin the rays of all sensors of a robot, each from its own pose.
 
     Args:
-        sight: The arena as rays see it.
-        networks: Networks of the response, if it needs any.
+        walls: The walls as rays see them.
         parameters: Record of the robot's constants.
-        tracks: Tracks of nearby discs (`kiks.engine.sensing.disc_rays`).
-        track_count: Number of tracks.
-        moment: The time (`kiks.engine.scene.moment_of`).
-        x: Where the robot is [mm].
-        y: Where the robot is [mm].
-        heading: Where it looks [rad].
+        is_all: Whether to follow also the rays of sensors that nothing is near enough to.
+        moments: The time of each sensor, `Lanes` (`kiks.engine.physics.motion.moment_of`).
+        poses: The robot's x and y [mm] and heading [rad] at those times, `Lanes`.
+        disc_count: Number of tracks of discs near it.
+        tracing: Scratch memory (`Tracing`).
+        k: The robot's number among those that are read together.
+        first: The first free packet.
+
+    Returns:
+        The next free packet.
+    """
+    per_cell = 1.0 / walls.cell_mm
+    view = view_of(parameters, poses)
+    room_mm = room_around(walls, poses)
+    is_near = poses[0] < poses[0]
+    # One look-up often shows that no wall is near any sensor; eight would wait for the memory eight times.
+    if room_mm <= parameters.watch_reach_mm:
+        watch_x, watch_y = on_body(*poses[:2], *view[5], load(parameters.watch_x_mm), load(parameters.watch_y_mm))
+        # Outside this circle nothing makes a sensor respond.
+        leaps = leap_at(walls, watch_x * per_cell + walls.pad, watch_y * per_cell + walls.pad)
+        is_near = leaps <= load(parameters.watch_mm) * per_cell
+    if disc_count > 0:
+        see(walls, tracing.tracks, 0, disc_count, moments, view, tracing.seen, tracing.seen_counts)
+        is_near = is_near | (load(tracing.seen_counts) > 0.0)
+    packet_of = tracing.packet_of[SENSOR_COUNT * k :]
+    store(packet_of, choose(is_near, NO_WALL, NOT_NEAR))
+    if is_all or anywhere(is_near):
+        its = tracing.views[_VIEW_SIZE * k :]
+        store(its, view[0])
+        store(its[LANES:], view[1])
+        store(its[2 * LANES :], view[5][0])
+        store(its[3 * LANES :], view[5][1])
+        for sensor in range(SENSOR_COUNT):
+            if is_all or packet_of[sensor] != NOT_NEAR:
+                packet_of[sensor] = NO_WALL
+                if room_mm <= parameters.ray_reach_mm:
+                    origin, rays = rays_of(walls, parameters, tracing, k, sensor)
+                    enter(
+                        walls, tracing.packets, tracing.origins, first, *origin, *rays, parameters.reach_mm * per_cell
+                    )
+                    packet_of[sensor] = first
+                    first += 1
+    return first
+
+
+@inlined
+def follow_rays(walls: Any, tracing: Any, packet_count: Any) -> Any:
+    """Follow the rays of all robots whose rays have begun."""
+    step_all(walls, tracing.packets, tracing.origins, tracing.under_way, packet_count)
+
+
+@inlined
+def end_rays(walls: Any, parameters: Any, has_faces: Any, disc_count: Any, tracing: Any, k: Any, sensor: Any) -> Any:
+    """Return the hits of a sensor's rays that `follow_rays` has followed; most arguments are those of `begin_rays`.
+
+    Args:
+        walls: The walls.
+        parameters: The robot's constants.
+        has_faces: Whether walls have smooth surfaces.
+        disc_count: Number of tracks of discs near it.
+        tracing: Scratch memory.
+        k: The robot's number.
         sensor: Index of the sensor.
+
+    Returns:
+        Lengths [mm], cosines of the angles of incidence, and brightnesses, 0 for nothing, `Lanes`.
     """
-    view = view_of(parameters, x, y, heading, sensor)
-    seen = stack_floats(SEEN_SIZE)
-    is_near, seen_count = survey(sight, parameters, tracks, track_count, moment, view, seen)
-    if not is_near:
-        return parameters.baseline_counts[sensor]
-    lengths_mm, cosines, brightnesses = trace(sight, parameters.response, view, parameters.reach_mm, seen, seen_count)
-    counts = respond(networks, parameters, sensor, lengths_mm, cosines, brightnesses)
-    return parameters.baseline_counts[sensor] + counts
+    packet = np.int64(tracing.packet_of[SENSOR_COUNT * k + sensor])
+    lengths, cosines, brightnesses = nothing_met(parameters.reach_mm * (1.0 / walls.cell_mm))
+    if packet >= 0:
+        lengths, cosines, brightnesses = met(walls, has_faces, tracing.packets, tracing.origins, packet)
+    if disc_count > 0 and tracing.seen_counts[sensor] > 0.0:
+        discs = tracing.seen[SEEN_SIZE * sensor :], np.int64(tracing.seen_counts[sensor])
+        origin, rays = rays_of(walls, parameters, tracing, k, sensor)
+        lengths, cosines, brightnesses = meet_discs(*discs, *origin, *rays, lengths, cosines, brightnesses)
+    return lengths * walls.cell_mm, cosines, brightnesses
 
 
 @inlined
-def view_of(parameters: Any, x: Any, y: Any, heading: Any, sensor: Any) -> Any:
-    """Return the view of a sensor.
+def room_around(walls: Any, poses: Any) -> Any:
+    """Return a distance from a robot within which no look-up finds a wall, from any of its poses [mm].
+
+    That is the clearance, less the way to the other poses and less three diagonals of cells, as places and distances
+    are rounded to cells.
+    """
+    x, y, _ = poses
+    centre_x, centre_y = lane_of(x, 0), lane_of(y, 0)
+    moved_mm = _DIAGONAL * greatest(max(abs(x - centre_x), abs(y - centre_y)))
+    per_cell = 1.0 / walls.cell_mm
+    clearance_mm = pick(walls.clearance, centre_x * per_cell + walls.pad, centre_y * per_cell + walls.pad)
+    return clearance_mm - moved_mm - 3.0 * _DIAGONAL * walls.cell_mm
+
+
+@inlined
+def view_of(parameters: Any, poses: Any) -> Any:
+    """Return what all sensors of a robot see, each from a pose of its own, as `see` takes it.
 
     Returns:
-        Origin of its rays, x and y [mm]; their directions, cosines and sines, `Lanes`; the circle outside which nothing
-        makes it respond, x, y and radius [mm].
+        The origins of their rays, x and y [mm]; the directions of their leftmost and rightmost rays, cosines and sines;
+        the length of the rays [mm]; sines and cosines of the robot's headings. All but the length are `Lanes`.
     """
+    x, y, heading = poses
     sine, cosine = sin_cos(heading)
-    watch = *watched(parameters, x, y, sine, cosine, sensor), parameters.watch_mm[sensor]
-    x, y = mount(parameters, x, y, sine, cosine, sensor)
-    rays_x, rays_y = aim(parameters, sine, cosine, sensor)
-    return x, y, rays_x, rays_y, watch
+    left = turned(parameters.edge_cos[0], parameters.edge_sin[0], sine, cosine)
+    right = turned(parameters.edge_cos[1], parameters.edge_sin[1], sine, cosine)
+    x, y = on_body(x, y, sine, cosine, load(parameters.ray_x_mm), load(parameters.ray_y_mm))
+    return x, y, left, right, parameters.reach_mm, (sine, cosine)
 
 
 @inlined
-def watched(parameters: Any, x: Any, y: Any, sine: Any, cosine: Any, sensor: Any) -> Any:
-    """Return the centre of the circle outside which nothing makes a sensor respond, x and y [mm]."""
-    watch_x, watch_y = parameters.watch_x_mm[sensor], parameters.watch_y_mm[sensor]
-    return x + watch_x * cosine - watch_y * sine, y + watch_x * sine + watch_y * cosine
+def rays_of(walls: Any, parameters: Any, tracing: Any, k: Any, sensor: Any) -> Any:
+    """Return the origin of a sensor's rays, column and row [cells], and their directions, cosines and sines."""
+    place, per_cell = _VIEW_SIZE * k + sensor, 1.0 / walls.cell_mm
+    x, y = tracing.views[place], tracing.views[place + LANES]
+    sine, cosine = tracing.views[place + 2 * LANES], tracing.views[place + 3 * LANES]
+    rays = turned(parameters.ray_cos[sensor], parameters.ray_sin[sensor], sine, cosine)
+    return (x * per_cell + walls.pad, y * per_cell + walls.pad), rays
 
 
 @inlined
-def mount(parameters: Any, x: Any, y: Any, sine: Any, cosine: Any, sensor: Any) -> Any:
-    """Return the origin of a sensor's rays, x and y [mm]; of one robot or eight."""
-    ray_x, ray_y = parameters.ray_x_mm[sensor], parameters.ray_y_mm[sensor]
-    return x + ray_x * cosine - ray_y * sine, y + ray_x * sine + ray_y * cosine
+def on_body(x: Any, y: Any, sine: Any, cosine: Any, ahead: Any, aside: Any) -> Any:
+    """Return a place of a robot's body [mm], x and y, from where it is relative to its centre."""
+    return x + ahead * cosine - aside * sine, y + ahead * sine + aside * cosine
 
 
 @inlined
-def aim(parameters: Any, sine: Any, cosine: Any, sensor: Any) -> Any:
-    """Return the directions of a sensor's rays, cosines and sines, `Lanes`."""
-    ray_cos, ray_sin = load(parameters.ray_cos[sensor]), load(parameters.ray_sin[sensor])
-    return ray_cos * cosine - ray_sin * sine, ray_cos * sine + ray_sin * cosine
+def turned(cosines: Any, sines: Any, sine: Any, cosine: Any) -> Any:
+    """Return directions on a robot that is turned, cosines and sines, `Lanes`, from arrays of them."""
+    return load(cosines) * cosine - load(sines) * sine, load(cosines) * sine + load(sines) * cosine
 
 
-@inlined
-def survey(sight: Any, parameters: Any, tracks: Any, track_count: Any, moment: Any, view: Any, seen: Any) -> Any:
-    """Check whether anything is near a sensor; write the discs in its view into `seen`, float64 [`SEEN_SIZE`].
+@kernel
+def expected_counts(scene: Any, parameters: Any, disc_count: Any, tracing: Any, k: Any, counts: Any) -> Any:
+    """Write the mean counts of a robot's sensors into `counts`, float64 [8], without an upper limit.
 
-    Returns:
-        Whether anything may be near enough (otherwise the sensor reads its baseline), and the number of discs in view.
+    Its rays have been followed; arguments as for `end_rays`.
     """
-    x, y, rays_x, rays_y, (watch_x, watch_y, watch_mm) = view
-    cell, pad = scale(sight)
-    per_cell = 1.0 / cell
-    is_near = leap_at(sight, watch_x * per_cell + pad, watch_y * per_cell + pad) <= watch_mm * per_cell
-    seen_count = 0
-    if track_count > 0:
-        left = lane_of(rays_x, 0), lane_of(rays_y, 0)
-        right = lane_of(rays_x, RAY_COUNT - 1), lane_of(rays_y, RAY_COUNT - 1)
-        seen_count = see(tracks, track_count, moment, (cell, pad), (x, y, left, right, parameters.reach_mm), seen)
-    return is_near or seen_count > 0, seen_count
-
-
-@inlined
-def trace(sight: Any, response: Any, view: Any, reach_mm: Any, seen: Any, seen_count: Any) -> Any:
-    """Follow the rays of a sensor to their hits, as exactly as a response needs them.
-
-    Returns:
-        Lengths of the rays [mm], cosines of the angles of incidence, and brightnesses, 0 for nothing, `Lanes`.
-    """
-    x, y, rays_x, rays_y, _ = view
-    cell, pad = scale(sight)
-    per_cell = 1.0 / cell
-    column, row, reach = x * per_cell + pad, y * per_cell + pad, reach_mm * per_cell
-    has_faces = response == REFLECTION
-    lengths, cosines, brightnesses = cast_fan(sight, has_faces, column, row, rays_x, rays_y, reach)
-    if seen_count > 0:
-        lengths, cosines, brightnesses = meet_discs(
-            seen, seen_count, column, row, rays_x, rays_y, lengths, cosines, brightnesses
-        )
-    return lengths * cell, cosines, brightnesses
+    has_faces = parameters.response == REFLECTION
+    store(counts, load(parameters.baseline_counts))
+    for sensor in range(SENSOR_COUNT):
+        if tracing.packet_of[SENSOR_COUNT * k + sensor] != NOT_NEAR:
+            hits = end_rays(scene.walls, parameters, has_faces, disc_count, tracing, k, sensor)
+            counts[sensor] += respond(scene.networks, parameters, sensor, *hits)
 
 
 @kernel
@@ -221,72 +336,99 @@ def quantize(parameters: Any, count: Any) -> Any:
 
 
 @inlined
-def follow_near(scene: Any, robot: Any, tracks: Any) -> Any:
-    """List the tracks of the discs that a robot's proximity sensors may see; return their number."""
-    state = scene[0][0, robot]
-    return follow_around(scene, robot, state.x_mm, state.y_mm, tracks)
-
-
-@inlined
-def follow_around(scene: Any, robot: Any, x: Any, y: Any, tracks: Any) -> Any:
+def track_around(scene: Any, world: Any, robot: Any, x: Any, y: Any, tracks: Any) -> Any:
     """List the tracks of the discs that a robot's proximity sensors might see from a place; return their number.
 
     Args:
-        scene: The robots, balls and cylinders (`kiks.engine.scene`).
+        scene: The scene (`kiks.engine.scene.open_scene`).
+        world: Index of the world.
         robot: Index of the robot.
         x: The place [mm].
         y: The place [mm].
         tracks: float64 [`TRACKS_SIZE`].
     """
-    robots, _, kinds, _ = scene
-    parameters = kinds[robots[0, robot].kind]
-    found = stack_integers(SEEN_LIMIT)
-    reach = parameters.radius_mm + parameters.reach_mm + MOVED_MM
-    count = find_near(scene, 0, x, y, reach + MOVED_MM, robot, found)
-    return follow(scene, 0, found, count, x, y, reach, tracks) if count > 0 else 0
+    state = scene.robots[world, robot]
+    parameters = scene.kinds[state.kind]
+    found = stack_integers(_FOUND_LIMIT)
+    reach_mm = parameters.ray_reach_mm + moved_of(state)
+    count = find_near(scene, world, x, y, reach_mm + MOVED_MM, robot, found)
+    return follow(scene, world, found, count, x, y, reach_mm, tracks) if count > 0 else 0
+
+
+@kernel
+def sense_proximity(scene: Any, readers: Any, count: Any, is_noisy: Any, out: Any) -> Any:
+    """Write the eight counts that command N returns to some robots into `out`, each sampled at its own instant.
+
+    The rays of the robots are followed together: while some wait for the memory, others go on. So that one list of
+    discs is enough, no more than one robot that has others near it is among those that are read together.
+
+    Args:
+        scene: The scene (`kiks.engine.scene.open_scene`).
+        readers: Which robots, and when (`Readers`).
+        count: Their number.
+        is_noisy: False for the expected counts at the present pose, without rounding.
+        out: int64, or float64 for expected counts, shape [`READERS`, 8].
+    """
+    tracing, turns, counts = make_tracing(), stack_floats(_TURNS_SIZE), stack_floats(LANES)
+    disc_counts = stack_integers(READERS)
+    first = 0
+    while first < count:
+        end, packet_count, has_discs = first, 0, False
+        while end < count:
+            world, robot, tick_count = readers.worlds[end], readers.robots[end], readers.ticks[end]
+            state = scene.robots[world, robot]
+            parameters = scene.kinds[state.kind]
+            disc_count = track_around(scene, world, robot, state.x_mm, state.y_mm, tracing.tracks)
+            if disc_count > 0 and has_discs:
+                break
+            disc_counts[end], has_discs = disc_count, has_discs or disc_count > 0
+            time_ns = 1.0 * readers.times_ns[end]
+            turn, instants_ns, x, y, heading = sampled_pose(state, tick_count, time_ns, sensors_in_lanes(), is_noisy)
+            store(turns[LANES * end :], turn)
+            given = moment_of(tick_count, instants_ns), (x, y, heading), disc_count
+            packet_count = begin_rays(scene.walls, parameters, False, *given, tracing, end, packet_count)
+            end += 1
+        follow_rays(scene.walls, tracing, packet_count)
+        for k in range(first, end):
+            world, robot = readers.worlds[k], readers.robots[k]
+            parameters = scene.kinds[scene.robots[world, robot].kind]
+            expected_counts(scene, parameters, disc_counts[k], tracing, k, counts)
+            if is_noisy:
+                stream = stream_of(scene.seeds[world], 0, robot, STREAM_PROXIMITY)
+                add_noise(parameters, stream, load(turns[LANES * k :]), counts)
+            else:
+                store(counts, min(load(counts), parameters.maximum_counts))
+            for sensor in range(SENSOR_COUNT):
+                out[k, sensor] = counts[sensor]
+        first = end
+
+
+@inlined
+def add_noise(parameters: Any, stream: Any, turns: Any, counts: Any) -> Any:
+    """Add the noise of a reading to mean counts, float64 [8], and round them."""
+    jitters = stack_floats(LANES)
+    sign, size, chance = chances(stream, turns, sensors_in_lanes())
+    store(jitters, chance)
+    for sensor in range(SENSOR_COUNT):
+        jitters[sensor] = jitter_of(parameters, jitters[sensor])
+    store(counts, quantize(parameters, scatter(parameters, load(counts), sign, size) + load(jitters)))
 
 
 @entry
-def read_proximity(
-    scene: Any,
-    sight: Any,
-    networks: Any,
-    tick_count: Any,
-    time_ns: Any,
-    seed: Any,
-    robot: Any,
-    is_noisy: Any,
-    out: Any,
-) -> Any:
-    """Write the eight counts that command N returns at a time into `out`, each sampled at its own instant.
+def read_proximity(scene: Any, robot: Any, tick_count: Any, time_ns: Any, is_noisy: Any, out: Any) -> Any:
+    """Write the eight counts that command N returns to a robot of the first world at a time into `out`.
 
     Args:
-        scene: The scene (`kiks.engine.scene`).
-        sight: The arena as rays see it (`kiks.engine.sensing.rays`).
-        networks: A record of `kiks.engine.sensing.thesis_networks.NETWORKS`; empty if no robot's response needs one.
+        scene: The scene (`kiks.engine.scene.Scene.record`).
+        robot: Index of the robot.
         tick_count: Ticks done.
         time_ns: Time of the reading [ns].
-        seed: Seed of the run.
-        robot: Index of the robot.
         is_noisy: False for the expected counts at the present pose, without rounding.
         out: int64, or float64 for expected counts, shape [8].
     """
-    robots, _, kinds, _ = scene
-    state = robots[0, robot]
-    parameters = kinds[state.kind]
-    stream = stream_of(seed, 0, robot, STREAM_PROXIMITY)
-    tracks = stack_floats(TRACKS_SIZE)
-    track_count = follow_near(scene, robot, tracks)
-    for sensor in range(out.shape[0]):
-        turn, instant_ns, x, y, heading = sampled_pose(state, tick_count, time_ns, sensor, is_noisy)
-        moment = moment_of(tick_count, instant_ns)
-        count = expected_count(sight, networks, parameters, tracks, track_count, moment, x, y, heading, sensor)
-        if is_noisy:
-            sign, size, jitter = chances(stream, turn, sensor)
-            noisy = scatter(parameters, count, sign, size) + jitter_of(parameters, jitter)
-            out[sensor] = np.int64(quantize(parameters, noisy))
-        else:
-            out[sensor] = min(count, parameters.maximum_counts)
+    readers = make_readers()
+    readers.worlds[0], readers.robots[0], readers.ticks[0], readers.times_ns[0] = 0, robot, tick_count, time_ns
+    sense_proximity(open_scene(scene[0]), readers, 1, is_noisy, out.reshape((1, out.shape[0])))
 
 
 @entry

@@ -8,10 +8,11 @@ import numpy as np
 
 from kiks.engine.compiling import entry
 from kiks.engine.numbers import sin_cos, uniform
-from kiks.engine.scene import moment_of
-from kiks.engine.sensing.disc_rays import ALL_AROUND, PER_DISC, disc_of, meet_disc, other_tracks, see
+from kiks.engine.physics.motion import moment_of
+from kiks.engine.scene import open_scene
+from kiks.engine.sensing.disc_rays import PER_DISC, disc_of, meet_disc, other_tracks, see_all
 from kiks.engine.sensing.proximity import pose_at
-from kiks.engine.sensing.rays import cast, scale
+from kiks.engine.sensing.rays import cast
 
 _ANYWHERE_MM = 1e6
 
@@ -20,28 +21,29 @@ WALL = -1
 
 
 @entry
-def probe(scene: Any, sight: Any, tick_count: Any, time_ns: Any, robot: Any, angle: Any) -> Any:
+def probe(scene: Any, robot: Any, tick_count: Any, time_ns: Any, angle: Any) -> Any:
     """Follow a ray from the centre of a robot.
 
     Args:
-        scene: The scene (`kiks.engine.scene`).
-        sight: The arena as rays see it (`kiks.engine.sensing.rays`).
+        scene: The scene (`kiks.engine.scene.Scene.record`).
+        robot: Index of the robot.
         tick_count: Ticks done.
         time_ns: Time [ns], at most 10 ms before the end of the last tick.
-        robot: Index of the robot.
         angle: Direction, counter-clockwise from the heading [rad].
 
     Returns:
         Length of the ray [mm]; the disc that it hit, `WALL` for none; the brightness there.
     """
-    x, y, heading = pose_at(scene[0][0, robot], tick_count, time_ns)
+    scene = open_scene(scene[0])
+    walls = scene.walls
+    x, y, heading = pose_at(scene.robots[0, robot], tick_count, time_ns)
     sine, cosine = sin_cos(heading + angle)
-    cell, pad = scale(sight)
+    cell, pad = walls.cell_mm, walls.pad
     column, row = x / cell + pad, y / cell + pad
-    length, brightness = cast(sight, column, row, cosine, sine, _ANYWHERE_MM / cell)
+    length, brightness = cast(walls, column, row, cosine, sine, _ANYWHERE_MM / cell)
     met = WALL
     tracks, count, seen = other_tracks(scene, 0, robot)
-    see(tracks, count, moment_of(tick_count, time_ns), (cell, pad), ALL_AROUND, seen)
+    see_all(walls, tracks, count, moment_of(tick_count, 1.0 * time_ns), seen)
     for k in range(count):
         way, _, shade = meet_disc(seen[PER_DISC * k :], 1, column, row, cosine, sine, length)
         if shade > 0.0:

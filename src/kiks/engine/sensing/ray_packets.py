@@ -1,7 +1,7 @@
 """Ray packets: the rays of proximity sensors in eight lanes each, of one sensor or of several at once.
 
 A reading of eight sensors is mostly rays, and a ray mostly waits for memory. While one packet waits, others go on:
-`enter` starts packets one by one, `follow` lets them step in turn until all have ended, `met` returns the hits. The
+`enter` starts packets one by one, `step_all` lets them step in turn until all have ended, `met` returns the hits. The
 steps of a packet do not depend on other packets, and so neither do its bits. They are in float32, relative to the cell
 in which the packet begins (`kiks.engine.simd.f32x8`).
 
@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from kiks.engine.compiling import entry, inlined, kernel
+from kiks.engine.sensing.rays import Walls
 from kiks.engine.simd.f32x8 import (
     count_any,
     faces_at,
@@ -49,12 +50,12 @@ _FLAT = 1e-10  # square of a direction's part along an axis below which it count
 
 @inlined
 def enter(
-    sight: Any, ways: Any, origins: Any, k: Any, column: Any, row: Any, rays_x: Any, rays_y: Any, reach: Any
+    walls: Any, ways: Any, origins: Any, k: Any, column: Any, row: Any, rays_x: Any, rays_y: Any, reach: Any
 ) -> Any:
     """Start a packet.
 
     Args:
-        sight: The arena as rays see it (`kiks.engine.sensing.rays`).
+        walls: The walls as rays see them (`kiks.engine.sensing.rays`).
         ways: float32 [`WAY_SIZE` per packet].
         origins: int64, one per packet.
         k: Index of the packet.
@@ -64,7 +65,7 @@ def enter(
         rays_y: Directions, `Lanes`.
         reach: Longest length of a ray [cells].
     """
-    field = sight[0]
+    field = walls.clearance
     # An origin outside the arena counts as in the wall around it, a cell from its edge: no lookup leaves the raster.
     i = np.int64(min(max(1.0, column), field.shape[1] - 2.0))
     j = np.int64(min(max(1.0, row), field.shape[0] - 2.0))
@@ -103,9 +104,9 @@ def step(leaps: Any, origin: Any, ways: Any, way: Any, lengths: Any) -> Any:
 
 
 @kernel
-def follow(sight: Any, ways: Any, origins: Any, under_way: Any, count: Any) -> Any:
+def step_all(walls: Any, ways: Any, origins: Any, under_way: Any, count: Any) -> Any:
     """Step packets until each ray has hit a wall or its reach; `under_way` is scratch memory, int64 [packet]."""
-    leaps = sight[2]
+    leaps = walls.leaps
     for k in range(count):
         under_way[k] = k
     while count > 0:
@@ -123,7 +124,7 @@ def follow(sight: Any, ways: Any, origins: Any, under_way: Any, count: Any) -> A
 
 
 @inlined
-def meet_faces(sight: Any, ways: Any, origin: Any, way: Any, lengths: Any, shades: Any) -> Any:
+def meet_faces(walls: Any, ways: Any, origin: Any, way: Any, lengths: Any, shades: Any) -> Any:
     """Return the hits of rays on the smooth surface of a wall.
 
     Returns:
@@ -135,7 +136,7 @@ def meet_faces(sight: Any, ways: Any, origin: Any, way: Any, lengths: Any, shade
     columns, rows = whole(x), whole(y)
     # A ray without a hit looks up its origin: another cell would cost a memory access.
     place_x, place_y = if_less(0.0, shades, columns, 0.0), if_less(0.0, shades, rows, 0.0)
-    face_x, face_y, left = faces_at(sight[3], origin, place_x, place_y)
+    face_x, face_y, left = faces_at(walls.faces, origin, place_x, place_y)
     squarely = face_x * dx + face_y * dy
     left = left - (x - columns - 0.5) * face_x - (y - rows - 0.5) * face_y
     further = left / if_less(_GRAZING, squarely, squarely, 1.0)
@@ -150,53 +151,45 @@ def meet_faces(sight: Any, ways: Any, origin: Any, way: Any, lengths: Any, shade
 
 
 @inlined
-def met(sight: Any, has_faces: Any, ways: Any, origins: Any, k: Any) -> Any:
-    """Return the result of `cast_fan` for a packet that has ended."""
+def met(walls: Any, has_faces: Any, ways: Any, origins: Any, k: Any) -> Any:
+    """Return the hits of a packet that has ended.
+
+    Returns:
+        Lengths [cells], cosines of the angles of incidence (1 without surfaces), and brightnesses (0 for no hit),
+        `Lanes`.
+    """
     way = k * WAY_SIZE
     ended = load_narrow(ways, way + _MET)
     shades = if_less(ended, 0.0, 0.5 - ended, 0.0)
     lengths = if_less(ended, 0.0, load_narrow(ways, way + _LENGTH), ways[way + _REST + 2])
     cosines = narrow(1.0)
     if has_faces and count_any(shades):
-        lengths, cosines = meet_faces(sight, ways, origins[k], way, lengths, shades)
+        lengths, cosines = meet_faces(walls, ways, origins[k], way, lengths, shades)
     return widen(lengths), widen(cosines), widen(shades)
 
 
-@kernel
-def cast_fan(sight: Any, has_faces: Any, column: Any, row: Any, rays_x: Any, rays_y: Any, reach: Any) -> Any:
-    """Follow the rays of one packet.
-
-    Args:
-        sight: The arena as rays see it.
-        has_faces: Whether walls have smooth surfaces.
-        column: Origin [cells].
-        row: Origin [cells].
-        rays_x: Directions, `Lanes`.
-        rays_y: Directions, `Lanes`.
-        reach: Longest length followed [cells].
-
-    Returns:
-        Lengths [cells], cosines of the angles of incidence (1 without surfaces), and brightnesses (0 for no hit),
-        `Lanes`.
-    """
-    ways, origins, under_way = stack_narrow(WAY_SIZE), stack_integers(1), stack_integers(1)
-    enter(sight, ways, origins, 0, column, row, rays_x, rays_y, reach)
-    follow(sight, ways, origins, under_way, 1)
-    return met(sight, has_faces, ways, origins, 0)
+@inlined
+def nothing_met(reach: Any) -> Any:
+    """Return the hits of a packet whose rays meet nothing, as `met` does."""
+    return widen(narrow(min(LONGEST, reach))), widen(narrow(1.0)), widen(narrow(0.0))
 
 
 @entry
-def cast_eight(sight: Any, column: Any, row: Any, directions: Any, reach: Any, out: Any) -> Any:
+def cast_eight(walls: Any, column: Any, row: Any, directions: Any, reach: Any, out: Any) -> Any:
     """Follow eight rays as a proximity sensor does, for Python; all lengths in cells.
 
     Args:
-        sight: The arena as rays see it.
+        walls: The walls as rays see them, `walls_of` an arena.
         column: Origin.
         row: Origin.
         directions: Cosines and sines, shape [2, 8].
         reach: Longest length followed.
         out: Output: lengths and brightnesses, shape [2, 8].
     """
-    lengths, _, brightnesses = cast_fan(sight, False, column, row, load(directions[0]), load(directions[1]), reach)
+    walls = Walls(*walls)
+    ways, origins, under_way = stack_narrow(WAY_SIZE), stack_integers(1), stack_integers(1)
+    enter(walls, ways, origins, 0, column, row, load(directions[0]), load(directions[1]), reach)
+    step_all(walls, ways, origins, under_way, 1)
+    lengths, _, brightnesses = met(walls, False, ways, origins, 0)
     store(out[0], lengths)
     store(out[1], brightnesses)

@@ -4,22 +4,13 @@ Method: the clearance of a cell (distance from its centre to the nearest wall ce
 cell, is a distance that any point of the cell may go freely in any direction: empty space is crossed in a few leaps.
 Next to a wall the ray goes to the edge of its cell instead, so no corner is missed.
 
-All that rays meet of an arena is one argument, `sight`, which sensors only pass on: a plain tuple, because with a named
-one each call from Python would cost half a microsecond more. It holds
-
-* field: distance of cells to the nearest wall [mm], 0 in a wall, float32 [rows, columns];
-* surface: brightness of cells, 0 for floor, uint8 [rows, columns];
-* leaps: how far one may go from anywhere in a cell, int16 [rows, columns] (`kiks.model.arena.Arena.leaps`);
-* faces: the smooth surface of the wall beside free cells that touch one, int32 [rows, columns] (`Arena.faces` there);
-* cell: edge of a cell [mm];
-* pad: cells of the border around the arena.
-
 Places and lengths of the kernels are in cells of the raster with its border.
 """
 
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 from typing import Any
 
 import numpy as np
@@ -39,16 +30,21 @@ _LANES = 32  # of whole pictures: while some wait for the memory, others go on
 _FLAT = 1e-24  # square of a direction's part along an axis below which a ray never gets to the next cell there
 
 
-def sight_of(arena: Arena) -> tuple[Any, ...]:
-    """Return what rays meet of an arena."""
+Walls: Any = namedtuple("Walls", ("clearance", "brightness", "leaps", "faces", "cell_mm", "pad"))
+"""The walls as rays see them.
+
+* clearance: distance of cells to the nearest wall [mm], 0 in a wall, float32 [rows, columns];
+* brightness: brightness of cells, 0 for floor, uint8 [rows, columns];
+* leaps: how far one may go from anywhere in a cell, int16 [rows, columns] (`kiks.model.arena.Arena.leaps`);
+* faces: the smooth surface of the wall beside free cells that touch one, int32 [rows, columns] (`Arena.faces` there);
+* cell_mm: edge of a cell [mm];
+* pad: cells of the border around the arena.
+"""
+
+
+def walls_of(arena: Arena) -> tuple[Any, ...]:
+    """Return the parts of `Walls`; a plain tuple, which Numba opens faster."""
     return arena.clearance, arena.surface, arena.leaps, arena.faces, float(arena.mm_per_cell), PAD
-
-
-@kernel
-def scale(sight: Any) -> Any:
-    """Return the edge of a cell [mm] and the cells of the border around the arena."""
-    _, _, _, _, cell, pad = sight
-    return cell, pad
 
 
 @kernel
@@ -59,24 +55,24 @@ def cell_at(raster: Any, column: Any, row: Any) -> Any:
 
 
 @kernel
-def free_cells(sight: Any, column: Any, row: Any) -> Any:
+def free_cells(walls: Any, column: Any, row: Any) -> Any:
     """Return how far a point may go in any direction without meeting a wall [cells]; at most 0 next to one."""
-    field, _, _, _, cell, _ = sight
+    field, cell = walls.clearance, walls.cell_mm
     return pick(field, column, row) * (1.0 / cell) - _DIAGONAL
 
 
 @kernel
-def leap_at(sight: Any, column: Any, row: Any) -> Any:
+def leap_at(walls: Any, column: Any, row: Any) -> Any:
     """Return how far a point, or eight, may go in any direction [cells]; less than 0 in a wall and beyond."""
-    return pick(sight[2], column, row) * (1.0 / LEAPS_PER_CELL)
+    return pick(walls.leaps, column, row) * (1.0 / LEAPS_PER_CELL)
 
 
 @kernel
-def cast(sight: Any, column: Any, row: Any, cosine: Any, sine: Any, reach: Any, begin: Any = 0.0) -> Any:
+def cast(walls: Any, column: Any, row: Any, cosine: Any, sine: Any, reach: Any, begin: Any = 0.0) -> Any:
     """Follow one ray.
 
     Args:
-        sight: The arena as rays see it.
+        walls: The walls as rays see them.
         column: Origin [cells].
         row: Origin [cells].
         cosine: Direction.
@@ -87,7 +83,7 @@ def cast(sight: Any, column: Any, row: Any, cosine: Any, sine: Any, reach: Any, 
     Returns:
         Length of the ray [cells], `reach` if it meets nothing, and the brightness of what it met, 0 for nothing.
     """
-    field, surface, _, _, cell, _ = sight
+    field, surface, cell = walls.clearance, walls.brightness, walls.cell_mm
     per_cell = 1.0 / cell
     per_column = 1.0 / cosine if cosine * cosine > _FLAT else _FAR
     per_row = 1.0 / sine if sine * sine > _FLAT else _FAR
@@ -111,13 +107,13 @@ def cast(sight: Any, column: Any, row: Any, cosine: Any, sine: Any, reach: Any, 
 
 
 @kernel
-def cast_many(sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, lengths: Any, brightnesses: Any) -> Any:
+def cast_many(walls: Any, columns: Any, rows: Any, cosines: Any, sines: Any, lengths: Any, brightnesses: Any) -> Any:
     """Follow many rays, each to the first wall: the lengths and brightnesses of `cast` to the bit, in less time.
 
     Neighbours step together, one lane each, until the last of them has met its wall; a lane that has stays where it is.
 
     Args:
-        sight: The arena as rays see it.
+        walls: The walls as rays see them.
         columns: Origins [cells], shape [rays].
         rows: Origins [cells], shape [rays].
         cosines: Directions, shape [rays].
@@ -125,7 +121,7 @@ def cast_many(sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, len
         lengths: Where the lengths of the rays go [cells], shape [rays].
         brightnesses: Where the brightnesses of the walls go, shape [rays].
     """
-    field, surface, _, _, cell, _ = sight
+    field, surface, cell = walls.clearance, walls.brightness, walls.cell_mm
     per_cell = 1.0 / cell
     clearances, width = pointer_to(field), np.int32(field.shape[1])
     last_column, last_row = field.shape[1] - 1.0, field.shape[0] - 1.0
@@ -164,13 +160,13 @@ def cast_many(sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, len
 
 
 @kernel
-def is_lit(sight: Any, seen: Any, seen_count: Any, x: Any, y: Any, lamp_x: Any, lamp_y: Any) -> Any:
+def is_lit(walls: Any, seen: Any, seen_count: Any, x: Any, y: Any, lamp_x: Any, lamp_y: Any) -> Any:
     """Return whether nothing stands between a place and a lamp [mm].
 
     A lamp may hang over a wall or a thing, which hides nothing then.
 
     Args:
-        sight: The arena as rays see it.
+        walls: The walls as rays see them.
         seen: Discs that may stand between (`kiks.engine.sensing.disc_rays`).
         seen_count: Number of discs.
         x: The place [mm].
@@ -178,7 +174,7 @@ def is_lit(sight: Any, seen: Any, seen_count: Any, x: Any, y: Any, lamp_x: Any, 
         lamp_x: The lamp [mm].
         lamp_y: The lamp [mm].
     """
-    field, _, _, _, cell, pad = sight
+    field, cell, pad = walls.clearance, walls.cell_mm, walls.pad
     per_cell = 1.0 / cell
     column, row = x * per_cell + pad, y * per_cell + pad
     dx, dy = (lamp_x - x) * per_cell, (lamp_y - y) * per_cell
@@ -188,7 +184,7 @@ def is_lit(sight: Any, seen: Any, seen_count: Any, x: Any, y: Any, lamp_x: Any, 
     for k in range(seen_count):
         if hides(seen, k, column, row, dx / reach, dy / reach, reach):
             return False
-    length, brightness = cast(sight, column, row, dx / reach, dy / reach, reach)
+    length, brightness = cast(walls, column, row, dx / reach, dy / reach, reach)
     if brightness == 0:
         return True
     # Beyond the raster all is wall, however far the lamp hangs.
@@ -202,15 +198,16 @@ def is_lit(sight: Any, seen: Any, seen_count: Any, x: Any, y: Any, lamp_x: Any, 
 
 
 @entry
-def cast_ray(sight: Any, x: Any, y: Any, cosine: Any, sine: Any, reach: Any) -> Any:
+def cast_ray(walls: Any, x: Any, y: Any, cosine: Any, sine: Any, reach: Any) -> Any:
     """Follow one ray from Python; lengths and places in mm of the arena."""
-    cell, pad = scale(sight)
+    walls = Walls(*walls)
+    cell, pad = walls.cell_mm, walls.pad
     per_cell = 1.0 / cell
-    length, brightness = cast(sight, x * per_cell + pad, y * per_cell + pad, cosine, sine, reach * per_cell)
+    length, brightness = cast(walls, x * per_cell + pad, y * per_cell + pad, cosine, sine, reach * per_cell)
     return (length * cell if brightness > 0 else reach), brightness
 
 
 @entry
-def cast_rays(sight: Any, columns: Any, rows: Any, cosines: Any, sines: Any, lengths: Any, brightnesses: Any) -> Any:
+def cast_rays(walls: Any, columns: Any, rows: Any, cosines: Any, sines: Any, lengths: Any, brightnesses: Any) -> Any:
     """Follow many rays from Python, each to the first wall; lengths and places in cells."""
-    cast_many(sight, columns, rows, cosines, sines, lengths, brightnesses)
+    cast_many(Walls(*walls), columns, rows, cosines, sines, lengths, brightnesses)

@@ -58,11 +58,10 @@ EIGHT = record8_of(
         *("target_pulses", "trajectory_pulses", "trajectory_speed", "error_sum", "last_error", "measured_speed"),
         *("controlled_speed", "motor_mode", "speed_setpoint", "pwm_setpoint", "pwm", "on_target", "profile_speed"),
         *("profile_acceleration", "speed_gains", "position_gains"),
-        *("has_gripper", "arm_target", "arm", "jaws", "is_closing"),
     ),
-    "tick_count",
+    *("number", "tick_count", "until", "left_pulses", "right_pulses", "way_mm", "is_near", "is_touching_discs"),
 )
-"""Eight robots, each alone in its world, and the number of ticks that each has done."""
+"""Eight robots of a bunch, and what a tick notes about them (`kiks.engine.bunch`)."""
 
 EIGHT_KINDS = record8_of(
     PARAMETERS,
@@ -327,8 +326,7 @@ def _copy(context: Any, builder: Any, eight: Any, record: Any, arguments: Any, i
     lanes, one = (builder.bitcast(each, _BYTE.as_pointer()) for each in (lanes, one))
     lanes = builder.gep(lanes, [builder.mul(lane, ir.Constant(_WORD, 8))], inbounds=True)
     for kind, there, here in _copies(eight, record):
-        content = context.get_data_type(kind)
-        single = _at(builder, one, ir.Constant(_WORD, there), content)
+        single = _at(builder, one, ir.Constant(_WORD, there), context.get_data_type(kind))
         number = _at(builder, lanes, ir.Constant(_WORD, here), ir.DoubleType())
         if is_loaded:
             value = builder.load(single, align=1)
@@ -336,6 +334,22 @@ def _copy(context: Any, builder: Any, eight: Any, record: Any, arguments: Any, i
         else:
             value = builder.load(number, align=8)
             builder.store(context.cast(builder, value, types.float64, kind), single, align=1)
+
+
+@_intrinsic
+def fill_lanes(typing: Any, eight: Any, record: Any) -> Any:
+    """Copy what a record of eights has of a record into all lanes."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        lanes, one = (builder.bitcast(each, _BYTE.as_pointer()) for each in arguments)
+        for kind, there, here in _copies(eight, record):
+            single = _at(builder, one, ir.Constant(_WORD, there), context.get_data_type(kind))
+            value = context.cast(builder, builder.load(single, align=1), kind, types.float64)
+            filled = context.cast(builder, value, types.float64, _LANES)
+            builder.store(filled, _at(builder, lanes, ir.Constant(_WORD, here), _VECTOR), align=8)
+        return context.get_dummy_value()
+
+    return types.void(eight, record), generate
 
 
 @_intrinsic

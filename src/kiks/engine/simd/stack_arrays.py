@@ -77,6 +77,15 @@ def stack_booleans(typing: Any, count: Any) -> Any:
 
 
 @_intrinsic
+def stack_records(typing: Any, count: Any, record_type: Any) -> Any:
+    """Return an uninitialised array of records on the stack, of a length and a type that are constants."""
+    if not isinstance(count, types.IntegerLiteral):
+        return None
+    signature, generate = _on_the_stack(count, record_type.dtype)
+    return signature.return_type(count, record_type), generate
+
+
+@_intrinsic
 def pointer_to(typing: Any, array: Any) -> Any:
     """Return the address of the first element of an array without gaps, in C order."""
     if not (isinstance(array, types.Array) and array.layout == "C"):
@@ -121,3 +130,13 @@ def borrowed(typing: Any, value: Any) -> Any:
         return borrow(context, builder, value, arguments[0])
 
     return value(value), generate
+
+
+@_intrinsic
+def keep_alive(typing: Any, *values: Any) -> Any:
+    """Do nothing: arrays that were borrowed live up to here."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return context.get_dummy_value()
+
+    return types.void(types.BaseTuple.from_types(values)), generate  # type: ignore[no-untyped-call, unused-ignore]

@@ -1,24 +1,21 @@
-"""Record8 worlds at once are eight worlds, to the bit: the same physics compiled for lanes and for a robot alone."""
+"""Robots in lanes move as each of them moves alone, to the bit: the same physics compiled for eight and for one."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.engine.by_eights import read_after
+from tests.engine.one_by_one import advance_alone, advance_each, records_taken
 
-from kiks.batch.kernel_args import PROXIMITY
 from kiks.engine import step
 from kiks.engine.parameters import pack
 from kiks.engine.physics import motor
-from kiks.engine.scene import make_scene
-from kiks.engine.sensing.rays import sight_of
+from kiks.engine.scene import Scene
 from kiks.engine.sensing.thesis_networks import networks_for
 from kiks.engine.state import State
-from kiks.model.arena import PAD
+from kiks.model.arena import PAD, Arena
 from kiks.model.robot import RobotSpec
-from kiks.units import TICK_NS
 
-pytestmark = pytest.mark.slow  # they compile the kernels for eight robots
+pytestmark = pytest.mark.slow  # they compile the engine once more, for one robot
 
 KINDS = (
     {},
@@ -35,7 +32,8 @@ class Worlds:
         self.arena, self.count = arena, count
         specs = [RobotSpec.load("khepera").with_changes(**changes) for changes in KINDS]
         self.kinds = np.concatenate([pack(spec) for spec in specs])
-        self.lanes = State.empty(world_count=count, robot_count=1).robots
+        state = State.empty(world_count=count, robot_count=1)
+        self.lanes = state.robots
         self.seeds = self.rng.integers(0, 2**63, count)
         self.ticks = self.rng.integers(0, 1000, count)
         free = np.argwhere(arena.clearance[PAD:-PAD, PAD:-PAD] > 31.0)
@@ -49,11 +47,10 @@ class Worlds:
             robot["position_gains"] = specs[0].reset.position_gains
             robot["profile_speed"] = specs[0].reset.profile_speed_pulses
             robot["profile_acceleration"] = specs[0].reset.profile_acceleration
-        self.alone = self.lanes.copy()
-
-    @property
-    def ground(self):
-        return self.arena.clearance, float(self.arena.mm_per_cell), PAD
+        other = state.snapshot()
+        self.alone = other.robots
+        given = self.kinds, [arena], networks_for("reflection"), np.zeros((count, 0, 4)), self.seeds
+        self.scene, self.scene_alone = Scene(state, *given), Scene(other, *given)
 
     def command(self, name, most):
         """Give a third of the robots a new command."""
@@ -63,17 +60,13 @@ class Worlds:
                 getattr(motor, name)(robots, world, 0, left, right)
 
     def advance(self, ticks_to):
-        before, self.ticks = self.ticks, ticks_to
-        lanes = State(self.lanes, State.empty(world_count=self.count, robot_count=1).bodies)
-        scene = make_scene(lanes, self.kinds, self.arena.width_mm, self.arena.height_mm)
-        lamps = np.zeros((self.count, 0, 4))
-        places = self.ground, sight_of(self.arena), networks_for("reflection"), lamps
-        read_after(scene, *places, self.seeds, before, ticks_to * TICK_NS, PROXIMITY)
+        before, self.ticks = self.ticks, np.maximum(ticks_to, self.ticks)
         for world in range(self.count):
-            state = State(self.alone[world : world + 1], State.empty(world_count=1, robot_count=1).bodies)
-            scene = make_scene(state, self.kinds, self.arena.width_mm, self.arena.height_mm)
-            ticks = max(ticks_to[world] - before[world], 0)
-            step.advance(scene, self.ground, self.seeds[world], before[world], ticks)
+            ticks = self.ticks[world] - before[world]
+            advance_alone(self.scene_alone.record, world, 0, before[world], ticks)
+        done = before.copy()
+        advance_each(self.scene.record, done, ticks_to)
+        assert done.tolist() == self.ticks.tolist()
 
     def assert_equal(self):
         for name in self.lanes.dtype.names:
@@ -133,3 +126,47 @@ def test_a_time_that_has_come_changes_nothing(make_random_arena):
     before = worlds.lanes.copy()
     worlds.advance(worlds.ticks.copy())
     assert worlds.lanes.tobytes() == before.tobytes()
+
+
+@pytest.mark.parametrize("count", [2, 7, 8, 9, 41])
+def test_robots_that_never_meet_move_as_if_alone(count):
+    """In one world, some along walls, some in the open; each turns on the spot or drives to and fro."""
+    rng = np.random.default_rng(count)
+    spec = RobotSpec.load("khepera")
+    state = State.empty(world_count=1, robot_count=count)
+    robots = state.robots[0]
+    robots["speed_gains"] = spec.reset.speed_gains
+    robots["x_mm"] = 30.0 + 100.0 * (np.arange(count) % 7)
+    robots["y_mm"] = 30.0 + 100.0 * (np.arange(count) // 7)
+    robots["heading_rad"] = rng.uniform(-4.0, 4.0, count)
+    other = state.snapshot()
+    given = pack(spec), [Arena.box(660, 560)], networks_for("reflection"), np.zeros((1, 0, 4)), [5]
+    together, alone = Scene(state, *given), Scene(other, *given)
+    tick = 0
+    for _ in range(40):
+        speed = rng.integers(-3, 4, count)
+        for number in range(count):
+            turn = 1 if number % 3 else -1
+            for each in (state, other):
+                motor.set_speed(each.robots, 0, number, int(speed[number]), int(speed[number]) * turn)
+        for sign in (1, -1):
+            ticks = int(rng.integers(1, 12))
+            step.advance(together.record, tick, ticks)
+            for number in range(count):
+                advance_alone(alone.record, 0, number, tick, ticks)
+            tick += ticks
+            robots["speed_setpoint"] *= -sign
+            other.robots["speed_setpoint"] *= -sign
+        for name in robots.dtype.names:
+            assert state.robots[name].tobytes() == other.robots[name].tobytes(), name
+    assert robots["contact_count"].any()
+
+
+@pytest.mark.parametrize(("robots", "records"), [(1, 1), (8, 1), (9, 2), (20, 3)])
+def test_memory_for_more_worlds_is_not_used(robots, records):
+    """The last bunch of a block may have fewer worlds than the others."""
+    state = State.empty(world_count=1, robot_count=robots)
+    state.robots["x_mm"] = 40.0 + 60.0 * np.arange(robots)
+    spec = RobotSpec.load("khepera")
+    given = pack(spec), [Arena.box(1500, 300)], networks_for("reflection"), np.zeros((1, 0, 4)), [5]
+    assert records_taken(Scene(state, *given).record, 80, np.zeros(1, np.int64)) == records
