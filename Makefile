@@ -10,7 +10,7 @@ PYTEST = $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 # The tests start hundreds of Python processes: Python keeps the bytecode of the modules, whatever the environment says.
 export PYTHONDONTWRITEBYTECODE =
 
-.PHONY: demo test quick nightly checked setup system lint types docs benchmarks clean
+.PHONY: demo test quick nightly checked setup system lint types docs benchmarks wheel clean
 
 demo: setup
 	$(BIN)/kiks demo follow --arena examples/arenas/office.toml --seconds 300 --picture kiks-demo.png
@@ -56,7 +56,12 @@ docs: setup
 	$(BIN)/python docs/make_commands.py
 
 benchmarks: setup
-	for name in wire sensors crowd programs desk batch evolve environments octave; do $(BIN)/python benchmarks/$$name.py; done
+	for name in wire sensors crowd programs desk batch evolve environments octave start; do $(BIN)/python benchmarks/$$name.py; done
+
+# A wheel in `dist` that brings compiled kernels, for this version of Python. Any other way to build a wheel gives a pure one.
+wheel: setup
+	$(BIN)/python tools/compile_kernels.py build/kernels
+	KIKS_KERNELS=build/kernels $(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist .
 
 clean:
 	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -4,7 +4,8 @@ Need: Numba keeps machine code as pickles. A damaged one raises anything in the 
 and one that another user has written runs that user's code.
 Method: each file holds one function for one signature, and the digests of what is in it. It is read only if it belongs
 to this user or the superuser and others cannot write it. A damaged file is deleted and its function compiled again.
-The name of the folder is a digest of all that the code depends on, so files of another version are never read.
+The name of the folder is a digest of all that the code depends on, so files of another version are never read. Neither
+paths nor times are part of it: the files fit the same sources on another computer. A wheel can bring some.
 """
 
 from __future__ import annotations
@@ -25,15 +26,18 @@ from typing import Any
 import llvmlite
 import numba
 import numpy as np
-from llvmlite import binding
 from numba.core import serialize
 from numba.core.compiler import CompileResult
 
+from kiks.engine.processor import processor
 from kiks.errors import ParameterError
 from kiks.model.atomic_files import replace_file
 
 KERNEL_FOLDERS = ("engine", "control", "batch")
 """Folders beside one another whose files hold kernels."""
+
+SHIPPED = Path(__file__).parent / "compiled"
+"""Folder of what a wheel brings (`make wheel`), with a folder for each version; most installations have none."""
 
 # Numba has no types for these.
 _numba: Any = serialize
@@ -41,6 +45,9 @@ _Result: Any = CompileResult
 
 _FORMAT = b"kiks-code-1"
 _ENDING = ".code"
+
+_ANNOTATION = 6
+"""Where Numba puts the annotated source among the parts of a compiled function."""
 
 
 class CodeCache:
@@ -67,8 +74,9 @@ class CodeCache:
     def load_overload(self, signature: Any, context: Any) -> Any:
         """Return what was compiled for a signature; None if it has to be compiled."""
         context.refresh()
-        key = signature, context.codegen().magic_tuple()
+        key = _key(signature, context.codegen())
         for path in _files(self._name):
+            is_shipped = path.parent.parent == SHIPPED
             try:
                 payload = _payload(path, key)
                 if payload is not None:
@@ -76,11 +84,15 @@ class CodeCache:
             except OSError:
                 continue
             except _ForeignError:
+                if is_shipped:
+                    continue
                 _tell(
                     f"The compiled engine must be in files that you alone can write, but others can write those in "
                     f"{str(path.parent)!r}. It is compiled again; set NUMBA_CACHE_DIR to a folder of yours."
                 )
             except Exception:  # what unpickling raises has no common base
+                if is_shipped:
+                    continue
                 _tell(f"Damaged files in {str(path.parent)!r} are thrown away; what they held is compiled again.")
                 with contextlib.suppress(OSError):
                     path.unlink()
@@ -90,8 +102,10 @@ class CodeCache:
         """Keep what was compiled for a signature, where there is room for it."""
         if compiled.library.has_dynamic_globals:
             return
-        key = _numba.dumps((signature, compiled.library.codegen.magic_tuple()))
-        payload = _numba.dumps(compiled._reduce())
+        key = _numba.dumps(_key(signature, compiled.library.codegen))
+        parts = list(compiled._reduce())
+        parts[_ANNOTATION] = ""  # a text for people, which names the folder of the sources
+        payload = _numba.dumps(tuple(parts))
         head = b" ".join((_FORMAT, str(len(key)).encode(), _digest(key), _digest(payload)))
         data, name = head + b"\n" + key + payload, f"{self._name}-{_digest(key)[:16].decode()}{_ENDING}"
         troubles = []
@@ -136,22 +150,30 @@ def cache_folders() -> Iterator[Path]:
 
 @functools.cache
 def _version() -> str:
-    """Return a digest of all that machine code depends on: sources, compilers, Python, this computer's processor."""
+    """Return a digest of all that machine code depends on: sources, compilers, Python, processor."""
     digest = hashlib.sha256()
+    package = Path(__file__).parent.parent
     for folder in KERNEL_FOLDERS:
-        for source in sorted((Path(__file__).parent.parent / folder).rglob("*.py")):
-            digest.update(source.read_bytes())
-    processor = binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
+        for source in sorted((package / folder).rglob("*.py")):
+            digest.update(repr((source.relative_to(package).parts, source.read_bytes())).encode())
     config: Any = numba.config
-    settings = config.CPU_NAME, config.CPU_FEATURES, config.OPT, bool(config.BOUNDSCHECK)
+    settings = processor(), config.OPT, bool(config.BOUNDSCHECK)
     versions = numba.__version__, llvmlite.__version__, np.__version__, sys.implementation.cache_tag
-    digest.update(repr((processor, settings, versions)).encode())
+    digest.update(repr((settings, versions)).encode())
     return digest.hexdigest()[:16]
+
+
+def _key(signature: Any, codegen: Any) -> tuple[Any, ...]:
+    """Return what distinguishes machine code of a function: the types, the system, the processor."""
+    # Numba reads its settings again when the environment changes, but its compiler stays as it was made.
+    triple, _, features = codegen.magic_tuple()
+    return signature, (triple, processor()[0], features)
 
 
 def _files(name: str) -> Iterator[Path]:
     """Yield the files of a function."""
-    for folder in cache_folders():
+    shipped = SHIPPED / _version()
+    for folder in (shipped, *cache_folders()) if _is_believed(shipped) else cache_folders():
         with contextlib.suppress(OSError):
             yield from sorted(folder.glob(f"{name}-*{_ENDING}"))
 
@@ -170,7 +192,7 @@ def _payload(path: Path, key: object) -> Any:
     """
     with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW), "rb") as file:
         about = os.fstat(file.fileno())
-        if about.st_uid not in (0, _user()) or about.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        if not _is_safe(about):
             raise _ForeignError
         head, _, rest = file.read().partition(b"\n")
     form, size, key_digest, payload_digest = head.split(b" ")
@@ -179,6 +201,20 @@ def _payload(path: Path, key: object) -> Any:
         raise ValueError("damaged")
     # Only now it is sure that these are pickles of ours.
     return pickle.loads(payload) if pickle.loads(own_key) == key else None
+
+
+def _is_safe(about: os.stat_result) -> bool:
+    """Return whether no other user but the superuser can write something."""
+    return about.st_uid in (0, _user()) and not about.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+
+
+def _is_believed(folder: Path) -> bool:
+    """Return whether there is a folder whose files no other user but the superuser can replace."""
+    try:
+        about = folder.lstat()
+    except OSError:
+        return False
+    return stat.S_ISDIR(about.st_mode) and _is_safe(about)
 
 
 def _make_own(folder: Path) -> None:
