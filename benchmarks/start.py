@@ -1,7 +1,7 @@
 """How long the first start takes: in a clone, where kernels are compiled, and from a wheel that brings them.
 
-Run: python benchmarks/start.py [--json]. Some minutes. Each figure is one start of a process with an empty cache, from its
-beginning to the end of what it is named for:
+Run: python benchmarks/start.py [--json]. Some minutes. Each figure is one start of a process with an empty cache, from
+its beginning to the end of what it is named for:
 
 * `start.demo_s`: the follow-wall demo in the office has made its first step, and only its kernels are compiled;
 * `start.clone_s`: the same after all kernels of the engine, as `kiks demo` compiles them at its first start;
@@ -9,8 +9,8 @@ beginning to the end of what it is named for:
 * `start.wheel_s`: the demo's first step, from a copy of the package that brings the kernels, as `make wheel` packs it;
 * `start.again_s`: the demo's first step at the second start in a clone.
 
-`NAME_cpu_s` is the time of processors in it, and `NAME_over_calibration` that time in repetitions of a fixed piece of plain
-Python, measured in the same run.
+`NAME_cpu_s` is the time of processors in it, and `NAME_over_calibration` that time in repetitions of a fixed piece of
+plain Python, measured in the same run.
 """
 
 from __future__ import annotations

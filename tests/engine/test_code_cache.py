@@ -6,6 +6,7 @@ import os
 import pickle
 import random
 import resource
+import shutil
 import stat
 import tempfile
 from collections.abc import Callable
@@ -183,6 +184,61 @@ def test_on_a_full_disk_the_run_goes_on(tmp_path: Path, caplog: pytest.LogCaptur
     assert "(File too large)" in line
     assert line.endswith("so each start compiles it. Set NUMBA_CACHE_DIR to a folder of yours with room.")
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
+
+
+@pytest.fixture
+def shipped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return a file with machine code, as a wheel brings it; the user's cache is empty."""
+    call()
+    (file,) = files(tmp_path)
+    monkeypatch.setattr(code_cache, "SHIPPED", tmp_path / "compiled")
+    (tmp_path / "compiled").mkdir()
+    return Path(shutil.move(file.parent, tmp_path / "compiled")) / file.name
+
+
+def own_files(tmp_path: Path) -> list[Path]:
+    return files(tmp_path / "cache")
+
+
+def test_what_a_wheel_brings_is_used(shipped: Path, tmp_path: Path) -> None:
+    assert is_compiled("double_of")
+    assert call()
+    assert own_files(tmp_path) == []
+    assert [call(0.5), call(0.5)] == [False, True]
+    assert files(shipped.parent) == [shipped]
+
+
+def test_what_a_wheel_brings_for_another_version_is_quietly_ignored(
+    shipped: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    with monkeypatch.context() as context:
+        context.setattr(numba, "__version__", "0.0")
+        code_cache._version.cache_clear()
+        assert not is_compiled("double_of")
+        assert [call(), call()] == [False, True]
+    code_cache._version.cache_clear()
+    assert not caplog.records
+
+
+def test_a_damaged_file_of_a_wheel_stays_and_is_quietly_ignored(
+    shipped: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    damaged = flipped(1)(shipped.read_bytes())
+    shipped.write_bytes(damaged)
+    assert [call(), call()] == [False, True]
+    assert shipped.read_bytes() == damaged
+    assert not caplog.records
+
+
+@pytest.mark.parametrize("is_folder", [False, True])
+@pytest.mark.parametrize("right", [0o020, 0o002])
+def test_what_others_can_write_in_a_wheel_is_quietly_ignored(
+    right: int, is_folder: bool, shipped: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = shipped.parent if is_folder else shipped
+    path.chmod(stat.S_IMODE(path.stat().st_mode) | right)
+    assert [call(), call()] == [False, True]
+    assert not caplog.records
 
 
 def test_a_user_without_a_home(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

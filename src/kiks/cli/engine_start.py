@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+import threading
+from typing import Any
+
 import typer
 
 
@@ -21,6 +27,35 @@ def ready_batch() -> None:
     ready_engine()
     if not is_compiled("roll_out"):
         typer.echo("Compiling the batch for this computer: once, half a minute or so ...", err=True)
+
+
+def compile_all() -> None:
+    """Compile the engine and the batch; side by side, where there are processors for it."""
+    if len(os.sched_getaffinity(0)) == 1:
+        compile_everything()
+        compile_batch()
+        return
+    # Both fill the same cache. Should the other process fail, this one compiles what is missing, and tells why it must.
+    program = "from kiks.cli.engine_start import help_to_compile; help_to_compile()"
+    streams: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    with subprocess.Popen([sys.executable, "-c", program], **streams) as other:
+        try:
+            compile_everything()
+            other.wait()
+        finally:
+            other.kill()
+    compile_batch()
+
+
+def help_to_compile() -> None:
+    """Compile the batch for the process that has started this one; end when it ends."""
+
+    def end_with_it() -> None:
+        sys.stdin.read()
+        os._exit(1)
+
+    threading.Thread(target=end_with_it, daemon=True).start()
+    compile_batch()
 
 
 def compile_batch() -> None:

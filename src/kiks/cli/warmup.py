@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from kiks.cli.engine_start import compile_batch, compile_everything, ready_batch
+from kiks.cli.engine_start import compile_all, compile_batch, compile_everything
 
 
 def warmup() -> None:
@@ -14,8 +14,13 @@ def warmup() -> None:
     """
     from time import perf_counter
 
+    from kiks.engine.compiling import is_compiled
+
     start_s = perf_counter()
-    ready_batch()
-    compile_everything()
-    compile_batch()
+    if is_compiled() and is_compiled("roll_out"):
+        compile_everything()
+        compile_batch()
+    else:
+        typer.echo("Compiling the engine and the batch for this computer: once, a minute or so ...", err=True)
+        compile_all()
     typer.echo(f"The engine is ready ({perf_counter() - start_s:.1f} s).")

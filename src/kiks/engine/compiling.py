@@ -12,7 +12,10 @@ from numba import njit
 
 from kiks.ending import send_again_what_is_dropped
 from kiks.engine.code_cache import CodeCache, is_kept
+from kiks.engine.processor import processor
 
+# The first function that Numba is shown makes its compiler, which stays as it is.
+processor()
 # Numba and LLVM call back while they compile and load.
 send_again_what_is_dropped()
 
