@@ -61,7 +61,7 @@ benchmarks: setup
 # A wheel in `dist` that brings compiled kernels, for this version of Python. Any other way to build a wheel gives a pure one.
 wheel: setup
 	$(BIN)/python tools/compile_kernels.py build/kernels
-	KIKS_KERNELS=build/kernels $(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist .
+	KIKS_KERNELS=build/kernels $(BIN)/python -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
 
 clean:
 	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
