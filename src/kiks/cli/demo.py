@@ -84,7 +84,7 @@ def demo(
     name = behaviour if behaviour in list(Behaviour) else Path(behaviour).stem
     picture = picture or Path(f"kiks-{name}.png")
     check_picture(picture)
-    ready_engine()
+    ready_engine(as_needed=not (is_soccer or desk))
     if is_soccer:
         sys.path.append(str(shipped_folder("examples/soccer", "player.py")))
         importlib.import_module("soccer_command").show_match(

@@ -11,13 +11,19 @@ from typing import Any
 import typer
 
 
-def ready_engine() -> None:
-    """Compile the engine if it is not in the cache, and print a line before that."""
-    from kiks.engine.compiling import is_compiled
+def ready_engine(*, as_needed: bool = False) -> None:
+    """Compile the engine if it is not in the cache, and print a line before that.
 
-    if not is_compiled():
+    Args:
+        as_needed: Whether to leave each kernel to its first call. That suits a run that calls few of them and has no
+            other program waiting.
+    """
+    from kiks.engine.compiling import LAST, is_compiled
+
+    if not is_compiled("advance" if as_needed else LAST):
         typer.echo("Compiling the engine for this computer: once, a minute or so ...", err=True)
-        compile_everything()
+        if not as_needed:
+            compile_everything()
 
 
 def ready_batch() -> None:

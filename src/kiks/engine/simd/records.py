@@ -33,7 +33,6 @@ _lower: Any = extending
 _templates: Any = templates
 _proxy: Any = cgutils.create_struct_proxy
 
-_CACHE_LINE = 64  # bytes
 _LANES, _MASK = Lanes(), Mask()
 _BYTE, _WORD, _VECTOR = ir.IntType(8), ir.IntType(64), ir.VectorType(ir.DoubleType(), LANES)
 
@@ -261,20 +260,6 @@ def one_of(typing: Any, robot: Any, lane: Any) -> Any:
         return one._getvalue()
 
     return result(robot, types.int64), generate
-
-
-@_intrinsic
-def stack_record(typing: Any, record_type: Any) -> Any:
-    """Return an uninitialised record on the stack, of a type that is a constant; it dies with its function."""
-    record = record_type.dtype
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        with builder.goto_entry_block():
-            memory = builder.alloca(ir.ArrayType(_BYTE, record.size))
-            memory.align = _CACHE_LINE
-        return builder.bitcast(memory, context.get_value_type(record))
-
-    return record(record_type), generate
 
 
 @_intrinsic
