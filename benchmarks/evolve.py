@@ -5,6 +5,8 @@ Run: python benchmarks/evolve.py [--json] [--seeds 5]. For each seed `kiks.tasks
 is above `THRESHOLD`, with everything that comes before it but imports; `evolve.whole_s` that of a whole evolution.
 `evolve.contact_free` is the share of champions that drive `EXAM_S` simulated seconds on a line of 9600 baud in each
 of the arenas of `exams`, where none of them trained, without one contact; `evolve.squares_...` is how far each got.
+`evolve.swarm_generations_per_min` is the pace at which a swarm evolves: `SWARM` robots that gather as many balls, in
+each of a hundred candidates' worlds; `evolve.generations_per_min` is that of the robots that avoid obstacles.
 """
 
 from __future__ import annotations
@@ -19,11 +21,12 @@ from pathlib import Path
 import kiks
 from calibration import report
 from kiks.batch.initial_state import random_starts
-from kiks.model.arena import Pose
+from kiks.model.arena import Ball, Pose
 
 ARENAS = Path(__file__).parent.parent / "examples" / "arenas"
 GENERATIONS, THRESHOLD, EXAM_S = 60, 0.15, 180.0
 SQUARE_MM = 100.0
+SWARM, SWARM_MM, SWARM_POPULATION, SWARM_GENERATIONS = 20, 2000, 100, 3
 
 
 def exams() -> list[kiks.Arena]:
@@ -42,6 +45,23 @@ def drive(champion: kiks.Champion, arena: kiks.Arena, seed: int) -> tuple[int, f
     champion.drive(ports, seconds=EXAM_S)
     squares = {(int(x_mm // SQUARE_MM), int(y_mm // SQUARE_MM)) for x_mm, y_mm in sim.paths()[0, :, 1:3]}
     return sim.contacts(1), sim.travelled_mm(1) / 1000, len(squares)
+
+
+def swarm_task() -> kiks.Task:
+    """Return the task of many robots to gather as many balls in a large room."""
+    room = kiks.Arena.box(SWARM_MM, SWARM_MM)
+    places = random_starts(room, SWARM, seed=1, clear_mm=50)[:, :2].tolist()
+    balls = tuple(Ball(x_mm, y_mm) for x_mm, y_mm in places)
+    middle_mm = SWARM_MM / 2
+    counted = (kiks.measures.gathered(middle_mm, middle_mm, radius_mm=300), kiks.measures.spread_mm)
+    return kiks.tasks.gather(
+        arenas=(replace(room, balls=balls),),
+        robots=SWARM,
+        worlds=1,
+        starts="arena",
+        measures=(*counted, kiks.measures.contacts, kiks.measures.path_mm),
+        exam=None,
+    )
 
 
 def main() -> None:
@@ -74,6 +94,14 @@ def main() -> None:
     rows.append(("evolve.whole_s", statistics.median(wholes_s), f"s for {GENERATIONS} generations"))
     rows.append(("evolve.speed_mm_s", 1000 * statistics.mean(lengths_m) / EXAM_S, "mm/s in the exams"))
     rows.append(("evolve.contact_free", passed / options.seeds, "of the champions"))
+    rows.append(
+        ("evolve.generations_per_min", 60 * GENERATIONS / statistics.median(wholes_s), "of one robot that avoids")
+    )
+    start_s = time.perf_counter()
+    swarm = kiks.Evolution(swarm_task(), seed=1, population=SWARM_POPULATION)
+    swarm.run(generations=SWARM_GENERATIONS, executor=options.where)
+    pace = 60 * SWARM_GENERATIONS / (time.perf_counter() - start_s)
+    rows.append(("evolve.swarm_generations_per_min", pace, f"of {SWARM} robots and {SWARM} balls"))
     report(rows, as_json=options.json)
 
 
