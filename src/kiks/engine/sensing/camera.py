@@ -30,7 +30,7 @@ from kiks.engine.physics.motion import moment_of
 from kiks.engine.scene import open_scene
 from kiks.engine.sensing.disc_rays import meet_disc, other_tracks, see_all
 from kiks.engine.sensing.proximity import pose_at
-from kiks.engine.sensing.rays import cast, cast_many, free_cells
+from kiks.engine.sensing.rays import ENDLESS, brightness_met, cast, cast_many, free_cells
 from kiks.engine.simd.stack_arrays import stack_floats
 from kiks.engine.state import PIXEL_COUNT
 from kiks.units import TICK_NS
@@ -47,7 +47,6 @@ _EDGE_COS, _EDGE_SIN = 0.9510565162951535, 0.3090169943749474
 
 _BEGIN_MM = 50.0
 _NEAREST_MM = 1e-3  # a camera within a wall
-_ANYWHERE = 1e9  # cells: the border of the world is always nearer
 _SHARP_MM = 250.0
 _DEFOCUS_PIXELS = 7.0  # to each side, at infinite distance
 
@@ -111,7 +110,8 @@ def look(walls: Any, seen: Any, seen_count: Any, x: Any, y: Any, heading: Any, g
         start, length, brightness = begin, lengths[p], brightnesses[p]
         if length == 0.0:  # the view begins inside a wall: the pixel sees its surface
             start = 0.0
-            length, brightness = cast(walls, column, row, rays_x[p], rays_y[p], _ANYWHERE)
+            length, is_met = cast(walls, column, row, rays_x[p], rays_y[p], ENDLESS)
+            brightness = brightness_met(walls, column, row, rays_x[p], rays_y[p], length, is_met)
         if seen_count > 0:
             to_disc, _, shade = meet_disc(seen, seen_count, column, row, rays_x[p], rays_y[p], start + length)
             if shade > 0.0:

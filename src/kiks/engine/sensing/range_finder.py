@@ -12,7 +12,7 @@ from kiks.engine.physics.motion import moment_of
 from kiks.engine.scene import open_scene
 from kiks.engine.sensing.disc_rays import PER_DISC, disc_of, meet_disc, other_tracks, see_all
 from kiks.engine.sensing.proximity import pose_at
-from kiks.engine.sensing.rays import cast
+from kiks.engine.sensing.rays import brightness_met, cast
 
 _ANYWHERE_MM = 1e6
 
@@ -40,7 +40,8 @@ def probe(scene: Any, robot: Any, tick_count: Any, time_ns: Any, angle: Any) -> 
     sine, cosine = sin_cos(heading + angle)
     cell, pad = walls.cell_mm, walls.pad
     column, row = x / cell + pad, y / cell + pad
-    length, brightness = cast(walls, column, row, cosine, sine, _ANYWHERE_MM / cell)
+    length, is_met = cast(walls, column, row, cosine, sine, _ANYWHERE_MM / cell)
+    brightness = brightness_met(walls, column, row, cosine, sine, length, is_met)
     met = WALL
     tracks, count, seen = other_tracks(scene, 0, robot)
     see_all(walls, tracks, count, moment_of(tick_count, 1.0 * time_ns), seen)

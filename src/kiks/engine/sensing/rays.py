@@ -17,8 +17,9 @@ import numpy as np
 
 from kiks.engine.compiling import entry, kernel
 from kiks.engine.sensing.disc_rays import hides
-from kiks.engine.simd.f64x8 import pick
-from kiks.engine.simd.stack_arrays import element, pointer_to, stack_floats
+from kiks.engine.simd.f64x8 import LANES, floor, load, pick, store
+from kiks.engine.simd.masks import anywhere, choose, opposite
+from kiks.engine.simd.stack_arrays import stack_floats
 from kiks.model.arena import PAD, Arena
 from kiks.model.raster import LEAPS_PER_CELL
 
@@ -26,9 +27,10 @@ _DIAGONAL = 1.4142135623730951
 _WALK = 2.5  # up to this clearance a ray goes from cell to cell [cells]
 _NUDGE = 1e-3  # over the edge of a cell [cells]
 _FAR = 1e30
-_LANES = 32  # of whole pictures: while some wait for the memory, others go on
 _FLAT = 1e-24  # square of a direction's part along an axis below which a ray never gets to the next cell there
 
+ENDLESS = 1e9
+"""Length of rays that only a wall ends [cells]: the border of the world is nearer."""
 
 Walls: Any = namedtuple("Walls", ("clearance", "brightness", "leaps", "faces", "cell_mm", "pad"))
 """The walls as rays see them.
@@ -68,49 +70,57 @@ def leap_at(walls: Any, column: Any, row: Any) -> Any:
 
 
 @kernel
-def cast(walls: Any, column: Any, row: Any, cosine: Any, sine: Any, reach: Any, begin: Any = 0.0) -> Any:
-    """Follow one ray.
+def cast(walls: Any, column: Any, row: Any, cosine: Any, sine: Any, reach: Any) -> Any:
+    """Follow a ray to the first wall, or eight, in lanes; a lane that has met its wall stays where it is.
 
     Args:
         walls: The walls as rays see them.
-        column: Origin [cells].
+        column: Origin [cells], a number or `Lanes`, as are the next three.
         row: Origin [cells].
         cosine: Direction.
         sine: Direction.
         reach: Longest length followed [cells].
-        begin: Length that is known to be free [cells].
 
     Returns:
-        Length of the ray [cells], `reach` if it meets nothing, and the brightness of what it met, 0 for nothing.
+        Length of the ray [cells], `reach` if it meets nothing, and whether it met a wall: a boolean, or a mask.
     """
-    field, surface, cell = walls.clearance, walls.brightness, walls.cell_mm
-    per_cell = 1.0 / cell
-    per_column = 1.0 / cosine if cosine * cosine > _FLAT else _FAR
-    per_row = 1.0 / sine if sine * sine > _FLAT else _FAR
-    right = 1 if cosine > 0.0 else 0
-    up = 1 if sine > 0.0 else 0
-    length = begin
-    while length < reach:
-        px = column + length * cosine
-        py = row + length * sine
-        i, j = cell_at(field, px, py)
-        clearance = field[j, i] * per_cell
-        if clearance == 0.0:
-            return length, np.int64(surface[j, i])
-        if clearance > _WALK:
-            length += clearance - _DIAGONAL
-        else:
-            to_column = (i + right - px) * per_column if per_column < _FAR else _FAR
-            to_row = (j + up - py) * per_row if per_row < _FAR else _FAR
-            length += max(min(to_column, to_row), 0.0) + _NUDGE
-    return reach, np.int64(0)
+    field, per_cell = walls.clearance, 1.0 / walls.cell_mm
+    last_column, last_row = field.shape[1] - 1.0, field.shape[0] - 1.0
+    per_column = choose(cosine * cosine > _FLAT, 1.0 / cosine, _FAR)
+    per_row = choose(sine * sine > _FLAT, 1.0 / sine, _FAR)
+    right, up = choose(cosine > 0.0, 1.0, 0.0), choose(sine > 0.0, 1.0, 0.0)
+    length = 0.0 * cosine
+    goes_on, is_met = length < reach, length < 0.0
+    while anywhere(goes_on):
+        px, py = column + length * cosine, row + length * sine
+        i, j = floor(min(max(0.0, px), last_column)), floor(min(max(0.0, py), last_row))
+        clearance = pick(field, i, j) * per_cell
+        is_met = is_met | (goes_on & (clearance == 0.0))
+        to_column = choose(per_column < _FAR, (i + right - px) * per_column, _FAR)
+        to_row = choose(per_row < _FAR, (j + up - py) * per_row, _FAR)
+        walk = max(min(to_column, to_row), 0.0) + _NUDGE
+        goes_on = goes_on & opposite(is_met)
+        length = choose(goes_on, length + choose(clearance > _WALK, clearance - _DIAGONAL, walk), length)
+        goes_on = goes_on & (length < reach)
+    return choose(is_met, length, reach), is_met
+
+
+@kernel
+def brightness_at(walls: Any, column: Any, row: Any) -> Any:
+    """Return the brightness of the wall at a place [cells], 0 for floor."""
+    i, j = cell_at(walls.brightness, column, row)
+    return np.int64(walls.brightness[j, i])
+
+
+@kernel
+def brightness_met(walls: Any, column: Any, row: Any, cosine: Any, sine: Any, length: Any, is_met: Any) -> Any:
+    """Return the brightness of the wall that a ray met, 0 for none; arguments and results of `cast`."""
+    return brightness_at(walls, column + length * cosine, row + length * sine) if is_met else 0
 
 
 @kernel
 def cast_many(walls: Any, columns: Any, rows: Any, cosines: Any, sines: Any, lengths: Any, brightnesses: Any) -> Any:
-    """Follow many rays, each to the first wall: the lengths and brightnesses of `cast` to the bit, in less time.
-
-    Neighbours step together, one lane each, until the last of them has met its wall; a lane that has stays where it is.
+    """Follow many rays, eight at a time, each to the first wall: `cast` without a limit of the length.
 
     Args:
         walls: The walls as rays see them.
@@ -121,42 +131,19 @@ def cast_many(walls: Any, columns: Any, rows: Any, cosines: Any, sines: Any, len
         lengths: Where the lengths of the rays go [cells], shape [rays].
         brightnesses: Where the brightnesses of the walls go, shape [rays].
     """
-    field, surface, cell = walls.clearance, walls.brightness, walls.cell_mm
-    per_cell = 1.0 / cell
-    clearances, width = pointer_to(field), np.int32(field.shape[1])
-    last_column, last_row = field.shape[1] - 1.0, field.shape[0] - 1.0
-    column, row = stack_floats(_LANES), stack_floats(_LANES)
-    cosine, sine = stack_floats(_LANES), stack_floats(_LANES)
-    per_column, per_row = stack_floats(_LANES), stack_floats(_LANES)
-    right, up = stack_floats(_LANES), stack_floats(_LANES)
-    length = stack_floats(_LANES)
-    for first in range(0, lengths.shape[0], _LANES):
-        for lane in range(_LANES):
-            ray = min(first + lane, lengths.shape[0] - 1)
-            column[lane], row[lane], cosine[lane], sine[lane] = columns[ray], rows[ray], cosines[ray], sines[ray]
-            per_column[lane] = 1.0 / cosine[lane] if cosine[lane] * cosine[lane] > _FLAT else _FAR
-            per_row[lane] = 1.0 / sine[lane] if sine[lane] * sine[lane] > _FLAT else _FAR
-            right[lane] = 1.0 if cosine[lane] > 0.0 else 0.0
-            up[lane] = 1.0 if sine[lane] > 0.0 else 0.0
-            length[lane] = 0.0
-        under_way = np.int32(1)
-        while under_way != 0:
-            under_way = np.int32(0)
-            for lane in range(_LANES):
-                px = column[lane] + length[lane] * cosine[lane]
-                py = row[lane] + length[lane] * sine[lane]
-                i, j = np.int32(min(max(0.0, px), last_column)), np.int32(min(max(0.0, py), last_row))
-                clearance = element(clearances, np.int32(j * width + i)) * per_cell
-                to_column = (i + right[lane] - px) * per_column[lane] if per_column[lane] < _FAR else _FAR
-                to_row = (j + up[lane] - py) * per_row[lane] if per_row[lane] < _FAR else _FAR
-                walk = max(min(to_column, to_row), 0.0) + _NUDGE
-                step = clearance - _DIAGONAL if clearance > _WALK else walk
-                length[lane] += step if clearance > 0.0 else 0.0
-                under_way |= np.int32(clearance > 0.0)
-        for lane in range(min(_LANES, lengths.shape[0] - first)):
-            ray = first + lane
-            i, j = cell_at(field, column[lane] + length[lane] * cosine[lane], row[lane] + length[lane] * sine[lane])
-            lengths[ray], brightnesses[ray] = length[lane], surface[j, i]
+    count = lengths.shape[0]
+    parts = stack_floats(LANES), stack_floats(LANES), stack_floats(LANES), stack_floats(LANES), stack_floats(LANES)
+    for first in range(0, count, LANES):
+        for lane in range(LANES):
+            ray = min(first + lane, count - 1)
+            parts[0][lane], parts[1][lane] = columns[ray], rows[ray]
+            parts[2][lane], parts[3][lane] = cosines[ray], sines[ray]
+        rays = load(parts[0]), load(parts[1]), load(parts[2]), load(parts[3])
+        store(parts[4], cast(walls, *rays, ENDLESS)[0])
+        for ray in range(first, min(first + LANES, count)):
+            lengths[ray] = parts[4][ray - first]
+            place = columns[ray] + lengths[ray] * cosines[ray], rows[ray] + lengths[ray] * sines[ray]
+            brightnesses[ray] = brightness_at(walls, *place)
 
 
 @kernel
@@ -184,8 +171,8 @@ def is_lit(walls: Any, seen: Any, seen_count: Any, x: Any, y: Any, lamp_x: Any, 
     for k in range(seen_count):
         if hides(seen, k, column, row, dx / reach, dy / reach, reach):
             return False
-    length, brightness = cast(walls, column, row, dx / reach, dy / reach, reach)
-    if brightness == 0:
+    length, is_met = cast(walls, column, row, dx / reach, dy / reach, reach)
+    if not is_met:
         return True
     # Beyond the raster all is wall, however far the lamp hangs.
     end = min(reach, length + field.shape[0] + field.shape[1])
@@ -203,8 +190,9 @@ def cast_ray(walls: Any, x: Any, y: Any, cosine: Any, sine: Any, reach: Any) -> 
     walls = Walls(*walls)
     cell, pad = walls.cell_mm, walls.pad
     per_cell = 1.0 / cell
-    length, brightness = cast(walls, x * per_cell + pad, y * per_cell + pad, cosine, sine, reach * per_cell)
-    return (length * cell if brightness > 0 else reach), brightness
+    ray = x * per_cell + pad, y * per_cell + pad, cosine, sine
+    length, is_met = cast(walls, *ray, reach * per_cell)
+    return (length * cell if is_met else reach), brightness_met(walls, *ray, length, is_met)
 
 
 @entry
