@@ -1,9 +1,7 @@
-"""Scratch arrays and look-ups that the compiler turns into vector code.
+"""Scratch arrays on the stack, and arrays whose references are not counted.
 
-Need: a loop over lanes (many rays, one step each) becomes vector instructions only if LLVM can prove that no store in
-it changes what another lane loads, and if its loads need no test of their index.
-Method: scratch arrays on the stack, which nothing else can overlap, and a bare load for each lane. The instructions
-are the same additions and roundings as in scalar code, so the bits are the same on every processor.
+Need: an array of NumPy costs an allocation, and each call that passes one counts references; both take longer than a
+tick. And the compiler makes vector code only where it can prove that nothing else overlaps an array.
 """
 
 from __future__ import annotations
@@ -17,7 +15,6 @@ from numba.np import arrayobj
 
 # Numba annotates these in part, and not as they are used in kernels.
 _intrinsic: Any = extending.intrinsic
-_address: Any = types.CPointer
 _arrays: Any = arrayobj
 _pack: Any = cgutils.pack_array
 
@@ -83,28 +80,6 @@ def stack_records(typing: Any, count: Any, record_type: Any) -> Any:
         return None
     signature, generate = _on_the_stack(count, record_type.dtype)
     return signature.return_type(count, record_type), generate
-
-
-@_intrinsic
-def pointer_to(typing: Any, array: Any) -> Any:
-    """Return the address of the first element of an array without gaps, in C order."""
-    if not (isinstance(array, types.Array) and array.layout == "C"):
-        return None
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return _arrays.make_array(array)(context, builder, arguments[0]).data
-
-    return _address(array.dtype)(array), generate
-
-
-@_intrinsic
-def element(typing: Any, pointer: Any, index: Any) -> Any:
-    """Return the element at an int32 index from an address; nothing checks that it lies within the array."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.load(builder.gep(arguments[0], [arguments[1]], inbounds=True))
-
-    return pointer.dtype(pointer, types.int32), generate
 
 
 @_intrinsic
