@@ -24,7 +24,7 @@ from kiks.engine.sensing.proximity import (
 )
 from kiks.engine.sensing.ray_packets import WAY_SIZE, enter, met, step_all
 from kiks.engine.sensing.responses import REFLECTION, respond
-from kiks.engine.simd.f64x8 import LANES, load, store
+from kiks.engine.simd.lanes import LANES, load, store
 from kiks.engine.simd.stack_arrays import stack_floats, stack_integers, stack_narrow
 from kiks.engine.step import advance_bunch
 

@@ -23,7 +23,7 @@ from kiks.control.controller import SENSES, Controller, check_senses
 from kiks.control.measure import Measure
 from kiks.engine.bunch import worlds_in_bunch
 from kiks.engine.scene import Scene, enter_worlds
-from kiks.engine.simd.f64x8 import LANES
+from kiks.engine.simd.lanes import LANES
 from kiks.engine.state import State
 from kiks.errors import ParameterError, counted, shown
 from kiks.model.arena import Arena

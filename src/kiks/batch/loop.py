@@ -21,7 +21,7 @@ from kiks.engine.physics.motor import command_speed
 from kiks.engine.scene import open_scene
 from kiks.engine.sensing.ambient import sense_ambient
 from kiks.engine.sensing.proximity import READERS, make_readers, sense_proximity
-from kiks.engine.simd.f64x8 import LANES
+from kiks.engine.simd.lanes import LANES
 from kiks.engine.simd.stack_arrays import borrowed, keep_alive, stack_booleans, stack_integers
 from kiks.engine.step import advance_bunch
 from kiks.model.robot import SENSOR_COUNT

@@ -16,7 +16,7 @@ import numpy as np
 
 from kiks.engine.compiling import inlined, kernel, spliced
 from kiks.engine.grid import PAIRS_PER_DISC, count_discs, enter_all, has_changed, note_places
-from kiks.engine.simd.f64x8 import LANES
+from kiks.engine.simd.lanes import LANES
 from kiks.engine.simd.records import EIGHT, EIGHT_KINDS, fill_lanes, load_lane, one_of, open_record8, store_lane
 from kiks.engine.simd.stack_arrays import stack_integers, stack_records
 from kiks.engine.state import TRAIL_LENGTH
@@ -104,7 +104,7 @@ def worlds_in_bunch(robot_count: int) -> int:
     return LANES // math.gcd(LANES, robot_count) if robot_count < 4 * LANES else 1
 
 
-Lanes: Any = namedtuple("Lanes", ("robots", "before", "kinds", "seeds"))
+LaneMemory: Any = namedtuple("LaneMemory", ("robots", "before", "kinds", "seeds"))
 """Memory for the lanes of a bunch, as in `Bunch`."""
 
 
@@ -117,7 +117,7 @@ def make_lanes(count: Any) -> Any:
     if eights > 1:
         robots, before, kinds = np.empty(eights, EIGHT), np.empty(eights, EIGHT), np.empty(eights, EIGHT_KINDS)
         seeds = np.empty(eights * LANES, np.int64)
-    return Lanes(robots, before, kinds, seeds)
+    return LaneMemory(robots, before, kinds, seeds)
 
 
 @kernel

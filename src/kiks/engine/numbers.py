@@ -2,7 +2,7 @@
 
 Mathematical libraries differ between systems in the last bit, and a run must not. So these functions use additions,
 multiplications, divisions, square roots and roundings only, which IEEE 754 fixes to the bit. Sine, cosine and random
-numbers also work on `Lanes` (`kiks.engine.simd.f64x8`). Random numbers are counter-based: a pure function of seed,
+numbers also work on lanes (`kiks.engine.simd.lanes`). Random numbers are counter-based: a pure function of seed,
 world, robot, stream, instant and index, so neither order nor threads matter.
 """
 
@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 
 from kiks.engine.compiling import kernel
-from kiks.engine.simd.f64x8 import floor
+from kiks.engine.simd.lanes import floor, number, word
 from kiks.engine.simd.masks import choose, everywhere, has_bit
-from kiks.engine.simd.u64x8 import number, word
 
 # Pi/2 and ln 2 in two parts: the first has 33 bits, so that its product with a count below 2^20 is exact.
 _HALF_PI_HIGH = 1.5707963267341256

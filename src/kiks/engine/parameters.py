@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from kiks.engine.scalar_math import exponential, logarithm, power, sin_cos
 from kiks.engine.sensing.thesis_networks import NETWORK_RESPONSES, TABLE_LEVELS
-from kiks.engine.simd.f64x8 import LANES
+from kiks.engine.simd.lanes import LANES
 from kiks.model.robot import (
     AMBIENT_MODELS,
     JITTER_POINT_LIMIT,

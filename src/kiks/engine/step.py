@@ -23,11 +23,10 @@ from kiks.engine.physics.gripper import tend_grippers
 from kiks.engine.physics.motion import move, note_contact, remember_pose
 from kiks.engine.physics.motor import control_motors, latch_encoders, turn_motors
 from kiks.engine.scene import open_scene
-from kiks.engine.simd.f64x8 import LANES
+from kiks.engine.simd.lanes import LANES, load
 from kiks.engine.simd.masks import anywhere, everywhere, holds, opposite
 from kiks.engine.simd.records import copy_lanes, copy_record8, one_of, open_record8
 from kiks.engine.simd.stack_arrays import borrowed, keep_alive, stack_integers
-from kiks.engine.simd.u64x8 import load_words
 
 
 @entry
@@ -124,7 +123,7 @@ def move_freely(scene: Any, bunch: Any) -> Any:
         is_due = eight.tick_count < eight.until
         if not anywhere(is_due):
             continue
-        chance = load_words(bunch.seeds[LANES * place :]), eight.number, eight.tick_count
+        chance = load(bunch.seeds[LANES * place :]), eight.number, eight.tick_count
         is_near = eight.is_near > 0.0
         # Those that have met others move, too, and then get back where collisions have brought them.
         is_touching = move(scene.ground, eight, parameters, eight.left_pulses, eight.right_pulses, chance)

@@ -13,7 +13,7 @@ from tests.at_length import share
 from tests.engine.same_walls import with_things
 
 from kiks.engine.sensing.disc_rays import meet_disc, meet_discs_all
-from kiks.engine.simd.f64x8 import LANES
+from kiks.engine.simd.lanes import LANES
 from kiks.model.arena import Arena
 from kiks.model.arena_objects import Ball, Cylinder, Lamp, Pose
 from kiks.model.robot import RobotSpec

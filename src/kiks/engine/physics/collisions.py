@@ -24,7 +24,7 @@ from kiks.engine.physics.balls import collide, kick, remember_place, roll, speed
 from kiks.engine.physics.contact import PIECES_MAX, clearance_mm, outward
 from kiks.engine.physics.grasp import REACH, carry_along, is_dragged, keep_holds, return_held, turn_back
 from kiks.engine.physics.motion import draw_slip, give_way, move
-from kiks.engine.simd.f64x8 import floor
+from kiks.engine.simd.lanes import floor
 from kiks.units import NS_PER_S, TICK_NS
 
 PIECE_MM = 2.0

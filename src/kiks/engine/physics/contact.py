@@ -23,7 +23,8 @@ from collections import namedtuple
 from typing import Any
 
 from kiks.engine.compiling import entry, kernel
-from kiks.engine.simd.f64x8 import corners, floor
+from kiks.engine.simd.lanes import floor
+from kiks.engine.simd.rasters import corners
 
 Ground: Any = namedtuple("Ground", ("clearance", "cell_mm", "pad"))
 """The walls as contact sees them.

@@ -15,7 +15,7 @@ from numba import extending, types
 from kiks.engine.compiling import inlined, kernel
 from kiks.engine.numbers import SMALL_RAD, sin_cos, sin_cos_of_small, sinc, uniform
 from kiks.engine.physics.contact import PIECE_MM, PIECES_MAX, clearance_mm, is_free, slide
-from kiks.engine.simd.f64x8 import floor, greatest, lane_of, with_lane
+from kiks.engine.simd.lanes import floor, greatest, lane_of, with_lane
 from kiks.engine.simd.masks import anywhere, choose, everywhere, holds, lane_count, opposite
 from kiks.engine.simd.records import one_of, only
 from kiks.engine.state import TRAIL_LENGTH

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from kiks.engine.compiling import entry, inlined, kernel
-from kiks.engine.simd.f64x8 import floor
+from kiks.engine.simd.lanes import floor
 from kiks.engine.simd.masks import choose, everywhere, lane_count
 from kiks.engine.simd.records import one_of
 from kiks.engine.state import MODE_POSITION, MODE_PWM, MODE_SPEED

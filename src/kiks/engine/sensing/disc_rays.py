@@ -18,7 +18,7 @@ import numpy as np
 
 from kiks.engine.compiling import entry, inlined, kernel
 from kiks.engine.grid import count_discs, find_near
-from kiks.engine.simd.f64x8 import LANES, load, root, splat, store, where_less
+from kiks.engine.simd.lanes import LANES, load, root, store, wide
 from kiks.engine.simd.masks import anywhere, choose, holds
 from kiks.engine.simd.stack_arrays import stack_floats
 from kiks.engine.state import TRAIL_LENGTH
@@ -42,8 +42,6 @@ TRACKS_SIZE = 1056
 """Numbers for `SEEN_LIMIT` tracks."""
 
 _ANYWHERE_MM = 1e6
-
-_NEVER = 1e30  # cells
 
 _RADIUS, _BRIGHTNESS, _DISC = (2 * (TRAIL_LENGTH + 1) + k for k in range(3))
 
@@ -157,7 +155,7 @@ def see(walls: Any, tracks: Any, first: Any, end: Any, moments: Any, view: Any, 
         counts: Output: their numbers, float64 [8].
     """
     x, y, left, right, reach_mm = view[:5]
-    store(counts, splat(0.0))
+    store(counts, wide(0.0))
     xs, ys = stack_floats(LANES), stack_floats(LANES)
     for k in range(first, end):
         disc_x, disc_y = place_then(tracks, k, moments)
@@ -235,14 +233,12 @@ def meet_discs(
         dx, dy, radius = seen[PER_DISC * k] - column, seen[PER_DISC * k + 1] - row, seen[PER_DISC * k + 2]
         along, aside = cosines * dx + sines * dy, sines * dx - cosines * dy
         square = radius * radius - aside * aside
-        half = root(where_less(0.0, square, square, 0.0))
-        begin = along - half
-        begin = where_less(0.0, begin, begin, 0.0)
-        begin = where_less(0.0, square, begin, _NEVER)
-        begin = where_less(0.0, along + half, begin, _NEVER)
-        squarely = where_less(begin, lengths, half / radius, squarely)
-        shades = where_less(begin, lengths, seen[PER_DISC * k + 3], shades)
-        lengths = where_less(begin, lengths, begin, lengths)
+        half = root(max(0.0, square))
+        begin = max(0.0, along - half)
+        is_met = (square > 0.0) & (along + half > 0.0) & (begin < lengths)
+        squarely = choose(is_met, half / radius, squarely)
+        shades = choose(is_met, seen[PER_DISC * k + 3], shades)
+        lengths = choose(is_met, begin, lengths)
     return lengths, squarely, shades
 
 

@@ -32,7 +32,7 @@ from kiks.engine.sensing.proximity import (
 )
 from kiks.engine.sensing.rays import is_lit
 from kiks.engine.sensing.responses import REFLECTION, respond
-from kiks.engine.simd.f64x8 import LANES, lane_of, load, store
+from kiks.engine.simd.lanes import LANES, lane_of, load, store
 from kiks.engine.simd.stack_arrays import stack_floats
 
 SHINING, BEHIND, BEHIND_BODY, HIDDEN, OFF = 0, 1, 2, 3, 4

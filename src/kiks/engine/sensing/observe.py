@@ -30,7 +30,7 @@ from kiks.engine.sensing.proximity import (
     track_around,
     view_of,
 )
-from kiks.engine.simd.f64x8 import lane_of, splat
+from kiks.engine.simd.lanes import lane_of, wide
 
 NOTHING, WALL = -2, -1
 """Hits of a ray that hit no disc; discs are numbered as in `kiks.engine.scene`."""
@@ -73,7 +73,7 @@ def gaze_robot(
             for part in range(3):
                 rays[sensor, part, ray] = lane_of(hits[part], ray)
             met[sensor, ray] = WALL if rays[sensor, 2, ray] > 0.0 else NOTHING
-    view, nothing = view_of(parameters, poses), (splat(_FAR_MM), splat(1.0), splat(0.0))
+    view, nothing = view_of(parameters, poses), (wide(_FAR_MM), wide(1.0), wide(0.0))
     for k in range(disc_count):
         see(walls, tracing.tracks, k, k + 1, moments, view, tracing.seen, tracing.seen_counts)
         for sensor in range(met.shape[0]):
@@ -101,8 +101,8 @@ def gaze(scene: Any, tick_count: Any, time_ns: Any, first: Any, rays: Any, met: 
     scene, tracing = open_scene(scene[0]), make_tracing()
     for k in range(met.shape[0]):
         x, y, heading = pose_at(scene.robots[0, first + k], tick_count, time_ns)
-        poses = splat(x), splat(y), splat(heading)
-        gaze_robot(scene, first + k, True, tick_count, splat(1.0 * time_ns), poses, tracing, rays[k], met[k])
+        poses = wide(x), wide(y), wide(heading)
+        gaze_robot(scene, first + k, True, tick_count, wide(1.0 * time_ns), poses, tracing, rays[k], met[k])
 
 
 @entry
@@ -171,11 +171,11 @@ def read_from(scene: Any, robot: Any, tick_count: Any, time_ns: Any, poses: Any,
     scene = open_scene(scene[0])
     parameters = scene.kinds[scene.robots[0, robot].kind]
     tracing = make_tracing()
-    moments = moment_of(tick_count, splat(1.0 * time_ns))
+    moments = moment_of(tick_count, wide(1.0 * time_ns))
     for k in range(out.shape[0]):
         x, y, heading = poses[k, 0], poses[k, 1], poses[k, 2]
         disc_count = track_around(scene, 0, robot, x, y, tracing.tracks)
-        pose = splat(x), splat(y), splat(heading)
+        pose = wide(x), wide(y), wide(heading)
         packet_count = begin_rays(scene.walls, parameters, False, moments, pose, disc_count, tracing, 0, 0)
         follow_rays(scene.walls, tracing, packet_count)
         expected_counts(scene, parameters, disc_count, tracing, 0, out[k])

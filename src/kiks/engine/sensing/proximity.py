@@ -22,8 +22,9 @@ from kiks.engine.sensing.disc_rays import ALL_SEEN_SIZE, SEEN_SIZE, TRACKS_SIZE,
 from kiks.engine.sensing.ray_packets import WAY_SIZE, enter, met, nothing_met, step_all
 from kiks.engine.sensing.rays import leap_at
 from kiks.engine.sensing.responses import REFLECTION, respond
-from kiks.engine.simd.f64x8 import LANES, floor, greatest, lane_of, load, pick, store
+from kiks.engine.simd.lanes import LANES, floor, greatest, lane_of, load, store
 from kiks.engine.simd.masks import anywhere, choose
+from kiks.engine.simd.rasters import pick
 from kiks.engine.simd.stack_arrays import stack_floats, stack_integers, stack_narrow
 from kiks.model.robot import SENSOR_COUNT
 from kiks.units import SENSOR_ROUND_NS, SENSOR_SLOT_NS

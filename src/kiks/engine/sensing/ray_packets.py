@@ -3,7 +3,7 @@
 A reading of eight sensors is mostly rays, and a ray mostly waits for memory. While one packet waits, others go on:
 `enter` starts packets one by one, `step_all` lets them step in turn until all have ended, `met` returns the hits. The
 steps of a packet do not depend on other packets, and so neither do its bits. They are in float32, relative to the cell
-in which the packet begins (`kiks.engine.simd.f32x8`).
+in which the packet begins (`kiks.engine.simd.lanes`).
 
 From any point of a cell, a ray may go in any direction as far as the cell's square is from that of the nearest wall
 (`kiks.model.arena.Arena.leaps`). So a step goes to the edge of the cell, and then that far: no corner is missed, and a
@@ -18,18 +18,9 @@ import numpy as np
 
 from kiks.engine.compiling import entry, inlined, kernel
 from kiks.engine.sensing.rays import Walls
-from kiks.engine.simd.f32x8 import (
-    count_any,
-    faces_at,
-    if_less,
-    load_narrow,
-    look_up,
-    narrow,
-    store_narrow,
-    whole,
-    widen,
-)
-from kiks.engine.simd.f64x8 import load, store
+from kiks.engine.simd.lanes import floor, load, narrow, store, wide
+from kiks.engine.simd.masks import anywhere, choose
+from kiks.engine.simd.rasters import faces_at, look_up
 from kiks.engine.simd.stack_arrays import stack_integers, stack_narrow
 from kiks.model.raster import LEAPS_PER_CELL
 
@@ -72,15 +63,15 @@ def enter(
     x, y = min(max(0.0, column - i), 1.0), min(max(0.0, row - j), 1.0)
     origins[k] = j * field.shape[1] + i
     dx, dy = narrow(rays_x), narrow(rays_y)
-    dx, dy = if_less(_FLAT, dx * dx, dx, 0.0), if_less(_FLAT, dy * dy, dy, 0.0)
+    dx, dy = choose(dx * dx > _FLAT, dx, 0.0), choose(dy * dy > _FLAT, dy, 0.0)
     way = k * WAY_SIZE
-    store_narrow(ways, way + _DX, dx)
-    store_narrow(ways, way + _DY, dy)
-    store_narrow(ways, way + _PER_DX, if_less(_FLAT, dx * dx, 1.0 / dx, _FAR))
-    store_narrow(ways, way + _PER_DY, if_less(_FLAT, dy * dy, 1.0 / dy, _FAR))
-    store_narrow(ways, way + _RIGHT, if_less(dx, 0.0, 0.0, narrow(1.0)) - x)
-    store_narrow(ways, way + _UP, if_less(dy, 0.0, 0.0, narrow(1.0)) - y)
-    store_narrow(ways, way + _LENGTH, narrow(0.0))
+    store(ways, dx, way + _DX)
+    store(ways, dy, way + _DY)
+    store(ways, choose(dx * dx > _FLAT, 1.0 / dx, _FAR), way + _PER_DX)
+    store(ways, choose(dy * dy > _FLAT, 1.0 / dy, _FAR), way + _PER_DY)
+    store(ways, choose(dx < 0.0, 0.0, narrow(1.0)) - x, way + _RIGHT)
+    store(ways, choose(dy < 0.0, 0.0, narrow(1.0)) - y, way + _UP)
+    store(ways, narrow(0.0), way + _LENGTH)
     ways[way + _REST], ways[way + _REST + 1], ways[way + _REST + 2] = x, y, min(LONGEST, reach)
 
 
@@ -92,15 +83,15 @@ def step(leaps: Any, origin: Any, ways: Any, way: Any, lengths: Any) -> Any:
         The new lengths; and for each ray a number above 0 if it goes on, 0 if it is beyond its reach, or 1/2 minus the
         brightness of the wall that it hit.
     """
-    columns = whole(ways[way + _REST] + lengths * load_narrow(ways, way + _DX))
-    rows = whole(ways[way + _REST + 1] + lengths * load_narrow(ways, way + _DY))
+    columns = floor(ways[way + _REST] + lengths * load(ways, way + _DX))
+    rows = floor(ways[way + _REST + 1] + lengths * load(ways, way + _DY))
     found = look_up(leaps, origin, columns, rows)
-    to_column = (columns + load_narrow(ways, way + _RIGHT)) * load_narrow(ways, way + _PER_DX)
-    to_row = (rows + load_narrow(ways, way + _UP)) * load_narrow(ways, way + _PER_DY)
-    edge = if_less(to_column, to_row, to_column, to_row)
-    onward = if_less(edge, lengths, lengths, edge) + (found * (1.0 / LEAPS_PER_CELL) + _NUDGE)
-    goes_on = if_less(lengths, ways[way + _REST + 2], found + 0.5, 0.0)
-    return if_less(0.0, goes_on, onward, lengths), goes_on
+    to_column = (columns + load(ways, way + _RIGHT)) * load(ways, way + _PER_DX)
+    to_row = (rows + load(ways, way + _UP)) * load(ways, way + _PER_DY)
+    edge = min(to_row, to_column)
+    onward = max(edge, lengths) + (found * (1.0 / LEAPS_PER_CELL) + _NUDGE)
+    goes_on = choose(lengths < ways[way + _REST + 2], found + 0.5, 0.0)
+    return choose(goes_on > 0.0, onward, lengths), goes_on
 
 
 @kernel
@@ -114,12 +105,12 @@ def step_all(walls: Any, ways: Any, origins: Any, under_way: Any, count: Any) ->
         for place_in_line in range(count):
             k = under_way[place_in_line]
             way, origin = k * WAY_SIZE, origins[k]
-            lengths = load_narrow(ways, way + _LENGTH)
+            lengths = load(ways, way + _LENGTH)
             lengths, goes_on = step(leaps, origin, ways, way, lengths)
-            store_narrow(ways, way + _LENGTH, lengths)
-            store_narrow(ways, way + _MET, goes_on)
+            store(ways, lengths, way + _LENGTH)
+            store(ways, goes_on, way + _MET)
             under_way[kept] = k
-            kept += count_any(goes_on)
+            kept += anywhere(goes_on > 0.0)
         count = kept
 
 
@@ -130,24 +121,22 @@ def meet_faces(walls: Any, ways: Any, origin: Any, way: Any, lengths: Any, shade
     Returns:
         Lengths of the rays [cells], at most a cell from the given ones, and cosines of the angles of incidence.
     """
-    dx, dy = load_narrow(ways, way + _DX), load_narrow(ways, way + _DY)
+    dx, dy = load(ways, way + _DX), load(ways, way + _DY)
     before = lengths - 2.0 * _NUDGE
     x, y = ways[way + _REST] + before * dx, ways[way + _REST + 1] + before * dy
-    columns, rows = whole(x), whole(y)
+    columns, rows = floor(x), floor(y)
     # A ray without a hit looks up its origin: another cell would cost a memory access.
-    place_x, place_y = if_less(0.0, shades, columns, 0.0), if_less(0.0, shades, rows, 0.0)
+    place_x, place_y = choose(shades > 0.0, columns, 0.0), choose(shades > 0.0, rows, 0.0)
     face_x, face_y, left = faces_at(walls.faces, origin, place_x, place_y)
     squarely = face_x * dx + face_y * dy
     left = left - (x - columns - 0.5) * face_x - (y - rows - 0.5) * face_y
-    further = left / if_less(_GRAZING, squarely, squarely, 1.0)
-    further = if_less(-1.0, further, if_less(further, 1.0, further, 1.0), -1.0)
-    smooth = before + further
-    smooth = if_less(0.0, smooth, smooth, 0.0)
-    cosines = if_less(0.0, squarely, squarely, 0.0)
+    further = left / choose(squarely > _GRAZING, squarely, 1.0)
+    further = max(-1.0, min(1.0, further))
+    smooth, cosines = max(0.0, before + further), max(0.0, squarely)
     # A ray that begins in a wall or meets the tip of a corner between cells finds no surface.
-    cosines = if_less(0.0, face_x * face_x + face_y * face_y, cosines, 1.0)
-    found = if_less(0.0, shades, squarely, 0.0)
-    return if_less(_GRAZING, found, smooth, lengths), if_less(0.0, shades, cosines, 1.0)
+    cosines = choose(face_x * face_x + face_y * face_y > 0.0, cosines, 1.0)
+    found = choose(shades > 0.0, squarely, 0.0)
+    return choose(found > _GRAZING, smooth, lengths), choose(shades > 0.0, cosines, 1.0)
 
 
 @inlined
@@ -159,19 +148,19 @@ def met(walls: Any, has_faces: Any, ways: Any, origins: Any, k: Any) -> Any:
         `Lanes`.
     """
     way = k * WAY_SIZE
-    ended = load_narrow(ways, way + _MET)
-    shades = if_less(ended, 0.0, 0.5 - ended, 0.0)
-    lengths = if_less(ended, 0.0, load_narrow(ways, way + _LENGTH), ways[way + _REST + 2])
+    ended = load(ways, way + _MET)
+    shades = choose(ended < 0.0, 0.5 - ended, 0.0)
+    lengths = choose(ended < 0.0, load(ways, way + _LENGTH), ways[way + _REST + 2])
     cosines = narrow(1.0)
-    if has_faces and count_any(shades):
+    if has_faces and anywhere(shades > 0.0):
         lengths, cosines = meet_faces(walls, ways, origins[k], way, lengths, shades)
-    return widen(lengths), widen(cosines), widen(shades)
+    return wide(lengths), wide(cosines), wide(shades)
 
 
 @inlined
 def nothing_met(reach: Any) -> Any:
     """Return the hits of a packet whose rays meet nothing, as `met` does."""
-    return widen(narrow(min(LONGEST, reach))), widen(narrow(1.0)), widen(narrow(0.0))
+    return wide(narrow(min(LONGEST, reach))), wide(narrow(1.0)), wide(narrow(0.0))
 
 
 @entry

@@ -17,8 +17,9 @@ import numpy as np
 
 from kiks.engine.compiling import entry, kernel
 from kiks.engine.sensing.disc_rays import hides
-from kiks.engine.simd.f64x8 import LANES, floor, load, pick, store
+from kiks.engine.simd.lanes import LANES, floor, load, store
 from kiks.engine.simd.masks import anywhere, choose, opposite
+from kiks.engine.simd.rasters import pick
 from kiks.engine.simd.stack_arrays import stack_floats
 from kiks.model.arena import PAD, Arena
 from kiks.model.raster import LEAPS_PER_CELL

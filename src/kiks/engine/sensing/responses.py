@@ -25,8 +25,8 @@ from kiks.engine.compiling import entry, inlined, kernel
 from kiks.engine.numbers import exponential, power
 from kiks.engine.parameters import CURVE_POINT_COUNT, RAY_COUNT, STANDIN_REACH
 from kiks.engine.sensing.thesis_networks import network_count, table_count
-from kiks.engine.simd.f32x8 import narrow, store_narrow, total
-from kiks.engine.simd.f64x8 import LANES, load, splat, store, where_less
+from kiks.engine.simd.lanes import LANES, load, narrow, store, total
+from kiks.engine.simd.masks import choose
 from kiks.engine.simd.stack_arrays import stack_floats, stack_narrow
 from kiks.model.materials import BLACK_REFLECTANCE
 
@@ -61,7 +61,7 @@ def reflection_count(parameters: Any, sensor: Any, lengths_mm: Any, cosines: Any
     """Return the count for the light that returns to a sensor; its rays are `Lanes`."""
     near = cosines / (lengths_mm + parameters.behind_mm)
     shares = BLACK_REFLECTANCE + brightnesses * ((1.0 - BLACK_REFLECTANCE) / 255.0)
-    shares = where_less(0.0, brightnesses, shares, 0.0)
+    shares = choose(brightnesses > 0.0, shares, 0.0)
     returned = load(parameters.ray_weight[sensor]) * shares * near * near * near
     light = total(returned)
     threshold = parameters.threshold[sensor]
@@ -89,7 +89,7 @@ def standin_count(range_mm: Any, lengths_mm: Any, brightnesses: Any) -> Any:
 def nearnesses(range_mm: Any, lengths_mm: Any, brightnesses: Any) -> Any:
     """Return the inputs of the thesis's networks: 1 at the sensor, 0 out of range, less for a dark surface; `Lanes`."""
     inverted = max(1.0 - lengths_mm * (1.0 / range_mm), 0.0)
-    return where_less(0.0, brightnesses, inverted * darkness(brightnesses), 0.0)
+    return choose(brightnesses > 0.0, inverted * darkness(brightnesses), 0.0)
 
 
 @kernel
@@ -113,7 +113,7 @@ def respond(networks: Any, parameters: Any, sensor: Any, lengths_mm: Any, cosine
     gain = parameters.gain[sensor]
     if parameters.response == THESIS or parameters.response == FAST:
         seen = stack_narrow(LANES)
-        store_narrow(seen, 0, narrow(nearnesses(parameters.range_mm, lengths_mm, brightnesses)))
+        store(seen, narrow(nearnesses(parameters.range_mm, lengths_mm, brightnesses)))
         if parameters.response == THESIS:
             return gain * network_count(networks[0], sensor, seen)
         return gain * table_count(networks[0].table, seen)
@@ -147,5 +147,5 @@ def respond_all(kinds: Any, lengths_mm: Any, cosines: Any, out: Any) -> Any:
         for sensor in range(out.shape[1]):
             for ray in range(RAY_COUNT):
                 padded_mm[ray], padded[ray] = lengths_mm[sample, sensor, ray], cosines[sample, sensor, ray]
-            shades = where_less(0.0, load(padded), 255.0, splat(0.0))
+            shades = choose(load(padded) > 0.0, 255.0, 0.0)
             out[sample, sensor] = reflection_count(kinds[0], sensor, load(padded_mm), load(padded), shades)

@@ -4,7 +4,7 @@ Source: thesis section 3.3, "7 input neurons, 13+7 neurons in 2 hidden layers, 1
 sensors' setting". A nearness is 1 for a ray of no length and 0 for one that meets nothing in range. Of each row of
 weights in a file the last is the bias; their shapes stand in `kiks.model.thesis_networks`.
 
-Method: the neurons of a sensor are computed eight at a time in float32 (`kiks.engine.simd.f32x8`). The second layer and
+Method: the neurons of a sensor are computed eight at a time in float32 (`kiks.engine.simd.lanes`). The second layer and
 the output are linear, so they are merged into one when the networks are packed. Sums run in a fixed order.
 """
 
@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.engine.compiling import entry, inlined, kernel
-from kiks.engine.simd.f32x8 import if_less, load_narrow, narrow, store_narrow, total, whole
-from kiks.engine.simd.f64x8 import LANES
+from kiks.engine.simd.lanes import LANES, floor, load, narrow, store, total
 from kiks.engine.simd.stack_arrays import stack_narrow
 from kiks.model.robot import SENSOR_COUNT
 from kiks.model.thesis_networks import INPUT_COUNT, TANH_COUNT, NetworkResponse
@@ -55,14 +54,12 @@ _PLACE_VALUES = np.array([TABLE_LEVELS**k for k in range(INPUT_COUNT - 1, -1, -1
 @inlined
 def tanh(x: Any) -> Any:
     """Return hyperbolic tangents within 7e-6: the continued fraction to the ninth level, up to 1."""
-    x = if_less(x, 6.297, x, 6.297)
-    x = if_less(-6.297, x, x, -6.297)
+    x = max(-6.297, min(6.297, x))
     q = x * x
     above = (((q + 990.0) * q + 135135.0) * q + 4729725.0) * q + 34459425.0
     below = (((q * 45.0 + 13860.0) * q + 945945.0) * q + 16216200.0) * q + 34459425.0
     value = x * above / below
-    value = if_less(value, 1.0, value, 1.0)
-    return if_less(-1.0, value, value, -1.0)
+    return max(-1.0, min(1.0, value))
 
 
 @kernel
@@ -74,21 +71,20 @@ def network_count(networks: Any, sensor: Any, seen: Any) -> Any:
     if nearest <= 0.0:
         return 0.0
     weights = networks.hidden[sensor]
-    first, second = load_narrow(weights[INPUT_COUNT], 0), load_narrow(weights[INPUT_COUNT], LANES)
+    first, second = load(weights[INPUT_COUNT]), load(weights[INPUT_COUNT], LANES)
     for ray in range(INPUT_COUNT):
-        first = first + load_narrow(weights[ray], 0) * seen[ray]
-        second = second + load_narrow(weights[ray], LANES) * seen[ray]
+        first = first + load(weights[ray]) * seen[ray]
+        second = second + load(weights[ray], LANES) * seen[ray]
     output = networks.output[sensor]
-    sums = tanh(first) * load_narrow(output, 0) + tanh(second) * load_narrow(output, LANES)
+    sums = tanh(first) * load(output) + tanh(second) * load(output, LANES)
     return min(max(np.float64(networks.bias[sensor] + total(sums)), 0.0), MAXIMUM)
 
 
 @kernel
 def table_count(table: Any, seen: Any) -> Any:
     """Return the table's count for nearnesses, float32 [8], each rounded to a fifth; the first ray counts most."""
-    levels = whole(load_narrow(seen, 0) * (TABLE_LEVELS - 1.0) + 0.5)
-    levels = if_less(levels, TABLE_LEVELS - 1.0, levels, TABLE_LEVELS - 1.0)
-    index = total(if_less(0.0, levels, levels, 0.0) * load_narrow(_PLACE_VALUES, 0))
+    levels = floor(load(seen) * (TABLE_LEVELS - 1.0) + 0.5)
+    index = total(max(0.0, min(TABLE_LEVELS - 1.0, levels)) * load(_PLACE_VALUES))
     return np.float64(table[np.int64(index)])
 
 
@@ -135,7 +131,7 @@ def respond_table(table: Any, seen: Any, out: Any) -> Any:
 @kernel
 def copy_rays(seen: Any, rays: Any) -> Any:
     """Copy seven nearnesses into eight lanes."""
-    store_narrow(rays, 0, narrow(0.0))
+    store(rays, narrow(0.0))
     for ray in range(INPUT_COUNT):
         rays[ray] = seen[ray]
 

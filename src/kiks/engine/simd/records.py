@@ -4,7 +4,7 @@ Need: a tick is a few hundred operations on one robot. A processor can do each o
 time. The formulas must stand in one place, for one robot and for eight.
 Method: `EIGHT` has the numbers of `ROBOT` that a tick of a lone robot reads or writes, `EIGHT_KINDS` those of
 `PARAMETERS`, each as eight float64 side by side, which hold whole numbers below 2^53 exactly. For kernels such a record
-is a `Record8`: `robot.x_mm` are `Lanes`, `robot.trail[0, 1]` too. `only(robot, condition)` is one that is written only
+is a `Record8`: `robot.x_mm` are lanes, `robot.trail[0, 1]` too. `only(robot, condition)` is one that is written only
 where a condition holds, `one_of(robot, lane)` is the robot of a lane, with the same names for single numbers.
 """
 
@@ -23,8 +23,8 @@ from numba.core.typing import templates
 from numba.extending import models
 
 from kiks.engine.parameters import PARAMETERS
-from kiks.engine.simd.f64x8 import LANES, Lanes, offer
-from kiks.engine.simd.masks import Mask, select
+from kiks.engine.simd.lanes import F64X8, LANES, MASK, offer
+from kiks.engine.simd.masks import select
 from kiks.engine.state import ROBOT
 
 # Numba annotates these in part, and not as they are used in kernels.
@@ -33,8 +33,7 @@ _lower: Any = extending
 _templates: Any = templates
 _proxy: Any = cgutils.create_struct_proxy
 
-_LANES, _MASK = Lanes(), Mask()
-_BYTE, _WORD, _VECTOR = ir.IntType(8), ir.IntType(64), ir.VectorType(ir.DoubleType(), LANES)
+_BYTE, _WORD = ir.IntType(8), ir.IntType(64)
 
 
 def record8_of(record: np.dtype[np.void], names: tuple[str, ...], *more: str) -> np.dtype[np.void]:
@@ -83,7 +82,7 @@ class _Numbers(types.Type):  # type: ignore[misc, unused-ignore]
 
 
 class Record8(_Numbers):
-    """Numba's type of eight records: their numbers are `Lanes`."""
+    """Numba's type of eight records: their numbers are lanes."""
 
 
 class SomeOf(Record8):
@@ -97,7 +96,7 @@ class OneOf(_Numbers):
 @extending.register_model(SomeOf)
 class _SomeOfModel(models.StructModel):  # type: ignore[misc, unused-ignore]
     def __init__(self, manager: Any, numba_type: Any) -> None:
-        members = [("address", types.voidptr), ("mask", _MASK)]
+        members = [("address", types.voidptr), ("mask", MASK)]
         super().__init__(manager, numba_type, members)  # type: ignore[no-untyped-call, unused-ignore]
 
 
@@ -110,7 +109,7 @@ class _NumbersModel(models.StructModel):  # type: ignore[misc, unused-ignore]
 
 def _kind_of(numbers: Any) -> Any:
     """Return the type of what one name or number stands for."""
-    return _LANES if isinstance(numbers, Record8) else types.float64
+    return F64X8 if isinstance(numbers, Record8) else types.float64
 
 
 def _at(builder: Any, address: Any, offset: Any, content: Any) -> Any:
@@ -281,7 +280,7 @@ def copy_lanes(typing: Any, source: Any, target: Any, condition: Any) -> Any:
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         there, here = (_parts(context, builder, source, each).address for each in arguments[:2])
-        there, here = (builder.bitcast(each, _VECTOR.as_pointer()) for each in (there, here))
+        there, here = (builder.bitcast(each, F64X8.vector.as_pointer()) for each in (there, here))
         with cgutils.for_range(builder, ir.Constant(_WORD, count)) as loop:  # type: ignore[no-untyped-call, unused-ignore]
             new = builder.load(builder.gep(there, [loop.index]), align=8)
             place = builder.gep(here, [loop.index])
@@ -330,8 +329,8 @@ def fill_lanes(typing: Any, eight: Any, record: Any) -> Any:
         for kind, there, here in _copies(eight, record):
             single = _at(builder, one, ir.Constant(_WORD, there), context.get_data_type(kind))
             value = context.cast(builder, builder.load(single, align=1), kind, types.float64)
-            filled = context.cast(builder, value, types.float64, _LANES)
-            builder.store(filled, _at(builder, lanes, ir.Constant(_WORD, here), _VECTOR), align=8)
+            filled = context.cast(builder, value, types.float64, F64X8)
+            builder.store(filled, _at(builder, lanes, ir.Constant(_WORD, here), F64X8.vector), align=8)
         return context.get_dummy_value()
 
     return types.void(eight, record), generate
