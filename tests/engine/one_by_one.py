@@ -11,7 +11,7 @@ from kiks.engine.physics.gripper import move_gripper
 from kiks.engine.physics.motion import draw_slip, moment_of, move, note_contact, remember_pose
 from kiks.engine.physics.motor import control_motors, latch_encoders, turn_motors
 from kiks.engine.scene import open_scene
-from kiks.engine.sensing.disc_rays import meet_disc, other_tracks, see_all
+from kiks.engine.sensing.disc_rays import meet_discs, other_tracks, see_all
 from kiks.engine.sensing.proximity import (
     STREAM_PROXIMITY,
     chances,
@@ -91,7 +91,8 @@ def read_one_by_one(record, world, robot, tick, time_ns, out):
         store(rays_y, across)
         see_all(walls, tracks, disc_count, moment_of(tick, instant_ns), seen)
         for ray in range(LANES):
-            length, at, shade = meet_disc(seen, disc_count, column, row, rays_x[ray], rays_y[ray], lengths[ray])
+            ray_hit = column, row, rays_x[ray], rays_y[ray], lengths[ray], 1.0, 0.0
+            length, at, shade = meet_discs(seen, disc_count, *ray_hit)
             if shade > 0.0:
                 lengths[ray], cosines[ray], shades[ray] = length, at, shade
         sight = load(lengths) * walls.cell_mm, load(cosines), load(shades)

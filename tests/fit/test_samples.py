@@ -7,9 +7,10 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from tests.engine.sensing.followed_rays import cast_ray
 from tools.sensors.train_networks import PLACES
 
-from kiks.engine.sensing.rays import cast_ray, walls_of
+from kiks.engine.sensing.rays import walls_of
 from kiks.errors import ParameterError
 from kiks.fit.samples import (
     BODY_RADIUS_MM,

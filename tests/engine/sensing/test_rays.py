@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.at_length import share
+from tests.engine.sensing.followed_rays import cast_eight, cast_ray, cast_rays
 
-from kiks.engine.sensing.ray_packets import cast_eight
-from kiks.engine.sensing.rays import cast_ray, cast_rays, walls_of
+from kiks.engine.sensing.rays import walls_of
 from kiks.model.arena import PAD, Arena
 
 TOLERANCE_MM = 0.02

@@ -21,12 +21,14 @@ from typing import Any
 import numpy as np
 
 from kiks.engine.compiling import entry, inlined, kernel
+from kiks.engine.grid import count_discs, disc_at, is_on_floor
 from kiks.engine.numbers import power, sin_cos, uniform
 from kiks.engine.physics.motion import moment_of
 from kiks.engine.scene import open_scene
-from kiks.engine.sensing.disc_rays import other_tracks, see_all
+from kiks.engine.sensing.disc_rays import moved_at, moved_of, note_tracks, see_all
 from kiks.engine.sensing.proximity import quantize, sampled_pose
 from kiks.engine.sensing.rays import is_lit
+from kiks.model.robot import SENSOR_COUNT
 
 STREAM_AMBIENT = 3
 """Random stream of the noise on light readings."""
@@ -135,6 +137,38 @@ def is_burning(lamps: Any, number: Any) -> Any:
 
 
 @kernel
+def hiding_tracks(scene: Any, world: Any, robot: Any) -> Any:
+    """Return the tracks of discs that may hide a lamp from a robot, their number, and memory for the visible discs."""
+    state, lamps = scene.robots[world, robot], scene.lamps[world]
+    parameters = scene.kinds[state.kind]
+    # Light ends at a sensor, where that was at a moment of the trail.
+    mount_mm = 0.0
+    for sensor in range(SENSOR_COUNT):
+        mount_mm = max(mount_mm, abs(parameters.mount_x_mm[sensor]) + abs(parameters.mount_y_mm[sensor]))
+    margin_mm = mount_mm + moved_of(state)
+    found, count = np.empty(count_discs(scene)[1], np.int64), 0
+    for disc in range(found.shape[0]):
+        if disc != robot and is_on_floor(scene, world, disc):
+            x, y, radius = disc_at(scene, world, disc)
+            far_mm = radius + margin_mm + moved_at(scene, world, disc)
+            for number in range(lamps.shape[0]):
+                if is_burning(lamps, number) and distance_from_way(state, lamps[number], x, y) < far_mm:
+                    found[count] = disc
+                    count += 1
+                    break
+    return note_tracks(scene, world, found, count)
+
+
+@inlined
+def distance_from_way(robot: Any, lamp: Any, x: Any, y: Any) -> Any:
+    """Return the distance of a place from the way between a robot and a lamp [mm]."""
+    way_x, way_y, dx, dy = lamp[0] - robot.x_mm, lamp[1] - robot.y_mm, x - robot.x_mm, y - robot.y_mm
+    along = min(max((dx * way_x + dy * way_y) / max(way_x * way_x + way_y * way_y, _NEAREST_MM), 0.0), 1.0)
+    aside_x, aside_y = dx - along * way_x, dy - along * way_y
+    return math.sqrt(aside_x * aside_x + aside_y * aside_y)
+
+
+@kernel
 def sense_ambient(scene: Any, world: Any, robot: Any, tick_count: Any, time_ns: Any, is_noisy: Any, out: Any) -> Any:
     """Write the eight counts that command O returns at a time into `out`, each sampled at its own instant.
 
@@ -149,7 +183,7 @@ def sense_ambient(scene: Any, world: Any, robot: Any, tick_count: Any, time_ns: 
     """
     state, lamps = scene.robots[world, robot], scene.lamps[world]
     parameters = scene.kinds[state.kind]
-    tracks, count, seen = other_tracks(scene, world, robot)
+    tracks, count, seen = hiding_tracks(scene, world, robot)
     for sensor in range(out.shape[0]):
         turn, instant_ns, x, y, heading = sampled_pose(state, tick_count, 1.0 * time_ns, sensor, is_noisy)
         see_all(scene.walls, tracks, count, moment_of(tick_count, instant_ns), seen)

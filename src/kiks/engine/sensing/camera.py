@@ -28,7 +28,7 @@ from kiks.engine.compiling import entry, kernel
 from kiks.engine.numbers import at_instant, draw, sin_cos, stream_of
 from kiks.engine.physics.motion import moment_of
 from kiks.engine.scene import open_scene
-from kiks.engine.sensing.disc_rays import meet_disc, other_tracks, see_all
+from kiks.engine.sensing.disc_rays import meet_discs, other_tracks, see_all
 from kiks.engine.sensing.proximity import pose_at
 from kiks.engine.sensing.rays import ENDLESS, brightness_met, cast, cast_many, free_cells
 from kiks.engine.simd.stack_arrays import stack_floats
@@ -113,7 +113,8 @@ def look(walls: Any, seen: Any, seen_count: Any, x: Any, y: Any, heading: Any, g
             length, is_met = cast(walls, column, row, rays_x[p], rays_y[p], ENDLESS)
             brightness = brightness_met(walls, column, row, rays_x[p], rays_y[p], length, is_met)
         if seen_count > 0:
-            to_disc, _, shade = meet_disc(seen, seen_count, column, row, rays_x[p], rays_y[p], start + length)
+            limit = start + length
+            to_disc, _, shade = meet_discs(seen, seen_count, column, row, rays_x[p], rays_y[p], limit, 1.0, 0.0)
             if shade > 0.0:
                 start, length, brightness = 0.0, to_disc, shade
         grey[p] = _BLACK + brightness * ((_WHITE - _BLACK) / 255.0)

@@ -11,14 +11,13 @@ and brightness.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 
-from kiks.engine.compiling import entry, inlined, kernel
-from kiks.engine.grid import count_discs, find_near
-from kiks.engine.simd.lanes import LANES, load, root, store, wide
+from kiks.engine.compiling import inlined, kernel
+from kiks.engine.grid import count_discs, is_on_floor
+from kiks.engine.simd.lanes import LANES, root, store, wide
 from kiks.engine.simd.masks import anywhere, choose, holds
 from kiks.engine.simd.stack_arrays import stack_floats
 from kiks.engine.state import TRAIL_LENGTH
@@ -106,6 +105,14 @@ def moved_of(thing: Any) -> Any:
 
 
 @inlined
+def moved_at(scene: Any, world: Any, disc: Any) -> Any:
+    """Return the same of a disc."""
+    if disc < scene.robots.shape[1]:
+        return moved_of(scene.robots[world, disc])
+    return moved_of(scene.bodies[world, disc - scene.robots.shape[1]])
+
+
+@inlined
 def place_then(tracks: Any, k: Any, moment: Any) -> Any:
     """Return where the disc of a track was at a moment, x and y [mm]; at eight of them, `Lanes`."""
     ticks_ago, back = moment
@@ -174,83 +181,43 @@ def see(walls: Any, tracks: Any, first: Any, end: Any, moments: Any, view: Any, 
                     counts[sensor] += 1.0
 
 
+@inlined
+def enter_disc(seen: Any, k: Any, column: Any, row: Any, cosine: Any, sine: Any) -> Any:
+    """Return the length at which a ray enters a disc (0 from inside), the cosine of its incidence, and if it does."""
+    dx, dy, radius = seen[PER_DISC * k] - column, seen[PER_DISC * k + 1] - row, seen[PER_DISC * k + 2]
+    along, aside = cosine * dx + sine * dy, sine * dx - cosine * dy
+    square = radius * radius - aside * aside
+    half = root(max(0.0, square))
+    return max(0.0, along - half), half / radius, (square > 0.0) & (along + half > 0.0)
+
+
 @kernel
-def meet_disc(seen: Any, count: Any, column: Any, row: Any, cosine: Any, sine: Any, reach: Any) -> Any:
-    """Follow one ray to the first disc.
+def meet_discs(
+    seen: Any, count: Any, column: Any, row: Any, cosine: Any, sine: Any, length: Any, squarely: Any, shade: Any
+) -> Any:
+    """Follow a ray to the first disc that it meets, or eight rays of one origin, in lanes.
 
     Args:
         seen: The discs.
         count: Number of discs.
         column: Origin [cells].
         row: Origin [cells].
-        cosine: Direction.
+        cosine: Direction, a number or lanes, as are the others.
         sine: Direction.
-        reach: Longest length followed [cells].
+        length: Length up to the wall, or the longest to be followed [cells].
+        squarely: Cosine of the angle of incidence there.
+        shade: Brightness there.
 
     Returns:
-        Length of the ray [cells], the cosine of the angle of incidence, and the brightness of the disc; `reach`, 1
-        and 0 if the ray meets none.
+        Length, cosine and brightness up to the wall or the first disc before it.
     """
-    length, squarely, brightness = reach, 1.0, 0.0
     for k in range(count):
         begin, cosine_in, is_met = enter_disc(seen, k, column, row, cosine, sine)
-        if is_met and begin < length:
-            length, squarely, brightness = begin, cosine_in, seen[PER_DISC * k + 3]
-    return length, squarely, brightness
-
-
-@kernel
-def enter_disc(seen: Any, k: Any, column: Any, row: Any, cosine: Any, sine: Any) -> Any:
-    """Return the length at which a ray enters a disc (0 from inside), the cosine of its incidence, and if it does."""
-    dx, dy, radius = seen[PER_DISC * k] - column, seen[PER_DISC * k + 1] - row, seen[PER_DISC * k + 2]
-    along, aside = dx * cosine + dy * sine, dx * sine - dy * cosine
-    square = radius * radius - aside * aside
-    half = math.sqrt(max(square, 0.0))
-    return max(along - half, 0.0), half / radius, (square > 0.0) & (along + half > 0.0)
-
-
-@kernel
-def meet_discs(
-    seen: Any, count: Any, column: Any, row: Any, cosines: Any, sines: Any, lengths: Any, squarely: Any, shades: Any
-) -> Any:
-    """Follow a sensor's rays to the first disc that each hits: `meet_disc` for all of them at once.
-
-    Args:
-        seen: The discs.
-        count: Number of discs.
-        column: Origin of all rays [cells].
-        row: Origin of all rays [cells].
-        cosines: Directions, `Lanes`, as are the others.
-        sines: Directions.
-        lengths: Lengths up to the walls [cells].
-        squarely: Cosines of the angles of incidence there.
-        shades: Brightnesses there.
-
-    Returns:
-        Lengths, cosines and brightnesses up to walls or discs.
-    """
-    for k in range(count):
-        dx, dy, radius = seen[PER_DISC * k] - column, seen[PER_DISC * k + 1] - row, seen[PER_DISC * k + 2]
-        along, aside = cosines * dx + sines * dy, sines * dx - cosines * dy
-        square = radius * radius - aside * aside
-        half = root(max(0.0, square))
-        begin = max(0.0, along - half)
-        is_met = (square > 0.0) & (along + half > 0.0) & (begin < lengths)
-        squarely = choose(is_met, half / radius, squarely)
-        shades = choose(is_met, seen[PER_DISC * k + 3], shades)
-        lengths = choose(is_met, begin, lengths)
-    return lengths, squarely, shades
-
-
-@entry
-def meet_discs_all(seen: Any, count: Any, cosines: Any, sines: Any, out: Any) -> Any:
-    """Follow eight rays from (0, 0), for Python: `out`, shape [3, 8], holds the hits on walls, and then on all."""
-    lengths, squarely, shades = meet_discs(
-        seen, count, 0.0, 0.0, load(cosines), load(sines), load(out[0]), load(out[1]), load(out[2])
-    )
-    store(out[0], lengths)
-    store(out[1], squarely)
-    store(out[2], shades)
+        is_first = is_met & (begin < length)
+        squarely = choose(is_first, cosine_in, squarely)
+        shade = choose(is_first, seen[PER_DISC * k + 3], shade)
+        length = choose(is_first, begin, length)
+    return length, squarely, shade
 
 
 @kernel
@@ -266,8 +233,17 @@ def hides(seen: Any, k: Any, column: Any, row: Any, cosine: Any, sine: Any, reac
 @kernel
 def other_tracks(scene: Any, world: Any, itself: Any) -> Any:
     """Return the tracks of all discs of a world except one, their number, and memory for the visible discs."""
-    limit = count_discs(scene)[1]
-    found, tracks = np.empty(limit, np.int64), np.empty(PER_TRACK * limit, np.float64)
-    count = find_near(scene, world, 0.0, 0.0, _ANYWHERE_MM, itself, found)
+    found, count = np.empty(count_discs(scene)[1], np.int64), 0
+    for disc in range(found.shape[0]):
+        if disc != itself and is_on_floor(scene, world, disc):
+            found[count] = disc
+            count += 1
+    return note_tracks(scene, world, found, count)
+
+
+@kernel
+def note_tracks(scene: Any, world: Any, found: Any, count: Any) -> Any:
+    """Return the tracks of some discs, their number, and memory for the visible discs."""
+    tracks = np.empty(PER_TRACK * count, np.float64)
     count = follow(scene, world, found, count, 0.0, 0.0, _ANYWHERE_MM, tracks)
-    return tracks, count, np.empty(PER_DISC * limit, np.float64)
+    return tracks, count, np.empty(PER_DISC * count, np.float64)

@@ -10,7 +10,7 @@ from kiks.engine.compiling import entry
 from kiks.engine.numbers import sin_cos, uniform
 from kiks.engine.physics.motion import moment_of
 from kiks.engine.scene import open_scene
-from kiks.engine.sensing.disc_rays import PER_DISC, disc_of, meet_disc, other_tracks, see_all
+from kiks.engine.sensing.disc_rays import PER_DISC, disc_of, meet_discs, other_tracks, see_all
 from kiks.engine.sensing.proximity import pose_at
 from kiks.engine.sensing.rays import brightness_met, cast
 
@@ -46,7 +46,7 @@ def probe(scene: Any, robot: Any, tick_count: Any, time_ns: Any, angle: Any) -> 
     tracks, count, seen = other_tracks(scene, 0, robot)
     see_all(walls, tracks, count, moment_of(tick_count, 1.0 * time_ns), seen)
     for k in range(count):
-        way, _, shade = meet_disc(seen[PER_DISC * k :], 1, column, row, cosine, sine, length)
+        way, _, shade = meet_discs(seen[PER_DISC * k :], 1, column, row, cosine, sine, length, 1.0, 0.0)
         if shade > 0.0:
             length, brightness, met = way, np.int64(shade), disc_of(tracks, k)
     return length * cell, met, brightness

@@ -16,12 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from kiks.engine.compiling import entry, inlined, kernel
-from kiks.engine.sensing.rays import Walls
+from kiks.engine.compiling import inlined, kernel
 from kiks.engine.simd.lanes import floor, load, narrow, store, wide
 from kiks.engine.simd.masks import anywhere, choose
 from kiks.engine.simd.rasters import faces_at, look_up
-from kiks.engine.simd.stack_arrays import stack_integers, stack_narrow
 from kiks.model.raster import LEAPS_PER_CELL
 
 WAY_SIZE = 72
@@ -161,24 +159,3 @@ def met(walls: Any, has_faces: Any, ways: Any, origins: Any, k: Any) -> Any:
 def nothing_met(reach: Any) -> Any:
     """Return the hits of a packet whose rays meet nothing, as `met` does."""
     return wide(narrow(min(LONGEST, reach))), wide(narrow(1.0)), wide(narrow(0.0))
-
-
-@entry
-def cast_eight(walls: Any, column: Any, row: Any, directions: Any, reach: Any, out: Any) -> Any:
-    """Follow eight rays as a proximity sensor does, for Python; all lengths in cells.
-
-    Args:
-        walls: The walls as rays see them, `walls_of` an arena.
-        column: Origin.
-        row: Origin.
-        directions: Cosines and sines, shape [2, 8].
-        reach: Longest length followed.
-        out: Output: lengths and brightnesses, shape [2, 8].
-    """
-    walls = Walls(*walls)
-    ways, origins, under_way = stack_narrow(WAY_SIZE), stack_integers(1), stack_integers(1)
-    enter(walls, ways, origins, 0, column, row, load(directions[0]), load(directions[1]), reach)
-    step_all(walls, ways, origins, under_way, 1)
-    lengths, _, brightnesses = met(walls, False, ways, origins, 0)
-    store(out[0], lengths)
-    store(out[1], brightnesses)

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from kiks.engine.compiling import entry, kernel
+from kiks.engine.compiling import kernel
 from kiks.engine.sensing.disc_rays import hides
 from kiks.engine.simd.lanes import LANES, floor, load, store
 from kiks.engine.simd.masks import anywhere, choose, opposite
@@ -183,20 +183,3 @@ def is_lit(walls: Any, seen: Any, seen_count: Any, x: Any, y: Any, lamp_x: Any, 
             return False
         length += 0.5
     return True
-
-
-@entry
-def cast_ray(walls: Any, x: Any, y: Any, cosine: Any, sine: Any, reach: Any) -> Any:
-    """Follow one ray from Python; lengths and places in mm of the arena."""
-    walls = Walls(*walls)
-    cell, pad = walls.cell_mm, walls.pad
-    per_cell = 1.0 / cell
-    ray = x * per_cell + pad, y * per_cell + pad, cosine, sine
-    length, is_met = cast(walls, *ray, reach * per_cell)
-    return (length * cell if is_met else reach), brightness_met(walls, *ray, length, is_met)
-
-
-@entry
-def cast_rays(walls: Any, columns: Any, rows: Any, cosines: Any, sines: Any, lengths: Any, brightnesses: Any) -> Any:
-    """Follow many rays from Python, each to the first wall; lengths and places in cells."""
-    cast_many(Walls(*walls), columns, rows, cosines, sines, lengths, brightnesses)
