@@ -113,7 +113,7 @@ def test_sensors_are_trained_on_samples_and_saved(tmp_path):
     seen = np.zeros((len(inputs), 8, 7))
     seen[:, 5] = inputs
     out = np.empty((len(inputs), 8))
-    kernels.respond_networks(kernels.pack_networks(response), seen, out)
+    kernels.respond_networks(kernels.pack_networks(response), False, seen, out)
     np.testing.assert_allclose(out[:, 5], np.clip(trained[5](inputs), 0, 1023), atol=0.3)
     assert not out[:, :5].any()  # nothing near, nothing read
 
@@ -136,10 +136,10 @@ def test_the_table_is_the_mean_of_the_networks():
     levels = rng.integers(0, 6, (50, 7))
     seen = np.repeat((levels / 5.0)[:, None], 8, axis=1)
     out, looked_up = np.empty((50, 8)), np.empty((50, 8))
-    kernels.respond_networks(kernels.pack_networks(response), seen, out)
+    kernels.respond_networks(kernels.pack_networks(response), False, seen, out)
     # Anything that rounds to the same level is the same entry.
     nearby = np.clip(seen + rng.uniform(-0.09, 0.09, seen.shape), 0.0, 1.0)
-    kernels.respond_table(table, nearby, looked_up)
+    kernels.respond_networks(kernels.networks_for("fast"), True, nearby, looked_up)
     np.testing.assert_allclose(looked_up, np.repeat(out.mean(axis=1)[:, None], 8, axis=1), rtol=1e-5, atol=1e-3)
 
 
@@ -147,7 +147,7 @@ def test_kernels_against_numpy():
     response = NetworkResponse.load()
     seen = np.random.default_rng(1).random((200, 8, 7))
     out = np.empty((200, 8))
-    kernels.respond_networks(kernels.pack_networks(response), seen, out)
+    kernels.respond_networks(kernels.pack_networks(response), False, seen, out)
     for sensor in range(8):
         hidden, middle, last = (each[sensor] for each in response.weights)
         network = train_networks.Network((hidden, middle, last[None]), (True, False, False))

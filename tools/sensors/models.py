@@ -58,7 +58,7 @@ def thesis(samples: Samples, response: NetworkResponse | None = None) -> Floats:
     seen = nearnesses(samples, fan_of(response))
     counts = np.empty(samples.counts.shape, np.float64)
     packed = thesis_networks.pack_networks(response)
-    thesis_networks.respond_networks(packed, seen.reshape(-1, *seen.shape[2:]), counts.reshape(-1, SENSOR_COUNT))
+    thesis_networks.respond_networks(packed, False, seen.reshape(-1, *seen.shape[2:]), counts.reshape(-1, SENSOR_COUNT))
     return counts
 
 
@@ -67,8 +67,8 @@ def fast(samples: Samples) -> Floats:
     response = NetworkResponse.load()
     seen = nearnesses(samples, fan_of(response))
     counts = np.empty(samples.counts.shape, np.float64)
-    table = thesis_networks.networks_for("fast")["table"][0]
-    thesis_networks.respond_table(table, seen.reshape(-1, *seen.shape[2:]), counts.reshape(-1, SENSOR_COUNT))
+    packed = thesis_networks.networks_for("fast")
+    thesis_networks.respond_networks(packed, True, seen.reshape(-1, *seen.shape[2:]), counts.reshape(-1, SENSOR_COUNT))
     return counts
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from kiks.engine.compiling import kernel
+from kiks.engine.compiling import inlined, kernel
 from kiks.engine.simd.lanes import floor, number, word
 from kiks.engine.simd.masks import choose, everywhere, has_bit
 
@@ -28,6 +28,9 @@ SMALL_RAD = 0.78
 
 FARTHEST_RAD = 1e9
 """Larger angles are limited to this: its number of quarters fits 32 bits, and the remainder stays below pi/4."""
+
+TANH_IS_1 = 6.297
+"""From here on, `tanh` is 1."""
 
 _RECIPROCALS = (0.0, *(1.0 / k for k in range(1, 22)))  # a multiplication costs a fraction of a division
 
@@ -125,17 +128,21 @@ def power(base: Any, exponent: Any) -> Any:
     return exponential(exponent * logarithm(base))
 
 
-@kernel
-def tanh(x: Any) -> Any:
-    """Return the hyperbolic tangent within 7e-6: its continued fraction to the ninth level, up to 1."""
-    if x >= 6.297:
-        return 1.0
-    if x <= -6.297:
-        return -1.0
+@inlined
+def tanh_fraction(x: Any) -> Any:
+    """Return the continued fraction of the hyperbolic tangent to the ninth level: within 7e-6 up to 1."""
     q = x * x
     above = (((q + 990.0) * q + 135135.0) * q + 4729725.0) * q + 34459425.0
     below = (((45.0 * q + 13860.0) * q + 945945.0) * q + 16216200.0) * q + 34459425.0
     return x * above / below
+
+
+@kernel
+def tanh(x: Any) -> Any:
+    """Return the hyperbolic tangent of a number within 7e-6."""
+    if abs(x) >= TANH_IS_1:
+        return 1.0 if x > 0.0 else -1.0
+    return tanh_fraction(x)
 
 
 @kernel

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from kiks.engine.physics.gripper import ARM_MAX, ARM_START, GAP_MM, GAP_PER_STEP, JAW_LENGTH_MM, JAWS_MAX
-from kiks.engine.sensing.range_finder import turn_to
+from kiks.engine.scalar_math import sin_cos
 from kiks.firmware.turret import Orders, Shape, Site, Turret, Values
 
 BARRIER_BROKEN = 255
@@ -89,7 +89,7 @@ class Gripper(Turret):
     def shapes(self) -> Sequence[Shape]:
         """Return two jaws, drawn as short as the arm's slope makes them from above."""
         record = self.site.record
-        _, cosine = turn_to(START_RAD + RAD_PER_STEP * float(record["arm"]))
+        _, cosine = sin_cos(START_RAD + RAD_PER_STEP * float(record["arm"]))
         inner = GAP_MM + GAP_PER_STEP * float(record["jaws"])
         rim = self.site.spec.body.radius_mm
         near, far = (PIVOT_MM - (reach - PIVOT_MM) * cosine for reach in (rim, rim + JAW_LENGTH_MM))

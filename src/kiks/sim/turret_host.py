@@ -7,7 +7,8 @@ from contextlib import AbstractContextManager
 from typing import Any
 
 from kiks.engine.physics.gripper import find_object
-from kiks.engine.sensing.range_finder import chance, probe
+from kiks.engine.scalar_math import uniform
+from kiks.engine.sensing.range_finder import probe
 from kiks.engine.state import MEMORY_COUNT
 from kiks.errors import ParameterError, nearest, shown
 from kiks.firmware.battle import Battle
@@ -167,7 +168,7 @@ class RobotSite:
     def random(self, index: int = 0, time_ns: int | None = None) -> float:
         """Return a number in [0, 1) that belongs to this seed, robot, turret, time (the present one) and index."""
         time_ns = self._world.now_ns if time_ns is None else time_ns
-        return float(chance(self._world.seed, self._index, self._stream, time_ns, index))
+        return float(uniform(self._world.seed, 0, self._index, self._stream, time_ns, index))
 
     def poses(self) -> list[tuple[float, float, float]]:
         """Return where all robots are, robot 1 first."""

@@ -48,7 +48,7 @@ INVERTED_MM = np.repeat(PATTERNS[:, None, :7], 8, axis=1)
 
 def networks():
     counts = np.empty((len(PATTERNS), 8))
-    respond_networks(pack_networks(NetworkResponse.load()), INVERTED_MM / 50.0, counts)
+    respond_networks(pack_networks(NetworkResponse.load()), False, INVERTED_MM / 50.0, counts)
     return counts
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from kiks.engine.compiling import entry
-from kiks.engine.numbers import sin_cos, uniform
+from kiks.engine.numbers import sin_cos
 from kiks.engine.physics.motion import moment_of
 from kiks.engine.scene import open_scene
 from kiks.engine.sensing.disc_rays import PER_DISC, disc_of, meet_discs, other_tracks, see_all
@@ -50,15 +50,3 @@ def probe(scene: Any, robot: Any, tick_count: Any, time_ns: Any, angle: Any) -> 
         if shade > 0.0:
             length, brightness, met = way, np.int64(shade), disc_of(tracks, k)
     return length * cell, met, brightness
-
-
-@entry
-def turn_to(angle: Any) -> Any:
-    """Return sine and cosine of an angle [rad], the same bits on every machine, for Python."""
-    return sin_cos(angle)
-
-
-@entry
-def chance(seed: Any, robot: Any, stream: Any, time_ns: Any, index: Any) -> Any:
-    """Return a random number in [0, 1) of a robot, a stream and a time, for Python."""
-    return uniform(seed, 0, robot, stream, time_ns, index)

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.engine.compiling import entry, inlined, kernel
-from kiks.engine.simd.lanes import LANES, floor, load, narrow, store, total
+from kiks.engine.numbers import TANH_IS_1, tanh_fraction
+from kiks.engine.simd.lanes import LANES, floor, load, store, total
 from kiks.engine.simd.stack_arrays import stack_narrow
 from kiks.model.robot import SENSOR_COUNT
 from kiks.model.thesis_networks import INPUT_COUNT, TANH_COUNT, NetworkResponse
@@ -53,13 +54,8 @@ _PLACE_VALUES = np.array([TABLE_LEVELS**k for k in range(INPUT_COUNT - 1, -1, -1
 
 @inlined
 def tanh(x: Any) -> Any:
-    """Return hyperbolic tangents within 7e-6: the continued fraction to the ninth level, up to 1."""
-    x = max(-6.297, min(6.297, x))
-    q = x * x
-    above = (((q + 990.0) * q + 135135.0) * q + 4729725.0) * q + 34459425.0
-    below = (((q * 45.0 + 13860.0) * q + 945945.0) * q + 16216200.0) * q + 34459425.0
-    value = x * above / below
-    return max(-1.0, min(1.0, value))
+    """Return hyperbolic tangents in lanes."""
+    return max(-1.0, min(1.0, tanh_fraction(max(-TANH_IS_1, min(TANH_IS_1, x)))))
 
 
 @kernel
@@ -109,31 +105,23 @@ def fill_table(networks: Any, table: Any) -> Any:
 
 
 @entry
-def respond_networks(networks: Any, seen: Any, out: Any) -> Any:
-    """Write the counts of `NETWORKS`, shape [1], for nearnesses [samples, 8, 7] into `out`, shape [samples, 8]."""
+def respond_networks(networks: Any, by_table: Any, seen: Any, out: Any) -> Any:
+    """Write the counts of networks, or of their table, for many nearnesses.
+
+    Args:
+        networks: Records of `NETWORKS`, shape [1].
+        by_table: Whether to look counts up in the table.
+        seen: Nearnesses, shape [samples, 8, 7].
+        out: Output: counts, shape [samples, 8].
+    """
     rays = stack_narrow(LANES)
+    store(rays, 0.0)
     for sample in range(seen.shape[0]):
         for sensor in range(seen.shape[1]):
-            copy_rays(seen[sample, sensor], rays)
-            out[sample, sensor] = network_count(networks[0], sensor, rays)
-
-
-@entry
-def respond_table(table: Any, seen: Any, out: Any) -> Any:
-    """Write the table's counts for many nearnesses, shape [samples, 8, 7], into `out`, shape [samples, 8]."""
-    rays = stack_narrow(LANES)
-    for sample in range(seen.shape[0]):
-        for sensor in range(seen.shape[1]):
-            copy_rays(seen[sample, sensor], rays)
-            out[sample, sensor] = table_count(table, rays)
-
-
-@kernel
-def copy_rays(seen: Any, rays: Any) -> Any:
-    """Copy seven nearnesses into eight lanes."""
-    store(rays, narrow(0.0))
-    for ray in range(INPUT_COUNT):
-        rays[ray] = seen[ray]
+            for ray in range(INPUT_COUNT):
+                rays[ray] = seen[sample, sensor, ray]
+            counts = table_count(networks[0].table, rays) if by_table else network_count(networks[0], sensor, rays)
+            out[sample, sensor] = counts
 
 
 def pack_networks(response: NetworkResponse) -> NDArray[np.void]:

@@ -304,22 +304,6 @@ def _copies(eight: Any, record: Any) -> Any:
                 yield element, source.offset + k * (element.bitwidth // 8), field.offset + k * 8 * LANES
 
 
-def _copy(context: Any, builder: Any, eight: Any, record: Any, arguments: Any, is_loaded: bool) -> None:
-    """Copy the numbers of one lane to a record, or from it."""
-    lanes, lane, one = arguments
-    lanes, one = (builder.bitcast(each, _BYTE.as_pointer()) for each in (lanes, one))
-    lanes = builder.gep(lanes, [builder.mul(lane, ir.Constant(_WORD, 8))], inbounds=True)
-    for kind, there, here in _copies(eight, record):
-        single = _at(builder, one, ir.Constant(_WORD, there), context.get_data_type(kind))
-        number = _at(builder, lanes, ir.Constant(_WORD, here), ir.DoubleType())
-        if is_loaded:
-            value = builder.load(single, align=1)
-            builder.store(context.cast(builder, value, kind, types.float64), number, align=8)
-        else:
-            value = builder.load(number, align=8)
-            builder.store(context.cast(builder, value, types.float64, kind), single, align=1)
-
-
 @_intrinsic
 def fill_lanes(typing: Any, eight: Any, record: Any) -> Any:
     """Copy what a record of eights has of a record into all lanes."""
@@ -336,23 +320,32 @@ def fill_lanes(typing: Any, eight: Any, record: Any) -> Any:
     return types.void(eight, record), generate
 
 
-@_intrinsic
-def load_lane(typing: Any, eight: Any, lane: Any, record: Any) -> Any:
-    """Copy what a record of eights has of a record into a lane."""
+def _lane_copy(is_loaded: bool) -> Any:
+    """Return what copies the numbers of one lane from a record, or to it."""
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        _copy(context, builder, eight, record, arguments, True)
-        return context.get_dummy_value()
+    def copy(typing: Any, eight: Any, lane: Any, record: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            lanes, number_of_lane, one = arguments
+            lanes, one = (builder.bitcast(each, _BYTE.as_pointer()) for each in (lanes, one))
+            lanes = builder.gep(lanes, [builder.mul(number_of_lane, ir.Constant(_WORD, 8))], inbounds=True)
+            for kind, there, here in _copies(eight, record):
+                single = _at(builder, one, ir.Constant(_WORD, there), context.get_data_type(kind))
+                number = _at(builder, lanes, ir.Constant(_WORD, here), ir.DoubleType())
+                if is_loaded:
+                    value = builder.load(single, align=1)
+                    builder.store(context.cast(builder, value, kind, types.float64), number, align=8)
+                else:
+                    value = builder.load(number, align=8)
+                    builder.store(context.cast(builder, value, types.float64, kind), single, align=1)
+            return context.get_dummy_value()
 
-    return types.void(eight, types.int64, record), generate
+        return types.void(eight, types.int64, record), generate
+
+    return _intrinsic(copy)
 
 
-@_intrinsic
-def store_lane(typing: Any, eight: Any, lane: Any, record: Any) -> Any:
-    """Copy what a record of eights has of a record from a lane."""
+load_lane = _lane_copy(True)
+"""Copies what a record of eights has of a record into a lane: the eights, the lane, the record."""
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        _copy(context, builder, eight, record, arguments, False)
-        return context.get_dummy_value()
-
-    return types.void(eight, types.int64, record), generate
+store_lane = _lane_copy(False)
+"""Copies what a record of eights has of a record from a lane."""

@@ -21,16 +21,16 @@ _pack: Any = cgutils.pack_array
 _CACHE_LINE = 64  # bytes
 
 
-def _on_the_stack(count: Any, element_type: Any) -> Any:
+def _on_the_stack(element_type: Any, *kinds: Any) -> Any:
     """Return signature and code of an intrinsic that makes an array on the stack; None if its length is no constant."""
-    if not isinstance(count, types.IntegerLiteral):
+    if not isinstance(kinds[0], types.IntegerLiteral):
         return None
     array_type = types.Array(element_type, 1, "C")
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        content = context.get_data_type(element_type)
+        content, count = context.get_data_type(element_type), kinds[0].literal_value
         with builder.goto_entry_block():
-            memory = builder.alloca(ir.ArrayType(content, count.literal_value))
+            memory = builder.alloca(ir.ArrayType(content, count))
             memory.align = _CACHE_LINE
         size = context.get_value_type(types.intp)
         bytes_each = size(context.get_abi_sizeof(content))
@@ -38,7 +38,7 @@ def _on_the_stack(count: Any, element_type: Any) -> Any:
         _arrays.populate_array(
             array,
             data=builder.bitcast(memory, content.as_pointer()),
-            shape=_pack(builder, [size(count.literal_value)]),
+            shape=_pack(builder, [size(count)]),
             strides=_pack(builder, [bytes_each]),
             itemsize=bytes_each,
             meminfo=None,
@@ -46,40 +46,28 @@ def _on_the_stack(count: Any, element_type: Any) -> Any:
         )
         return array._getvalue()
 
-    return array_type(count), generate
+    return array_type(*kinds), generate
 
 
-@_intrinsic
-def stack_floats(typing: Any, count: Any) -> Any:
-    """Return an uninitialised float64 array on the stack, of a length that is a constant; it dies with its function."""
-    return _on_the_stack(count, types.float64)
+def _stack(element_type: Any) -> Any:
+    """Return what makes an uninitialised array on the stack, of a length that is a constant."""
+
+    def make(typing: Any, count: Any) -> Any:
+        return _on_the_stack(element_type, count)
+
+    return _intrinsic(make)
 
 
-@_intrinsic
-def stack_narrow(typing: Any, count: Any) -> Any:
-    """Return an uninitialised float32 array on the stack, of a length that is a constant; it dies with its function."""
-    return _on_the_stack(count, types.float32)
-
-
-@_intrinsic
-def stack_integers(typing: Any, count: Any) -> Any:
-    """Return an uninitialised int64 array on the stack, of a length that is a constant; it dies with its function."""
-    return _on_the_stack(count, types.int64)
-
-
-@_intrinsic
-def stack_booleans(typing: Any, count: Any) -> Any:
-    """Return an uninitialised bool array on the stack, of a length that is a constant; it dies with its function."""
-    return _on_the_stack(count, types.boolean)
+stack_floats, stack_narrow, stack_integers, stack_booleans = (
+    _stack(kind) for kind in (types.float64, types.float32, types.int64, types.boolean)
+)
+"""Each makes an uninitialised array on the stack, of a length that is a constant; it dies with its function."""
 
 
 @_intrinsic
 def stack_records(typing: Any, count: Any, record_type: Any) -> Any:
     """Return an uninitialised array of records on the stack, of a length and a type that are constants."""
-    if not isinstance(count, types.IntegerLiteral):
-        return None
-    signature, generate = _on_the_stack(count, record_type.dtype)
-    return signature.return_type(count, record_type), generate
+    return _on_the_stack(record_type.dtype, count, record_type)
 
 
 @_intrinsic
