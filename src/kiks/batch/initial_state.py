@@ -248,20 +248,18 @@ def random_starts(
         ParameterError: If the arena has too few free places.
     """
     rng = np.random.default_rng(seed)
-    poses: list[NDArray[np.float64]] = []
-    found = 0
+    poses = np.zeros((0, 3))
     for _ in range(1000):
-        if found >= count:
+        if len(poses) >= count:
             break
         tried = rng.uniform((0, 0, -math.pi), (arena.width_mm, arena.height_mm, math.pi), (2 * count + 100, 3))
         free = np.array([arena.free_for(x_mm, y_mm, radius_mm + clear_mm) for x_mm, y_mm, _ in tried.tolist()])
         for body in arena.bodies:
             free &= np.hypot(tried[:, 0] - body.x_mm, tried[:, 1] - body.y_mm) > radius_mm + clear_mm + body.radius_mm
-        poses.append(tried[free])
-        found += int(free.sum())
-    if found < count:
+        poses = np.concatenate([poses, tried[free]])
+    if len(poses) < count:
         raise ParameterError(
-            f"the arena {shown(arena.name)} must have free places for a robot of {radius_mm:g} mm, but only {found} of "
-            f"{count} were found. Take a larger one, or a smaller clear_mm."
+            f"the arena {shown(arena.name)} must have free places for a robot of {radius_mm:g} mm, but only "
+            f"{len(poses)} of {count} were found. Take a larger one, or a smaller clear_mm."
         )
-    return np.concatenate(poses)[:count]
+    return poses[:count]

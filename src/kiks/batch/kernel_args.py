@@ -7,21 +7,7 @@ from typing import Any
 
 Worlds: Any = namedtuple(
     "Worlds",
-    (
-        "line",
-        "sense_codes",
-        "ticks",
-        "begins_ns",
-        "watched_ns",
-        "sensed_ns",
-        "steps",
-        "sensors",
-        "wheels",
-        "turns",
-        "memory",
-        "parameters",
-        "notes",
-    ),
+    "line sense_codes ticks begins_ns watched_ns sensed_ns steps sensors wheels turns memory parameters notes",
 )
 """What the loop knows of all worlds of a batch.
 

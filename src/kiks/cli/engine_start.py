@@ -18,7 +18,8 @@ def ready_engine(*, as_needed: bool = False) -> None:
         as_needed: Whether to leave each kernel to its first call. That suits a run that calls few of them and has no
             other program waiting.
     """
-    from kiks.engine.compiling import LAST, is_compiled
+    from kiks.engine.code_cache import is_compiled
+    from kiks.engine.compiling import LAST
 
     if not is_compiled("advance" if as_needed else LAST):
         typer.echo("Compiling the engine for this computer: once, a minute or so ...", err=True)
@@ -28,7 +29,7 @@ def ready_engine(*, as_needed: bool = False) -> None:
 
 def ready_batch() -> None:
     """Compile the engine, and print a line if the batch, which is compiled at its first run, is not in the cache."""
-    from kiks.engine.compiling import is_compiled
+    from kiks.engine.code_cache import is_compiled
 
     ready_engine()
     if not is_compiled("roll_out"):

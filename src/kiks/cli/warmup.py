@@ -14,10 +14,11 @@ def warmup() -> None:
     """
     from time import perf_counter
 
-    from kiks.engine.compiling import is_compiled
+    from kiks.engine.code_cache import is_compiled
+    from kiks.engine.compiling import LAST
 
     start_s = perf_counter()
-    if is_compiled() and is_compiled("roll_out"):
+    if is_compiled(LAST) and is_compiled("roll_out"):
         compile_everything()
         compile_batch()
     else:

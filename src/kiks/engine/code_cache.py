@@ -129,8 +129,8 @@ class CodeCache:
             )
 
 
-def is_kept(name: str) -> bool:
-    """Return whether there is machine code of a function on the disk."""
+def is_compiled(name: str) -> bool:
+    """Return whether there is machine code of a function on the disk, so that its first call is quick."""
     return any(_files(f"*.{name}"))
 
 

@@ -11,7 +11,7 @@ from typing import Any
 from numba import njit
 
 from kiks.ending import send_again_what_is_dropped
-from kiks.engine.code_cache import CodeCache, is_kept
+from kiks.engine.code_cache import CodeCache
 from kiks.engine.processor import processor
 
 # The first function that Numba is shown makes its compiler, which stays as it is.
@@ -51,12 +51,3 @@ def entry(function: Callable[..., Any]) -> Any:
     dispatcher: Any = njit(**_OPTIONS)(function)
     dispatcher._cache = CodeCache(function)
     return dispatcher
-
-
-def is_compiled(name: str = LAST) -> bool:
-    """Return whether the machine code of a function that Python calls is on the disk, so that its first call is quick.
-
-    Args:
-        name: Name of the function; the last of the engine if left out.
-    """
-    return is_kept(name)

@@ -14,7 +14,8 @@ from typing import Any
 from kiks.desk.server.desk import Desk, NewsHandler
 from kiks.desk.server.frames import pack_frame
 from kiks.desk.server.server import SERVER
-from kiks.engine.compiling import is_compiled
+from kiks.engine.code_cache import is_compiled
+from kiks.engine.compiling import LAST
 from kiks.sim.simulation import Simulation
 from kiks.units import NS_PER_S
 
@@ -88,7 +89,7 @@ class Shown:
 
     def __init__(self, desk: Desk, *, host: str = "127.0.0.1", port: int | None = None) -> None:
         self.desk = desk
-        if not is_compiled():
+        if not is_compiled(LAST):
             _log.warning("Compiling the engine for this computer: once, a minute or so ...")
         with desk.sim.lock:
             # Compile the code for frames before the first browser waits for it.

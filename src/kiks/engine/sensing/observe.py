@@ -121,12 +121,8 @@ def read_all(scene: Any, tick_count: Any, time_ns: Any, proximity: Any, ambient:
     for first in range(0, proximity.shape[0], READERS):
         count = min(READERS, proximity.shape[0] - first)
         for k in range(count):
-            readers.worlds[k], readers.robots[k], readers.ticks[k], readers.times_ns[k] = (
-                0,
-                first + k,
-                tick_count,
-                time_ns,
-            )
+            readers.worlds[k], readers.robots[k] = 0, first + k
+            readers.ticks[k], readers.times_ns[k] = tick_count, time_ns
         sense_proximity(scene, readers, count, True, proximity[first : first + READERS])
     for robot in range(proximity.shape[0]):
         sense_ambient(scene, 0, robot, tick_count, time_ns, True, ambient[robot])
