@@ -10,12 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kiks
+from kiks.control import neural_nets
 from kiks.control.controller import whole_speeds
-from kiks.control.neural_nets import exponential_between
+from kiks.engine.compiling import callable_kernel
 
 BOTH = ("proximity", "ambient")
 
 Trace = np.ndarray[Any, np.dtype[np.float64]]
+
+EXPONENTIAL_BETWEEN = callable_kernel(neural_nets.exponential_between.py_func)
 
 
 def outputs(controller: kiks.Controller, parameters: Any, sensors: Any) -> Trace:
@@ -114,7 +117,7 @@ def test_ctrnn_of_any_time_constant_stays_in_its_bounds(logarithm: float) -> Non
 @settings(max_examples=50)
 @given(st.floats(-6, 6))
 def test_exponential_between(x: float) -> None:
-    assert exponential_between(x) == pytest.approx(np.exp(np.clip(x, -4, 4)), rel=1e-3)
+    assert EXPONENTIAL_BETWEEN(x) == pytest.approx(np.exp(np.clip(x, -4, 4)), rel=1e-3)
 
 
 @pytest.mark.slow

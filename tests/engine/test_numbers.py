@@ -10,7 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from kiks.engine.numbers import exponential, logarithm, power, sin_cos, sinc, uniform
+from kiks.engine import numbers
+from kiks.engine.compiling import callable_kernel
+from kiks.engine.scalar_math import exponential, logarithm, power, sin_cos, uniform
+
+sinc = callable_kernel(numbers.sinc.py_func)
 
 LAW = settings(derandomize=True, max_examples=500)
 

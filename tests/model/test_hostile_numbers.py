@@ -14,7 +14,8 @@ from tests.engine.checked_worlds import furnished, sense_everything
 
 import kiks
 from kiks import controllers, measures
-from kiks.engine.numbers import FARTHEST_RAD, sin_cos
+from kiks.engine.numbers import FARTHEST_RAD
+from kiks.engine.scalar_math import sin_cos
 from kiks.errors import SHOWN_MAX, KiksError
 from kiks.model.arena import Arena
 from kiks.model.array_checks import check_numbers

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from kiks.control.compiled_function import address_of, caller_of
 from kiks.control.controller import Controller
 from kiks.control.measure import Measure, Moment
-from kiks.engine.compiling import kernel
+from kiks.engine.compiling import callable_kernel
 from kiks.engine.state import BODY
 
 _types: Any = types
@@ -54,7 +54,7 @@ def decider_of(controller: Controller) -> Any:
     """
     decide = controller.kernel
 
-    @kernel
+    @callable_kernel
     def decide_all(numbers: Any, is_on: Any, sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
         for k in range(numbers.shape[0]):
             if is_on[k]:

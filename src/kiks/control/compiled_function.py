@@ -9,7 +9,7 @@ from typing import Any
 from numba import extending, types
 from numba.core import errors
 
-from kiks.engine.compiling import kernel
+from kiks.engine.compiling import callable_kernel
 from kiks.errors import ParameterError, shown
 
 # Numba annotates these in part, and not as they are used.
@@ -49,7 +49,7 @@ class Compiled:
         self.function = function
         self.name = function.__name__
         self._what = what
-        self.kernel = kernel(function)
+        self.kernel = callable_kernel(function)
 
     def refused(self, error: Exception) -> ParameterError:
         """Return the message if Numba cannot compile it."""

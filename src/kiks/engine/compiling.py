@@ -1,5 +1,8 @@
 """How kernels are compiled: the same bits on every machine, and from the disk cache at the second start.
 
+Method: machine code is made of entries alone, for they contain all that they call. What Numba would make of each other
+kernel besides would take a third of the time of a first start.
+
 Need: `fastmath` would let the compiler reorder sums, and then the bits depend on the width of the processor's vectors.
 """
 
@@ -9,6 +12,7 @@ from collections.abc import Callable
 from typing import Any
 
 from numba import njit
+from numba.core import codegen, compiler
 
 from kiks.ending import send_again_what_is_dropped
 from kiks.engine.code_cache import CodeCache
@@ -22,12 +26,46 @@ send_again_what_is_dropped()
 LAST = "fill_table"
 """The function that `kiks warmup` compiles last: where it is, a start that was interrupted has not left others out."""
 
+# Numba annotates these in part, and not as they are used here.
+_njit: Any = njit
+_Library: Any = codegen.JITCodeLibrary
+_Pipeline: Any = compiler.Compiler
+
+
+class _Part(_Library):  # type: ignore[misc, unused-ignore]
+    """The code of a kernel, without machine code: that is made of what the kernel is linked into."""
+
+    def _finalize_final_module(self) -> None:
+        self._finalized = True
+
+
+class _PartPipeline(_Pipeline):  # type: ignore[misc, unused-ignore]
+    def define_pipelines(self) -> Any:
+        """Return Numba's passes; the last one shall only keep the code."""
+        state = self.state
+        state.library = _Part(state.targetctx.codegen(), state.func_id.func_qualname)
+        # Numba knows each function by what Python would call: this is one that raises.
+        refusal = f"{{{state.func_id.func_name} is for kernels}}".format
+        state.targetctx.get_executable = lambda library, description, environment: refusal
+        return super().define_pipelines()
+
+
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "nogil": True}
+_PART: dict[str, Any] = _OPTIONS | {
+    "pipeline_class": _PartPipeline,
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+}
 
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile a function that only other kernels call."""
-    return njit(**_OPTIONS)(function)
+    return _njit(**_PART)(function)
+
+
+def callable_kernel(function: Callable[..., Any]) -> Any:
+    """Compile a function that is called by Python or at its address as well."""
+    return _njit(**_OPTIONS)(function)
 
 
 def inlined(function: Callable[..., Any]) -> Any:
@@ -35,7 +73,7 @@ def inlined(function: Callable[..., Any]) -> Any:
 
     For pieces of a sensor's reading: called, they would cost a sixth of it more, as lanes then go by way of memory.
     """
-    return njit(forceinline=True, **_OPTIONS)(function)
+    return _njit(forceinline=True, **_PART)(function)
 
 
 def spliced(function: Callable[..., Any]) -> Any:
@@ -43,11 +81,11 @@ def spliced(function: Callable[..., Any]) -> Any:
 
     For large ones with one caller: what they call is then linked and compiled once, not again at each level.
     """
-    return njit(inline="always", **_OPTIONS)(function)
+    return _njit(inline="always", **_OPTIONS)(function)
 
 
 def entry(function: Callable[..., Any]) -> Any:
     """Compile a function that Python calls, and keep the machine code on disk."""
-    dispatcher: Any = njit(**_OPTIONS)(function)
+    dispatcher: Any = _njit(no_cfunc_wrapper=True, **_OPTIONS)(function)
     dispatcher._cache = CodeCache(function)
     return dispatcher

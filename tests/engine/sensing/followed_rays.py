@@ -57,3 +57,9 @@ def meet_discs_of(seen, count, cosines, sines, out):
     store(out[0], lengths)
     store(out[1], squarely)
     store(out[2], shades)
+
+
+@entry
+def meet_discs_alone(seen, count, cosine, sine, reach):
+    """Follow one ray from (0, 0) to discs; return its hit."""
+    return meet_discs(seen, count, 0.0, 0.0, cosine, sine, reach, 1.0, 0.0)

@@ -11,9 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.at_length import share
 from tests.engine.same_walls import with_things
-from tests.engine.sensing.followed_rays import meet_discs_of
+from tests.engine.sensing.followed_rays import meet_discs_alone, meet_discs_of
 
-from kiks.engine.sensing.disc_rays import meet_discs
 from kiks.engine.simd.lanes import LANES
 from kiks.model.arena import Arena
 from kiks.model.arena_objects import Ball, Cylinder, Lamp, Pose
@@ -58,7 +57,7 @@ def test_rays_meet_the_first_disc(draw, count):
         expected, which = meet_by_quadratic(discs, 0.0, 0.0, angle, reach)
         assert lengths[lane] == pytest.approx(expected, abs=1e-6)
         assert shades[lane] == (0 if which is None else which + 1)
-        alone = meet_discs(seen, count, 0.0, 0.0, math.cos(angle), math.sin(angle), reach, 1.0, 0.0)
+        alone = meet_discs_alone(seen, count, math.cos(angle), math.sin(angle), reach)
         assert alone == (lengths[lane], squarely[lane], shades[lane])
         if which is not None and lengths[lane] > 0.0:
             hit = lengths[lane] * np.array([math.cos(angle), math.sin(angle)])
