@@ -1,9 +1,8 @@
 """How kernels are compiled: the same bits on every machine, and from the disk cache at the second start.
 
-Method: machine code is made of entries alone, for they contain all that they call. What Numba would make of each other
-kernel besides would take a third of the time of a first start.
-
 Need: `fastmath` would let the compiler reorder sums, and then the bits depend on the width of the processor's vectors.
+Method: only entries get machine code, for they contain all that they call. What Numba would make of each other kernel
+besides takes a quarter of the time of a first start.
 """
 
 from __future__ import annotations

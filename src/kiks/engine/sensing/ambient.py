@@ -163,7 +163,8 @@ def hiding_tracks(scene: Any, world: Any, robot: Any) -> Any:
 def distance_from_way(robot: Any, lamp: Any, x: Any, y: Any) -> Any:
     """Return the distance of a place from the way between a robot and a lamp [mm]."""
     way_x, way_y, dx, dy = lamp[0] - robot.x_mm, lamp[1] - robot.y_mm, x - robot.x_mm, y - robot.y_mm
-    along = min(max((dx * way_x + dy * way_y) / max(way_x * way_x + way_y * way_y, _NEAREST_MM), 0.0), 1.0)
+    square = way_x * way_x + way_y * way_y
+    along = min(max((dx * way_x + dy * way_y) / square, 0.0), 1.0) if square > 0.0 else 0.0
     aside_x, aside_y = dx - along * way_x, dy - along * way_y
     return math.sqrt(aside_x * aside_x + aside_y * aside_y)
 

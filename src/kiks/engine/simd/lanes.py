@@ -117,7 +117,7 @@ def offer(symbol: Any, define: Any, fits: Callable[..., bool]) -> None:
     _templates.infer_global(symbol, types.Function(template))
 
 
-def _offer(lanes: Any, operate: Callable[..., Any], *symbols: Any, result: Any = None) -> None:
+def _offer_on(lanes: Any, operate: Callable[..., Any], *symbols: Any, result: Any = None) -> None:
     """Let kernels use a function or operator on lanes of a type, or on some and numbers.
 
     Args:
@@ -197,12 +197,12 @@ _COMPARISONS = (
 
 for _lanes in (F64X8, F32X8):
     for _operate, _symbols in _FLOAT_OPERATORS:
-        _offer(_lanes, _operate, *_symbols)
+        _offer_on(_lanes, _operate, *_symbols)
     for _sign, _symbol in _COMPARISONS:
-        _offer(_lanes, _comparison(_sign), _symbol, result=MASK)
+        _offer_on(_lanes, _comparison(_sign), _symbol, result=MASK)
 for _lanes, _operators in ((U64X8, _WORD_OPERATORS), (MASK, _MASK_OPERATORS)):
     for _name, _symbol in _operators:
-        _offer(_lanes, _instruction(_name), _symbol)
+        _offer_on(_lanes, _instruction(_name), _symbol)
 
 
 # ---- functions, for a number as well ----
