@@ -22,7 +22,7 @@ from kiks.engine.scene import open_scene
 from kiks.engine.sensing.ambient import sense_ambient
 from kiks.engine.sensing.proximity import READERS, make_readers, sense_proximity
 from kiks.engine.simd.lanes import LANES
-from kiks.engine.simd.stack_arrays import borrowed, keep_alive, stack_booleans, stack_integers
+from kiks.engine.simd.stack_arrays import stack_booleans, stack_integers
 from kiks.engine.step import advance_bunch
 from kiks.model.robot import SENSOR_COUNT
 from kiks.units import NS_PER_S, TICK_NS
@@ -225,20 +225,28 @@ def roll_out(scene: Any, worlds: Any, size: Any, block: Any, span: Any, callback
         callbacks: Address of the kernel that calls a controller for each world of a bunch (`kiks.batch.callbacks`), 0
             if `worlds.wheels` holds the speeds already; and the measures (`kiks.batch.callbacks.watchers_of`).
     """
-    scene, worlds = open_scene(scene[0]), borrowed(worlds)
+    scene = open_scene(scene[0])
+    lanes, room = make_lanes(size * scene.robots.shape[1]), make_room(scene, size)
+    roll_out_block(scene, worlds, size, block, span, callbacks, lanes, room)
+
+
+@kernel
+def roll_out_block(
+    scene: Any, worlds: Any, size: Any, block: Any, span: Any, callbacks: Any, lanes: Any, room: Any
+) -> Any:
+    """Do what `roll_out` does, in an open scene, with memory as for `kiks.engine.bunch.take`."""
     first_half, end_half, until_ns = span
-    decider, watchers = callbacks[0], borrowed(callbacks[1])
+    decider, watchers = callbacks
     all_numbers, all_times_ns, all_on = stack_integers(LANES), stack_integers(LANES), stack_booleans(LANES)
     ticks = stack_integers(LANES)
     readers, counts = make_readers(), stack_integers(_READINGS).reshape((READERS, SENSOR_COUNT))
-    lanes, room = make_lanes(size * scene.robots.shape[1]), make_room(scene, size)
     for first in range(0, block.shape[0], size):
         count = min(size, block.shape[0] - first)
         numbers, times_ns, is_on = all_numbers[:count], all_times_ns[:count], all_on[:count]
-        numbers[:], is_on[:] = block[first : first + count], True
         for k in range(count):
+            numbers[k], is_on[k] = block[first + k], True
             ticks[k] = worlds.ticks[numbers[k]]
-        bunch = borrowed(take(scene, numbers, ticks[:count], borrowed(lanes), borrowed(room)))
+        bunch = take(scene, numbers, ticks[:count], lanes, room)
         for half in range(first_half, end_half):
             if half % 2 == 0:
                 if not mask_ended(worlds, numbers, is_on, until_ns):
@@ -256,4 +264,3 @@ def roll_out(scene: Any, worlds: Any, size: Any, block: Any, span: Any, callback
         give_back(scene, bunch)
         for k in range(count):
             worlds.ticks[numbers[k]] = ticks[k]
-    keep_alive(lanes, room)

@@ -26,7 +26,7 @@ from kiks.engine.scene import open_scene
 from kiks.engine.simd.lanes import LANES, load
 from kiks.engine.simd.masks import anywhere, everywhere, holds, opposite
 from kiks.engine.simd.records import copy_lanes, copy_record8, one_of, open_record8
-from kiks.engine.simd.stack_arrays import borrowed, keep_alive, stack_integers
+from kiks.engine.simd.stack_arrays import stack_integers
 
 
 @entry
@@ -39,13 +39,17 @@ def advance(scene: Any, tick: Any, tick_count: Any) -> Any:
         tick_count: Ticks to do.
     """
     scene = open_scene(scene[0])
+    advance_world(scene, tick, tick_count, make_lanes(scene.robots.shape[1]), make_room(scene, 1))
+
+
+@kernel
+def advance_world(scene: Any, tick: Any, tick_count: Any, lanes: Any, room: Any) -> Any:
+    """Let time pass in the first world of an open scene; memory as for `kiks.engine.bunch.take`."""
     worlds, ticks, until = stack_integers(1), stack_integers(1), stack_integers(1)
     worlds[0], ticks[0], until[0] = 0, tick, tick + tick_count
-    lanes, room = make_lanes(scene.robots.shape[1]), make_room(scene, 1)
-    bunch = borrowed(take(scene, worlds, ticks, borrowed(lanes), borrowed(room)))
+    bunch = take(scene, worlds, ticks, lanes, room)
     advance_bunch(scene, bunch, until)
     give_back(scene, bunch)
-    keep_alive(lanes, room)
 
 
 @kernel

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from kiks.engine.compiling import entry, inlined, kernel
+from kiks.engine.compiling import allocating, entry, inlined, kernel
 from kiks.engine.grid import count_discs, disc_at, is_on_floor
 from kiks.engine.numbers import power, sin_cos, uniform
 from kiks.engine.physics.motion import moment_of
@@ -136,7 +136,7 @@ def is_burning(lamps: Any, number: Any) -> Any:
     return lamps[number, 3] > 0.0 and lamps[number, 2] > 0.0
 
 
-@kernel
+@allocating
 def hiding_tracks(scene: Any, world: Any, robot: Any) -> Any:
     """Return the tracks of discs that may hide a lamp from a robot, their number, and memory for the visible discs."""
     state, lamps = scene.robots[world, robot], scene.lamps[world]
@@ -169,7 +169,7 @@ def distance_from_way(robot: Any, lamp: Any, x: Any, y: Any) -> Any:
     return math.sqrt(aside_x * aside_x + aside_y * aside_y)
 
 
-@kernel
+@allocating
 def sense_ambient(scene: Any, world: Any, robot: Any, tick_count: Any, time_ns: Any, is_noisy: Any, out: Any) -> Any:
     """Write the eight counts that command O returns at a time into `out`, each sampled at its own instant.
 

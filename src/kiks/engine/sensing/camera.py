@@ -84,7 +84,8 @@ def smear(grey: Any, half_width: Any) -> Any:
     for p in range(PIXEL_COUNT):
         low, high = p + 0.5 - half_width[p], p + 0.5 + half_width[p]
         mean[p] = (integral(sums, grey, high) - integral(sums, grey, low)) / (2.0 * half_width[p])
-    grey[:] = mean
+    for p in range(PIXEL_COUNT):
+        grey[p] = mean[p]
 
 
 @kernel

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from kiks.engine.compiling import inlined, kernel
+from kiks.engine.compiling import allocating, inlined, kernel
 from kiks.engine.grid import count_discs, is_on_floor
 from kiks.engine.simd.lanes import LANES, root, store, wide
 from kiks.engine.simd.masks import anywhere, choose, holds
@@ -230,7 +230,7 @@ def hides(seen: Any, k: Any, column: Any, row: Any, cosine: Any, sine: Any, reac
     return 0.0 < along < reach and abs(aside) < radius and not is_over
 
 
-@kernel
+@allocating
 def other_tracks(scene: Any, world: Any, itself: Any) -> Any:
     """Return the tracks of all discs of a world except one, their number, and memory for the visible discs."""
     found, count = np.empty(count_discs(scene)[1], np.int64), 0
@@ -241,7 +241,7 @@ def other_tracks(scene: Any, world: Any, itself: Any) -> Any:
     return note_tracks(scene, world, found, count)
 
 
-@kernel
+@allocating
 def note_tracks(scene: Any, world: Any, found: Any, count: Any) -> Any:
     """Return the tracks of some discs, their number, and memory for the visible discs."""
     tracks = np.empty(PER_TRACK * count, np.float64)

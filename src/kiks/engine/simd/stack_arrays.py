@@ -1,7 +1,7 @@
-"""Scratch arrays on the stack, and arrays whose references are not counted.
+"""Scratch arrays on the stack.
 
-Need: an array of NumPy costs an allocation, and each call that passes one counts references; both take longer than a
-tick. And the compiler makes vector code only where it can prove that nothing else overlaps an array.
+Need: an array of NumPy costs an allocation, which takes longer than a tick. And the compiler makes vector code only
+where it can prove that nothing else overlaps an array.
 """
 
 from __future__ import annotations
@@ -68,38 +68,3 @@ stack_floats, stack_narrow, stack_integers, stack_booleans = (
 def stack_records(typing: Any, count: Any, record_type: Any) -> Any:
     """Return an uninitialised array of records on the stack, of a length and a type that are constants."""
     return _on_the_stack(record_type.dtype, count, record_type)
-
-
-@_intrinsic
-def borrowed(typing: Any, value: Any) -> Any:
-    """Return arrays, or tuples of them, without reference counting; the caller of the entry point keeps them alive.
-
-    Counting them at each call of a kernel that is not compiled into its caller would cost a sixth of a batch's time.
-    """
-
-    def borrow(context: Any, builder: Any, kind: Any, arrays: Any) -> Any:
-        if isinstance(kind, types.BaseTuple):
-            kinds: Any = tuple(kind)  # type: ignore[arg-type, unused-ignore]
-            parts = [borrow(context, builder, each, builder.extract_value(arrays, k)) for k, each in enumerate(kinds)]
-            return context.make_tuple(builder, kind, parts)
-        if isinstance(kind, types.Array):
-            array = _arrays.make_array(kind)(context, builder, arrays)
-            array.meminfo = ir.Constant(array.meminfo.type, None)
-            array.parent = ir.Constant(array.parent.type, None)
-            return array._getvalue()
-        return arrays
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return borrow(context, builder, value, arguments[0])
-
-    return value(value), generate
-
-
-@_intrinsic
-def keep_alive(typing: Any, *values: Any) -> Any:
-    """Do nothing: arrays that were borrowed live up to here."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return context.get_dummy_value()
-
-    return types.void(types.BaseTuple.from_types(values)), generate  # type: ignore[no-untyped-call, unused-ignore]
