@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from kiks.engine.compiling import inlined, kernel, spliced
-from kiks.engine.grid import PAIRS_PER_DISC, count_discs, enter_all, has_changed, note_places
+from kiks.engine.grid import PAIRS_PER_DISC, count_discs, enter_all, has_changed, note_moves, note_places
 from kiks.engine.simd.lanes import LANES
 from kiks.engine.simd.records import EIGHT, EIGHT_KINDS, fill_lanes, load_lane, one_of, open_record8, store_lane
 from kiks.engine.simd.stack_arrays import stack_integers, stack_records
@@ -146,6 +146,7 @@ def take(scene: Any, worlds: Any, ticks: Any, lanes: Any, room: Any) -> Any:
                 fill_lanes(eights, robot)
                 fill_lanes(kinds, scene.kinds[robot.kind])
                 eights.is_near[:] = 0.0
+                eights.room_mm[:] = 0.0
             else:
                 load_lane(eights, lane, robot)
                 load_lane(kinds, lane, scene.kinds[robot.kind])
@@ -198,30 +199,50 @@ def robot_in(scene: Any, bunch: Any, k: Any, number: Any) -> Any:
 
 
 @kernel
-def show_poses(scene: Any, bunch: Any) -> Any:
-    """Write the robots' poses to the scene."""
-    for k in range(bunch.worlds.shape[0]):
-        for number in range(scene.robots.shape[1]):
-            one, robot = robot_in(scene, bunch, k, number)
-            robot.x_mm, robot.y_mm, robot.heading_rad = one.x_mm, one.y_mm, one.heading_rad
+def show_moves(scene: Any, bunch: Any, k: Any) -> Any:
+    """Write the poses of a world's robots to the scene, and note how far its things have moved in this tick."""
+    world, room, body_count = bunch.worlds[k], bunch.room, scene.bodies.shape[1]
+    longest, second = 0.0, 0.0  # squares of the two longest ways
+    for number in range(scene.robots.shape[1]):
+        one, robot = robot_in(scene, bunch, k, number)
+        copy_pose(one, robot)
+        square = square_of_move(one)
+        longest, second = max(longest, square), max(second, min(longest, square))
+    for place in range(room.awake_counts[k]):
+        square = square_of_move(scene.bodies[world, room.awake[body_count * k + place]])
+        longest, second = max(longest, square), max(second, min(longest, square))
+    note_moves(scene, world, math.sqrt(longest), math.sqrt(second))
+
+
+@inlined
+def square_of_move(thing: Any) -> Any:
+    """Return the square of how far a robot or body has moved since the last tick boundary that it remembers [mm^2]."""
+    dx, dy = thing.x_mm - thing.trail[0, 0], thing.y_mm - thing.trail[0, 1]
+    return dx * dx + dy * dy
 
 
 @kernel
 def show_tracks(scene: Any, bunch: Any) -> Any:
     """Write the robots' present and past poses to the scene, for sensors."""
-    show_poses(scene, bunch)
     for k in range(bunch.worlds.shape[0]):
         for number in range(scene.robots.shape[1]):
             one, robot = robot_in(scene, bunch, k, number)
+            copy_pose(one, robot)
             for ago in range(TRAIL_LENGTH):
                 for axis in range(3):
                     robot.trail[ago, axis] = one.trail[ago, axis]
 
 
 @inlined
+def copy_pose(source: Any, target: Any) -> Any:
+    """Copy the pose of a robot."""
+    target.x_mm, target.y_mm, target.heading_rad = source.x_mm, source.y_mm, source.heading_rad
+
+
+@inlined
 def copy_motion(source: Any, target: Any) -> Any:
     """Copy what a collision changes of a robot."""
-    target.x_mm, target.y_mm, target.heading_rad = source.x_mm, source.y_mm, source.heading_rad
+    copy_pose(source, target)
     target.forwards_mm, target.backwards_mm = source.forwards_mm, source.backwards_mm
     for wheel in range(2):
         target.wheel_pulses[wheel] = source.wheel_pulses[wheel]

@@ -29,6 +29,8 @@ NEAR_LIMIT = 128
 PAIRS_PER_DISC = 32
 """Space for pairs per disc: discs that do not overlap cannot have as many neighbours of their own size or larger."""
 
+_ROUNDED_MM = 1e-6  # more than the rounding of the ways in a tick
+
 Grid: Any = namedtuple("Grid", ("begins", "entries", "spots", "pairs", "places", "crowds", "widest_mm"))
 """The grid of each world.
 
@@ -181,6 +183,14 @@ def list_pairs(scene: Any, world: Any, reach_mm: Any) -> Any:
                     pairs[world, crowd.pair_count, 0], pairs[world, crowd.pair_count, 1] = disc, found[k]
                     crowd.pair_count += 1
     crowd.slack_mm = reach_mm
+
+
+@kernel
+def note_moves(scene: Any, world: Any, longest_mm: Any, second_mm: Any) -> Any:
+    """Note how far the discs of a world have moved in a tick: the longest way and the second longest [mm]."""
+    crowd = scene.grid.crowds[world]
+    crowd.slack_mm -= longest_mm + second_mm + _ROUNDED_MM
+    crowd.moved_mm += longest_mm + _ROUNDED_MM
 
 
 @kernel

@@ -11,7 +11,7 @@ from kiks.engine.bunch import (
     make_room,
     robot_in,
     set_end,
-    show_poses,
+    show_moves,
     take,
     wake_all,
     whose,
@@ -20,11 +20,11 @@ from kiks.engine.compiling import entry, inlined, kernel
 from kiks.engine.physics.collisions import collide_near_things, find_near_things, remember_places
 from kiks.engine.physics.grasp import carry_lifted
 from kiks.engine.physics.gripper import tend_grippers
-from kiks.engine.physics.motion import move, note_contact, remember_pose
+from kiks.engine.physics.motion import move, note_contact, remember_pose, room_of
 from kiks.engine.physics.motor import control_motors, latch_encoders, turn_motors
 from kiks.engine.scene import open_scene
 from kiks.engine.simd.lanes import LANES, load
-from kiks.engine.simd.masks import anywhere, everywhere, holds, opposite
+from kiks.engine.simd.masks import anywhere, choose, everywhere, holds, opposite
 from kiks.engine.simd.records import copy_lanes, copy_record8, one_of, open_record8
 from kiks.engine.simd.stack_arrays import stack_integers
 
@@ -67,10 +67,10 @@ def advance_bunch(scene: Any, bunch: Any, until: Any) -> Any:
             if bunch.ticks[k] < until[k] and (bunch.has_company or bunch.has_grippers):
                 meet_others(scene, bunch, k)
         move_freely(scene, bunch)
-        if bunch.has_company:
-            show_poses(scene, bunch)
         for k in range(until.shape[0]):
             if bunch.ticks[k] < until[k]:
+                if bunch.has_company:
+                    show_moves(scene, bunch, k)
                 if bunch.has_grippers:
                     carry_lifted(scene, bunch.worlds[k])
                 bunch.ticks[k] += 1
@@ -130,7 +130,8 @@ def move_freely(scene: Any, bunch: Any) -> Any:
         chance = load(bunch.seeds[LANES * place :]), eight.number, eight.tick_count
         is_near = eight.is_near > 0.0
         # Those that have met others move, too, and then get back where collisions have brought them.
-        is_touching = move(scene.ground, eight, parameters, eight.left_pulses, eight.right_pulses, chance)
+        room_mm = room_of(scene.ground, eight, parameters)
+        is_touching = move(scene.ground, eight, parameters, eight.left_pulses, eight.right_pulses, room_mm, chance)
         if anywhere(is_near):
             for lane in range(LANES):
                 if holds(is_near, lane):
@@ -138,6 +139,7 @@ def move_freely(scene: Any, bunch: Any) -> Any:
                     copy_motion(scene.robots[bunch.worlds[k], number], one_of(eight, lane))
             is_touching = (is_near & (eight.is_touching_discs > 0.0)) | (opposite(is_near) & is_touching)
             eight.is_near = 0.0
+            eight.room_mm = choose(is_near, 0.0, eight.room_mm)
         note_contact(eight, is_touching)
         eight.tick_count = eight.tick_count + 1.0
         if not everywhere(is_due):

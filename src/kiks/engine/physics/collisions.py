@@ -102,8 +102,6 @@ def find_near_things(scene: Any, bunch: Any, k: Any) -> Any:
     nearer_mm = HASTE * fastest_mm + TOUCHING_MM
     if crowd.slack_mm < nearer_mm:
         list_pairs(scene, world, max(min(max(SLACK_TICKS * nearer_mm, SLACK_MM[0]), SLACK_MM[1]), nearer_mm))
-    crowd.slack_mm -= nearer_mm
-    crowd.moved_mm += nearer_mm
     for row in awake:
         body = bodies[world, row]
         if speed_of(body) > 0.0 or is_dragged(body):
@@ -214,7 +212,8 @@ def drive_and_roll(scene: Any, world: Any, room: Any, near_count: Any, pieces: A
         if disc < robot_count:
             robot = scene.robots[world, disc]
             left, right = room.discs[disc].left / pieces, room.discs[disc].right / pieces
-            if move(scene.ground, robot, scene.kinds[robot.kind], left, right, room.discs[disc].slip_ratio):
+            free_mm = clearance_mm(scene.ground, robot.x_mm, robot.y_mm)
+            if move(scene.ground, robot, scene.kinds[robot.kind], left, right, free_mm, room.discs[disc].slip_ratio):
                 room.discs[disc].is_touching = True
         else:
             roll(scene.ground, scene.bodies[world, disc - robot_count], TICK_S / pieces)

@@ -24,6 +24,9 @@ from kiks.units import TICK_NS
 STREAM_SLIP = 1
 """Random stream of the slip ratios (`kiks.engine.sensing.proximity` has the next)."""
 
+STEEPEST = 1.5
+"""More than the change of the clearance per path: sqrt(2), as it is interpolated along each axis."""
+
 CONTACT_TICKS = 20
 """Ticks without a touch after which a contact is over: a touch within 0.2 s belongs to the same contact."""
 
@@ -40,7 +43,29 @@ def remember_pose(robot: Any) -> Any:
 
 
 @inlined
-def move(ground: Any, robot: Any, parameters: Any, left: Any, right: Any, chance: Any) -> Any:
+def room_of(ground: Any, eight: Any, parameters: Any) -> Any:
+    """Return the clearance of eight robots [mm], or less if no wall is near any of them.
+
+    Far from walls it is not looked up in each tick, as its raster may be too large for the processor's caches.
+    """
+    room_mm = eight.room_mm
+    if not everywhere(room_mm >= least_room(ground, parameters, eight.way_mm)):
+        room_mm = clearance_mm(ground, eight.x_mm, eight.y_mm)
+    eight.room_mm = room_mm - STEEPEST * eight.way_mm
+    return room_mm
+
+
+@inlined
+def least_room(ground: Any, parameters: Any, way_mm: Any) -> Any:
+    """Return the clearance from which on a robot touches no wall on its way [mm].
+
+    Between cell centres the error of the clearance is below one and a half cells.
+    """
+    return parameters.radius_mm + way_mm + 2.0 * ground.cell_mm
+
+
+@inlined
+def move(ground: Any, robot: Any, parameters: Any, left: Any, right: Any, room_mm: Any, chance: Any) -> Any:
     """Phase: drive along the arc that the wheels command, as far as walls allow; count the paths of the rims.
 
     Args:
@@ -49,6 +74,7 @@ def move(ground: Any, robot: Any, parameters: Any, left: Any, right: Any, chance
         parameters: Record of its constants.
         left: Path of the left wheel without a wall [pulses].
         right: Path of the right wheel without a wall [pulses].
+        room_mm: The clearance, or less where it is at least `least_room`.
         chance: Share of its command at which a blocked wheel turns, or the source of it (`slip_ratio_of`).
 
     Returns:
@@ -58,9 +84,7 @@ def move(ground: Any, robot: Any, parameters: Any, left: Any, right: Any, chance
     travel = max(abs(left), abs(right)) * pulse
     arc = 0.5 * (left + right) * pulse
     turn = (right - left) * pulse / parameters.wheel_base_mm
-    # Between cell centres the error of the clearance is below one and a half cells: farther away no wall is touched.
-    room = clearance_mm(ground, robot.x_mm, robot.y_mm)
-    is_near = room < parameters.radius_mm + travel + 2.0 * ground.cell_mm
+    is_near = room_mm < least_room(ground, parameters, travel)
     if anywhere(is_near):
         pieces = choose(is_near, min(max(1.0, -floor(-travel / PIECE_MM)), PIECES_MAX), 1.0)
         return move_near(ground, robot, parameters, (left, right), (arc, turn), pieces, chance)

@@ -57,7 +57,8 @@ EIGHT = record8_of(
         *("controlled_speed", "motor_mode", "speed_setpoint", "pwm_setpoint", "pwm", "on_target", "profile_speed"),
         *("profile_acceleration", "speed_gains", "position_gains"),
     ),
-    *("number", "tick_count", "until", "left_pulses", "right_pulses", "way_mm", "is_near", "is_touching_discs"),
+    *("number", "tick_count", "until", "left_pulses", "right_pulses", "way_mm", "room_mm", "is_near"),
+    "is_touching_discs",
 )
 """Eight robots of a bunch, and what a tick notes about them (`kiks.engine.bunch`)."""
 
