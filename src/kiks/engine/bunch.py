@@ -26,6 +26,7 @@ DISC = np.dtype(
         ("left", "f8"),  # of a near robot: the paths of its wheels [pulses] and its slip ratio
         ("right", "f8"),
         ("slip_ratio", "f8"),
+        ("room_mm", "f8"),  # of a near robot: what is known of its clearance at the start of a piece [mm]
         ("start_x", "f8"),  # its place at the start of a piece [mm]
         ("start_y", "f8"),
         ("moved_x", "f8"),  # where wheels and speed have moved it [mm]

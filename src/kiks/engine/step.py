@@ -20,11 +20,11 @@ from kiks.engine.compiling import entry, inlined, kernel
 from kiks.engine.physics.collisions import collide_near_things, find_near_things, remember_places
 from kiks.engine.physics.grasp import carry_lifted
 from kiks.engine.physics.gripper import tend_grippers
-from kiks.engine.physics.motion import move, note_contact, remember_pose, room_of
+from kiks.engine.physics.motion import move, note_contact, remember_pose, room_left, room_of
 from kiks.engine.physics.motor import control_motors, latch_encoders, turn_motors
 from kiks.engine.scene import open_scene
 from kiks.engine.simd.lanes import LANES, load
-from kiks.engine.simd.masks import anywhere, choose, everywhere, holds, opposite
+from kiks.engine.simd.masks import anywhere, everywhere, holds, opposite
 from kiks.engine.simd.records import copy_lanes, copy_record8, one_of, open_record8
 from kiks.engine.simd.stack_arrays import stack_integers
 
@@ -130,7 +130,7 @@ def move_freely(scene: Any, bunch: Any) -> Any:
         chance = load(bunch.seeds[LANES * place :]), eight.number, eight.tick_count
         is_near = eight.is_near > 0.0
         # Those that have met others move, too, and then get back where collisions have brought them.
-        room_mm = room_of(scene.ground, eight, parameters)
+        room_mm = room_of(scene.ground, eight, parameters, eight.way_mm, eight.room_mm)
         is_touching = move(scene.ground, eight, parameters, eight.left_pulses, eight.right_pulses, room_mm, chance)
         if anywhere(is_near):
             for lane in range(LANES):
@@ -139,7 +139,7 @@ def move_freely(scene: Any, bunch: Any) -> Any:
                     copy_motion(scene.robots[bunch.worlds[k], number], one_of(eight, lane))
             is_touching = (is_near & (eight.is_touching_discs > 0.0)) | (opposite(is_near) & is_touching)
             eight.is_near = 0.0
-            eight.room_mm = choose(is_near, 0.0, eight.room_mm)
+        eight.room_mm = room_left(room_mm, eight.x_mm - eight.trail[0, 0], eight.y_mm - eight.trail[0, 1])
         note_contact(eight, is_touching)
         eight.tick_count = eight.tick_count + 1.0
         if not everywhere(is_due):

@@ -23,7 +23,7 @@ from kiks.engine.grid import disc_at, list_pairs
 from kiks.engine.physics.balls import collide, kick, remember_place, roll, speed_of
 from kiks.engine.physics.contact import PIECES_MAX, clearance_mm, outward
 from kiks.engine.physics.grasp import REACH, carry_along, is_dragged, keep_holds, return_held, turn_back
-from kiks.engine.physics.motion import draw_slip, give_way, move
+from kiks.engine.physics.motion import draw_slip, give_way, move, room_left, room_of
 from kiks.engine.simd.lanes import floor
 from kiks.units import NS_PER_S, TICK_NS
 
@@ -145,6 +145,7 @@ def add_near(scene: Any, bunch: Any, k: Any, disc: Any, near_count: Any) -> Any:
     if disc < scene.robots.shape[1]:
         one, robot = robot_in(scene, bunch, k, disc)
         noted.left, noted.right, noted.is_driven = one.left_pulses, one.right_pulses, one.way_mm > 0.0
+        noted.room_mm, noted.start_x, noted.start_y = one.room_mm, one.x_mm, one.y_mm
         noted.slip_ratio = draw_slip(scene.kinds[robot.kind], scene.seeds[bunch.worlds[k]], disc, bunch.ticks[k])
     else:
         holder = scene.bodies[bunch.worlds[k], disc - scene.robots.shape[1]].holder
@@ -208,16 +209,19 @@ def drive_and_roll(scene: Any, world: Any, room: Any, near_count: Any, pieces: A
     robot_count = scene.robots.shape[1]
     for place in range(near_count):
         disc = room.near[place]
-        room.discs[disc].start_x, room.discs[disc].start_y, _ = disc_at(scene, world, disc)
+        noted, (x, y, _) = room.discs[disc], disc_at(scene, world, disc)
         if disc < robot_count:
             robot = scene.robots[world, disc]
-            left, right = room.discs[disc].left / pieces, room.discs[disc].right / pieces
-            free_mm = clearance_mm(scene.ground, robot.x_mm, robot.y_mm)
-            if move(scene.ground, robot, scene.kinds[robot.kind], left, right, free_mm, room.discs[disc].slip_ratio):
-                room.discs[disc].is_touching = True
+            parameters, left, right = scene.kinds[robot.kind], noted.left / pieces, noted.right / pieces
+            way_mm = max(abs(left), abs(right)) * parameters.pulse_mm
+            known_mm = room_left(noted.room_mm, x - noted.start_x, y - noted.start_y)
+            noted.room_mm = room_of(scene.ground, robot, parameters, way_mm, known_mm)
+            if move(scene.ground, robot, parameters, left, right, noted.room_mm, noted.slip_ratio):
+                noted.is_touching = True
         else:
             roll(scene.ground, scene.bodies[world, disc - robot_count], TICK_S / pieces)
-        room.discs[disc].moved_x, room.discs[disc].moved_y, _ = disc_at(scene, world, disc)
+        noted.start_x, noted.start_y = x, y
+        noted.moved_x, noted.moved_y, _ = disc_at(scene, world, disc)
 
 
 @kernel

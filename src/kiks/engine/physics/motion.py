@@ -24,8 +24,8 @@ from kiks.units import TICK_NS
 STREAM_SLIP = 1
 """Random stream of the slip ratios (`kiks.engine.sensing.proximity` has the next)."""
 
-STEEPEST = 1.5
-"""More than the change of the clearance per path: sqrt(2), as it is interpolated along each axis."""
+ROUNDED_MM = 0.001
+"""More than the rounding of clearances [mm]."""
 
 CONTACT_TICKS = 20
 """Ticks without a touch after which a contact is over: a touch within 0.2 s belongs to the same contact."""
@@ -43,16 +43,27 @@ def remember_pose(robot: Any) -> Any:
 
 
 @inlined
-def room_of(ground: Any, eight: Any, parameters: Any) -> Any:
-    """Return the clearance of eight robots [mm], or less if no wall is near any of them.
+def room_of(ground: Any, robot: Any, parameters: Any, way_mm: Any, known_mm: Any) -> Any:
+    """Return the clearance of a robot [mm], or less if no wall is near; of one robot or eight.
 
     Far from walls it is not looked up in each tick, as its raster may be too large for the processor's caches.
+
+    Args:
+        ground: The walls as contact sees them.
+        robot: Record of the robot.
+        parameters: Record of its constants.
+        way_mm: Longest way that it may go.
+        known_mm: What is known to be left of the clearance (`room_left`).
     """
-    room_mm = eight.room_mm
-    if not everywhere(room_mm >= least_room(ground, parameters, eight.way_mm)):
-        room_mm = clearance_mm(ground, eight.x_mm, eight.y_mm)
-    eight.room_mm = room_mm - STEEPEST * eight.way_mm
-    return room_mm
+    if everywhere(known_mm >= least_room(ground, parameters, way_mm)):
+        return known_mm
+    return clearance_mm(ground, robot.x_mm, robot.y_mm)
+
+
+@inlined
+def room_left(room_mm: Any, dx: Any, dy: Any) -> Any:
+    """Return what is left of a clearance after a way (dx, dy) [mm]: it is interpolated along each axis."""
+    return room_mm - abs(dx) - abs(dy) - ROUNDED_MM
 
 
 @inlined
