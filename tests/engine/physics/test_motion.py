@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numba import njit
 from tests.at_length import share
 
-from kiks.engine.physics.contact import Ground
+from kiks.engine.physics.contact import Ground, clearance_mm
 from kiks.engine.physics.motion import move, pose_between, remember_pose
 from kiks.model.arena import PAD, Arena
 
@@ -22,9 +22,11 @@ PATHS = st.floats(-130.0, 130.0)
 
 @njit
 def _drive(robots, kinds, field, paths):
+    ground, robot = Ground(field, 1.0, PAD), robots[0, 0]
     for tick in range(paths.shape[0]):
-        remember_pose(robots[0, 0])
-        move(Ground(field, 1.0, PAD), robots[0, 0], kinds[0], paths[tick, 0], paths[tick, 1], 0.1)
+        remember_pose(robot)
+        room_mm = clearance_mm(ground, robot.x_mm, robot.y_mm)
+        move(ground, robot, kinds[0], paths[tick, 0], paths[tick, 1], room_mm, 0.1)
 
 
 @njit

@@ -17,7 +17,7 @@ from kiks.engine.numbers import SMALL_RAD, sin_cos, sin_cos_of_small, sinc, unif
 from kiks.engine.physics.contact import PIECE_MM, PIECES_MAX, clearance_mm, is_free, slide
 from kiks.engine.simd.lanes import floor, greatest, lane_of, with_lane
 from kiks.engine.simd.masks import anywhere, choose, everywhere, holds, lane_count, opposite
-from kiks.engine.simd.records import one_of, only
+from kiks.engine.simd.records import one_of
 from kiks.engine.state import TRAIL_LENGTH
 from kiks.units import TICK_NS
 
@@ -100,7 +100,7 @@ def move(ground: Any, robot: Any, parameters: Any, left: Any, right: Any, room_m
         pieces = choose(is_near, min(max(1.0, -floor(-travel / PIECE_MM)), PIECES_MAX), 1.0)
         return move_near(ground, robot, parameters, (left, right), (arc, turn), pieces, chance)
     x, y, _, _ = end_of_arc(robot, arc * sinc(0.5 * turn), turn)
-    drive(robot, x, y, turn, arc)
+    drive(robot, x, y, robot.heading_rad + turn, arc)
     robot.wheel_pulses[0] += left
     robot.wheel_pulses[1] += right
     return is_near
@@ -138,7 +138,9 @@ def move_near(ground: Any, robot: Any, parameters: Any, paths: Any, whole: Any, 
         x, y, sine, cosine = end_of_arc(robot, chord, turn)
         is_going = is_moving & is_free(ground, parameters, x, y)
         if anywhere(is_going):
-            drive(only(robot, is_going), x, y, turn, arc)
+            x, y = choose(is_going, x, robot.x_mm), choose(is_going, y, robot.y_mm)
+            heading = choose(is_going, robot.heading_rad + turn, robot.heading_rad)
+            drive(robot, x, y, heading, choose(is_going, arc, 0.0))
             made_left += choose(is_going, rim_left, 0.0)
             made_right += choose(is_going, rim_right, 0.0)
         is_blocked = is_moving & opposite(is_going)
@@ -168,11 +170,9 @@ def end_of_arc(robot: Any, chord: Any, turn: Any) -> Any:
 
 
 @inlined
-def drive(robot: Any, x: Any, y: Any, turn: Any, arc: Any) -> Any:
-    """Move to (x, y) [mm] and turn [rad] after an arc [mm]."""
-    robot.x_mm = x
-    robot.y_mm = y
-    robot.heading_rad += turn
+def drive(robot: Any, x: Any, y: Any, heading: Any, arc: Any) -> Any:
+    """Move to a pose, x and y [mm] and heading [rad], after an arc [mm]."""
+    robot.x_mm, robot.y_mm, robot.heading_rad = x, y, heading
     count_path(robot, arc)
 
 

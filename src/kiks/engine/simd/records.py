@@ -4,8 +4,8 @@ Need: a tick is a few hundred operations on one robot. A processor can do each o
 time. The formulas must stand in one place, for one robot and for eight.
 Method: `EIGHT` has the numbers of `ROBOT` that a tick of a lone robot reads or writes, `EIGHT_KINDS` those of
 `PARAMETERS`, each as eight float64 side by side, which hold whole numbers below 2^53 exactly. For kernels such a record
-is a `Record8`: `robot.x_mm` are lanes, `robot.trail[0, 1]` too. `only(robot, condition)` is one that is written only
-where a condition holds, `one_of(robot, lane)` is the robot of a lane, with the same names for single numbers.
+is a `Record8`: `robot.x_mm` are lanes, `robot.trail[0, 1]` too. `one_of(robot, lane)` is the robot of a lane, with the
+same names for single numbers.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from numba.core.typing import templates
 from numba.extending import models
 
 from kiks.engine.parameters import PARAMETERS
-from kiks.engine.simd.lanes import F64X8, LANES, MASK, offer
+from kiks.engine.simd.lanes import F64X8, LANES, offer
 from kiks.engine.simd.masks import select
 from kiks.engine.state import ROBOT
 
@@ -86,19 +86,8 @@ class Record8(_Numbers):
     """Numba's type of eight records: their numbers are lanes."""
 
 
-class SomeOf(Record8):
-    """Numba's type of eight records; writing changes only the lanes that a mask selects."""
-
-
 class OneOf(_Numbers):
     """Numba's type of one of them: its numbers are float64."""
-
-
-@extending.register_model(SomeOf)
-class _SomeOfModel(models.StructModel):  # type: ignore[misc, unused-ignore]
-    def __init__(self, manager: Any, numba_type: Any) -> None:
-        members = [("address", types.voidptr), ("mask", MASK)]
-        super().__init__(manager, numba_type, members)  # type: ignore[no-untyped-call, unused-ignore]
 
 
 @extending.register_model(Record8)
@@ -129,12 +118,9 @@ def _read(context: Any, builder: Any, numbers: Any, value: Any, offset: Any) -> 
 
 
 def _write(context: Any, builder: Any, numbers: Any, value: Any, offset: Any, kind: Any, new: Any) -> Any:
-    """Write the value at an offset [bytes] from the beginning, in the selected lanes."""
+    """Write the value at an offset [bytes] from the beginning."""
     new = context.cast(builder, new, kind, _kind_of(numbers))
     place = _at(builder, _parts(context, builder, numbers, value).address, offset, new.type)
-    if isinstance(numbers, SomeOf):
-        mask = _parts(context, builder, numbers, value).mask
-        new = select(builder, mask, new, builder.load(place, align=8))
     builder.store(new, place, align=8)
 
 
@@ -162,8 +148,6 @@ def _get_field(context: Any, builder: Any, numbers: Any, value: Any, name: str) 
     before = _parts(context, builder, numbers, value)
     part = _proxy(type(numbers)(shape))(context, builder)
     part.address = builder.gep(before.address, [offset], inbounds=True)
-    if isinstance(numbers, SomeOf):
-        part.mask = before.mask
     return part._getvalue()
 
 
@@ -224,24 +208,6 @@ def open_record8(typing: Any, record: Any) -> Any:
         return eight._getvalue()
 
     return Record8(record)(record), generate
-
-
-@_intrinsic
-def only(typing: Any, robot: Any, condition: Any) -> Any:
-    """Return a `Record8` that is written only where a condition holds; a robot alone as it is."""
-    result = SomeOf(robot.fields) if isinstance(robot, Record8) else robot
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        value, mask = arguments
-        if not isinstance(robot, Record8):
-            return value
-        before = _parts(context, builder, robot, value)
-        some = _proxy(result)(context, builder)
-        some.address = before.address
-        some.mask = builder.and_(before.mask, mask) if isinstance(robot, SomeOf) else mask
-        return some._getvalue()
-
-    return result(robot, condition), generate
 
 
 @_intrinsic
