@@ -112,15 +112,19 @@ class Batch:
         self._starts = initial.starts_of(self.seeds, starts)
         scene = Scene(self.state, initial.kinds, self.arenas, self.networks, self._lamps, self.seeds)
         self._scenes = [scene.in_arena(arena) for arena in self.arenas]
-        self._line = self.timing.line(self.specs[0])
-        self._ticks, self._begins_ns, self._watched_ns, self._sensed_ns, self._steps = (
-            np.zeros(self.world_count, np.int64) for _ in range(5)
-        )
-        self._sensors = np.zeros((self.world_count, self.robot_count, SENSOR_COUNT * len(self.senses)))
-        self._wheels = np.zeros((self.world_count, self.robot_count, 2))
-        self._turns = np.zeros((self.world_count, self.robot_count), np.int64)
         self._watching = MeasureSlots(measures, self.senses, "the batch")
-        self.notes = np.zeros((self.world_count, self.robot_count, self._watching.note_count))
+        shape = self.state.robots.shape
+        self.notes = np.zeros((*shape, self._watching.note_count))
+        self._worlds = Worlds(
+            self.timing.line(self.specs[0]),
+            _codes_of(self.senses),
+            *(np.zeros(self.world_count, np.int64) for _ in range(5)),
+            np.zeros((*shape, SENSOR_COUNT * len(self.senses))),
+            np.zeros((*shape, 2)),
+            np.zeros(shape, np.int64),
+            *(np.zeros((*shape, 0)) for _ in range(2)),
+            self.notes,
+        )
         self._is_sensed = False
         self._reset_worlds(np.arange(self.world_count))
 
@@ -170,8 +174,8 @@ class Batch:
             ) from None
         self._reset_worlds(np.arange(self.world_count))
         self._is_sensed = False
-        worlds = self._worlds(
-            controller.senses,
+        worlds = self._worlds._replace(
+            sense_codes=_codes_of(controller.senses),
             sensors=np.zeros((*shape, controller.sensor_count)),
             memory=np.zeros((*shape, controller.memory_count)),
             parameters=each_given,
@@ -225,7 +229,7 @@ class Batch:
         if len(chosen) and (self._is_sensed or worlds is None):
             self._do_halves(0, 1, chosen)
             self._is_sensed = self._is_sensed or worlds is None
-        return self._sensors.copy()
+        return np.array(self._worlds.sensors)
 
     def step(self, wheels: ArrayLike) -> NDArray[np.float64]:
         """Send all robots their speeds, wait for the next loop, and let them sense again.
@@ -241,16 +245,16 @@ class Batch:
             ParameterError: If the shape is wrong, a speed is NaN, or `reset` was not called before.
         """
         given = array_of(wheels)
-        if given is None or given.shape != self._wheels.shape:
+        if given is None or given.shape != self._worlds.wheels.shape:
             found = "they were no numbers" if given is None else f"their shape was {given.shape}"
-            raise ParameterError(f"wheels must be [world, robot, 2], here {self._wheels.shape}, but {found}.")
+            raise ParameterError(f"wheels must be [world, robot, 2], here {self._worlds.wheels.shape}, but {found}.")
         if not self._is_sensed:
             raise ParameterError("reset() must be called before the first step(), and after a run().")
         if np.isnan(given).any():
             raise ParameterError("wheels must be numbers, but some were none. Look at what your program has divided.")
-        self._wheels[...] = given
+        self._worlds.wheels[...] = given
         self._do_halves(1, 3)
-        return self._sensors.copy()
+        return np.array(self._worlds.sensors)
 
     # ---- state ----
 
@@ -274,7 +278,7 @@ class Batch:
     @property
     def times_s(self) -> NDArray[np.float64]:
         """Start time of the present loop of each world [s], float64 [world]."""
-        return self._begins_ns / NS_PER_S
+        return np.divide(self._worlds.begins_ns, NS_PER_S)
 
     @property
     def poses(self) -> NDArray[np.float64]:
@@ -298,42 +302,23 @@ class Batch:
         # A simulation numbers only the kinds of its own robots.
         kinds = robots["kind"][0].tolist()
         robots["kind"] = [list(dict.fromkeys(kinds)).index(kind) for kind in kinds]
-        return State(robots, self.state.bodies[world : world + 1], int(self._ticks[world])).hash()
+        return State(robots, self.state.bodies[world : world + 1], int(self._worlds.ticks[world])).hash()
 
     # ---- inside ----
 
     def _reset_worlds(self, chosen: NDArray[np.int64]) -> None:
         """Reset worlds to their initial state."""
         self._initial_state.reset(self.state, chosen, self._starts[chosen])
-        for count in (self._ticks, self._begins_ns, self._watched_ns, self._sensed_ns, self._steps):
+        worlds = self._worlds
+        for count in (worlds.ticks, worlds.begins_ns, worlds.watched_ns, worlds.sensed_ns, worlds.steps):
             count[chosen] = 0
         self.notes[chosen] = 0.0
         enter_worlds(self._scenes[0].record, chosen)
 
-    def _worlds(self, senses: Sequence[str], **given: NDArray[np.float64]) -> Any:
-        """Return what the loop knows of all worlds, with some arrays replaced."""
-        nothing = np.zeros((self.world_count, self.robot_count, 0))
-        arrays = {"sensors": self._sensors, "memory": nothing, "parameters": nothing, "notes": self.notes} | given
-        return Worlds(
-            self._line,
-            np.array([SENSES.index(sense) for sense in senses], np.int64),
-            self._ticks,
-            self._begins_ns,
-            self._watched_ns,
-            self._sensed_ns,
-            self._steps,
-            arrays["sensors"],
-            self._wheels,
-            self._turns,
-            arrays["memory"],
-            arrays["parameters"],
-            arrays["notes"],
-        )
-
     def _do_halves(self, first: int, end: int, chosen: NDArray[np.int64] | None = None) -> None:
-        """Do halves of control loops with the speeds in `_wheels`: even halves sense, odd halves act."""
+        """Do halves of control loops with the present speeds of the wheels: even halves sense, odd halves act."""
         span, callbacks = (first, end, UNLIMITED), (0, self._watching.watchers)
-        self._on_all_cores(self._worlds(self.senses), span, callbacks, chosen=chosen, least=STEP_BLOCK)
+        self._on_all_cores(self._worlds, span, callbacks, chosen=chosen, least=STEP_BLOCK)
 
     def _on_all_cores(
         self,
@@ -372,3 +357,8 @@ class Batch:
             here = chosen[self.arena_indices[chosen] == index]
             for first in range(0, len(here), length):
                 yield scene, np.ascontiguousarray(here[first : first + length])
+
+
+def _codes_of(senses: Sequence[str]) -> NDArray[np.int64]:
+    """Return the numbers of senses, as kernels know them."""
+    return np.array([SENSES.index(sense) for sense in senses], np.int64)
