@@ -115,16 +115,13 @@ class Batch:
         self._watching = MeasureSlots(measures, self.senses, "the batch")
         shape = self.state.robots.shape
         self.notes = np.zeros((*shape, self._watching.note_count))
-        self._worlds = Worlds(
-            self.timing.line(self.specs[0]),
-            _codes_of(self.senses),
+        parts = (
+            *(self.timing.line(self.specs[0]), _codes_of(self.senses)),
             *(np.zeros(self.world_count, np.int64) for _ in range(5)),
-            np.zeros((*shape, SENSOR_COUNT * len(self.senses))),
-            np.zeros((*shape, 2)),
-            np.zeros(shape, np.int64),
-            *(np.zeros((*shape, 0)) for _ in range(2)),
-            self.notes,
+            *(np.zeros((*shape, SENSOR_COUNT * len(self.senses))), np.zeros((*shape, 2)), np.zeros(shape, np.int64)),
+            *(np.zeros((*shape, 0)), np.zeros((*shape, 0)), self.notes),
         )
+        self._worlds = Worlds._make(parts)
         self._is_sensed = False
         self._reset_worlds(np.arange(self.world_count))
 
@@ -278,7 +275,8 @@ class Batch:
     @property
     def times_s(self) -> NDArray[np.float64]:
         """Start time of the present loop of each world [s], float64 [world]."""
-        return np.divide(self._worlds.begins_ns, NS_PER_S)
+        times_s: NDArray[np.float64] = self._worlds.begins_ns / NS_PER_S
+        return times_s
 
     @property
     def poses(self) -> NDArray[np.float64]:
