@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from kiks.engine.bunch import give_back, make_lanes, make_room, take
-from kiks.engine.compiling import entry
+from kiks.engine.compiling import entry, kernel
 from kiks.engine.numbers import sin_cos, stream_of
+from kiks.engine.physics.contact import clearance_mm
 from kiks.engine.physics.gripper import move_gripper
 from kiks.engine.physics.motion import draw_slip, moment_of, move, note_contact, remember_pose
 from kiks.engine.physics.motor import control_motors, latch_encoders, turn_motors
@@ -43,7 +44,8 @@ def advance_alone(record, world, number, tick, tick_count):
         if robot.has_gripper != 0:
             move_gripper(robot, 0.0)
         slip_ratio = draw_slip(parameters, scene.seeds[world], number, now)
-        note_contact(robot, move(scene.ground, robot, parameters, left, right, slip_ratio))
+        room_mm = clearance_mm(scene.ground, robot.x_mm, robot.y_mm)
+        note_contact(robot, move(scene.ground, robot, parameters, left, right, room_mm, slip_ratio))
 
 
 @entry
@@ -51,17 +53,29 @@ def advance_each(record, ticks, until):
     """Let time pass in bunches of eight worlds, in each from a tick of its own to another."""
     scene = open_scene(record[0])
     for first in range(0, ticks.shape[0], LANES):
-        worlds = np.arange(first, min(first + LANES, ticks.shape[0]))
-        bunch = take(scene, worlds, ticks[first : first + LANES], make_lanes(LANES), make_room(scene, LANES))
-        advance_bunch(scene, bunch, until[first : first + LANES])
-        give_back(scene, bunch)
+        worlds, end = np.arange(first, min(first + LANES, ticks.shape[0])), first + LANES
+        advance_eight(scene, worlds, ticks[first:end], until[first:end], make_lanes(LANES), make_room(scene, LANES))
+
+
+@kernel
+def advance_eight(scene, worlds, ticks, until, lanes, room):
+    """Let time pass in eight worlds."""
+    bunch = take(scene, worlds, ticks, lanes, room)
+    advance_bunch(scene, bunch, until)
+    give_back(scene, bunch)
 
 
 @entry
 def records_taken(record, spare, ticks):
     """Return how many records of eight a bunch of the first world has, if there is memory for more robots."""
     scene = open_scene(record[0])
-    return take(scene, np.zeros(1, np.int64), ticks, make_lanes(spare), make_room(scene, 1)).robots.shape[0]
+    return count_records(scene, np.zeros(1, np.int64), ticks, make_lanes(spare), make_room(scene, 1))
+
+
+@kernel
+def count_records(scene, worlds, ticks, lanes, room):
+    """Return how many records of eight a bunch has."""
+    return take(scene, worlds, ticks, lanes, room).robots.shape[0]
 
 
 @entry
