@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import queue
 import subprocess
 import sys
 import threading
-from typing import Any
+from collections import deque
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import typer
+
+if TYPE_CHECKING:
+    from kiks.sim.simulation import Simulation
 
 
 def ready_engine(*, as_needed: bool = False) -> None:
@@ -24,6 +31,7 @@ def ready_engine(*, as_needed: bool = False) -> None:
     if not is_compiled("advance" if as_needed else LAST):
         typer.echo("Compiling the engine for this computer: once, a minute or so ...", err=True)
         if not as_needed:
+            _compile_together(_OF_ENGINE)
             compile_everything()
 
 
@@ -37,32 +45,20 @@ def ready_batch() -> None:
 
 
 def compile_all() -> None:
-    """Compile the engine and the batch; side by side, where there are processors for it."""
-    if len(os.sched_getaffinity(0)) == 1:
-        compile_everything()
-        compile_batch()
-        return
-    # Both fill the same cache. Should the other process fail, this one compiles what is missing, and tells why it must.
-    program = "from kiks.cli.engine_start import help_to_compile; help_to_compile()"
-    streams: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    with subprocess.Popen([sys.executable, "-c", program], **streams) as other:
-        try:
-            compile_everything()
-            other.wait()
-        finally:
-            other.kill()
+    """Compile the engine and the batch, side by side, where there are processors for it."""
+    _compile_together(range(len(_PIECES)))
+    compile_everything()
     compile_batch()
 
 
-def help_to_compile() -> None:
-    """Compile the batch for the process that has started this one; end when it ends."""
+def compile_everything() -> None:
+    """Call every compiled function of the engine once, through the public functions."""
+    from kiks.model.arena import Arena
+    from kiks.sim.simulation import Simulation
 
-    def end_with_it() -> None:
-        sys.stdin.read()
-        os._exit(1)
-
-    threading.Thread(target=end_with_it, daemon=True).start()
-    compile_batch()
+    for number in _OF_ENGINE:
+        _PIECES[number]()
+    Simulation(Arena.box(200, 200), response="fast")  # last, for it calls `kiks.engine.compiling.LAST`
 
 
 def compile_batch() -> None:
@@ -78,30 +74,77 @@ def compile_batch() -> None:
         batch.reset()
 
 
-def compile_everything() -> None:
-    """Call every compiled function once, through the public functions."""
-    from kiks.client.khepera import Khepera
+def help_to_compile() -> None:
+    """Compile the pieces whose numbers come in, a line each; answer each with a line, and end with the input."""
+    orders: queue.SimpleQueue[int] = queue.SimpleQueue()
+
+    def receive() -> None:
+        for line in sys.stdin:
+            orders.put(int(line))
+        os._exit(0)
+
+    threading.Thread(target=receive, daemon=True).start()
+    while True:
+        _PIECES[orders.get()]()
+        print(flush=True)
+
+
+def _compile_together(numbers: Sequence[int]) -> None:
+    """Compile pieces by this process and one more for each other processor; do nothing where there is no other.
+
+    All fill the same cache. This process begins with the first piece, the others with the last: neighbours in the list
+    call the same kernels, and each process compiles those for itself. A piece whose process fails is left out.
+
+    Args:
+        numbers: Indices of the pieces.
+    """
+    left = deque(numbers)
+
+    def feed(helper: subprocess.Popen[bytes]) -> None:
+        assert helper.stdin
+        assert helper.stdout
+        with contextlib.suppress(IndexError, OSError, ValueError):
+            while True:
+                # A buffer would keep what a dead process does not take, and then could not be closed.
+                os.write(helper.stdin.fileno(), b"%d\n" % left.pop())
+                if not helper.stdout.readline():
+                    break
+
+    program = "from kiks.cli.engine_start import help_to_compile; help_to_compile()"
+    streams: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+    with contextlib.ExitStack() as stack:
+        feeders = []
+        for _ in range(min(len(os.sched_getaffinity(0)), _MOST_PROCESSES) - 1):
+            helper = stack.enter_context(subprocess.Popen([sys.executable, "-c", program], **streams))
+            stack.callback(helper.kill)
+            feeders.append(threading.Thread(target=feed, args=(helper,), daemon=True))
+            feeders[-1].start()
+        if not feeders:
+            return
+        with contextlib.suppress(IndexError):
+            while True:
+                _PIECES[left.popleft()]()
+        for feeder in feeders:
+            feeder.join()
+
+
+def _simulation() -> Simulation:
     from kiks.model.arena import Arena
     from kiks.sim.simulation import Simulation
 
-    sim = Simulation(Arena.box(200, 200))
+    return Simulation(Arena.box(200, 200))
+
+
+def _drive() -> None:
+    from kiks.client.khepera import Khepera
+
+    sim = _simulation()
     robot = Khepera(sim.port(1))
     robot.set_speed(1, 1)
     robot.set_pwm(1, 1)
     robot.set_encoders(0, 0)
     robot.move_to(1, 1)
     robot.status()
-    robot.proximity()
-    robot.ambient()
-    sim.proximity(1)
-    sim.ambient(1)
-    sim.proximity_at(1, sim.poses())
-    sim.look()
-    sim.explain(1, 0)
-    sim.explain_light(1, 0)
-    sim.fit(1, "k213")
-    robot.image()
-    sim.image(1)
     sim.place(1, *sim.pose(1))
     sim.fit(1, "gripper")
     robot.turret(1, "G")
@@ -109,4 +152,38 @@ def compile_everything() -> None:
     robot.turret(99, "S")
     sim.add_cylinder(40, 40)
     sim.run(0.1)
-    Simulation(Arena.box(200, 200), response="fast")  # last, for it calls `kiks.engine.compiling.LAST`
+
+
+def _take_image() -> None:
+    sim = _simulation()
+    sim.fit(1, "k213")
+    sim.image(1)
+
+
+def _look() -> None:
+    _simulation().look()
+
+
+def _explain() -> None:
+    sim = _simulation()
+    sim.explain(1, 0)
+    sim.explain_light(1, 0)
+
+
+def _read_light() -> None:
+    _simulation().ambient(1)
+
+
+def _read_proximity() -> None:
+    sim = _simulation()
+    sim.proximity(1)
+    sim.proximity_at(1, sim.poses())
+
+
+_PIECES = (_drive, compile_batch, _take_image, _look, _explain, _read_light, _read_proximity)
+"""What one process compiles in one go. Time passes in `_drive` and the batch alone: ticks take longest to compile."""
+
+_OF_ENGINE = tuple(number for number, piece in enumerate(_PIECES) if piece is not compile_batch)
+
+_MOST_PROCESSES = 4
+"""More would compile the same kernels again rather than others."""

@@ -22,8 +22,7 @@ class Sensors:
 
     def __init__(self, world: World) -> None:
         self._world = world
-        self._counts = np.zeros(SENSOR_COUNT, np.int64)
-        self._expected = np.zeros(SENSOR_COUNT, np.float64)
+        self._readings = np.zeros(SENSOR_COUNT, np.float64)
 
     def proximity(self, index: int, is_noisy: bool = True) -> list[Any]:
         """Return what a robot's proximity sensors read now: counts with noise, or what is expected without it."""
@@ -36,7 +35,7 @@ class Sensors:
     def _read(self, kernel: Callable[..., Any], index: int, is_noisy: bool) -> list[Any]:
         if not isinstance(is_noisy, bool):
             raise ParameterError(f"noise must be True or False, but it was {shown(is_noisy)}.")
-        world = self._world
-        out = self._counts if is_noisy else self._expected
+        world, out = self._world, self._readings
         kernel(world.scene, index, world.state.tick_count, world.now_ns, is_noisy, out)
-        return out.tolist()
+        # One type of array serves both, for a kernel is compiled for each type that it is given.
+        return (out.astype(np.int64) if is_noisy else out).tolist()

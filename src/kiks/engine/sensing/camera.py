@@ -141,14 +141,7 @@ def darken_edges(grey: Any, noise: Any) -> Any:
 
 
 @entry
-def take_image(
-    scene: Any,
-    robot: Any,
-    tick_count: Any,
-    time_ns: Any,
-    is_noisy: Any,
-    out: Any,
-) -> Any:
+def take_image(scene: Any, robot: Any, tick_count: Any, time_ns: Any, is_noisy: Any, out: Any) -> Any:
     """Write the image of a robot's camera at a time into `out` and return its light level.
 
     Args:
@@ -209,8 +202,8 @@ def take_image(
         here = out[p]
         out[p] = 0.25 * before + 0.5 * here + 0.25 * out[min(p + 1, PIXEL_COUNT - 1)]
         before = here
-    out[:] = (1.0 - _LINE_NOISE) * out + _LINE_NOISE * 255.0 * chance[2]
-    if is_noisy:
-        for p in range(PIXEL_COUNT):
+    for p in range(PIXEL_COUNT):
+        out[p] = (1.0 - _LINE_NOISE) * out[p] + _LINE_NOISE * 255.0 * chance[2, p]
+        if is_noisy:
             out[p] = min(max(0.0, np.floor(out[p] + 0.5)), 255.0)
     return np.int64(np.floor(light + 0.5))
