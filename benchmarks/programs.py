@@ -2,22 +2,36 @@
 
 Each sends D and N in a loop at 9600 baud. Run: python benchmarks/programs.py [--json]. Each figure is a median, from
 the first command to the last end.
+
+The programs of `programs.match_*` play soccer (`kiks demo soccer`):
+
+* `programs.match_start_s`: real time from the start of their processes to the first command;
+* `programs.match_s`: real time of a simulated minute, without the start;
+* `programs.match_cpu_s`: the time of processors of all processes in it;
+* `programs.match_over_calibration`: that time in repetitions of a fixed piece of plain Python, of the same run.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import logging
+import resource
 import statistics
+import sys
 import tempfile
 import time
 from pathlib import Path
 
 import kiks
-from calibration import report
+from calibration import calibration_loops_per_s, report
 from kiks.ports.program_process import Command
 from kiks.ports.programs import Programs
 from kiks.script.runner import run_here
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "examples" / "soccer"))
+from soccer_command import player
+from soccer_match import FullTime, Match
 
 SOURCE = """
 import sys, serial
@@ -69,6 +83,43 @@ def run(program: Path, count: int, loops: int) -> tuple[float, float]:
     return sim.time_s, time.perf_counter() - start_s
 
 
+def match(seconds: float) -> tuple[float, float, float]:
+    """Return the real time [s] of a match and that of its start, and the time of processors in both."""
+    programs = Programs(
+        Match(seconds), [player(None, 1, "left"), player(None, 2, "right")], when_silent="wait", say=lambda text: None
+    )
+    start_s, cpu_s = time.perf_counter(), processor_s()
+    programs.begin()
+    while programs.sim.now_ns == 0:
+        programs.round(0.05)
+    begin_s = time.perf_counter()
+    with contextlib.suppress(FullTime):
+        programs.run()
+    return time.perf_counter() - begin_s, begin_s - start_s, processor_s() - cpu_s
+
+
+def processor_s() -> float:
+    """Return the time of processors that this process and its children that have ended have taken [s]."""
+    used = [resource.getrusage(each) for each in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(each.ru_utime + each.ru_stime for each in used)
+
+
+def match_figures() -> list[tuple[str, float, str]]:
+    """Return the figures of soccer matches; the difference of two lengths leaves out the start."""
+    pairs, costs, ratios = [], [], []
+    for _ in range(5):
+        short, long = match(10.0), match(70.0)
+        pairs.append((short, long))
+        costs.append(long[2] - short[2])
+        ratios.append(costs[-1] * calibration_loops_per_s(time.process_time))
+    return [
+        ("programs.match_start_s", statistics.median(each[1] for pair in pairs for each in pair), "s"),
+        ("programs.match_s", statistics.median(long[0] - short[0] for short, long in pairs), "s a minute"),
+        ("programs.match_cpu_s", statistics.median(costs), "s a minute"),
+        ("programs.match_over_calibration", statistics.median(ratios), "repetitions a minute"),
+    ]
+
+
 def main() -> None:
     """Measure and report."""
     arguments = argparse.ArgumentParser(description=__doc__)
@@ -91,6 +142,7 @@ def main() -> None:
             exchanges = statistics.median(2 * count * options.loops / real for _, real in runs)
             figures.append((f"programs.{count}_speedup", speedup, "x real time"))
             figures.append((f"programs.{count}_exchanges_per_s", exchanges, "1/s"))
+    figures += match_figures()
     report(figures, as_json=options.json)
 
 

@@ -34,6 +34,7 @@ class FakeWorld:
     def __init__(self) -> None:
         self.now_ns = 0
         self.wires = ()
+        self.loop = self
         self.log: Log = []
         self.answered: set[int] = set()
         self._events: list[tuple[int, int]] = []

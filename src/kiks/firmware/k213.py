@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kiks.engine.state import PIXEL_COUNT, ROBOT
 from kiks.firmware.turret import Orders, Shape, Turret
@@ -20,7 +21,7 @@ NUMBER = 2
 PERIODS_NS = tuple(ms * 1_000_000 for ms in (200, 50, 100, 150, 250, 500, 1000, 5000))
 """Reading periods by the code of order U [ns]; code 0 is also that of the power-on."""
 
-Picture = tuple[list[int], int]
+Picture = tuple[Sequence[int] | NDArray[np.uint8], int]
 """64 greys 0..255, the leftmost first, and the light level, which is more for a darker scene."""
 
 

@@ -69,6 +69,8 @@ class Kind(IntEnum):
 ASKING = frozenset(Kind) - {Kind.REACHED, Kind.HANG_UP, Kind.SEND, Kind.DROP, Kind.SET_BAUD, Kind.END}
 """The kinds that get an answer."""
 
+_KINDS = {kind.value: kind for kind in Kind}
+
 
 class Request(NamedTuple):
     """A request of a program; `robot` is 0 where it does not matter, and the answer has the same ticket.
@@ -117,17 +119,19 @@ class Answer(NamedTuple):
         return _ANSWER.pack(*self[:5], len(self.data)) + self.data
 
 
-def take_request(buffer: bytearray) -> Request | None:
-    """Remove and return the first request of a buffer; None while it is incomplete."""
-    if len(buffer) < _REQUEST.size:
-        return None
-    kind, robot, at_ns, ticket, first, second, third, thought_ns, length = _REQUEST.unpack_from(buffer)
-    end = _REQUEST.size + length
-    if len(buffer) < end:
-        return None
-    data = bytes(buffer[_REQUEST.size : end])
-    del buffer[:end]
-    return Request(Kind(kind), robot, at_ns, ticket, first, second, third, thought_ns, data)
+def take_requests(buffer: bytearray) -> list[Request]:
+    """Remove and return the complete requests at the beginning of a buffer."""
+    requests, start, size = [], 0, len(buffer)
+    while start + _REQUEST.size <= size:
+        kind, robot, at_ns, ticket, first, second, third, thought_ns, length = _REQUEST.unpack_from(buffer, start)
+        data_start = start + _REQUEST.size
+        if data_start + length > size:
+            break
+        start = data_start + length
+        data = bytes(buffer[data_start:start])
+        requests.append(Request(_KINDS[kind], robot, at_ns, ticket, first, second, third, thought_ns, data))
+    del buffer[:start]
+    return requests
 
 
 def take_answer(buffer: bytearray) -> Answer | None:

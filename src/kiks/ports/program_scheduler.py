@@ -148,7 +148,7 @@ class ProgramScheduler:
         self.participants: list[Participant] = []
         self.has_begun = expected == 0
         self.is_repeatable = True
-        self._sim = sim
+        self._loop = sim.loop
         self._expected = expected
         self._is_once = is_once
         self._missing = missing
@@ -198,15 +198,15 @@ class ProgramScheduler:
             return 0.0
         if self.participants:
             horizon_ns = min((participant.acts_from_ns for participant in self._thinking()), default=NEVER_NS)
-            self._sim.advance_to(min(self._seen_ns, horizon_ns))
+            self._loop.advance_to(min(self._seen_ns, horizon_ns))
         return self._check_patience(holders)
 
     def finish(self) -> None:
         """Advance the world to its end after the last program has left: commands under way still act."""
-        sim = self._sim
-        while any(wire.pending for wire in sim.wires):
-            sim.advance_to(sim.next_event_ns() or 0)
-        sim.advance_to(self._seen_ns)
+        loop = self._loop
+        while any(wire.pending for wire in loop.wires):
+            loop.advance_to(loop.next_event_ns() or 0)
+        loop.advance_to(self._seen_ns)
 
     # ---- events ----
 
@@ -216,7 +216,7 @@ class ProgramScheduler:
         Returns:
             Whether it may not, and then the programs that might still act before it.
         """
-        sim = self._sim
+        loop = self._loop
         actor: Participant | None = None
         first = horizon = (NEVER_NS, 0)
         is_waited = False
@@ -233,7 +233,7 @@ class ProgramScheduler:
                     first, actor = (due_ns, participant.rank), participant
             elif participant.is_waited_for and (participant.acts_from_ns, participant.rank) < horizon:
                 horizon = (participant.acts_from_ns, participant.rank)
-        event_ns = sim.next_event_ns()
+        event_ns = loop.next_event_ns()
         if event_ns is not None and (actor is not None or is_waited) and event_ns <= first[0]:
             # Before anything that a program does at the same instant.
             first, actor = (event_ns, -1), None
@@ -247,7 +247,7 @@ class ProgramScheduler:
             actor.patience.renew()
             actor.act()
             return False, []
-        sim.advance_to(first[0])
+        loop.advance_to(first[0])
         for participant in self.participants:
             if participant.waits:
                 participant.check_wait()

@@ -429,10 +429,11 @@ class Programs:
 
     def _listen_to(self, participant: RemoteParticipant) -> None:
         events = selectors.EVENT_READ | (selectors.EVENT_WRITE if participant.has_unsent else 0)
-        if participant not in self._selector.get_map():
+        if not participant.events:
             self._selector.register(participant, events, participant)
-        elif self._selector.get_key(participant).events != events:
+        elif events != participant.events:
             self._selector.modify(participant, events, participant)
+        participant.events = events
 
     def _hang_up(self, participant: RemoteParticipant) -> None:
         self._selector.unregister(participant)

@@ -122,10 +122,11 @@ class SocketConnection(Connection):
                 _end()
 
     def _wait(self, ticket: int) -> Answer:
-        while (answer := take_answer(self._received)) is None or answer.ticket != ticket:
-            if answer is None:
-                self._receive()
-        return answer
+        while True:
+            self._receive()
+            while (answer := take_answer(self._received)) is not None:
+                if answer.ticket == ticket:
+                    return answer
 
     def _receive(self) -> None:
         try:

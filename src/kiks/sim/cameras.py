@@ -48,7 +48,8 @@ class Cameras:
         After a change of the period the engine may have passed an instant already: no picture is taken of the past.
         """
         world = self._world
-        instants = [(world.now_ns // each.period_ns * each.period_ns, index) for index, each in self._fitted.items()]
+        now_ns = world.now_ns
+        instants = [(now_ns - now_ns % each.period_ns, index) for index, each in self._fitted.items()]
         for instant_ns, index in sorted(instants):
             fitted = self._fitted[index]
             if instant_ns > fitted.taken_ns and instant_ns >= world.state.tick_count * TICK_NS:
@@ -68,7 +69,8 @@ class Cameras:
 
     def _take(self, index: int, time_ns: int) -> Picture:
         light = self._kernel(index, time_ns, is_noisy=self._world.specs[index].is_noisy)
-        return np.clip(np.rint(self._pixels), 0, 255).astype(np.int64).tolist(), light
+        greys = np.rint(self._pixels, out=self._pixels)
+        return np.minimum(np.maximum(greys, 0.0, out=greys), 255.0, out=greys).astype(np.uint8), light
 
     def _kernel(self, index: int, time_ns: int, *, is_noisy: bool) -> int:
         world = self._world
