@@ -111,7 +111,7 @@ def find_near_things(scene: Any, bunch: Any, k: Any) -> Any:
             robots[world, body.holder - 1].piece_headings[0] = robots[world, body.holder - 1].heading_rad
     pair_count = 0
     for place in range(crowd.pair_count):
-        first, second = scene.grid.pairs[world, place, 0], scene.grid.pairs[world, place, 1]
+        first, second = np.int64(scene.grid.pairs[world, place, 0]), np.int64(scene.grid.pairs[world, place, 1])
         x, y, radius = disc_at(scene, world, first)
         other_x, other_y, other_radius = disc_at(scene, world, second)
         dx, dy, apart = other_x - x, other_y - y, radius + other_radius + nearer_mm
