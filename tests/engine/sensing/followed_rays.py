@@ -22,9 +22,9 @@ def cast_ray(walls, x, y, cosine, sine, reach):
 
 
 @entry
-def cast_rays(walls, columns, rows, cosines, sines, lengths, brightnesses):
+def cast_rays(walls, columns, rows, cosines, sines, lengths):
     """Follow many rays from Python, each to the first wall; lengths and places in cells."""
-    cast_many(Walls(*walls), columns, rows, cosines, sines, lengths, brightnesses)
+    cast_many(Walls(*walls), columns, rows, cosines, sines, lengths)
 
 
 @entry

@@ -97,7 +97,7 @@ def look(walls: Any, seen: Any, seen_count: Any, x: Any, y: Any, heading: Any, g
     begin = max(_BEGIN_MM * per_cell, free_cells(walls, column, row))
     begin_columns, begin_rows = stack_floats(PIXEL_COUNT), stack_floats(PIXEL_COUNT)
     rays_x, rays_y = stack_floats(PIXEL_COUNT), stack_floats(PIXEL_COUNT)
-    lengths, brightnesses = stack_floats(PIXEL_COUNT), stack_floats(PIXEL_COUNT)
+    lengths = stack_floats(PIXEL_COUNT)
     sine, cosine = sin_cos(heading)
     ray_x = cosine * _EDGE_COS - sine * _EDGE_SIN
     ray_y = sine * _EDGE_COS + cosine * _EDGE_SIN
@@ -106,16 +106,17 @@ def look(walls: Any, seen: Any, seen_count: Any, x: Any, y: Any, heading: Any, g
         begin_columns[p], begin_rows[p] = column + begin * ray_x, row + begin * ray_y
         # Clockwise to the next pixel.
         ray_x, ray_y = ray_x * _PIXEL_COS + ray_y * _PIXEL_SIN, ray_y * _PIXEL_COS - ray_x * _PIXEL_SIN
-    cast_many(walls, begin_columns, begin_rows, rays_x, rays_y, lengths, brightnesses)
+    cast_many(walls, begin_columns, begin_rows, rays_x, rays_y, lengths)
     for p in range(PIXEL_COUNT):
-        start, length, brightness = begin, lengths[p], brightnesses[p]
+        start, length, ray = begin, lengths[p], (rays_x[p], rays_y[p])
+        brightness = 1.0 * brightness_met(walls, begin_columns[p], begin_rows[p], *ray, length, True)
         if length == 0.0:  # the view begins inside a wall: the pixel sees its surface
             start = 0.0
-            length, is_met = cast(walls, column, row, rays_x[p], rays_y[p], ENDLESS)
-            brightness = brightness_met(walls, column, row, rays_x[p], rays_y[p], length, is_met)
+            length, is_met = cast(walls, column, row, *ray, ENDLESS)
+            brightness = 1.0 * brightness_met(walls, column, row, *ray, length, is_met)
         if seen_count > 0:
             limit = start + length
-            to_disc, _, shade = meet_discs(seen, seen_count, column, row, rays_x[p], rays_y[p], limit, 1.0, 0.0)
+            to_disc, _, shade = meet_discs(seen, seen_count, column, row, *ray, limit, 1.0, 0.0)
             if shade > 0.0:
                 start, length, brightness = 0.0, to_disc, shade
         grey[p] = _BLACK + brightness * ((_WHITE - _BLACK) / 255.0)

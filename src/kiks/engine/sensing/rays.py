@@ -20,7 +20,6 @@ from kiks.engine.sensing.disc_rays import hides
 from kiks.engine.simd.lanes import LANES, floor, load, store
 from kiks.engine.simd.masks import anywhere, choose, opposite
 from kiks.engine.simd.rasters import pick
-from kiks.engine.simd.stack_arrays import stack_floats
 from kiks.model.arena import PAD, Arena
 from kiks.model.raster import LEAPS_PER_CELL
 
@@ -120,31 +119,14 @@ def brightness_met(walls: Any, column: Any, row: Any, cosine: Any, sine: Any, le
 
 
 @kernel
-def cast_many(walls: Any, columns: Any, rows: Any, cosines: Any, sines: Any, lengths: Any, brightnesses: Any) -> Any:
-    """Follow many rays, eight at a time, each to the first wall: `cast` without a limit of the length.
+def cast_many(walls: Any, columns: Any, rows: Any, cosines: Any, sines: Any, lengths: Any) -> Any:
+    """Write the lengths of many rays, each to the first wall, into `lengths`: `cast` without a limit of the length.
 
-    Args:
-        walls: The walls as rays see them.
-        columns: Origins [cells], shape [rays].
-        rows: Origins [cells], shape [rays].
-        cosines: Directions, shape [rays].
-        sines: Directions, shape [rays].
-        lengths: Where the lengths of the rays go [cells], shape [rays].
-        brightnesses: Where the brightnesses of the walls go, shape [rays].
+    All arrays are float64 of one length, which is a multiple of eight; places and lengths are in cells.
     """
-    count = lengths.shape[0]
-    parts = stack_floats(LANES), stack_floats(LANES), stack_floats(LANES), stack_floats(LANES), stack_floats(LANES)
-    for first in range(0, count, LANES):
-        for lane in range(LANES):
-            ray = min(first + lane, count - 1)
-            parts[0][lane], parts[1][lane] = columns[ray], rows[ray]
-            parts[2][lane], parts[3][lane] = cosines[ray], sines[ray]
-        rays = load(parts[0]), load(parts[1]), load(parts[2]), load(parts[3])
-        store(parts[4], cast(walls, *rays, ENDLESS)[0])
-        for ray in range(first, min(first + LANES, count)):
-            lengths[ray] = parts[4][ray - first]
-            place = columns[ray] + lengths[ray] * cosines[ray], rows[ray] + lengths[ray] * sines[ray]
-            brightnesses[ray] = brightness_at(walls, *place)
+    for first in range(0, lengths.shape[0], LANES):
+        origins, directions = (load(columns[first:]), load(rows[first:])), (load(cosines[first:]), load(sines[first:]))
+        store(lengths[first:], cast(walls, *origins, *directions, ENDLESS)[0])
 
 
 @kernel
