@@ -7,7 +7,7 @@ eight sensors (56 rays, the response, noise), the controller, and five ticks of 
   of 1 m x 1 m with 30 walls in it; `batch.reflection_...` with the default response, `batch.fast_...` with the table.
 * `batch.full_steps_per_s_all`: the same on all cores, in wall time; `batch.second_core_adds`: what a second one adds.
 * `batch.link_...`: with the default response and the loop of 0.1 s over a line of 9600 baud, which is ten ticks.
-* `batch.bodies10_...`: with ten balls in each world.
+* `batch.bodies10_...`: with ten balls in each world; `batch.swarmN_...`: N robots in a world of 1, 3 or 7 m.
 * `batch.worlds_N_...`, `batch.arena_Nm_...`, `batch.bodies_N_...`: how it goes with their number, default response.
 * `batch.megabytes_10000`: how much memory 10,000 worlds add, and what a further minute of runs adds to that.
 * `batch.kheperax8_steps_per_s`: Kheperax with 8 lasers in its standard maze (benchmarks/kheperax_peer.py), 100 and
@@ -180,10 +180,11 @@ def main() -> None:
             "reflection": rate(worlds(arena, count), seconds),
             "fast": rate(worlds(arena, count, response="fast"), seconds),
             "link": rate(worlds(arena, count, timing=kiks.Timing(0.1, 9600)), 2 * seconds),
-            "bodies10": rate(worlds(box(1000, 10), 64), seconds / 4),
-            "swarm10": rate(swarm(1000, 10, 8), seconds / 4),
-            "swarm100": rate(swarm(3000, 100, 2), seconds / 8),
-            "swarm1000": rate(swarm(7000, 1000, 1), seconds / 40),
+            # As long as each other: a run begins with a reset, whose share would depend on its length.
+            "bodies10": rate(worlds(box(1000, 10), 64), seconds / 2),
+            "swarm10": rate(swarm(1000, 10, 8), seconds / 2),
+            "swarm100": rate(swarm(3000, 100, 2), seconds / 2),
+            "swarm1000": rate(swarm(7000, 1000, 1), seconds / 2),
         },
     )
     rows += [(f"batch.{name}_steps_per_s_core", value, "robot-steps/CPU s") for name, value in found.items()]
