@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from kiks.learn import tasks
     from kiks.learn.champion import Champion
     from kiks.learn.evolution import Evolution
+    from kiks.learn.exam import Exam
     from kiks.learn.executors import executor_for
     from kiks.learn.task import Axis, Task
     from kiks.model.arena import Arena
@@ -45,6 +46,7 @@ __all__ = [
     "Champion",
     "Controller",
     "Evolution",
+    "Exam",
     "Khepera",
     "KiksError",
     "LinkError",
@@ -78,6 +80,7 @@ _HOMES = {
     "Champion": "kiks.learn.champion",
     "Controller": "kiks.control.controller",
     "Evolution": "kiks.learn.evolution",
+    "Exam": "kiks.learn.exam",
     "Khepera": "kiks.client.khepera",
     "KiksError": "kiks.errors",
     "LinkError": "kiks.errors",

@@ -38,9 +38,6 @@ class ControllerKind(enum.StrEnum):
 GENERATIONS = 60
 """Default number of generations."""
 
-EXAM_S = 180.0
-"""Time for which a champion drives in its exam [s]."""
-
 
 def evolve(
     task: Annotated[str, typer.Argument(help="A task (--list shows them), or a Python file that holds one.")] = "avoid",
@@ -123,22 +120,9 @@ def _finish(evolution: Evolution, folder: Path, *, stopped: bool) -> None:
     typer.echo(f"Champion of generation {champion.generation}: fitness {champion.fitness:.4f}   {figures}")
     if stopped:
         typer.echo(f"Stopped after generation {len(evolution.generations)}; the same command continues.")
-    elif evolution.task.exam is not None:
-        typer.echo(_exam(evolution))
     typer.echo(f"Folder: {folder}   See it drive: kiks demo {folder / 'champion.toml'}")
-
-
-def _exam(evolution: Evolution) -> str:
-    """Let the champion drive on a serial line in an unseen arena, and return the result as text."""
-    task, champion = evolution.task, evolution.champion
-    assert task.exam is not None
-    sim, ports = champion.simulation(task.exam, robots=task.robots, seed=evolution.seed)
-    champion.drive(ports, seconds=EXAM_S)
-    contacts = sum(sim.contacts(number) for number in range(1, task.robots + 1))
-    return (
-        f"Exam on a line of {champion.baud} baud in '{task.exam.name}', unseen: {contacts} contacts, "
-        f"{sim.travelled_mm(1) / 1000:.2f} m in {sim.time_s:.0f} s"
-    )
+    if not stopped and evolution.task.exam is not None:
+        typer.echo(evolution.task.exam.examine(champion, robots=evolution.task.robots))
 
 
 def _controller(kind: ControllerKind, task: Task) -> Controller:

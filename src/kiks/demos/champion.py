@@ -39,7 +39,7 @@ class ChampionScene(Scene):
         if make_task is None:
             return Arena.default()
         task = make_task()
-        return task.exam or task.arenas[0]
+        return (task if task.exam is None else task.exam).arenas[0]
 
     def make_simulation(self, arena: Arena) -> Simulation:
         """Return a world of the champion's kind of robot."""

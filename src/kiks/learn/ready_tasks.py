@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from kiks.control import controllers, measures
 from kiks.control.controller import Controller
 from kiks.learn import training_arenas
+from kiks.learn.exam import Exam
 from kiks.learn.task import Axis, Task, cautious_mean
 from kiks.model.arena import Arena, Cylinder, Lamp
 
@@ -20,6 +21,12 @@ Values = Mapping[str, Floats]
 
 SPEED_LIMIT = 8.0
 """Highest speed of the ready-made tasks [pulses/10 ms]: 64 mm/s."""
+
+EXAM_S = 180.0
+"""Time of an exam [s]."""
+
+LEAST_ROAMING = 0.2
+"""Mean `roaming` from which on a robot gets around: 16 mm/s away from where it was two seconds ago."""
 
 CONTACT_COST = 3.0
 """Fitness is divided by 1 plus this times the mean number of contacts per world."""
@@ -59,10 +66,21 @@ def avoid(controller: Controller | None = None, **changes: Any) -> Task:
         seconds=20.0,
         worlds=12,
         axes=(Axis("path_mm", 0, 1500), Axis("straightness", 0, 1)),
-        exam=training_arenas.unseen(),
+        exam=Exam(
+            (training_arenas.unseen(), training_arenas.rooms()),
+            (measures.contacts, measures.roaming),
+            avoid_solved,
+            "got around for three minutes and touched nothing",
+        ),
         about="drive fast and straight, explore, touch nothing",
     )
     return replace(task, **changes)
+
+
+def avoid_solved(values: Values) -> NDArray[np.bool_]:
+    """Return whether the robot touched nothing and did not stay where it was."""
+    solved: NDArray[np.bool_] = (values["contacts"] == 0) & (values["roaming"] > LEAST_ROAMING)
+    return solved
 
 
 # ---- follow ----
@@ -89,7 +107,6 @@ def follow(controller: Controller | None = None, **changes: Any) -> Task:
         seconds=40.0,
         worlds=12,
         axes=(Axis("path_mm", 0, 3000), Axis("wall_following", 0, 1)),
-        exam=training_arenas.unseen(),
         about="drive along walls, on the robot's left",
     )
     return replace(task, **changes)
@@ -124,7 +141,6 @@ def light(controller: Controller | None = None, **changes: Any) -> Task:
         seconds=40.0,
         worlds=12,
         axes=(Axis("light_mm", 0, 600), Axis("path_mm", 0, 3000)),
-        exam=_lit(training_arenas.unseen(), 550, 320),
         about="go to the lamp and stay there",
     )
     return replace(task, **changes)
@@ -136,6 +152,9 @@ def _lit(arena: Arena, x_mm: float, y_mm: float) -> Arena:
 
 
 # ---- gather ----
+
+GATHERED = 4
+"""Cylinders in the middle that are enough to pass the exam, of six."""
 
 
 def gather_fitness(values: Values) -> Floats:
@@ -159,10 +178,20 @@ def gather(controller: Controller | None = None, **changes: Any) -> Task:
         seconds=90.0,
         worlds=12,
         axes=(Axis("spread_mm", 0, 300), Axis("path_mm", 0, 6000)),
-        exam=_with_cylinders(3),
+        exam=Exam(
+            tuple(_with_cylinders(number) for number in (3, 4)),
+            (measures.gathered(300, 300, radius_mm=150),),
+            gather_solved,
+            "brought four of six cylinders to the middle",
+        ),
         about="push six cylinders to the middle",
     )
     return replace(task, **changes)
+
+
+def gather_solved(values: Values) -> NDArray[np.bool_]:
+    """Return whether most cylinders were brought to the middle."""
+    return values["gathered"] >= GATHERED
 
 
 def _with_cylinders(number: int) -> Arena:
@@ -178,6 +207,9 @@ def _with_cylinders(number: int) -> Arena:
 
 
 # ---- maze ----
+
+GOAL_RADIUS_MM = 100.0
+"""Distance from the goal at which it counts as reached [mm]."""
 
 
 def maze_fitness(values: Values) -> Floats:
@@ -207,9 +239,21 @@ def maze(controller: Controller | None = None, **changes: Any) -> Task:
         worlds=2,
         axes=(Axis("final_x_mm", 0, training_arenas.SIDE_MM, 32), Axis("final_y_mm", 0, training_arenas.SIDE_MM, 32)),
         starts="arena",
+        exam=Exam(
+            (training_arenas.kheperax(),),
+            (measures.reached_s(*training_arenas.goal_mm(), radius_mm=GOAL_RADIUS_MM),),
+            maze_solved,
+            "reached the goal",
+            starts="arena",
+        ),
         about="end near the goal of the Kheperax maze",
     )
     return replace(task, **changes)
+
+
+def maze_solved(values: Values) -> NDArray[np.bool_]:
+    """Return whether the robot reached the goal before the end."""
+    return values["reached_s"] < EXAM_S - 1.0
 
 
 def maze_qd_fitness(values: Values) -> Floats:

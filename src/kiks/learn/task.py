@@ -13,13 +13,13 @@ import numpy as np
 from pydantic import Field
 
 from kiks.batch.batch import Batch
-from kiks.batch.initial_state import Arenas, Starts, random_starts
+from kiks.batch.initial_state import Arenas, Starts, spread_starts
 from kiks.batch.loop_timing import Timing
 from kiks.control.controller import Controller
 from kiks.control.measure import Measure
 from kiks.errors import ParameterError, shown
 from kiks.learn.evaluation import Floats, Integers, check_candidates
-from kiks.model.arena import AnArena
+from kiks.learn.exam import Exam
 from kiks.model.checks import check_number
 from kiks.model.data_file import Number, Text, Whole, read_file, record
 from kiks.model.robot import RobotSpec
@@ -28,9 +28,6 @@ Fitness = Callable[[Mapping[str, Floats]], Floats]
 
 BATCH_WORLDS_MAX = 20_000
 """Largest number of worlds in a batch: more need more memory and run no faster."""
-
-CLEAR_MM = 8.0
-"""Smallest gap between a start and anything else [mm]."""
 
 WORLDS_MAX, ROBOTS_MAX, MEASURES_MAX = 100_000, 1000, 100
 """Largest number of worlds of a candidate, of robots in each world, and of measures."""
@@ -83,7 +80,7 @@ class Task:
         robots: Number of robots in each world, all with the same controller.
         timing: Timing of the control loop; that of a program on a line of 9600 baud if left out.
         starts: 'random' for free places anywhere, or 'arena' for the starts of the arena.
-        exam: An arena that is not used for training, in which champions are shown.
+        exam: The exam of its champions.
         about: A description in one line.
         file: The user's file that defines it.
 
@@ -113,7 +110,7 @@ class Task:
     robots: Annotated[Whole, Field(ge=1, le=ROBOTS_MAX)] = 1
     timing: Timing = field(default_factory=Timing)
     starts: Starts = "random"
-    exam: AnArena | None = None
+    exam: Annotated[Exam | None, Field(description="kiks.Exam(arenas, measures, solved) makes one.")] = None
     about: Text = ""
     file: str = ""
 
@@ -261,16 +258,10 @@ class Task:
 
     def _starts(self, seeds: Integers) -> Floats:
         """Return random start poses, float64 [world, 1, 3]: the same for the same seed."""
-        arena_world_count = self.worlds // len(self.arenas)
-        radius_mm = RobotSpec.load(self.robot).body.radius_mm
-        poses = {}
-        for seed in dict.fromkeys(seeds.tolist()):
-            of_arenas = [
-                random_starts(arena, arena_world_count, seed=seed, radius_mm=radius_mm, clear_mm=CLEAR_MM)
-                for arena in self.arenas
-            ]
-            # The worlds take the arenas in turn.
-            poses[seed] = np.stack(of_arenas, axis=1).reshape(self.worlds, 1, 3)
+        poses = {
+            seed: spread_starts(self.arenas, self.worlds, seed=seed, robot=self.robot)
+            for seed in dict.fromkeys(seeds.tolist())
+        }
         return np.concatenate([poses[seed] for seed in seeds.tolist()])
 
 

@@ -118,7 +118,8 @@ def _task_of(given: TaskFile, path: Path, controller: Controller | None) -> Task
     if given.arenas is not None:
         changes["arenas"] = tuple(Arena.load(inside(folder, each, "arenas")) for each in given.arenas)
     if given.exam is not None:
-        changes["exam"] = Arena.load(inside(folder, given.exam, "exam"))
+        assert base.exam is not None
+        changes["exam"] = replace(base.exam, arenas=(Arena.load(inside(folder, given.exam, "exam")),))
     if given.robot is not None:
         is_name = given.robot in robot_names()
         changes["robot"] = given.robot if is_name else str(inside(folder, given.robot, "robot"))

@@ -116,6 +116,25 @@ def unseen() -> Arena:
     return draw(800, 800, walls, "unseen", 220)
 
 
+def rooms() -> Arena:
+    """Return an arena for the exam: three rooms with doors, furniture, thin dark walls and a post."""
+    walls = [
+        *wall((0, 420), (250, 420)),
+        *wall((370, 420), (430, 420), (430, 620), brightness=90),
+        *wall((430, 740), (430, 900)),
+        *wall((430, 420), (620, 420)),
+        *wall((740, 420), (900, 420), brightness=60),
+        *wall((430, 0), (430, 150)),
+        *wall((430, 280), (430, 420), brightness=200),
+        *wall((120, 200), (220, 200), (220, 110), (120, 110), (120, 200), brightness=150),
+        *wall((640, 620), (760, 700), brightness=40),
+        pillar(200, 660, 80, 110),
+        pillar(680, 200, 20, 60),
+        pillar(610, 800, 45),
+    ]
+    return draw(900, 900, walls, "rooms", 180)
+
+
 def follow_box() -> Arena:
     """Return an arena with a corner cut off and a block in its middle."""
     walls = [*wall((0, 440), (160, 600)), pillar(330, 270, 130, 180)]

@@ -1,0 +1,144 @@
+"""An exam: a champion drives where it was not trained, from many starts, and each start is solved or not.
+
+A batch whose loops have the timing of a serial line is that line to the bit. So an exam says how the champion does on
+a line, and takes a fraction of a second.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from kiks.batch.batch import Batch
+from kiks.batch.initial_state import Arenas, Starts, spread_starts
+from kiks.control.measure import Measure
+from kiks.errors import ParameterError, shown
+from kiks.learn.champion import Champion
+from kiks.learn.evaluation import Floats
+from kiks.model.checks import check_kind
+from kiks.model.data_file import Number, Text, Whole, record
+
+Solved = Callable[[Mapping[str, Floats]], NDArray[np.bool_]]
+
+PASS_SHARE = 0.9
+"""Share of the starts that a champion must solve to pass."""
+
+EXAM_SEED = 2**40
+"""Seed of the first start of each exam; evolutions draw theirs from others."""
+
+STARTS_MAX, MEASURES_MAX = 10_000, 100
+"""Most starts and measures of an exam."""
+
+
+@dataclass(frozen=True)
+class ExamResult:
+    """How a champion did in an exam.
+
+    Attributes:
+        solved: Whether each start was solved, bool [start].
+        values: The measures of each start, float64 [start, measure]; of several robots, their mean.
+        measures: Names of the measures.
+        goal: What a solved start shows.
+    """
+
+    solved: NDArray[np.bool_]
+    values: Floats
+    measures: tuple[str, ...]
+    goal: str
+
+    @property
+    def is_passed(self) -> bool:
+        """Whether enough starts were solved."""
+        return bool(self.solved.sum() >= PASS_SHARE * len(self.solved))
+
+    def __str__(self) -> str:
+        verdict = "solved" if self.is_passed else "not solved"
+        goal = f" ({self.goal})" if self.goal else ""
+        return f"Exam: {verdict}, {int(self.solved.sum())} of {len(self.solved)} starts{goal}"
+
+
+@record
+class Exam:
+    """An exam for champions.
+
+    Args:
+        arenas: Arenas, which the starts take in turn; best such in which none trained.
+        measures: What is measured, each with a different name.
+        solved: Maps the measures, by name float64 [start], to whether each start is solved, bool [start].
+        goal: What a solved start shows, in some words.
+        seconds: Time for which the champion drives from each start [s].
+        count: Number of starts; a multiple of the number of arenas.
+        starts: 'random' for free places anywhere, or 'arena' for the starts of the arenas, each with noise of its own.
+
+    Raises:
+        ParameterError: If an argument is out of range.
+
+    Example:
+        >>> import kiks
+        >>> @kiks.controller(parameters=2)
+        ... def ahead(sensors, memory, parameters, wheels):
+        ...     wheels[:] = parameters
+        >>> exam = Exam([kiks.Arena.box(900, 900)], [kiks.measures.path_mm], lambda values: values["path_mm"] > 100,
+        ...             goal="drove 100 mm", seconds=10, count=4)
+        >>> print(exam.examine(kiks.Champion(ahead, (3, 3))))
+        Exam: solved, 4 of 4 starts (drove 100 mm)
+    """
+
+    arenas: Arenas
+    measures: Annotated[tuple[Measure, ...], Field(min_length=1, max_length=MEASURES_MAX)]
+    solved: Solved
+    goal: Text = ""
+    seconds: Annotated[Number, Field(ge=1e-3, le=1e5)] = 180.0
+    count: Annotated[Whole, Field(ge=1, le=STARTS_MAX)] = 20
+    starts: Starts = "random"
+
+    # Functions cannot be compared: an exam equals itself only.
+    __eq__ = object.__eq__
+    __hash__ = object.__hash__
+
+    def __post_init__(self) -> None:
+        if self.count % len(self.arenas):
+            raise ParameterError(
+                f"count must be a multiple of the number of arenas, {len(self.arenas)}, but it was {self.count}."
+            )
+
+    def examine(self, champion: Champion, *, robots: int = 1) -> ExamResult:
+        """Let a champion drive from all starts, with the timing of its own control loop.
+
+        Args:
+            champion: The champion.
+            robots: Number of robots in each world, all driven by it.
+
+        Raises:
+            ParameterError: If an argument is wrong, or `solved` returns something else than a yes or no for each start.
+            ArenaError: If something has no free place in an arena.
+        """
+        check_kind("champion", champion, Champion, "kiks.Champion.load() returns one.")
+        poses = None
+        if self.starts == "random":
+            poses = spread_starts(self.arenas, self.count, seed=EXAM_SEED, robot=champion.robot)
+        batch = Batch(
+            self.arenas,
+            self.count,
+            robot=champion.robot,
+            robots=robots,
+            seed=EXAM_SEED,
+            starts=poses,
+            senses=champion.controller.senses,
+            timing=champion.timing,
+        )
+        rollouts = batch.run(champion.controller, champion.parameters, seconds=self.seconds, measures=self.measures)
+        values = rollouts.values.mean(axis=1)
+        result = self.solved({name: values[:, number] for number, name in enumerate(rollouts.measures)})
+        solved = np.asarray(result)
+        if solved.dtype != np.bool_ or solved.shape != (self.count,):
+            raise ParameterError(
+                f"solved must return a bool for each of {self.count} starts, but returned {shown(result)}. "
+                "The measures have the shape [start]."
+            )
+        return ExamResult(solved, values, rollouts.measures, self.goal)
