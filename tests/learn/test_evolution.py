@@ -352,7 +352,7 @@ def test_obstacle_avoidance_evolves_and_works_on_a_serial_line() -> None:
     medians = [float(np.median(each.fitness)) for each in evolution.generations]
     assert medians[-1] > 5 * max(medians[0], 0.01)
     assert task.exam is not None
-    sim, ports = champion.simulation(task.exam, seed=1)
+    sim, ports = champion.simulation(task.exam.arenas[0], seed=1)
     champion.drive(ports, seconds=60.0)
     assert sim.contacts(1) <= 3
     assert sim.travelled_mm(1) > 1000

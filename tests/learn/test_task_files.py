@@ -53,7 +53,7 @@ def test_all_keys(folder: Path) -> None:
     assert (task.name, task.about, task.seconds, task.worlds, task.starts) == ("in a room", "x", 2.0, 4, "arena")
     assert [arena.width_mm for arena in task.arenas] == [400, 500]
     assert task.exam is not None
-    assert task.exam.width_mm == 500
+    assert [arena.width_mm for arena in task.exam.arenas] == [500]
     assert task.robot == str((folder / "my.toml").resolve())
     assert task.timing == kiks.Timing(0.05, 38400, 0.0025)
     assert task.controller is kiks.controllers.gru(units=2)

@@ -1,0 +1,92 @@
+"""Exams: their starts are those of the wire, and neither standing still nor chance passes the ready-made ones."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import kiks
+from kiks.batch.initial_state import spread_starts
+from kiks.errors import ParameterError
+from kiks.learn.exam import EXAM_SEED, PASS_SHARE, ExamResult
+from kiks.model.arena import Pose
+
+ROOM = kiks.Arena.box(500, 500)
+
+
+@kiks.controller(parameters=2)
+def ahead(sensors, memory, parameters, wheels):
+    wheels[:] = parameters
+
+
+SLOW = kiks.Champion(ahead, (1, 1))
+
+
+def exam_of(solved=lambda values: values["path_mm"] > 100, **changes):
+    return kiks.Exam(
+        [ROOM], [kiks.measures.path_mm, kiks.measures.contacts], solved, **{"count": 4, "seconds": 5} | changes
+    )
+
+
+def test_a_start_is_what_happens_on_a_serial_line():
+    champion = kiks.Champion(kiks.controllers.linear(speed_limit=8.0), tuple(np.linspace(-3, 3, 18).tolist()))
+    exam = exam_of(seconds=20)
+    examined = exam.examine(champion)
+    poses = spread_starts(exam.arenas, exam.count, seed=EXAM_SEED, robot="khepera")[:, 0]
+    for start, pose in enumerate(poses.tolist()):
+        sim, ports = champion.simulation(replace(ROOM, starts=(Pose(*pose),)), seed=EXAM_SEED + start)
+        champion.drive(ports, seconds=exam.seconds)
+        path_mm, contacts = examined.values[start].tolist()
+        # The measure sees the robot when the last command takes effect, the wire a loop later.
+        assert 0.0 <= sim.travelled_mm(1) - path_mm < 0.1 * 8.0 * 10.0
+        assert contacts == sim.contacts(1)
+
+
+def test_starts_take_the_arenas_in_turn():
+    far_mm = kiks.measures.final_x_mm
+    arenas = [kiks.Arena.box(200, 200), kiks.Arena.box(2000, 200)]
+    exam = kiks.Exam(arenas, [far_mm], lambda values: values["final_x_mm"] > 200, count=40, seconds=0.1)
+    solved = exam.examine(SLOW).solved
+    assert not solved[::2].any()
+    assert solved[1::2].sum() > 10
+
+
+@pytest.mark.parametrize(("solved", "word"), [(18, "solved"), (17, "not solved")])
+def test_the_text_says_whether_the_exam_is_passed(solved, word):
+    result = ExamResult(np.arange(20) < solved, np.zeros((20, 1)), ("path_mm",), "went far")
+    assert result.is_passed == (solved >= PASS_SHARE * 20)
+    assert str(result) == f"Exam: {word}, {solved} of 20 starts (went far)"
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: exam_of(count=0), "count must be"),
+        (lambda: kiks.Exam([ROOM, ROOM], [kiks.measures.path_mm], lambda values: values, count=3), "a multiple of the"),
+        (
+            lambda: exam_of(lambda values: values["path_mm"]).examine(kiks.Champion(ahead, (1, 1))),
+            "a bool for each of 4",
+        ),
+        (lambda: exam_of(lambda values: True).examine(kiks.Champion(ahead, (1, 1))), "solved must return a bool"),
+        (lambda: exam_of().examine("me"), "champion must be a Champion"),
+        (lambda: kiks.tasks.avoid(exam=ROOM), "exam must be"),
+    ],
+)
+def test_wrong_exams_are_errors(make, message):
+    with pytest.raises(ParameterError, match=message):
+        make()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", list(kiks.tasks.TASKS))
+def test_neither_standing_still_nor_chance_passes(name):
+    task = kiks.tasks.load(name)
+    assert not set(map(id, task.exam.arenas)) & set(map(id, task.arenas))
+    exam = replace(task.exam, count=len(task.exam.arenas))
+    rng = np.random.default_rng(1)
+    for scale in (0.0, 1.0, 3.0):
+        parameters = (scale * rng.standard_normal(task.parameter_count)).tolist()
+        champion = kiks.Champion(task.controller, parameters, timing=task.timing)
+        assert not exam.examine(champion, robots=task.robots).solved.all()
