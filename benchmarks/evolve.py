@@ -1,13 +1,13 @@
 """How long tasks take to evolve from random, and whether their champions solve them.
 
-Run: python benchmarks/evolve.py [--json] [--seeds 5] [--task NAME ...]. For each seed the task is evolved by CMA-ES for the generations of
-`TASKS`, and its champion takes the exam (`kiks.Exam`): twenty starts in arenas where it was not trained, with the timing of a line of 9600
-baud.
+Run: python benchmarks/evolve.py [--json] [--seeds 5] [--task NAME ...]. For each seed the task is evolved by CMA-ES for
+the generations of `TASKS`, and its champion takes the exam (`kiks.Exam`): twenty starts in arenas where it was not
+trained, with the timing of a line of 9600 baud.
 
-* `evolve.NAME_solved`: the share of champions that pass; `evolve.NAME_s`: the median of the time that an evolution takes.
+* `evolve.NAME_solved`: the share of champions that pass; `evolve.NAME_s`: the median time of an evolution.
 * `evolve.avoid_maze_solved`, `evolve.avoid_office_solved`: the same exam in two arenas of `examples`.
-* `evolve.swarm_generations_per_min`: the pace at which a swarm evolves: `SWARM` robots that gather as many balls, in each of a hundred
-  candidates' worlds; `evolve.generations_per_min`: that of the robots that avoid obstacles.
+* `evolve.swarm_generations_per_min`: the pace at which a swarm evolves: `SWARM` robots that gather as many balls, in
+  each of a hundred candidates' worlds; `evolve.generations_per_min`: that of the robots that avoid obstacles.
 """
 
 from __future__ import annotations
