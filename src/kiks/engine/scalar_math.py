@@ -5,10 +5,37 @@ A kernel that Python calls directly is compiled anew in each process, which take
 
 from __future__ import annotations
 
+from typing import Any
+
 from kiks.engine import numbers
 from kiks.engine.compiling import entry
 
-sin_cos, exponential, logarithm, power, uniform = (
-    entry(kernel.py_func)
-    for kernel in (numbers.sin_cos, numbers.exponential, numbers.logarithm, numbers.power, numbers.uniform)
-)
+
+@entry
+def sin_cos(angle_rad: Any) -> Any:
+    """Return the sine and the cosine of an angle; see `numbers.sin_cos`."""
+    return numbers.sin_cos(angle_rad)
+
+
+@entry
+def exponential(x: Any) -> Any:
+    """Return e to the power of x; see `numbers.exponential`."""
+    return numbers.exponential(x)
+
+
+@entry
+def logarithm(x: Any) -> Any:
+    """Return the natural logarithm; see `numbers.logarithm`."""
+    return numbers.logarithm(x)
+
+
+@entry
+def power(base: Any, exponent: Any) -> Any:
+    """Return a power of a positive number; see `numbers.power`."""
+    return numbers.power(base, exponent)
+
+
+@entry
+def uniform(seed: Any, world: Any, robot: Any, stream: Any, instant: Any, index: Any) -> Any:
+    """Return a random number from 0 to 1; see `numbers.uniform`."""
+    return numbers.uniform(seed, world, robot, stream, instant, index)
