@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 import kiks
-from kiks.batch.initial_state import spread_starts
 from kiks.errors import ParameterError
-from kiks.learn.exam import EXAM_SEED, PASS_SHARE, ExamResult
+from kiks.learn.exam import EXAM_SEED, PASS_SHARE, ExamResult, spread_starts
 from kiks.model.arena import Pose
 
 ROOM = kiks.Arena.box(500, 500)

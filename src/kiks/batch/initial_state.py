@@ -263,22 +263,3 @@ def random_starts(
             f"{len(poses)} of {count} were found. Take a larger one, or a smaller clear_mm."
         )
     return poses[:count]
-
-
-def spread_starts(arenas: Sequence[Arena], count: int, *, seed: int, robot: str, clear_mm: float = 8.0) -> Any:
-    """Return random start poses of lone robots in worlds that take arenas in turn, float64 [count, 1, 3].
-
-    Args:
-        arenas: The arenas.
-        count: Number of worlds, a multiple of the number of arenas.
-        seed: Seed of the random generator.
-        robot: Kind of the robots.
-        clear_mm: Least distance of a robot's edge from anything else [mm].
-
-    Raises:
-        ParameterError: If an arena has too few free places.
-    """
-    radius_mm = RobotSpec.load(robot).body.radius_mm
-    each = count // len(arenas)
-    poses = [random_starts(arena, each, seed=seed, radius_mm=radius_mm, clear_mm=clear_mm) for arena in arenas]
-    return np.stack(poses, axis=1).reshape(count, 1, 3)

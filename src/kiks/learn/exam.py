@@ -6,7 +6,7 @@ a line, and takes a fraction of a second.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -15,13 +15,15 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from kiks.batch.batch import Batch
-from kiks.batch.initial_state import Arenas, Starts, spread_starts
+from kiks.batch.initial_state import Arenas, Starts, random_starts
 from kiks.control.measure import Measure
 from kiks.errors import ParameterError, shown
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats
+from kiks.model.arena import Arena
 from kiks.model.checks import check_kind
 from kiks.model.data_file import Number, Text, Whole, record
+from kiks.model.robot import RobotSpec
 
 Solved = Callable[[Mapping[str, Floats]], NDArray[np.bool_]]
 
@@ -30,6 +32,9 @@ PASS_SHARE = 0.9
 
 EXAM_SEED = 2**40
 """Seed of the first start of each exam; evolutions draw theirs from others."""
+
+CLEAR_MM = 8.0
+"""Smallest gap between a start and anything else [mm]."""
 
 STARTS_MAX, MEASURES_MAX = 10_000, 100
 """Most starts and measures of an exam."""
@@ -142,3 +147,22 @@ class Exam:
                 "The measures have the shape [start]."
             )
         return ExamResult(solved, values, rollouts.measures, self.goal)
+
+
+def spread_starts(arenas: Sequence[Arena], count: int, *, seed: int, robot: str, clear_mm: float = CLEAR_MM) -> Floats:
+    """Return random start poses of lone robots in worlds that take arenas in turn, float64 [count, 1, 3].
+
+    Args:
+        arenas: The arenas.
+        count: Number of worlds, a multiple of the number of arenas.
+        seed: Seed of the random generator.
+        robot: Kind of the robots.
+        clear_mm: Least distance of a robot's edge from anything else [mm].
+
+    Raises:
+        ParameterError: If an arena has too few free places.
+    """
+    radius_mm = RobotSpec.load(robot).body.radius_mm
+    each = count // len(arenas)
+    poses = [random_starts(arena, each, seed=seed, radius_mm=radius_mm, clear_mm=clear_mm) for arena in arenas]
+    return np.stack(poses, axis=1).reshape(count, 1, 3)

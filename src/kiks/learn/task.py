@@ -13,13 +13,13 @@ import numpy as np
 from pydantic import Field
 
 from kiks.batch.batch import Batch
-from kiks.batch.initial_state import Arenas, Starts, spread_starts
+from kiks.batch.initial_state import Arenas, Starts
 from kiks.batch.loop_timing import Timing
 from kiks.control.controller import Controller
 from kiks.control.measure import Measure
 from kiks.errors import ParameterError, shown
 from kiks.learn.evaluation import Floats, Integers, check_candidates
-from kiks.learn.exam import Exam
+from kiks.learn.exam import Exam, spread_starts
 from kiks.model.checks import check_number
 from kiks.model.data_file import Number, Text, Whole, read_file, record
 from kiks.model.robot import RobotSpec
