@@ -69,7 +69,7 @@ def test_the_text_says_whether_the_exam_is_passed(solved, word):
             "a bool for each of 4",
         ),
         (lambda: exam_of(lambda values: True).examine(kiks.Champion(ahead, (1, 1))), "solved must return a bool"),
-        (lambda: exam_of().examine("me"), "champion must be a Champion"),
+        (lambda: exam_of().examine("me"), "champion must be a kiks.Champion"),
         (lambda: kiks.tasks.avoid(exam=ROOM), "exam must be"),
     ],
 )
