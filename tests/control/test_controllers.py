@@ -33,6 +33,13 @@ def readings(controller: kiks.Controller, step_count: int = 12, seed: int = 5) -
     return np.random.default_rng(seed).integers(0, 1024, (step_count, controller.sensor_count)).astype(float)
 
 
+def inputs_of(controller: kiks.Controller, sensors: Trace) -> Trace:
+    """Return readings as the inputs of networks: proximity as a share of 1023, light as what is missing from 500."""
+    senses = np.split(sensors, len(controller.senses), axis=1)
+    shares = {"proximity": lambda counts: counts / 1023.0, "ambient": lambda counts: (500.0 - counts) / 500.0}
+    return np.hstack([shares[name](counts) for name, counts in zip(controller.senses, senses, strict=True)])
+
+
 def logistic(x: Any) -> Any:
     return 1.0 / (1.0 + np.exp(-x))
 
@@ -48,11 +55,11 @@ def taken(parameters: Trace, *shapes: tuple[int, ...]) -> list[Trace]:
     return parts
 
 
-def feed_forward(parameters: Trace, sensors: Trace, counts: list[int], *, feedback: bool, is_cut: bool) -> Trace:
+def feed_forward(parameters: Trace, inputs: Trace, counts: list[int], *, feedback: bool, is_cut: bool) -> Trace:
     layers = taken(parameters, *((1 + counts[k], counts[k + 1]) for k in range(len(counts) - 1)))
     wheels, last = [], np.zeros(2)
-    for reading in sensors:
-        x = np.concatenate([reading / 1023.0, last]) if feedback else reading / 1023.0
+    for each in inputs:
+        x = np.concatenate([each, last]) if feedback else each
         for layer in layers[:-1]:
             x = np.tanh(layer[0] + x @ layer[1:])
         total = layers[-1][0] + x @ layers[-1][1:]
@@ -66,7 +73,9 @@ def test_linear(feedback: bool) -> None:
     controller = kiks.controllers.linear(feedback=feedback, speed_limit=7.0)
     parameters = 0.8 * kiks.controllers.random_parameters(controller, 1, seed=1)[0]
     sensors = readings(controller)
-    expected = feed_forward(parameters, sensors, [8 + 2 * feedback, 2], feedback=feedback, is_cut=True)
+    expected = feed_forward(
+        parameters, inputs_of(controller, sensors), [8 + 2 * feedback, 2], feedback=feedback, is_cut=True
+    )
     np.testing.assert_allclose(outputs(controller, parameters, sensors), 7.0 * expected, atol=1e-12)
     assert abs(expected).max() == 1.0
     assert abs(expected).min() < 0.5
@@ -83,7 +92,7 @@ def test_mlp(hidden: tuple[int, ...], senses: Any, feedback: bool) -> None:
     parameters = kiks.controllers.random_parameters(controller, 1, seed=2)[0]
     sensors = readings(controller)
     counts = [controller.sensor_count + 2 * feedback, *hidden, 2]
-    expected = 10.0 * feed_forward(parameters, sensors, counts, feedback=feedback, is_cut=False)
+    expected = 10.0 * feed_forward(parameters, inputs_of(controller, sensors), counts, feedback=feedback, is_cut=False)
     np.testing.assert_allclose(outputs(controller, parameters, sensors), expected, atol=1e-3)
 
 
@@ -97,9 +106,9 @@ def test_ctrnn(time_constant_s: float) -> None:
     step_count = max(int(np.ceil(0.2 / constants_s.min())), 1)
     y, expected = np.zeros(3), []
     sensors = readings(controller)
-    for reading in sensors:
+    for x in inputs_of(controller, sensors):
         for _ in range(step_count):
-            drive = 4 * (logistic(y + 4 * biases) @ to_neurons + reading / 1023.0 @ to_inputs)
+            drive = 4 * (logistic(y + 4 * biases) @ to_neurons + x @ to_inputs)
             y = y + 0.1 / step_count / constants_s * (drive - y)
         expected.append(10.0 * (2.0 * logistic(y + 4 * biases) - 1.0)[:2])
     np.testing.assert_allclose(outputs(controller, parameters, sensors), expected, atol=5e-2)
@@ -122,18 +131,25 @@ def test_exponential_between(x: float) -> None:
 
 @pytest.mark.slow
 def test_gru() -> None:
-    controller = kiks.controllers.gru(units=3)
+    controller = kiks.controllers.gru(units=3, senses=("ambient", "proximity"))
     parameters = kiks.controllers.random_parameters(controller, 1, seed=4)[0]
-    to_gates, to_units, to_wheels = taken(parameters, (12, 6), (12, 3), (4, 2))
+    to_gates, to_units, to_wheels = taken(parameters, (20, 6), (20, 3), (4, 2))
     h, expected = np.zeros(3), []
     sensors = readings(controller)
-    for reading in sensors:
-        x = reading / 1023.0
+    for x in inputs_of(controller, sensors):
         gates = logistic(to_gates[0] + np.concatenate([x, h]) @ to_gates[1:])
         z, r = gates[:3], gates[3:]
         h = z * h + (1 - z) * np.tanh(to_units[0] + np.concatenate([x, r * h]) @ to_units[1:])
         expected.append(10.0 * np.tanh(to_wheels[0] + h @ to_wheels[1:]))
     np.testing.assert_allclose(outputs(controller, parameters, sensors), expected, atol=1e-3)
+
+
+def test_the_dark_is_no_input_and_light_is_one() -> None:
+    controller = kiks.controllers.linear(senses=("ambient",))
+    parameters = np.zeros(18)
+    parameters[2:] = 0.125
+    speeds = outputs(controller, parameters, np.array([[500.0] * 8, [0.0] * 8, [250.0] * 8]))
+    np.testing.assert_allclose(speeds[:, 0], [0.0, 10.0, 5.0], atol=1e-12)
 
 
 READY_MADE = [

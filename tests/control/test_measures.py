@@ -108,6 +108,8 @@ def test_place_measures() -> None:
         kiks.measures.reached_s(*PLACE_MM, radius_mm=radius_mm),
         kiks.measures.light_mm,
         kiks.measures.near_light_share(radius_mm),
+        kiks.measures.light_approach,
+        kiks.measures.light_stay_s(radius_mm),
         kiks.measures.gathered(*PLACE_MM, radius_mm=radius_mm),
         kiks.measures.spread_mm,
     )
@@ -121,12 +123,19 @@ def test_place_measures() -> None:
     lamp_mm = trace.far_mm(100, 350)
     np.testing.assert_allclose(trace.values[3], lamp_mm[:, -1])
     np.testing.assert_allclose(trace.values[4], (lamp_mm <= radius_mm).mean(axis=1))
+    start_mm = np.hypot(*(trace.starts_mm - (100, 350)).T)
+    made = np.maximum(1 - lamp_mm / start_mm[:, None], 0)
+    np.testing.assert_allclose(trace.values[5], made.mean(axis=1))
+    assert trace.values[5].max() > 0
+    last_away = [np.flatnonzero(np.append(True, each > radius_mm))[-1] for each in lamp_mm]
+    stays_s = [trace.periods_s[world, first:].sum() for world, first in enumerate(last_away)]
+    np.testing.assert_allclose(trace.values[6], stays_s)
     # Nothing has moved the cylinders since the last step, or next to nothing.
     places_mm = np.stack([trace.batch.state.bodies["x_mm"], trace.batch.state.bodies["y_mm"]], axis=-1)
     within = (np.hypot(*np.moveaxis(places_mm - PLACE_MM, -1, 0)) <= radius_mm).sum(axis=1)
-    np.testing.assert_array_equal(trace.values[5], within)
+    np.testing.assert_array_equal(trace.values[7], within)
     spread_mm = np.sqrt(((places_mm - places_mm.mean(axis=1, keepdims=True)) ** 2).sum(axis=2).mean(axis=1))
-    np.testing.assert_allclose(trace.values[6], spread_mm, atol=5.0)
+    np.testing.assert_allclose(trace.values[8], spread_mm, atol=5.0)
 
 
 def test_avoidance_of_a_stepped_batch() -> None:
@@ -227,6 +236,8 @@ def test_lamps_that_do_not_burn_are_none() -> None:
     lamps = np.array([[10.0, 0.0, 1.0, 0.0], [30.0, 40.0, 1.0, 1.0]])
     assert after(kiks.measures.light_mm, moment(lamps=lamps)) == 50.0
     assert after(kiks.measures.light_mm, moment(lamps=lamps[:1])) == np.inf
+    assert after(kiks.measures.light_approach, moment(lamps=lamps[:1])) == 0.0
+    assert after(kiks.measures.light_stay_s(20.0), moment(lamps=lamps[:1])) == 0.0
 
 
 def test_measures_of_a_drive_without_steps_are_zero() -> None:

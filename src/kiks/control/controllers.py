@@ -1,9 +1,9 @@
 """Built-in controllers, whose parameters are evolved or set by hand.
 
 Parameters are numbers of about 1: normally distributed around 0 with a deviation of 1 they are a sensible start.
-Sensors come in as shares of 1023 counts, speeds go out as shares of `speed_limit`. `N` inputs are those of the senses:
-eight proximity counts, eight ambient ones (500 in the dark, less in the light), in the order of `senses`. Matrices are
-[input, unit], row by row. The same arguments return the same controller.
+`N` inputs are those of the senses, in the order of `senses`: eight of proximity, as shares of 1023 counts, and eight of
+ambient light, (500 - counts) / 500: about 0 in the dark, nearly 1 beside a lamp. Speeds go out as shares of
+`speed_limit`. Matrices are [input, unit], row by row. The same arguments return the same controller.
 """
 
 from __future__ import annotations
@@ -247,7 +247,7 @@ def _shaped(recipe: Shape) -> Controller:
         memory = recipe.neurons
         size = memory * (2 + sense_count + memory)
         decide = neural_nets.continuous(
-            sense_count,
+            recipe.senses,
             memory,
             period_s=recipe.period_s,
             time_constant_s=recipe.time_constant_s,
@@ -256,14 +256,16 @@ def _shaped(recipe: Shape) -> Controller:
     elif isinstance(recipe, Gru):
         memory = recipe.units
         size = 3 * neural_nets.layer_size(sense_count + memory, memory) + neural_nets.layer_size(memory, 2)
-        decide = neural_nets.gated(sense_count, memory, speed_limit=limit)
+        decide = neural_nets.gated(recipe.senses, memory, speed_limit=limit)
     else:
         memory = 2 * recipe.feedback
         hidden = recipe.hidden if isinstance(recipe, Mlp) else ()
         counts = (sense_count + memory, *hidden, 2)
         size = sum(neural_nets.layer_size(*pair) for pair in itertools.pairwise(counts))
         is_cut = isinstance(recipe, Linear)
-        decide = neural_nets.feed_forward(counts, has_feedback=recipe.feedback, is_cut=is_cut, speed_limit=limit)
+        decide = neural_nets.feed_forward(
+            counts, recipe.senses, has_feedback=recipe.feedback, is_cut=is_cut, speed_limit=limit
+        )
     decide.__name__ = decide.__qualname__ = recipe.kind
     model: Any = type(recipe)
     said = adapter(model).dump_python(recipe, mode="json")

@@ -259,6 +259,36 @@ def light_mm(moment: Any, notes: Any) -> None:
     notes[0] = nearest_lamp_mm(moment)
 
 
+@measure(notes=2, result=mean)
+def light_approach(moment: Any, notes: Any) -> None:
+    """Mean share of the way to the nearest lamp that it has made: 0 if it stands still, near 1 if it soon stays there.
+
+    The way is the straight one from its start. A robot that is farther away than its start has made 0.
+    """
+    start_mm = from_lamp_mm(moment, moment.start_x_mm, moment.start_y_mm)
+    if 0.0 < start_mm < np.inf:
+        notes[0] += max(1.0 - nearest_lamp_mm(moment) / start_mm, 0.0)
+    notes[1] += 1.0
+
+
+def light_stay_s(radius_mm: float = 100.0) -> Measure:
+    """How long it has been within a radius of a lamp that burns, without a break until the end [s]; 0 if it is not.
+
+    Raises:
+        ParameterError: If the radius is out of range.
+    """
+    return _light_stay_s(_radius(radius_mm))
+
+
+@functools.lru_cache(maxsize=256)
+def _light_stay_s(radius_mm: float) -> Measure:
+    @measure
+    def light_stay_s(moment: Any, notes: Any) -> None:
+        notes[0] = notes[0] + moment.period_s if nearest_lamp_mm(moment) <= radius_mm else 0.0
+
+    return light_stay_s
+
+
 def near_light_share(radius_mm: float = 100.0) -> Measure:
     """Share of control steps in which it was within a radius of a lamp that burns.
 
@@ -331,10 +361,17 @@ def share_of_full(speed: Any) -> Any:
 @kernel
 def nearest_lamp_mm(moment: Any) -> Any:
     """Return how far the nearest lamp that burns is; infinite if there is none."""
+    return from_lamp_mm(moment, moment.x_mm, moment.y_mm)
+
+
+@kernel
+def from_lamp_mm(moment: Any, x_mm: Any, y_mm: Any) -> Any:
+    """Return how far a place is from the nearest lamp that burns; infinite if there is none."""
     nearest = np.inf
     for lamp in range(moment.lamps.shape[0]):
         if moment.lamps[lamp, 3] != 0.0 and moment.lamps[lamp, 2] > 0.0:
-            nearest = min(nearest, distance_mm(moment, moment.lamps[lamp, 0], moment.lamps[lamp, 1]))
+            across, up = x_mm - moment.lamps[lamp, 0], y_mm - moment.lamps[lamp, 1]
+            nearest = min(nearest, np.sqrt(across * across + up * up))
     return nearest
 
 

@@ -17,9 +17,13 @@ import numpy as np
 from kiks.engine.compiling import inlined, kernel
 from kiks.engine.numbers import tanh
 from kiks.engine.simd.stack_arrays import stack_floats
+from kiks.model.robot import SENSOR_COUNT
 
 COUNT_MAX = 1023
 """The largest count that a sensor gives (khepera-protocol.md 8.4)."""
+
+DARK_COUNTS = 500.0
+"""The ambient count that is an input of 0: that of a Khepera in the dark (khepera-protocol.md 9.4)."""
 
 TIME_SCALE_LIMIT = 4.0
 """Time constants lie within e to this power of the one that is given, to either side."""
@@ -27,7 +31,7 @@ TIME_SCALE_LIMIT = 4.0
 GAIN = 4.0
 """What a CTRNN's weights and biases are multiplied by: from 1 on, a parameter makes a unit hold what it has."""
 
-_SHARE = 1.0 / COUNT_MAX
+_SHARE, _LIGHT_SHARE = 1.0 / COUNT_MAX, 1.0 / DARK_COUNTS
 
 
 @kernel
@@ -60,6 +64,27 @@ def do_layer(inputs: Any, input_count: Any, parameters: Any, first: Any, units: 
     add_products(inputs, input_count, parameters, first + unit_count, units, unit_count)
 
 
+def senses_as_inputs(senses: tuple[str, ...]) -> Any:
+    """Return a kernel `(sensors, inputs)` that writes the counts of senses as inputs.
+
+    Proximity is a share of `COUNT_MAX`. Ambient counts fall in light, so their inputs are what is missing from
+    `DARK_COUNTS`, as a share of it: about 0 in the dark, nearly 1 beside a lamp. As shares of `COUNT_MAX` they would
+    be half of full scale in the dark, more than the light of most lamps takes off.
+    """
+    sense_count = SENSOR_COUNT * len(senses)
+    light_first = SENSOR_COUNT * senses.index("ambient") if "ambient" in senses else sense_count
+
+    @inlined
+    def take(sensors: Any, inputs: Any) -> None:
+        for k in range(sense_count):
+            if light_first <= k < light_first + SENSOR_COUNT:
+                inputs[k] = (DARK_COUNTS - sensors[k]) * _LIGHT_SHARE
+            else:
+                inputs[k] = sensors[k] * _SHARE
+
+    return take
+
+
 def layer_size(input_count: int, unit_count: int) -> int:
     """Return how many parameters a layer has."""
     return (1 + input_count) * unit_count
@@ -90,22 +115,24 @@ def layers(counts: tuple[int, ...], first: int = 0) -> Any:
     return do_all
 
 
-def feed_forward(counts: tuple[int, ...], *, has_feedback: bool, is_cut: bool, speed_limit: float) -> Any:
+def feed_forward(
+    counts: tuple[int, ...], senses: tuple[str, ...], *, has_feedback: bool, is_cut: bool, speed_limit: float
+) -> Any:
     """Return the function of a controller: layers from the senses, and its last speeds if so wanted, to the wheels.
 
     Args:
         counts: Inputs, units of each hidden layer, 2.
+        senses: The senses of the inputs.
         has_feedback: Whether the last two inputs are the last outputs, from the memory.
         is_cut: Whether outputs are cut to +-1; else they are their tanh.
         speed_limit: The speed of an output of 1 [pulses/10 ms].
     """
     input_count, memory_count, net = counts[0], 2 * has_feedback, layers(counts)
-    sense_count = input_count - memory_count
+    sense_count, take_senses = input_count - memory_count, senses_as_inputs(senses)
 
     def decide(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
         inputs, outputs = stack_floats(input_count), stack_floats(2)
-        for k in range(sense_count):
-            inputs[k] = sensors[k] * _SHARE
+        take_senses(sensors, inputs)
         for k in range(memory_count):
             inputs[sense_count + k] = memory[k]
         net(inputs, parameters, outputs)
@@ -119,9 +146,10 @@ def feed_forward(counts: tuple[int, ...], *, has_feedback: bool, is_cut: bool, s
 
 
 def continuous(
-    sense_count: int, neuron_count: int, *, period_s: float, time_constant_s: float, speed_limit: float
+    senses: tuple[str, ...], neuron_count: int, *, period_s: float, time_constant_s: float, speed_limit: float
 ) -> Any:
     """Return the function of a controller: a continuous-time recurrent network; see `kiks.controllers.ctrnn`."""
+    sense_count, take_senses = SENSOR_COUNT * len(senses), senses_as_inputs(senses)
     bias_first, senses_first = neuron_count, 2 * neuron_count
     neurons_first = senses_first + sense_count * neuron_count
     periods = period_s / time_constant_s
@@ -135,8 +163,7 @@ def continuous(
             driven[k] = 0.0
         for k in range(neuron_count):
             fastest = max(fastest, rates[k])
-        for k in range(sense_count):
-            inputs[k] = sensors[k] * _SHARE
+        take_senses(sensors, inputs)
         add_products(inputs, sense_count, parameters, senses_first, driven, neuron_count)
         # Steps of at most half of the shortest time constant neither swing nor run away.
         step_count = max(int(np.ceil(2.0 * fastest)), 1)
@@ -154,8 +181,9 @@ def continuous(
     return decide
 
 
-def gated(sense_count: int, unit_count: int, *, speed_limit: float) -> Any:
+def gated(senses: tuple[str, ...], unit_count: int, *, speed_limit: float) -> Any:
     """Return the function of a controller: gated recurrent units; see `kiks.controllers.gru`."""
+    sense_count, take_senses = SENSOR_COUNT * len(senses), senses_as_inputs(senses)
     input_count, gate_count = sense_count + unit_count, 2 * unit_count
     units_first = layer_size(input_count, gate_count)
     wheels_first = units_first + layer_size(input_count, unit_count)
@@ -163,8 +191,7 @@ def gated(sense_count: int, unit_count: int, *, speed_limit: float) -> Any:
     def decide(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
         inputs, outputs = stack_floats(input_count), stack_floats(2)
         gates, fresh = stack_floats(gate_count), stack_floats(unit_count)
-        for k in range(sense_count):
-            inputs[k] = sensors[k] * _SHARE
+        take_senses(sensors, inputs)
         for k in range(unit_count):
             inputs[sense_count + k] = memory[k]
         do_layer(inputs, input_count, parameters, 0, gates, gate_count)

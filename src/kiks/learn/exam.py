@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import cycle
 from typing import Annotated
 
 import numpy as np
@@ -78,7 +79,8 @@ class Exam:
         goal: What a solved start shows, in some words.
         seconds: Time for which the champion drives from each start [s].
         count: Number of starts; a multiple of the number of arenas.
-        starts: 'random' for free places anywhere, or 'arena' for the starts of the arenas, each with noise of its own.
+        starts: 'random' for free places anywhere, or 'arena' for the start poses of the arenas: lone robots take those
+            of an arena in turn, each with noise of its own.
 
     Raises:
         ParameterError: If an argument is out of range.
@@ -127,6 +129,9 @@ class Exam:
         poses = None
         if self.starts == "random":
             poses = spread_starts(self.arenas, self.count, seed=EXAM_SEED, robot=champion.robot)
+        elif robots == 1 and all(arena.starts for arena in self.arenas):
+            places = [cycle(arena.starts) for arena in self.arenas]
+            poses = np.array([next(places[k % len(places)]) for k in range(self.count)])[:, None]
         batch = Batch(
             self.arenas,
             self.count,

@@ -14,7 +14,7 @@ from kiks.control.controller import Controller
 from kiks.learn import training_arenas
 from kiks.learn.exam import Exam
 from kiks.learn.task import Axis, Task, cautious_mean
-from kiks.model.arena import Arena, Cylinder, Lamp
+from kiks.model.arena import Arena, Cylinder
 
 Floats = NDArray[np.float64]
 Values = Mapping[str, Floats]
@@ -35,10 +35,10 @@ CONTACTS_COUNTED = 3.0
 """Largest number of contacts of a world that counts: a stuck robot has hundreds."""
 
 
-def without_contacts(fitness: Floats, values: Values) -> Floats:
+def without_contacts(fitness: Floats, values: Values, cost: float = CONTACT_COST) -> Floats:
     """Return fitness reduced by contacts, but not below zero: driving with contacts beats standing still."""
     contacts = np.minimum(values["contacts"], CONTACTS_COUNTED).mean(axis=1)
-    reduced: Floats = fitness / (1 + CONTACT_COST * contacts)
+    reduced: Floats = fitness / (1 + cost * contacts)
     return reduced
 
 
@@ -118,40 +118,66 @@ def follow(controller: Controller | None = None, **changes: Any) -> Task:
 # ---- light ----
 
 
+LIGHT_SPEED_LIMIT = 10.0
+"""Highest speed on the way to a lamp [pulses/10 ms]: 80 mm/s. A robot in the dark has to search."""
+
+LIGHT_CONTACT_COST = 0.5
+"""As `CONTACT_COST`, but less: a robot that stands still in the dark touches nothing, and finds no lamp."""
+
+AT_LAMP_MM = 100.0
+"""Distance of the robot's middle from the lamp at which it is there [mm]."""
+
+STAY_S = 30.0
+"""Time at the end of the exam for which it must be there without a break [s]."""
+
+
 def light_fitness(values: Values) -> Floats:
-    """Return the fitness of `light`."""
-    return without_contacts(cautious_mean(values["near_light_share"] - values["light_mm"] / 1000 + 1), values)
+    """Return the fitness of `light`: the share of the way that was made, more if it ends at the lamp; 0 of standing."""
+    scores = values["light_approach"] * (1 + values["near_light_share"])
+    return without_contacts(cautious_mean(scores), values, LIGHT_CONTACT_COST)
+
+
+def light_solved(values: Values) -> NDArray[np.bool_]:
+    """Return whether the robot reached the lamp and stayed there."""
+    solved: NDArray[np.bool_] = values["light_stay_s"] >= STAY_S
+    return solved
 
 
 def light(controller: Controller | None = None, **changes: Any) -> Task:
-    """Return the task to go to the lamp and stay there.
+    """Return the task to find the lamp, go to it and stay there.
+
+    In the exam the robot starts at least 1 m from the lamp, in the shadow of walls.
 
     Args:
         controller: The controller to evolve; a network of both senses with four hidden units if left out.
         changes: Other arguments of `Task`.
     """
-    default = controllers.mlp(hidden=(4,), senses=("proximity", "ambient"), speed_limit=SPEED_LIMIT)
+    default = controllers.mlp(hidden=(4,), senses=("proximity", "ambient"), speed_limit=LIGHT_SPEED_LIMIT)
     task = Task(
         "light",
-        (
-            _lit(training_arenas.pillars(), 200, 300),
-            _lit(training_arenas.wedges(), 300, 300),
-            _lit(training_arenas.corridors(), 400, 400),
-        ),
+        (training_arenas.lit_pillars(), training_arenas.lit_walls(), training_arenas.lit_rooms()),
         default if controller is None else controller,
-        (measures.near_light_share(100.0), measures.light_mm, measures.contacts, measures.path_mm),
+        (
+            measures.light_approach,
+            measures.near_light_share(AT_LAMP_MM),
+            measures.light_mm,
+            measures.contacts,
+            measures.path_mm,
+        ),
         fitness=light_fitness,
-        seconds=40.0,
-        worlds=12,
-        axes=(Axis("light_mm", 0, 600), Axis("path_mm", 0, 3000)),
-        about="go to the lamp and stay there",
+        seconds=60.0,
+        worlds=6,
+        axes=(Axis("light_mm", 0, 600), Axis("path_mm", 0, 4000)),
+        exam=Exam(
+            (training_arenas.lit_unseen(),),
+            (measures.light_stay_s(AT_LAMP_MM),),
+            light_solved,
+            "reached the lamp from the shadow, 1 m away, and stayed",
+            starts="arena",
+        ),
+        about="find the lamp, go to it and stay there",
     )
     return replace(task, **changes)
-
-
-def _lit(arena: Arena, x_mm: float, y_mm: float) -> Arena:
-    """Return an arena with a lamp."""
-    return replace(arena, lamps=(Lamp(x_mm, y_mm),))
 
 
 # ---- gather ----

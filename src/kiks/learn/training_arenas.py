@@ -8,11 +8,19 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from kiks.model.arena import Arena, Pose
+from kiks.batch.initial_state import random_starts
+from kiks.model.arena import Arena, Lamp, Pose
 
 WALL_MM = 10.0
 """Thickness of walls [mm]."""
+
+CLEAR_MM = 8.0
+"""Smallest gap between the start of an exam and a wall [mm]."""
+
+TRIED_STARTS = 2000
+"""Random places among which starts in shadow are looked for."""
 
 
 @dataclass(frozen=True)
@@ -155,6 +163,102 @@ def follow_box() -> Arena:
     """Return an arena with a corner cut off and a block in its middle."""
     walls = [*wall((0, 440), (160, 600)), pillar(330, 270, 130, 180)]
     return draw(600, 600, walls, "box with a block")
+
+
+LAMP_W = 25.0
+"""Power of lamps [W]: their light exceeds the noise of a Khepera's sensors up to 1.15 m away, that of 1 W to 0.23 m."""
+
+
+def lit_pillars() -> Arena:
+    """Return an arena with a lamp among thick pillars."""
+    strokes = [
+        pillar(480, 560, 140),
+        pillar(760, 460, 90, 120),
+        pillar(820, 850, 110),
+        pillar(300, 850, 60, 60),
+        pillar(250, 300, 120, 180),
+        pillar(620, 200, 40),
+    ]
+    return _lit(draw(1100, 1100, strokes, "lit pillars"), 640, 700)
+
+
+def lit_walls() -> Arena:
+    """Return an arena with a lamp between walls that end inside."""
+    walls = [
+        *wall((430, 130), (430, 560)),
+        *wall((150, 620), (560, 760), brightness=140),
+        *wall((700, 1100), (700, 800)),
+        *wall((1100, 330), (760, 400)),
+        pillar(680, 560, 60, 180),
+    ]
+    return _lit(draw(1100, 1100, walls, "lit walls"), 260, 330)
+
+
+def lit_rooms() -> Arena:
+    """Return an arena of three rooms with a lamp in one of them."""
+    walls = [
+        *wall((550, 0), (550, 330)),
+        *wall((550, 560), (550, 1100), brightness=170),
+        *wall((550, 620), (800, 620)),
+        pillar(300, 520, 110),
+        pillar(830, 400, 70, 90),
+    ]
+    return _lit(draw(1100, 1100, walls, "lit rooms", 220), 840, 860)
+
+
+def lit_unseen() -> Arena:
+    """Return an arena for the exam, with a lamp in a corner behind walls and pillars."""
+    walls = [
+        *wall((330, 620), (620, 330)),
+        *wall((700, 900), (1000, 900), (1000, 620), brightness=170),
+        *wall((1500, 420), (1180, 420)),
+        *wall((420, 1200), (420, 940)),
+        pillar(760, 620, 120, 150),
+        pillar(960, 230, 80),
+        pillar(250, 850, 60),
+    ]
+    arena = _lit(draw(1500, 1200, walls, "lit unseen", 220), 260, 260)
+    return replace(arena, starts=starts_in_shadow(arena, 20, lamp_mm=1000.0, seed=1))
+
+
+def starts_in_shadow(
+    arena: Arena, count: int, *, lamp_mm: float, seed: int, radius_mm: float = 27.5
+) -> tuple[Pose, ...]:
+    """Return random free starts at which a robot is far from the arena's lamp, and wholly in the shadow of a wall.
+
+    Args:
+        arena: The arena; its first lamp counts.
+        count: Number of starts.
+        lamp_mm: Least distance from the lamp [mm].
+        seed: Seed of the random generator.
+        radius_mm: Radius of the robot [mm].
+    """
+    lamp, found = arena.lamps[0], []
+    for x_mm, y_mm, heading_rad in random_starts(
+        arena, TRIED_STARTS, seed=seed, radius_mm=radius_mm, clear_mm=CLEAR_MM
+    ):
+        distance_mm = math.hypot(x_mm - lamp.x_mm, y_mm - lamp.y_mm)
+        if distance_mm < lamp_mm:
+            continue
+        across = np.array([y_mm - lamp.y_mm, lamp.x_mm - x_mm]) / distance_mm
+        lines_mm = [(x_mm, y_mm) + side_mm * across for side_mm in np.linspace(-radius_mm, radius_mm, 12)]
+        if all(is_wall_between(arena, begin_mm, (lamp.x_mm, lamp.y_mm)) for begin_mm in lines_mm):
+            found.append(Pose(x_mm, y_mm, heading_rad))
+    return tuple(found[:count])
+
+
+def is_wall_between(arena: Arena, begin_mm: ArrayLike, end_mm: ArrayLike) -> bool:
+    """Return whether the straight line between two places, x and y [mm], meets a wall."""
+    begin, end = np.asarray(begin_mm, np.float64), np.asarray(end_mm, np.float64)
+    step_count = int(2 * np.abs(end - begin).max() / arena.mm_per_cell)
+    x_mm, y_mm = np.linspace(begin, end, 2 + step_count).T
+    rows, columns = (y_mm / arena.mm_per_cell).astype(int), (x_mm / arena.mm_per_cell).astype(int)
+    return bool(arena.brightness[rows, columns].any())
+
+
+def _lit(arena: Arena, x_mm: float, y_mm: float) -> Arena:
+    """Return an arena with a lamp."""
+    return replace(arena, lamps=(Lamp(x_mm, y_mm, LAMP_W),))
 
 
 SIDE_MM = 27.5 / 0.015
