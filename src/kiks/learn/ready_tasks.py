@@ -116,7 +116,7 @@ def follow(controller: Controller | None = None, *, side: str = "left", **change
     """Return the task to follow walls.
 
     Args:
-        controller: The controller to evolve; a linear one if left out.
+        controller: The controller to evolve; a network without hidden units if left out.
         side: The side of the robot on which the wall is: 'left' or 'right'.
         changes: Other arguments of `Task`.
 
@@ -126,7 +126,7 @@ def follow(controller: Controller | None = None, *, side: str = "left", **change
     task = Task(
         "follow",
         (training_arenas.wall_ends(), training_arenas.alcoves(), training_arenas.corridors()),
-        controllers.linear(speed_limit=SPEED_LIMIT) if controller is None else controller,
+        controllers.mlp(hidden=(), speed_limit=SPEED_LIMIT) if controller is None else controller,
         (measures.wall_following(side), measures.beside_wall_share(side), measures.contacts, measures.path_mm),
         fitness=follow_fitness,
         seconds=40.0,
