@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -82,18 +83,15 @@ def test_distance_measures() -> None:
 
 @pytest.mark.slow
 def test_scores_of_drives() -> None:
-    following = kiks.measures.wall_following("right", counts=200)
-    trace = Trace(kiks.measures.avoidance, following, kiks.measures.touching_share, kiks.measures.contacts)
+    beside_wall = kiks.measures.beside_wall_share("right", counts=200)
+    trace = Trace(kiks.measures.avoidance, beside_wall, kiks.measures.touching_share, kiks.measures.contacts)
     shares = trace.wheels / 10.0
     straight = 1 - np.sqrt(abs(shares[..., 0] - shares[..., 1]) / 2)
     highest = trace.sensors.max(axis=2) / 1023
     np.testing.assert_allclose(
         trace.values[0], (np.maximum(shares.mean(axis=2), 0) * straight * (1 - highest)).mean(axis=1), atol=1e-12
     )
-    beside = np.interp(trace.sensors[..., 5], [0, 200, 1023], [0, 1, 0])
-    np.testing.assert_allclose(
-        trace.values[1], (np.maximum(shares.mean(axis=2), 0) * straight * beside).mean(axis=1), atol=1e-12
-    )
+    np.testing.assert_allclose(trace.values[1], (trace.sensors[..., 5] >= 200).mean(axis=1))
     np.testing.assert_allclose(trace.values[2], trace.is_touching.mean(axis=1))
     assert trace.values[2].max() > 0
     np.testing.assert_array_equal(trace.values[3], trace.batch.state.robots["contact_count"][:, 0])
@@ -224,12 +222,33 @@ def test_the_best_scores() -> None:
     assert after(kiks.measures.avoidance, moment(wheels=ahead)) == 1.0
     assert after(kiks.measures.avoidance, moment(wheels=np.array([10.0, -10.0]))) == 0.0
     assert after(kiks.measures.avoidance, moment(wheels=-ahead)) == 0.0
-    beside = np.zeros(8)
-    beside[0] = 400.0
-    following = kiks.measures.wall_following("left", counts=400)
-    assert after(following, moment(wheels=ahead, sensors=beside)) == 1.0
-    assert after(following, moment(wheels=-ahead, sensors=beside)) == 0.0
-    assert after(following, moment(wheels=ahead)) == 0.0
+
+
+def along_wall(seconds: float, counts: Callable[[float], float], x_mm: Callable[[float], float]) -> list[Any]:
+    """Return the moments of a robot, ten a second, with counts of the left sensor and a place at each time."""
+    moments = []
+    for step in range(1, round(10 * seconds) + 1):
+        sensors = np.zeros(8)
+        sensors[0] = counts(0.1 * step)
+        moments.append(moment(time_s=0.1 * step, period_s=0.1, sensors=sensors, x_mm=x_mm(0.1 * step)))
+    return moments
+
+
+def test_following_a_wall_scores_and_standing_shuttling_or_leaving_it_does_not() -> None:
+    following = kiks.measures.wall_following("left")
+    ahead, wall = (lambda s: 50.0 * s), (lambda s: 300.0)
+    kept = after(following, *along_wall(60, wall, ahead))
+    # The first ten seconds count half.
+    assert kept == pytest.approx(55 / 60, abs=0.02)
+    assert after(kiks.measures.wall_following("right"), *along_wall(60, wall, ahead)) == 0.0
+    assert after(following, *along_wall(60, lambda s: 40.0, ahead)) == 0.0
+    assert after(following, *along_wall(60, wall, lambda s: 0.0)) == 0.0
+    assert after(following, *along_wall(60, wall, lambda s: 10.0 * (s % 1.0))) < 0.15
+    # A wall end takes a second of six, a way across the room three of six: then a wall is never kept for long.
+    ends = after(following, *along_wall(60, lambda s: 300.0 * (s % 6 < 5), ahead))
+    crossing = after(following, *along_wall(60, lambda s: 300.0 * (s % 6 < 3), ahead))
+    assert 0.7 < ends < kept
+    assert crossing < 0.1
 
 
 def test_lamps_that_do_not_burn_are_none() -> None:
@@ -250,7 +269,8 @@ def test_the_same_arguments_make_the_same_measure() -> None:
     measures = kiks.measures
     assert measures.coverage(kiks.Arena.box(500, 300)) is measures.coverage(kiks.Arena.box(450, 250), square_mm=100)
     assert measures.gathered(1, 2, radius_mm=3) is measures.gathered(y_mm=2.0, x_mm=1.0, radius_mm=3.0)
-    assert measures.wall_following() is measures.wall_following("left", counts=300)
+    assert measures.wall_following() is measures.wall_following("left", counts=50)
+    assert measures.beside_wall_share() is measures.beside_wall_share("left", counts=50)
     assert measures.reached_s(1, 2) is not measures.reached_s(1, 3)
 
 
@@ -265,7 +285,7 @@ def test_what_a_measure_needs_must_be_sensed() -> None:
     ("make", "message"),
     [
         (lambda: kiks.measures.wall_following("top"), "side must be 'left' or 'right', but it was 'top'"),
-        (lambda: kiks.measures.wall_following(counts=1023), "counts must be from 1 to 1022"),
+        (lambda: kiks.measures.beside_wall_share(counts=1024), "counts must be from 1 to 1023"),
         (lambda: kiks.measures.coverage(kiks.Arena.box(2000, 2000), square_mm=1), "at most 1000000 squares, but 1 mm"),
         (lambda: kiks.measures.goal_mm("here", 0), "x_mm must be from -1e"),
         (lambda: kiks.measures.gathered(0, 0, radius_mm=-1), "radius_mm must be from 0"),

@@ -27,6 +27,15 @@ FULL_SPEED_MM_S = 8.0 * FULL_SPEED
 ROAMING_S = 2.0
 """Time within which a robot must have been elsewhere to count as moving [s]."""
 
+FOLLOWING_MM_S = 30.0
+"""Speed at which a robot gets along a wall well enough [mm/s]: beyond it, keeping the wall counts, and not haste."""
+
+WALL_LOST_S = 2.0
+"""Longest time without a wall in which a robot still follows the same one [s]: at 64 mm/s, half a circle at an end."""
+
+KEPT_S = 10.0
+"""Time for which a robot must have followed a wall to score in full [s]."""
+
 FULL_COUNT = 1023.0
 """Proximity that counts as 1 (khepera-protocol.md 8.4)."""
 
@@ -83,13 +92,7 @@ def roaming(moment: Any, notes: Any) -> None:
 
     A robot that shuttles or spins drives fast and gets nowhere: there `path_mm` grows, and this does not.
     """
-    if notes[1] == 0.0:
-        notes[2], notes[3] = moment.start_x_mm, moment.start_y_mm
-    # Where it was is a mean that forgets; on a straight way that is as far behind as it drives in that time.
-    share = min(moment.period_s / ROAMING_S, 1.0)
-    notes[2] += share * (moment.x_mm - notes[2])
-    notes[3] += share * (moment.y_mm - notes[3])
-    away_mm = distance_mm(moment, notes[2], notes[3])
+    away_mm = moved_lately_mm(moment, notes)
     notes[0] += min(away_mm / (ROAMING_S * FULL_SPEED_MM_S), 1.0)
     notes[1] += 1.0
 
@@ -128,35 +131,63 @@ def avoidance(moment: Any, notes: Any) -> None:
     notes[1] += 1.0
 
 
-def wall_following(side: str = "left", *, counts: float = 300.0) -> Measure:
-    """Mean of V (1 - sqrt(D)) w: fast ahead, straight, with a wall beside it, neither too near nor too far.
+def wall_following(side: str = "left", *, counts: float = 50.0) -> Measure:
+    """Mean of m k w: it gets along a wall on that side, and keeps it.
 
-    V is the mean of the wheels' speeds, 0 if the robot drives back, D as in `avoidance`. w is 1 where the sensor on
-    that side reads `counts`, and falls in straight lines to 0 at no counts and at 1023. A measure of our own.
+    m is how far it is from where it was in the last two seconds, as in `roaming`, and 1 from 30 mm/s on. k grows from
+    0 to 1 within ten seconds of following, and begins again when the robot was without a wall for more than two
+    seconds. w is 1 while a wall is at its side, else 0. So a robot that stays in a corner or shuttles scores next to
+    nothing, and one that crosses the room from wall to wall scores little. A measure of our own.
 
     Args:
         side: 'left' or 'right'.
-        counts: The proximity to keep.
+        counts: Proximity of the sensor on that side from which on a wall is at its side.
 
     Raises:
         ParameterError: If an argument is out of range.
     """
-    if not isinstance(side, str) or side not in ("left", "right"):
-        raise ParameterError(f"side must be 'left' or 'right', but it was {shown(side)}.")
-    return _wall_following(0 if side == "left" else 5, check_number("counts", counts, 1, FULL_COUNT - 1))
+    return _wall_following(_side_sensor(side), _wall_counts(counts))
 
 
 @functools.lru_cache(maxsize=256)
 def _wall_following(sensor: int, counts: float) -> Measure:
-    @measure(notes=2, result=mean, senses=("proximity",))
+    @measure(notes=6, result=mean, senses=("proximity",))
     def wall_following(moment: Any, notes: Any) -> None:
-        found = min(moment.sensors[sensor], FULL_COUNT)
-        beside = found / counts if found < counts else (FULL_COUNT - found) / (FULL_COUNT - counts)
-        left, right = share_of_full(moment.wheels[0]), share_of_full(moment.wheels[1])
-        notes[0] += max(0.5 * (left + right), 0.0) * (1.0 - np.sqrt(0.5 * abs(left - right))) * beside
+        away_mm = moved_lately_mm(moment, notes)
+        # Notes 4 and 5: the time since it began to follow, and since a wall was at its side.
+        notes[4] += moment.period_s
+        notes[5] += moment.period_s
+        if moment.sensors[sensor] >= counts:
+            if notes[5] > WALL_LOST_S:
+                notes[4] = 0.0
+            notes[5] = 0.0
+            notes[0] += min(away_mm / (ROAMING_S * FOLLOWING_MM_S), 1.0) * min(notes[4] / KEPT_S, 1.0)
         notes[1] += 1.0
 
     return wall_following
+
+
+def beside_wall_share(side: str = "left", *, counts: float = 50.0) -> Measure:
+    """Share of control steps in which a wall was at its side.
+
+    Args:
+        side: 'left' or 'right'.
+        counts: Proximity of the sensor on that side from which on a wall is at its side.
+
+    Raises:
+        ParameterError: If an argument is out of range.
+    """
+    return _beside_wall_share(_side_sensor(side), _wall_counts(counts))
+
+
+@functools.lru_cache(maxsize=256)
+def _beside_wall_share(sensor: int, counts: float) -> Measure:
+    @measure(notes=2, result=mean, senses=("proximity",))
+    def beside_wall_share(moment: Any, notes: Any) -> None:
+        notes[0] += 1.0 if moment.sensors[sensor] >= counts else 0.0
+        notes[1] += 1.0
+
+    return beside_wall_share
 
 
 # ---- where ----
@@ -353,6 +384,21 @@ def distance_mm(moment: Any, x_mm: Any, y_mm: Any) -> Any:
 
 
 @kernel
+def moved_lately_mm(moment: Any, notes: Any) -> Any:
+    """Return how far the robot is from where it was in the last two seconds; notes 2 and 3 remember that place.
+
+    Note 1 counts the steps before this one.
+    """
+    if notes[1] == 0.0:
+        notes[2], notes[3] = moment.start_x_mm, moment.start_y_mm
+    # Where it was is a mean that forgets; on a straight way that is as far behind as it drives in that time.
+    share = min(moment.period_s / ROAMING_S, 1.0)
+    notes[2] += share * (moment.x_mm - notes[2])
+    notes[3] += share * (moment.y_mm - notes[3])
+    return distance_mm(moment, notes[2], notes[3])
+
+
+@kernel
 def share_of_full(speed: Any) -> Any:
     """Return a speed as a share of `FULL_SPEED`, cut to +-1."""
     return min(max(speed / FULL_SPEED, -1.0), 1.0)
@@ -373,6 +419,16 @@ def from_lamp_mm(moment: Any, x_mm: Any, y_mm: Any) -> Any:
             across, up = x_mm - moment.lamps[lamp, 0], y_mm - moment.lamps[lamp, 1]
             nearest = min(nearest, np.sqrt(across * across + up * up))
     return nearest
+
+
+def _side_sensor(side: object) -> int:
+    if not isinstance(side, str) or side not in ("left", "right"):
+        raise ParameterError(f"side must be 'left' or 'right', but it was {shown(side)}.")
+    return 0 if side == "left" else 5
+
+
+def _wall_counts(counts: object) -> float:
+    return check_number("counts", counts, 1, FULL_COUNT)
 
 
 def _place(name: str, value: object) -> float:

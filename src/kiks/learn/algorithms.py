@@ -14,13 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.errors import ParameterError, installing, nearest, shown
-from kiks.learn.task import Axis
+from kiks.learn.task import SPREAD, Axis
 
 Floats = NDArray[np.float64]
-
-SPREAD = 3.0
-"""Standard deviation of each parameter at the beginning: three times the usual scale of controllers, so that some of
-the first candidates react sharply."""
 
 
 class Algorithm(Protocol):
@@ -45,9 +41,12 @@ class Cma:
         parameter_count: Number of parameters of a candidate.
         population: Number of candidates in a generation.
         seed: Seed of its random numbers.
+        spread: Standard deviation of each parameter at the beginning.
     """
 
-    def __init__(self, parameter_count: int, population: int, seed: int, axes: Sequence[Axis] = ()) -> None:
+    def __init__(
+        self, parameter_count: int, population: int, seed: int, axes: Sequence[Axis] = (), spread: float = SPREAD
+    ) -> None:
         cma = library("cma")
         rng = np.random.default_rng(seed)
         options = {
@@ -57,7 +56,7 @@ class Cma:
             "verbose": -9,
             "verb_log": 0,
         }
-        self._strategy: Any = cma.CMAEvolutionStrategy(np.zeros(parameter_count), SPREAD, options)
+        self._strategy: Any = cma.CMAEvolutionStrategy(np.zeros(parameter_count), spread, options)
         self._candidates: list[Floats] = []
 
     def ask(self) -> Floats:
@@ -81,6 +80,7 @@ class Ga:
         parameter_count: Number of parameters of a candidate.
         population: Number of candidates in a generation.
         seed: Seed of its random numbers.
+        spread: Standard deviation of each parameter at the beginning.
     """
 
     MUTATION = 0.07
@@ -89,9 +89,12 @@ class Ga:
     RIVALS = 3
     """Number of candidates in a tournament."""
 
-    def __init__(self, parameter_count: int, population: int, seed: int, axes: Sequence[Axis] = ()) -> None:
+    def __init__(
+        self, parameter_count: int, population: int, seed: int, axes: Sequence[Axis] = (), spread: float = SPREAD
+    ) -> None:
         self._rng = np.random.default_rng(seed)
-        self._candidates = SPREAD * self._rng.standard_normal((population, parameter_count))
+        self._spread = spread
+        self._candidates = spread * self._rng.standard_normal((population, parameter_count))
         self._favourite = self._candidates[0]
 
     def ask(self) -> Floats:
@@ -106,7 +109,7 @@ class Ga:
         winners = np.take_along_axis(rivals, fitness[rivals].argmax(axis=2)[:, :, None], axis=2)[:, :, 0]
         mothers, fathers = self._candidates[winners]
         children = np.where(rng.random((population, parameter_count)) < 0.5, mothers, fathers)
-        children += self.MUTATION * SPREAD * rng.standard_normal(children.shape)
+        children += self.MUTATION * self._spread * rng.standard_normal(children.shape)
         children[0] = self._favourite
         self._candidates = children
 
@@ -126,6 +129,7 @@ class MapElites:
         population: Number of candidates in a generation.
         seed: Seed of its random numbers.
         axes: Axes of the map.
+        spread: Standard deviation of each parameter at the beginning.
 
     Raises:
         ParameterError: If there are no axes.
@@ -134,14 +138,16 @@ class MapElites:
     NEAR, ALONG = 0.1, 0.2
     """Standard deviation of a child's distance from its parent in all directions, and along the line."""
 
-    def __init__(self, parameter_count: int, population: int, seed: int, axes: Sequence[Axis] = ()) -> None:
+    def __init__(
+        self, parameter_count: int, population: int, seed: int, axes: Sequence[Axis] = (), spread: float = SPREAD
+    ) -> None:
         if not axes:
             raise ParameterError(
                 "map-elites must have axes along which behaviours differ, but this task has none. Give it some."
             )
         archives, emitters = library("ribs.archives"), library("ribs.emitters")
         schedulers = library("ribs.schedulers")
-        first = SPREAD * np.random.default_rng(seed).standard_normal((population, parameter_count))
+        first = spread * np.random.default_rng(seed).standard_normal((population, parameter_count))
         self.archive: Any = archives.GridArchive(
             solution_dim=parameter_count,
             dims=[axis.cells for axis in axes],
@@ -150,7 +156,7 @@ class MapElites:
         )
         emitter = emitters.IsoLineEmitter(
             self.archive,
-            iso_sigma=self.NEAR * SPREAD,
+            iso_sigma=self.NEAR * spread,
             line_sigma=self.ALONG,
             initial_solutions=first,
             batch_size=population,
@@ -182,7 +188,9 @@ ALGORITHMS: dict[str, type[Cma] | type[Ga] | type[MapElites]] = {"cma": Cma, "ga
 """The algorithms by their names."""
 
 
-def make_algorithm(name: str, parameter_count: int, population: int, seed: int, axes: Sequence[Axis]) -> Algorithm:
+def make_algorithm(
+    name: str, parameter_count: int, population: int, seed: int, axes: Sequence[Axis], spread: float
+) -> Algorithm:
     """Return an algorithm.
 
     Raises:
@@ -193,7 +201,7 @@ def make_algorithm(name: str, parameter_count: int, population: int, seed: int, 
             f"algorithm must be one of {', '.join(ALGORITHMS)}, but it was "
             f"{shown(name)}.{nearest(str(name), ALGORITHMS)}"
         )
-    return ALGORITHMS[name](parameter_count, population, seed, axes)
+    return ALGORITHMS[name](parameter_count, population, seed, axes, spread)
 
 
 def library(name: str) -> Any:

@@ -86,7 +86,7 @@ class Evolution:
         self.seed = check_count("seed", seed, most=2**63 - 1)
         self.generations: list[Generation] = []
         self.algorithm = make_algorithm(
-            algorithm, task.parameter_count, self.population, self._seed_for(_ALGORITHM_SEED), task.axes
+            algorithm, task.parameter_count, self.population, self._seed_for(_ALGORITHM_SEED), task.axes, task.spread
         )
         self._trial_seeds = [self._seed_for(_TRIAL_SEED, number) for number in range(TRIALS)]
         self._rival: Floats | None = None

@@ -29,6 +29,10 @@ Fitness = Callable[[Mapping[str, Floats]], Floats]
 BATCH_WORLDS_MAX = 20_000
 """Largest number of worlds in a batch: more need more memory and run no faster."""
 
+SPREAD = 3.0
+"""Standard deviation of each parameter at the beginning: three times the usual scale of controllers, so that some of
+the first candidates react sharply."""
+
 WORLDS_MAX, ROBOTS_MAX, MEASURES_MAX = 100_000, 1000, 100
 """Largest number of worlds of a candidate, of robots in each world, and of measures."""
 
@@ -80,6 +84,7 @@ class Task:
         robots: Number of robots in each world, all with the same controller.
         timing: Timing of the control loop; that of a program on a line of 9600 baud if left out.
         starts: 'random' for free places anywhere, or 'arena' for the starts of the arena.
+        spread: Standard deviation of each parameter in the first generation.
         exam: The exam of its champions.
         about: A description in one line.
         file: The user's file that defines it.
@@ -110,6 +115,7 @@ class Task:
     robots: Annotated[Whole, Field(ge=1, le=ROBOTS_MAX)] = 1
     timing: Timing = field(default_factory=Timing)
     starts: Starts = "random"
+    spread: Annotated[Number, Field(gt=0, le=1000)] = SPREAD
     exam: Annotated[Exam | None, Field(description="kiks.Exam(arenas, measures, solved) makes one.")] = None
     about: Text = ""
     file: str = ""
@@ -188,7 +194,7 @@ class Task:
             self.measure_names,
             self.seconds,
         )
-        worlds = (self.worlds, self.axes, self.robots, self.timing, self.starts)
+        worlds = (self.worlds, self.axes, self.robots, self.timing, self.starts, self.spread)
         digest.update(repr((self.name, evaluated, worlds, RobotSpec.load(self.robot))).encode())
         if self.file:
             digest.update(read_file(Path(self.file), "the task's file"))

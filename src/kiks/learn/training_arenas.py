@@ -159,10 +159,47 @@ def rooms() -> Arena:
     return draw(900, 900, walls, "rooms", 180)
 
 
-def follow_box() -> Arena:
-    """Return an arena with a corner cut off and a block in its middle."""
-    walls = [*wall((0, 440), (160, 600)), pillar(330, 270, 130, 180)]
-    return draw(600, 600, walls, "box with a block")
+def wall_ends() -> Arena:
+    """Return an arena for following walls: walls that end inside, with corners to both sides, and two pillars."""
+    walls = [
+        *wall((235, 0), (235, 210), (430, 210)),
+        *wall((0, 390), (195, 390), (285, 520), brightness=170),
+        *wall((455, 375), (455, 560), (625, 560)),
+        *wall((650, 0), (650, 180)),
+        *wall((845, 340), (665, 375)),
+        *wall((390, 845), (390, 700), (260, 700)),
+        pillar(730, 700, 70),
+        pillar(115, 585, 45, 190),
+    ]
+    return draw(845, 845, walls, "wall ends")
+
+
+def alcoves() -> Arena:
+    """Return an arena for following walls: a room with alcoves, and an angled wall in its middle."""
+    walls = [
+        *wall((0, 245), (155, 245), (155, 195)),
+        *wall((340, 0), (340, 85), (545, 85), (545, 0)),
+        *wall((780, 235), (610, 235), (610, 325), brightness=180),
+        *wall((235, 430), (405, 365), (495, 480)),
+        *wall((780, 545), (695, 545), (695, 780)),
+        *wall((430, 780), (430, 650), (545, 570), brightness=200),
+        *wall((0, 570), (145, 700)),
+    ]
+    return draw(780, 780, walls, "alcoves", 230)
+
+
+def unseen_rooms() -> Arena:
+    """Return an arena for the exam of followers: ledges, open rooms and a hook, with corners to both sides."""
+    walls = [
+        *wall((0, 65), (180, 65), (180, 0)),
+        *wall((330, 0), (330, 260), (230, 260)),
+        *wall((700, 0), (760, 140), (900, 140)),
+        *wall((520, 700), (520, 450), (700, 450), (700, 560)),
+        *wall((0, 430), (200, 430), (260, 520)),
+        *wall((520, 150), (520, 310), (640, 310)),
+        *wall((900, 420), (835, 420), (835, 700)),
+    ]
+    return draw(900, 700, walls, "unseen rooms", 220)
 
 
 LAMP_W = 25.0
