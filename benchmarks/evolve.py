@@ -1,7 +1,7 @@
 """How long tasks take to evolve from random, and whether their champions solve them.
 
 Run: python benchmarks/evolve.py [--json] [--seeds 5] [--task NAME ...]. For each seed the task is evolved by CMA-ES for
-the generations of `TASKS`, and its champion takes the exam (`kiks.Exam`): twenty starts in arenas where it was not
+the task's own number of generations, and its champion takes the exam (`kiks.Exam`): twenty starts in arenas where it was not
 trained, with the timing of a line of 9600 baud.
 
 * `evolve.NAME_solved`: the share of champions that pass; `evolve.NAME_s`: the median time of an evolution.
@@ -25,8 +25,7 @@ from kiks.batch.initial_state import random_starts
 from kiks.model.arena import Ball
 
 ARENAS = Path(__file__).parent.parent / "examples" / "arenas"
-TASKS = {"avoid": 60, "follow": 60, "light": 60, "gather": 60, "maze": 60}
-"""Generations of each task."""
+TASKS = ("avoid", "follow", "light", "gather", "maze")
 
 SWARM, SWARM_MM, SWARM_POPULATION, SWARM_GENERATIONS = 20, 2000, 100, 3
 
@@ -63,7 +62,7 @@ def main() -> None:
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--json", action="store_true", help="one JSON object a line")
     arguments.add_argument("--seeds", type=int, default=5, help="how many evolutions of each task")
-    arguments.add_argument("--task", nargs="+", choices=list(TASKS), default=list(TASKS), help="the tasks")
+    arguments.add_argument("--task", nargs="+", choices=TASKS, default=TASKS, help="the tasks")
     arguments.add_argument("--where", default="threads", help="where candidates are evaluated")
     options = arguments.parse_args()
 
@@ -73,7 +72,7 @@ def main() -> None:
         exams = exams_of(task)
         for seed in range(1, options.seeds + 1):
             start_s = time.perf_counter()
-            champion = kiks.Evolution(task, seed=seed).run(generations=TASKS[name], executor=options.where)
+            champion = kiks.Evolution(task, seed=seed).run(generations=task.generations, executor=options.where)
             wholes_s.append(time.perf_counter() - start_s)
             for exam_name, exam in exams.items():
                 result = exam.examine(champion)
@@ -82,9 +81,9 @@ def main() -> None:
                     (f"evolve.{exam_name}_starts_{seed}", result.solved.sum(), f"of {len(result.solved)} solved")
                 )
         rows += [(f"evolve.{each}_solved", passed[each] / options.seeds, "of the champions") for each in exams]
-        rows.append((f"evolve.{name}_s", statistics.median(wholes_s), f"s for {TASKS[name]} generations"))
+        rows.append((f"evolve.{name}_s", statistics.median(wholes_s), f"s for {task.generations} generations"))
         if name == "avoid":
-            pace = 60 * TASKS[name] / statistics.median(wholes_s)
+            pace = 60 * task.generations / statistics.median(wholes_s)
             rows.append(("evolve.generations_per_min", pace, "of one robot that avoids"))
     start_s = time.perf_counter()
     swarm = kiks.Evolution(swarm_task(), seed=1, population=SWARM_POPULATION)

@@ -35,10 +35,6 @@ class ControllerKind(enum.StrEnum):
     GRU = "gru"
 
 
-GENERATIONS = 60
-"""Default number of generations."""
-
-
 def evolve(
     task: Annotated[str, typer.Argument(help="A task (--list shows them), or a Python file that holds one.")] = "avoid",
     out: Annotated[
@@ -48,7 +44,7 @@ def evolve(
         ),
     ] = None,
     generations: Annotated[
-        int | None, typer.Option(help=f"Generations; {GENERATIONS} if neither this nor --seconds is given.", min=1)
+        int | None, typer.Option(help="Generations; as many as the task wants if --seconds is not given either.", min=1)
     ] = None,
     seconds: Annotated[float | None, typer.Option(help="Begin no generation later than this [s].", min=0)] = None,
     population: Annotated[int | None, typer.Option(help="Candidates in a generation.", min=4)] = None,
@@ -86,7 +82,7 @@ def evolve(
     evolution = Evolution(chosen, str(name), seed=seed, population=population, folder=folder)
     if evolution.generations:
         typer.echo(f"Continuing after generation {len(evolution.generations)} in {folder}.")
-    until = GENERATIONS if generations is None and seconds is None else generations
+    until = chosen.generations if generations is None and seconds is None else generations
     where = "threads" if ray is None else _ray(ray)
     end_as_with_ctrl_c()
     stopped = _run(evolution, until, seconds, where)

@@ -112,7 +112,8 @@ def follow(controller: Controller | None = None, *, side: str = "left", **change
     """Return the task to follow walls.
 
     Args:
-        controller: The controller to evolve; a network without hidden units if left out.
+        controller: The controller to evolve; a perceptron with feedback if left out, which remembers that it has lost a
+            wall.
         side: The side of the robot on which the wall is: 'left' or 'right'.
         changes: Other arguments of `Task`.
 
@@ -122,7 +123,7 @@ def follow(controller: Controller | None = None, *, side: str = "left", **change
     task = Task(
         "follow",
         (training_arenas.wall_ends(), training_arenas.alcoves(), training_arenas.corridors()),
-        controllers.mlp(hidden=(), speed_limit=SPEED_LIMIT) if controller is None else controller,
+        controllers.mlp(hidden=(), feedback=True, speed_limit=SPEED_LIMIT) if controller is None else controller,
         (measures.wall_following(side), measures.beside_wall_share(side), measures.contacts, measures.path_mm),
         fitness=follow_fitness,
         seconds=40.0,
@@ -131,6 +132,7 @@ def follow(controller: Controller | None = None, *, side: str = "left", **change
         # Larger parameters saturate the wheels: then a robot without a wall drives straight on or spins. The arc that
         # leads round the end of a wall needs small ones.
         spread=1.0,
+        generations=140,
         exam=Exam(
             (training_arenas.unseen(), training_arenas.unseen_rooms()),
             (measures.beside_wall_share(side), measures.roaming, measures.contacts),

@@ -29,6 +29,9 @@ Fitness = Callable[[Mapping[str, Floats]], Floats]
 BATCH_WORLDS_MAX = 20_000
 """Largest number of worlds in a batch: more need more memory and run no faster."""
 
+GENERATIONS = 60
+"""Default number of generations."""
+
 SPREAD = 3.0
 """Standard deviation of each parameter at the beginning: three times the usual scale of controllers, so that some of
 the first candidates react sharply."""
@@ -85,6 +88,7 @@ class Task:
         timing: Timing of the control loop; that of a program on a line of 9600 baud if left out.
         starts: 'random' for free places anywhere, or 'arena' for the starts of the arena.
         spread: Standard deviation of each parameter in the first generation.
+        generations: How many generations an evolution has, unless the user says otherwise.
         exam: The exam of its champions.
         about: A description in one line.
         file: The user's file that defines it.
@@ -116,6 +120,7 @@ class Task:
     timing: Timing = field(default_factory=Timing)
     starts: Starts = "random"
     spread: Annotated[Number, Field(gt=0, le=1000)] = SPREAD
+    generations: Annotated[Whole, Field(ge=1)] = GENERATIONS
     exam: Annotated[Exam | None, Field(description="kiks.Exam(arenas, measures, solved) makes one.")] = None
     about: Text = ""
     file: str = ""
