@@ -1,8 +1,8 @@
 """How long tasks take to evolve from random, and whether their champions solve them.
 
 Run: python benchmarks/evolve.py [--json] [--seeds 5] [--task NAME ...]. For each seed the task is evolved by CMA-ES for
-the task's own number of generations, and its champion takes the exam (`kiks.Exam`): twenty starts in arenas where it was not
-trained, with the timing of a line of 9600 baud.
+the task's own number of generations, and its champion takes the exam (`kiks.Exam`): twenty starts in arenas where it
+was not trained, with the timing of a line of 9600 baud.
 
 * `evolve.NAME_solved`: the share of champions that pass; `evolve.NAME_s`: the median time of an evolution.
 * `evolve.avoid_maze_solved`, `evolve.avoid_office_solved`: the same exam in two arenas of `examples`.

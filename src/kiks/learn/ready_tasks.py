@@ -59,15 +59,12 @@ def avoid(controller: Controller | None = None, **changes: Any) -> Task:
     """
     task = Task(
         "avoid",
-        (
-            *(training_arenas.pillars(), training_arenas.corridors()),
-            *(training_arenas.wedges(), training_arenas.furniture()),
-        ),
+        (training_arenas.pillars(), training_arenas.corridors(), training_arenas.wedges()),
         controllers.linear(speed_limit=SPEED_LIMIT) if controller is None else controller,
         (measures.avoidance, measures.roaming, measures.contacts, measures.path_mm, measures.straightness),
         fitness=avoid_fitness,
         seconds=20.0,
-        worlds=16,
+        worlds=12,
         axes=(Axis("path_mm", 0, 1500), Axis("straightness", 0, 1)),
         exam=Exam(
             (training_arenas.unseen(), training_arenas.rooms()),

@@ -108,22 +108,6 @@ def wedges() -> Arena:
     return draw(600, 600, walls, "wedges")
 
 
-def furniture() -> Arena:
-    """Return a room with dark things, which sensors feel late: boxes with their corners, round things and wall ends."""
-    things = [
-        Stroke((0, 40), (90, 40), 80, 60),
-        Stroke((300, 90), (400, 90), 70, 40),
-        pillar(560, 110, 60, 30),
-        pillar(130, 480, 80, 45),
-        Stroke((330, 300), (330, 360), 70, 80),
-        *wall((600, 330), (480, 330), brightness=50),
-        *wall((400, 600), (400, 500)),
-        *wall((0, 250), (150, 250), brightness=120),
-        pillar(520, 500, 25, 60),
-    ]
-    return draw(600, 600, things, "furniture", 140)
-
-
 def unseen() -> Arena:
     """Return an arena for the exam: slanted walls, pillars, a passage and a dead end."""
     walls = [
