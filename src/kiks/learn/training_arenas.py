@@ -11,13 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kiks.batch.initial_state import random_starts
+from kiks.learn.exam import CLEAR_MM
 from kiks.model.arena import Arena, Lamp, Pose
 
 WALL_MM = 10.0
 """Thickness of walls [mm]."""
-
-CLEAR_MM = 8.0
-"""Smallest gap between the start of an exam and a wall [mm]."""
 
 TRIED_STARTS = 2000
 """Random places among which starts in shadow are looked for."""
