@@ -90,10 +90,10 @@ class Exam:
         >>> @kiks.controller(parameters=2)
         ... def ahead(sensors, memory, parameters, wheels):
         ...     wheels[:] = parameters
-        >>> exam = Exam([kiks.Arena.box(900, 900)], [kiks.measures.path_mm], lambda values: values["path_mm"] > 100,
-        ...             goal="drove 100 mm", seconds=10, count=4)
+        >>> exam = Exam([kiks.Arena.box(900, 900)], [kiks.measures.path_mm], lambda values: values["path_mm"] > 30,
+        ...             goal="drove 30 mm", seconds=2, count=4)
         >>> print(exam.examine(kiks.Champion(ahead, (3, 3))))
-        Exam: solved, 4 of 4 starts (drove 100 mm)
+        Exam: solved, 4 of 4 starts (drove 30 mm)
     """
 
     arenas: Arenas
