@@ -82,7 +82,9 @@ def test_wrong_exams_are_errors(make, message):
 @pytest.mark.parametrize("name", list(kiks.tasks.TASKS))
 def test_neither_standing_still_nor_chance_passes(name):
     task = kiks.tasks.load(name)
-    assert not set(map(id, task.exam.arenas)) & set(map(id, task.arenas))
+    trained = [(each.brightness.tobytes(), each.cylinders) for each in task.arenas]
+    seen = [(each.brightness.tobytes(), each.cylinders) in trained for each in task.exam.arenas]
+    assert any(seen) == name.startswith("maze")
     exam = replace(task.exam, count=len(task.exam.arenas))
     rng = np.random.default_rng(1)
     for scale in (0.0, 1.0, 3.0):
