@@ -193,6 +193,80 @@ def test_a_run_rejects_wrong_arguments(arguments: dict[str, Any], words: str) ->
         make(4).run(given.pop("controller"), given.pop("parameters"), **given)
 
 
+@kiks.controller(senses=("ambient",))
+def light_only(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+    """Stand still."""
+
+
+@pytest.mark.parametrize(
+    ("controllers", "parameters", "words"),
+    [
+        ([vehicle], [[1.0, 0.0]], "or a list of 2, one for each robot of a world, but it was a list of 1"),
+        ([vehicle, 5], [[1.0, 0.0]] * 2, "controller must be one that"),
+        ([vehicle, light_only], [[1.0, 0.0], []], "'light_only' senses ambient where another senses proximity"),
+        ([vehicle, vehicle], [1.0, 0.0, 2.0], "a list with those of each of the 2 controllers"),
+        ([vehicle, vehicle], [[1.0, 0.0], [1.0]], "must be given 2 parameters"),
+        ([vehicle, vehicle], [[1.0, 0.0], np.zeros((3, 2))], r"those of robot 2 had the shape \(3, 2\)"),
+    ],
+)
+def test_a_run_rejects_wrong_controllers_of_several_robots(controllers: Any, parameters: Any, words: str) -> None:
+    with pytest.raises(kiks.ParameterError, match=words):
+        kiks.Batch(kiks.Arena.box(400, 400), 2, robots=2).run(controllers, parameters, seconds=1.0)
+
+
+def test_the_same_controller_for_each_robot_is_one_for_all() -> None:
+    batch, given = kiks.Batch(kiks.Arena.box(400, 400), 3, robots=2, seed=1), np.random.default_rng(1).random((3, 2))
+    batch.run(vehicle, given, seconds=3.0)
+    expected = [batch.state_hash(world) for world in range(3)]
+    batch.run([vehicle, vehicle], [given, given], seconds=3.0)
+    assert [batch.state_hash(world) for world in range(3)] == expected
+
+
+def test_controllers_get_their_own_counts_of_numbers() -> None:
+    @kiks.controller(senses=("proximity", "ambient"), memory=3, parameters=1)
+    def large(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+        wheels[0] = 10000 * len(sensors) + 100 * len(memory) + len(parameters) + parameters[0]
+
+    @kiks.controller(memory=1)
+    def small(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+        wheels[0] = 10000 * len(sensors) + 100 * len(memory) + len(parameters) + parameters[1]
+
+    @kiks.measure
+    def wanted(moment: Any, notes: Any) -> None:
+        notes[0] = moment.wheels[0]
+
+    @kiks.measure
+    def told(moment: Any, notes: Any) -> None:
+        notes[0] = memory_total[moment.robot]
+
+    memory_total = (1.0, 2.0, 3.0)
+    batch = kiks.Batch(kiks.Arena.box(400, 400), 1, robots=3)
+    rollouts = batch.run([small, large, small], [[1, 0.25], [-0.5], [1, 2, 3]], seconds=0.1, measures=[wanted, told])
+    assert rollouts.values[0, :, 0].tolist() == [127.0] * 3
+    assert rollouts.values[0, :, 1].tolist() == [1.0, 2.0, 3.0]
+
+
+def test_measures_see_all_robots_of_their_world() -> None:
+    @kiks.measure(notes=3, result=lambda notes: notes[..., 2])
+    def errors(moment: Any, notes: Any) -> None:
+        own = moment.poses[moment.robot]
+        notes[2] += abs(own[0] - moment.x_mm) + abs(own[1] - moment.y_mm) + abs(own[2] - moment.heading_rad)
+        notes[2] += abs(len(moment.poses) - 3)
+
+    @kiks.measure
+    def of_next_mm(moment: Any, notes: Any) -> None:
+        notes[0] = moment.poses[(moment.robot + 1) % 3, 0]
+
+    @kiks.measure
+    def own_mm(moment: Any, notes: Any) -> None:
+        notes[0] = moment.x_mm
+
+    batch = kiks.Batch(kiks.Arena.box(500, 500), 10, robots=3, seed=2)
+    values = batch.run(vehicle, [1.0, 0.01], seconds=2.0, measures=[errors, of_next_mm, own_mm]).values
+    assert (values[..., 0] == 0.0).all()
+    assert np.array_equal(values[..., 1], np.roll(values[..., 2], -1, axis=1))
+
+
 def test_steps_reject_wrong_arguments() -> None:
     batch = make(2)
     with pytest.raises(kiks.ParameterError, match=r"reset\(\) must be called"):

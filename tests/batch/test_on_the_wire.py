@@ -41,7 +41,7 @@ def arena(**things: Any) -> kiks.Arena:
 
 
 def drive_alone(
-    where: kiks.Arena, seed: int, timing: kiks.Timing, controller: kiks.Controller, parameters: Any, **sim_options: Any
+    where: kiks.Arena, seed: int, timing: kiks.Timing, controller: Any, parameters: Any, **sim_options: Any
 ) -> tuple[int, str]:
     """Return the loops of a drive on the wire, and the hash when it ended, before the robot was stopped."""
     assert timing.baud is not None
@@ -97,6 +97,17 @@ def test_one_program_with_three_robots() -> None:
     rollouts = batch.run(wander, np.full((2, 3, 1), [[1.0], [0.5], [0.8]]), seconds=8.0)
     for world in range(2):
         found = drive_alone(arena(ball=True), 5 + world, timing, wander, [[1.0], [0.5], [0.8]], robots=3)
+        assert found == (rollouts.step_counts[world], batch.state_hash(world))
+
+
+@pytest.mark.slow
+def test_one_program_with_a_controller_for_each_robot() -> None:
+    timing = kiks.Timing(0.1, 19200)
+    batch = kiks.Batch(arena(ball=True), worlds=2, robots=3, seed=5, timing=timing)
+    controllers, parameters = [wander, peer, wander], [[1.0], [], [0.5]]
+    rollouts = batch.run(controllers, parameters, seconds=8.0)
+    for world in range(2):
+        found = drive_alone(arena(ball=True), 5 + world, timing, controllers, parameters, robots=3)
         assert found == (rollouts.step_counts[world], batch.state_hash(world))
 
 

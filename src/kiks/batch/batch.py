@@ -11,16 +11,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kiks.batch.callbacks import DECIDER, decider_of
+from kiks.batch.callbacks import NO_DECIDERS, deciders_of
 from kiks.batch.initial_state import InitialState
 from kiks.batch.kernel_args import Worlds
 from kiks.batch.loop import roll_out
 from kiks.batch.loop_timing import Timing
 from kiks.batch.measure_slots import MeasureSlots
 from kiks.batch.rollouts import Rollouts
-from kiks.control.compiled_function import address_of
 from kiks.control.controller import SENSES, Controller, check_senses
 from kiks.control.measure import Measure
+from kiks.control.robot_controllers import robot_controllers
 from kiks.engine.bunch import worlds_in_bunch
 from kiks.engine.scene import Scene, enter_worlds
 from kiks.engine.simd.lanes import LANES
@@ -133,54 +133,41 @@ class Batch:
 
     def run(
         self,
-        controller: Controller,
-        parameters: ArrayLike = (),
+        controller: Controller | Sequence[Controller],
+        parameters: Any = (),
         *,
         seconds: float,
         measures: Sequence[Measure] = (),
     ) -> Rollouts:
-        """Reset all worlds, let a controller drive all robots, and return the values of the measures.
+        """Reset all worlds, let controllers drive the robots, and return the values of the measures.
 
         Args:
-            controller: The controller.
+            controller: The controller of all robots, or a list with one for each robot of a world. All robots sense
+                what the one with the most senses needs; the senses of the others must come first among these.
             parameters: Its parameters: float64 [parameter] for all robots, [world, parameter] for all of a world, or
-                [world, robot, parameter].
+                [world, robot, parameter]. With a list of controllers, a list with the parameters of each: [parameter]
+                or [world, parameter].
             seconds: Simulated time after which no loop begins [s].
             measures: The measures.
 
         Raises:
             ParameterError: If an argument is out of range, or Numba cannot compile the controller or a measure.
         """
-        if not isinstance(controller, Controller):
-            raise ParameterError(
-                f"controller must be one that @kiks.controller has made, but it was {shown(controller)}. "
-                "Write @kiks.controller over the function."
-            )
         until_ns = ns_from_s(check_number("seconds", seconds, 0, SECONDS_MAX))
-        watching = MeasureSlots(measures, controller.senses, repr(controller.name))
-        given = controller.check_parameters(parameters)
-        if given.ndim == 2:
-            given = given[:, None, :]
+        driving = robot_controllers(controller, parameters, self.world_count, self.robot_count)
+        watching = MeasureSlots(measures, driving.senses, driving.names)
         shape = (self.world_count, self.robot_count)
-        try:
-            each_given = np.array(np.broadcast_to(given, (*shape, given.shape[-1])), order="C")
-        except ValueError:
-            raise ParameterError(
-                f"parameters must be [parameter], [world, parameter] or [world, robot, parameter] with {shape[0]} "
-                f"worlds and {shape[1]} robots, but their shape was {np.shape(parameters)}."
-            ) from None
         self._reset_worlds(np.arange(self.world_count))
         self._is_sensed = False
         worlds = self._worlds._replace(
-            sense_codes=_codes_of(controller.senses),
-            sensors=np.zeros((*shape, controller.sensor_count)),
-            memory=np.zeros((*shape, controller.memory_count)),
-            parameters=each_given,
+            sense_codes=_codes_of(driving.senses),
+            sensors=np.zeros((*shape, SENSOR_COUNT * len(driving.senses))),
+            memory=np.zeros((*shape, driving.memory_count)),
+            parameters=driving.parameters,
             notes=np.zeros((*shape, watching.note_count)),
         )
-        decider = decider_of(controller)
-        address = address_of(decider, DECIDER)
-        self._on_all_cores(worlds, (0, UNLIMITED, until_ns), (address, watching.watchers))
+        deciders = deciders_of(driving.controllers, driving.parameter_counts)
+        self._on_all_cores(worlds, (0, UNLIMITED, until_ns), (deciders, watching.watchers))
         names = tuple(each.name for each in watching.measures)
         return Rollouts(watching.values(worlds.notes), worlds.steps.copy(), names)
 
@@ -315,14 +302,14 @@ class Batch:
 
     def _do_halves(self, first: int, end: int, chosen: NDArray[np.int64] | None = None) -> None:
         """Do halves of control loops with the present speeds of the wheels: even halves sense, odd halves act."""
-        span, callbacks = (first, end, UNLIMITED), (0, self._watching.watchers)
+        span, callbacks = (first, end, UNLIMITED), (NO_DECIDERS, self._watching.watchers)
         self._on_all_cores(self._worlds, span, callbacks, chosen=chosen, least=STEP_BLOCK)
 
     def _on_all_cores(
         self,
         worlds: Any,
         span: tuple[int, int, int],
-        callbacks: tuple[int, NDArray[np.int64]],
+        callbacks: tuple[NDArray[np.int64], NDArray[np.int64]],
         *,
         chosen: NDArray[np.int64] | None = None,
         least: int = LANES,

@@ -172,7 +172,7 @@ def mask_ended(worlds: Any, numbers: Any, is_on: Any, until_ns: Any) -> Any:
 
 
 @spliced
-def call_measures(scene: Any, worlds: Any, bunch: Any, is_on: Any, times_ns: Any, watchers: Any) -> Any:
+def call_measures(scene: Any, worlds: Any, bunch: Any, is_on: Any, times_ns: Any, watchers: Any, poses: Any) -> Any:
     """Call the measures for the robots of a bunch.
 
     Args:
@@ -182,13 +182,18 @@ def call_measures(scene: Any, worlds: Any, bunch: Any, is_on: Any, times_ns: Any
         is_on: Their mask, bool [W].
         times_ns: When the last command of each world acted [ns], int64 [W].
         watchers: The measures (`kiks.batch.callbacks.watchers_of`).
+        poses: Buffer for the poses of a world's robots, float64 [robot, 3].
     """
     for k in range(bunch.worlds.shape[0]):
         if is_on[k]:
             world = bunch.worlds[k]
             period_s = (times_ns[k] - worlds.watched_ns[world]) / NS_PER_S
             worlds.watched_ns[world] = times_ns[k]
-            for robot in range(worlds.sensors.shape[1] if watchers.shape[0] > 0 else 0):
+            robot_count = poses.shape[0] if watchers.shape[0] > 0 else 0
+            for robot in range(robot_count):
+                one = robot_in(scene, bunch, k, robot)[0]
+                poses[robot, 0], poses[robot, 1], poses[robot, 2] = one.x_mm, one.y_mm, one.heading_rad
+            for robot in range(robot_count):
                 one, record = robot_in(scene, bunch, k, robot)
                 moment = Moment(
                     times_ns[k] / NS_PER_S,
@@ -205,6 +210,8 @@ def call_measures(scene: Any, worlds: Any, bunch: Any, is_on: Any, times_ns: Any
                     one.is_touching > 0.0,
                     scene.bodies[world],
                     scene.lamps[world],
+                    robot,
+                    poses,
                 )
                 for number in range(watchers.shape[0]):
                     notes = worlds.notes[world, robot, watchers[number, 1] : watchers[number, 2]]
@@ -222,21 +229,22 @@ def roll_out(scene: Any, worlds: Any, size: Any, block: Any, span: Any, callback
         block: Indices of the worlds, int64 [world].
         span: Number of the first half of a loop to do, and of the first one not to do: even halves sense, odd halves
             act; time at and after which no loop begins [ns].
-        callbacks: Address of the kernel that calls a controller for each world of a bunch (`kiks.batch.callbacks`), 0
-            if `worlds.wheels` holds the speeds already; and the measures (`kiks.batch.callbacks.watchers_of`).
+        callbacks: The controllers (`kiks.batch.callbacks.deciders_of`), none if `worlds.wheels` holds the speeds
+            already; and the measures (`kiks.batch.callbacks.watchers_of`).
     """
     scene = open_scene(scene[0])
-    lanes, room = make_lanes(size * scene.robots.shape[1]), make_room(scene, size)
-    roll_out_block(scene, worlds, size, block, span, callbacks, lanes, room)
+    robot_count = scene.robots.shape[1]
+    lanes, room, poses = make_lanes(size * robot_count), make_room(scene, size), np.zeros((robot_count, 3))
+    roll_out_block(scene, worlds, size, block, span, callbacks, lanes, room, poses)
 
 
 @kernel
 def roll_out_block(
-    scene: Any, worlds: Any, size: Any, block: Any, span: Any, callbacks: Any, lanes: Any, room: Any
+    scene: Any, worlds: Any, size: Any, block: Any, span: Any, callbacks: Any, lanes: Any, room: Any, poses: Any
 ) -> Any:
-    """Do what `roll_out` does, in an open scene, with memory as for `kiks.engine.bunch.take`."""
+    """Do what `roll_out` does, in an open scene, with memory as for `kiks.engine.bunch.take` and `call_measures`."""
     first_half, end_half, until_ns = span
-    decider, watchers = callbacks
+    deciders, watchers = callbacks
     all_numbers, all_times_ns, all_on = stack_integers(LANES), stack_integers(LANES), stack_booleans(LANES)
     ticks = stack_integers(LANES)
     readers, counts = make_readers(), stack_integers(_READINGS).reshape((READERS, SENSOR_COUNT))
@@ -252,12 +260,12 @@ def roll_out_block(
                 if not mask_ended(worlds, numbers, is_on, until_ns):
                     break
                 sense(scene, worlds, bunch, is_on, times_ns, readers, counts)
-                if decider != 0:
+                for number in range(deciders.shape[0]):
                     given = worlds.sensors, worlds.memory, worlds.parameters, worlds.wheels
-                    call_decider(decider, (numbers, is_on, *given))
+                    call_decider(deciders[number, 0], (deciders[number], numbers, is_on, *given))
             else:
                 act(scene, worlds, bunch, is_on, times_ns)
-                call_measures(scene, worlds, bunch, is_on, times_ns, watchers)
+                call_measures(scene, worlds, bunch, is_on, times_ns, watchers, poses)
         for k in range(count):
             times_ns[k] = worlds.begins_ns[numbers[k]]
         pass_to(scene, bunch, times_ns)

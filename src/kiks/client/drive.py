@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import NDArray
 
 from kiks.client.khepera import Khepera
 from kiks.client.port import Port
 from kiks.control.controller import Controller, whole_speeds
-from kiks.errors import ParameterError, shown
+from kiks.control.robot_controllers import robot_controllers
+from kiks.errors import ParameterError
 from kiks.model.checks import SECONDS_MAX, check_number
 from kiks.model.robot import SENSOR_COUNT
 from kiks.units import ns_from_s, s_from_ns
@@ -21,8 +23,8 @@ COMMANDS = {"proximity": b"N\n", "ambient": b"O\n"}
 
 def drive(
     port: str | Port | Sequence[str | Port],
-    controller: Controller,
-    parameters: ArrayLike = (),
+    controller: Controller | Sequence[Controller],
+    parameters: Any = (),
     *,
     seconds: float,
     period_s: float = 0.1,
@@ -36,8 +38,10 @@ def drive(
     Args:
         port: As for `kiks.Khepera`: a simulation's port, a port's name, or an open port. One program drives several
             ports; each robot has a memory of its own.
-        controller: The controller.
-        parameters: Its parameters, float64 [parameter], or [robot, parameter].
+        controller: The controller of all robots, or a list with one for each. All robots sense what the one with the
+            most senses needs; the senses of the others must come first among these.
+        parameters: Its parameters, float64 [parameter], or [robot, parameter]; with a list of controllers, a list with
+            those of each.
         seconds: Time after which no loop begins [s].
         period_s: Time from the beginning of one loop to that of the next [s]; a loop that takes longer delays the next.
         baud: Speed of ports that are opened by name [bit/s].
@@ -84,30 +88,28 @@ class Driver:
     def __init__(
         self,
         port: str | Port | Sequence[str | Port],
-        controller: Controller,
-        parameters: ArrayLike = (),
+        controller: Controller | Sequence[Controller],
+        parameters: Any = (),
         *,
         period_s: float = 0.1,
         baud: int = 9600,
     ) -> None:
         self._period_ns = ns_from_s(check_number("period_s", period_s, 0, SECONDS_MAX))
-        if not isinstance(controller, Controller):
-            raise ParameterError(
-                f"controller must be one that @kiks.controller has made, but it was {shown(controller)}. "
-                "Write @kiks.controller over the function."
-            )
         ports = [port] if isinstance(port, str) or not isinstance(port, Sequence) else list(port)
         if not ports:
             raise ParameterError("port must be one or more robots' ports, but there was none.")
-        self._controller = controller
-        given = controller.check_parameters(parameters)
-        self._given = np.array(np.broadcast_to(given, (len(ports), given.shape[-1])), order="C")
-        self._sensors = np.zeros((len(ports), controller.sensor_count))
-        self._memory = np.zeros((len(ports), controller.memory_count))
+        if isinstance(controller, Controller):
+            given = controller.check_parameters(parameters)
+            parameters = given[None] if given.ndim == 2 else given  # one world
+        driving = robot_controllers(controller, parameters, 1, len(ports))
+        self._senses, self._controllers = driving.senses, driving.controllers
+        self._given = [driving.parameters[0, k, :count] for k, count in enumerate(driving.parameter_counts)]
+        self._sensors = np.zeros((len(ports), SENSOR_COUNT * len(driving.senses)))
+        self._memory = [np.zeros(each.memory_count) for each in driving.controllers]
         self._wheels = np.zeros((len(ports), 2))
-        # Compiles the controller, so that a faulty one raises before a robot moves.
+        # Compiles the controllers, so that a faulty one raises before a robot moves.
         for k in range(len(ports)):
-            controller(self._sensors[k], self._memory[k].copy(), self._given[k], self._wheels[k])
+            self._decide(k, self._memory[k].copy())
         self._wheels[:] = 0.0
         self._robots = [Khepera(each, baud=baud) for each in ports]
         self.begin_ns = ns_from_s(self._robots[0].time_s)
@@ -120,14 +122,14 @@ class Driver:
             LinkError: If a robot does not send the expected reply.
         """
         robots, sensors, wheels = self._robots, self._sensors, self._wheels
-        for number, sense in enumerate(self._controller.senses):
+        for number, sense in enumerate(self._senses):
             first = number * SENSOR_COUNT
             for robot in robots:
                 robot.port.write(COMMANDS[sense])
             for k, robot in enumerate(robots):
                 sensors[k, first : first + SENSOR_COUNT] = robot.read_numbers(COMMANDS[sense], SENSOR_COUNT)
         for k, robot in enumerate(robots):
-            self._controller(sensors[k], self._memory[k], self._given[k], wheels[k])
+            self._decide(k, self._memory[k])
             wheels[k] = whole_speeds(wheels[k])
             robot.port.write(b"D,%d,%d\n" % tuple(wheels[k]))
         for robot in robots:
@@ -137,6 +139,11 @@ class Driver:
         if self.begin_ns + self._period_ns > now_ns:
             robots[0].pause(s_from_ns(self.begin_ns + self._period_ns - now_ns))
         self.begin_ns = max(self.begin_ns + self._period_ns, now_ns)
+
+    def _decide(self, robot: int, memory: NDArray[np.float64]) -> None:
+        """Let the controller of a robot write its speeds."""
+        decide = self._controllers[robot]
+        decide(self._sensors[robot, : decide.sensor_count], memory, self._given[robot], self._wheels[robot])
 
     def stop(self) -> None:
         """Stop the robots."""

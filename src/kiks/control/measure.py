@@ -31,6 +31,8 @@ Moment: Any = namedtuple(
         "is_touching",
         "bodies",
         "lamps",
+        "robot",
+        "poses",
     ),
 )
 """The input of a measure: one robot in a control step, when its command takes effect.
@@ -45,7 +47,9 @@ Moment: Any = namedtuple(
 * contact_count: number of its contacts so far;
 * is_touching: whether it touches something, or did within the last 0.2 s;
 * bodies: records of `kiks.engine.state.BODY`, balls and cylinders of its world;
-* lamps: x [mm], y [mm], power [W] and 1 for on or 0 for off, float64 [lamp, 4].
+* lamps: x [mm], y [mm], power [W] and 1 for on or 0 for off, float64 [lamp, 4];
+* robot: index of the robot in its world, from 0;
+* poses: x [mm], y [mm] and heading [rad] of all robots of its world at this instant, float64 [robot, 3].
 """
 
 Result = Callable[[NDArray[np.float64]], NDArray[np.float64]]
