@@ -142,6 +142,18 @@ def test_every_random_start_is_free() -> None:
     np.testing.assert_array_equal(starts, random_starts(arena, 200, seed=1))
 
 
+def test_random_starts_of_several_robots_are_clear_of_each_other() -> None:
+    arena = kiks.Arena.box(500, 500)
+    starts = random_starts(arena, 50, seed=1, robots=8, clear_mm=4.0)
+    assert starts.shape == (50, 8, 3)
+    gaps = np.linalg.norm(starts[:, :, None, :2] - starts[:, None, :, :2], axis=3) - 55.0
+    assert gaps[:, ~np.eye(8, dtype=bool)].min() > 4.0
+    kiks.Batch(arena, 50, robots=8, starts=starts)  # accepts them
+    np.testing.assert_array_equal(starts[:, 0], random_starts(arena, 50, seed=1, clear_mm=4.0))
+    with pytest.raises(kiks.ParameterError, match="must have room for 60 robots of 27.5 mm"):
+        random_starts(arena, 1, seed=1, robots=60)
+
+
 def test_a_family_differs_and_repeats() -> None:
     robots = family(kiks.RobotSpec.load("khepera"), 20, seed=1, dead_share=0.5)
     assert robots == family(kiks.RobotSpec.load("khepera"), 20, seed=1, dead_share=0.5)

@@ -90,7 +90,6 @@ def test_the_digest_depends_on_the_file_and_its_arenas(folder: Path) -> None:
         ('base = "avoid"\nrobot = "kepera"', "Robot file|robot must|must exist"),
         ('base = "avoid"\nbaud = 50', "baud must be a whole number from 110"),
         ('base = "avoid"\nperiod_ms = 1\nbaud = 0', "period_s must be at least 0.01 without a line"),
-        ('base = "avoid"\nrobots = 2', "must be 'arena' with several robots"),
         (
             'base = "avoid"\n[controller]\nkind = "mlp"\nhidden = [1000000000]',
             r"controller.hidden\[0\] must be a whole",

@@ -24,6 +24,9 @@ from kiks.sim.simulation import Simulation, check_kinds
 ARENAS_LIMIT = 10_000
 """Most arenas of a batch."""
 
+ATTEMPTS = 1000
+"""How often random places are drawn for a robot."""
+
 WORLDS_LIMIT = 10_000_000
 """Most worlds in a batch: their robots alone would fill the memory of any computer."""
 
@@ -233,23 +236,58 @@ def _kinds_of(
 
 
 def random_starts(
-    arena: Arena, count: int, *, seed: int, radius_mm: float = 27.5, clear_mm: float = 5.0
+    arena: Arena,
+    count: int,
+    *,
+    seed: int,
+    robots: int | None = None,
+    radius_mm: float = 27.5,
+    clear_mm: float = 5.0,
 ) -> NDArray[np.float64]:
-    """Return random free poses, uniformly distributed over an arena, float64 [count, 3]: x_mm, y_mm, heading_rad.
+    """Return random free poses, uniformly distributed over an arena: x_mm, y_mm, heading_rad.
 
     Args:
         arena: The arena.
-        count: Number of poses.
+        count: Number of poses, or of worlds if `robots` is given.
         seed: Seed of the random generator.
-        radius_mm: Radius of the robot [mm].
-        clear_mm: Least distance of its edge from walls, balls and cylinders [mm].
+        robots: Number of robots in each world, which are clear of each other, too.
+        radius_mm: Radius of a robot [mm].
+        clear_mm: Least distance of its edge from walls, balls, cylinders and the other robots of its world [mm].
+
+    Returns:
+        float64 [count, 3], or [count, robot, 3] if `robots` is given.
 
     Raises:
         ParameterError: If the arena has too few free places.
     """
     rng = np.random.default_rng(seed)
+    if robots is None:
+        return _free_poses(rng, arena, count, radius_mm, clear_mm)
+    poses = np.zeros((count, robots, 3))
+    for robot in range(robots):
+        todo = np.arange(count)
+        for _ in range(ATTEMPTS):
+            tried = _free_poses(rng, arena, len(todo), radius_mm, clear_mm)
+            across, up = (poses[todo, :robot, axis] - tried[:, None, axis] for axis in range(2))
+            is_free = (np.hypot(across, up) > 2 * radius_mm + clear_mm).all(axis=1)
+            poses[todo[is_free], robot] = tried[is_free]
+            todo = todo[~is_free]
+            if not len(todo):
+                break
+        else:
+            raise ParameterError(
+                f"the arena {shown(arena.name)} must have room for {robots} robots of {radius_mm:g} mm, but {ATTEMPTS} "
+                f"random places for robot {robot + 1} were all taken. Take a larger one, or fewer robots."
+            )
+    return poses
+
+
+def _free_poses(
+    rng: np.random.Generator, arena: Arena, count: int, radius_mm: float, clear_mm: float
+) -> NDArray[np.float64]:
+    """Return random free poses of lone robots, float64 [count, 3]."""
     poses = np.zeros((0, 3))
-    for _ in range(1000):
+    for _ in range(ATTEMPTS):
         if len(poses) >= count:
             break
         tried = rng.uniform((0, 0, -math.pi), (arena.width_mm, arena.height_mm, math.pi), (2 * count + 100, 3))

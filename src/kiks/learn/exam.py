@@ -119,7 +119,7 @@ class Exam:
 
         Args:
             champion: The champion.
-            robots: Number of robots in each world, all driven by it.
+            robots: Number of robots in each world, all driven by it. A start is that of all of them.
 
         Raises:
             ParameterError: If an argument is wrong, or `solved` returns something else than a yes or no for each start.
@@ -128,7 +128,7 @@ class Exam:
         check_kind("champion", champion, Champion, "kiks.Champion.load() returns one.")
         poses = None
         if self.starts == "random":
-            poses = spread_starts(self.arenas, self.count, seed=EXAM_SEED, robot=champion.robot)
+            poses = spread_starts(self.arenas, self.count, seed=EXAM_SEED, robot=champion.robot, robots=robots)
         elif robots == 1 and all(arena.starts for arena in self.arenas):
             places = [cycle(arena.starts) for arena in self.arenas]
             poses = np.array([next(places[k % len(places)]) for k in range(self.count)])[:, None]
@@ -154,20 +154,25 @@ class Exam:
         return ExamResult(solved, values, rollouts.measures, self.goal)
 
 
-def spread_starts(arenas: Sequence[Arena], count: int, *, seed: int, robot: str, clear_mm: float = CLEAR_MM) -> Floats:
-    """Return random start poses of lone robots in worlds that take arenas in turn, float64 [count, 1, 3].
+def spread_starts(
+    arenas: Sequence[Arena], count: int, *, seed: int, robot: str, robots: int = 1, clear_mm: float = CLEAR_MM
+) -> Floats:
+    """Return random start poses in worlds that take arenas in turn, float64 [count, robot, 3].
 
     Args:
         arenas: The arenas.
         count: Number of worlds, a multiple of the number of arenas.
         seed: Seed of the random generator.
         robot: Kind of the robots.
+        robots: Number of robots in each world.
         clear_mm: Least distance of a robot's edge from anything else [mm].
 
     Raises:
         ParameterError: If an arena has too few free places.
     """
     radius_mm = RobotSpec.load(robot).body.radius_mm
-    each = count // len(arenas)
-    poses = [random_starts(arena, each, seed=seed, radius_mm=radius_mm, clear_mm=clear_mm) for arena in arenas]
-    return np.stack(poses, axis=1).reshape(count, 1, 3)
+    poses = [
+        random_starts(arena, count // len(arenas), seed=seed, robots=robots, radius_mm=radius_mm, clear_mm=clear_mm)
+        for arena in arenas
+    ]
+    return np.stack(poses, axis=1).reshape(count, robots, 3)

@@ -139,8 +139,6 @@ class Task:
             raise ParameterError(
                 f"worlds must be a multiple of the number of arenas, {len(self.arenas)}, but it was {self.worlds}."
             )
-        if self.starts == "random" and self.robots > 1:
-            raise ParameterError("starts must be 'arena' with several robots, but it was 'random'.")
         names = self.measure_names
         if len(set(names)) != len(names):
             raise ParameterError(f"measures must have different names, but they were {shown(names)}.")
@@ -268,9 +266,9 @@ class Task:
         return np.column_stack([fitness, values.mean(axis=1)])
 
     def _starts(self, seeds: Integers) -> Floats:
-        """Return random start poses, float64 [world, 1, 3]: the same for the same seed."""
+        """Return random start poses, float64 [world, robot, 3]: the same for the same seed."""
         poses = {
-            seed: spread_starts(self.arenas, self.worlds, seed=seed, robot=self.robot)
+            seed: spread_starts(self.arenas, self.worlds, seed=seed, robot=self.robot, robots=self.robots)
             for seed in dict.fromkeys(seeds.tolist())
         }
         return np.concatenate([poses[seed] for seed in seeds.tolist()])
