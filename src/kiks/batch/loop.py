@@ -97,10 +97,15 @@ def read_sense(scene: Any, worlds: Any, code: Any, first: Any, readers: Any, cou
         if code == AMBIENT:
             sense_ambient(scene, world, robot, readers.ticks[k], time_ns, True, counts[k])
         readings = worlds.sensors[world, robot, first : first + _SIZES[code]]
-        pixels = scene.robots[world, robot].camera_pixels
-        for number in range(readings.shape[0]):
-            readings[number] = pixels[_PIXEL_STEP * number] if code == CAMERA else counts[k, number]
-        heard_ns = time_ns + answer_length(code, readings) * worlds.line.character_ns
+        if code == CAMERA:
+            for number in range(readings.shape[0]):
+                readings[number] = scene.robots[world, robot].camera_pixels[_PIXEL_STEP * number]
+            length = answer_length(CAMERA, readings)
+        else:
+            for sensor in range(SENSOR_COUNT):
+                readings[sensor] = counts[k, sensor]
+            length = answer_length(PROXIMITY, counts[k])  # as long for each letter
+        heard_ns = time_ns + length * worlds.line.character_ns
         worlds.sensed_ns[world] = max(worlds.sensed_ns[world], heard_ns)
 
 
@@ -133,7 +138,8 @@ def take_pictures(scene: Any, worlds: Any, bunch: Any, times_ns: Any) -> Any:
 @kernel
 def pass_to(scene: Any, worlds: Any, bunch: Any, times_ns: Any) -> Any:
     """Let time pass in each world of a bunch: do the ticks that have begun, and take the pictures that are due."""
-    take_pictures(scene, worlds, bunch, times_ns)
+    if worlds.has_camera.any():
+        take_pictures(scene, worlds, bunch, times_ns)
     tick_to(scene, bunch, times_ns)
 
 
