@@ -78,3 +78,19 @@ def test_the_tasks_are_listed() -> None:
 def test_wrong_words_are_named(words: tuple[str, ...], said: str) -> None:
     with pytest.raises(KiksError, match=said):
         kiks(*words)
+
+
+@pytest.mark.slow
+def test_champions_are_shown_in_their_world(folder: Path, tmp_path: Path) -> None:
+    from kiks import Champion
+
+    champion, picture = folder / "champion.toml", tmp_path / "shown.png"
+    said = kiks("demo", champion, "--seconds", 1, "--picture", picture).output
+    assert f"Seed {2**40}, state" in said
+    assert "names no world" not in said
+    text = champion.read_text()
+    champion.write_text(text.replace('world = "champion_world.kiks"\n', ""))
+    assert Champion.load(champion).world is None
+    for command in (("demo", champion, "--picture", picture), ("run", champion)):
+        assert "names no world, so it drives in the default box" in kiks(*command, "--seconds", 1).output
+        assert "names no world" not in kiks(*command, "--seconds", 1, "--arena", "examples/arenas/maze.toml").output

@@ -13,7 +13,7 @@ import typer
 
 from kiks.cli.desk import NoWait, WithDesk, open_desk
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import Seed, load_arena, shipped_folder
+from kiks.cli.options import SeedOrOwn, load_arena, say_without_world, shipped_folder
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, nearest, shown
 
@@ -47,7 +47,7 @@ def demo(
     arena: Annotated[
         str | None, typer.Option(help="Arena file (.toml) or picture; each demonstration's own if left out.")
     ] = None,
-    seed: Seed = 0,
+    seed: SeedOrOwn = None,
     baud: Annotated[
         int | None,
         typer.Option(help="Speed of the simulated serial line [bit/s]; each demonstration's own if left out."),
@@ -64,7 +64,7 @@ def demo(
 
     avoid: wander and touch nothing. follow: follow walls. clean: push cylinders to the walls. maze: find the way out.
     camera: watch a moving ball. race: drive round a track. swarm: twenty robots spread out.
-    soccer: a match of two programs. A champion's file of `kiks evolve`: the champion drives.
+    soccer: a match of two programs. A champion's file of `kiks evolve`: the champion drives in its world.
 
     Example: kiks demo follow --arena examples/arenas/office.toml --seconds 300
     """
@@ -88,19 +88,21 @@ def demo(
     if is_soccer:
         sys.path.append(str(shipped_folder("examples/soccer", "player.py")))
         importlib.import_module("soccer_command").show_match(
-            seconds, seed, picture, left, right, on_desk=desk, waits=not no_wait
+            seconds, seed or 0, picture, left, right, on_desk=desk, waits=not no_wait
         )
         return
     given = None if arena is None else load_arena(arena)
     if behaviour in list(Behaviour):
         from kiks.demos.scenes import SCENES
 
-        scene = SCENES[behaviour](given, seed=seed, baud=baud)
+        scene = SCENES[behaviour](given, seed=seed or 0, baud=baud)
     else:
         from kiks.demos.champion import ChampionScene
         from kiks.learn.champion import Champion
 
-        scene = ChampionScene(Champion.load(behaviour), given, seed=seed, baud=baud)
+        champion = Champion.load(behaviour)
+        say_without_world(champion, given)
+        scene = ChampionScene(champion, given, seed=seed, baud=baud)
     work = partial(_run, scene, name, scene.seconds if seconds is None else seconds, picture)
     if desk:
         from kiks.desk.server.desk import Desk

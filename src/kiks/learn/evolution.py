@@ -93,6 +93,7 @@ class Evolution:
         self._asked: Floats | None = None
         self._best: Champion | None = None
         self._earlier_s, self._start_s, self._logged_s = 0.0, perf_counter(), -np.inf
+        self._world = task.world()
         self._folder = None if folder is None else Folder(folder)
         if self._folder is not None:
             self._resume(self._folder)
@@ -250,6 +251,7 @@ class Evolution:
             seed=self.seed,
             robot=task.robot,
             timing=task.timing,
+            world=self._world,
         )
 
     # ---- seeds and folders ----

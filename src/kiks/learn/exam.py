@@ -7,7 +7,7 @@ a line, and takes a fraction of a second.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import cycle
 from typing import Annotated
 
@@ -22,9 +22,12 @@ from kiks.errors import ParameterError, shown
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats
 from kiks.model.arena import Arena
+from kiks.model.arena_file import THINGS_MAX
 from kiks.model.checks import check_kind
 from kiks.model.data_file import Number, Text, Whole, record
+from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec
+from kiks.sim.from_project import rounded_pose
 
 Solved = Callable[[Mapping[str, Floats]], NDArray[np.bool_]]
 
@@ -126,19 +129,13 @@ class Exam:
             ArenaError: If something has no free place in an arena.
         """
         check_kind("champion", champion, Champion, "kiks.Champion.load() returns one.")
-        poses = None
-        if self.starts == "random":
-            poses = spread_starts(self.arenas, self.count, seed=EXAM_SEED, robot=champion.robot)
-        elif robots == 1 and all(arena.starts for arena in self.arenas):
-            places = [cycle(arena.starts) for arena in self.arenas]
-            poses = np.array([next(places[k % len(places)]) for k in range(self.count)])[:, None]
         batch = Batch(
             self.arenas,
             self.count,
             robot=champion.robot,
             robots=robots,
             seed=EXAM_SEED,
-            starts=poses,
+            starts=self._poses(champion.robot, robots),
             senses=champion.controller.senses,
             timing=champion.timing,
         )
@@ -153,8 +150,48 @@ class Exam:
             )
         return ExamResult(solved, values, rollouts.measures, self.goal)
 
+    def world(self, robot: str | RobotSpec, robots: int = 1) -> Project:
+        """Return the world of the first start, in the first arena; the other starts there come after it.
 
-def spread_starts(arenas: Sequence[Arena], count: int, *, seed: int, robot: str, clear_mm: float = CLEAR_MM) -> Floats:
+        Args:
+            robot: Kind of the robots.
+            robots: Number of robots.
+
+        Raises:
+            ParameterError: If the arena has too few free places, or more in it than a project may have.
+        """
+        poses = self._poses(robot, robots) if self.starts == "random" else None
+        return world_of(self.arenas[0], None if poses is None else poses[:: len(self.arenas), 0], robots, EXAM_SEED)
+
+    def _poses(self, robot: str | RobotSpec, robots: int) -> Floats | None:
+        """Return the start poses, float64 [start, 1, 3]; None for those that arenas give several robots."""
+        if self.starts == "random":
+            return spread_starts(self.arenas, self.count, seed=EXAM_SEED, robot=robot)
+        if robots > 1 or not all(arena.starts for arena in self.arenas):
+            return None
+        places = [cycle(arena.starts) for arena in self.arenas]
+        return np.array([next(places[k % len(places)]) for k in range(self.count)])[:, None]
+
+
+def world_of(arena: Arena, poses: Floats | None, robots: int, seed: int) -> Project:
+    """Return a world that fits in a champion's file, which holds headings in degrees.
+
+    Args:
+        arena: The arena.
+        poses: Start poses [start, 3], which are rounded like those of projects from the desk; the arena's own if None.
+        robots: Number of robots.
+        seed: Seed of all random numbers.
+
+    Raises:
+        ParameterError: If the arena has more in it than a project may have.
+    """
+    starts = tuple(rounded_pose(*pose) for pose in (arena.starts if poses is None else poses[:THINGS_MAX].tolist()))
+    return Project(replace(arena, starts=starts), robots=(ProjectRobot(),) * robots, seed=seed)
+
+
+def spread_starts(
+    arenas: Sequence[Arena], count: int, *, seed: int, robot: str | RobotSpec, clear_mm: float = CLEAR_MM
+) -> Floats:
     """Return random start poses of lone robots in worlds that take arenas in turn, float64 [count, 1, 3].
 
     Args:
@@ -167,7 +204,7 @@ def spread_starts(arenas: Sequence[Arena], count: int, *, seed: int, robot: str,
     Raises:
         ParameterError: If an arena has too few free places.
     """
-    radius_mm = RobotSpec.load(robot).body.radius_mm
+    radius_mm = (robot if isinstance(robot, RobotSpec) else RobotSpec.load(robot)).body.radius_mm
     each = count // len(arenas)
     poses = [random_starts(arena, each, seed=seed, radius_mm=radius_mm, clear_mm=clear_mm) for arena in arenas]
     return np.stack(poses, axis=1).reshape(count, 1, 3)

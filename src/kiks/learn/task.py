@@ -19,9 +19,10 @@ from kiks.control.controller import Controller
 from kiks.control.measure import Measure
 from kiks.errors import ParameterError, shown
 from kiks.learn.evaluation import Floats, Integers, check_candidates
-from kiks.learn.exam import Exam, spread_starts
+from kiks.learn.exam import Exam, spread_starts, world_of
 from kiks.model.checks import check_number
 from kiks.model.data_file import Number, Text, Whole, read_file, record
+from kiks.model.project import Project
 from kiks.model.robot import RobotSpec
 
 Fitness = Callable[[Mapping[str, Floats]], Floats]
@@ -185,6 +186,17 @@ class Task:
     def driven_s(self) -> float:
         """Total time for which the robots of a candidate drive [s]."""
         return self.worlds * self.robots * self.seconds
+
+    def world(self) -> Project:
+        """Return the world in which its champions are shown: that of their exam, or of training if there is none.
+
+        Raises:
+            ParameterError: If the arena has too few free places, or more in it than a project may have.
+        """
+        if self.exam is not None:
+            return self.exam.world(self.robot, self.robots)
+        poses = self._starts(np.zeros(1, np.int64)) if self.starts == "random" else None
+        return world_of(self.arenas[0], None if poses is None else poses[:: len(self.arenas), 0], self.robots, 0)
 
     def digest(self) -> str:
         """Return 16 hexadecimal digits that differ between tasks whose evolutions differ."""
