@@ -117,8 +117,13 @@ def _finish(evolution: Evolution, folder: Path, *, stopped: bool) -> None:
     if stopped:
         typer.echo(f"Stopped after generation {len(evolution.generations)}; the same command continues.")
     typer.echo(f"Folder: {folder}   See it drive: kiks demo {folder / 'champion.toml'}")
-    if not stopped and evolution.task.exam is not None:
-        typer.echo(evolution.task.exam.examine(champion, robots=evolution.task.robots))
+    exam, robots = evolution.task.exam, evolution.task.robots
+    if not stopped and exam is not None:
+        from kiks.learn.exam import imperfect_robots
+
+        typer.echo(exam.examine(champion, robots=robots))
+        solved = exam.examine(champion, robots=robots, kinds=imperfect_robots(champion)).solved
+        typer.echo(f"With ten imperfect robots: {int(solved.sum())} of {len(solved)} starts")
 
 
 def _controller(kind: ControllerKind, task: Task) -> Controller:
@@ -128,7 +133,7 @@ def _controller(kind: ControllerKind, task: Task) -> Controller:
 
     recipe: dict[str, Any] = {"kind": str(kind), "senses": list(task.controller.senses), "speed_limit": SPEED_LIMIT}
     if kind is ControllerKind.CTRNN:
-        recipe["period_s"] = task.timing.period_s
+        recipe["period_s"] = task.timings[0].period_s
     return from_recipe(recipe)
 
 

@@ -21,7 +21,7 @@ from kiks.model.atomic_files import inside, path_of, replace_files
 from kiks.model.checks import check_count
 from kiks.model.data_file import Number, Rule, Text, Whole, as_list, check, parse_toml, read_file, record
 from kiks.model.project import Project
-from kiks.model.robot import RobotSpec, robot_names, robot_toml
+from kiks.model.robot import RobotSpec, robot_names, robot_toml, specs_of
 from kiks.sim.from_project import simulation_of
 from kiks.sim.simulation import Simulation
 from kiks.version import __version__
@@ -187,7 +187,7 @@ class Champion:
         if self.robot in robot_names():
             named["robot"] = str(self.robot)
         else:
-            spec = self.robot if isinstance(self.robot, RobotSpec) else RobotSpec.load(self.robot)
+            (spec,) = specs_of(self.robot, 1, None)
             named["robot"] = beside("robot.toml", robot_toml(spec))
         if self.world is not None:
             robots = tuple(replace(each, kind=named["robot"]) for each in self.world.robots)

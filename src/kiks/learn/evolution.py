@@ -249,8 +249,8 @@ class Evolution:
             generation=generation,
             algorithm=self.name,
             seed=self.seed,
-            robot=task.robot,
-            timing=task.timing,
+            robot=task.kinds[0],
+            timing=task.timings[0],
             world=self._world,
         )
 

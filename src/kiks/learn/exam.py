@@ -25,8 +25,9 @@ from kiks.model.arena import Arena
 from kiks.model.arena_file import THINGS_MAX
 from kiks.model.checks import check_kind
 from kiks.model.data_file import Number, Text, Whole, record
+from kiks.model.family import family
 from kiks.model.project import Project, ProjectRobot
-from kiks.model.robot import RobotSpec
+from kiks.model.robot import RobotSpec, specs_of
 from kiks.sim.from_project import rounded_pose
 
 Solved = Callable[[Mapping[str, Floats]], NDArray[np.bool_]]
@@ -36,6 +37,9 @@ PASS_SHARE = 0.9
 
 EXAM_SEED = 2**40
 """Seed of the first start of each exam; evolutions draw theirs from others."""
+
+IMPERFECT = 10
+"""Number of imperfect robots with which an exam is taken again."""
 
 CLEAR_MM = 8.0
 """Smallest gap between a start and anything else [mm]."""
@@ -117,25 +121,29 @@ class Exam:
                 f"count must be a multiple of the number of arenas, {len(self.arenas)}, but it was {self.count}."
             )
 
-    def examine(self, champion: Champion, *, robots: int = 1) -> ExamResult:
+    def examine(self, champion: Champion, *, robots: int = 1, kinds: Sequence[RobotSpec] | None = None) -> ExamResult:
         """Let a champion drive from all starts, with the timing of its own control loop.
 
         Args:
             champion: The champion.
             robots: Number of robots in each world, all driven by it.
+            kinds: Kinds of robots, such as those of `imperfect_robots`. All starts are taken with each, so the result
+                has as many times more starts. Left out, the champion's own.
 
         Raises:
             ParameterError: If an argument is wrong, or `solved` returns something else than a yes or no for each start.
             ArenaError: If something has no free place in an arena.
         """
         check_kind("champion", champion, Champion, "kiks.Champion.load() returns one.")
+        named = specs_of(champion.robot if kinds is None else kinds, None, None)
+        count, poses = self.count * len(named), self._poses(champion.robot, robots)
         batch = Batch(
             self.arenas,
-            self.count,
-            robot=champion.robot,
+            count,
+            robot=[(each,) * robots for each in named for _ in range(self.count)],
             robots=robots,
-            seed=EXAM_SEED,
-            starts=self._poses(champion.robot, robots),
+            seed=np.tile(EXAM_SEED + np.arange(self.count), len(named)),
+            starts=None if poses is None else np.tile(poses, (len(named), 1, 1)),
             senses=champion.controller.senses,
             timing=champion.timing,
         )
@@ -143,9 +151,9 @@ class Exam:
         values = rollouts.values.mean(axis=1)
         result = self.solved({name: values[:, number] for number, name in enumerate(rollouts.measures)})
         solved = np.asarray(result)
-        if solved.dtype != np.bool_ or solved.shape != (self.count,):
+        if solved.dtype != np.bool_ or solved.shape != (count,):
             raise ParameterError(
-                f"solved must return a bool for each of {self.count} starts, but returned {shown(result)}. "
+                f"solved must return a bool for each of {count} starts, but returned {shown(result)}. "
                 "The measures have the shape [start]."
             )
         return ExamResult(solved, values, rollouts.measures, self.goal)
@@ -171,6 +179,12 @@ class Exam:
             return None
         places = [cycle(arena.starts) for arena in self.arenas]
         return np.array([next(places[k % len(places)]) for k in range(self.count)])[:, None]
+
+
+def imperfect_robots(champion: Champion) -> list[RobotSpec]:
+    """Return the family of the champion's robot, for exams: `IMPERFECT` robots, the same for the same kind."""
+    (spec,) = specs_of(champion.robot, 1, None)
+    return family(spec, IMPERFECT, seed=EXAM_SEED)
 
 
 def world_of(arena: Arena, poses: Floats | None, robots: int, seed: int) -> Project:
@@ -204,7 +218,8 @@ def spread_starts(
     Raises:
         ParameterError: If an arena has too few free places.
     """
-    radius_mm = (robot if isinstance(robot, RobotSpec) else RobotSpec.load(robot)).body.radius_mm
+    (spec,) = specs_of(robot, 1, None)
+    radius_mm = spec.body.radius_mm
     each = count // len(arenas)
     poses = [random_starts(arena, each, seed=seed, radius_mm=radius_mm, clear_mm=clear_mm) for arena in arenas]
     return np.stack(poses, axis=1).reshape(count, 1, 3)
