@@ -204,6 +204,87 @@ def test_wrong_arguments_are_errors(given: dict[str, Any], message: str) -> None
         kiks.Evolution(small(), **given)
 
 
+class Own:
+    """Proposes normal candidates around the best so far, and keeps everything that it is told."""
+
+    def __init__(self, count: int = 8, **given: Any) -> None:
+        self.rng, self.count, self.given = np.random.default_rng(1), count, given
+        self.mean, self.told = np.zeros(18), list[Any]()
+
+    def ask(self) -> Any:
+        self.candidates = self.mean + self.rng.standard_normal((self.count, 18))
+        return self.given.get("asked", self.candidates)
+
+    def tell(self, fitness: Any, behaviours: Any) -> None:
+        self.told.append((fitness.tolist(), behaviours.shape))
+        self.mean = self.candidates[fitness.argmax()].copy()
+        fitness[:] = 0
+        self.candidates[:] = 0
+
+
+class OwnWithFavourite(Own):
+    def favourite(self) -> Any:
+        return self.given.get("best", np.full(18, 0.5))
+
+
+def test_an_object_with_ask_and_tell_is_an_algorithm(tmp_path: Path) -> None:
+    own = Own()
+    evolution = kiks.Evolution(small(), own, folder=tmp_path)
+    evolution.run(generations=3, executor="threads:1")
+    assert evolution.algorithm is own
+    assert (evolution.population, evolution.champion.algorithm) == (8, "Own")
+    for (fitness, shape), generation in zip(own.told, evolution.generations, strict=True):
+        assert (fitness, shape) == (generation.fitness.tolist(), (8, 2))
+        assert generation.candidates[:8].all()
+    best = evolution.generations[0].candidates[evolution.generations[0].fitness.argmax()]
+    assert (evolution.generations[1].candidates[8:] == best).all()
+    assert candidates_of(kiks.Evolution(small(), Own(), folder=tmp_path)) == candidates_of(evolution)
+    with pytest.raises(ParameterError, match="algorithm is 'Own', not 'OwnWithFavourite'"):
+        kiks.Evolution(small(), OwnWithFavourite(), folder=tmp_path)
+    different = Own()
+    different.rng = np.random.default_rng(2)
+    with pytest.raises(ParameterError, match="would have other candidates here"):
+        kiks.Evolution(small(), different, folder=tmp_path)
+
+
+def test_the_favourite_of_an_own_algorithm_is_tried() -> None:
+    evolution = kiks.Evolution(small(), OwnWithFavourite(), population=8)
+    evolution.tell(np.zeros(len(evolution.ask())))
+    assert (evolution.ask()[8:] == 0.5).all()
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Own(asked=np.zeros((8, 17))), r"candidates of ask\(\) must be numbers of the shape \[any, 18\]"),
+        (lambda: Own(asked=np.zeros(18)), r"candidates of ask\(\) must be numbers of the shape"),
+        (lambda: Own(asked=np.full((8, 18), np.nan)), r"candidates of ask\(\) must be finite"),
+        (lambda: Own(asked=None), r"candidates of ask\(\) must be finite"),
+        (lambda: Own(count=0), r"candidates of ask\(\) must be at least one"),
+        (lambda: Own, "algorithm must be"),
+        (lambda: 3, "algorithm must be"),
+    ],
+)
+def test_wrong_algorithms_are_errors(make: Any, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        kiks.Evolution(small(), make())
+
+
+def test_wrong_later_answers_of_an_algorithm_are_errors() -> None:
+    with pytest.raises(ParameterError, match=r"of the shape \[4, 18\], but their shape was \(8, 18\)"):
+        kiks.Evolution(small(), Own(), population=4)
+    own = Own()
+    evolution = kiks.Evolution(small(), own)
+    evolution.tell(np.zeros(8))
+    own.count = 9
+    with pytest.raises(ParameterError, match=r"of the shape \[8, 18\], but their shape was \(9, 18\)"):
+        evolution.ask()
+    for best in (np.zeros(17), np.full(18, np.nan), None):
+        evolution = kiks.Evolution(small(), OwnWithFavourite(best=best))
+        with pytest.raises(ParameterError, match=r"parameters of favourite\(\) must be"):
+            evolution.tell(np.zeros(8))
+
+
 def test_calls_in_the_wrong_order_are_errors() -> None:
     evolution = kiks.Evolution(small(), "ga", population=8)
     with pytest.raises(ParameterError, match="before there is a champion"):

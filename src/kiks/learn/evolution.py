@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kiks.errors import ParameterError, shown
-from kiks.learn.algorithms import make_algorithm
+from kiks.learn.algorithms import Algorithm, make_algorithm
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Executor
 from kiks.learn.evolution_log import Folder, Generation, Identity
@@ -47,9 +47,12 @@ class Evolution:
 
     Args:
         task: The task.
-        algorithm: 'cma' (CMA-ES), 'ga' (a genetic algorithm) or 'map-elites' (many different behaviours).
+        algorithm: 'cma' (CMA-ES), 'ga' (a genetic algorithm) or 'map-elites' (many different behaviours); or an object
+            with `ask()`, which returns candidates, float64 [candidate, parameter], each time as many, and
+            `tell(fitness, behaviours)`, float64 [candidate] and [candidate, axis]. It may have `favourite()`, which
+            returns the parameters that it considers best; else these are the best of the last generation.
         seed: Seed of all random numbers: the same seed gives the same evolution, with any number of workers.
-        population: Number of candidates in a generation.
+        population: Number of candidates in a generation; as many as `ask` returns, if the algorithm is an object.
         folder: Folder of its generations, its champion and its log. If it holds generations of the same evolution, the
             evolution continues after them, as if it had never stopped. Left out, nothing is written.
 
@@ -74,23 +77,34 @@ class Evolution:
     def __init__(
         self,
         task: Task,
-        algorithm: str = "cma",
+        algorithm: object = "cma",
         *,
         seed: int = 0,
         population: int | None = None,
         folder: str | Path | None = None,
     ) -> None:
         self.task = check_kind("task", task, Task, "kiks.tasks.load() returns one.")
-        self.name = check_kind("algorithm", algorithm, str)
-        self.population = check_count("population", POPULATION if population is None else population, 4)
         self.seed = check_count("seed", seed, most=2**63 - 1)
         self.generations: list[Generation] = []
-        self.algorithm = make_algorithm(
-            algorithm, task.parameter_count, self.population, self._seed_for(_ALGORITHM_SEED), task.axes, task.spread
-        )
+        self._asked: Floats | None = None
+        self.algorithm: Algorithm
+        if is_algorithm(algorithm):
+            self.name, self.algorithm = type(algorithm).__name__, algorithm
+            self._asked = self._candidates(None if population is None else check_count("population", population, 1))
+            self.population = len(self._asked)
+        else:
+            self.name = check_kind("algorithm", algorithm, str, "Or give an object with ask and tell.")
+            self.population = check_count("population", POPULATION if population is None else population, 4)
+            self.algorithm = make_algorithm(
+                self.name,
+                task.parameter_count,
+                self.population,
+                self._seed_for(_ALGORITHM_SEED),
+                task.axes,
+                task.spread,
+            )
         self._trial_seeds = [self._seed_for(_TRIAL_SEED, number) for number in range(TRIALS)]
         self._rival: Floats | None = None
-        self._asked: Floats | None = None
         self._best: Champion | None = None
         self._earlier_s, self._start_s, self._logged_s = 0.0, perf_counter(), -np.inf
         self._world = task.world()
@@ -104,13 +118,30 @@ class Evolution:
         """Return the candidates of the next generation, float64 [candidate, parameter]; the same until `tell`.
 
         After the population come the trials of the last generation's rival, if there is one.
+
+        Raises:
+            ParameterError: If the algorithm returns anything else than so many candidates.
         """
         if self._asked is None:
-            asked = self.algorithm.ask()
+            asked = self._candidates(self.population)
             if self._rival is not None:
                 asked = np.concatenate([asked, np.tile(self._rival, (TRIALS, 1))])
             self._asked = asked
         return self._asked.copy()
+
+    def _candidates(self, count: int | None) -> Floats:
+        """Return candidates of the algorithm, a copy.
+
+        Args:
+            count: Number of candidates; any from 1 if None.
+
+        Raises:
+            ParameterError: If it returns something else.
+        """
+        candidates = check_numbers("candidates of ask()", self.algorithm.ask(), (count, self.task.parameter_count))
+        if not len(candidates):
+            raise ParameterError("candidates of ask() must be at least one, but there were none.")
+        return candidates
 
     @property
     def seeds(self) -> Integers:
@@ -155,9 +186,12 @@ class Evolution:
         if given.shape[1] == value_count:
             columns = [self.task.value_names.index(axis.measure) for axis in self.task.axes]
             behaviours = given[: self.population, columns]
-        self.algorithm.tell(fitness, behaviours)
+        self.algorithm.tell(fitness.copy(), behaviours)
+        favourite: Any = getattr(self.algorithm, "favourite", None)
+        best = self._asked[int(fitness.argmax())] if favourite is None else favourite()
+        self._rival = check_numbers("parameters of favourite()", best, (self.task.parameter_count,))
         self.generations.append(generation)
-        self._rival, self._asked = self.algorithm.favourite(), None
+        self._asked = None
 
     # ---- run ----
 
@@ -281,3 +315,8 @@ class Evolution:
                 )
             self._tell(saved["values"], float(saved["seconds"]))
         self._earlier_s = self.generations[-1].seconds if self.generations else 0.0
+
+
+def is_algorithm(algorithm: object) -> TypeGuard[Algorithm]:
+    """Return whether an object is an algorithm of a user's own."""
+    return all(callable(getattr(algorithm, name, None)) for name in ("ask", "tell")) and not isinstance(algorithm, type)
