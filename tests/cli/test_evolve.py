@@ -95,3 +95,30 @@ def test_champions_are_shown_in_their_world(folder: Path, tmp_path: Path) -> Non
     for command in (("demo", champion, "--picture", picture), ("run", champion)):
         assert "names no world, so it drives in the default box" in kiks(*command, "--seconds", 1).output
         assert "names no world" not in kiks(*command, "--seconds", 1, "--arena", "examples/arenas/maze.toml").output
+
+
+@pytest.mark.slow
+def test_a_folder_is_its_champion_or_one_of_a_generation(folder: Path, tmp_path: Path) -> None:
+    picture, task = tmp_path / "shown.png", folder.parent / "quick.py"
+    said = [
+        kiks("demo", shown, "--seconds", 2, "--picture", picture).output.partition("Picture")[2]
+        for shown in (folder, folder / "champion.toml")
+    ]
+    assert said[0] == said[1]
+    words = ("demo", folder, "--generation", 2, "--picture", picture)
+    once = kiks(*words, "--rank", 3, "--world", 1, "--task", task).output
+    assert re.search(r"Candidate \d of generation 2: rank 3, fitness \d", once)
+    assert "1.0 s" in once
+    for more, message in (
+        ((), "quick.py' is a Python file. Give it: --task FILE"),
+        (("--task", task, "--rank", 9), "rank must be a whole number from 1 to 8"),
+        (("--task", task, "--seed", 1), "--seed must be left out with --generation"),
+    ):
+        with pytest.raises(KiksError, match=message):
+            kiks(*words, *more)
+    with pytest.raises(KiksError, match="--rank must come with --generation"):
+        kiks("demo", folder, "--rank", 2)
+    with pytest.raises(KiksError, match="--generation must come with the folder of an evolution"):
+        kiks("demo", "avoid", "--generation", 2)
+    with pytest.raises(KiksError, match=r"champion.toml' must exist"):
+        kiks("demo", tmp_path)

@@ -100,14 +100,19 @@ def test_a_killed_evolution_loses_at_most_the_current_generation(tmp_path: Path)
     assert again.champion.parameters == whole.champion.parameters
 
 
-def test_the_log_has_a_row_for_each_candidate(tmp_path: Path) -> None:
+def test_the_log_has_a_row_for_each_evaluation(tmp_path: Path) -> None:
     evolution = run("cma", tmp_path)
     log = parquet.read_table(tmp_path / "log.parquet").to_pydict()
-    assert log["generation"] == [number for number in range(1, 5) for _ in range(8)]
-    assert log["candidate"] == list(range(8)) * 4
-    assert log["fitness"] == [value for each in evolution.generations for value in each.fitness.tolist()]
-    assert {"avoidance", "contacts", "path_mm", "seconds", "evaluations", "champion_fitness"} <= set(log)
-    assert log["evaluations"][-1] == sum(len(each.values) for each in evolution.generations)
+    counts = [8, 16, 16, 16]
+    assert log["generation"] == [number for number, count in enumerate(counts, start=1) for _ in range(count)]
+    assert log["candidate"] == [number for count in counts for number in range(count)]
+    assert log["is_trial"] == [number >= 8 for number in log["candidate"]]
+    assert log["fitness"] == [value for each in evolution.generations for value in each.values[:, 0].tolist()]
+    assert {"avoidance", "contacts", "path_mm", "seconds", "champion_fitness"} <= set(log)
+    assert log["evaluations"] == [sum(counts[:number]) for number in log["generation"]]
+    candidates = np.concatenate([each.candidates for each in evolution.generations])
+    again = small().evaluate(candidates, np.array(log["seed"]), 1)
+    assert again[:, 0].tolist() == log["fitness"]
 
 
 def test_a_folder_of_another_evolution_is_an_error(tmp_path: Path) -> None:

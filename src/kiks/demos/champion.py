@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import ClassVar
 
 from kiks.demos.scene import Scene
 from kiks.learn.champion import Champion
 from kiks.model.arena import Arena
 from kiks.sim.simulation import Simulation
+from kiks.units import ns_from_s
 
 
 class ChampionScene(Scene):
@@ -39,6 +41,16 @@ class ChampionScene(Scene):
     def prepare(self) -> None:
         """Put the champion at the wheel."""
         self.driver = self.champion.driver(self.ports)
+
+    def slices(self, seconds: float | None = None) -> Iterator[None]:
+        """Run, and stop for a moment after each slice of time; no loop begins after the end, as in a batch."""
+        self._end_ns = ns_from_s(self.seconds if seconds is None else seconds)
+        yield from super().slices(seconds)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the next loop would begin after the end."""
+        return self.driver.begin_ns >= self._end_ns
 
     def step(self) -> None:
         """Let it do a loop."""

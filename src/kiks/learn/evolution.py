@@ -38,7 +38,7 @@ TRIALS = 8
 LOG_EVERY_S = 10.0
 """Time between two writes of the log [s]; each writes the whole log."""
 
-_ALGORITHM_SEED, _WORLDS_SEED, _TRIAL_SEED = range(3)
+_ALGORITHM_SEED, WORLDS_SEED, TRIAL_SEED = range(3)
 """Purposes of seeds."""
 
 
@@ -103,7 +103,7 @@ class Evolution:
                 task.axes,
                 task.spread,
             )
-        self._trial_seeds = [self._seed_for(_TRIAL_SEED, number) for number in range(TRIALS)]
+        self._trial_seeds = [self._seed_for(TRIAL_SEED, number) for number in range(TRIALS)]
         self._rival: Floats | None = None
         self._best: Champion | None = None
         self._earlier_s, self._start_s, self._logged_s = 0.0, perf_counter(), -np.inf
@@ -149,7 +149,7 @@ class Evolution:
 
         All candidates of a population drive in the same worlds, so their fitness can be compared.
         """
-        seeds = [self._seed_for(_WORLDS_SEED, len(self.generations))] * self.population
+        seeds = [self._seed_for(WORLDS_SEED, len(self.generations))] * self.population
         return np.array(seeds + ([] if self._rival is None else self._trial_seeds), np.int64)
 
     def tell(self, values: ArrayLike) -> None:
@@ -181,7 +181,7 @@ class Evolution:
         if self._rival is not None and (self._best is None or trials[:, 0].mean() > self._best.fitness):
             self._best = self._champion(self._rival, trials.mean(axis=0), len(self.generations))
         best_fitness = np.nan if self._best is None else self._best.fitness
-        generation = Generation(self._asked, given, self.population, best_fitness, seconds)
+        generation = Generation(self._asked, given, self.seeds, self.population, best_fitness, seconds)
         behaviours = np.zeros((self.population, 0))
         if given.shape[1] == value_count:
             columns = [self.task.value_names.index(axis.measure) for axis in self.task.axes]
@@ -292,8 +292,7 @@ class Evolution:
 
     def _seed_for(self, purpose: int, number: int = 0) -> int:
         """Return a seed derived from that of the evolution."""
-        sequence = np.random.SeedSequence(self.seed, spawn_key=(purpose, number))
-        return int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(2))
+        return derived_seed(self.seed, purpose, number)
 
     def _resume(self, folder: Folder) -> None:
         """Take the generations of the folder.
@@ -302,8 +301,9 @@ class Evolution:
             ParameterError: If it holds another evolution.
         """
         task = self.task
+        controller, digest = task.controller.name, task.digest()
         folder.check_identity(
-            Identity(task.name, self.name, self.seed, self.population, task.controller.name, task.digest(), __version__)
+            Identity(task.name, self.name, self.seed, self.population, controller, digest, __version__, task.file)
         )
         value_count = len(task.value_names)
         while (saved := folder.generation(len(self.generations), self.ask().shape, value_count)) is not None:
@@ -315,6 +315,12 @@ class Evolution:
                 )
             self._tell(saved["values"], float(saved["seconds"]))
         self._earlier_s = self.generations[-1].seconds if self.generations else 0.0
+
+
+def derived_seed(seed: int, purpose: int, number: int = 0) -> int:
+    """Return a seed of an evolution with a seed: of `WORLDS_SEED`, the worlds of a generation, counted from 0."""
+    sequence = np.random.SeedSequence(seed, spawn_key=(purpose, number))
+    return int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(2))
 
 
 def is_algorithm(algorithm: object) -> TypeGuard[Algorithm]:

@@ -18,11 +18,13 @@ from kiks.batch.loop_timing import Timing
 from kiks.control.controller import Controller
 from kiks.control.measure import Measure
 from kiks.errors import ParameterError, shown
+from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats, Integers, check_candidates
 from kiks.learn.exam import Exam, spread_starts, world_of
-from kiks.model.checks import check_number
+from kiks.model.arena import Pose
+from kiks.model.checks import check_count, check_number
 from kiks.model.data_file import Number, Rule, Text, Whole, read_file, record
-from kiks.model.project import Project
+from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, specs_of
 
 Fitness = Callable[[Mapping[str, Floats]], Floats]
@@ -218,6 +220,33 @@ class Task:
             return self.exam.world(self.kinds[0], self.robots)
         poses = self._starts(np.zeros(1, np.int64)) if self.starts == "random" else None
         return world_of(self.arenas[0], None if poses is None else poses[:: len(self.arenas), 0], self.robots, 0)
+
+    def individual(self, parameters: Floats, seed: int, world: int = 0) -> Champion:
+        """Return a candidate as a champion, whose world is one of those in which it is evaluated.
+
+        On a line, the world then takes the course that it takes in the evaluation, to the bit.
+
+        Args:
+            parameters: Its parameters, float64 [parameter].
+            seed: Its seed.
+            world: Number of the world, from 0.
+
+        Raises:
+            ParameterError: If an argument is out of range.
+        """
+        world, seeds = check_count("world", world, 0, self.worlds - 1), np.array([seed])
+        kinds, timings = self._turns(seeds)
+        arena = self.arenas[world % len(self.arenas)]
+        if self.starts == "random":
+            arena = replace(arena, starts=(Pose(*self._starts(seeds)[world, 0].tolist()),))
+        return Champion(
+            controller=self.controller,
+            parameters=tuple(parameters.tolist()),
+            task=self.name,
+            robot=self._specs()[kinds[world]],
+            timing=self.timings[timings[world]],
+            world=Project(arena, robots=(ProjectRobot(),) * self.robots, seed=seed + world),
+        )
 
     def digest(self) -> str:
         """Return 16 hexadecimal digits that differ between tasks whose evolutions differ."""
