@@ -162,9 +162,10 @@ def test_the_error_names_a_broken_generation_file(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("algorithm", ["ga", "map-elites"])
 def test_save_plot_writes_a_png_file(algorithm: str, tmp_path: Path) -> None:
+    from kiks.learn.baselines import Baselines
     from kiks.learn.evolution_plot import save_plot
 
-    save_plot(run(algorithm), tmp_path / "fitness.png")
+    save_plot(run(algorithm), tmp_path / "fitness.png", Baselines(0.0, 0.1))
     assert (tmp_path / "fitness.png").read_bytes().startswith(b"\x89PNG")
 
 

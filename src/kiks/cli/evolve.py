@@ -108,10 +108,12 @@ def _run(evolution: Evolution, generations: int | None, seconds: float | None, w
 
 def _finish(evolution: Evolution, folder: Path, *, stopped: bool) -> None:
     """Save the picture, and print the result."""
+    from kiks.learn.baselines import baselines_of
     from kiks.learn.evolution_plot import save_plot
 
     champion = evolution.champion
-    save_plot(evolution, folder / "fitness.png")
+    baselines = None if stopped else baselines_of(evolution.task, evolution.seed)
+    save_plot(evolution, folder / "fitness.png", baselines)
     figures = ", ".join(f"{name} {value:.4g}" for name, value in champion.measures.items())
     typer.echo(f"Champion of generation {champion.generation}: fitness {champion.fitness:.4f}   {figures}")
     if stopped:

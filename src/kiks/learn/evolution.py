@@ -38,7 +38,7 @@ TRIALS = 8
 LOG_EVERY_S = 10.0
 """Time between two writes of the log [s]; each writes the whole log."""
 
-_ALGORITHM_SEED, WORLDS_SEED, TRIAL_SEED = range(3)
+_ALGORITHM_SEED, WORLDS_SEED, TRIAL_SEED, BASELINE_SEED = range(4)
 """Purposes of seeds."""
 
 
