@@ -122,3 +122,28 @@ def test_a_folder_is_its_champion_or_one_of_a_generation(folder: Path, tmp_path:
         kiks("demo", "avoid", "--generation", 2)
     with pytest.raises(KiksError, match=r"champion.toml' must exist"):
         kiks("demo", tmp_path)
+
+
+@pytest.mark.slow
+def test_seeds_evolve_one_after_another_and_are_compared(folder: Path, tmp_path: Path) -> None:
+    task, out = folder.parent / "quick.py", tmp_path / "two"
+    words = ("evolve", task, "--population", 8, "--generations", 3, "--seed", 1, "--out", out)
+    said = kiks(*words, "--seeds", 2).output
+    assert {path.name for path in out.iterdir()} == {"seed-1", "seed-2", "seeds.png", "summary.json"}
+    assert (out / "seed-1/champion.toml").read_bytes() == (folder / "champion.toml").read_bytes()
+    assert re.search(r"\n 1 +-?\d\.\d{4} +\d +\d+ of 20 +\d+ of 200 +40 ", said)
+    assert re.search(r"\n all +-?\d\.\d{4} +\d of 2 +40 ", said)
+    again = kiks(*words, "--seeds", 3).output
+    assert "Continuing after generation 3" in again
+    assert (out / "seed-3/result.json").exists()
+    compared = kiks("compare", out, folder, "--picture", tmp_path / "compared.png").output
+    assert re.search(r"Fitness: U = [\d.]+, p = [\d.]+, A = \d\.\d\d \(\w+\)", compared)
+    assert re.search(r"Exam: U = ", compared)
+    assert (tmp_path / "compared.png").exists()
+
+
+def test_folders_that_cannot_be_compared_are_errors(tmp_path: Path) -> None:
+    with pytest.raises(KiksError, match="SECOND must be another folder than FIRST"):
+        kiks("compare", tmp_path, tmp_path)
+    with pytest.raises(KiksError, match="must be a folder of `kiks evolve`, but it holds no evolution"):
+        kiks("compare", tmp_path, tmp_path / "other")

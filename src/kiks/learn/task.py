@@ -248,24 +248,25 @@ class Task:
             world=Project(arena, robots=(ProjectRobot(),) * self.robots, seed=seed + world),
         )
 
-    def digest(self) -> str:
-        """Return 16 hexadecimal digits that differ between tasks whose evolutions differ."""
+    def digest(self, *, with_controller: bool = True) -> str:
+        """Return 16 hexadecimal digits that differ between tasks whose evolutions differ.
+
+        Args:
+            with_controller: Whether controller, spread and the task's file count, too. Without them, tasks have the
+                same digits if champions drive in the same worlds and are measured in the same way.
+        """
         digest = hashlib.sha256()
         for each in self.arenas:
             digest.update(each.brightness.tobytes())
             digest.update(repr((each.mm_per_cell, each.starts, each.lamps, each.balls, each.cylinders)).encode())
-        evaluated = (
-            self.controller.recipe,
-            self.controller.name,
-            self.parameter_count,
-            self.measure_names,
-            self.seconds,
-        )
+        controller = (self.controller.recipe, self.controller.name, self.parameter_count) if with_controller else ()
+        evaluated = (*controller, self.measure_names, self.seconds)
         specs, timings = self._specs(), self.timings
         timing, spec = (each[0] if len(each) == 1 else each for each in (timings, specs))
-        worlds = (self.worlds, self.axes, self.robots, timing, self.starts, self.spread)
+        spread = (self.spread,) if with_controller else ()
+        worlds = (self.worlds, self.axes, self.robots, timing, self.starts, *spread)
         digest.update(repr((self.name, evaluated, worlds, spec)).encode())
-        if self.file:
+        if self.file and with_controller:
             digest.update(read_file(Path(self.file), "the task's file"))
         return digest.hexdigest()[:16]
 
