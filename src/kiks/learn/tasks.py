@@ -130,7 +130,7 @@ def _task_of(given: TaskFile, path: Path, controller: Controller | None) -> Task
         timing["think_s"] = given.think_ms / 1000
     if given.baud is not None:
         timing["baud"] = given.baud or None
-    changes["timing"] = replace(base.timing, **timing)
+    changes["timing"] = replace(base.timings[0], **timing)
     if controller is None and given.controller is not None:
         controller = controller_of(given.controller, folder)
     if controller is not None:
