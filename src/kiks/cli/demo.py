@@ -19,6 +19,7 @@ from kiks.errors import ParameterError, nearest, shown
 
 if TYPE_CHECKING:
     from kiks.demos.scene import Scene
+    from kiks.learn.champion import Champion
 
 REPORT_S = 2.0
 """Simulated time between two updates of the display [s]: more updates would cost more than the simulation."""
@@ -39,7 +40,10 @@ class Behaviour(enum.StrEnum):
 
 def demo(
     behaviour: Annotated[
-        str, typer.Argument(help=f"The demo: {', '.join(Behaviour)}, or a champion's file.", metavar="[BEHAVIOUR]")
+        str,
+        typer.Argument(
+            help=f"The demo: {', '.join(Behaviour)}, or a champion's file or folder.", metavar="[BEHAVIOUR]"
+        ),
     ] = Behaviour.AVOID,
     seconds: Annotated[
         float | None, typer.Option(help="Simulated time [s]; each demonstration's own if left out.", min=1, max=86400)
@@ -57,6 +61,12 @@ def demo(
         str | None, typer.Option(help="soccer: the Python program of the left side; with its arguments, in quotes.")
     ] = None,
     right: Annotated[str | None, typer.Option(help="soccer: the program of the right side.")] = None,
+    at: Annotated[
+        str | None,
+        typer.Option(
+            help="Of a folder's archive, drive the elite of this place: a number for each axis.", metavar="X,Y"
+        ),
+    ] = None,
     desk: WithDesk = False,
     no_wait: NoWait = False,
 ) -> None:
@@ -64,13 +74,14 @@ def demo(
 
     avoid: wander and touch nothing. follow: follow walls. clean: push cylinders to the walls. maze: find the way out.
     camera: watch a moving ball. race: drive round a track. swarm: twenty robots spread out.
-    soccer: a match of two programs. A champion's file of `kiks evolve`: the champion drives.
+    soccer: a match of two programs. A folder of `kiks evolve` or a champion's file in it: the champion drives.
 
     Example: kiks demo follow --arena examples/arenas/office.toml --seconds 300
     """
-    if behaviour not in list(Behaviour) and not Path(behaviour).is_file():
+    if behaviour not in list(Behaviour) and not Path(behaviour).exists():
         raise ParameterError(
-            f"BEHAVIOUR must be one of {', '.join(Behaviour)}, or a champion's file, but it was {shown(behaviour)}."
+            f"BEHAVIOUR must be one of {', '.join(Behaviour)}, or a champion's file or folder, but it was "
+            f"{shown(behaviour)}."
             f"{nearest(behaviour, [each.value for each in Behaviour])}"
         )
     is_soccer = behaviour == Behaviour.SOCCER
@@ -79,6 +90,8 @@ def demo(
             raise ParameterError(
                 f"{name} must be left out with {behaviour}, but it was {shown(value)}. Other demos take it."
             )
+    if at is not None and (behaviour in list(Behaviour) or not Path(behaviour).is_dir()):
+        raise ParameterError(f"--at must be given with a folder of kiks evolve, but it was given with {behaviour}.")
     from kiks.drawing import check_picture
 
     name = behaviour if behaviour in list(Behaviour) else Path(behaviour).stem
@@ -98,9 +111,8 @@ def demo(
         scene = SCENES[behaviour](given, seed=seed, baud=baud)
     else:
         from kiks.demos.champion import ChampionScene
-        from kiks.learn.champion import Champion
 
-        scene = ChampionScene(Champion.load(behaviour), given, seed=seed, baud=baud)
+        scene = ChampionScene(_champion(Path(behaviour), at), given, seed=seed, baud=baud)
     work = partial(_run, scene, name, scene.seconds if seconds is None else seconds, picture)
     if desk:
         from kiks.desk.server.desk import Desk
@@ -108,6 +120,28 @@ def demo(
         open_desk(Desk(scene.sim), work=work, waits=not no_wait)
     else:
         work()
+
+
+def _champion(path: Path, at: str | None) -> Champion:
+    """Return the champion of a file or of a folder; with `at`, the elite there of the folder's archive.
+
+    Raises:
+        ParameterError: If there is none, or `at` is no place.
+    """
+    from kiks.learn.archive import CHAMPION, Archive
+    from kiks.learn.champion import Champion
+
+    if at is None:
+        return Champion.load(path / CHAMPION if path.is_dir() else path)
+    try:
+        place = [float(word) for word in at.split(",")]
+    except ValueError:
+        raise ParameterError(f"--at must be numbers such as 300,450, but it was {shown(at)}.") from None
+    archive = Archive.load(path)
+    elite = archive.elite_at(*place)
+    where = ", ".join(f"{axis.measure} {elite.values[axis.measure]:.4g}" for axis in archive.axes)
+    typer.echo(f"The elite nearest to {at}: {where}, fitness {elite.fitness:.4g}, of generation {elite.generation}.")
+    return archive.champion_of(elite)
 
 
 def _run(scene: Scene, behaviour: str, total_s: float, picture: Path) -> None:

@@ -11,19 +11,12 @@ import typer
 from kiks.cli.engine_start import ready_batch
 from kiks.cli.options import Seed, written_folder
 from kiks.ending import end_as_with_ctrl_c
+from kiks.learn.algorithm_name import AlgorithmName
 
 if TYPE_CHECKING:
     from kiks.control.controller import Controller
     from kiks.learn.evolution import Evolution
     from kiks.learn.task import Task
-
-
-class AlgorithmName(enum.StrEnum):
-    """The algorithms."""
-
-    CMA = "cma"
-    GA = "ga"
-    MAP_ELITES = "map-elites"
 
 
 class ControllerKind(enum.StrEnum):
@@ -40,15 +33,17 @@ def evolve(
     out: Annotated[
         Path | None,
         typer.Option(
-            help="Folder of champion, log and picture; kiks-evolve-TASK if left out.", callback=written_folder
+            help="Folder of champion, archive, log and picture; kiks-evolve-TASK if left out.", callback=written_folder
         ),
     ] = None,
     generations: Annotated[
         int | None, typer.Option(help="Generations; as many as the task wants if --seconds is not given either.", min=1)
     ] = None,
     seconds: Annotated[float | None, typer.Option(help="Begin no generation later than this [s].", min=0)] = None,
-    population: Annotated[int | None, typer.Option(help="Candidates in a generation.", min=4)] = None,
-    algorithm: Annotated[AlgorithmName | None, typer.Option(help="cma if left out; map-elites for maze-qd.")] = None,
+    population: Annotated[
+        int | None, typer.Option(help="Candidates in a generation; the task's own if left out.", min=4)
+    ] = None,
+    algorithm: Annotated[AlgorithmName | None, typer.Option(help="The task's own if left out.")] = None,
     controller: Annotated[
         ControllerKind | None, typer.Option(help="The controller to evolve; the task's own if left out.")
     ] = None,
@@ -59,7 +54,7 @@ def evolve(
     ] = None,
     list_: Annotated[bool, typer.Option("--list", help="List the tasks that come with KiKS.")] = False,
 ) -> None:
-    """Evolve a controller for a task, and write champion.toml, log.parquet and fitness.png.
+    """Evolve a controller for a task, and write champion.toml, archive.parquet, log.parquet and fitness.png.
 
     After Ctrl-C or a kill, the same command continues the evolution.
 
@@ -75,11 +70,10 @@ def evolve(
     chosen = tasks.load(task)
     if controller is not None:
         chosen = tasks.load(task, _controller(controller, chosen))
-    name = algorithm or (AlgorithmName.MAP_ELITES if task == "maze-qd" else AlgorithmName.CMA)
     folder = out or Path(f"kiks-evolve-{chosen.name}")
     from kiks.learn.evolution import Evolution
 
-    evolution = Evolution(chosen, str(name), seed=seed, population=population, folder=folder)
+    evolution = Evolution(chosen, algorithm, seed=seed, population=population, folder=folder)
     if evolution.generations:
         typer.echo(f"Continuing after generation {len(evolution.generations)} in {folder}.")
     until = chosen.generations if generations is None and seconds is None else generations
@@ -114,6 +108,10 @@ def _finish(evolution: Evolution, folder: Path, *, stopped: bool) -> None:
     save_plot(evolution, folder / "fitness.png")
     figures = ", ".join(f"{name} {value:.4g}" for name, value in champion.measures.items())
     typer.echo(f"Champion of generation {champion.generation}: fitness {champion.fitness:.4f}   {figures}")
+    if (archive := evolution.archive) is not None:
+        filled = f"{len(archive.elites)} of {archive.cell_count} cells ({100 * archive.coverage:.1f} %)"
+        names = ", ".join(axis.measure for axis in archive.axes)
+        typer.echo(f"Archive by {names}: {filled}, QD score {archive.qd_score:.4g}   One of them: kiks demo --at")
     if stopped:
         typer.echo(f"Stopped after generation {len(evolution.generations)}; the same command continues.")
     typer.echo(f"Folder: {folder}   See it drive: kiks demo {folder / 'champion.toml'}")

@@ -18,10 +18,11 @@ from kiks.batch.loop_timing import Timing
 from kiks.control.controller import Controller
 from kiks.control.measure import Measure
 from kiks.errors import ParameterError, shown
+from kiks.learn.algorithm_name import AlgorithmName
 from kiks.learn.evaluation import Floats, Integers, check_candidates
 from kiks.learn.exam import Exam, spread_starts
 from kiks.model.checks import check_number
-from kiks.model.data_file import Number, Text, Whole, read_file, record
+from kiks.model.data_file import Number, OneOf, Text, Whole, read_file, record
 from kiks.model.robot import RobotSpec
 
 Fitness = Callable[[Mapping[str, Floats]], Floats]
@@ -29,8 +30,8 @@ Fitness = Callable[[Mapping[str, Floats]], Floats]
 BATCH_WORLDS_MAX = 20_000
 """Largest number of worlds in a batch: more need more memory and run no faster."""
 
-GENERATIONS = 60
-"""Default number of generations."""
+GENERATIONS, POPULATION = 60, 40
+"""Default numbers of generations, and of candidates in a generation."""
 
 SPREAD = 3.0
 """Standard deviation of each parameter at the beginning: three times the usual scale of controllers, so that some of
@@ -80,6 +81,8 @@ class Task:
         measures: The measures, each with a different name.
         fitness: Maps the measures, by name float64 [candidate, world], to the fitness, float64 [candidate]; more is
             better. Left out, it is `cautious_mean` of the first measure.
+        quality: Like fitness, for archives: the best candidate of a cell stays. Left out, it is fitness. The champion
+            is always chosen by fitness.
         seconds: Time for which a candidate drives in each world [s].
         worlds: Number of worlds; a multiple of the number of arenas.
         axes: Axes along which behaviours differ, for algorithms that look for many of them.
@@ -88,7 +91,9 @@ class Task:
         timing: Timing of the control loop; that of a program on a line of 9600 baud if left out.
         starts: 'random' for free places anywhere, or 'arena' for the starts of the arena.
         spread: Standard deviation of each parameter in the first generation.
+        algorithm: The algorithm of an evolution, unless the user says otherwise.
         generations: How many generations an evolution has, unless the user says otherwise.
+        population: How many candidates a generation has, unless the user says otherwise.
         exam: The exam of its champions.
         about: A description in one line.
         file: The user's file that defines it.
@@ -112,6 +117,7 @@ class Task:
     controller: Annotated[Controller, Field(description="Write @kiks.controller(parameters=COUNT) over the function.")]
     measures: Annotated[tuple[Measure, ...], Field(min_length=1, max_length=MEASURES_MAX)]
     fitness: Fitness | None = None
+    quality: Fitness | None = None
     seconds: Seconds = 30.0
     worlds: Annotated[Whole, Field(ge=1, le=WORLDS_MAX)] = 1
     axes: tuple[Axis, ...] = ()
@@ -120,7 +126,9 @@ class Task:
     timing: Timing = field(default_factory=Timing)
     starts: Starts = "random"
     spread: Annotated[Number, Field(gt=0, le=1000)] = SPREAD
+    algorithm: Annotated[str, OneOf(tuple(AlgorithmName))] = AlgorithmName.CMA
     generations: Annotated[Whole, Field(ge=1)] = GENERATIONS
+    population: Annotated[Whole, Field(ge=4)] = POPULATION
     exam: Annotated[Exam | None, Field(description="kiks.Exam(arenas, measures, solved) makes one.")] = None
     about: Text = ""
     file: str = ""
@@ -173,8 +181,8 @@ class Task:
 
     @property
     def value_names(self) -> tuple[str, ...]:
-        """Names of the values of a candidate: fitness, then the measures."""
-        return ("fitness", *self.measure_names)
+        """Names of the values of a candidate: fitness, quality if the task has one of its own, then the measures."""
+        return ("fitness", *(() if self.quality is None else ("quality",)), *self.measure_names)
 
     @property
     def parameter_count(self) -> int:
@@ -196,7 +204,7 @@ class Task:
             self.controller.recipe,
             self.controller.name,
             self.parameter_count,
-            self.measure_names,
+            self.value_names[1:],
             self.seconds,
         )
         worlds = (self.worlds, self.axes, self.robots, self.timing, self.starts, self.spread)
@@ -221,10 +229,10 @@ class Task:
             seconds: Time for which they drive [s], if not that of the task.
 
         Returns:
-            Fitness, then the mean of each measure, float64 [candidate, 1 + measure].
+            Fitness, quality if the task has one of its own, then the mean of each measure, float64 [candidate, value].
 
         Raises:
-            ParameterError: If candidates, seeds or fitness have the wrong shape, or a measure or the fitness is not
+            ParameterError: If candidates, seeds, fitness or quality have the wrong shape, or one of the values is not
                 finite.
         """
         candidates, seeds = check_candidates(candidates, seeds)
@@ -258,14 +266,17 @@ class Task:
             if not np.isfinite(values[:, :, number]).all():
                 raise ParameterError(f"measures must be finite, but {shown(name)} was not. Check its divisions.")
         named = {name: values[:, :, number] for number, name in enumerate(self.measure_names)}
-        result = cautious_mean(values[:, :, 0]) if self.fitness is None else self.fitness(named)
-        fitness = np.asarray(result, np.float64)
-        if fitness.shape != (count,) or not np.isfinite(fitness).all():
-            raise ParameterError(
-                f"fitness must return a finite number for each of {count} candidates, but returned {shown(result)}. "
-                "The measures have the shape [candidate, world]: take a mean over axis 1."
-            )
-        return np.column_stack([fitness, values.mean(axis=1)])
+        scores = {"fitness": cautious_mean(values[:, :, 0]) if self.fitness is None else self.fitness(named)}
+        if self.quality is not None:
+            scores["quality"] = self.quality(named)
+        for name, result in scores.items():
+            score = np.asarray(result, np.float64)
+            if score.shape != (count,) or not np.isfinite(score).all():
+                raise ParameterError(
+                    f"{name} must return a finite number for each of {count} candidates, but returned {shown(result)}. "
+                    "The measures have the shape [candidate, world]: take a mean over axis 1."
+                )
+        return np.column_stack([*scores.values(), values.mean(axis=1)])
 
     def _starts(self, seeds: Integers) -> Floats:
         """Return random start poses, float64 [world, 1, 3]: the same for the same seed."""
