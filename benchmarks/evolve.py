@@ -1,10 +1,15 @@
 """How long tasks take to evolve from random, and whether their champions solve them.
 
-Run: python benchmarks/evolve.py [--json] [--seeds 5] [--task NAME ...]. For each seed the task is evolved by CMA-ES for
-the task's own number of generations, and its champion takes the exam (`kiks.Exam`): twenty starts in arenas where it
-was not trained, with the timing of a line of 9600 baud.
+Run: python benchmarks/evolve.py [--json] [--seeds 5] [--task NAME ...] [--kheperax FOLDER]. For each seed the task is
+evolved with its own algorithm, population and number of generations, and its champion takes the exam (`kiks.Exam`):
+twenty starts, with the timing of a line of 9600 baud, in arenas where it was not trained, but for the maze.
 
-* `evolve.NAME_solved`: the share of champions that pass; `evolve.NAME_s`: the median time of an evolution.
+* `evolve.NAME_solved`: the share of champions that pass; `evolve.NAME_s`: the median time of an evolution, and
+  `evolve.NAME_cpu_s` that of the processor.
+* `evolve.maze_coverage`, `evolve.maze_qd_score`: of the archive of `maze`, medians; `evolve.maze_kheperax_coverage`:
+  that of MAP-Elites in Kheperax itself, in the same maze with as many cells, candidates and evaluations
+  (benchmarks/kheperax_elites.py). Its environment is made in the folder if it is not there; without --kheperax it is
+  left out.
 * `evolve.avoid_maze_solved`, `evolve.avoid_office_solved`: the same exam in two arenas of `examples`.
 * `evolve.swarm_generations_per_min`: the pace at which a swarm evolves: `SWARM` robots that gather as many balls, in
   each of a hundred candidates' worlds; `evolve.generations_per_min`: that of the robots that avoid obstacles.
@@ -13,13 +18,16 @@ was not trained, with the timing of a line of 9600 baud.
 from __future__ import annotations
 
 import argparse
+import json
 import statistics
+import subprocess
 import time
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
 import kiks
+from batch import kheperax_python
 from calibration import report
 from kiks.batch.initial_state import random_starts
 from kiks.model.arena import Ball
@@ -38,6 +46,15 @@ def exams_of(task: kiks.Task) -> dict[str, kiks.Exam]:
         for name in ("maze", "office"):
             exams[f"avoid_{name}"] = replace(task.exam, arenas=(kiks.Arena.load(ARENAS / f"{name}.toml"),))
     return exams
+
+
+def kheperax_coverage(folder: Path, task: kiks.Task, seed: int) -> float:
+    """Return the coverage of MAP-Elites in Kheperax, with the cells and the number of evaluations of a task."""
+    script = Path(__file__).with_name("kheperax_elites.py")
+    numbers = (seed, task.population, task.population * task.generations, task.axes[0].cells)
+    command = [str(kheperax_python(folder)), str(script), *map(str, numbers)]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    return float(json.loads(done.stdout.splitlines()[-1])["coverage"])
 
 
 def swarm_task() -> kiks.Task:
@@ -63,17 +80,26 @@ def main() -> None:
     arguments.add_argument("--json", action="store_true", help="one JSON object a line")
     arguments.add_argument("--seeds", type=int, default=5, help="how many evolutions of each task")
     arguments.add_argument("--task", nargs="+", choices=TASKS, default=TASKS, help="the tasks")
+    arguments.add_argument("--kheperax", type=Path, metavar="FOLDER", help="environment of Kheperax, for maze")
     arguments.add_argument("--where", default="threads", help="where candidates are evaluated")
     options = arguments.parse_args()
 
     rows: list[tuple[str, float, str]] = []
     for name in options.task:
-        task, wholes_s, passed = kiks.tasks.load(name), [], Counter[str]()
+        task, wholes_s, cpus_s, passed = kiks.tasks.load(name), [], [], Counter[str]()
+        coverages: dict[str, list[float]] = {"coverage": [], "qd_score": [], "kheperax_coverage": []}
         exams = exams_of(task)
         for seed in range(1, options.seeds + 1):
-            start_s = time.perf_counter()
-            champion = kiks.Evolution(task, seed=seed).run(generations=task.generations, executor=options.where)
+            start_s, start_cpu_s = time.perf_counter(), time.process_time()
+            evolution = kiks.Evolution(task, seed=seed)
+            champion = evolution.run(generations=task.generations, executor=options.where)
             wholes_s.append(time.perf_counter() - start_s)
+            cpus_s.append(time.process_time() - start_cpu_s)
+            if name == "maze" and evolution.archive is not None:
+                coverages["coverage"].append(evolution.archive.coverage)
+                coverages["qd_score"].append(evolution.archive.qd_score)
+                if options.kheperax is not None:
+                    coverages["kheperax_coverage"].append(kheperax_coverage(options.kheperax, task, seed))
             for exam_name, exam in exams.items():
                 result = exam.examine(champion)
                 passed[exam_name] += result.is_passed
@@ -82,6 +108,11 @@ def main() -> None:
                 )
         rows += [(f"evolve.{each}_solved", passed[each] / options.seeds, "of the champions") for each in exams]
         rows.append((f"evolve.{name}_s", statistics.median(wholes_s), f"s for {task.generations} generations"))
+        rows.append((f"evolve.{name}_cpu_s", statistics.median(cpus_s), "s of the processor"))
+        cells = f"of {task.generations * task.population} evaluations"
+        rows += [
+            (f"evolve.{name}_{each}", statistics.median(found), cells) for each, found in coverages.items() if found
+        ]
         if name == "avoid":
             pace = 60 * task.generations / statistics.median(wholes_s)
             rows.append(("evolve.generations_per_min", pace, "of one robot that avoids"))

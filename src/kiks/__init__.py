@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from kiks.control.measure import Measure, measure
     from kiks.errors import ArenaError, KiksError, LinkError, ParameterError
     from kiks.learn import tasks
+    from kiks.learn.archive import Archive
     from kiks.learn.champion import Champion
     from kiks.learn.evolution import Evolution
     from kiks.learn.exam import Exam
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     from kiks.sim.simulation import Simulation
 
 __all__ = [
+    "Archive",
     "Arena",
     "ArenaError",
     "Axis",
@@ -73,6 +75,7 @@ __all__ = [
 ]
 
 _HOMES = {
+    "Archive": "kiks.learn.archive",
     "Arena": "kiks.model.arena",
     "ArenaError": "kiks.errors",
     "Axis": "kiks.learn.task",

@@ -110,12 +110,14 @@ def test_place_measures() -> None:
         kiks.measures.light_stay_s(radius_mm),
         kiks.measures.gathered(*PLACE_MM, radius_mm=radius_mm),
         kiks.measures.spread_mm,
+        kiks.measures.closest_mm(*PLACE_MM),
     )
     for world in range(WORLDS):
         squares = {(int(x // 50), int(y // 50)) for x, y in trace.places_mm[world]}
         assert trace.values[0, world] == len(squares) / 80
         far_mm = trace.far_mm(*PLACE_MM)[world]
         assert trace.values[1, world] == pytest.approx(far_mm[-1])
+        assert trace.values[9, world] == pytest.approx(far_mm.min())
         arrived = np.flatnonzero(far_mm <= radius_mm)
         assert trace.values[2, world] == trace.times_s[world, arrived[0] if len(arrived) else -1]
     lamp_mm = trace.far_mm(100, 350)

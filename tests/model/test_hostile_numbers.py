@@ -210,6 +210,7 @@ def of_batch(batch: kiks.Batch, h: Any) -> dict[str, Callable[[], Any]]:
         "coverage square": lambda: measures.coverage(ARENA, square_mm=h),
         "goal": lambda: measures.goal_mm(h, h),
         "reached": lambda: measures.reached_s(0, 0, radius_mm=h),
+        "closest": lambda: measures.closest_mm(h, 0),
         "near light": lambda: measures.near_light_share(h),
         "gathered": lambda: measures.gathered(0, h),
         "measure": lambda: kiks.measure(h),

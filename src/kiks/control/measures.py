@@ -261,6 +261,26 @@ def _goal_mm(x_mm: float, y_mm: float) -> Measure:
     return goal_mm
 
 
+def closest_mm(x_mm: float, y_mm: float) -> Measure:
+    """How near it has come to a place, at best [mm].
+
+    Raises:
+        ParameterError: If an argument is out of range.
+    """
+    return _closest_mm(_place("x_mm", x_mm), _place("y_mm", y_mm))
+
+
+@functools.lru_cache(maxsize=256)
+def _closest_mm(x_mm: float, y_mm: float) -> Measure:
+    @measure(notes=2)
+    def closest_mm(moment: Any, notes: Any) -> None:
+        away_mm = distance_mm(moment, x_mm, y_mm)
+        notes[0] = away_mm if notes[1] == 0.0 else min(notes[0], away_mm)
+        notes[1] = 1.0
+
+    return closest_mm
+
+
 def reached_s(x_mm: float, y_mm: float, *, radius_mm: float = 50.0) -> Measure:
     """When it first came within a radius of a place [s]; if it never did, how long it has tried.
 

@@ -18,12 +18,13 @@ from kiks.batch.loop_timing import Timing
 from kiks.control.controller import Controller
 from kiks.control.measure import Measure
 from kiks.errors import ParameterError, shown
+from kiks.learn.algorithm_name import AlgorithmName
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats, Integers, check_candidates
 from kiks.learn.exam import Exam, spread_starts, world_of
 from kiks.model.arena import Pose
 from kiks.model.checks import check_count, check_number
-from kiks.model.data_file import Number, Rule, Text, Whole, read_file, record
+from kiks.model.data_file import Number, OneOf, Rule, Text, Whole, read_file, record
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, specs_of
 
@@ -32,8 +33,8 @@ Fitness = Callable[[Mapping[str, Floats]], Floats]
 BATCH_WORLDS_MAX = 20_000
 """Largest number of worlds in a batch: more need more memory and run no faster."""
 
-GENERATIONS = 60
-"""Default number of generations."""
+GENERATIONS, POPULATION = 60, 40
+"""Default numbers of generations, and of candidates in a generation."""
 
 SPREAD = 3.0
 """Standard deviation of each parameter at the beginning: three times the usual scale of controllers, so that some of
@@ -92,6 +93,8 @@ class Task:
         measures: The measures, each with a different name.
         fitness: Maps the measures, by name float64 [candidate, world], to the fitness, float64 [candidate]; more is
             better. Left out, it is `cautious_mean` of the first measure.
+        quality: Like fitness, for archives: the best candidate of a cell stays. Left out, it is fitness. The champion
+            is always chosen by fitness.
         seconds: Time for which a candidate drives in each world [s].
         worlds: Number of worlds; a multiple of the number of arenas.
         axes: Axes along which behaviours differ, for algorithms that look for many of them.
@@ -102,7 +105,9 @@ class Task:
             the worlds take in turn like the robots.
         starts: 'random' for free places anywhere, or 'arena' for the starts of the arena.
         spread: Standard deviation of each parameter in the first generation.
+        algorithm: The algorithm of an evolution, unless the user says otherwise.
         generations: How many generations an evolution has, unless the user says otherwise.
+        population: How many candidates a generation has, unless the user says otherwise.
         exam: The exam of its champions.
         about: A description in one line.
         file: The user's file that defines it.
@@ -126,6 +131,7 @@ class Task:
     controller: Annotated[Controller, Field(description="Write @kiks.controller(parameters=COUNT) over the function.")]
     measures: Annotated[tuple[Measure, ...], Field(min_length=1, max_length=MEASURES_MAX)]
     fitness: Fitness | None = None
+    quality: Fitness | None = None
     seconds: Seconds = 30.0
     worlds: Annotated[Whole, Field(ge=1, le=WORLDS_MAX)] = 1
     axes: tuple[Axis, ...] = ()
@@ -134,7 +140,9 @@ class Task:
     timing: Timings = field(default_factory=Timing)
     starts: Starts = "random"
     spread: Annotated[Number, Field(gt=0, le=1000)] = SPREAD
+    algorithm: Annotated[str, OneOf(tuple(AlgorithmName))] = AlgorithmName.CMA
     generations: Annotated[Whole, Field(ge=1)] = GENERATIONS
+    population: Annotated[Whole, Field(ge=4)] = POPULATION
     exam: Annotated[Exam | None, Field(description="kiks.Exam(arenas, measures, solved) makes one.")] = None
     about: Text = ""
     file: str = ""
@@ -185,8 +193,8 @@ class Task:
 
     @property
     def value_names(self) -> tuple[str, ...]:
-        """Names of the values of a candidate: fitness, then the measures."""
-        return ("fitness", *self.measure_names)
+        """Names of the values of a candidate: fitness, quality if the task has one of its own, then the measures."""
+        return ("fitness", *(() if self.quality is None else ("quality",)), *self.measure_names)
 
     @property
     def kinds(self) -> tuple[Kind, ...]:
@@ -217,7 +225,9 @@ class Task:
         if self.exam is not None:
             return self.exam.world(self.kinds[0], self.robots)
         poses = self._starts(np.zeros(1, np.int64)) if self.starts == "random" else None
-        return world_of(self.arenas[0], None if poses is None else poses[:: len(self.arenas), 0], self.robots, 0)
+        return world_of(
+            self.arenas[0], None if poses is None else poses[:: len(self.arenas)].reshape(-1, 3), self.robots, 0
+        )
 
     def individual(self, parameters: Floats, seed: int, world: int = 0) -> Champion:
         """Return a candidate as a champion, whose world is one of those in which it is evaluated.
@@ -236,7 +246,7 @@ class Task:
         kinds, timings = self._turns(seeds)
         arena = self.arenas[world % len(self.arenas)]
         if self.starts == "random":
-            arena = replace(arena, starts=(Pose(*self._starts(seeds)[world, 0].tolist()),))
+            arena = replace(arena, starts=tuple(Pose(*each) for each in self._starts(seeds)[world].tolist()))
         return Champion(
             controller=self.controller,
             parameters=tuple(parameters.tolist()),
@@ -258,7 +268,7 @@ class Task:
             digest.update(each.brightness.tobytes())
             digest.update(repr((each.mm_per_cell, each.starts, each.lamps, each.balls, each.cylinders)).encode())
         controller = (self.controller.recipe, self.controller.name, self.parameter_count) if with_controller else ()
-        evaluated = (*controller, self.measure_names, self.seconds)
+        evaluated = (*controller, self.value_names[1:], self.seconds)
         specs, timings = self._specs(), self.timings
         timing, spec = (each[0] if len(each) == 1 else each for each in (timings, specs))
         spread = (self.spread,) if with_controller else ()
@@ -284,10 +294,10 @@ class Task:
             seconds: Time for which they drive [s], if not that of the task.
 
         Returns:
-            Fitness, then the mean of each measure, float64 [candidate, 1 + measure].
+            Fitness, quality if the task has one of its own, then the mean of each measure, float64 [candidate, value].
 
         Raises:
-            ParameterError: If candidates, seeds or fitness have the wrong shape, or a measure or the fitness is not
+            ParameterError: If candidates, seeds, fitness or quality have the wrong shape, or one of the values is not
                 finite.
         """
         candidates, seeds = check_candidates(candidates, seeds)
@@ -307,7 +317,7 @@ class Task:
         starts = self._starts(seeds) if self.starts == "random" else None
         specs, (kinds, timings) = self._specs(), self._turns(seeds)
         given = np.repeat(candidates, self.worlds, axis=0)
-        scores = np.zeros((count * self.worlds, len(self.measures)))
+        means = np.zeros((count * self.worlds, len(self.measures)))
         for number in np.unique(timings).tolist():
             here = np.flatnonzero(timings == number)
             each = [(specs[kind],) * self.robots for kind in kinds[here].tolist()]
@@ -323,20 +333,23 @@ class Task:
                 threads=threads,
             )
             driven = batch.run(self.controller, given[here], seconds=seconds, measures=self.measures)
-            scores[here] = driven.values.mean(axis=1)
-        values = scores.reshape(count, self.worlds, len(self.measures))
+            means[here] = driven.values.mean(axis=1)
+        values = means.reshape(count, self.worlds, len(self.measures))
         for number, name in enumerate(self.measure_names):
             if not np.isfinite(values[:, :, number]).all():
                 raise ParameterError(f"measures must be finite, but {shown(name)} was not. Check its divisions.")
         named = {name: values[:, :, number] for number, name in enumerate(self.measure_names)}
-        result = cautious_mean(values[:, :, 0]) if self.fitness is None else self.fitness(named)
-        fitness = np.asarray(result, np.float64)
-        if fitness.shape != (count,) or not np.isfinite(fitness).all():
-            raise ParameterError(
-                f"fitness must return a finite number for each of {count} candidates, but returned {shown(result)}. "
-                "The measures have the shape [candidate, world]: take a mean over axis 1."
-            )
-        return np.column_stack([fitness, values.mean(axis=1)])
+        scores = {"fitness": cautious_mean(values[:, :, 0]) if self.fitness is None else self.fitness(named)}
+        if self.quality is not None:
+            scores["quality"] = self.quality(named)
+        for name, result in scores.items():
+            score = np.asarray(result, np.float64)
+            if score.shape != (count,) or not np.isfinite(score).all():
+                raise ParameterError(
+                    f"{name} must return a finite number for each of {count} candidates, but returned {shown(result)}. "
+                    "The measures have the shape [candidate, world]: take a mean over axis 1."
+                )
+        return np.column_stack([*scores.values(), values.mean(axis=1)])
 
     def _specs(self) -> tuple[RobotSpec, ...]:
         """Return the robots that worlds take in turn."""
