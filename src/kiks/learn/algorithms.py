@@ -28,10 +28,7 @@ class Algorithm(Protocol):
         ...
 
     def tell(self, fitness: Floats, behaviours: Floats) -> None:
-        """Take their fitness, float64 [candidate], and their behaviours, float64 [candidate, axis].
-
-        An algorithm that looks for many behaviours takes their quality instead of their fitness.
-        """
+        """Take their fitness, float64 [candidate], and their behaviours, float64 [candidate, axis]."""
 
     def favourite(self) -> Floats | None:
         """Return the best parameters according to the algorithm, float64 [parameter].

@@ -56,7 +56,7 @@ class Elite:
     Attributes:
         cell: Number of the cell along each axis.
         generation: The generation that found it.
-        values: Its values by name: fitness, quality if the task has one of its own, and the measures.
+        values: Its values by name: fitness, then the measures.
         parameters: Its parameters.
     """
 
@@ -70,18 +70,13 @@ class Elite:
         """Its fitness."""
         return self.values["fitness"]
 
-    @property
-    def quality(self) -> float:
-        """What the candidates of a cell compete by."""
-        return self.values.get("quality", self.fitness)
-
 
 class Archive:
     """An archive: the best candidate of each cell.
 
     Args:
         axes: Axes of the map; each names one of the values.
-        value_names: Names of the values of a candidate: fitness, quality if there is one, and the measures.
+        value_names: Names of the values of a candidate: fitness, then the measures.
         champion: The champion of the evolution, or one like it: it lends controller, robot and timing to the elites.
 
     Attributes:
@@ -124,10 +119,10 @@ class Archive:
             generation: The generation that found them.
         """
         places = values[:, [self.value_names.index(axis.measure) for axis in self.axes]]
-        qualities = values[:, self.value_names.index("quality" if "quality" in self.value_names else "fitness")]
+        fitness = values[:, self.value_names.index("fitness")]
         for number, cell in enumerate(self._cells(places)):
             elite = self._elites.get(cell)
-            if elite is None or qualities[number] > elite.quality:
+            if elite is None or fitness[number] > elite.fitness:
                 named = dict(zip(self.value_names, values[number].tolist(), strict=True))
                 self._elites[cell] = Elite(cell, generation, named, tuple(candidates[number].tolist()))
 
@@ -170,7 +165,7 @@ class Archive:
 
     def champion_of(self, elite: Elite) -> Champion:
         """Return an elite as a champion."""
-        measures = {name: value for name, value in elite.values.items() if name not in ("fitness", "quality")}
+        measures = {name: value for name, value in elite.values.items() if name != "fitness"}
         return replace(
             self.champion,
             parameters=elite.parameters,
@@ -196,14 +191,14 @@ class Archive:
 
     @property
     def qd_score(self) -> float:
-        """Sum of the qualities of all elites."""
-        return float(sum(elite.quality for elite in self.elites))
+        """Sum of the fitness of all elites; a fitness below zero makes an elite count against it."""
+        return float(sum(elite.fitness for elite in self.elites))
 
     def heat_map(self) -> Floats:
-        """Return the quality in each cell, NaN in empty ones, float64 [cell of axis 0, ...]."""
+        """Return the fitness in each cell, NaN in empty ones, float64 [cell of axis 0, ...]."""
         heat: Floats = np.full(self.shape, np.nan)
         for elite in self.elites:
-            heat[elite.cell] = elite.quality
+            heat[elite.cell] = elite.fitness
         return heat
 
     # ---- files ----

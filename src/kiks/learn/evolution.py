@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kiks.errors import ParameterError, shown
-from kiks.learn.algorithms import Algorithm, Diverse, make_algorithm
+from kiks.learn.algorithms import Algorithm, make_algorithm
 from kiks.learn.archive import CHAMPION, Archive
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Executor
@@ -164,7 +164,7 @@ class Evolution:
         """Take the values of the candidates of `ask`.
 
         Args:
-            values: Fitness and the other values, float64 [candidate, value], as `Task.evaluate` returns them; or
+            values: Fitness, then the measures, float64 [candidate, 1 + measure], as `Task.evaluate` returns them; or
                 fitness alone, float64 [candidate]. More is better.
 
         Raises:
@@ -191,13 +191,11 @@ class Evolution:
             self._best = self._champion(self._rival, trials.mean(axis=0), len(self.generations))
         best_fitness = np.nan if self._best is None else self._best.fitness
         generation = Generation(self._asked, given, self.seeds, self.population, best_fitness, seconds)
-        behaviours, quality = np.zeros((self.population, 0)), fitness
+        behaviours = np.zeros((self.population, 0))
         if given.shape[1] == value_count:
             columns = [self.task.value_names.index(axis.measure) for axis in self.task.axes]
             behaviours = given[: self.population, columns]
-            if self.task.quality is not None and isinstance(self.algorithm, Diverse):
-                quality = given[: self.population, self.task.value_names.index("quality")]
-        self.algorithm.tell(quality.copy(), behaviours)
+        self.algorithm.tell(fitness.copy(), behaviours)
         if self.archive is not None and given.shape[1] == value_count:
             self.archive.add(self._asked[: self.population], given[: self.population], len(self.generations) + 1)
         self._rival = self._next_rival(self._asked[int(fitness.argmax())])

@@ -66,7 +66,7 @@ def draw_baselines(axes: Any, baselines: Baselines) -> None:
 
 
 def _draw_archive(figure: Any, axes: Any, archive: Archive, champion: Champion) -> None:
-    """Draw the quality in each cell; the fittest cell and the champion are marked."""
+    """Draw the fitness in each cell; the fittest cell and the champion are marked."""
     heat, (across, *others) = archive.heat_map(), archive.axes
     while heat.ndim > 2:  # with more than two axes, show the best along the others
         heat = np.fmax.reduce(heat, axis=-1)
@@ -89,7 +89,7 @@ def _draw_archive(figure: Any, axes: Any, archive: Archive, champion: Champion) 
     axes.set_ylabel(up.measure)
     axes.set_title(f"{len(archive.elites)} of {archive.cell_count} cells, QD score {archive.qd_score:.4g}")
     axes.legend(loc="best", fontsize="small")
-    figure.colorbar(image, ax=axes, label="quality" if "quality" in archive.value_names else "fitness")
+    figure.colorbar(image, ax=axes, label="fitness")
 
 
 def _cell(axis: Axis) -> float:

@@ -331,27 +331,21 @@ GOAL_RADIUS_MM = 100.0
 MAZE_SPEED_LIMIT = 20.0
 """Highest speed in the maze [pulses/10 ms]: 160 mm/s. The shortest way to the goal is 4 m long."""
 
+GOAL_COUNTS, THRIFT_COUNTS = 2.0, 0.1
+"""Fitness for the goal, and the most that thrift adds: less than a goal that is missed once in eight trials costs."""
+
+FAR_MM = 2000.0
+"""Distance from the goal at which fitness is zero [mm]."""
+
 HALF_THRIFT_PULSES = 1e5
-"""Turns of both wheels that halve `thrift` [pulses]: 4 m straight on."""
-
-THRIFT_COUNTS = 0.1
-"""Part of thrift in the fitness of `maze`: less than a goal that is missed once in eight trials."""
-
-
-def thrift(values: Values) -> Floats:
-    """Return how sparing of turns the wheels were, float64 [candidate, world]: 1 for none, and less the more."""
-    return 1 / (1 + values["turned_pulses"] / HALF_THRIFT_PULSES)
+"""Turns of both wheels that halve what thrift adds [pulses]: 4 m straight on."""
 
 
 def maze_fitness(values: Values) -> Floats:
-    """Return the fitness of `maze`: 1 for the goal and a little more for thrift, else minus the distance in metres."""
-    missed = -values["closest_mm"] / 1000
-    return cautious_mean(np.where(maze_solved(values), 1 + THRIFT_COUNTS * thrift(values), missed))
-
-
-def maze_quality(values: Values) -> Floats:
-    """Return the quality of `maze`: thrift, so that the archive holds cheap ways to all places."""
-    return cautious_mean(thrift(values))
+    """Return the fitness of `maze`: more than 2 for the goal, by thrift, else nearness, from 0 to 1."""
+    thrift = THRIFT_COUNTS / (1 + values["turned_pulses"] / HALF_THRIFT_PULSES)
+    nearness = np.maximum(1 - values["closest_mm"] / FAR_MM, 0.0)
+    return cautious_mean(np.where(maze_solved(values), GOAL_COUNTS + thrift, nearness))
 
 
 def maze(controller: Controller | None = None, **changes: Any) -> Task:
@@ -371,7 +365,6 @@ def maze(controller: Controller | None = None, **changes: Any) -> Task:
         controllers.mlp(hidden=(8,), speed_limit=MAZE_SPEED_LIMIT) if controller is None else controller,
         (goal_mm, measures.final_x_mm, measures.final_y_mm, measures.turned_pulses),
         fitness=maze_fitness,
-        quality=maze_quality,
         seconds=70.0,
         axes=(Axis("final_x_mm", 0, training_arenas.SIDE_MM, 32), Axis("final_y_mm", 0, training_arenas.SIDE_MM, 32)),
         starts="arena",
@@ -387,7 +380,7 @@ def maze(controller: Controller | None = None, **changes: Any) -> Task:
             "reached the goal",
             starts="arena",
         ),
-        about="reach the goal of the Kheperax maze; its archive holds ways to all places",
+        about="reach the goal of the Kheperax maze; the archive holds ways to all places",
     )
     return replace(task, **changes)
 

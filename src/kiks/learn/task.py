@@ -93,8 +93,6 @@ class Task:
         measures: The measures, each with a different name.
         fitness: Maps the measures, by name float64 [candidate, world], to the fitness, float64 [candidate]; more is
             better. Left out, it is `cautious_mean` of the first measure.
-        quality: Like fitness, for archives: the best candidate of a cell stays. Left out, it is fitness. The champion
-            is always chosen by fitness.
         seconds: Time for which a candidate drives in each world [s].
         worlds: Number of worlds; a multiple of the number of arenas.
         axes: Axes along which behaviours differ, for algorithms that look for many of them.
@@ -131,7 +129,6 @@ class Task:
     controller: Annotated[Controller, Field(description="Write @kiks.controller(parameters=COUNT) over the function.")]
     measures: Annotated[tuple[Measure, ...], Field(min_length=1, max_length=MEASURES_MAX)]
     fitness: Fitness | None = None
-    quality: Fitness | None = None
     seconds: Seconds = 30.0
     worlds: Annotated[Whole, Field(ge=1, le=WORLDS_MAX)] = 1
     axes: tuple[Axis, ...] = ()
@@ -193,8 +190,8 @@ class Task:
 
     @property
     def value_names(self) -> tuple[str, ...]:
-        """Names of the values of a candidate: fitness, quality if the task has one of its own, then the measures."""
-        return ("fitness", *(() if self.quality is None else ("quality",)), *self.measure_names)
+        """Names of the values of a candidate: fitness, then the measures."""
+        return ("fitness", *self.measure_names)
 
     @property
     def kinds(self) -> tuple[Kind, ...]:
@@ -268,7 +265,7 @@ class Task:
             digest.update(each.brightness.tobytes())
             digest.update(repr((each.mm_per_cell, each.starts, each.lamps, each.balls, each.cylinders)).encode())
         controller = (self.controller.recipe, self.controller.name, self.parameter_count) if with_controller else ()
-        evaluated = (*controller, self.value_names[1:], self.seconds)
+        evaluated = (*controller, self.measure_names, self.seconds)
         specs, timings = self._specs(), self.timings
         timing, spec = (each[0] if len(each) == 1 else each for each in (timings, specs))
         spread = (self.spread,) if with_controller else ()
@@ -294,10 +291,10 @@ class Task:
             seconds: Time for which they drive [s], if not that of the task.
 
         Returns:
-            Fitness, quality if the task has one of its own, then the mean of each measure, float64 [candidate, value].
+            Fitness, then the mean of each measure, float64 [candidate, 1 + measure].
 
         Raises:
-            ParameterError: If candidates, seeds, fitness or quality have the wrong shape, or one of the values is not
+            ParameterError: If candidates, seeds or fitness have the wrong shape, or a measure or the fitness is not
                 finite.
         """
         candidates, seeds = check_candidates(candidates, seeds)
@@ -339,17 +336,14 @@ class Task:
             if not np.isfinite(values[:, :, number]).all():
                 raise ParameterError(f"measures must be finite, but {shown(name)} was not. Check its divisions.")
         named = {name: values[:, :, number] for number, name in enumerate(self.measure_names)}
-        scores = {"fitness": cautious_mean(values[:, :, 0]) if self.fitness is None else self.fitness(named)}
-        if self.quality is not None:
-            scores["quality"] = self.quality(named)
-        for name, result in scores.items():
-            score = np.asarray(result, np.float64)
-            if score.shape != (count,) or not np.isfinite(score).all():
-                raise ParameterError(
-                    f"{name} must return a finite number for each of {count} candidates, but returned {shown(result)}. "
-                    "The measures have the shape [candidate, world]: take a mean over axis 1."
-                )
-        return np.column_stack([*scores.values(), values.mean(axis=1)])
+        result = cautious_mean(values[:, :, 0]) if self.fitness is None else self.fitness(named)
+        fitness = np.asarray(result, np.float64)
+        if fitness.shape != (count,) or not np.isfinite(fitness).all():
+            raise ParameterError(
+                f"fitness must return a finite number for each of {count} candidates, but returned {shown(result)}. "
+                "The measures have the shape [candidate, world]: take a mean over axis 1."
+            )
+        return np.column_stack([fitness, values.mean(axis=1)])
 
     def _specs(self) -> tuple[RobotSpec, ...]:
         """Return the robots that worlds take in turn."""
