@@ -10,6 +10,7 @@ import typer
 
 from kiks.cli.engine_start import ready_batch
 from kiks.cli.options import Seed, written_folder
+from kiks.control.controller_kinds import ControllerKind
 from kiks.ending import end_as_with_ctrl_c
 
 if TYPE_CHECKING:
@@ -24,15 +25,6 @@ class AlgorithmName(enum.StrEnum):
     CMA = "cma"
     GA = "ga"
     MAP_ELITES = "map-elites"
-
-
-class ControllerKind(enum.StrEnum):
-    """The controllers that come with KiKS."""
-
-    LINEAR = "linear"
-    MLP = "mlp"
-    CTRNN = "ctrnn"
-    GRU = "gru"
 
 
 def evolve(

@@ -31,6 +31,9 @@ TIME_SCALE_LIMIT = 4.0
 GAIN = 4.0
 """What a CTRNN's weights and biases are multiplied by: from 1 on, a parameter makes a unit hold what it has."""
 
+PLASTIC_GAIN = 4.0
+"""What the sum of a plastic neuron is multiplied by: one strong synapse of an active sender nearly saturates it."""
+
 _SHARE, _LIGHT_SHARE = 1.0 / COUNT_MAX, 1.0 / DARK_COUNTS
 
 
@@ -145,6 +148,27 @@ def feed_forward(
     return decide
 
 
+def simple_recurrent(senses: tuple[str, ...], unit_count: int, *, speed_limit: float) -> Any:
+    """Return the function of a controller: units that feed back to themselves; see `kiks.controllers.elman`."""
+    sense_count, take_senses = SENSOR_COUNT * len(senses), senses_as_inputs(senses)
+    input_count = sense_count + unit_count
+    wheels_first = layer_size(input_count, unit_count)
+
+    def decide(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+        inputs, fresh, outputs = stack_floats(input_count), stack_floats(unit_count), stack_floats(2)
+        take_senses(sensors, inputs)
+        for k in range(unit_count):
+            inputs[sense_count + k] = memory[k]
+        do_layer(inputs, input_count, parameters, 0, fresh, unit_count)
+        for k in range(unit_count):
+            memory[k] = tanh(fresh[k])
+        do_layer(memory, unit_count, parameters, wheels_first, outputs, 2)
+        for wheel in range(2):
+            wheels[wheel] = speed_limit * tanh(outputs[wheel])
+
+    return decide
+
+
 def continuous(
     senses: tuple[str, ...], neuron_count: int, *, period_s: float, time_constant_s: float, speed_limit: float
 ) -> Any:
@@ -207,3 +231,72 @@ def gated(senses: tuple[str, ...], unit_count: int, *, speed_limit: float) -> An
             wheels[wheel] = speed_limit * tanh(outputs[wheel])
 
     return decide
+
+
+@kernel
+def learnt(weight: Any, before: Any, after: Any, first_bit: Any, second_bit: Any) -> Any:
+    """Return the change of a weight at a learning rate of 1; two bits choose the rule (`kiks.controllers.plastic`).
+
+    The weight and the activities of the sender before the synapse and of the neuron after it are from 0 to 1.
+    """
+    if not first_bit:
+        return after * (before - weight) if second_bit else (1.0 - weight) * before * after
+    if not second_bit:
+        return before * (after - weight)
+    alike = tanh(4.0 * (1.0 - abs(before - after)) - 2.0)
+    return ((1.0 - weight) if alike > 0.0 else weight) * alike
+
+
+def plastic(senses: tuple[str, ...], neuron_count: int, *, is_per_synapse: bool, speed_limit: float) -> Any:
+    """Return the function of a controller: neurons whose weights change; see `kiks.controllers.plastic`.
+
+    The memory holds the activity of each neuron, then the weights, [sender, neuron].
+    """
+    sense_count, take_senses = SENSOR_COUNT * len(senses), senses_as_inputs(senses)
+    sender_count = sense_count + neuron_count + 1
+    synapse_count = sender_count * neuron_count
+    # A rate stands `row` further on for the next sender, and each table `size` behind the one before.
+    row, size = (neuron_count, synapse_count) if is_per_synapse else (0, neuron_count)
+    signs_first, sign_row, sign_column = (0, neuron_count, 1) if is_per_synapse else (0, 1, 0)
+    rates_first = 0 if is_per_synapse else sender_count
+    first_bits, second_bits = rates_first + size, rates_first + 2 * size
+
+    def decide(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+        senders, totals = stack_floats(sender_count), stack_floats(neuron_count)
+        take_senses(sensors, senders)
+        for k in range(sense_count):
+            senders[k] = min(max(0.0, senders[k]), 1.0)
+        for k in range(neuron_count):
+            senders[sense_count + k] = memory[k]
+            totals[k] = 0.0
+        senders[sender_count - 1] = 1.0
+        for sender in range(sender_count):
+            for k in range(neuron_count):
+                excites = parameters[signs_first + sender * sign_row + k * sign_column] > 0.0
+                given = senders[sender] * memory[neuron_count + sender * neuron_count + k]
+                totals[k] += given if excites else -given
+        for k in range(neuron_count):
+            memory[k] = logistic(PLASTIC_GAIN * totals[k])
+        for sender in range(sender_count):
+            for k in range(neuron_count):
+                own, rule = neuron_count + sender * neuron_count + k, sender * row + k
+                rate = abs(parameters[rates_first + rule])
+                change = learnt(
+                    memory[own],
+                    senders[sender],
+                    memory[k],
+                    parameters[first_bits + rule] > 0.0,
+                    parameters[second_bits + rule] > 0.0,
+                )
+                memory[own] += rate / (1.0 + rate) * change
+        for wheel in range(2):
+            wheels[wheel] = speed_limit * (2.0 * memory[wheel] - 1.0)
+
+    return decide
+
+
+def plastic_size(sense_count: int, neuron_count: int, *, is_per_synapse: bool) -> tuple[int, int]:
+    """Return how many numbers of memory and how many parameters a plastic network has."""
+    sender_count = sense_count + neuron_count + 1
+    synapse_count = sender_count * neuron_count
+    return neuron_count + synapse_count, 3 * synapse_count if is_per_synapse else sender_count + 3 * neuron_count
