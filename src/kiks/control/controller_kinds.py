@@ -14,3 +14,4 @@ class ControllerKind(enum.StrEnum):
     CTRNN = "ctrnn"
     GRU = "gru"
     PLASTIC = "plastic"
+    POLICY = "policy"

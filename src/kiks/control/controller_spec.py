@@ -33,6 +33,9 @@ PERIOD_S, TIME_CONSTANT_S = 0.1, 0.4
 PLASTIC_NEURONS_MAX = 64
 """Most neurons of a plastic network: each world keeps the weights of all their synapses."""
 
+POLICY_UNITS_MAX = 512
+"""Most units in a hidden layer of a policy; learners take 400 by default at most."""
+
 
 def _each_once(senses: tuple[str, ...]) -> tuple[str, ...]:
     if len(set(senses)) != len(senses):
@@ -118,6 +121,21 @@ class Plastic:
 
 
 @record
+class Policy:
+    """Arguments of `kiks.controllers.policy`."""
+
+    kind: Literal["policy"]
+    hidden: Annotated[
+        tuple[Annotated[Whole, Field(ge=1, le=POLICY_UNITS_MAX)], ...],
+        Field(max_length=LAYERS_MAX, description="One for each hidden layer."),
+    ] = (16, 16)
+    activation: Annotated[Literal["tanh", "relu"], Field(description="Of hidden units.")] = "tanh"
+    output: Annotated[Literal["clip", "tanh"], Field(description="What keeps outputs within +-1.")] = "clip"
+    senses: Senses = ("proximity",)
+    speed_limit: SpeedLimit = SPEED_LIMIT
+
+
+@record
 class InModule:
     """A user's own controller, found by importing a module."""
 
@@ -132,7 +150,7 @@ class InFile:
     name: Annotated[Text, Field(min_length=1)]
 
 
-Shape = Linear | Mlp | Elman | Ctrnn | Gru | Plastic
+Shape = Linear | Mlp | Elman | Ctrnn | Gru | Plastic | Policy
 
 SHAPES: dict[ControllerKind, type[Shape]] = {
     ControllerKind.LINEAR: Linear,
@@ -141,6 +159,7 @@ SHAPES: dict[ControllerKind, type[Shape]] = {
     ControllerKind.CTRNN: Ctrnn,
     ControllerKind.GRU: Gru,
     ControllerKind.PLASTIC: Plastic,
+    ControllerKind.POLICY: Policy,
 }
 """The arguments of each kind."""
 
@@ -159,6 +178,7 @@ Recipe = Annotated[
     | Annotated[Ctrnn, Tag("ctrnn")]
     | Annotated[Gru, Tag("gru")]
     | Annotated[Plastic, Tag("plastic")]
+    | Annotated[Policy, Tag("policy")]
     | Annotated[InModule, Tag("function")]
     | Annotated[InFile, Tag("file")],
     Discriminator(_tag),

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from kiks.engine.compiling import inlined, kernel
-from kiks.engine.numbers import tanh
+from kiks.engine.numbers import exponential, tanh
 from kiks.engine.simd.stack_arrays import stack_floats
 from kiks.model.robot import SENSOR_COUNT
 
@@ -41,6 +41,26 @@ _SHARE, _LIGHT_SHARE = 1.0 / COUNT_MAX, 1.0 / DARK_COUNTS
 def logistic(x: Any) -> Any:
     """Return 1 / (1 + e^-x), within 4e-6."""
     return 0.5 + 0.5 * tanh(0.5 * x)
+
+
+@kernel
+def exact_tanh(x: Any) -> Any:
+    """Return the hyperbolic tangent within 3e-16, for networks that learnt with that of a mathematical library."""
+    shrunk = exponential(-2.0 * abs(x))
+    positive = (1.0 - shrunk) / (1.0 + shrunk)
+    return positive if x > 0.0 else -positive
+
+
+@kernel
+def cut(x: Any) -> Any:
+    """Return a number cut to +-1."""
+    return min(max(x, -1.0), 1.0)
+
+
+@kernel
+def rectified(x: Any) -> Any:
+    """Return a number, or 0 if it is negative."""
+    return max(x, 0.0)
 
 
 @kernel
@@ -93,8 +113,8 @@ def layer_size(input_count: int, unit_count: int) -> int:
     return (1 + input_count) * unit_count
 
 
-def layers(counts: tuple[int, ...], first: int = 0) -> Any:
-    """Return a kernel `(inputs, parameters, units)` of layers of so many numbers, with tanh between, not at the end."""
+def layers(counts: tuple[int, ...], activation: Any, first: int = 0) -> Any:
+    """Return a kernel `(inputs, parameters, units)` of layers of so many numbers; `activation` is between them."""
     input_count, unit_count = counts[:2]
 
     if len(counts) == 2:
@@ -105,21 +125,27 @@ def layers(counts: tuple[int, ...], first: int = 0) -> Any:
 
         return do_last
 
-    do_rest = layers(counts[1:], first + layer_size(input_count, unit_count))
+    do_rest = layers(counts[1:], activation, first + layer_size(input_count, unit_count))
 
     @inlined
     def do_all(inputs: Any, parameters: Any, units: Any) -> Any:
         between = stack_floats(unit_count)
         do_layer(inputs, input_count, parameters, first, between, unit_count)
         for unit in range(unit_count):
-            between[unit] = tanh(between[unit])
+            between[unit] = activation(between[unit])
         do_rest(between, parameters, units)
 
     return do_all
 
 
 def feed_forward(
-    counts: tuple[int, ...], senses: tuple[str, ...], *, has_feedback: bool, is_cut: bool, speed_limit: float
+    counts: tuple[int, ...],
+    senses: tuple[str, ...],
+    *,
+    has_feedback: bool = False,
+    activation: Any = tanh,
+    squash: Any = tanh,
+    speed_limit: float,
 ) -> Any:
     """Return the function of a controller: layers from the senses, and its last speeds if so wanted, to the wheels.
 
@@ -127,10 +153,11 @@ def feed_forward(
         counts: Inputs, units of each hidden layer, 2.
         senses: The senses of the inputs.
         has_feedback: Whether the last two inputs are the last outputs, from the memory.
-        is_cut: Whether outputs are cut to +-1; else they are their tanh.
+        activation: Kernel of hidden units.
+        squash: Kernel that keeps outputs within +-1.
         speed_limit: The speed of an output of 1 [pulses/10 ms].
     """
-    input_count, memory_count, net = counts[0], 2 * has_feedback, layers(counts)
+    input_count, memory_count, net = counts[0], 2 * has_feedback, layers(counts, activation)
     sense_count, take_senses = input_count - memory_count, senses_as_inputs(senses)
 
     def decide(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
@@ -140,7 +167,7 @@ def feed_forward(
             inputs[sense_count + k] = memory[k]
         net(inputs, parameters, outputs)
         for wheel in range(2):
-            output = min(max(outputs[wheel], -1.0), 1.0) if is_cut else tanh(outputs[wheel])
+            output = squash(outputs[wheel])
             wheels[wheel] = speed_limit * output
             if has_feedback:
                 memory[wheel] = output
