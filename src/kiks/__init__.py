@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from kiks.learn.evolution import Evolution
     from kiks.learn.exam import Exam
     from kiks.learn.executors import executor_for
+    from kiks.learn.policy_export import champion_of_policy
     from kiks.learn.task import Axis, Task
     from kiks.model.arena import Arena
     from kiks.model.robot import RobotSpec
@@ -60,6 +61,7 @@ __all__ = [
     "Task",
     "Timing",
     "__version__",
+    "champion_of_policy",
     "controller",
     "controllers",
     "drive",
@@ -94,6 +96,7 @@ _HOMES = {
     "Status": "kiks.client.khepera",
     "Task": "kiks.learn.task",
     "Timing": "kiks.batch.loop_timing",
+    "champion_of_policy": "kiks.learn.policy_export",
     "controller": "kiks.control.controller",
     "controllers": "kiks.control.controllers",
     "drive": "kiks.client.drive",

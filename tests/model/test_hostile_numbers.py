@@ -221,6 +221,9 @@ def of_batch(batch: kiks.Batch, h: Any) -> dict[str, Callable[[], Any]]:
         "hidden units": lambda: controllers.mlp(hidden=[h]),
         "neurons": lambda: controllers.ctrnn(neurons=h),
         "units": lambda: controllers.gru(units=h),
+        "units of elman": lambda: controllers.elman(units=h),
+        "plastic neurons": lambda: controllers.plastic(neurons=h),
+        "plastic per": lambda: controllers.plastic(per=h),
     }
 
 

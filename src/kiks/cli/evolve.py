@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import enum
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -13,6 +12,7 @@ import typer
 from kiks.cli.engine_start import ready_batch
 from kiks.cli.evolution_progress import progress_of
 from kiks.cli.options import Seed, written_folder
+from kiks.control.controller_kinds import ControllerKind
 from kiks.ending import end_as_with_ctrl_c
 from kiks.learn.algorithm_name import AlgorithmName
 
@@ -22,15 +22,6 @@ if TYPE_CHECKING:
     from kiks.learn.evolution import Evolution
     from kiks.learn.results import Result
     from kiks.learn.task import Task
-
-
-class ControllerKind(enum.StrEnum):
-    """The controllers that come with KiKS."""
-
-    LINEAR = "linear"
-    MLP = "mlp"
-    CTRNN = "ctrnn"
-    GRU = "gru"
 
 
 def evolve(
