@@ -212,6 +212,7 @@ def of_batch(batch: kiks.Batch, h: Any) -> dict[str, Callable[[], Any]]:
         "reached": lambda: measures.reached_s(0, 0, radius_mm=h),
         "near light": lambda: measures.near_light_share(h),
         "gathered": lambda: measures.gathered(0, h),
+        "largest group": lambda: measures.largest_group(h),
         "measure": lambda: kiks.measure(h),
         "measure notes": lambda: kiks.measure(notes=h)(lambda moment, notes: None),
         "controller senses": lambda: controllers.linear(senses=h),
