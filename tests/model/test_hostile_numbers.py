@@ -213,6 +213,7 @@ def of_batch(batch: kiks.Batch, h: Any) -> dict[str, Callable[[], Any]]:
         "closest": lambda: measures.closest_mm(h, 0),
         "near light": lambda: measures.near_light_share(h),
         "gathered": lambda: measures.gathered(0, h),
+        "largest group": lambda: measures.largest_group(h),
         "measure": lambda: kiks.measure(h),
         "measure notes": lambda: kiks.measure(notes=h)(lambda moment, notes: None),
         "controller senses": lambda: controllers.linear(senses=h),

@@ -163,7 +163,9 @@ def _controller(kind: ControllerKind, task: Task) -> Controller:
     from kiks.control.controllers import from_recipe
     from kiks.learn.ready_tasks import SPEED_LIMIT
 
-    recipe: dict[str, Any] = {"kind": str(kind), "senses": list(task.controller.senses), "speed_limit": SPEED_LIMIT}
+    own = task.controller
+    limit = (own.recipe or {}).get("speed_limit", SPEED_LIMIT)
+    recipe: dict[str, Any] = {"kind": str(kind), "senses": list(own.senses), "speed_limit": limit}
     if kind is ControllerKind.CTRNN:
         recipe["period_s"] = task.timings[0].period_s
     return from_recipe(recipe)
