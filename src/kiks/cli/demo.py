@@ -39,7 +39,10 @@ class Behaviour(enum.StrEnum):
 
 def demo(
     behaviour: Annotated[
-        str, typer.Argument(help=f"The demo: {', '.join(Behaviour)}, or a champion's file.", metavar="[BEHAVIOUR]")
+        str,
+        typer.Argument(
+            help=f"The demo: {', '.join(Behaviour)}, or a champion's file or folder.", metavar="[BEHAVIOUR]"
+        ),
     ] = Behaviour.AVOID,
     seconds: Annotated[
         float | None, typer.Option(help="Simulated time [s]; each demonstration's own if left out.", min=1, max=86400)
@@ -64,13 +67,15 @@ def demo(
 
     avoid: wander and touch nothing. follow: follow walls. clean: push cylinders to the walls. maze: find the way out.
     camera: watch a moving ball. race: drive round a track. swarm: twenty robots spread out.
-    soccer: a match of two programs. A champion's file of `kiks evolve`: the champion drives.
+    soccer: a match of two programs. A champion's file of `kiks evolve`: the champion drives. The folder of `kiks evolve
+    pursuit`: predator and prey drive until they touch.
 
     Example: kiks demo follow --arena examples/arenas/office.toml --seconds 300
     """
-    if behaviour not in list(Behaviour) and not Path(behaviour).is_file():
+    if behaviour not in list(Behaviour) and not Path(behaviour).exists():
         raise ParameterError(
-            f"BEHAVIOUR must be one of {', '.join(Behaviour)}, or a champion's file, but it was {shown(behaviour)}."
+            f"BEHAVIOUR must be one of {', '.join(Behaviour)}, or a champion's file or folder, but it was "
+            f"{shown(behaviour)}."
             f"{nearest(behaviour, [each.value for each in Behaviour])}"
         )
     is_soccer = behaviour == Behaviour.SOCCER
@@ -96,6 +101,10 @@ def demo(
         from kiks.demos.scenes import SCENES
 
         scene = SCENES[behaviour](given, seed=seed, baud=baud)
+    elif Path(behaviour).is_dir():
+        from kiks.demos.contest import ContestScene
+
+        scene = ContestScene(behaviour, given, seed=seed, baud=baud)
     else:
         from kiks.demos.champion import ChampionScene
         from kiks.learn.champion import Champion

@@ -11,6 +11,7 @@ import typer
 from kiks.cli.engine_start import ready_batch
 from kiks.cli.options import Seed, written_folder
 from kiks.ending import end_as_with_ctrl_c
+from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
     from kiks.control.controller import Controller
@@ -48,7 +49,9 @@ def evolve(
     ] = None,
     seconds: Annotated[float | None, typer.Option(help="Begin no generation later than this [s].", min=0)] = None,
     population: Annotated[int | None, typer.Option(help="Candidates in a generation.", min=4)] = None,
-    algorithm: Annotated[AlgorithmName | None, typer.Option(help="cma if left out; map-elites for maze-qd.")] = None,
+    algorithm: Annotated[
+        AlgorithmName | None, typer.Option(help="cma if left out; map-elites for maze-qd, ga for pursuit.")
+    ] = None,
     controller: Annotated[
         ControllerKind | None, typer.Option(help="The controller to evolve; the task's own if left out.")
     ] = None,
@@ -61,7 +64,8 @@ def evolve(
 ) -> None:
     """Evolve a controller for a task, and write champion.toml, log.parquet and fitness.png.
 
-    After Ctrl-C or a kill, the same command continues the evolution.
+    After Ctrl-C or a kill, the same command continues the evolution. In pursuit, predator and prey evolve against each
+    other: predator.toml and prey.toml are the champions, and tournament.png tells who progressed.
 
     Example: kiks evolve avoid --seed 1 --out runs/avoid
     """
@@ -70,8 +74,26 @@ def evolve(
     if list_:
         for name in tasks.TASKS:
             typer.echo(f"{name:10} {tasks.load(name).about}")
+        for name, make in tasks.CONTESTS.items():
+            typer.echo(f"{name:10} {make().about}")
         return
     ready_batch()
+    if task in tasks.CONTESTS:
+        from kiks.cli.coevolve import coevolve
+
+        if controller is not None:
+            raise ParameterError(f"--controller must be left out with {task}, but it was {controller}.")
+        coevolve(
+            tasks.CONTESTS[task](),
+            str(algorithm or AlgorithmName.GA),
+            out or Path(f"kiks-evolve-{task}"),
+            seed=seed,
+            population=population,
+            generations=generations,
+            seconds=seconds,
+            where="threads" if ray is None else _ray(ray),
+        )
+        return
     chosen = tasks.load(task)
     if controller is not None:
         chosen = tasks.load(task, _controller(controller, chosen))
