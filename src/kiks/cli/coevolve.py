@@ -96,4 +96,5 @@ def winners_of(tournament: Tournament) -> Iterator[str]:
         figures = "   ".join(f"{name} {mean:.2f}" for name, mean in zip(tournament.sides, of_sides, strict=True))
         is_tie = of_sides[0] == of_sides[1]
         verdict = "a tie" if is_tie else f"the {tournament.sides[int(of_sides.argmax())]} won"
-        yield f"Generations {first:3} to {last:3}: {figures}   {verdict}"
+        numbers = f"Generation {first}" if first == last else f"Generations {first} to {last}"
+        yield f"{numbers}: {figures}   {verdict}"
