@@ -18,7 +18,8 @@ import kiks
 from kiks import ParameterError
 from kiks.client.drive import Driver
 from kiks.learn.candidate_worlds import starts_of
-from kiks.learn.coevolution import Tournament
+from kiks.learn.coevolution import _TOURNAMENT_SEED, Tournament
+from kiks.learn.generation_loop import seed_for
 from kiks.learn.ready_contests import CAUGHT_MM, PREY_SPEED
 from kiks.model.arena import Pose
 
@@ -84,12 +85,12 @@ def test_later_motion_does_not_count() -> None:
         memory[0] += 1.0
         wheels[:] = 10.0 if memory[0] < 20.0 else parameters[0]
 
-    sides = tuple(replace(side, controller=ahead_then) for side in small().sides)
+    sides = tuple(replace(side, controller=ahead_then) for side in small(seconds=6.0).sides)
     contest = small(sides=sides, arenas=[room], starts="arena", seconds=6.0)
     pairs = np.array([[10.0, 10.0], [-10.0, -3.0], [0.0, 0.0]])
     values = contest.evaluate(pairs, np.zeros(3, np.int64), 1)
     assert len(set(values[:, 0].tolist())) == 1
-    # They have 145 mm between them, and 2 mm at the contact, at 160 mm/s and with some time to speed up.
+    # They close in at 160 mm/s, after the time of the first readings.
     assert values[0, 1] == pytest.approx((200 - CAUGHT_MM) / 160 / 6.0, abs=0.03)
 
 
@@ -300,22 +301,20 @@ def test_wrong_calls_are_errors() -> None:
 def test_the_tournament_equals_a_loop_over_all_pairs() -> None:
     coevolution = run()
     tournament = coevolution.master_tournament(trials=2, executor="threads:1")
-    seeds = [
-        int(np.random.SeedSequence(3, spawn_key=(12, trial)).generate_state(1, np.uint64)[0] >> np.uint64(2))
-        for trial in range(2)
-    ]
     for first in range(4):
         for second in range(4):
             pair = [
                 *coevolution.champion("predator", first + 1).parameters,
                 *coevolution.champion("prey", second + 1).parameters,
             ]
-            values = coevolution.contest.evaluate(np.array([pair, pair]), np.array(seeds), 1)
+            numbers = [4 * trial + (first + second) % 4 for trial in range(2)]
+            seeds = np.array([seed_for(3, _TOURNAMENT_SEED, number) for number in numbers])
+            values = coevolution.contest.evaluate(np.array([pair, pair]), seeds, 1)
             np.testing.assert_array_equal(tournament.scores[:, first, second], (values[0, :2] + values[1, :2]) / 2)
     np.testing.assert_array_equal(tournament.generations, [1, 2, 3, 4])
     some = coevolution.master_tournament(trials=2, every=2, executor="threads:1")
     np.testing.assert_array_equal(some.generations, [2, 4])
-    np.testing.assert_array_equal(some.scores, tournament.scores[:, 1::2, 1::2])
+    assert some.scores.shape == (2, 2, 2)
 
 
 def test_a_tournament_knows_the_best_and_who_won(tmp_path: Path) -> None:

@@ -312,7 +312,8 @@ class Coevolution:
         """Let the champion of each generation meet the champions of all generations of the other side.
 
         Args:
-            trials: Number of contests of each pair. The starts of a trial are the same for all pairs.
+            trials: Number of contests of each pair. In each trial all champions have the same starts, a different one
+                with each opponent.
             every: Take only each so-many-th generation, the last one included.
             executor: An open executor, or where to evaluate: see `kiks.learn.executors.executor_for`.
 
@@ -333,9 +334,12 @@ class Coevolution:
         size = len(chosen)
         pairs = np.concatenate([np.repeat(first, size, axis=0), np.tile(second, (size, 1))], axis=1)
         scores = np.zeros((2, size, size))
+        # A Latin square: each row and each column of the pairs holds each start once.
+        starts = (np.arange(size)[:, None] + np.arange(size)) % size
         for trial in range(trials):
-            seeds = np.full(len(pairs), seed_for(self.seed, _TOURNAMENT_SEED, trial), np.int64)
-            scores += executor.evaluate(pairs, seeds)[:, :2].T.reshape(2, size, size)
+            numbers = range(trial * size, (trial + 1) * size)
+            seeds = np.array([seed_for(self.seed, _TOURNAMENT_SEED, number) for number in numbers], np.int64)
+            scores += executor.evaluate(pairs, seeds[starts.ravel()])[:, :2].T.reshape(2, size, size)
         return Tournament(self.contest.side_names, chosen + 1, scores / trials)
 
     # ---- folders ----
