@@ -11,6 +11,9 @@ twenty starts, with the timing of a line of 9600 baud, in arenas where it was no
   (benchmarks/kheperax_elites.py). Its environment is made in the folder if it is not there; without --kheperax it is
   left out.
 * `evolve.avoid_maze_solved`, `evolve.avoid_office_solved`: the same exam in two arenas of `examples`.
+* `evolve.pursuit_s`: the median time of a co-evolution of predator and prey without its master tournament, which gives
+  `evolve.pursuit_SIDE_N`, the mean fitness of the champions of each fifth of the generations against all champions of
+  the other side.
 * `evolve.swarm_generations_per_min`: the pace at which a swarm evolves: `SWARM` robots that gather as many balls, in
   each of a hundred candidates' worlds; `evolve.generations_per_min`: that of the robots that avoid obstacles.
 """
@@ -26,6 +29,8 @@ from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 import kiks
 from batch import kheperax_python
 from calibration import report
@@ -34,6 +39,7 @@ from kiks.model.arena import Ball
 
 ARENAS = Path(__file__).parent.parent / "examples" / "arenas"
 TASKS = ("avoid", "follow", "light", "gather", "maze")
+CONTEST, PERIODS = "pursuit", 5
 
 SWARM, SWARM_MM, SWARM_POPULATION, SWARM_GENERATIONS = 20, 2000, 100, 3
 
@@ -71,18 +77,37 @@ def swarm_task() -> kiks.Task:
     )
 
 
+def coevolutions(seeds: range, where: str) -> list[tuple[str, float, str]]:
+    """Return how long predator and prey take to evolve against each other, and who progressed."""
+    rows: list[tuple[str, float, str]] = []
+    contest, wholes_s = kiks.tasks.pursuit(), []
+    for seed in seeds:
+        start_s = time.perf_counter()
+        coevolution = kiks.Coevolution(contest, seed=seed)
+        coevolution.run(generations=contest.generations, executor=where)
+        wholes_s.append(time.perf_counter() - start_s)
+        tournament = coevolution.master_tournament(executor=where)
+        for side, means in zip(contest.side_names, tournament.means, strict=True):
+            for number, period in enumerate(np.array_split(means, PERIODS), 1):
+                rows.append((f"evolve.pursuit_{side}_{number}", period.mean(), f"against all champions, seed {seed}"))
+    rows.append(("evolve.pursuit_s", statistics.median(wholes_s), f"s for {contest.generations} generations"))
+    return rows
+
+
 def main() -> None:
     """Measure and report."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--json", action="store_true", help="one JSON object a line")
     arguments.add_argument("--seeds", type=int, default=5, help="how many evolutions of each task")
-    arguments.add_argument("--task", nargs="+", choices=TASKS, default=TASKS, help="the tasks")
+    arguments.add_argument("--task", nargs="+", choices=(*TASKS, CONTEST), default=(*TASKS, CONTEST), help="the tasks")
     arguments.add_argument("--kheperax", type=Path, metavar="FOLDER", help="environment of Kheperax, for maze")
     arguments.add_argument("--where", default="threads", help="where candidates are evaluated")
     options = arguments.parse_args()
 
     rows: list[tuple[str, float, str]] = []
-    for name in options.task:
+    if CONTEST in options.task:
+        rows += coevolutions(range(1, options.seeds + 1), options.where)
+    for name in (name for name in options.task if name != CONTEST):
         task, wholes_s, cpus_s, passed = kiks.tasks.load(name), [], [], Counter[str]()
         coverages: dict[str, list[float]] = {"coverage": [], "qd_score": [], "kheperax_coverage": []}
         exams = exams_of(task)

@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from kiks.learn import tasks
     from kiks.learn.archive import Archive
     from kiks.learn.champion import Champion
+    from kiks.learn.coevolution import Coevolution
+    from kiks.learn.contest import Contest, Side
     from kiks.learn.evolution import Evolution
     from kiks.learn.exam import Exam
     from kiks.learn.executors import executor_for
@@ -47,6 +49,8 @@ __all__ = [
     "Axis",
     "Batch",
     "Champion",
+    "Coevolution",
+    "Contest",
     "Controller",
     "Evolution",
     "Exam",
@@ -56,6 +60,7 @@ __all__ = [
     "Measure",
     "ParameterError",
     "RobotSpec",
+    "Side",
     "Simulation",
     "Status",
     "Task",
@@ -83,6 +88,8 @@ _HOMES = {
     "Axis": "kiks.learn.task",
     "Batch": "kiks.batch.batch",
     "Champion": "kiks.learn.champion",
+    "Coevolution": "kiks.learn.coevolution",
+    "Contest": "kiks.learn.contest",
     "Controller": "kiks.control.controller",
     "Evolution": "kiks.learn.evolution",
     "Exam": "kiks.learn.exam",
@@ -92,6 +99,7 @@ _HOMES = {
     "Measure": "kiks.control.measure",
     "ParameterError": "kiks.errors",
     "RobotSpec": "kiks.model.robot",
+    "Side": "kiks.learn.contest",
     "Simulation": "kiks.sim.simulation",
     "Status": "kiks.client.khepera",
     "Task": "kiks.learn.task",

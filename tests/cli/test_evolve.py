@@ -64,7 +64,32 @@ def test_champions_run_and_are_shown(folder: Path, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_tasks_are_listed() -> None:
-    assert "touch nothing" in kiks("evolve", "--list").output
+    listed = kiks("evolve", "--list").output
+    assert "touch nothing" in listed
+    assert "predator and prey" in listed
+
+
+@pytest.mark.slow
+def test_two_sides_evolve_and_are_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from kiks.learn.ready_contests import CONTESTS, pursuit
+
+    monkeypatch.setitem(CONTESTS, "pursuit", lambda: pursuit(seconds=2.0))
+    folder = tmp_path / "out"
+    words = ("evolve", "pursuit", "--seed", 1, "--population", 4, "--out", folder, "--generations")
+    said = kiks(*words, 2).output
+    assert re.search(r"\nGeneration 1: predator 0\.\d\d   prey 0\.\d\d   (the \w+ won|a tie)\n", said)
+    assert re.search(r"\nBest against all generations: predator of generation [12] \(.*\), prey of generation", said)
+    names = {path.name for path in folder.iterdir()}
+    pictures = {"fitness.png", "tournament.png", "tournament.parquet"}
+    assert names == pictures | {"predator.toml", "prey.toml", "log.parquet", "generations", "evolution.json"}
+    assert "Continuing after generation 2" in kiks(*words, 3).output
+    shown = kiks("demo", folder, "--seconds", 3, "--picture", tmp_path / "shown.png").output
+    assert re.search("predator and prey (have not touched|touched after)", shown)
+    assert (tmp_path / "shown.png").exists()
+    with pytest.raises(KiksError, match="--controller must be left out with pursuit"):
+        kiks("evolve", "pursuit", "--controller", "gru")
+    with pytest.raises(KiksError, match=r"must have predator.toml and prey.toml, but has not"):
+        kiks("demo", tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ import pytest
 import kiks
 from kiks import ParameterError
 from kiks.learn.algorithm_name import AlgorithmName
-from kiks.learn.task import cautious_mean
+from kiks.learn.candidate_worlds import cautious_mean
 
 pytestmark = pytest.mark.slow
 

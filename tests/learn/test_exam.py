@@ -9,7 +9,8 @@ import pytest
 
 import kiks
 from kiks.errors import ParameterError
-from kiks.learn.exam import EXAM_SEED, PASS_SHARE, ExamResult, spread_starts
+from kiks.learn.candidate_worlds import spread_starts
+from kiks.learn.exam import EXAM_SEED, PASS_SHARE, ExamResult
 from kiks.model.arena import Pose
 
 ROOM = kiks.Arena.box(500, 500)
@@ -33,7 +34,7 @@ def test_a_start_is_what_happens_on_a_serial_line():
     champion = kiks.Champion(kiks.controllers.linear(speed_limit=8.0), tuple(np.linspace(-3, 3, 18).tolist()))
     exam = exam_of(seconds=20)
     examined = exam.examine(champion)
-    poses = spread_starts(exam.arenas, exam.count, seed=EXAM_SEED, robot="khepera")[:, 0]
+    poses = spread_starts(exam.arenas, exam.count, seed=EXAM_SEED, radius_mm=27.5)[:, 0]
     for start, pose in enumerate(poses.tolist()):
         sim, ports = champion.simulation(replace(ROOM, starts=(Pose(*pose),)), seed=EXAM_SEED + start)
         champion.drive(ports, seconds=exam.seconds)

@@ -243,6 +243,7 @@ def random_starts(
     robots: int | None = None,
     radius_mm: float = 27.5,
     clear_mm: float = 5.0,
+    apart_mm: float = 0.0,
 ) -> NDArray[np.float64]:
     """Return random free poses, uniformly distributed over an arena: x_mm, y_mm, heading_rad.
 
@@ -253,6 +254,7 @@ def random_starts(
         robots: Number of robots in each world, which are clear of each other, too.
         radius_mm: Radius of a robot [mm].
         clear_mm: Least distance of its edge from walls, balls, cylinders and the other robots of its world [mm].
+        apart_mm: Least distance of its edge from the other robots of its world [mm], if that is more than `clear_mm`.
 
     Returns:
         float64 [count, 3], or [count, robot, 3] if `robots` is given.
@@ -269,7 +271,7 @@ def random_starts(
         for _ in range(ATTEMPTS):
             tried = _free_poses(rng, arena, len(todo), radius_mm, clear_mm)
             across, up = (poses[todo, :robot, axis] - tried[:, None, axis] for axis in range(2))
-            is_free = (np.hypot(across, up) > 2 * radius_mm + clear_mm).all(axis=1)
+            is_free = (np.hypot(across, up) > 2 * radius_mm + max(clear_mm, apart_mm)).all(axis=1)
             poses[todo[is_free], robot] = tried[is_free]
             todo = todo[~is_free]
             if not len(todo):

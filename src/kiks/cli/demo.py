@@ -87,7 +87,8 @@ def demo(
     camera: watch a moving ball. race: drive round a track. swarm: twenty robots spread out.
     soccer: a match of two programs. A champion's file of `kiks evolve`, or its folder: the champion drives in its
     world. With --at X,Y, the elite of that place in the folder's archive drives. With --generation 12 --rank 3, the
-    third best of generation 12 drives again as in its evaluation.
+    third best of generation 12 drives again as in its evaluation. The folder of `kiks evolve pursuit`: predator and
+    prey drive until they touch.
 
     Example: kiks demo follow --arena examples/arenas/office.toml --seconds 300
     """
@@ -133,6 +134,13 @@ def demo(
         from kiks.demos.scenes import SCENES
 
         scene = SCENES[behaviour](given, seed=seed or 0, baud=baud)
+    elif _is_contest(Path(behaviour)):
+        from kiks.demos.contest import ContestScene
+
+        for option, value in (("--generation", generation), ("--at", at)):
+            if value is not None:
+                raise ParameterError(f"{option} must be left out with a contest, but it was {shown(value)}.")
+        scene = ContestScene(behaviour, given, seed=seed or 0, baud=baud)
     else:
         from kiks.demos.champion import ChampionScene
 
@@ -150,6 +158,11 @@ def demo(
         open_desk(Desk(scene.sim), work=work, waits=not no_wait)
     else:
         work()
+
+
+def _is_contest(path: Path) -> bool:
+    """Return whether a path is the folder of a co-evolution: it has champions, but no single one."""
+    return path.is_dir() and not (path / "champion.toml").exists() and any(path.glob("*.toml"))
 
 
 def _individual(folder: str, generation: int, rank: int, world: int, task: str | None) -> tuple[Champion, float]:

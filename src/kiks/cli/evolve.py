@@ -14,6 +14,7 @@ from kiks.cli.evolution_progress import progress_of
 from kiks.cli.options import Seed, written_folder
 from kiks.control.controller_kinds import ControllerKind
 from kiks.ending import end_as_with_ctrl_c
+from kiks.errors import ParameterError
 from kiks.learn.algorithm_name import AlgorithmName
 
 if TYPE_CHECKING:
@@ -57,7 +58,8 @@ def evolve(
     """Evolve a controller for a task, and write champion.toml, archive.parquet, log.parquet and fitness.png.
 
     After Ctrl-C or a kill, the same command continues the evolution. With --seeds 10, ten evolutions run one after the
-    other; a table, seeds.png and summary.json show their results.
+    other; a table, seeds.png and summary.json show their results. In pursuit, predator and prey evolve against each
+    other: predator.toml and prey.toml are the champions, and tournament.png tells which of them progressed.
 
     Example: kiks evolve avoid --seed 1 --out runs/avoid
     """
@@ -66,8 +68,27 @@ def evolve(
     if list_:
         for name in tasks.TASKS:
             typer.echo(f"{name:10} {tasks.load(name).about}")
+        for name, make in tasks.CONTESTS.items():
+            typer.echo(f"{name:10} {make().about}")
         return
     ready_batch()
+    if task in tasks.CONTESTS:
+        from kiks.cli.coevolve import coevolve
+
+        for option, value in (("--controller", controller), ("--seeds", seeds)):
+            if value is not None:
+                raise ParameterError(f"{option} must be left out with {task}, but it was {value}.")
+        coevolve(
+            tasks.CONTESTS[task](),
+            str(algorithm or AlgorithmName.GA),
+            out or Path(f"kiks-evolve-{task}"),
+            seed=seed,
+            population=population,
+            generations=generations,
+            seconds=seconds,
+            where="threads" if ray is None else _ray(ray),
+        )
+        return
     chosen = tasks.load(task)
     if controller is not None:
         chosen = tasks.load(task, _controller(controller, chosen))

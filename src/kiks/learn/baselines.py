@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from kiks.control.controller import Controller
-from kiks.learn.evolution import BASELINE_SEED, TRIAL_SEED, TRIALS, derived_seed
+from kiks.learn.evolution import BASELINE_SEED, TRIAL_SEED, TRIALS
+from kiks.learn.generation_loop import seed_for
 from kiks.learn.task import Task
 
 RANDOM_COUNT = 40
@@ -41,10 +42,10 @@ def baselines_of(task: Task, seed: int, threads: int | None = None) -> Baselines
         ParameterError: If the fitness is not finite.
     """
     threads = threads or os.cpu_count() or 1
-    trials = np.array([derived_seed(seed, TRIAL_SEED, number) for number in range(TRIALS)])
+    trials = np.array([seed_for(seed, TRIAL_SEED, number) for number in range(TRIALS)])
     still = Controller(_stand, senses=task.controller.senses, parameters=1)
     standing = task.with_changes(controller=still).evaluate(np.zeros((TRIALS, 1)), trials, threads)
-    rng = np.random.default_rng(derived_seed(seed, BASELINE_SEED))
+    rng = np.random.default_rng(seed_for(seed, BASELINE_SEED))
     drawn = task.spread * rng.standard_normal((RANDOM_COUNT, task.parameter_count))
     random = task.evaluate(drawn, np.resize(trials, RANDOM_COUNT), threads)
     return Baselines(float(standing[:, 0].mean()), float(np.median(random[:, 0])))

@@ -18,16 +18,16 @@ from typing import Any, TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kiks.errors import ParameterError, shown
+from kiks.errors import ParameterError
 from kiks.learn.algorithms import Algorithm, make_algorithm
 from kiks.learn.archive import CHAMPION, Archive
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Executor
 from kiks.learn.evolution_log import Folder, Generation, Identity
-from kiks.learn.executors import executor_for
+from kiks.learn.generation_loop import run_generations, seed_for
 from kiks.learn.task import Task
 from kiks.model.array_checks import check_numbers
-from kiks.model.checks import check_count, check_kind, check_number
+from kiks.model.checks import check_count, check_kind
 from kiks.version import __version__
 
 Floats = NDArray[np.float64]
@@ -35,9 +35,6 @@ Integers = NDArray[np.int64]
 
 TRIALS = 8
 """Trials of a rival, each in as many worlds as a candidate of the population gets."""
-
-LOG_EVERY_S = 10.0
-"""Time between two writes of the log [s]; each writes the whole log."""
 
 _ALGORITHM_SEED, WORLDS_SEED, TRIAL_SEED, BASELINE_SEED = range(4)
 """Purposes of seeds."""
@@ -115,7 +112,7 @@ class Evolution:
         self._world = task.world()
         unknown = self._champion(np.zeros(task.parameter_count), np.zeros(len(task.value_names)), 0)
         self.archive = Archive(task.axes, task.value_names, unknown) if task.axes else None
-        self._earlier_s, self._start_s, self._logged_s = 0.0, perf_counter(), -np.inf
+        self._earlier_s, self._start_s = 0.0, perf_counter()
         self._folder = None if folder is None else Folder(folder)
         if self._folder is not None:
             self._resume(self._folder)
@@ -246,30 +243,7 @@ class Evolution:
             ParameterError: If neither generations nor seconds are given, or one is out of range.
             WorkError: If the task cannot be evaluated.
         """
-        if generations is None and seconds is None:
-            raise ParameterError("generations or seconds must be given, but neither was: the run would never end.")
-        for name, value in (("generations", generations), ("seconds", seconds)):
-            if value is not None:
-                check_number(name, value, 0)
-        if not isinstance(executor, Executor | str):
-            raise ParameterError(
-                f"executor must be an Executor or a text such as 'threads', but it was {shown(executor)}."
-            )
-        if isinstance(executor, str):
-            with executor_for(executor, self.task) as opened:
-                return self.run(generations=generations, seconds=seconds, executor=opened, each=each)
-        begin_s = perf_counter()
-        try:
-            while (generations is None or len(self.generations) < generations) and (
-                seconds is None or perf_counter() - begin_s < seconds
-            ):
-                self.tell(executor.evaluate(self.ask(), self.seeds))
-                if perf_counter() - self._logged_s > LOG_EVERY_S:
-                    self.save_log()
-                if each is not None:
-                    each(self)
-        finally:
-            self.save_log()
+        run_generations(self, self.task, generations=generations, seconds=seconds, executor=executor, each=each)
         return self.champion
 
     def save_log(self) -> None:
@@ -283,7 +257,6 @@ class Evolution:
             if self.archive is not None:
                 self.archive.save(self._folder.path)
             self._folder.save_log(self.generations, self.task.value_names)
-            self._logged_s = perf_counter()
 
     # ---- results ----
 
@@ -322,7 +295,7 @@ class Evolution:
 
     def _seed_for(self, purpose: int, number: int = 0) -> int:
         """Return a seed derived from that of the evolution."""
-        return derived_seed(self.seed, purpose, number)
+        return seed_for(self.seed, purpose, number)
 
     def _resume(self, folder: Folder) -> None:
         """Take the generations of the folder.
@@ -345,12 +318,6 @@ class Evolution:
                 )
             self._tell(saved["values"], float(saved["seconds"]))
         self._earlier_s = self.generations[-1].seconds if self.generations else 0.0
-
-
-def derived_seed(seed: int, purpose: int, number: int = 0) -> int:
-    """Return a seed of an evolution with a seed: of `WORLDS_SEED`, the worlds of a generation, counted from 0."""
-    sequence = np.random.SeedSequence(seed, spawn_key=(purpose, number))
-    return int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(2))
 
 
 def is_algorithm(algorithm: object) -> TypeGuard[Algorithm]:

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from kiks.batch.batch import Batch
-from kiks.batch.initial_state import Arenas, Starts, random_starts
+from kiks.batch.initial_state import Arenas, Starts
 from kiks.control.measure import Measure
 from kiks.errors import ParameterError, shown
+from kiks.learn.candidate_worlds import spread_starts
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats
 from kiks.model.arena import Arena
@@ -40,9 +41,6 @@ EXAM_SEED = 2**40
 
 IMPERFECT = 10
 """Number of imperfect robots with which an exam is taken again."""
-
-CLEAR_MM = 8.0
-"""Smallest gap between a start and anything else [mm]."""
 
 STARTS_MAX, MEASURES_MAX = 10_000, 100
 """Most starts and measures of an exam."""
@@ -176,7 +174,8 @@ class Exam:
     def _poses(self, robot: str | RobotSpec, robots: int) -> Floats | None:
         """Return the start poses, float64 [start, robot, 3]; None for those that arenas give several robots."""
         if self.starts == "random":
-            return spread_starts(self.arenas, self.count, seed=EXAM_SEED, robot=robot, robots=robots)
+            (spec,) = specs_of(robot, 1, None)
+            return spread_starts(self.arenas, self.count, seed=EXAM_SEED, radius_mm=spec.body.radius_mm, robots=robots)
         if robots > 1 or not all(arena.starts for arena in self.arenas):
             return None
         places = [cycle(arena.starts) for arena in self.arenas]
@@ -203,34 +202,3 @@ def world_of(arena: Arena, poses: Floats | None, robots: int, seed: int) -> Proj
     """
     starts = tuple(rounded_pose(*pose) for pose in (arena.starts if poses is None else poses[:THINGS_MAX].tolist()))
     return Project(replace(arena, starts=starts), robots=(ProjectRobot(),) * robots, seed=seed)
-
-
-def spread_starts(
-    arenas: Sequence[Arena],
-    count: int,
-    *,
-    seed: int,
-    robot: str | RobotSpec,
-    robots: int = 1,
-    clear_mm: float = CLEAR_MM,
-) -> Floats:
-    """Return random start poses in worlds that take arenas in turn, float64 [count, robot, 3].
-
-    Args:
-        arenas: The arenas.
-        count: Number of worlds, a multiple of the number of arenas.
-        seed: Seed of the random generator.
-        robot: Kind of the robots.
-        robots: Number of robots in each world.
-        clear_mm: Least distance of a robot's edge from anything else [mm].
-
-    Raises:
-        ParameterError: If an arena has too few free places.
-    """
-    (spec,) = specs_of(robot, 1, None)
-    radius_mm = spec.body.radius_mm
-    poses = [
-        random_starts(arena, count // len(arenas), seed=seed, robots=robots, radius_mm=radius_mm, clear_mm=clear_mm)
-        for arena in arenas
-    ]
-    return np.stack(poses, axis=1).reshape(count, robots, 3)

@@ -8,8 +8,9 @@ from pathlib import Path
 from kiks.errors import ParameterError, shown
 from kiks.learn import tasks
 from kiks.learn.champion import Champion
-from kiks.learn.evolution import TRIALS, WORLDS_SEED, derived_seed
+from kiks.learn.evolution import TRIALS, WORLDS_SEED
 from kiks.learn.evolution_log import Folder, Identity
+from kiks.learn.generation_loop import seed_for
 from kiks.learn.task import Task
 from kiks.model.checks import check_count
 
@@ -62,7 +63,7 @@ def individual_of(
     fitness = arrays["values"][: identity.population, 0]
     order = (-fitness).argsort(kind="stable")
     candidate = int(order[check_count("rank", rank, 1, identity.population) - 1])
-    seed = derived_seed(identity.seed, WORLDS_SEED, number)
+    seed = seed_for(identity.seed, WORLDS_SEED, number)
     champion = found.individual(arrays["candidates"][candidate], seed, world)
     return Individual(champion, candidate, float(fitness[candidate]), found.seconds, identity.kiks)
 

@@ -14,8 +14,9 @@ from kiks.batch.loop_timing import Timing
 from kiks.control import controllers, measures
 from kiks.control.controller import Controller
 from kiks.learn import training_arenas
+from kiks.learn.candidate_worlds import cautious_mean
 from kiks.learn.exam import Exam
-from kiks.learn.task import Axis, Task, cautious_mean
+from kiks.learn.task import Axis, Task
 from kiks.model.arena import Arena, Cylinder
 
 Floats = NDArray[np.float64]
@@ -237,7 +238,9 @@ def gather_fitness(values: Values) -> Floats:
 
 
 def gather(controller: Controller | None = None, **changes: Any) -> Task:
-    """Return the task to push cylinders together, anywhere (Maris and te Boekhorst, Exploiting physical constraints, 1996).
+    """Return the task to push cylinders together, anywhere.
+
+    Source: Maris and te Boekhorst, Exploiting physical constraints: heap formation through behavioral error, 1996.
 
     A robot that senses proximity alone cannot know where the middle of a room is, but it notices what is near others.
 

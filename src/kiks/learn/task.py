@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import pickle
-from collections.abc import Callable, Mapping
-from dataclasses import field, fields, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -19,19 +17,15 @@ from kiks.control.controller import Controller
 from kiks.control.measure import Measure
 from kiks.errors import ParameterError, shown
 from kiks.learn.algorithm_name import AlgorithmName
+from kiks.learn.candidate_worlds import Fitness, batches_of, bytes_of, fitness_of, reduced_by_value, starts_of
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats, Integers, check_candidates
-from kiks.learn.exam import Exam, spread_starts, world_of
+from kiks.learn.exam import Exam, world_of
 from kiks.model.arena import Pose
 from kiks.model.checks import check_count, check_number
 from kiks.model.data_file import Number, OneOf, Rule, Text, Whole, read_file, record
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, specs_of
-
-Fitness = Callable[[Mapping[str, Floats]], Floats]
-
-BATCH_WORLDS_MAX = 20_000
-"""Largest number of worlds in a batch: more need more memory and run no faster."""
 
 GENERATIONS, POPULATION = 60, 40
 """Default numbers of generations, and of candidates in a generation."""
@@ -168,12 +162,7 @@ class Task:
                 )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # Functions are pickled by value, because a worker on another computer does not have the user's file.
-        from numba import cloudpickle
-
-        dumps: Any = cloudpickle.dumps
-        values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
-        return _task_of, (dumps(values),)
+        return reduced_by_value(self)
 
     def with_changes(self, **changes: Any) -> Task:
         """Return a copy with some arguments changed.
@@ -261,9 +250,7 @@ class Task:
                 same digits if champions drive in the same worlds and are measured in the same way.
         """
         digest = hashlib.sha256()
-        for each in self.arenas:
-            digest.update(each.brightness.tobytes())
-            digest.update(repr((each.mm_per_cell, each.starts, each.lamps, each.balls, each.cylinders)).encode())
+        digest.update(bytes_of(self.arenas))
         controller = (self.controller.recipe, self.controller.name, self.parameter_count) if with_controller else ()
         evaluated = (*controller, self.measure_names, self.seconds)
         specs, timings = self._specs(), self.timings
@@ -301,12 +288,8 @@ class Task:
         if not len(candidates):
             return np.empty((0, len(self.value_names)))
         seconds = self.seconds if seconds is None else check_number("seconds", seconds, 1e-3, 1e6)
-        batch_size = max(1, BATCH_WORLDS_MAX // self.worlds)
-        parts = []
-        for first in range(0, len(candidates), batch_size):
-            part = slice(first, first + batch_size)
-            parts.append(self._evaluate(candidates[part], seeds[part], threads, seconds))
-        return np.concatenate(parts)
+        parts = batches_of(len(candidates), self.worlds)
+        return np.concatenate([self._evaluate(candidates[part], seeds[part], threads, seconds) for part in parts])
 
     def _evaluate(self, candidates: Floats, seeds: Integers, threads: int, seconds: float) -> Floats:
         count = len(candidates)
@@ -332,17 +315,7 @@ class Task:
             driven = batch.run(self.controller, given[here], seconds=seconds, measures=self.measures)
             means[here] = driven.values.mean(axis=1)
         values = means.reshape(count, self.worlds, len(self.measures))
-        for number, name in enumerate(self.measure_names):
-            if not np.isfinite(values[:, :, number]).all():
-                raise ParameterError(f"measures must be finite, but {shown(name)} was not. Check its divisions.")
-        named = {name: values[:, :, number] for number, name in enumerate(self.measure_names)}
-        result = cautious_mean(values[:, :, 0]) if self.fitness is None else self.fitness(named)
-        fitness = np.asarray(result, np.float64)
-        if fitness.shape != (count,) or not np.isfinite(fitness).all():
-            raise ParameterError(
-                f"fitness must return a finite number for each of {count} candidates, but returned {shown(result)}. "
-                "The measures have the shape [candidate, world]: take a mean over axis 1."
-            )
+        fitness = fitness_of(self.fitness, self.measure_names, values)
         return np.column_stack([fitness, values.mean(axis=1)])
 
     def _specs(self) -> tuple[RobotSpec, ...]:
@@ -362,33 +335,5 @@ class Task:
 
     def _starts(self, seeds: Integers) -> Floats:
         """Return random start poses, float64 [world, robot, 3]: the same for the same seed."""
-        widest = max(self._specs(), key=lambda spec: spec.body.radius_mm)
-        poses = {
-            seed: spread_starts(self.arenas, self.worlds, seed=seed, robot=widest, robots=self.robots)
-            for seed in dict.fromkeys(seeds.tolist())
-        }
-        return np.concatenate([poses[seed] for seed in seeds.tolist()])
-
-
-def _task_of(pickled: bytes) -> Task:
-    """Return a pickled task."""
-    return Task(**pickle.loads(pickled))
-
-
-def cautious_mean(scores: Floats, caution: float = 0.5) -> Floats:
-    """Return the mean of scores over worlds, weighted with the mean of the worse half.
-
-    The worse half shows how a controller does in worlds that do not suit it. Accidents count there, but no single one
-    decides, as it would in the worst world.
-
-    Args:
-        scores: [candidate, world].
-        caution: From 0, the mean, to 1, the mean of the worse half.
-
-    Example:
-        >>> cautious_mean(np.array([[1.0, 1.0, 0.0, 1.0]]))
-        array([0.625])
-    """
-    worse = np.sort(scores, axis=1)[:, : (scores.shape[1] + 1) // 2]
-    mean: Floats = (1 - caution) * scores.mean(axis=1) + caution * worse.mean(axis=1)
-    return mean
+        radius_mm = max(spec.body.radius_mm for spec in self._specs())
+        return starts_of(seeds, self.arenas, self.worlds, radius_mm=radius_mm, robots=self.robots)

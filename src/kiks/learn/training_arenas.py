@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kiks.batch.initial_state import random_starts
-from kiks.learn.exam import CLEAR_MM
+from kiks.learn.candidate_worlds import CLEAR_MM
 from kiks.model.arena import Arena, Lamp, Pose
 
 WALL_MM = 10.0

@@ -1,0 +1,111 @@
+"""Two champions of a co-evolution in one world."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import combinations
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+
+from kiks.client.drive import Driver
+from kiks.demos.scene import Scene
+from kiks.errors import ParameterError
+from kiks.learn import tasks
+from kiks.learn.champion import Champion
+from kiks.learn.contest import Contest
+from kiks.model.arena import Arena, Pose
+from kiks.sim.simulation import Simulation
+
+TOUCH_MM = 2.0
+"""Gap between two robots at which they touch [mm], as in `pursuit`: steps of the control loop see where robots are."""
+
+
+class ContestScene(Scene):
+    """The champions of both sides drive against each other until a robot of one touches a robot of the other.
+
+    Args:
+        folder: The folder of a co-evolution, with a champion's file for each side.
+        arena: Where they drive; an arena of the contest if left out.
+        seed: Seed of the world, and of random starts.
+        baud: Speed of the lines [bit/s]; that of the champions if left out.
+
+    Raises:
+        ParameterError: If the folder has no champions of a contest that comes with KiKS.
+        ArenaError: If the arena has no room for them.
+    """
+
+    seconds: ClassVar[float] = 60.0
+
+    def __init__(
+        self, folder: str | Path, arena: Arena | None = None, *, seed: int = 0, baud: int | None = None
+    ) -> None:
+        self.contest, self.champions = _load(Path(folder))
+        self._sides = [side for side in range(2) for _ in range(self.contest.sides[side].robots)]
+        self.touched_s: float | None = None
+        super().__init__(arena, seed=seed, baud=baud or self.champions[0].baud)
+
+    def make_arena(self) -> Arena:
+        """Return an arena of the contest."""
+        return self.contest.arenas[0]
+
+    def make_simulation(self, arena: Arena | None) -> Simulation:
+        """Return a world of the contest at the start of the evaluation with this seed."""
+        arena = arena or self.make_arena()
+        contest = self.contest.with_changes(arenas=(arena,), worlds=1)
+        kinds = [self.champions[side].robot for side in self._sides]
+        think_s = self.champions[0].timing.think_s
+        thinking = f"fixed:{think_s * 1e3:g}" if think_s else "none"
+        poses = contest.start_poses(np.array([self.seed]))
+        if poses is not None:
+            arena = replace(arena, starts=tuple(Pose(*pose) for pose in poses[0].tolist()))
+        return Simulation(arena, robots=len(kinds), seed=self.seed, robot=kinds, thinking=thinking)
+
+    def prepare(self) -> None:
+        """Put the champions at the wheels."""
+        drivers = [self.champions[side] for side in self._sides]
+        ports = [self.sim.port(number) for number in range(1, len(drivers) + 1)]
+        for port in ports:
+            port.baudrate = self.ports[0].baudrate
+        parameters = [list(each.parameters) for each in drivers]
+        period_s = self.champions[0].timing.period_s
+        self.driver = Driver(ports, [each.controller for each in drivers], parameters, period_s=period_s)
+
+    def step(self) -> None:
+        """Let them do a loop, and see whether they touch."""
+        self.driver.step()
+        robots = zip(self._sides, self.sim.poses().tolist(), self.sim.specs, strict=True)
+        for (side, pose, spec), (other_side, other_pose, other_spec) in combinations(robots, 2):
+            gap_mm = math.dist(pose[:2], other_pose[:2]) - spec.body.radius_mm - other_spec.body.radius_mm
+            if side != other_side and gap_mm <= TOUCH_MM and self.touched_s is None:
+                self.touched_s = self.sim.time_s
+
+    @property
+    def is_over(self) -> bool:
+        """Whether they have touched."""
+        return self.touched_s is not None
+
+    def result(self) -> str:
+        """Return when they touched."""
+        names = " and ".join(self.contest.side_names)
+        return f"{names} " + ("have not touched" if self.touched_s is None else f"touched after {self.touched_s:.1f} s")
+
+
+def _load(folder: Path) -> tuple[Contest, list[Champion]]:
+    """Return the contest of a folder, and the champion of each side.
+
+    Raises:
+        ParameterError: If there are no such champions.
+    """
+    for contest in (make() for make in tasks.CONTESTS.values()):
+        files = [folder / f"{name}.toml" for name in contest.side_names]
+        if all(file.is_file() for file in files):
+            return contest, [Champion.load(file) for file in files]
+    wanted = ", or ".join(
+        " and ".join(f"{name}.toml" for name in make().side_names) for make in tasks.CONTESTS.values()
+    )
+    raise ParameterError(
+        f"the folder {str(folder)!r} must have {wanted}, but has not. `kiks evolve pursuit` makes one."
+    )

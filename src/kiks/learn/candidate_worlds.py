@@ -1,0 +1,146 @@
+"""What evaluations of candidates in batches of worlds have in common: batches, starts, fitness, pickling."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from kiks.batch.initial_state import random_starts
+from kiks.errors import ParameterError, shown
+from kiks.learn.evaluation import Floats, Integers
+from kiks.model.arena import Arena
+
+Fitness = Callable[[Mapping[str, Floats]], Floats]
+
+BATCH_WORLDS_MAX = 20_000
+"""Largest number of worlds in a batch: more need more memory and run no faster."""
+
+CLEAR_MM = 8.0
+"""Smallest gap between a random start and anything else [mm]."""
+
+
+def reduced_by_value(entry: Any) -> tuple[Any, ...]:
+    """Return what `__reduce__` returns of a record whose functions are pickled by value.
+
+    A worker on another computer does not have the user's file.
+    """
+    from numba import cloudpickle
+
+    dumps: Any = cloudpickle.dumps
+    return _unpickled, (type(entry), dumps({each.name: getattr(entry, each.name) for each in fields(entry)}))
+
+
+def _unpickled(kind: type[Any], pickled: bytes) -> Any:
+    """Return a record of a kind."""
+    return kind(**pickle.loads(pickled))
+
+
+def bytes_of(arenas: Sequence[Arena]) -> bytes:
+    """Return bytes that differ between arenas in which robots may drive differently."""
+    return b"".join(
+        each.brightness.tobytes()
+        + repr((each.mm_per_cell, each.starts, each.lamps, each.balls, each.cylinders)).encode()
+        for each in arenas
+    )
+
+
+def batches_of(count: int, worlds: int) -> list[slice]:
+    """Return the candidates of each batch, of so many worlds each."""
+    size = max(1, BATCH_WORLDS_MAX // worlds)
+    return [slice(first, first + size) for first in range(0, count, size)]
+
+
+def spread_starts(
+    arenas: Sequence[Arena], count: int, *, seed: int, radius_mm: float, robots: int = 1, apart_mm: float = CLEAR_MM
+) -> Floats:
+    """Return random start poses in worlds that take arenas in turn, float64 [count, robot, 3].
+
+    Args:
+        arenas: The arenas.
+        count: Number of worlds, a multiple of the number of arenas.
+        seed: Seed of the random generator.
+        radius_mm: Radius of a robot [mm].
+        robots: Number of robots in each world.
+        apart_mm: Least distance between the edges of two robots [mm].
+
+    Raises:
+        ParameterError: If an arena has too few free places.
+    """
+    given: dict[str, Any] = {"robots": robots, "radius_mm": radius_mm, "clear_mm": CLEAR_MM, "apart_mm": apart_mm}
+    poses = [random_starts(arena, count // len(arenas), seed=seed, **given) for arena in arenas]
+    return np.stack(poses, axis=1).reshape(count, robots, 3)
+
+
+def starts_of(
+    seeds: Integers,
+    arenas: Sequence[Arena],
+    worlds: int,
+    *,
+    radius_mm: float,
+    robots: int,
+    apart_mm: float = CLEAR_MM,
+) -> Floats:
+    """Return random start poses for candidates, float64 [candidate and world, robot, 3]: the same for the same seed.
+
+    Args:
+        seeds: A seed for each [candidate].
+        arenas: The arenas.
+        worlds: Number of worlds of a candidate.
+        radius_mm: Radius of a robot [mm].
+        robots: Number of robots in each world.
+        apart_mm: Least distance between the edges of two robots [mm].
+
+    Raises:
+        ParameterError: If an arena has too few free places.
+    """
+    given: dict[str, Any] = {"robots": robots, "radius_mm": radius_mm, "apart_mm": apart_mm}
+    poses = {seed: spread_starts(arenas, worlds, seed=seed, **given) for seed in dict.fromkeys(seeds.tolist())}
+    return np.concatenate([poses[seed] for seed in seeds.tolist()])
+
+
+def fitness_of(fitness: Fitness | None, measure_names: Sequence[str], values: Floats) -> Floats:
+    """Return the fitness of candidates, float64 [candidate].
+
+    Args:
+        fitness: The fitness function; None for `cautious_mean` of the first measure.
+        measure_names: Names of the measures.
+        values: Values of the measures, float64 [candidate, world, measure].
+
+    Raises:
+        ParameterError: If a value or a fitness is not finite, or the fitness has another shape.
+    """
+    for number, name in enumerate(measure_names):
+        if not np.isfinite(values[:, :, number]).all():
+            raise ParameterError(f"measures must be finite, but {shown(name)} was not. Check its divisions.")
+    named = {name: values[:, :, number] for number, name in enumerate(measure_names)}
+    result = cautious_mean(values[:, :, 0]) if fitness is None else fitness(named)
+    numbers = np.asarray(result, np.float64)
+    if numbers.shape != (len(values),) or not np.isfinite(numbers).all():
+        raise ParameterError(
+            f"fitness must return a finite number for each of {len(values)} candidates, but returned {shown(result)}. "
+            "The measures have the shape [candidate, world]: take a mean over axis 1."
+        )
+    return numbers
+
+
+def cautious_mean(scores: Floats, caution: float = 0.5) -> Floats:
+    """Return the mean of scores over worlds, weighted with the mean of the worse half.
+
+    The worse half shows how a controller does in worlds that do not suit it. Accidents count there, but no single one
+    decides, as it would in the worst world.
+
+    Args:
+        scores: [candidate, world].
+        caution: From 0, the mean, to 1, the mean of the worse half.
+
+    Example:
+        >>> cautious_mean(np.array([[1.0, 1.0, 0.0, 1.0]]))
+        array([0.625])
+    """
+    worse = np.sort(scores, axis=1)[:, : (scores.shape[1] + 1) // 2]
+    mean: Floats = (1 - caution) * scores.mean(axis=1) + caution * worse.mean(axis=1)
+    return mean

@@ -1,0 +1,265 @@
+"""A contest: two sides of robots in one world, each with a controller and a fitness of its own."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import field, replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field
+
+from kiks.batch.batch import Batch
+from kiks.batch.initial_state import Arenas, Starts
+from kiks.batch.loop_timing import Timing
+from kiks.control.controller import Controller
+from kiks.control.measure import Measure
+from kiks.errors import ParameterError, shown
+from kiks.learn.candidate_worlds import Fitness, batches_of, bytes_of, fitness_of, reduced_by_value, starts_of
+from kiks.learn.evaluation import Floats, Integers, check_candidates
+from kiks.learn.task import MEASURES_MAX, ROBOTS_MAX, SPREAD, WORLDS_MAX, Seconds
+from kiks.model.checks import check_number
+from kiks.model.data_file import Number, Rule, Text, Whole, read_file, record
+from kiks.model.robot import RobotSpec
+
+POPULATION, GENERATIONS = 100, 100
+"""Default number of candidates of a side, and of generations: those of Floreano and Nolfi (1997)."""
+
+
+@record
+class Side:
+    """A side of a contest.
+
+    Args:
+        name: Its name, with which its champion's file and its columns in the log begin.
+        controller: The controller of its robots; it must state the number of its parameters.
+        fitness: Maps the measures of its robots, by name float64 [pair, world], to its fitness, float64 [pair]; more is
+            better. Left out, it is `kiks.learn.task.cautious_mean` of the first measure.
+        robot: Kind of its robots: a name or a robot file.
+        robots: Number of its robots in each world.
+
+    Raises:
+        ParameterError: If an argument is out of range.
+    """
+
+    name: Annotated[Text, Field(pattern=r"^[^\W\d]\w{0,29}$"), Rule("1 to 30 letters, digits and _, no digit first")]
+    controller: Annotated[Controller, Field(description="Write @kiks.controller(parameters=COUNT) over the function.")]
+    fitness: Fitness | None = None
+    robot: Text = "khepera"
+    robots: Annotated[Whole, Field(ge=1, le=ROBOTS_MAX)] = 1
+
+    # Functions cannot be compared: a side equals itself only.
+    __eq__ = object.__eq__
+    __hash__ = object.__hash__
+
+    def __post_init__(self) -> None:
+        if not self.controller.parameter_count:
+            raise ParameterError(
+                f"the controller of a side must state the number of its parameters, but {shown(self.controller)} does "
+                "not. Write @kiks.controller(parameters=COUNT) over the function."
+            )
+
+    @property
+    def parameter_count(self) -> int:
+        """Number of parameters of its controller."""
+        return self.controller.parameter_count or 0
+
+
+@record
+class Contest:
+    """A contest of two sides: a `kiks.learn.evaluation.Evaluation` of pairs.
+
+    A candidate of the evaluation is a pair: the parameters of the first side's controller, then those of the second
+    side's. In each world the robots of the first side come first.
+
+    Args:
+        name: Its name.
+        sides: The two sides, with different names.
+        arenas: Arenas of the contests.
+        measures: The measures, each with a different name. Each robot is measured.
+        seconds: Time for which the robots drive in each world [s].
+        worlds: Number of worlds of a pair; a multiple of the number of arenas.
+        apart_mm: Least distance between the edges of two robots at a random start [mm].
+        timing: Timing of the control loop; that of a program on a line of 9600 baud if left out.
+        starts: 'random' for free places anywhere, or 'arena' for the starts of the arena.
+        spread: Standard deviation of each parameter in the first generation.
+        population: How many candidates each side has, unless the user says otherwise.
+        generations: How many generations a co-evolution has, unless the user says otherwise.
+        about: A description in one line.
+        file: The user's file that defines it.
+
+    Raises:
+        ParameterError: If an argument is out of range.
+
+    Example:
+        >>> import kiks
+        >>> @kiks.controller(parameters=2)
+        ... def ahead(sensors, memory, parameters, wheels):
+        ...     wheels[:] = parameters
+        >>> contest = Contest("race", (Side("left", ahead), Side("right", ahead)), [kiks.Arena.box(500, 500)],
+        ...                   [kiks.measures.path_mm], seconds=1)
+        >>> contest.evaluate(np.array([[3.0, 3.0, 0.0, 0.0]]), np.zeros(1, np.int64), 1)[:, :2].round(1)
+        array([[20.4,  0. ]])
+    """
+
+    name: Text
+    sides: tuple[Side, Side]
+    arenas: Arenas
+    measures: Annotated[tuple[Measure, ...], Field(min_length=1, max_length=MEASURES_MAX)]
+    seconds: Seconds = 30.0
+    worlds: Annotated[Whole, Field(ge=1, le=WORLDS_MAX)] = 1
+    apart_mm: Annotated[Number, Field(ge=0, le=1e6)] = 0.0
+    timing: Timing = field(default_factory=Timing)
+    starts: Starts = "random"
+    spread: Annotated[Number, Field(gt=0, le=1000)] = SPREAD
+    population: Annotated[Whole, Field(ge=4)] = POPULATION
+    generations: Annotated[Whole, Field(ge=1)] = GENERATIONS
+    about: Text = ""
+    file: str = ""
+
+    # Functions cannot be compared: a contest equals itself only.
+    __eq__ = object.__eq__
+    __hash__ = object.__hash__
+
+    def __post_init__(self) -> None:
+        if self.worlds % len(self.arenas):
+            raise ParameterError(
+                f"worlds must be a multiple of the number of arenas, {len(self.arenas)}, but it was {self.worlds}."
+            )
+        for what, names in (("sides", self.side_names), ("values of sides", self.value_names)):
+            if len(set(names)) != len(names):
+                raise ParameterError(f"{what} must have different names, but they were {shown(names)}.")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return reduced_by_value(self)
+
+    def with_changes(self, **changes: Any) -> Contest:
+        """Return a copy with some arguments changed.
+
+        Raises:
+            ParameterError: If an argument is out of range.
+        """
+        return replace(self, **changes)
+
+    @property
+    def side_names(self) -> tuple[str, str]:
+        """Names of the sides."""
+        first, second = self.sides
+        return first.name, second.name
+
+    @property
+    def measure_names(self) -> tuple[str, ...]:
+        """Names of the measures."""
+        return tuple(each.name for each in self.measures)
+
+    @property
+    def value_names(self) -> tuple[str, ...]:
+        """Names of the values of a pair: the fitness of both sides, then the measures of the first, of the second."""
+        return (*self.side_names, *(f"{side}_{name}" for side in self.side_names for name in self.measure_names))
+
+    @property
+    def controllers(self) -> list[Controller]:
+        """The controller of each robot of a world."""
+        return [side.controller for side in self.sides for _ in range(side.robots)]
+
+    @property
+    def robot_kinds(self) -> list[str]:
+        """The kind of each robot of a world."""
+        return [side.robot for side in self.sides for _ in range(side.robots)]
+
+    @property
+    def driven_s(self) -> float:
+        """Total time for which the robots of a pair drive [s]."""
+        return self.worlds * len(self.controllers) * self.seconds
+
+    def parameters_of(self, pairs: Floats) -> list[Floats]:
+        """Return the parameters of each robot of a world, float64 [..., parameter] of pairs [..., parameter]."""
+        first, second = self.sides
+        parts = pairs[..., : first.parameter_count], pairs[..., first.parameter_count :]
+        return [part for side, part in zip((first, second), parts, strict=True) for _ in range(side.robots)]
+
+    def digest(self) -> str:
+        """Return 16 hexadecimal digits that differ between contests whose evolutions differ."""
+        digest = hashlib.sha256(bytes_of(self.arenas))
+        for side in self.sides:
+            controller = side.controller
+            told = (side.name, controller.recipe, controller.name, side.parameter_count, side.robots)
+            digest.update(repr((told, RobotSpec.load(side.robot))).encode())
+        worlds = (self.worlds, self.seconds, self.apart_mm, self.timing, self.starts, self.spread)
+        digest.update(repr((self.name, self.measure_names, worlds)).encode())
+        if self.file:
+            digest.update(read_file(Path(self.file), "the contest's file"))
+        return digest.hexdigest()[:16]
+
+    # ---- evaluation ----
+
+    def prepare(self) -> None:
+        """Compile the controllers and the measures."""
+        parameter_count = sum(side.parameter_count for side in self.sides)
+        self.evaluate(np.zeros((1, parameter_count)), np.zeros(1, np.int64), 1, seconds=self.timing.period_s)
+
+    def start_poses(self, seeds: Integers) -> Floats | None:
+        """Return the starts of pairs with such seeds, float64 [pair and world, robot, 3]; None for those of the arena.
+
+        Raises:
+            ParameterError: If an arena has too few free places.
+        """
+        if self.starts == "arena":
+            return None
+        kinds = self.robot_kinds
+        radius_mm = max(RobotSpec.load(kind).body.radius_mm for kind in kinds)
+        return starts_of(
+            seeds, self.arenas, self.worlds, radius_mm=radius_mm, robots=len(kinds), apart_mm=self.apart_mm
+        )
+
+    def evaluate(self, candidates: Floats, seeds: Integers, threads: int, seconds: float | None = None) -> Floats:
+        """Return the values of pairs.
+
+        Args:
+            candidates: Parameters of pairs [pair, parameter].
+            seeds: A seed for each [pair]: of its worlds and its starts.
+            threads: Number of threads.
+            seconds: Time for which they drive [s], if not that of the contest.
+
+        Returns:
+            The values that `value_names` lists, the measures averaged over worlds, float64 [pair, value].
+
+        Raises:
+            ParameterError: If pairs, seeds or a fitness have the wrong shape, or a measure or a fitness is not finite.
+        """
+        candidates, seeds = check_candidates(candidates, seeds)
+        parameter_count = sum(side.parameter_count for side in self.sides)
+        if candidates.shape[1] != parameter_count:
+            counts = " and ".join(f"{side.parameter_count} of the {side.name}" for side in self.sides)
+            raise ParameterError(
+                f"a pair must have {parameter_count} parameters ({counts}), but their number was {candidates.shape[1]}."
+            )
+        if not len(candidates):
+            return np.empty((0, len(self.value_names)))
+        seconds = self.seconds if seconds is None else check_number("seconds", seconds, 1e-3, 1e6)
+        parts = batches_of(len(candidates), self.worlds)
+        return np.concatenate([self._evaluate(candidates[part], seeds[part], threads, seconds) for part in parts])
+
+    def _evaluate(self, pairs: Floats, seeds: Integers, threads: int, seconds: float) -> Floats:
+        count, kinds = len(pairs), self.robot_kinds
+        specs = [RobotSpec.load(kind) for kind in kinds] if len(set(kinds)) > 1 else []
+        batch = Batch(
+            self.arenas,
+            count * self.worlds,
+            robot=[specs] * (count * self.worlds) if specs else kinds[0],
+            robots=len(kinds),
+            seed=(seeds[:, None] + np.arange(self.worlds)).ravel(),
+            starts=self.start_poses(seeds),
+            timing=self.timing,
+            threads=threads,
+        )
+        given = self.parameters_of(np.repeat(pairs, self.worlds, axis=0))
+        values = batch.run(self.controllers, given, seconds=seconds, measures=self.measures).values
+        values = values.reshape(count, self.worlds, len(kinds), len(self.measures))
+        parts = np.split(values, [self.sides[0].robots], axis=2)
+        of_sides = [part.mean(axis=2) for part in parts]
+        scores = [
+            fitness_of(side.fitness, self.measure_names, each) for side, each in zip(self.sides, of_sides, strict=True)
+        ]
+        return np.column_stack([*scores, *(each.mean(axis=1) for each in of_sides)])

@@ -1,0 +1,115 @@
+"""The loop over the generations of an evolution, and derived seeds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from time import perf_counter
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.errors import ParameterError, shown
+from kiks.learn.evaluation import Evaluation, Executor
+from kiks.learn.executors import executor_for
+from kiks.model.checks import check_number
+
+LOG_EVERY_S = 10.0
+"""Time between two writes of the log [s]; each writes the whole log."""
+
+
+class Evolving(Protocol):
+    """An evolution."""
+
+    @property
+    def generations(self) -> Sequence[Any]:
+        """The generations so far."""
+        ...
+
+    @property
+    def seeds(self) -> NDArray[np.int64]:
+        """Seeds of the candidates that `ask` returns, int64 [candidate]."""
+        ...
+
+    def ask(self) -> NDArray[np.float64]:
+        """Return the candidates of the next generation, float64 [candidate, parameter]."""
+        ...
+
+    def tell(self, values: NDArray[np.float64]) -> None:
+        """Take their values, float64 [candidate, value]."""
+
+    def save_log(self) -> None:
+        """Write the results so far."""
+
+
+Some = TypeVar("Some", bound=Evolving)
+
+
+def run_generations(
+    evolution: Some,
+    work: Evaluation,
+    *,
+    generations: int | None,
+    seconds: float | None,
+    executor: Executor | str,
+    each: Callable[[Some], Any] | None,
+) -> None:
+    """Evolve.
+
+    Args:
+        evolution: The evolution.
+        work: Evaluates its candidates.
+        generations: Total number of generations, including earlier ones.
+        seconds: No generation begins later than this [s of the wall clock].
+        executor: An open executor, or where to evaluate: see `kiks.learn.executors.executor_for`.
+        each: Called after each generation.
+
+    Raises:
+        ParameterError: If neither generations nor seconds are given, or one is out of range.
+        WorkError: If candidates cannot be evaluated.
+    """
+    if generations is None and seconds is None:
+        raise ParameterError("generations or seconds must be given, but neither was: the run would never end.")
+    for name, value in (("generations", generations), ("seconds", seconds)):
+        if value is not None:
+            check_number(name, value, 0)
+    check_executor(executor)
+    if isinstance(executor, str):
+        with executor_for(executor, work) as opened:
+            run_generations(evolution, work, generations=generations, seconds=seconds, executor=opened, each=each)
+        return
+    begin_s, logged_s = perf_counter(), -np.inf
+    try:
+        while (generations is None or len(evolution.generations) < generations) and (
+            seconds is None or perf_counter() - begin_s < seconds
+        ):
+            evolution.tell(executor.evaluate(evolution.ask(), evolution.seeds))
+            if perf_counter() - logged_s > LOG_EVERY_S:
+                evolution.save_log()
+                logged_s = perf_counter()
+            if each is not None:
+                each(evolution)
+    finally:
+        evolution.save_log()
+
+
+def check_executor(executor: object) -> None:
+    """Check that this is an executor, or the place of one.
+
+    Raises:
+        ParameterError: If it is neither.
+    """
+    if not isinstance(executor, Executor | str):
+        raise ParameterError(f"executor must be an Executor or a text such as 'threads', but it was {shown(executor)}.")
+
+
+def seed_for(seed: int, purpose: int, number: int = 0) -> int:
+    """Return a seed that is derived from that of an evolution.
+
+    Args:
+        seed: Seed of the evolution.
+        purpose: What it is for.
+        number: Number of the seed for that purpose.
+    """
+    sequence = np.random.SeedSequence(seed, spawn_key=(purpose, number))
+    return int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(2))
