@@ -1,10 +1,10 @@
-"""Learn to avoid obstacles by PPO in 64 worlds at once, then drive a robot on a serial line with the policy.
+"""Learn to avoid obstacles by PPO in 96 worlds at once, then drive a robot on a serial line with the policy.
 
 pip install '.[learn]' stable-baselines3
 python examples/learning/ppo_avoid.py
 
-The policy's network has the shape of `kiks.controllers.mlp`, so its weights become a controller that needs no
-PyTorch: in a batch, in a simulation and on a real robot.
+The policy learns in the arenas of the task `avoid` and takes its exam in others. Its network becomes a champion that
+needs no PyTorch: in a batch, in a simulation and on a real robot.
 """
 
 from __future__ import annotations
@@ -20,17 +20,21 @@ from stable_baselines3.common.vec_env import VecEnv
 
 import kiks
 import kiks.learn.gymnasium_envs
-from kiks.batch.initial_state import random_starts
+from kiks.learn.env_specs import without_contacts
 
 HIDDEN = (16, 16)
-WORLDS = 64
+WORLDS = 96
 EPISODE_STEPS = 300
-RAW_LIMIT = 3.0
-"""The policy's actions are clipped to +-3, then tanh maps them to speeds, as the last layer of the controller does."""
+
+SPEED_LIMIT = 8.0
+"""Highest speed [pulses/10 ms]: 64 mm/s, as in the task."""
+
+CONTACT_COST = 20.0
+"""What a contact takes off the reward: the exam allows none, and the reward of Floreano and Mondada counts none."""
 
 
 class Sb3VecEnv(VecEnv):
-    """Adapts a vector environment of Gymnasium to Stable-Baselines3, with tanh before the wheels.
+    """Adapts a vector environment of Gymnasium to Stable-Baselines3, which clips the actions.
 
     Args:
         envs: The environment; its worlds must reset in the step in which they end (`SAME_STEP`).
@@ -38,14 +42,13 @@ class Sb3VecEnv(VecEnv):
 
     def __init__(self, envs: gymnasium.vector.VectorEnv) -> None:
         self.envs = envs
-        actions = gymnasium.spaces.Box(-RAW_LIMIT, RAW_LIMIT, envs.single_action_space.shape, np.float32)
-        super().__init__(envs.num_envs, envs.single_observation_space, actions)
+        super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
 
     def reset(self) -> Any:
         return self.envs.reset(seed=self._seeds[0])[0]
 
     def step_async(self, actions: Any) -> None:
-        self.actions = np.tanh(actions)
+        self.actions = actions
 
     def step_wait(self) -> Any:
         seen, rewards, terminations, truncations, infos = self.envs.step(self.actions)
@@ -73,59 +76,48 @@ class Sb3VecEnv(VecEnv):
         return [False] * self.num_envs
 
 
-def parameters_of(model: PPO) -> np.ndarray:
-    """Return the weights of the policy's mean action as parameters of `kiks.controllers.mlp`."""
-    layers = [layer for layer in model.policy.mlp_extractor.policy_net if hasattr(layer, "weight")]
-    parts = []
-    for layer in (*layers, model.policy.action_net):
-        parts += [layer.bias.detach().numpy(), layer.weight.detach().numpy().T.ravel()]
-    return np.concatenate(parts).astype(np.float64)
-
-
-def report(title: str, controller: kiks.Controller, parameters: np.ndarray, arena: kiks.Arena) -> None:
-    """Print the mean performance of a controller over 100 starts, a minute each."""
-    batch = kiks.Batch(arena, 100, seed=1000, starts=random_starts(arena, 100, seed=1)[:, None])
-    measures = [kiks.measures.avoidance, kiks.measures.contacts, kiks.measures.path_mm]
-    rollouts = batch.run(controller, parameters, seconds=60, measures=measures)
-    reward, contacts, path_mm = rollouts.values[:, 0].mean(axis=0)
-    print(f"{title}: reward {reward:.3f} a step, {contacts:.2f} contacts and {path_mm:.0f} mm in a minute")
-
-
 def main() -> None:
     torch.set_num_threads(1)  # the networks are small: more threads are slower
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    options.add_argument("--steps", type=int, default=400_000, help="steps of all worlds together")
+    options.add_argument("--steps", type=int, default=900_000, help="steps of all worlds together")
+    options.add_argument("--seed", type=int, default=1, help="seed of weights, exploration and episodes")
     options.add_argument("--save", default="ppo_avoid", help="name of the files, without suffix")
     options.add_argument("--port", help="drive the robot on this serial port for a minute, for example /dev/ttyUSB0")
     given = options.parse_args()
 
+    task = kiks.tasks.avoid()
     envs = gymnasium.make_vec(
-        "kiks/Avoid-v0", num_envs=WORLDS, max_episode_steps=EPISODE_STEPS, autoreset_mode="SameStep"
+        "kiks/Avoid-v0",
+        num_envs=WORLDS,
+        max_episode_steps=EPISODE_STEPS,
+        autoreset_mode="SameStep",
+        arenas=task.arenas,
+        reward=without_contacts(kiks.measures.avoidance, CONTACT_COST),
+        speed_limit=SPEED_LIMIT,
     )
-    vec_env = Sb3VecEnv(envs)
     model = PPO(
         "MlpPolicy",
-        vec_env,
+        Sb3VecEnv(envs),
         n_steps=64,
-        batch_size=1024,
+        batch_size=1536,
         n_epochs=10,
-        learning_rate=1e-3,
-        gamma=0.95,
+        learning_rate=lambda share_left: 1.5e-3 * share_left,
+        gamma=0.97,
         policy_kwargs={"net_arch": {"pi": HIDDEN, "vf": (64, 64)}, "log_std_init": -0.5},
-        seed=1,
+        seed=given.seed,
         device="cpu",
     )
     spec = envs.unwrapped.episodes.spec
-    arena, controller = spec.arenas[0], kiks.controllers.mlp(hidden=HIDDEN, speed_limit=spec.speed_limit)
-    report("before", controller, parameters_of(model), arena)
+    assert task.exam is not None
+    print("before:", task.exam.examine(kiks.champion_of_policy(model, spec)))
     model.learn(given.steps)
-    parameters = parameters_of(model)
-    report("after", controller, parameters, arena)
+    champion = kiks.champion_of_policy(model, spec)
+    print("after:", task.exam.examine(champion))
 
     model.save(f"{given.save}.zip")
-    np.save(f"{given.save}.npy", parameters)
-    sim = kiks.Simulation(arena, seed=1)
-    loops = kiks.drive(given.port or sim.port(1), controller, parameters, seconds=60, period_s=0.1)
+    champion.save(f"{given.save}.toml")
+    sim, ports = champion.simulation(task.arenas[0], seed=1)
+    loops = champion.drive(given.port or ports, seconds=60)
     print(f"on the wire: {loops} loops" + ("" if given.port else f", state {sim.state_hash()}"))
 
 

@@ -12,7 +12,8 @@ import gymnasium
 import numpy as np
 import pytest
 
-import kiks.learn.gymnasium_envs  # noqa: F401  (registers the environments)
+import kiks
+import kiks.learn.gymnasium_envs  # registers the environments
 
 ROOT = Path(__file__).parents[2]
 
@@ -115,4 +116,4 @@ def test_the_ppo_example_runs(tmp_path: Path) -> None:
     program = [sys.executable, str(ROOT / "examples/learning/ppo_avoid.py"), "--steps", "4096"]
     output = subprocess.run(program, capture_output=True, text=True, check=True, cwd=tmp_path).stdout
     assert [line.split(":")[0] for line in output.splitlines()] == ["before", "after", "on the wire"]
-    assert (tmp_path / "ppo_avoid.npy").is_file()
+    assert kiks.Champion.load(tmp_path / "ppo_avoid.toml").algorithm == "PPO"

@@ -14,6 +14,8 @@ import kiks
 from kiks.clock.thinking import parse_thinking, save_thinking
 from kiks.errors import SHOWN_MAX, KiksError
 from kiks.learn.evolution_log import Folder, Identity
+from kiks.learn.results import ExamScore, Result, load_result
+from kiks.model.project import Project
 from kiks.model.thesis_networks import NetworkResponse
 
 LINEAR = kiks.controllers.linear()
@@ -22,7 +24,8 @@ TASK = 'task = 1\nbase = "avoid"\nname = "mine"\nseconds = 2.5\nworlds = 6\nbaud
 
 
 def champion(path: Path) -> None:
-    kiks.Champion(LINEAR, (0.5,) * 18, task="avoid", fitness=1.0, measures={"contacts": 2.0}).save(path)
+    world = Project(kiks.Arena.box(300, 300))
+    kiks.Champion(LINEAR, (0.5,) * 18, task="avoid", fitness=1.0, measures={"contacts": 2.0}, world=world).save(path)
 
 
 def identity(path: Path) -> None:
@@ -30,10 +33,26 @@ def identity(path: Path) -> None:
     Folder(path.parent).check_identity(IDENTITY)
 
 
+def result(path: Path) -> None:
+    curve = {"generations": 0, "evaluations": (8,), "champion_fitness": (0.5,)}
+    costs = {
+        "fitness": 0.5,
+        "generation": 1,
+        "seconds": 2.0,
+        "standing": 0.0,
+        "random": 0.1,
+        "population": 8,
+        "seed": 3,
+    }
+    names = dict.fromkeys(("task", "worlds_digest", "algorithm", "controller", "kiks"), "name")
+    Result(result=1, **names, **costs, **curve, exam=ExamScore(1, 20, 2, 200, "Exam")).save(path.parent)
+
+
 KINDS: dict[str, tuple[Callable[[Path], object], Callable[[Path], object]]] = {
     "champion.toml": (champion, kiks.Champion.load),
     "task.toml": (lambda path: path.write_text(TASK), lambda path: kiks.tasks.load(str(path))),
     "evolution.json": (identity, lambda path: Folder(path.parent).check_identity(IDENTITY)),
+    "result.json": (result, lambda path: load_result(path.parent)),
     "networks.json": (lambda path: NetworkResponse.load().save(path), NetworkResponse.load),
     "times.txt": (lambda path: save_thinking([12_345] * 20, path), lambda path: parse_thinking(f"replay:{path}")),
 }

@@ -133,7 +133,9 @@ def _uploaded(path: Path) -> None:
 
 def _champion(path: Path) -> None:
     champion = kiks.Champion.load(path)
-    sim, ports = champion.simulation(_BOX, seed=1)
+    world = champion.world
+    is_small = world is None or (world.arena.brightness.size <= CELLS_MAX and len(world.robots) <= 20)
+    sim, ports = champion.simulation(None if is_small else _BOX, seed=1)
     driver = champion.driver(ports)
     for _ in range(3):
         driver.step()
@@ -145,7 +147,7 @@ def _evolution(path: Path) -> None:
     evolution = kiks.Evolution(_task(), "ga", seed=3, population=4, folder=folder)
     evolution.ask()
     if evolution.generations:
-        evolution.champion._text({})
+        evolution.champion._text({}, {})
 
 
 def _network(path: Path) -> None:
