@@ -108,13 +108,14 @@ def test_a_contest_on_the_wire_equals_that_of_the_batch() -> None:
     contest, seed = small(seconds=5.0), 7
     pair = pairs_of(contest, 1)
     starts = starts_of(np.array([seed]), contest.arenas, 1, radius_mm=27.5, robots=2, apart_mm=contest.apart_mm)
-    batch = kiks.Batch(contest.arenas[0], 1, robots=2, seed=seed, starts=starts)
+    batch = kiks.Batch(contest.arenas[0], 1, robots=2, seed=seed, starts=starts, timing=contest.timing)
     batch.run(contest.controllers, contest.parameters_of(pair), seconds=5.0)
     room = replace(contest.arenas[0], starts=tuple(Pose(*pose) for pose in starts[0].tolist()))
     sim = kiks.Simulation(room, robots=2, seed=seed)
+    sim.fit(1, "k213")
     ports = [sim.port(1), sim.port(2)]
     for port in ports:
-        port.baudrate = 9600
+        port.baudrate = contest.timing.baud
     driver = Driver(ports, contest.controllers, [each[0] for each in contest.parameters_of(pair)])
     while driver.begin_ns < 5e9:
         driver.step()

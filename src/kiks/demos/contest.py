@@ -61,7 +61,11 @@ class ContestScene(Scene):
         poses = contest.start_poses(np.array([self.seed]))
         if poses is not None:
             arena = replace(arena, starts=tuple(Pose(*pose) for pose in poses[0].tolist()))
-        return Simulation(arena, robots=len(kinds), seed=self.seed, robot=kinds, thinking=thinking)
+        sim = Simulation(arena, robots=len(kinds), seed=self.seed, robot=kinds, thinking=thinking)
+        for number, side in enumerate(self._sides, 1):
+            if "camera" in self.champions[side].controller.senses:
+                sim.fit(number, "k213")
+        return sim
 
     def prepare(self) -> None:
         """Put the champions at the wheels."""

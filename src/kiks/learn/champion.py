@@ -137,7 +137,7 @@ class Champion:
     def simulation(
         self, arena: Arena | None = None, *, robots: int | None = None, seed: int | None = None
     ) -> tuple[Simulation, list[Port]]:
-        """Return a simulation with its kind of robot and its timing, and the ports of the robots.
+        """Return a simulation with its kind of robot, which has its senses, and its timing; and the robots' ports.
 
         Args:
             arena: The arena; its own world if left out, or the default box if it has none.
@@ -156,6 +156,8 @@ class Champion:
         sim = simulation_of(project, kinds=[self.robot], thinking=f"fixed:{think_s * 1e3:g}" if think_s else "none")
         ports: list[Port] = []
         for number in range(1, count + 1):
+            if "camera" in self.controller.senses:
+                sim.fit(number, "k213")
             port = sim.port(number)
             port.baudrate = self.baud
             ports.append(port)

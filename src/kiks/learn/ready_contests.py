@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kiks.batch.loop_timing import Timing
 from kiks.control import controllers, measures
 from kiks.learn.contest import Contest, Side
 from kiks.model.arena import Arena
@@ -32,8 +33,14 @@ PURSUIT_APART_MM = 100.0
 """Least gap between predator and prey at the start [mm], beyond the range of the proximity sensors."""
 
 
+PURSUIT_BAUD = 38400
+"""Speed of the lines [bit/s]: a picture takes 22 ms."""
+
+
 def pursuit(*, seconds: float = PURSUIT_S, **changes: Any) -> Contest:
     """Return the contest of a predator and a prey that is twice as fast (Floreano and Nolfi 1997).
+
+    Both sense proximity. The predator has a camera, too, and sees the prey dark before white walls.
 
     The prey's fitness is the share of the time for which it was not caught, the predator's is the rest. What the
     robots do after the first contact does not count.
@@ -50,7 +57,7 @@ def pursuit(*, seconds: float = PURSUIT_S, **changes: Any) -> Contest:
     def predator_fitness(values: Values) -> Floats:
         return 1.0 - prey_fitness(values)
 
-    predator = controllers.mlp(hidden=(), feedback=True, speed_limit=PREDATOR_SPEED)
+    predator = controllers.mlp(hidden=(), feedback=True, senses=("proximity", "camera"), speed_limit=PREDATOR_SPEED)
     prey = controllers.mlp(hidden=(), feedback=True, speed_limit=PREY_SPEED)
     contest = Contest(
         "pursuit",
@@ -59,6 +66,7 @@ def pursuit(*, seconds: float = PURSUIT_S, **changes: Any) -> Contest:
         (measures.escaped_s(radius_mm=CAUGHT_MM), measures.path_mm, measures.contacts),
         seconds=seconds,
         apart_mm=PURSUIT_APART_MM,
+        timing=Timing(baud=PURSUIT_BAUD),
         about="predator and prey, which evolve against each other",
     )
     return replace(contest, **changes)
