@@ -18,9 +18,10 @@ from kiks.batch.loop import roll_out
 from kiks.batch.loop_timing import Timing
 from kiks.batch.measure_slots import MeasureSlots
 from kiks.batch.rollouts import Rollouts
-from kiks.control.controller import SENSES, Controller, check_senses, reading_count
+from kiks.control.controller import Controller
 from kiks.control.measure import Measure
 from kiks.control.robot_controllers import robot_controllers
+from kiks.control.senses import SENSES, check_senses, reading_count
 from kiks.engine.bunch import worlds_in_bunch
 from kiks.engine.scene import Scene, enter_worlds
 from kiks.engine.simd.lanes import LANES

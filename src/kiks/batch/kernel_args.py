@@ -30,4 +30,4 @@ Worlds: Any = namedtuple(
 """
 
 PROXIMITY, AMBIENT, CAMERA = range(3)
-"""Senses in the order of `kiks.control.controller.SENSES`."""
+"""Senses in the order of `kiks.control.senses.SENSES`."""

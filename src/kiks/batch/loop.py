@@ -13,8 +13,9 @@ import numpy as np
 from kiks.batch.callbacks import call_decider, call_measure
 from kiks.batch.kernel_args import AMBIENT, CAMERA, PROXIMITY
 from kiks.batch.loop_timing import ASK_LENGTHS, LENGTHS, acts_at, answer_length, order_length
-from kiks.control.controller import SENSES, whole_speed
+from kiks.control.controller import whole_speed
 from kiks.control.measure import Moment
+from kiks.control.senses import SENSES
 from kiks.engine.bunch import give_back, make_lanes, make_room, robot_in, show_tracks, take
 from kiks.engine.compiling import entry, inlined, kernel, spliced
 from kiks.engine.physics.motor import command_speed

@@ -15,7 +15,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from kiks.control.controller import SENSES
+from kiks.control.senses import SENSES
 from kiks.engine.compiling import kernel
 from kiks.errors import ParameterError
 from kiks.model.data_file import Number, Whole, record

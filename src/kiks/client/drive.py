@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from kiks.client.khepera import Khepera
 from kiks.client.port import Port
-from kiks.control.controller import SENSES, Controller, reading_count, whole_speeds
+from kiks.control.controller import Controller, whole_speeds
 from kiks.control.robot_controllers import robot_controllers
+from kiks.control.senses import SENSES, reading_count
 from kiks.errors import ParameterError
 from kiks.model.checks import SECONDS_MAX, check_number
 from kiks.units import ns_from_s, s_from_ns

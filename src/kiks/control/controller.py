@@ -6,48 +6,20 @@ The same function runs compiled in a batch and drives one robot on any port, sim
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, NamedTuple, overload
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kiks.control.compiled_function import Compiled
 from kiks.control.controller_spec import recipe_of
+from kiks.control.senses import check_senses, reading_count
 from kiks.engine.compiling import entry, kernel
 from kiks.engine.physics.motor import SPEED_MAX
-from kiks.engine.state import PIXEL_COUNT
-from kiks.errors import ParameterError, nearest, shown
+from kiks.errors import ParameterError, shown
 from kiks.model.array_checks import check_numbers
 from kiks.model.checks import check_count
-from kiks.model.robot import SENSOR_COUNT
-
-
-class Sense(NamedTuple):
-    """A sense of controllers.
-
-    Attributes:
-        command: The command that reads it.
-        size: Number of its readings.
-        most: The largest reading.
-    """
-
-    command: str
-    size: int
-    most: int
-
-    @property
-    def request(self) -> bytes:
-        """The command as it is sent."""
-        return f"{self.command}\n".encode()
-
-
-SENSES = {
-    "proximity": Sense("N", SENSOR_COUNT, 1023),  # khepera-protocol.md 8.4
-    "ambient": Sense("O", SENSOR_COUNT, 1023),
-    "camera": Sense("T,2,T", PIXEL_COUNT // 4, 255),  # every fourth grey of a K213 (khepera-protocol.md 10.3)
-}
-"""The senses of controllers, in the order of their numbers in kernels."""
 
 ARGUMENTS = ("sensors", "memory", "parameters", "wheels")
 
@@ -179,28 +151,3 @@ def whole_speed(wanted: Any) -> Any:
 def whole_speeds(wheels: Any) -> Any:
     """Return the speeds to send for two wanted ones [pulses/10 ms]."""
     return whole_speed(wheels[0]), whole_speed(wheels[1])
-
-
-def reading_count(senses: Sequence[str]) -> int:
-    """Return the number of readings of some senses together."""
-    return sum(SENSES[sense].size for sense in senses)
-
-
-def check_senses(senses: str | Sequence[str]) -> tuple[str, ...]:
-    """Return some of `SENSES`.
-
-    Raises:
-        ParameterError: If there is another among them, or one twice.
-    """
-    if not isinstance(senses, Iterable):
-        raise ParameterError(f"senses must be some of {', '.join(SENSES)}, but they were {shown(senses)}.")
-    given = (senses,) if isinstance(senses, str) else tuple(senses)
-    for sense in given:
-        if not isinstance(sense, str) or sense not in SENSES:
-            raise ParameterError(
-                f"senses must be some of {', '.join(SENSES)}, but {shown(sense)} was among them."
-                f"{nearest(shown(sense), SENSES)}"
-            )
-    if len(set(given)) != len(given):
-        raise ParameterError(f"senses must name each sense once, but they were {given}.")
-    return given

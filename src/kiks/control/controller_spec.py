@@ -18,9 +18,10 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
 
 from kiks.control.controller_kinds import ControllerKind
+from kiks.control.senses import SENSES
 from kiks.errors import ParameterError, nearest, shown
 from kiks.model.atomic_files import program_in
-from kiks.model.data_file import Number, Rule, Switch, Text, Whole, record
+from kiks.model.data_file import Number, OneOf, Rule, Switch, Text, Whole, record
 
 SPEED_LIMIT = 10.0
 """Default speed of an output of 1 [pulses/10 ms]: 80 mm/s."""
@@ -44,8 +45,8 @@ def _each_once(senses: tuple[str, ...]) -> tuple[str, ...]:
 
 
 Senses = Annotated[
-    tuple[Literal["proximity", "ambient"], ...],
-    Field(min_length=1, description="Each is eight counts."),
+    tuple[Annotated[str, OneOf(tuple(SENSES))], ...],
+    Field(min_length=1, description="Proximity and ambient light are eight counts each, the camera is sixteen greys."),
     AfterValidator(_each_once),
     BeforeValidator(lambda given: (given,) if isinstance(given, str) else given),
 ]

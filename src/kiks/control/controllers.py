@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.control import neural_nets
-from kiks.control.controller import Controller, reading_count
+from kiks.control.controller import Controller
 from kiks.control.controller_kinds import ControllerKind
 from kiks.control.controller_spec import (
     PERIOD_S,
@@ -39,6 +39,7 @@ from kiks.control.controller_spec import (
     find,
     relative_to,
 )
+from kiks.control.senses import reading_count
 from kiks.engine.numbers import tanh
 from kiks.errors import ParameterError, shown
 from kiks.model.checks import check_count, check_kind

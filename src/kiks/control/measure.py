@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.control.compiled_function import Compiled
-from kiks.control.controller import check_senses
+from kiks.control.senses import check_senses
 from kiks.errors import ParameterError, shown
 from kiks.model.checks import check_count
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from kiks.control.controller import SENSES, reading_count
+from kiks.control.senses import SENSES, reading_count
 from kiks.engine.compiling import inlined, kernel
 from kiks.engine.numbers import exponential, tanh
 from kiks.engine.simd.stack_arrays import stack_floats

@@ -13,9 +13,9 @@ from pydantic import BeforeValidator, Field
 
 from kiks.batch.initial_state import Arenas, Starts
 from kiks.batch.loop_timing import Timing
-from kiks.control.controller import check_senses, reading_count
 from kiks.control.measure import Measure, measure
 from kiks.control.measures import avoidance, light_approach, near_light_share, nearest_lamp_mm
+from kiks.control.senses import check_senses, reading_count
 from kiks.engine.physics.motor import SPEED_MAX
 from kiks.errors import ParameterError, nearest, shown
 from kiks.learn import ready_tasks

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from kiks.batch.batch import Batch
 from kiks.batch.initial_state import random_starts
-from kiks.control.controller import SENSES
 from kiks.control.measures import contacts, path_mm
+from kiks.control.senses import SENSES
 from kiks.drawing import draw_world
 from kiks.errors import ParameterError
 from kiks.learn.env_specs import EnvSpec

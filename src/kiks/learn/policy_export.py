@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.control import controllers
-from kiks.control.controller import SENSES, reading_count
 from kiks.control.neural_nets import DARK_COUNTS
+from kiks.control.senses import SENSES, reading_count
 from kiks.errors import ParameterError, shown
 from kiks.learn.champion import Champion
 from kiks.learn.env_specs import EnvSpec, env_spec_of
