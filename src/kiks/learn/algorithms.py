@@ -263,11 +263,11 @@ class Novelty(CmaMe):
 
 
 ALGORITHMS: dict[str, type[Cma] | type[Ga] | type[MapElites] | type[CmaMe]] = {
-    AlgorithmName.CMA: Cma,
-    AlgorithmName.GA: Ga,
-    AlgorithmName.MAP_ELITES: MapElites,
-    AlgorithmName.CMA_ME: CmaMe,
-    AlgorithmName.NOVELTY: Novelty,
+    AlgorithmName.CMA.value: Cma,
+    AlgorithmName.GA.value: Ga,
+    AlgorithmName.MAP_ELITES.value: MapElites,
+    AlgorithmName.CMA_ME.value: CmaMe,
+    AlgorithmName.NOVELTY.value: Novelty,
 }
 """The algorithms by their names."""
 

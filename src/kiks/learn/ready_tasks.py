@@ -407,7 +407,7 @@ def maze(controller: Controller | None = None, **changes: Any) -> Task:
         # Larger parameters saturate the wheels: then the robot turns on the spot or shuttles.
         spread=1.0,
         algorithm="map-elites",
-        generations=125,
+        generations=250,
         population=200,
         exam=Exam(
             (training_arenas.kheperax(),),

@@ -131,7 +131,7 @@ class Task:
     timing: Timings = field(default_factory=Timing)
     starts: Starts = "random"
     spread: Annotated[Number, Field(gt=0, le=1000)] = SPREAD
-    algorithm: Annotated[str, OneOf(tuple(AlgorithmName))] = AlgorithmName.CMA
+    algorithm: Annotated[str, OneOf(tuple(name.value for name in AlgorithmName))] = AlgorithmName.CMA.value
     generations: Annotated[Whole, Field(ge=1)] = GENERATIONS
     population: Annotated[Whole, Field(ge=4)] = POPULATION
     exam: Annotated[Exam | None, Field(description="kiks.Exam(arenas, measures, solved) makes one.")] = None
