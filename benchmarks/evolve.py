@@ -45,14 +45,11 @@ def swarm_task() -> kiks.Task:
     room = kiks.Arena.box(SWARM_MM, SWARM_MM)
     places = random_starts(room, SWARM, seed=1, clear_mm=50)[:, :2].tolist()
     balls = tuple(Ball(x_mm, y_mm) for x_mm, y_mm in places)
-    middle_mm = SWARM_MM / 2
-    counted = (kiks.measures.gathered(middle_mm, middle_mm, radius_mm=300), kiks.measures.spread_mm)
     return kiks.tasks.gather(
         arenas=(replace(room, balls=balls),),
         robots=SWARM,
         worlds=1,
         starts="arena",
-        measures=(*counted, kiks.measures.contacts, kiks.measures.path_mm),
         exam=None,
     )
 

@@ -217,56 +217,82 @@ def light(controller: Controller | None = None, **changes: Any) -> Task:
 
 # ---- gather ----
 
-GATHERED = 4
-"""Cylinders in the middle that are enough to pass the exam, of six."""
+GATHER_SPEED_LIMIT = 15.0
+"""Highest speed of `gather` [pulses/10 ms]: 120 mm/s. Contacts do no harm here, and a faster robot meets more."""
+
+CYLINDERS, GATHERED = 5, 4
+"""Cylinders of `gather`, and those that must be together to pass the exam."""
+
+GROUP_MM, APART_MM = 150.0, 170.0
+"""Distance from one of them within which cylinders are together, and their least distance at the start [mm]."""
+
+FROM_WALL_MM = 90.0
+"""Least distance of cylinders from the outside of a room's walls [mm]: there a robot can get behind them."""
+
+CLOSENESS_WEIGHT = 5.0
+"""Cylinders in a group that a `closeness` of 1 is worth."""
 
 
 def gather_fitness(values: Values) -> Floats:
-    """Return the fitness of `gather`."""
-    return cautious_mean(values["gathered"] - values["spread_mm"] / 1000)
+    """Return the fitness of `gather`: cylinders in the largest group, and how close they all are, wherever it is."""
+    return cautious_mean(values["largest_group"] + CLOSENESS_WEIGHT * values["closeness"])
 
 
 def gather(controller: Controller | None = None, **changes: Any) -> Task:
-    """Return the task to push cylinders to the middle of a room.
+    """Return the task to push cylinders together, wherever that is.
+
+    A robot that senses proximity alone cannot know where the middle of a room is, but it notices what is near others
+    (Maris and te Boekhorst, Exploiting physical constraints: heap formation through behavioral error in a group of
+    robots, 1996).
 
     Args:
-        controller: The controller to evolve; gated recurrent units, which have a memory, if left out.
+        controller: The controller to evolve; a perceptron with feedback if left out.
         changes: Other arguments of `Task`.
     """
+    default = controllers.mlp(hidden=(), feedback=True, speed_limit=GATHER_SPEED_LIMIT)
     task = Task(
         "gather",
-        tuple(_with_cylinders(number) for number in range(3)),
-        controllers.gru(units=4, speed_limit=SPEED_LIMIT) if controller is None else controller,
-        (measures.gathered(300, 300, radius_mm=150), measures.spread_mm, measures.contacts, measures.path_mm),
+        tuple(room_with_cylinders(600, seed) for seed in range(8)),
+        default if controller is None else controller,
+        (measures.largest_group(GROUP_MM), measures.closeness, measures.contacts, measures.path_mm),
         fitness=gather_fitness,
         seconds=90.0,
-        worlds=12,
-        axes=(Axis("spread_mm", 0, 300), Axis("path_mm", 0, 6000)),
+        worlds=8,
+        axes=(Axis("closeness", 0, 0.6), Axis("path_mm", 0, 10_000)),
+        generations=120,
         exam=Exam(
-            tuple(_with_cylinders(number) for number in (3, 4)),
-            (measures.gathered(300, 300, radius_mm=150),),
+            tuple(room_with_cylinders(side_mm, 100 + k) for k, side_mm in enumerate((600, 560, 640, 680))),
+            (measures.largest_group(GROUP_MM),),
             gather_solved,
-            "brought four of six cylinders to the middle",
+            "brought four of five cylinders together",
         ),
-        about="push six cylinders to the middle",
+        about="push five cylinders together",
     )
     return replace(task, **changes)
 
 
 def gather_solved(values: Values) -> NDArray[np.bool_]:
-    """Return whether most cylinders were brought to the middle."""
-    return values["gathered"] >= GATHERED
+    """Return whether most cylinders were brought together."""
+    return values["largest_group"] >= GATHERED
 
 
-def _with_cylinders(number: int) -> Arena:
-    """Return an arena with six cylinders around its middle, placed differently for each number."""
-    angles = np.arange(6) * np.pi / 3 + number * 0.4
-    away_mm = 170.0 + 15.0 * ((np.arange(6) + number) % 3)
-    places = zip(300 + away_mm * np.cos(angles), 300 + away_mm * np.sin(angles), strict=True)
+def room_with_cylinders(side_mm: int, seed: int) -> Arena:
+    """Return a square room with cylinders that are far from each other and from walls, placed at random.
+
+    Args:
+        side_mm: Side of the room [mm]; smaller rooms than 500 mm may have no room for them.
+        seed: Seed of the random generator.
+    """
+    rng = np.random.default_rng(seed)
+    rows, columns = np.tril_indices(CYLINDERS, -1)
+    while True:
+        places_mm = rng.uniform(FROM_WALL_MM, side_mm - FROM_WALL_MM, (CYLINDERS, 2))
+        if np.linalg.norm(places_mm[rows] - places_mm[columns], axis=1).min() >= APART_MM:
+            break
     return replace(
-        Arena.box(600, 600),
-        name=f"cylinders {number + 1}",
-        cylinders=tuple(Cylinder(float(x), float(y)) for x, y in places),
+        Arena.box(side_mm, side_mm),
+        name=f"cylinders {seed}",
+        cylinders=tuple(Cylinder(x_mm, y_mm) for x_mm, y_mm in places_mm.tolist()),
     )
 
 
