@@ -238,11 +238,11 @@ def gather_fitness(values: Values) -> Floats:
 
 
 def gather(controller: Controller | None = None, **changes: Any) -> Task:
-    """Return the task to push cylinders together, anywhere.
+    """Return the task to push cylinders together, wherever that is.
 
-    Source: Maris and te Boekhorst, Exploiting physical constraints: heap formation through behavioral error, 1996.
-
-    A robot that senses proximity alone cannot know where the middle of a room is, but it notices what is near others.
+    A robot that senses proximity alone cannot know where the middle of a room is, but it notices what is near others
+    (Maris and te Boekhorst, Exploiting physical constraints: heap formation through behavioral error in a group of
+    robots, 1996).
 
     Args:
         controller: The controller to evolve; a perceptron with feedback if left out.
