@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -41,11 +42,19 @@ def arena(**things: Any) -> kiks.Arena:
 
 
 def drive_alone(
-    where: kiks.Arena, seed: int, timing: kiks.Timing, controller: Any, parameters: Any, **sim_options: Any
+    where: kiks.Arena,
+    seed: int,
+    timing: kiks.Timing,
+    controller: Any,
+    parameters: Any,
+    cameras: Sequence[int] = (),
+    **sim_options: Any,
 ) -> tuple[int, str]:
     """Return the loops of a drive on the wire, and the hash when it ended, before the robot was stopped."""
     assert timing.baud is not None
     sim = kiks.Simulation(where, seed=seed, thinking=f"fixed:{timing.think_s * 1e3}", **sim_options)
+    for number in cameras:
+        sim.fit(number, "k213")
     ports = [sim.port(number + 1) for number in range(sim.robot_count)]
     hashes = []
     for port in ports:
@@ -108,6 +117,32 @@ def test_one_program_with_a_controller_for_each_robot() -> None:
     rollouts = batch.run(controllers, parameters, seconds=8.0)
     for world in range(2):
         found = drive_alone(arena(ball=True), 5 + world, timing, controllers, parameters, robots=3)
+        assert found == (rollouts.step_counts[world], batch.state_hash(world))
+
+
+@kiks.controller(senses=("proximity", "camera"))
+def gaze(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+    """Turn to the brighter side of the picture, away from what is near."""
+    left, right = sensors[8:16].sum(), sensors[16:24].sum()
+    wheels[0] = 6.0 + (right - left) / 150.0 - sensors[4] / 100.0
+    wheels[1] = 6.0 + (left - right) / 150.0 - sensors[1] / 100.0
+
+
+@kiks.controller(senses=("camera",))
+def gaze_only(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+    """Turn to the darker side of the picture."""
+    wheels[0], wheels[1] = 4.0 + sensors[12:].sum() / 500.0, 4.0 + sensors[:4].sum() / 500.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("timing", [kiks.Timing(0.1, 19200), kiks.Timing(0.03, 57600)], ids=["100 ms", "30 ms"])
+@pytest.mark.parametrize("controllers", [[gaze, wander], [gaze_only, gaze_only]], ids=["one camera", "two"])
+def test_pictures_are_those_of_the_wire(timing: kiks.Timing, controllers: list[kiks.Controller]) -> None:
+    batch = kiks.Batch(arena(ball=True), worlds=11, robots=2, seed=7, timing=timing)
+    rollouts = batch.run(controllers, [[1.0], [1.0]], seconds=8.0)
+    for world in (0, 10):
+        cameras = [number for number, each in enumerate(controllers, 1) if "camera" in each.senses]
+        found = drive_alone(arena(ball=True), 7 + world, timing, controllers, [[1.0], [1.0]], cameras, robots=2)
         assert found == (rollouts.step_counts[world], batch.state_hash(world))
 
 

@@ -44,6 +44,7 @@ def test_a_run_leaves_its_files_and_goes_on(folder: Path) -> None:
     said = kiks("evolve", task, "--seed", 1, "--population", 8, "--generations", 4, "--out", folder).output
     assert "Continuing after generation 3" in said
     assert re.search(r"\nExam: (not )?solved, \d+ of 20 starts \(got around", said)
+    assert re.search(r"\nWith ten imperfect robots: \d+ of 200 starts\n", said)
     with pytest.raises(KiksError, match="must hold the same evolution, but its seed is 1, not 2"):
         kiks("evolve", task, "--seed", 2, "--population", 8, "--generations", 4, "--out", folder)
 
@@ -103,3 +104,71 @@ def test_two_sides_evolve_and_are_shown(tmp_path: Path, monkeypatch: pytest.Monk
 def test_wrong_words_are_named(words: tuple[str, ...], said: str) -> None:
     with pytest.raises(KiksError, match=said):
         kiks(*words)
+
+
+@pytest.mark.slow
+def test_champions_are_shown_in_their_world(folder: Path, tmp_path: Path) -> None:
+    from kiks import Champion
+
+    champion, picture = folder / "champion.toml", tmp_path / "shown.png"
+    said = kiks("demo", champion, "--seconds", 1, "--picture", picture).output
+    assert f"Seed {2**40}, state" in said
+    assert "names no world" not in said
+    text = champion.read_text()
+    champion.write_text(text.replace('world = "champion_world.kiks"\n', ""))
+    assert Champion.load(champion).world is None
+    for command in (("demo", champion, "--picture", picture), ("run", champion)):
+        assert "names no world, so it drives in the default box" in kiks(*command, "--seconds", 1).output
+        assert "names no world" not in kiks(*command, "--seconds", 1, "--arena", "examples/arenas/maze.toml").output
+
+
+@pytest.mark.slow
+def test_a_folder_is_its_champion_or_one_of_a_generation(folder: Path, tmp_path: Path) -> None:
+    picture, task = tmp_path / "shown.png", folder.parent / "quick.py"
+    said = [
+        kiks("demo", shown, "--seconds", 2, "--picture", picture).output.partition("Picture")[2]
+        for shown in (folder, folder / "champion.toml")
+    ]
+    assert said[0] == said[1]
+    words = ("demo", folder, "--generation", 2, "--picture", picture)
+    once = kiks(*words, "--rank", 3, "--world", 1, "--task", task).output
+    assert re.search(r"Candidate \d of generation 2: rank 3, fitness \d", once)
+    assert "1.0 s" in once
+    for more, message in (
+        ((), "quick.py' is a Python file. Give it: --task FILE"),
+        (("--task", task, "--rank", 9), "rank must be a whole number from 1 to 8"),
+        (("--task", task, "--seed", 1), "--seed must be left out with --generation"),
+    ):
+        with pytest.raises(KiksError, match=message):
+            kiks(*words, *more)
+    with pytest.raises(KiksError, match="--rank must come with --generation"):
+        kiks("demo", folder, "--rank", 2)
+    with pytest.raises(KiksError, match="--generation must come with the folder of an evolution"):
+        kiks("demo", "avoid", "--generation", 2)
+    with pytest.raises(KiksError, match=r"champion.toml' must exist"):
+        kiks("demo", tmp_path)
+
+
+@pytest.mark.slow
+def test_seeds_evolve_one_after_another_and_are_compared(folder: Path, tmp_path: Path) -> None:
+    task, out = folder.parent / "quick.py", tmp_path / "two"
+    words = ("evolve", task, "--population", 8, "--generations", 3, "--seed", 1, "--out", out)
+    said = kiks(*words, "--seeds", 2).output
+    assert {path.name for path in out.iterdir()} == {"seed-1", "seed-2", "seeds.png", "summary.json"}
+    assert (out / "seed-1/champion.toml").read_bytes() == (folder / "champion.toml").read_bytes()
+    assert re.search(r"\n 1 +-?\d\.\d{4} +\d +\d+ of 20 +\d+ of 200 +40 ", said)
+    assert re.search(r"\n all +-?\d\.\d{4} +\d of 2 +40 ", said)
+    again = kiks(*words, "--seeds", 3).output
+    assert "Continuing after generation 3" in again
+    assert (out / "seed-3/result.json").exists()
+    compared = kiks("compare", out, folder, "--picture", tmp_path / "compared.png").output
+    assert re.search(r"Fitness: U = [\d.]+, p = [\d.]+, A = \d\.\d\d \(\w+\)", compared)
+    assert re.search(r"Exam: U = ", compared)
+    assert (tmp_path / "compared.png").exists()
+
+
+def test_folders_that_cannot_be_compared_are_errors(tmp_path: Path) -> None:
+    with pytest.raises(KiksError, match="SECOND must be another folder than FIRST"):
+        kiks("compare", tmp_path, tmp_path)
+    with pytest.raises(KiksError, match="must be a folder of `kiks evolve`, but it holds no evolution"):
+        kiks("compare", tmp_path, tmp_path / "other")

@@ -19,7 +19,7 @@ from kiks import ParameterError
 from kiks.client.drive import Driver
 from kiks.learn.candidate_worlds import starts_of
 from kiks.learn.coevolution import _TOURNAMENT_SEED, Tournament
-from kiks.learn.generation_loop import seed_for
+from kiks.learn.evolution import derived_seed
 from kiks.learn.ready_contests import CAUGHT_MM, PREY_SPEED
 from kiks.model.arena import Pose
 
@@ -108,13 +108,14 @@ def test_a_contest_on_the_wire_equals_that_of_the_batch() -> None:
     contest, seed = small(seconds=5.0), 7
     pair = pairs_of(contest, 1)
     starts = starts_of(np.array([seed]), contest.arenas, 1, radius_mm=27.5, robots=2, apart_mm=contest.apart_mm)
-    batch = kiks.Batch(contest.arenas[0], 1, robots=2, seed=seed, starts=starts)
+    batch = kiks.Batch(contest.arenas[0], 1, robots=2, seed=seed, starts=starts, timing=contest.timing)
     batch.run(contest.controllers, contest.parameters_of(pair), seconds=5.0)
     room = replace(contest.arenas[0], starts=tuple(Pose(*pose) for pose in starts[0].tolist()))
     sim = kiks.Simulation(room, robots=2, seed=seed)
+    sim.fit(1, "k213")
     ports = [sim.port(1), sim.port(2)]
     for port in ports:
-        port.baudrate = 9600
+        port.baudrate = contest.timing.baud or 0
     driver = Driver(ports, contest.controllers, [each[0] for each in contest.parameters_of(pair)])
     while driver.begin_ns < 5e9:
         driver.step()
@@ -161,13 +162,13 @@ def test_wrong_sides_and_pairs_are_errors() -> None:
     with pytest.raises(ParameterError, match="must state the number of its parameters"):
         kiks.Side("prey", any_number)
     contest = small()
-    with pytest.raises(ParameterError, match=r"a pair must have 44 parameters \(22 of the predator and 22 of the prey"):
+    with pytest.raises(ParameterError, match=r"a pair must have 76 parameters \(54 of the predator and 22 of the prey"):
         contest.evaluate(np.zeros((1, 43)), np.zeros(1, np.int64), 1)
     broken = small(sides=(replace(predator, fitness=lambda values: values["path_mm"]), prey))
     with pytest.raises(ParameterError, match="fitness must return a finite number for each of 2 candidates"):
-        broken.evaluate(np.zeros((2, 44)), np.zeros(2, np.int64), 1)
+        broken.evaluate(np.zeros((2, 76)), np.zeros(2, np.int64), 1)
     with pytest.raises(ParameterError, match="must have room for 2 robots"):
-        small(apart_mm=600.0).evaluate(np.zeros((1, 44)), np.zeros(1, np.int64), 1)
+        small(apart_mm=600.0).evaluate(np.zeros((1, 76)), np.zeros(1, np.int64), 1)
 
 
 # ---- co-evolution ----
@@ -202,7 +203,7 @@ def test_fitness_is_the_mean_over_the_contests_of_a_candidate() -> None:
             assert told[candidate, number] == (second if name.startswith("prey") else first)[number]
     best = int(told[:, 1].argmax())
     assert coevolution.champion("prey").fitness == told[best, 1]
-    assert coevolution.champion("prey").parameters == tuple(coevolution.generations[0].candidates[best, 22:])
+    assert coevolution.champion("prey").parameters == tuple(coevolution.generations[0].candidates[best, 54:])
 
 
 def test_a_resumed_coevolution_equals_one_that_never_stopped(tmp_path: Path) -> None:
@@ -308,7 +309,7 @@ def test_the_tournament_equals_a_loop_over_all_pairs() -> None:
                 *coevolution.champion("prey", second + 1).parameters,
             ]
             numbers = [4 * trial + (first + second) % 4 for trial in range(2)]
-            seeds = np.array([seed_for(3, _TOURNAMENT_SEED, number) for number in numbers])
+            seeds = np.array([derived_seed(3, _TOURNAMENT_SEED, number) for number in numbers])
             values = coevolution.contest.evaluate(np.array([pair, pair]), seeds, 1)
             np.testing.assert_array_equal(tournament.scores[:, first, second], (values[0, :2] + values[1, :2]) / 2)
     np.testing.assert_array_equal(tournament.generations, [1, 2, 3, 4])

@@ -100,14 +100,19 @@ def test_a_killed_evolution_loses_at_most_the_current_generation(tmp_path: Path)
     assert again.champion.parameters == whole.champion.parameters
 
 
-def test_the_log_has_a_row_for_each_candidate(tmp_path: Path) -> None:
+def test_the_log_has_a_row_for_each_evaluation(tmp_path: Path) -> None:
     evolution = run("cma", tmp_path)
     log = parquet.read_table(tmp_path / "log.parquet").to_pydict()
-    assert log["generation"] == [number for number in range(1, 5) for _ in range(8)]
-    assert log["candidate"] == list(range(8)) * 4
-    assert log["fitness"] == [value for each in evolution.generations for value in each.fitness.tolist()]
-    assert {"avoidance", "contacts", "path_mm", "seconds", "evaluations", "champion_fitness"} <= set(log)
-    assert log["evaluations"][-1] == sum(len(each.values) for each in evolution.generations)
+    counts = [8, 16, 16, 16]
+    assert log["generation"] == [number for number, count in enumerate(counts, start=1) for _ in range(count)]
+    assert log["candidate"] == [number for count in counts for number in range(count)]
+    assert log["is_trial"] == [number >= 8 for number in log["candidate"]]
+    assert log["fitness"] == [value for each in evolution.generations for value in each.values[:, 0].tolist()]
+    assert {"avoidance", "contacts", "path_mm", "seconds", "champion_fitness"} <= set(log)
+    assert log["evaluations"] == [sum(counts[:number]) for number in log["generation"]]
+    candidates = np.concatenate([each.candidates for each in evolution.generations])
+    again = small().evaluate(candidates, np.array(log["seed"]), 1)
+    assert again[:, 0].tolist() == log["fitness"]
 
 
 def test_a_folder_of_another_evolution_is_an_error(tmp_path: Path) -> None:
@@ -157,9 +162,10 @@ def test_the_error_names_a_broken_generation_file(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("algorithm", ["ga", "map-elites"])
 def test_save_plot_writes_a_png_file(algorithm: str, tmp_path: Path) -> None:
+    from kiks.learn.baselines import Baselines
     from kiks.learn.evolution_plot import save_plot
 
-    save_plot(run(algorithm), tmp_path / "fitness.png")
+    save_plot(run(algorithm), tmp_path / "fitness.png", Baselines(0.0, 0.1))
     assert (tmp_path / "fitness.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -202,6 +208,87 @@ def test_map_elites_needs_axes() -> None:
 def test_wrong_arguments_are_errors(given: dict[str, Any], message: str) -> None:
     with pytest.raises(ParameterError, match=message):
         kiks.Evolution(small(), **given)
+
+
+class Own:
+    """Proposes normal candidates around the best so far, and keeps everything that it is told."""
+
+    def __init__(self, count: int = 8, **given: Any) -> None:
+        self.rng, self.count, self.given = np.random.default_rng(1), count, given
+        self.mean, self.told = np.zeros(18), list[Any]()
+
+    def ask(self) -> Any:
+        self.candidates = self.mean + self.rng.standard_normal((self.count, 18))
+        return self.given.get("asked", self.candidates)
+
+    def tell(self, fitness: Any, behaviours: Any) -> None:
+        self.told.append((fitness.tolist(), behaviours.shape))
+        self.mean = self.candidates[fitness.argmax()].copy()
+        fitness[:] = 0
+        self.candidates[:] = 0
+
+
+class OwnWithFavourite(Own):
+    def favourite(self) -> Any:
+        return self.given.get("best", np.full(18, 0.5))
+
+
+def test_an_object_with_ask_and_tell_is_an_algorithm(tmp_path: Path) -> None:
+    own = Own()
+    evolution = kiks.Evolution(small(), own, folder=tmp_path)
+    evolution.run(generations=3, executor="threads:1")
+    assert evolution.algorithm is own
+    assert (evolution.population, evolution.champion.algorithm) == (8, "Own")
+    for (fitness, shape), generation in zip(own.told, evolution.generations, strict=True):
+        assert (fitness, shape) == (generation.fitness.tolist(), (8, 2))
+        assert generation.candidates[:8].all()
+    best = evolution.generations[0].candidates[evolution.generations[0].fitness.argmax()]
+    assert (evolution.generations[1].candidates[8:] == best).all()
+    assert candidates_of(kiks.Evolution(small(), Own(), folder=tmp_path)) == candidates_of(evolution)
+    with pytest.raises(ParameterError, match="algorithm is 'Own', not 'OwnWithFavourite'"):
+        kiks.Evolution(small(), OwnWithFavourite(), folder=tmp_path)
+    different = Own()
+    different.rng = np.random.default_rng(2)
+    with pytest.raises(ParameterError, match="would have other candidates here"):
+        kiks.Evolution(small(), different, folder=tmp_path)
+
+
+def test_the_favourite_of_an_own_algorithm_is_tried() -> None:
+    evolution = kiks.Evolution(small(), OwnWithFavourite(), population=8)
+    evolution.tell(np.zeros(len(evolution.ask())))
+    assert (evolution.ask()[8:] == 0.5).all()
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Own(asked=np.zeros((8, 17))), r"candidates of ask\(\) must be numbers of the shape \[any, 18\]"),
+        (lambda: Own(asked=np.zeros(18)), r"candidates of ask\(\) must be numbers of the shape"),
+        (lambda: Own(asked=np.full((8, 18), np.nan)), r"candidates of ask\(\) must be finite"),
+        (lambda: Own(asked=None), r"candidates of ask\(\) must be finite"),
+        (lambda: Own(count=0), r"candidates of ask\(\) must be at least one"),
+        (lambda: Own, "algorithm must be"),
+        (lambda: 3, "algorithm must be"),
+    ],
+)
+def test_wrong_algorithms_are_errors(make: Any, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        kiks.Evolution(small(), make())
+
+
+def test_wrong_later_answers_of_an_algorithm_are_errors() -> None:
+    with pytest.raises(ParameterError, match=r"of the shape \[4, 18\], but their shape was \(8, 18\)"):
+        kiks.Evolution(small(), Own(), population=4)
+    own = Own()
+    evolution = kiks.Evolution(small(), own)
+    evolution.tell(np.zeros(8))
+    own.count = 9
+    with pytest.raises(ParameterError, match=r"of the shape \[8, 18\], but their shape was \(9, 18\)"):
+        evolution.ask()
+    for best in (np.zeros(17), np.full(18, np.nan), None):
+        evolution = kiks.Evolution(small(), OwnWithFavourite(best=best))
+        with pytest.raises(ParameterError, match=r"parameters of favourite\(\) must be"):
+            evolution.tell(np.zeros(8))
 
 
 def test_calls_in_the_wrong_order_are_errors() -> None:

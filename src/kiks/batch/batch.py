@@ -18,7 +18,7 @@ from kiks.batch.loop import roll_out
 from kiks.batch.loop_timing import Timing
 from kiks.batch.measure_slots import MeasureSlots
 from kiks.batch.rollouts import Rollouts
-from kiks.control.controller import SENSES, Controller, check_senses
+from kiks.control.controller import SENSES, Controller, check_senses, reading_count
 from kiks.control.measure import Measure
 from kiks.control.robot_controllers import robot_controllers
 from kiks.engine.bunch import worlds_in_bunch
@@ -29,11 +29,14 @@ from kiks.errors import ParameterError, counted, shown
 from kiks.model.arena import Arena
 from kiks.model.array_checks import array_of, check_numbers
 from kiks.model.checks import SECONDS_MAX, check_count, check_number
-from kiks.model.robot import SENSOR_COUNT, RobotSpec
+from kiks.model.robot import RobotSpec
 from kiks.units import NS_PER_S, ns_from_s
 
 BLOCKS_PER_THREAD = 4
 """Blocks of worlds per thread: with several, no thread waits long for the slowest one."""
+
+NO_PICTURE = -1
+"""Time of the last picture of a camera that has not taken one yet [ns]."""
 
 UNLIMITED = 2**62
 """More half loops than a run has, and a time [ns] after its end."""
@@ -58,7 +61,8 @@ class Batch:
         seed: Seed of world 0, from which the other seeds count up; or a seed for each world, int64 [world].
         starts: Start poses: x_mm, y_mm, heading_rad, float64 [world, robot, 3] or anything that broadcasts to it; the
             start poses of a simulation with the world's seed if left out.
-        senses: Readings that `reset` and `step` return: 'proximity', 'ambient' or both. `run` uses its controller's.
+        senses: Readings that `reset` and `step` return, of 'proximity', 'ambient' and 'camera'. `run` uses its
+            controller's. Robots with the camera carry a K213, which takes a picture every 200 ms.
         measures: Measures for step-by-step use, see `values`; `run` has an argument of its own.
         timing: Timing of the control loop.
         response: Response of the proximity sensors, if not that of the robots' files.
@@ -117,13 +121,15 @@ class Batch:
         self.notes = np.zeros((*shape, self._watching.note_count))
         parts = (
             *(self.timing.line(self.specs[0]), _codes_of(self.senses)),
+            np.full(self.robot_count, len(self.senses)),
+            np.full(self.robot_count, "camera" in self.senses),
             *(np.zeros(self.world_count, np.int64) for _ in range(5)),
-            *(np.zeros((*shape, SENSOR_COUNT * len(self.senses))), np.zeros((*shape, 2)), np.zeros(shape, np.int64)),
+            *(np.zeros((*shape, reading_count(self.senses))), np.zeros((*shape, 2)), np.zeros(shape, np.int64)),
             *(np.zeros((*shape, 0)), np.zeros((*shape, 0)), self.notes),
         )
         self._worlds = Worlds._make(parts)
         self._is_sensed = False
-        self._reset_worlds(np.arange(self.world_count))
+        self._reset_worlds(np.arange(self.world_count), self._worlds.has_camera)
 
     def __repr__(self) -> str:
         robots = counted(self.robot_count, "robot")
@@ -142,8 +148,8 @@ class Batch:
         """Reset all worlds, let controllers drive the robots, and return the values of the measures.
 
         Args:
-            controller: The controller of all robots, or a list with one for each robot of a world. All robots sense
-                what the one with the most senses needs; the senses of the others must come first among these.
+            controller: The controller of all robots, or a list with one for each robot of a world. The senses of each
+                must come first among those of the one that has the most.
             parameters: Its parameters: float64 [parameter] for all robots, [world, parameter] for all of a world, or
                 [world, robot, parameter]. With a list of controllers, a list with the parameters of each: [parameter]
                 or [world, parameter].
@@ -155,13 +161,15 @@ class Batch:
         """
         until_ns = ns_from_s(check_number("seconds", seconds, 0, SECONDS_MAX))
         driving = robot_controllers(controller, parameters, self.world_count, self.robot_count)
-        watching = MeasureSlots(measures, driving.senses, driving.names)
+        watching = MeasureSlots(measures, driving.common_senses, driving.names)
         shape = (self.world_count, self.robot_count)
-        self._reset_worlds(np.arange(self.world_count))
+        self._reset_worlds(np.arange(self.world_count), driving.has_camera)
         self._is_sensed = False
         worlds = self._worlds._replace(
             sense_codes=_codes_of(driving.senses),
-            sensors=np.zeros((*shape, SENSOR_COUNT * len(driving.senses))),
+            sense_counts=driving.sense_counts,
+            has_camera=driving.has_camera,
+            sensors=np.zeros((*shape, reading_count(driving.senses))),
             memory=np.zeros((*shape, driving.memory_count)),
             parameters=driving.parameters,
             notes=np.zeros((*shape, watching.note_count)),
@@ -209,7 +217,7 @@ class Batch:
             self.seeds[chosen] = self._initial_state.check_seeds(seeds, len(chosen))
         if starts is not None or seeds is not None:
             self._starts[chosen] = self._initial_state.starts_of(self.seeds[chosen], starts, chosen)
-        self._reset_worlds(chosen)
+        self._reset_worlds(chosen, self._worlds.has_camera)
         if len(chosen) and (self._is_sensed or worlds is None):
             self._do_halves(0, 1, chosen)
             self._is_sensed = self._is_sensed or worlds is None
@@ -291,9 +299,10 @@ class Batch:
 
     # ---- inside ----
 
-    def _reset_worlds(self, chosen: NDArray[np.int64]) -> None:
-        """Reset worlds to their initial state."""
+    def _reset_worlds(self, chosen: NDArray[np.int64], has_camera: NDArray[np.bool_]) -> None:
+        """Reset worlds to their initial state; some robots, bool [robot], have a camera."""
         self._initial_state.reset(self.state, chosen, self._starts[chosen])
+        self.state.robots["camera_taken_ns"][np.ix_(chosen, has_camera)] = NO_PICTURE
         worlds = self._worlds
         for count in (worlds.ticks, worlds.begins_ns, worlds.watched_ns, worlds.sensed_ns, worlds.steps):
             count[chosen] = 0
@@ -346,4 +355,4 @@ class Batch:
 
 def _codes_of(senses: Sequence[str]) -> NDArray[np.int64]:
     """Return the numbers of senses, as kernels know them."""
-    return np.array([SENSES.index(sense) for sense in senses], np.int64)
+    return np.array([list(SENSES).index(sense) for sense in senses], np.int64)

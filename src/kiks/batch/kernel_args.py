@@ -7,12 +7,15 @@ from typing import Any
 
 Worlds: Any = namedtuple(
     "Worlds",
-    "line sense_codes ticks begins_ns watched_ns sensed_ns steps sensors wheels turns memory parameters notes",
+    "line sense_codes sense_counts has_camera ticks begins_ns watched_ns sensed_ns steps sensors wheels turns memory "
+    "parameters notes",
 )
 """What the loop knows of all worlds of a batch.
 
 * line: the serial lines (`kiks.batch.loop_timing.Line`);
-* sense_codes: the senses, `PROXIMITY` or `AMBIENT`, int64 [sense];
+* sense_codes: the senses, `PROXIMITY`, `AMBIENT` or `CAMERA`, int64 [sense];
+* sense_counts: how many of these each robot has, int64 [robot];
+* has_camera: whether each robot has a camera, bool [robot];
 * ticks: ticks done, int64 [world];
 * begins_ns: when the present loop began [ns], int64 [world];
 * watched_ns: when measures were last called [ns], int64 [world];
@@ -26,5 +29,5 @@ Worlds: Any = namedtuple(
 * notes: state slots of the measures, float64 [world, robot, note].
 """
 
-PROXIMITY, AMBIENT = 0, 1
+PROXIMITY, AMBIENT, CAMERA = range(3)
 """Senses in the order of `kiks.control.controller.SENSES`."""

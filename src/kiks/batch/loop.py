@@ -11,28 +11,34 @@ from typing import Any
 import numpy as np
 
 from kiks.batch.callbacks import call_decider, call_measure
-from kiks.batch.kernel_args import PROXIMITY
-from kiks.batch.loop_timing import ASK_LENGTH, LENGTHS, acts_at, answer_length, order_length
-from kiks.control.controller import whole_speed
+from kiks.batch.kernel_args import AMBIENT, CAMERA, PROXIMITY
+from kiks.batch.loop_timing import ASK_LENGTHS, LENGTHS, acts_at, answer_length, order_length
+from kiks.control.controller import SENSES, whole_speed
 from kiks.control.measure import Moment
 from kiks.engine.bunch import give_back, make_lanes, make_room, robot_in, show_tracks, take
 from kiks.engine.compiling import entry, inlined, kernel, spliced
 from kiks.engine.physics.motor import command_speed
 from kiks.engine.scene import open_scene
 from kiks.engine.sensing.ambient import sense_ambient
+from kiks.engine.sensing.camera import take_image_in
 from kiks.engine.sensing.proximity import READERS, make_readers, sense_proximity
 from kiks.engine.simd.lanes import LANES
-from kiks.engine.simd.stack_arrays import stack_booleans, stack_integers
+from kiks.engine.simd.stack_arrays import stack_booleans, stack_floats, stack_integers
+from kiks.engine.state import PIXEL_COUNT
 from kiks.engine.step import advance_bunch
+from kiks.firmware.k213 import PERIODS_NS
 from kiks.model.robot import SENSOR_COUNT
 from kiks.units import NS_PER_S, TICK_NS
 
 _READINGS = READERS * SENSOR_COUNT  # the size of a stack array must be a constant
+_SIZES = tuple(sense.size for sense in SENSES.values())
+_PICTURE_NS = PERIODS_NS[0]  # cameras have the reading period of the power-on
+_PIXEL_STEP = PIXEL_COUNT // SENSES["camera"].size
 
 
 @spliced
 def sense(scene: Any, worlds: Any, bunch: Any, is_on: Any, times_ns: Any, readers: Any, counts: Any) -> Any:
-    """Read all senses of all robots, and note when the last reply has arrived.
+    """Read the senses of all robots, and note when the last reply has arrived.
 
     Args:
         scene: The scene (`kiks.engine.scene.open_scene`).
@@ -48,22 +54,27 @@ def sense(scene: Any, worlds: Any, bunch: Any, is_on: Any, times_ns: Any, reader
         times_ns[k] = worlds.begins_ns[numbers[k]]
         if is_on[k]:
             worlds.sensed_ns[numbers[k]] = times_ns[k]
+    first = 0
     for place in range(worlds.sense_codes.shape[0]):
+        code = worlds.sense_codes[place]
         for k in range(numbers.shape[0]):
             if is_on[k]:
-                times_ns[k] = acts_at(line, worlds.sensed_ns[numbers[k]], ASK_LENGTH)
-        pass_to(scene, bunch, times_ns)
+                times_ns[k] = acts_at(line, worlds.sensed_ns[numbers[k]], ASK_LENGTHS[code])
+        pass_to(scene, worlds, bunch, times_ns)
         show_tracks(scene, bunch)
-        first, count = place * SENSOR_COUNT, 0
+        count = 0
         for k in range(numbers.shape[0]):
             for robot in range(worlds.sensors.shape[1] if is_on[k] else 0):
+                if place >= worlds.sense_counts[robot]:
+                    continue
                 readers.worlds[count], readers.robots[count] = numbers[k], robot
                 readers.ticks[count], readers.times_ns[count] = bunch.ticks[k], times_ns[k]
                 count += 1
                 if count == READERS:
-                    read_sense(scene, worlds, worlds.sense_codes[place], first, readers, count, counts)
+                    read_sense(scene, worlds, code, first, readers, count, counts)
                     count = 0
-        read_sense(scene, worlds, worlds.sense_codes[place], first, readers, count, counts)
+        read_sense(scene, worlds, code, first, readers, count, counts)
+        first += _SIZES[code]
 
 
 @inlined
@@ -73,7 +84,7 @@ def read_sense(scene: Any, worlds: Any, code: Any, first: Any, readers: Any, cou
     Args:
         scene: The scene.
         worlds: What the loop knows of all worlds.
-        code: The sense, `PROXIMITY` or `AMBIENT`.
+        code: The sense, `PROXIMITY`, `AMBIENT` or `CAMERA`.
         first: Place of its first reading among the sensors of a robot.
         readers: Which robots, and when (`kiks.engine.sensing.proximity.Readers`).
         count: Their number.
@@ -83,16 +94,57 @@ def read_sense(scene: Any, worlds: Any, code: Any, first: Any, readers: Any, cou
         sense_proximity(scene, readers, count, True, counts)
     for k in range(count):
         world, robot, time_ns = readers.worlds[k], readers.robots[k], readers.times_ns[k]
-        if code != PROXIMITY:
+        if code == AMBIENT:
             sense_ambient(scene, world, robot, readers.ticks[k], time_ns, True, counts[k])
-        for sensor in range(SENSOR_COUNT):
-            worlds.sensors[world, robot, first + sensor] = counts[k, sensor]
-        heard_ns = time_ns + answer_length(counts[k]) * worlds.line.character_ns
+        readings = worlds.sensors[world, robot, first : first + _SIZES[code]]
+        if code == CAMERA:
+            for number in range(readings.shape[0]):
+                readings[number] = scene.robots[world, robot].camera_pixels[_PIXEL_STEP * number]
+            length = answer_length(CAMERA, readings)
+        else:
+            for sensor in range(SENSOR_COUNT):
+                readings[sensor] = counts[k, sensor]
+            length = answer_length(PROXIMITY, counts[k])  # as long for each letter
+        heard_ns = time_ns + length * worlds.line.character_ns
         worlds.sensed_ns[world] = max(worlds.sensed_ns[world], heard_ns)
 
 
 @kernel
-def pass_to(scene: Any, bunch: Any, times_ns: Any) -> Any:
+def take_pictures(scene: Any, worlds: Any, bunch: Any, times_ns: Any) -> Any:
+    """Let the cameras of a bunch take the last pictures that are due before the time of each world.
+
+    It does what `kiks.sim.cameras.Cameras.sync` does for one world.
+    """
+    instants_ns, greys = stack_integers(LANES)[: times_ns.shape[0]], stack_floats(PIXEL_COUNT)
+    for robot in range(worlds.has_camera.shape[0]):
+        if worlds.has_camera[robot]:
+            for k in range(times_ns.shape[0]):
+                instants_ns[k] = times_ns[k] - times_ns[k] % _PICTURE_NS
+                if instants_ns[k] <= scene.robots[bunch.worlds[k], robot].camera_taken_ns:
+                    instants_ns[k] = bunch.ticks[k] * TICK_NS
+            tick_to(scene, bunch, instants_ns)
+            show_tracks(scene, bunch)
+            for k in range(times_ns.shape[0]):
+                state, instant_ns = scene.robots[bunch.worlds[k], robot], times_ns[k] - times_ns[k] % _PICTURE_NS
+                if instant_ns > state.camera_taken_ns:
+                    is_noisy = scene.kinds[state.kind].is_noisy != 0
+                    given = bunch.worlds[k], robot, bunch.ticks[k], instant_ns, is_noisy
+                    state.camera_light = take_image_in(scene, *given, greys)
+                    state.camera_taken_ns = instant_ns
+                    for p in range(PIXEL_COUNT):
+                        state.camera_pixels[p] = np.uint8(min(max(0.0, np.rint(greys[p])), 255.0))
+
+
+@kernel
+def pass_to(scene: Any, worlds: Any, bunch: Any, times_ns: Any) -> Any:
+    """Let time pass in each world of a bunch: do the ticks that have begun, and take the pictures that are due."""
+    if worlds.has_camera.any():
+        take_pictures(scene, worlds, bunch, times_ns)
+    tick_to(scene, bunch, times_ns)
+
+
+@kernel
+def tick_to(scene: Any, bunch: Any, times_ns: Any) -> Any:
     """Do the ticks that have begun before the time of each world of a bunch."""
     until = stack_integers(LANES)[: times_ns.shape[0]]
     is_any = False
@@ -123,7 +175,7 @@ def act(scene: Any, worlds: Any, bunch: Any, is_on: Any, times_ns: Any) -> Any:
             if is_on[k]:
                 length = command_length(wheels, numbers[k], worlds.turns[numbers[k], turn])
                 times_ns[k] = acts_at(line, worlds.sensed_ns[numbers[k]], length)
-        pass_to(scene, bunch, times_ns)
+        pass_to(scene, worlds, bunch, times_ns)
         for k in range(numbers.shape[0]):
             if is_on[k]:
                 robot = worlds.turns[numbers[k], turn]
@@ -268,7 +320,7 @@ def roll_out_block(
                 call_measures(scene, worlds, bunch, is_on, times_ns, watchers, poses)
         for k in range(count):
             times_ns[k] = worlds.begins_ns[numbers[k]]
-        pass_to(scene, bunch, times_ns)
+        pass_to(scene, worlds, bunch, times_ns)
         give_back(scene, bunch)
         for k in range(count):
             worlds.ticks[numbers[k]] = ticks[k]

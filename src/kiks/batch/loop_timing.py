@@ -12,8 +12,10 @@ from __future__ import annotations
 from collections import namedtuple
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import Field
 
+from kiks.control.controller import SENSES
 from kiks.engine.compiling import kernel
 from kiks.errors import ParameterError
 from kiks.model.data_file import Number, Whole, record
@@ -27,8 +29,8 @@ Baud = Annotated[Whole, Field(ge=110, le=10_000_000, description="The Khepera kn
 
 Milliseconds = Annotated[Number, Field(ge=0, le=1e6)]
 
-ASK_LENGTH = 2
-"""Number of characters of the command that reads a sense: its letter and a line feed."""
+ASK_LENGTHS = tuple(len(sense.command) + 1 for sense in SENSES.values())
+"""Number of characters of the command that reads each sense, with a line feed. The reply repeats all but that."""
 
 LENGTHS = 13
 """One more than the most characters of a command that sets speeds: `D,-127,-127` and a line feed."""
@@ -80,11 +82,11 @@ def digit_count(number: Any) -> Any:
 
 
 @kernel
-def answer_length(counts: Any) -> Any:
-    """Return the number of characters of a sense's reply: its letter, a comma before each count, and CR LF."""
-    length = 3 + counts.shape[0]
-    for k in range(counts.shape[0]):
-        length += digit_count(counts[k])
+def answer_length(code: Any, readings: Any) -> Any:
+    """Return the number of characters of a sense's reply: its command, a comma before each reading, and CR LF."""
+    length = ASK_LENGTHS[code] + 1 + readings.shape[0]
+    for k in range(readings.shape[0]):
+        length += digit_count(np.int64(readings[k]))
     return length
 
 

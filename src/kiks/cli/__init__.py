@@ -8,6 +8,7 @@ import typer
 
 from kiks.cli.arena import arena
 from kiks.cli.calibrate import calibrate
+from kiks.cli.compare import compare
 from kiks.cli.demo import demo
 from kiks.cli.desk import desk
 from kiks.cli.drive import drive
@@ -37,6 +38,7 @@ for _command in (
     run,
     drive,
     evolve,
+    compare,
     serve,
     matlab,
     session,

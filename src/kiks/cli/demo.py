@@ -13,12 +13,14 @@ import typer
 
 from kiks.cli.desk import NoWait, WithDesk, open_desk
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import Seed, load_arena, shipped_folder
+from kiks.cli.options import SeedOrOwn, load_arena, say, say_without_world, shipped_folder
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, nearest, shown
+from kiks.version import __version__
 
 if TYPE_CHECKING:
     from kiks.demos.scene import Scene
+    from kiks.learn.champion import Champion
 
 REPORT_S = 2.0
 """Simulated time between two updates of the display [s]: more updates would cost more than the simulation."""
@@ -50,7 +52,7 @@ def demo(
     arena: Annotated[
         str | None, typer.Option(help="Arena file (.toml) or picture; each demonstration's own if left out.")
     ] = None,
-    seed: Seed = 0,
+    seed: SeedOrOwn = None,
     baud: Annotated[
         int | None,
         typer.Option(help="Speed of the simulated serial line [bit/s]; each demonstration's own if left out."),
@@ -60,6 +62,16 @@ def demo(
         str | None, typer.Option(help="soccer: the Python program of the left side; with its arguments, in quotes.")
     ] = None,
     right: Annotated[str | None, typer.Option(help="soccer: the program of the right side.")] = None,
+    generation: Annotated[
+        int | None, typer.Option(help="In the folder of an evolution: drive one of this generation again.", min=1)
+    ] = None,
+    rank: Annotated[int, typer.Option(help="With --generation: 1 for its best, 2 for the next.", min=1)] = 1,
+    world: Annotated[
+        int, typer.Option(help="With --generation: in which of the worlds of its evaluation, from 0.", min=0)
+    ] = 0,
+    task: Annotated[
+        str | None, typer.Option(help="With --generation: the file of the task, if it is a Python file or was moved.")
+    ] = None,
     desk: WithDesk = False,
     no_wait: NoWait = False,
 ) -> None:
@@ -67,8 +79,9 @@ def demo(
 
     avoid: wander and touch nothing. follow: follow walls. clean: push cylinders to the walls. maze: find the way out.
     camera: watch a moving ball. race: drive round a track. swarm: twenty robots spread out.
-    soccer: a match of two programs. A champion's file of `kiks evolve`: the champion drives. The folder of `kiks evolve
-    pursuit`: predator and prey drive until they touch.
+    soccer: a match of two programs. A champion's file of `kiks evolve`, or its folder: the champion drives in its
+    world. With --generation 12 --rank 3, the third best of generation 12 drives again as in its evaluation. Of
+    the folder of `kiks evolve pursuit`, predator and prey drive until they touch.
 
     Example: kiks demo follow --arena examples/arenas/office.toml --seconds 300
     """
@@ -84,39 +97,75 @@ def demo(
             raise ParameterError(
                 f"{name} must be left out with {behaviour}, but it was {shown(value)}. Other demos take it."
             )
+    is_contest = Path(behaviour).is_dir() and not Path(behaviour, "champion.toml").exists()
+    if generation is None:
+        for option, is_given in (("--rank", rank != 1), ("--world", world != 0), ("--task", task is not None)):
+            if is_given:
+                raise ParameterError(f"{option} must come with --generation, but that is missing. Give the generation.")
+    else:
+        for option, value in (("--arena", arena), ("--seed", seed), ("--baud", baud)):
+            if value is not None:
+                raise ParameterError(f"{option} must be left out with --generation, but it was {shown(value)}.")
+        if not Path(behaviour).is_dir() or behaviour in list(Behaviour) or is_contest:
+            raise ParameterError(
+                "--generation must come with the folder of an evolution of one controller, but with it came "
+                f"{shown(behaviour)}."
+            )
     from kiks.drawing import check_picture
 
-    name = behaviour if behaviour in list(Behaviour) else Path(behaviour).stem
+    name = behaviour if behaviour in list(Behaviour) else Path(behaviour).resolve().stem
     picture = picture or Path(f"kiks-{name}.png")
     check_picture(picture)
     ready_engine(as_needed=not (is_soccer or desk))
     if is_soccer:
         sys.path.append(str(shipped_folder("examples/soccer", "player.py")))
         importlib.import_module("soccer_command").show_match(
-            seconds, seed, picture, left, right, on_desk=desk, waits=not no_wait
+            seconds, seed or 0, picture, left, right, on_desk=desk, waits=not no_wait
         )
         return
-    given = None if arena is None else load_arena(arena)
+    given, default_s = None if arena is None else load_arena(arena), None
     if behaviour in list(Behaviour):
         from kiks.demos.scenes import SCENES
 
-        scene = SCENES[behaviour](given, seed=seed, baud=baud)
-    elif Path(behaviour).is_dir():
+        scene = SCENES[behaviour](given, seed=seed or 0, baud=baud)
+    elif is_contest:
         from kiks.demos.contest import ContestScene
 
-        scene = ContestScene(behaviour, given, seed=seed, baud=baud)
+        scene = ContestScene(behaviour, given, seed=seed or 0, baud=baud)
     else:
         from kiks.demos.champion import ChampionScene
         from kiks.learn.champion import Champion
 
-        scene = ChampionScene(Champion.load(behaviour), given, seed=seed, baud=baud)
-    work = partial(_run, scene, name, scene.seconds if seconds is None else seconds, picture)
+        file = Path(behaviour, "champion.toml") if Path(behaviour).is_dir() else behaviour
+        if generation is None:
+            champion = Champion.load(file)
+            say_without_world(champion, given)
+        else:
+            champion, default_s = _individual(behaviour, generation, rank, world, task)
+        scene = ChampionScene(champion, given, seed=seed, baud=baud)
+    seconds = seconds or default_s or scene.seconds
+    work = partial(_run, scene, name, seconds, picture)
     if desk:
         from kiks.desk.server.desk import Desk
 
         open_desk(Desk(scene.sim), work=work, waits=not no_wait)
     else:
         work()
+
+
+def _individual(folder: str, generation: int, rank: int, world: int, task: str | None) -> tuple[Champion, float]:
+    """Return a candidate of an evolution in a world of its evaluation, and for how long it drove there [s]."""
+    from kiks.learn import tasks
+    from kiks.learn.individual import individual_of
+
+    given = None if task is None else tasks.load(task)
+    found = individual_of(folder, generation, rank=rank, world=world, task=given)
+    typer.echo(f"Candidate {found.candidate} of generation {generation}: rank {rank}, fitness {found.fitness:.4f}")
+    if found.kiks != __version__:
+        say(f"KiKS {found.kiks} has evaluated it. This is KiKS {__version__}, where it may drive differently.")
+    if found.champion.timing.baud is None:
+        say(f"it was evaluated without a serial line; here it drives on one of {found.champion.baud} baud.")
+    return found.champion, found.seconds
 
 
 def _run(scene: Scene, behaviour: str, total_s: float, picture: Path) -> None:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from kiks.cli.desk import open_desk
-from kiks.cli.options import fit_turrets, load_arena, say
+from kiks.cli.options import fit_turrets, load_arena, say, say_without_world
 from kiks.cli.record import recorded, tell_run
 from kiks.ending import end_as_with_ctrl_c
 
@@ -34,9 +34,9 @@ def drive(
 def run_champion(
     file: Path,
     arena: str | None,
-    robots: int,
+    robots: int | None,
     turret: list[str] | None,
-    seed: int,
+    seed: int | None,
     seconds: float,
     picture: Path | None,
     csv: Path | None,
@@ -52,7 +52,9 @@ def run_champion(
     from kiks.learn.champion import Champion
 
     champion = Champion.load(file)
-    sim, ports = champion.simulation(load_arena(arena), robots=robots, seed=seed)
+    given = None if arena is None else load_arena(arena)
+    say_without_world(champion, given)
+    sim, ports = champion.simulation(given, robots=robots, seed=seed)
     fit_turrets(sim, turret)
     end_as_with_ctrl_c()
 

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
 from kiks.cli.engine_start import ready_batch
+from kiks.cli.evolution_progress import progress_of
 from kiks.cli.options import Seed, written_folder
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
     from kiks.control.controller import Controller
+    from kiks.learn.evaluation import Executor
     from kiks.learn.evolution import Evolution
+    from kiks.learn.results import Result
     from kiks.learn.task import Task
 
 
@@ -56,6 +61,10 @@ def evolve(
         ControllerKind | None, typer.Option(help="The controller to evolve; the task's own if left out.")
     ] = None,
     seed: Seed = 0,
+    seeds: Annotated[
+        int | None,
+        typer.Option(help="Evolve so many times, with seeds from --seed on, each in a folder of its own.", min=1),
+    ] = None,
     ray: Annotated[
         str | None,
         typer.Option(help="Evaluate on a Ray cluster: its address, auto, or local; on all cores here if left out."),
@@ -64,8 +73,9 @@ def evolve(
 ) -> None:
     """Evolve a controller for a task, and write champion.toml, log.parquet and fitness.png.
 
-    After Ctrl-C or a kill, the same command continues the evolution. In pursuit, predator and prey evolve against each
-    other: predator.toml and prey.toml are the champions, and tournament.png tells who progressed.
+    After Ctrl-C or a kill, the same command continues the evolution. With --seeds 10, ten evolutions run one after the
+    other; a table, seeds.png and summary.json show their results. In pursuit, predator and prey evolve against each
+    other: predator.toml and prey.toml are the champions, and tournament.png shows who progressed.
 
     Example: kiks evolve avoid --seed 1 --out runs/avoid
     """
@@ -81,8 +91,9 @@ def evolve(
     if task in tasks.CONTESTS:
         from kiks.cli.coevolve import coevolve
 
-        if controller is not None:
-            raise ParameterError(f"--controller must be left out with {task}, but it was {controller}.")
+        for option, value in (("--controller", controller), ("--seeds", seeds)):
+            if value is not None:
+                raise ParameterError(f"{option} must be left out with {task}, but it was {value}.")
         coevolve(
             tasks.CONTESTS[task](),
             str(algorithm or AlgorithmName.GA),
@@ -99,48 +110,86 @@ def evolve(
         chosen = tasks.load(task, _controller(controller, chosen))
     name = algorithm or (AlgorithmName.MAP_ELITES if task == "maze-qd" else AlgorithmName.CMA)
     folder = out or Path(f"kiks-evolve-{chosen.name}")
-    from kiks.learn.evolution import Evolution
-
-    evolution = Evolution(chosen, str(name), seed=seed, population=population, folder=folder)
-    if evolution.generations:
-        typer.echo(f"Continuing after generation {len(evolution.generations)} in {folder}.")
     until = chosen.generations if generations is None and seconds is None else generations
-    where = "threads" if ray is None else _ray(ray)
+    from kiks.learn.evolution import Evolution
+    from kiks.learn.executors import executor_for
+    from kiks.learn.results import seed_folder
+
+    results: list[Result] = []
     end_as_with_ctrl_c()
-    stopped = _run(evolution, until, seconds, where)
-    if evolution.generations:
-        _finish(evolution, folder, stopped=stopped)
-    elif stopped:
-        typer.echo("kiks: stopped.", err=True)
-    if stopped:
-        raise typer.Exit(130)
+    with ExitStack() as stack:
+        executor: Executor | None = None
+        for number in [seed] if seeds is None else range(seed, seed + seeds):
+            home = folder if seeds is None else seed_folder(folder, number)
+            evolution = Evolution(chosen, str(name), seed=number, population=population, folder=home)
+            if seeds is not None:
+                typer.echo(f"Seed {number}:")
+            if evolution.generations:
+                typer.echo(f"Continuing after generation {len(evolution.generations)} in {home}.")
+            try:
+                executor = executor or stack.enter_context(
+                    executor_for("threads" if ray is None else _ray(ray), chosen)
+                )
+                with progress_of(evolution, until, seconds) as show:
+                    evolution.run(generations=until, seconds=seconds, executor=executor, each=show)
+                if evolution.generations:
+                    results.append(_finish(evolution, home))
+            except KeyboardInterrupt:
+                _stop(evolution, home)
+    if seeds is not None and results:
+        _tell_seeds(results, folder)
 
 
-def _run(evolution: Evolution, generations: int | None, seconds: float | None, where: str) -> bool:
-    """Run an evolution and show its progress; return whether it was interrupted."""
-    from kiks.cli.evolution_progress import progress_of
+def _finish(evolution: Evolution, folder: Path) -> Result:
+    """Save result and picture of an evolution that has come to its end, print the result, and return it."""
+    from kiks.learn.baselines import Baselines
+    from kiks.learn.evolution_plot import save_plot
+    from kiks.learn.results import load_result, result_of
 
-    try:
-        with progress_of(evolution, generations, seconds) as show:
-            evolution.run(generations=generations, seconds=seconds, executor=where, each=show)
-    except KeyboardInterrupt:
-        return True
-    return False
+    result = load_result(folder)
+    if result is None:
+        result = result_of(evolution)
+        result.save(folder)
+    save_plot(evolution, folder / "fitness.png", Baselines(result.standing, result.random))
+    _tell_champion(evolution, folder)
+    if (exam := result.exam) is not None:
+        typer.echo(exam.text)
+        typer.echo(f"With ten imperfect robots: {exam.imperfect_solved} of {exam.imperfect_starts} starts")
+    return result
 
 
-def _finish(evolution: Evolution, folder: Path, *, stopped: bool) -> None:
-    """Save the picture, and print the result."""
+def _stop(evolution: Evolution, folder: Path) -> NoReturn:
+    """Save the picture of an evolution that was interrupted, print how far it is, and exit."""
     from kiks.learn.evolution_plot import save_plot
 
+    if evolution.generations:
+        save_plot(evolution, folder / "fitness.png")
+        _tell_champion(evolution, folder)
+        typer.echo(f"Stopped after generation {len(evolution.generations)}; the same command continues.")
+    else:
+        typer.echo("kiks: stopped.", err=True)
+    raise typer.Exit(130)
+
+
+def _tell_champion(evolution: Evolution, folder: Path) -> None:
+    """Print what the champion achieved on trial, and where it is."""
     champion = evolution.champion
-    save_plot(evolution, folder / "fitness.png")
     figures = ", ".join(f"{name} {value:.4g}" for name, value in champion.measures.items())
     typer.echo(f"Champion of generation {champion.generation}: fitness {champion.fitness:.4f}   {figures}")
-    if stopped:
-        typer.echo(f"Stopped after generation {len(evolution.generations)}; the same command continues.")
     typer.echo(f"Folder: {folder}   See it drive: kiks demo {folder / 'champion.toml'}")
-    if not stopped and evolution.task.exam is not None:
-        typer.echo(evolution.task.exam.examine(champion, robots=evolution.task.robots))
+
+
+def _tell_seeds(results: Sequence[Result], folder: Path) -> None:
+    """Save summary and picture of several evolutions, and print them as a table."""
+    from kiks.cli.compare import print_seeds
+    from kiks.learn.results import SUMMARY, save_summary
+    from kiks.learn.results_plot import save_results_plot
+
+    picture = folder / "seeds.png"
+    save_summary(results, folder)
+    save_results_plot({str(folder): results}, picture)
+    print_seeds(results)
+    typer.echo(f"Picture: {picture}   Summary: {folder / SUMMARY}")
 
 
 def _controller(kind: ControllerKind, task: Task) -> Controller:
@@ -150,7 +199,7 @@ def _controller(kind: ControllerKind, task: Task) -> Controller:
 
     recipe: dict[str, Any] = {"kind": str(kind), "senses": list(task.controller.senses), "speed_limit": SPEED_LIMIT}
     if kind is ControllerKind.CTRNN:
-        recipe["period_s"] = task.timing.period_s
+        recipe["period_s"] = task.timings[0].period_s
     return from_recipe(recipe)
 
 

@@ -15,6 +15,7 @@ from kiks.errors import ParameterError, shown
 from kiks.model.atomic_files import check_writable, make_folder
 
 if TYPE_CHECKING:
+    from kiks.learn.champion import Champion
     from kiks.model.arena import Arena
     from kiks.model.project import Project
     from kiks.ports.program_process import Command
@@ -44,7 +45,8 @@ WhenSilent = Annotated[
 PatienceS = Annotated[float, typer.Option("--patience", help="Time for which it may be silent [s of real time].")]
 Seed = Annotated[int, typer.Option(help="Seed: the same seed, the same run.", min=0)]
 SeedOrOwn = Annotated[
-    int | None, typer.Option(help="Seed: the same seed, the same run; a project's own, else 0, if left out.", min=0)
+    int | None,
+    typer.Option(help="Seed: the same seed, the same run; the own one of a project or champion, else 0.", min=0),
 ]
 
 
@@ -138,6 +140,12 @@ def with_robots(project: Project, count: int | None, least: int) -> Project:
 def say(text: str) -> None:
     """Print a message for the user on the error output, apart from the results."""
     typer.echo(f"kiks: {text}", err=True)
+
+
+def say_without_world(champion: Champion, arena: Arena | None) -> None:
+    """Say so if a champion will drive in the default box because its file names no world."""
+    if arena is None and champion.world is None:
+        say("the champion's file names no world, so it drives in the default box. --arena names another arena.")
 
 
 def fit_turrets(sim: Simulation, entries: list[str] | None) -> None:

@@ -109,7 +109,7 @@ def run(
     in a process of its own: the first drives robot 1, the second robot 2, and so on.
 
     A project (.kiks) has its own world, robots and programs; programs after it replace its own, from robot 1 on. With a
-    file of `kiks evolve`, its champion drives all robots.
+    file of `kiks evolve`, its champion drives all robots, in its own world or in --arena.
 
     Example: kiks run --arena examples/arenas/maze.toml --map /dev/ttyUSB0=1 wander.py
     """
@@ -122,9 +122,7 @@ def run(
             raise ParameterError(
                 f"a champion must drive all robots alone, but {shown(arguments[0])} follows it. Leave it out."
             )
-        run_champion(
-            program, arena, robots or 1, turret, seed or 0, seconds, picture, csv, on_desk=desk, waits=not no_wait
-        )
+        run_champion(program, arena, robots, turret, seed, seconds, picture, csv, on_desk=desk, waits=not no_wait)
         return
     kinds = robot or []
     from kiks.ports.program_process import Labels, commands_of

@@ -10,15 +10,11 @@ from numpy.typing import NDArray
 
 from kiks.client.khepera import Khepera
 from kiks.client.port import Port
-from kiks.control.controller import Controller, whole_speeds
+from kiks.control.controller import SENSES, Controller, reading_count, whole_speeds
 from kiks.control.robot_controllers import robot_controllers
 from kiks.errors import ParameterError
 from kiks.model.checks import SECONDS_MAX, check_number
-from kiks.model.robot import SENSOR_COUNT
 from kiks.units import ns_from_s, s_from_ns
-
-COMMANDS = {"proximity": b"N\n", "ambient": b"O\n"}
-"""Command for each sense of `kiks.control.controller.SENSES`."""
 
 
 def drive(
@@ -38,8 +34,8 @@ def drive(
     Args:
         port: As for `kiks.Khepera`: a simulation's port, a port's name, or an open port. One program drives several
             ports; each robot has a memory of its own.
-        controller: The controller of all robots, or a list with one for each. All robots sense what the one with the
-            most senses needs; the senses of the others must come first among these.
+        controller: The controller of all robots, or a list with one for each. The senses of each must come first among
+            those of the one that has the most.
         parameters: Its parameters, float64 [parameter], or [robot, parameter]; with a list of controllers, a list with
             those of each.
         seconds: Time after which no loop begins [s].
@@ -104,7 +100,7 @@ class Driver:
         driving = robot_controllers(controller, parameters, 1, len(ports))
         self._senses, self._controllers = driving.senses, driving.controllers
         self._given = [driving.parameters[0, k, :count] for k, count in enumerate(driving.parameter_counts)]
-        self._sensors = np.zeros((len(ports), SENSOR_COUNT * len(driving.senses)))
+        self._sensors = np.zeros((len(ports), reading_count(driving.senses)))
         self._memory = [np.zeros(each.memory_count) for each in driving.controllers]
         self._wheels = np.zeros((len(ports), 2))
         # Compiles the controllers, so that a faulty one raises before a robot moves.
@@ -122,12 +118,15 @@ class Driver:
             LinkError: If a robot does not send the expected reply.
         """
         robots, sensors, wheels = self._robots, self._sensors, self._wheels
-        for number, sense in enumerate(self._senses):
-            first = number * SENSOR_COUNT
-            for robot in robots:
-                robot.port.write(COMMANDS[sense])
-            for k, robot in enumerate(robots):
-                sensors[k, first : first + SENSOR_COUNT] = robot.read_numbers(COMMANDS[sense], SENSOR_COUNT)
+        first = 0
+        for number, name in enumerate(self._senses):
+            sense = SENSES[name]
+            sensing = [k for k, each in enumerate(self._controllers) if number < len(each.senses)]
+            for k in sensing:
+                robots[k].port.write(sense.request)
+            for k in sensing:
+                sensors[k, first : first + sense.size] = robots[k].read_numbers(sense.request, sense.size)
+            first += sense.size
         for k, robot in enumerate(robots):
             self._decide(k, self._memory[k])
             wheels[k] = whole_speeds(wheels[k])

@@ -255,7 +255,7 @@ class Khepera:
             raise self._unexpected(request, reply)
 
     def read_numbers(self, request: bytes, count: int) -> list[int]:
-        """Read a reply of `count` whole numbers.
+        """Read a reply of `count` whole numbers, after the command's letter; after a turret's order, `t,2,t`.
 
         Raises:
             ParameterError: If the request is not bytes, or the count is not a whole number.
@@ -266,9 +266,10 @@ class Khepera:
             count = check_count("count", count)
         reply = self.port.read_until(b"\n")
         words = reply.split(b",")
-        if len(words) == count + 1 and words[0] == request[:1].lower() and reply[-2:] == b"\r\n":
+        head = request.rstrip().lower().split(b",") if request[:1] == b"T" else [request[:1].lower()]
+        if len(words) == len(head) + count and words[: len(head)] == head and reply[-2:] == b"\r\n":
             try:
-                return list(map(int, words[1:]))
+                return list(map(int, words[len(head) :]))
             except ValueError:
                 pass
         raise self._unexpected(request, reply)

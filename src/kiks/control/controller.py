@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, overload
+from typing import Any, NamedTuple, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,13 +16,38 @@ from kiks.control.compiled_function import Compiled
 from kiks.control.controller_spec import recipe_of
 from kiks.engine.compiling import entry, kernel
 from kiks.engine.physics.motor import SPEED_MAX
+from kiks.engine.state import PIXEL_COUNT
 from kiks.errors import ParameterError, nearest, shown
 from kiks.model.array_checks import check_numbers
 from kiks.model.checks import check_count
 from kiks.model.robot import SENSOR_COUNT
 
-SENSES = ("proximity", "ambient")
-"""The senses of controllers: eight counts each, by the commands N and O."""
+
+class Sense(NamedTuple):
+    """A sense of controllers.
+
+    Attributes:
+        command: The command that reads it.
+        size: Number of its readings.
+        most: The largest reading.
+    """
+
+    command: str
+    size: int
+    most: int
+
+    @property
+    def request(self) -> bytes:
+        """The command as it is sent."""
+        return f"{self.command}\n".encode()
+
+
+SENSES = {
+    "proximity": Sense("N", SENSOR_COUNT, 1023),  # khepera-protocol.md 8.4
+    "ambient": Sense("O", SENSOR_COUNT, 1023),
+    "camera": Sense("T,2,T", PIXEL_COUNT // 4, 255),  # every fourth grey of a K213 (khepera-protocol.md 10.3)
+}
+"""The senses of controllers, in the order of their numbers in kernels."""
 
 ARGUMENTS = ("sensors", "memory", "parameters", "wheels")
 
@@ -30,9 +55,10 @@ ARGUMENTS = ("sensors", "memory", "parameters", "wheels")
 class Controller(Compiled):
     """A function `(sensors, memory, parameters, wheels)` of four float64 arrays that writes the last.
 
-    It is called once a control step. `sensors` has eight counts for each sense, in the order of `senses`, clockwise
-    from the left; `memory` is zeros at the start and its own from then on; `wheels` takes the speeds of the left and
-    right wheel [pulses/10 ms], which are rounded and cut to +-127 when they are sent.
+    It is called once a control step. `sensors` has the readings of each sense, in the order of `senses`: eight counts
+    of proximity or ambient light, clockwise from the left, or sixteen greys of the camera, from the left. `memory` is
+    zeros at the start and its own from then on. `wheels` takes the speeds of the left and right wheel [pulses/10 ms],
+    which are rounded and cut to +-127 when they are sent.
 
     Attributes:
         senses: Its senses, of `SENSES`.
@@ -73,7 +99,7 @@ class Controller(Compiled):
     @property
     def sensor_count(self) -> int:
         """Number of its readings."""
-        return SENSOR_COUNT * len(self.senses)
+        return reading_count(self.senses)
 
     def __call__(
         self,
@@ -127,7 +153,7 @@ def controller(
 
     Args:
         function: A function `(sensors, memory, parameters, wheels)`; see `Controller`.
-        senses: What it senses: 'proximity', 'ambient' or both.
+        senses: What it senses, of 'proximity', 'ambient' and 'camera'.
         memory: How many numbers it remembers.
         parameters: How many parameters it has; any count if left out.
 
@@ -153,6 +179,11 @@ def whole_speed(wanted: Any) -> Any:
 def whole_speeds(wheels: Any) -> Any:
     """Return the speeds to send for two wanted ones [pulses/10 ms]."""
     return whole_speed(wheels[0]), whole_speed(wheels[1])
+
+
+def reading_count(senses: Sequence[str]) -> int:
+    """Return the number of readings of some senses together."""
+    return sum(SENSES[sense].size for sense in senses)
 
 
 def check_senses(senses: str | Sequence[str]) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.control import neural_nets
-from kiks.control.controller import Controller
+from kiks.control.controller import Controller, reading_count
 from kiks.control.controller_spec import (
     PERIOD_S,
     SPEED_LIMIT,
@@ -37,7 +37,6 @@ from kiks.control.controller_spec import (
 from kiks.errors import ParameterError, shown
 from kiks.model.checks import check_count, check_kind
 from kiks.model.data_file import adapter, check
-from kiks.model.robot import SENSOR_COUNT
 
 
 def linear(
@@ -242,7 +241,7 @@ def _made(kind: str, **arguments: Any) -> Controller:
 
 @functools.lru_cache(maxsize=1024)
 def _shaped(recipe: Shape) -> Controller:
-    sense_count, limit = SENSOR_COUNT * len(recipe.senses), recipe.speed_limit
+    sense_count, limit = reading_count(recipe.senses), recipe.speed_limit
     if isinstance(recipe, Ctrnn):
         memory = recipe.neurons
         size = memory * (2 + sense_count + memory)

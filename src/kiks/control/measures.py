@@ -390,6 +390,17 @@ def _gathered(x_mm: float, y_mm: float, radius_mm: float) -> Measure:
 
 
 @measure
+def neighbour_mm(moment: Any, notes: Any) -> None:
+    """How far the nearest other robot is, from middle to middle [mm]; 0 of a lone robot."""
+    nearest = np.inf
+    for other in range(moment.poses.shape[0]):
+        if other != moment.robot:
+            across, up = moment.poses[other, 0] - moment.x_mm, moment.poses[other, 1] - moment.y_mm
+            nearest = min(nearest, np.sqrt(across * across + up * up))
+    notes[0] = nearest if nearest < np.inf else 0.0
+
+
+@measure
 def spread_mm(moment: Any, notes: Any) -> None:
     """How far balls and cylinders are from the middle of them all [mm], root mean square; 0 of none."""
     count = moment.bodies.shape[0]

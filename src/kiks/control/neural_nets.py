@@ -14,13 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from kiks.control.controller import SENSES, reading_count
 from kiks.engine.compiling import inlined, kernel
 from kiks.engine.numbers import tanh
 from kiks.engine.simd.stack_arrays import stack_floats
-from kiks.model.robot import SENSOR_COUNT
-
-COUNT_MAX = 1023
-"""The largest count that a sensor gives (khepera-protocol.md 8.4)."""
 
 DARK_COUNTS = 500.0
 """The ambient count that is an input of 0: that of a Khepera in the dark (khepera-protocol.md 9.4)."""
@@ -30,8 +27,6 @@ TIME_SCALE_LIMIT = 4.0
 
 GAIN = 4.0
 """What a CTRNN's weights and biases are multiplied by: from 1 on, a parameter makes a unit hold what it has."""
-
-_SHARE, _LIGHT_SHARE = 1.0 / COUNT_MAX, 1.0 / DARK_COUNTS
 
 
 @kernel
@@ -67,20 +62,27 @@ def do_layer(inputs: Any, input_count: Any, parameters: Any, first: Any, units: 
 def senses_as_inputs(senses: tuple[str, ...]) -> Any:
     """Return a kernel `(sensors, inputs)` that writes the counts of senses as inputs.
 
-    Proximity is a share of `COUNT_MAX`. Ambient counts fall in light, so their inputs are what is missing from
-    `DARK_COUNTS`, as a share of it: about 0 in the dark, nearly 1 beside a lamp. As shares of `COUNT_MAX` they would
-    be half of full scale in the dark, more than the light of most lamps takes off.
+    Proximity and greys of the camera are shares of the largest reading. Ambient counts fall in light, so their inputs
+    are what is missing from `DARK_COUNTS`, as a share of it: about 0 in the dark, nearly 1 beside a lamp. As shares of
+    the largest count they would be half of full scale in the dark, more than the light of most lamps takes off.
     """
-    sense_count = SENSOR_COUNT * len(senses)
-    light_first = SENSOR_COUNT * senses.index("ambient") if "ambient" in senses else sense_count
+    if not senses:
+
+        @inlined
+        def take_none(sensors: Any, inputs: Any) -> None:
+            pass
+
+        return take_none
+
+    take_others, sense = senses_as_inputs(senses[:-1]), SENSES[senses[-1]]
+    first, count, is_light = reading_count(senses[:-1]), sense.size, senses[-1] == "ambient"
+    share = 1.0 / (DARK_COUNTS if is_light else sense.most)
 
     @inlined
     def take(sensors: Any, inputs: Any) -> None:
-        for k in range(sense_count):
-            if light_first <= k < light_first + SENSOR_COUNT:
-                inputs[k] = (DARK_COUNTS - sensors[k]) * _LIGHT_SHARE
-            else:
-                inputs[k] = sensors[k] * _SHARE
+        take_others(sensors, inputs)
+        for k in range(first, first + count):
+            inputs[k] = ((DARK_COUNTS - sensors[k]) if is_light else sensors[k]) * share
 
     return take
 
@@ -149,7 +151,7 @@ def continuous(
     senses: tuple[str, ...], neuron_count: int, *, period_s: float, time_constant_s: float, speed_limit: float
 ) -> Any:
     """Return the function of a controller: a continuous-time recurrent network; see `kiks.controllers.ctrnn`."""
-    sense_count, take_senses = SENSOR_COUNT * len(senses), senses_as_inputs(senses)
+    sense_count, take_senses = reading_count(senses), senses_as_inputs(senses)
     bias_first, senses_first = neuron_count, 2 * neuron_count
     neurons_first = senses_first + sense_count * neuron_count
     periods = period_s / time_constant_s
@@ -183,7 +185,7 @@ def continuous(
 
 def gated(senses: tuple[str, ...], unit_count: int, *, speed_limit: float) -> Any:
     """Return the function of a controller: gated recurrent units; see `kiks.controllers.gru`."""
-    sense_count, take_senses = SENSOR_COUNT * len(senses), senses_as_inputs(senses)
+    sense_count, take_senses = reading_count(senses), senses_as_inputs(senses)
     input_count, gate_count = sense_count + unit_count, 2 * unit_count
     units_first = layer_size(input_count, gate_count)
     wheels_first = units_first + layer_size(input_count, unit_count)

@@ -19,13 +19,28 @@ class RobotControllers(NamedTuple):
         controllers: The controller of each robot.
         parameter_counts: The number of parameters of each robot.
         parameters: Their parameters, padded with zeros, float64 [world, robot, parameter].
-        senses: What all robots sense: the senses of the controller with the most.
+        senses: All senses: those of the controller with the most. Each other robot has the first of these.
     """
 
     controllers: tuple[Controller, ...]
     parameter_counts: tuple[int, ...]
     parameters: NDArray[np.float64]
     senses: tuple[str, ...]
+
+    @property
+    def sense_counts(self) -> NDArray[np.int64]:
+        """Number of senses of each robot, int64 [robot]."""
+        return np.array([len(each.senses) for each in self.controllers], np.int64)
+
+    @property
+    def has_camera(self) -> NDArray[np.bool_]:
+        """Whether each robot has a camera, bool [robot]."""
+        return np.array(["camera" in each.senses for each in self.controllers])
+
+    @property
+    def common_senses(self) -> tuple[str, ...]:
+        """The senses that all robots have."""
+        return self.senses[: min(len(each.senses) for each in self.controllers)]
 
     @property
     def names(self) -> str:
@@ -66,7 +81,7 @@ def robot_controllers(given: Any, parameters: Any, world_count: int, robot_count
     for each in given:
         if each.senses != senses[: len(each.senses)]:
             raise ParameterError(
-                f"the senses of one controller must come first among those of the others, which all robots have, but "
+                f"the senses of one controller must come first among those of the one that has the most, but "
                 f"{shown(each.name)} senses {', '.join(each.senses)} where another senses {', '.join(senses)}."
             )
     rows = _parameters_of_each(given, parameters, world_count)

@@ -2,52 +2,55 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import ClassVar
 
 from kiks.demos.scene import Scene
-from kiks.learn import tasks
 from kiks.learn.champion import Champion
 from kiks.model.arena import Arena
 from kiks.sim.simulation import Simulation
+from kiks.units import ns_from_s
 
 
 class ChampionScene(Scene):
-    """A robot drives as evolution has taught it.
+    """Robots drive as evolution has taught them.
 
     Args:
-        champion: Its controller.
-        arena: Where it drives; if left out, where the champions of its task are examined.
-        seed: Seed of the world.
+        champion: Their controller.
+        arena: Where they drive; the champion's own world if left out.
+        seed: Seed of the world; the champion's own, else 0, if left out.
         baud: Speed of the line [bit/s]; the champion's own if left out.
 
     Raises:
-        ArenaError: If the arena has no room for it.
+        ArenaError: If the arena has no room for them.
     """
 
     seconds: ClassVar[float] = 180.0
 
     def __init__(
-        self, champion: Champion, arena: Arena | None = None, *, seed: int = 0, baud: int | None = None
+        self, champion: Champion, arena: Arena | None = None, *, seed: int | None = None, baud: int | None = None
     ) -> None:
         self.champion = champion
-        super().__init__(arena, seed=seed, baud=baud or champion.baud)
+        own_seed = 0 if arena is not None or champion.world is None else champion.world.seed
+        super().__init__(arena, seed=own_seed if seed is None else seed, baud=baud or champion.baud)
 
-    def make_arena(self) -> Arena:
-        """Return the arena of its task; the classic box if that is a user's own."""
-        # Its name alone: what a file calls a task is not to be found elsewhere, and run.
-        make_task = tasks.TASKS.get(self.champion.task)
-        if make_task is None:
-            return Arena.default()
-        task = make_task()
-        return (task if task.exam is None else task.exam).arenas[0]
-
-    def make_simulation(self, arena: Arena) -> Simulation:
-        """Return a world of the champion's kind of robot."""
+    def make_simulation(self, arena: Arena | None) -> Simulation:
+        """Return the champion's own world, or an arena with a robot of its kind."""
         return self.champion.simulation(arena, seed=self.seed)[0]
 
     def prepare(self) -> None:
         """Put the champion at the wheel."""
         self.driver = self.champion.driver(self.ports)
+
+    def slices(self, seconds: float | None = None) -> Iterator[None]:
+        """Run, and stop for a moment after each slice of time; no loop begins after the end, as in a batch."""
+        self._end_ns = ns_from_s(self.seconds if seconds is None else seconds)
+        yield from super().slices(seconds)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the next loop would begin after the end."""
+        return self.driver.begin_ns >= self._end_ns
 
     def step(self) -> None:
         """Let it do a loop."""

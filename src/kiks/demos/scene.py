@@ -52,8 +52,8 @@ class Scene:
 
     def __init__(self, arena: Arena | None = None, *, seed: int = 0, baud: int | None = None) -> None:
         self.seed = seed
-        self.sim = self.make_simulation(arena or self.make_arena())
-        self.ports = [self.sim.port(number) for number in range(1, self.robot_count + 1)]
+        self.sim = self.make_simulation(arena)
+        self.ports = [self.sim.port(number) for number in range(1, self.sim.robot_count + 1)]
         for port in self.ports:
             port.baudrate = self.baud if baud is None else baud
         self.robot = Khepera(self.ports[0])
@@ -65,9 +65,9 @@ class Scene:
         """Return the arena if no other is given."""
         return Arena.default()
 
-    def make_simulation(self, arena: Arena) -> Simulation:
-        """Return the world."""
-        return Simulation(arena, robots=self.robot_count, seed=self.seed)
+    def make_simulation(self, arena: Arena | None) -> Simulation:
+        """Return the world: the arena, or the scene's own if there is none, with its robots."""
+        return Simulation(arena or self.make_arena(), robots=self.robot_count, seed=self.seed)
 
     def prepare(self) -> None:
         """Put things into the arena and start the programs."""
@@ -112,7 +112,7 @@ class Scene:
 
     def contact_count(self) -> int:
         """Return how often robots have met something so far."""
-        return sum(self.sim.contacts(number) for number in range(1, self.robot_count + 1))
+        return sum(self.sim.contacts(number) for number in range(1, self.sim.robot_count + 1))
 
     def contacts(self) -> str:
         """Return that in words."""

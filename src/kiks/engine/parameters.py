@@ -94,6 +94,7 @@ PARAMETERS = np.dtype(
         ("jitter_counts", "f8", (JITTER_POINT_LIMIT + 1,)),
         ("axis_cos", "f8", (SENSOR_COUNT,)),
         ("axis_sin", "f8", (SENSOR_COUNT,)),
+        ("is_noisy", "i8"),  # whether chance has a say in readings and pictures
         ("ambient_model", "i8"),
         ("dark_counts", "f8"),
         ("dark_noise_counts", "f8"),
@@ -114,6 +115,7 @@ def pack(spec: RobotSpec) -> NDArray[np.void]:
     robot: Any = packed[0]
     body, motor, proximity = spec.body, spec.motor, spec.proximity
     robot["radius_mm"], robot["brightness"] = body.radius_mm, body.brightness
+    robot["is_noisy"] = spec.is_noisy
     for name in ("wheel_base_mm", "pulse_mm", "wall_friction", "slip_ratio_min", "slip_ratio_max"):
         robot[name] = getattr(body, name)
     robot["free_speed_pulses"] = motor.free_speed_pulses

@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 
 
 class Algorithm(Protocol):
-    """Proposes candidates. `ask` and `tell` alternate."""
+    """Proposes candidates. `ask` and `tell` alternate; an algorithm of a user's own may do without `favourite`."""
 
     def ask(self) -> Floats:
         """Return the next generation, float64 [candidate, parameter]."""
@@ -198,7 +198,7 @@ def make_algorithm(
     """
     if name not in ALGORITHMS:
         raise ParameterError(
-            f"algorithm must be one of {', '.join(ALGORITHMS)}, but it was "
+            f"algorithm must be one of {', '.join(ALGORITHMS)}, or an object with ask and tell, but it was "
             f"{shown(name)}.{nearest(str(name), ALGORITHMS)}"
         )
     return ALGORITHMS[name](parameter_count, population, seed, axes, spread)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, field, fields
+from dataclasses import asdict, field, fields, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -17,8 +17,12 @@ from kiks.control.controller_spec import Recipe
 from kiks.control.controllers import controller_of, recipe_for
 from kiks.model.arena import Arena
 from kiks.model.arena_file import quoted
-from kiks.model.atomic_files import path_of, replace_files
-from kiks.model.data_file import Number, Text, Whole, as_list, check, parse_toml, read_file, record
+from kiks.model.atomic_files import inside, path_of, replace_files
+from kiks.model.checks import check_count
+from kiks.model.data_file import Number, Rule, Text, Whole, as_list, check, parse_toml, read_file, record
+from kiks.model.project import Project
+from kiks.model.robot import RobotSpec, robot_names, robot_toml, specs_of
+from kiks.sim.from_project import simulation_of
 from kiks.sim.simulation import Simulation
 from kiks.version import __version__
 
@@ -36,6 +40,7 @@ Parameters = Annotated[tuple[Number, ...], BeforeValidator(as_list), Field(max_l
 Measures = Annotated[dict[Text, Number], Field(max_length=1000)]
 Generation = Annotated[Whole, Field(ge=0, lt=2**63)]
 Seed = Annotated[Whole, Field(ge=0, lt=2**63)]
+Kind = Annotated[Text | RobotSpec, Rule("the name of a robot, a robot file or a kiks.RobotSpec")]
 
 
 @record
@@ -61,6 +66,7 @@ class _ChampionFile:
     seed: Seed = 0
     kiks: Text = ""
     measures: Measures = field(default_factory=dict)
+    world: Text | None = None
 
 
 @record
@@ -76,9 +82,10 @@ class Champion:
         generation: The generation that found it.
         algorithm: The algorithm that found it.
         seed: Seed of its evolution.
-        robot: The kind of robot that it drives.
+        robot: The kind of robot that it drives: a name, a robot file or a `RobotSpec`.
         timing: Timing of its control loop.
         kiks: Version of KiKS that found it.
+        world: The world in which it lives: arena, number of robots, starts and seed. None if it is not known.
     """
 
     controller: Controller
@@ -89,9 +96,10 @@ class Champion:
     generation: Generation = 0
     algorithm: Text = ""
     seed: Seed = 0
-    robot: Text = "khepera"
+    robot: Kind = "khepera"
     timing: Timing = field(default_factory=Timing)
     kiks: Text = __version__
+    world: Project | None = None
 
     # Functions cannot be compared: a champion equals itself only.
     __eq__ = object.__eq__
@@ -126,18 +134,28 @@ class Champion:
         """Speed of its lines [bit/s]: the highest baud rate of a Khepera if it was evolved without a line."""
         return self.timing.baud or 57600
 
-    def simulation(self, arena: Arena, *, robots: int = 1, seed: int = 0) -> tuple[Simulation, list[Port]]:
+    def simulation(
+        self, arena: Arena | None = None, *, robots: int | None = None, seed: int | None = None
+    ) -> tuple[Simulation, list[Port]]:
         """Return a simulation with its kind of robot and its timing, and the ports of the robots.
+
+        Args:
+            arena: The arena; its own world if left out, or the default box if it has none.
+            robots: Number of robots; that of its own world, else 1, if left out.
+            seed: Seed of all random numbers; that of its own world, else 0, if left out.
 
         Raises:
             ParameterError: If an argument is out of range.
             ArenaError: If the arena has no free place for a robot.
         """
+        project = self.world if arena is None and self.world is not None else Project(arena or Arena.default())
+        count = len(project.robots) if robots is None else check_count("robots", robots, 1, 1000)
+        named = (*project.robots, *project.robots[-1:] * count)[:count]
+        project = replace(project, robots=named, seed=project.seed if seed is None else seed)
         think_s = self.timing.think_s
-        thinking = f"fixed:{think_s * 1e3:g}" if think_s else "none"
-        sim = Simulation(arena, robots=robots, seed=seed, robot=self.robot, thinking=thinking)
+        sim = simulation_of(project, kinds=[self.robot], thinking=f"fixed:{think_s * 1e3:g}" if think_s else "none")
         ports: list[Port] = []
-        for number in range(1, robots + 1):
+        for number in range(1, count + 1):
             port = sim.port(number)
             port.baudrate = self.baud
             ports.append(port)
@@ -146,27 +164,44 @@ class Champion:
     # ---- files ----
 
     def save(self, path: str | Path) -> None:
-        """Write a file that `load` reads; a Python file that defines the controller is copied beside it.
+        """Write a file that `load` reads, and beside it the files that it names.
+
+        These are its world, its robot if that does not come with KiKS, and the Python file that defines its controller.
 
         Raises:
-            ParameterError: If the file cannot be written, or the controller is not defined in a file.
+            ParameterError: If a file cannot be written, or the controller is not defined in a file.
         """
         target = path_of(path)
         recipe = recipe_for(self.controller, target.parent)
+        named: dict[str, str] = {}
         files: dict[Path, bytes | str] = {}
+
+        def beside(ending: str, data: bytes | str) -> str:
+            copy = target.with_name(f"{target.stem}_{ending}")
+            files[copy] = data
+            return copy.name
+
         if "file" in recipe:
-            copy = target.with_name(f"{target.stem}_controller.py")
-            files[copy] = read_file(target.parent / recipe["file"], "the file of the controller")
-            recipe = {"file": copy.name, "name": recipe["name"]}
-        files[target] = self._text(recipe)
+            code = read_file(target.parent / recipe["file"], "the file of the controller")
+            recipe = {"file": beside("controller.py", code), "name": recipe["name"]}
+        if self.robot in robot_names():
+            named["robot"] = str(self.robot)
+        else:
+            (spec,) = specs_of(self.robot, 1, None)
+            named["robot"] = beside("robot.toml", robot_toml(spec))
+        if self.world is not None:
+            robots = tuple(replace(each, kind=named["robot"]) for each in self.world.robots)
+            named["world"] = beside("world.kiks", replace(self.world, robots=robots).to_bytes())
+        files[target] = self._text(recipe, named)
         replace_files(files, "a champion")
 
-    def _text(self, recipe: Mapping[str, Any]) -> str:
-        top = ("task", "fitness", "generation", "algorithm", "seed", "robot", "kiks")
+    def _text(self, recipe: Mapping[str, Any], named: Mapping[str, str]) -> str:
+        top = ("task", "fitness", "generation", "algorithm", "seed", "kiks")
         lines = [
             "# A controller for Khepera robots. See it: kiks demo FILE. Let it drive: kiks run FILE.",
             f"champion = {FORMAT}",
             *(f"{name} = {_toml_value(getattr(self, name))}" for name in top),
+            *(f"{name} = {_toml_value(value)}" for name, value in named.items()),
             "parameters = [",
             *(f"    {value!r}," for value in self.parameters),
             "]",
@@ -189,10 +224,24 @@ class Champion:
         path = path_of(path)
         what = f"Champion's file {str(path)!r}"
         read = check(_ChampionFile, parse_toml(read_file(path, what, bytes_max=FILE_BYTES_MAX), what), what)
-        controller = controller_of(read.controller, path.parent)
         given = {each.name: getattr(read, each.name) for each in fields(cls)}
-        timing = Timing(**asdict(read.timing))
-        return cls(**given | {"controller": controller, "timing": timing})
+        given["timing"] = Timing(**asdict(read.timing))
+        if read.world is not None:
+            given["world"] = Project.load(inside(path.parent, read.world, "world"))
+        given["robot"] = _robot_of(read.robot, path.parent)
+        return cls(**given | {"controller": controller_of(read.controller, path.parent)})
+
+
+def _robot_of(name: str, folder: Path) -> str | RobotSpec:
+    """Return the robot of a file that lies beside the champion's, as `save` writes it; any other name as it is.
+
+    Raises:
+        ParameterError: If the file is no robot.
+    """
+    if name in robot_names() or "/" in name:
+        return name
+    path = inside(folder, name, "robot")
+    return RobotSpec.load(path) if path.is_file() else name
 
 
 def _toml_key(name: str) -> str:

@@ -23,9 +23,10 @@ from kiks.learn.algorithms import library, make_algorithm
 from kiks.learn.champion import Champion
 from kiks.learn.contest import Contest
 from kiks.learn.evaluation import Executor
+from kiks.learn.evolution import derived_seed
 from kiks.learn.evolution_log import LOG, Folder, Generation, Identity
 from kiks.learn.executors import executor_for
-from kiks.learn.generation_loop import check_executor, run_generations, seed_for
+from kiks.learn.generation_loop import check_executor, run_generations
 from kiks.model.array_checks import check_numbers
 from kiks.model.atomic_files import replace_file
 from kiks.model.checks import check_count, check_kind
@@ -135,7 +136,7 @@ class Coevolution:
                 algorithm,
                 side.parameter_count,
                 self.population,
-                seed_for(self.seed, _ALGORITHM_SEED, number),
+                derived_seed(self.seed, _ALGORITHM_SEED, number),
                 (),
                 contest.spread,
             )
@@ -168,7 +169,7 @@ class Coevolution:
         Contests with the same opponent have the same seed, so that the fitness of candidates can be compared.
         """
         begin = len(self.generations) * self.opponents
-        seeds = [seed_for(self.seed, _CONTEST_SEED, begin + number) for number in range(self.opponents)]
+        seeds = [derived_seed(self.seed, _CONTEST_SEED, begin + number) for number in range(self.opponents)]
         return np.tile(np.array(seeds, np.int64), 2 * self.population)
 
     def tell(self, values: ArrayLike) -> None:
@@ -197,6 +198,7 @@ class Coevolution:
         generation = Generation(
             candidates=np.concatenate(own, axis=1),
             values=values,
+            seeds=np.full(self.population, self.seed),
             population=self.population,
             champion_fitness=np.nan,
             seconds=seconds,
@@ -338,7 +340,7 @@ class Coevolution:
         starts = (np.arange(size)[:, None] + np.arange(size)) % size
         for trial in range(trials):
             numbers = range(trial * size, (trial + 1) * size)
-            seeds = np.array([seed_for(self.seed, _TOURNAMENT_SEED, number) for number in numbers], np.int64)
+            seeds = np.array([derived_seed(self.seed, _TOURNAMENT_SEED, number) for number in numbers], np.int64)
             scores += executor.evaluate(pairs, seeds[starts.ravel()])[:, :2].T.reshape(2, size, size)
         return Tournament(self.contest.side_names, chosen + 1, scores / trials)
 

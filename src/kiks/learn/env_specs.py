@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field
 
 from kiks.batch.initial_state import Arenas, Starts
 from kiks.batch.loop_timing import Timing
-from kiks.control.controller import check_senses
+from kiks.control.controller import check_senses, reading_count
 from kiks.control.measure import Measure, measure
 from kiks.control.measures import avoidance, near_light_share, nearest_lamp_mm, wall_following
 from kiks.engine.physics.motor import SPEED_MAX
@@ -19,7 +19,6 @@ from kiks.errors import ParameterError, nearest, shown
 from kiks.learn.training_arenas import corridors, pillars
 from kiks.model.arena import Arena, Cylinder, Lamp, Pose
 from kiks.model.data_file import Number, Text, record
-from kiks.model.robot import SENSOR_COUNT
 
 _CheckedMeasure = Annotated[Measure, Field(description="Write @kiks.measure over the function.")]
 
@@ -59,7 +58,7 @@ class EnvSpec:
     @property
     def sensor_count(self) -> int:
         """Number of readings of a robot."""
-        return SENSOR_COUNT * len(self.senses)
+        return reading_count(self.senses)
 
     def with_changes(self, **changes: Any) -> EnvSpec:
         """Return a copy with some arguments changed.

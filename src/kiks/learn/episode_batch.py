@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from kiks.batch.batch import Batch
 from kiks.batch.initial_state import random_starts
+from kiks.control.controller import SENSES
 from kiks.control.measures import contacts, path_mm
-from kiks.control.neural_nets import COUNT_MAX
 from kiks.drawing import draw_world
 from kiks.errors import ParameterError
 from kiks.learn.env_specs import EnvSpec
-from kiks.model.robot import SENSOR_COUNT, RobotSpec
+from kiks.model.robot import RobotSpec
 
 PLACE_COUNT = 1000
 """Number of free places in an arena from which starts are drawn."""
@@ -74,7 +74,8 @@ class Episodes:
         self._goal_note = spec.reward.note_count + 2 if goals else None
         self._radius_mm = self.batch.specs[0].body.radius_mm
         self._places = [self._free_places(arena) for arena in self.batch.arenas] if spec.starts == "random" else []
-        self._sensors = np.zeros((worlds, robots, SENSOR_COUNT * len(spec.senses)))
+        self._sensors = np.zeros((worlds, robots, spec.sensor_count))
+        self._most = np.concatenate([np.full(SENSES[name].size, SENSES[name].most) for name in spec.senses])
         self._scores = np.zeros((worlds, robots))
 
     @property
@@ -134,7 +135,7 @@ class Episodes:
 
     def observations(self) -> NDArray[np.float32]:
         """Return the last readings as shares of the largest count, float32 [world, robot, sensor]."""
-        return (self._sensors / COUNT_MAX).astype(np.float32)
+        return np.asarray(self._sensors / self._most, np.float32)
 
     def terminations(self) -> NDArray[np.bool_]:
         """Return whether a robot of each world has reached the goal, bool [world]."""

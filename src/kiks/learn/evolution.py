@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kiks.errors import ParameterError, shown
-from kiks.learn.algorithms import make_algorithm
+from kiks.learn.algorithms import Algorithm, make_algorithm
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Executor
 from kiks.learn.evolution_log import Folder, Generation, Identity
@@ -38,7 +38,7 @@ TRIALS = 8
 LOG_EVERY_S = 10.0
 """Time between two writes of the log [s]; each writes the whole log."""
 
-_ALGORITHM_SEED, _WORLDS_SEED, _TRIAL_SEED = range(3)
+_ALGORITHM_SEED, WORLDS_SEED, TRIAL_SEED, BASELINE_SEED = range(4)
 """Purposes of seeds."""
 
 
@@ -47,9 +47,12 @@ class Evolution:
 
     Args:
         task: The task.
-        algorithm: 'cma' (CMA-ES), 'ga' (a genetic algorithm) or 'map-elites' (many different behaviours).
+        algorithm: 'cma' (CMA-ES), 'ga' (a genetic algorithm) or 'map-elites' (many different behaviours); or an object
+            with `ask()`, which returns candidates, float64 [candidate, parameter], each time as many, and
+            `tell(fitness, behaviours)`, float64 [candidate] and [candidate, axis]. It may have `favourite()`, which
+            returns the parameters that it considers best; else these are the best of the last generation.
         seed: Seed of all random numbers: the same seed gives the same evolution, with any number of workers.
-        population: Number of candidates in a generation.
+        population: Number of candidates in a generation; as many as `ask` returns, if the algorithm is an object.
         folder: Folder of its generations, its champion and its log. If it holds generations of the same evolution, the
             evolution continues after them, as if it had never stopped. Left out, nothing is written.
 
@@ -74,25 +77,37 @@ class Evolution:
     def __init__(
         self,
         task: Task,
-        algorithm: str = "cma",
+        algorithm: object = "cma",
         *,
         seed: int = 0,
         population: int | None = None,
         folder: str | Path | None = None,
     ) -> None:
         self.task = check_kind("task", task, Task, "kiks.tasks.load() returns one.")
-        self.name = check_kind("algorithm", algorithm, str)
-        self.population = check_count("population", POPULATION if population is None else population, 4)
         self.seed = check_count("seed", seed, most=2**63 - 1)
         self.generations: list[Generation] = []
-        self.algorithm = make_algorithm(
-            algorithm, task.parameter_count, self.population, self._seed_for(_ALGORITHM_SEED), task.axes, task.spread
-        )
-        self._trial_seeds = [self._seed_for(_TRIAL_SEED, number) for number in range(TRIALS)]
-        self._rival: Floats | None = None
         self._asked: Floats | None = None
+        self.algorithm: Algorithm
+        if is_algorithm(algorithm):
+            self.name, self.algorithm = type(algorithm).__name__, algorithm
+            self._asked = self._candidates(None if population is None else check_count("population", population, 1))
+            self.population = len(self._asked)
+        else:
+            self.name = check_kind("algorithm", algorithm, str, "Or give an object with ask and tell.")
+            self.population = check_count("population", POPULATION if population is None else population, 4)
+            self.algorithm = make_algorithm(
+                self.name,
+                task.parameter_count,
+                self.population,
+                self._seed_for(_ALGORITHM_SEED),
+                task.axes,
+                task.spread,
+            )
+        self._trial_seeds = [self._seed_for(TRIAL_SEED, number) for number in range(TRIALS)]
+        self._rival: Floats | None = None
         self._best: Champion | None = None
         self._earlier_s, self._start_s, self._logged_s = 0.0, perf_counter(), -np.inf
+        self._world = task.world()
         self._folder = None if folder is None else Folder(folder)
         if self._folder is not None:
             self._resume(self._folder)
@@ -103,13 +118,30 @@ class Evolution:
         """Return the candidates of the next generation, float64 [candidate, parameter]; the same until `tell`.
 
         After the population come the trials of the last generation's rival, if there is one.
+
+        Raises:
+            ParameterError: If the algorithm returns anything else than so many candidates.
         """
         if self._asked is None:
-            asked = self.algorithm.ask()
+            asked = self._candidates(self.population)
             if self._rival is not None:
                 asked = np.concatenate([asked, np.tile(self._rival, (TRIALS, 1))])
             self._asked = asked
         return self._asked.copy()
+
+    def _candidates(self, count: int | None) -> Floats:
+        """Return candidates of the algorithm, a copy.
+
+        Args:
+            count: Number of candidates; any from 1 if None.
+
+        Raises:
+            ParameterError: If it returns something else.
+        """
+        candidates = check_numbers("candidates of ask()", self.algorithm.ask(), (count, self.task.parameter_count))
+        if not len(candidates):
+            raise ParameterError("candidates of ask() must be at least one, but there were none.")
+        return candidates
 
     @property
     def seeds(self) -> Integers:
@@ -117,7 +149,7 @@ class Evolution:
 
         All candidates of a population drive in the same worlds, so their fitness can be compared.
         """
-        seeds = [self._seed_for(_WORLDS_SEED, len(self.generations))] * self.population
+        seeds = [self._seed_for(WORLDS_SEED, len(self.generations))] * self.population
         return np.array(seeds + ([] if self._rival is None else self._trial_seeds), np.int64)
 
     def tell(self, values: ArrayLike) -> None:
@@ -149,14 +181,17 @@ class Evolution:
         if self._rival is not None and (self._best is None or trials[:, 0].mean() > self._best.fitness):
             self._best = self._champion(self._rival, trials.mean(axis=0), len(self.generations))
         best_fitness = np.nan if self._best is None else self._best.fitness
-        generation = Generation(self._asked, given, self.population, best_fitness, seconds)
+        generation = Generation(self._asked, given, self.seeds, self.population, best_fitness, seconds)
         behaviours = np.zeros((self.population, 0))
         if given.shape[1] == value_count:
             columns = [self.task.value_names.index(axis.measure) for axis in self.task.axes]
             behaviours = given[: self.population, columns]
-        self.algorithm.tell(fitness, behaviours)
+        self.algorithm.tell(fitness.copy(), behaviours)
+        favourite: Any = getattr(self.algorithm, "favourite", None)
+        best = self._asked[int(fitness.argmax())] if favourite is None else favourite()
+        self._rival = check_numbers("parameters of favourite()", best, (self.task.parameter_count,))
         self.generations.append(generation)
-        self._rival, self._asked = self.algorithm.favourite(), None
+        self._asked = None
 
     # ---- run ----
 
@@ -248,16 +283,16 @@ class Evolution:
             generation=generation,
             algorithm=self.name,
             seed=self.seed,
-            robot=task.robot,
-            timing=task.timing,
+            robot=task.kinds[0],
+            timing=task.timings[0],
+            world=self._world,
         )
 
     # ---- seeds and folders ----
 
     def _seed_for(self, purpose: int, number: int = 0) -> int:
         """Return a seed derived from that of the evolution."""
-        sequence = np.random.SeedSequence(self.seed, spawn_key=(purpose, number))
-        return int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(2))
+        return derived_seed(self.seed, purpose, number)
 
     def _resume(self, folder: Folder) -> None:
         """Take the generations of the folder.
@@ -266,8 +301,9 @@ class Evolution:
             ParameterError: If it holds another evolution.
         """
         task = self.task
+        controller, digest = task.controller.name, task.digest()
         folder.check_identity(
-            Identity(task.name, self.name, self.seed, self.population, task.controller.name, task.digest(), __version__)
+            Identity(task.name, self.name, self.seed, self.population, controller, digest, __version__, task.file)
         )
         value_count = len(task.value_names)
         while (saved := folder.generation(len(self.generations), self.ask().shape, value_count)) is not None:
@@ -279,3 +315,14 @@ class Evolution:
                 )
             self._tell(saved["values"], float(saved["seconds"]))
         self._earlier_s = self.generations[-1].seconds if self.generations else 0.0
+
+
+def derived_seed(seed: int, purpose: int, number: int = 0) -> int:
+    """Return a seed of an evolution with a seed: of `WORLDS_SEED`, the worlds of a generation, counted from 0."""
+    sequence = np.random.SeedSequence(seed, spawn_key=(purpose, number))
+    return int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(2))
+
+
+def is_algorithm(algorithm: object) -> TypeGuard[Algorithm]:
+    """Return whether an object is an algorithm of a user's own."""
+    return all(callable(getattr(algorithm, name, None)) for name in ("ask", "tell")) and not isinstance(algorithm, type)

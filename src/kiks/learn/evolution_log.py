@@ -24,6 +24,7 @@ from kiks.model.atomic_files import make_folder, path_of, replace_file
 from kiks.model.data_file import Text, Whole, check, parse_json, read_file, record
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 IDENTITY, GENERATIONS, LOG = "evolution.json", "generations", "log.parquet"
 """Names in the folder."""
@@ -33,7 +34,7 @@ _ADVICE = "Remove the file, and those after it."
 
 @record
 class Identity:
-    """The properties that identify an evolution."""
+    """The properties that identify an evolution, and the file of its task, which may be moved."""
 
     task: Text
     algorithm: Text
@@ -42,6 +43,7 @@ class Identity:
     controller: Text
     task_digest: Text
     kiks: Text
+    task_file: Text = ""
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,7 @@ class Generation:
     Attributes:
         candidates: All evaluated candidates, float64 [candidate, parameter]: the population, then trials of a rival.
         values: Their values, float64 [candidate, value]: fitness, then measures.
+        seeds: Seeds of their worlds, int64 [candidate].
         population: Size of the population.
         champion_fitness: Fitness of the best rival so far; NaN before the first.
         seconds: Time of its end [s of the wall clock, since the evolution began].
@@ -58,6 +61,7 @@ class Generation:
 
     candidates: Floats
     values: Floats
+    seeds: Integers
     population: int
     champion_fitness: float
     seconds: float
@@ -72,30 +76,44 @@ class Folder:
     """The folder of an evolution.
 
     Args:
-        path: The folder; created if it does not exist.
+        path: The folder.
 
     Raises:
-        ParameterError: If it cannot be created.
+        ParameterError: If it is no name of a folder.
     """
 
     def __init__(self, path: str | Path) -> None:
         self.path = path_of(path, "folder")
-        make_folder(self.path / GENERATIONS, "an evolution")
 
-    def check_identity(self, identity: Identity) -> None:
-        """Write the identity of an evolution into the folder, or compare it with the one there.
+    def identity(self) -> Identity:
+        """Return the identity of the evolution in the folder.
 
         Raises:
-            ParameterError: If the folder belongs to another evolution.
+            ParameterError: If there is none, or it is broken.
         """
+        file = self.path / IDENTITY
+        if not file.exists():
+            raise ParameterError(
+                f"{str(self.path)!r} must be the folder of an evolution, but it has no {IDENTITY}. "
+                "Name one that `kiks evolve` has written."
+            )
+        what = f"The record of an evolution {str(file)!r}"
+        return check(Identity, parse_json(read_file(file, what), what), what, advice="Take a new folder.")
+
+    def check_identity(self, identity: Identity) -> None:
+        """Write the identity of an evolution into the folder, which is made if need be, or compare it with that there.
+
+        Raises:
+            ParameterError: If the folder belongs to another evolution, or cannot be written.
+        """
+        make_folder(self.path / GENERATIONS, "an evolution")
         file = self.path / IDENTITY
         if not file.exists():
             replace_file(file, json.dumps(asdict(identity), indent=1) + "\n", "an evolution")
             return
-        what = f"The record of an evolution {str(file)!r}"
-        found = check(Identity, parse_json(read_file(file, what), what), what, advice="Take a new folder.")
+        found = self.identity()
         for name, value in asdict(identity).items():
-            if (known := getattr(found, name)) != value:
+            if (known := getattr(found, name)) != value and name != "task_file":
                 raise ParameterError(
                     f"the folder {str(self.path)!r} must hold the same evolution, but its {name} is "
                     f"{shown(known)}, not {shown(value)}. Take a new folder, or "
@@ -124,6 +142,13 @@ class Folder:
         number_count_max = shape[0] * (shape[1] + value_count) + 1
         return read_arrays(file, rules, f"Generation {str(file)!r}", numbers_max=number_count_max)
 
+    def generation_count(self) -> int:
+        """Return the number of saved generations."""
+        number = 0
+        while self._file(number).exists():
+            number += 1
+        return number
+
     def save(self, number: int, generation: Generation) -> None:
         """Save a generation.
 
@@ -136,13 +161,13 @@ class Folder:
         replace_file(self._file(number), buffer.getvalue(), "a generation")
 
     def save_log(self, generations: Sequence[Generation], value_names: Sequence[str]) -> None:
-        """Write the log of all generations, one row per candidate of each population.
+        """Write the log of all generations, a row for each evaluation: the population, then the trials of a rival.
 
         Raises:
             ParameterError: If it cannot be written, or pyarrow is not installed.
         """
         pyarrow, parquet = library("pyarrow"), library("pyarrow.parquet")
-        counts = [len(each.fitness) for each in generations]
+        counts = [len(each.values) for each in generations]
 
         def per_candidate(values: Sequence[float]) -> NDArray[Any]:
             return np.repeat(np.array(values), counts) if counts else np.zeros(0)
@@ -151,13 +176,15 @@ class Folder:
             "generation": per_candidate(range(1, len(counts) + 1)).astype(np.int64),
             "candidate": np.concatenate([np.zeros(0, np.int64), *map(np.arange, counts)]).astype(np.int64),
         }
-        values = [each.values[: each.population] for each in generations]
+        populations = per_candidate([each.population for each in generations])
+        columns["is_trial"] = columns["candidate"] >= populations
+        columns["seed"] = np.concatenate([np.zeros(0, np.int64), *(each.seeds for each in generations)])
+        values = [each.values for each in generations]
         table = np.concatenate(values) if values else np.zeros((0, len(value_names)))
         columns |= {name: table[:, number] for number, name in enumerate(value_names[: table.shape[1]])}
         columns["champion_fitness"] = per_candidate([each.champion_fitness for each in generations])
         columns["seconds"] = per_candidate([each.seconds for each in generations])
-        evaluated = np.cumsum([len(each.values) for each in generations]).tolist()
-        columns["evaluations"] = per_candidate(evaluated).astype(np.int64)
+        columns["evaluations"] = per_candidate(np.cumsum(counts).tolist()).astype(np.int64)
         buffer = io.BytesIO()
         parquet.write_table(pyarrow.table(columns), buffer)
         replace_file(self.path / LOG, buffer.getvalue(), "the log")

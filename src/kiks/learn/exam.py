@@ -7,7 +7,7 @@ a line, and takes a fraction of a second.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import cycle
 from typing import Annotated
 
@@ -22,9 +22,13 @@ from kiks.errors import ParameterError, shown
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats
 from kiks.model.arena import Arena
+from kiks.model.arena_file import THINGS_MAX
 from kiks.model.checks import check_kind
 from kiks.model.data_file import Number, Text, Whole, record
-from kiks.model.robot import RobotSpec
+from kiks.model.family import family
+from kiks.model.project import Project, ProjectRobot
+from kiks.model.robot import RobotSpec, specs_of
+from kiks.sim.from_project import rounded_pose
 
 Solved = Callable[[Mapping[str, Floats]], NDArray[np.bool_]]
 
@@ -33,6 +37,9 @@ PASS_SHARE = 0.9
 
 EXAM_SEED = 2**40
 """Seed of the first start of each exam; evolutions draw theirs from others."""
+
+IMPERFECT = 10
+"""Number of imperfect robots with which an exam is taken again."""
 
 CLEAR_MM = 8.0
 """Smallest gap between a start and anything else [mm]."""
@@ -114,31 +121,29 @@ class Exam:
                 f"count must be a multiple of the number of arenas, {len(self.arenas)}, but it was {self.count}."
             )
 
-    def examine(self, champion: Champion, *, robots: int = 1) -> ExamResult:
+    def examine(self, champion: Champion, *, robots: int = 1, kinds: Sequence[RobotSpec] | None = None) -> ExamResult:
         """Let a champion drive from all starts, with the timing of its own control loop.
 
         Args:
             champion: The champion.
             robots: Number of robots in each world, all driven by it. A start is that of all of them.
+            kinds: Kinds of robots, such as those of `imperfect_robots`. All starts are taken with each, so the result
+                has as many times more starts. Left out, the champion's own.
 
         Raises:
             ParameterError: If an argument is wrong, or `solved` returns something else than a yes or no for each start.
             ArenaError: If something has no free place in an arena.
         """
         check_kind("champion", champion, Champion, "kiks.Champion.load() returns one.")
-        poses = None
-        if self.starts == "random":
-            poses = spread_starts(self.arenas, self.count, seed=EXAM_SEED, robot=champion.robot, robots=robots)
-        elif robots == 1 and all(arena.starts for arena in self.arenas):
-            places = [cycle(arena.starts) for arena in self.arenas]
-            poses = np.array([next(places[k % len(places)]) for k in range(self.count)])[:, None]
+        named = specs_of(champion.robot if kinds is None else kinds, None, None)
+        count, poses = self.count * len(named), self._poses(champion.robot, robots)
         batch = Batch(
             self.arenas,
-            self.count,
-            robot=champion.robot,
+            count,
+            robot=[(each,) * robots for each in named for _ in range(self.count)],
             robots=robots,
-            seed=EXAM_SEED,
-            starts=poses,
+            seed=np.tile(EXAM_SEED + np.arange(self.count), len(named)),
+            starts=None if poses is None else np.tile(poses, (len(named), 1, 1)),
             senses=champion.controller.senses,
             timing=champion.timing,
         )
@@ -146,16 +151,68 @@ class Exam:
         values = rollouts.values.mean(axis=1)
         result = self.solved({name: values[:, number] for number, name in enumerate(rollouts.measures)})
         solved = np.asarray(result)
-        if solved.dtype != np.bool_ or solved.shape != (self.count,):
+        if solved.dtype != np.bool_ or solved.shape != (count,):
             raise ParameterError(
-                f"solved must return a bool for each of {self.count} starts, but returned {shown(result)}. "
+                f"solved must return a bool for each of {count} starts, but returned {shown(result)}. "
                 "The measures have the shape [start]."
             )
         return ExamResult(solved, values, rollouts.measures, self.goal)
 
+    def world(self, robot: str | RobotSpec, robots: int = 1) -> Project:
+        """Return the world of the first start, in the first arena; the other starts there come after it.
+
+        Args:
+            robot: Kind of the robots.
+            robots: Number of robots.
+
+        Raises:
+            ParameterError: If the arena has too few free places, or more in it than a project may have.
+        """
+        poses = self._poses(robot, robots) if self.starts == "random" else None
+        return world_of(
+            self.arenas[0], None if poses is None else poses[:: len(self.arenas)].reshape(-1, 3), robots, EXAM_SEED
+        )
+
+    def _poses(self, robot: str | RobotSpec, robots: int) -> Floats | None:
+        """Return the start poses, float64 [start, robot, 3]; None for those that arenas give several robots."""
+        if self.starts == "random":
+            return spread_starts(self.arenas, self.count, seed=EXAM_SEED, robot=robot, robots=robots)
+        if robots > 1 or not all(arena.starts for arena in self.arenas):
+            return None
+        places = [cycle(arena.starts) for arena in self.arenas]
+        return np.array([next(places[k % len(places)]) for k in range(self.count)])[:, None]
+
+
+def imperfect_robots(champion: Champion) -> list[RobotSpec]:
+    """Return the family of the champion's robot, for exams: `IMPERFECT` robots, the same for the same kind."""
+    (spec,) = specs_of(champion.robot, 1, None)
+    return family(spec, IMPERFECT, seed=EXAM_SEED)
+
+
+def world_of(arena: Arena, poses: Floats | None, robots: int, seed: int) -> Project:
+    """Return a world that fits in a champion's file, which holds headings in degrees.
+
+    Args:
+        arena: The arena.
+        poses: Start poses [start, 3], which are rounded like those of projects from the desk; the arena's own if None.
+        robots: Number of robots.
+        seed: Seed of all random numbers.
+
+    Raises:
+        ParameterError: If the arena has more in it than a project may have.
+    """
+    starts = tuple(rounded_pose(*pose) for pose in (arena.starts if poses is None else poses[:THINGS_MAX].tolist()))
+    return Project(replace(arena, starts=starts), robots=(ProjectRobot(),) * robots, seed=seed)
+
 
 def spread_starts(
-    arenas: Sequence[Arena], count: int, *, seed: int, robot: str, robots: int = 1, clear_mm: float = CLEAR_MM
+    arenas: Sequence[Arena],
+    count: int,
+    *,
+    seed: int,
+    robot: str | RobotSpec,
+    robots: int = 1,
+    clear_mm: float = CLEAR_MM,
 ) -> Floats:
     """Return random start poses in worlds that take arenas in turn, float64 [count, robot, 3].
 
@@ -170,7 +227,8 @@ def spread_starts(
     Raises:
         ParameterError: If an arena has too few free places.
     """
-    radius_mm = RobotSpec.load(robot).body.radius_mm
+    (spec,) = specs_of(robot, 1, None)
+    radius_mm = spec.body.radius_mm
     poses = [
         random_starts(arena, count // len(arenas), seed=seed, robots=robots, radius_mm=radius_mm, clear_mm=clear_mm)
         for arena in arenas

@@ -1,4 +1,4 @@
-"""The loop over the generations of an evolution, and derived seeds."""
+"""The loop over the generations of an evolution."""
 
 from __future__ import annotations
 
@@ -101,15 +101,3 @@ def check_executor(executor: object) -> None:
     """
     if not isinstance(executor, Executor | str):
         raise ParameterError(f"executor must be an Executor or a text such as 'threads', but it was {shown(executor)}.")
-
-
-def seed_for(seed: int, purpose: int, number: int = 0) -> int:
-    """Return a seed that is derived from that of an evolution.
-
-    Args:
-        seed: Seed of the evolution.
-        purpose: What it is for.
-        number: Number of the seed for that purpose.
-    """
-    sequence = np.random.SeedSequence(seed, spawn_key=(purpose, number))
-    return int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(2))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -261,6 +262,70 @@ def _with_cylinders(number: int) -> Arena:
     )
 
 
+# ---- disperse ----
+
+SWARM_ROBOTS = 20
+"""Robots of `disperse`."""
+
+SPREAD_SHARE = 0.85
+"""Share of the mean distance of random neighbours that a swarm must reach in the exam of `disperse`."""
+
+DISPERSE_CONTACT_COST = 0.1
+"""Fitness of a robot is divided by 1 plus this times its contacts."""
+
+EXAM_SIDE_MM = 1500.0
+"""Side of the rooms of that exam [mm]."""
+
+
+def disperse_fitness(values: Values) -> Floats:
+    """Return the fitness of `disperse`: the mean distance of neighbours at the end [m], reduced by contacts."""
+    return cautious_mean(values["neighbour_mm"] / (1 + DISPERSE_CONTACT_COST * values["contacts"])) / 1000
+
+
+def disperse_solved(values: Values) -> NDArray[np.bool_]:
+    """Return whether the robots are as far from each other as robots at random places, nearly.
+
+    Among n random places in an area A, the nearest neighbour is sqrt(A / n) / 2 away on average (Clark and Evans 1954,
+    equation 1).
+    """
+    return values["neighbour_mm"] >= SPREAD_SHARE * EXAM_SIDE_MM / math.sqrt(SWARM_ROBOTS) / 2
+
+
+def disperse(controller: Controller | None = None, **changes: Any) -> Task:
+    """Return the task of twenty robots, all with one controller, to spread out from a heap.
+
+    Args:
+        controller: The controller to evolve; a perceptron with feedback if left out.
+        changes: Other arguments of `Task`.
+    """
+    task = Task(
+        "disperse",
+        (training_arenas.heap(1400, 700, 700, 1), training_arenas.heap(1600, 400, 500, 2)),
+        controllers.mlp(hidden=(), feedback=True, speed_limit=SPEED_LIMIT) if controller is None else controller,
+        (measures.neighbour_mm, measures.contacts, measures.path_mm),
+        fitness=disperse_fitness,
+        seconds=60.0,
+        worlds=2,
+        axes=(Axis("neighbour_mm", 0, 400), Axis("path_mm", 0, 4000)),
+        robots=SWARM_ROBOTS,
+        starts="arena",
+        spread=1.0,
+        generations=30,
+        exam=Exam(
+            (
+                training_arenas.heap(EXAM_SIDE_MM, 1000, 400, 3),
+                training_arenas.heap(EXAM_SIDE_MM, 300, 750, 4),
+            ),
+            (measures.neighbour_mm,),
+            disperse_solved,
+            "spread out nearly as far as random places",
+            starts="arena",
+        ),
+        about="twenty robots spread out from a heap",
+    )
+    return replace(task, **changes)
+
+
 # ---- maze ----
 
 GOAL_RADIUS_MM = 100.0
@@ -336,6 +401,7 @@ TASKS: dict[str, Callable[..., Task]] = {
     "follow": follow,
     "light": light,
     "gather": gather,
+    "disperse": disperse,
     "maze": maze,
     "maze-qd": maze_qd,
 }

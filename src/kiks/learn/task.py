@@ -18,11 +18,14 @@ from kiks.batch.loop_timing import Timing
 from kiks.control.controller import Controller
 from kiks.control.measure import Measure
 from kiks.errors import ParameterError, shown
+from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats, Integers, check_candidates
-from kiks.learn.exam import Exam, spread_starts
-from kiks.model.checks import check_number
-from kiks.model.data_file import Number, Text, Whole, read_file, record
-from kiks.model.robot import RobotSpec
+from kiks.learn.exam import Exam, spread_starts, world_of
+from kiks.model.arena import Pose
+from kiks.model.checks import check_count, check_number
+from kiks.model.data_file import Number, Rule, Text, Whole, read_file, record
+from kiks.model.project import Project, ProjectRobot
+from kiks.model.robot import RobotSpec, specs_of
 
 Fitness = Callable[[Mapping[str, Floats]], Floats]
 
@@ -40,6 +43,15 @@ WORLDS_MAX, ROBOTS_MAX, MEASURES_MAX = 100_000, 1000, 100
 """Largest number of worlds of a candidate, of robots in each world, and of measures."""
 
 Seconds = Annotated[Number, Field(ge=1e-3, le=1e6)]
+
+Kind = Text | RobotSpec
+Kinds = Annotated[
+    Kind | Annotated[tuple[Kind, ...], Field(min_length=1)],
+    Rule("the name of a robot, a robot file or a kiks.RobotSpec, or a list of them"),
+]
+Timings = Annotated[
+    Timing | Annotated[tuple[Timing, ...], Field(min_length=1)], Rule("a kiks.Timing or a list of them")
+]
 
 
 @record
@@ -83,9 +95,11 @@ class Task:
         seconds: Time for which a candidate drives in each world [s].
         worlds: Number of worlds; a multiple of the number of arenas.
         axes: Axes along which behaviours differ, for algorithms that look for many of them.
-        robot: Kind of robot: a name or a robot file.
+        robot: Kind of robot: a name, a robot file or a `RobotSpec`. Or several, such as a `family`: the worlds of a
+            candidate take them in turn, each generation from another one on. Champions drive the first.
         robots: Number of robots in each world, all with the same controller.
-        timing: Timing of the control loop; that of a program on a line of 9600 baud if left out.
+        timing: Timing of the control loop; that of a program on a line of 9600 baud if left out. Or several, which
+            the worlds take in turn like the robots.
         starts: 'random' for free places anywhere, or 'arena' for the starts of the arena.
         spread: Standard deviation of each parameter in the first generation.
         generations: How many generations an evolution has, unless the user says otherwise.
@@ -115,9 +129,9 @@ class Task:
     seconds: Seconds = 30.0
     worlds: Annotated[Whole, Field(ge=1, le=WORLDS_MAX)] = 1
     axes: tuple[Axis, ...] = ()
-    robot: Text = "khepera"
+    robot: Kinds = "khepera"
     robots: Annotated[Whole, Field(ge=1, le=ROBOTS_MAX)] = 1
-    timing: Timing = field(default_factory=Timing)
+    timing: Timings = field(default_factory=Timing)
     starts: Starts = "random"
     spread: Annotated[Number, Field(gt=0, le=1000)] = SPREAD
     generations: Annotated[Whole, Field(ge=1)] = GENERATIONS
@@ -175,6 +189,16 @@ class Task:
         return ("fitness", *self.measure_names)
 
     @property
+    def kinds(self) -> tuple[Kind, ...]:
+        """The kinds of robots that worlds take in turn."""
+        return self.robot if isinstance(self.robot, tuple) else (self.robot,)
+
+    @property
+    def timings(self) -> tuple[Timing, ...]:
+        """The timings that worlds take in turn."""
+        return self.timing if isinstance(self.timing, tuple) else (self.timing,)
+
+    @property
     def parameter_count(self) -> int:
         """Number of parameters of a candidate."""
         return self.controller.parameter_count or 0
@@ -184,22 +208,63 @@ class Task:
         """Total time for which the robots of a candidate drive [s]."""
         return self.worlds * self.robots * self.seconds
 
-    def digest(self) -> str:
-        """Return 16 hexadecimal digits that differ between tasks whose evolutions differ."""
+    def world(self) -> Project:
+        """Return the world in which its champions are shown: that of their exam, or of training if there is none.
+
+        Raises:
+            ParameterError: If the arena has too few free places, or more in it than a project may have.
+        """
+        if self.exam is not None:
+            return self.exam.world(self.kinds[0], self.robots)
+        poses = self._starts(np.zeros(1, np.int64)) if self.starts == "random" else None
+        return world_of(self.arenas[0], None if poses is None else poses[:: len(self.arenas), 0], self.robots, 0)
+
+    def individual(self, parameters: Floats, seed: int, world: int = 0) -> Champion:
+        """Return a candidate as a champion, whose world is one of those in which it is evaluated.
+
+        On a line, the world then takes the course that it takes in the evaluation, to the bit.
+
+        Args:
+            parameters: Its parameters, float64 [parameter].
+            seed: Its seed.
+            world: Number of the world, from 0.
+
+        Raises:
+            ParameterError: If an argument is out of range.
+        """
+        world, seeds = check_count("world", world, 0, self.worlds - 1), np.array([seed])
+        kinds, timings = self._turns(seeds)
+        arena = self.arenas[world % len(self.arenas)]
+        if self.starts == "random":
+            arena = replace(arena, starts=(Pose(*self._starts(seeds)[world, 0].tolist()),))
+        return Champion(
+            controller=self.controller,
+            parameters=tuple(parameters.tolist()),
+            task=self.name,
+            robot=self._specs()[kinds[world]],
+            timing=self.timings[timings[world]],
+            world=Project(arena, robots=(ProjectRobot(),) * self.robots, seed=seed + world),
+        )
+
+    def digest(self, *, with_controller: bool = True) -> str:
+        """Return 16 hexadecimal digits that differ between tasks whose evolutions differ.
+
+        Args:
+            with_controller: Whether controller, spread and the task's file count, too. Without them, tasks have the
+                same digits if champions drive in the same worlds and are measured in the same way.
+        """
         digest = hashlib.sha256()
         for each in self.arenas:
             digest.update(each.brightness.tobytes())
             digest.update(repr((each.mm_per_cell, each.starts, each.lamps, each.balls, each.cylinders)).encode())
-        evaluated = (
-            self.controller.recipe,
-            self.controller.name,
-            self.parameter_count,
-            self.measure_names,
-            self.seconds,
-        )
-        worlds = (self.worlds, self.axes, self.robots, self.timing, self.starts, self.spread)
-        digest.update(repr((self.name, evaluated, worlds, RobotSpec.load(self.robot))).encode())
-        if self.file:
+        controller = (self.controller.recipe, self.controller.name, self.parameter_count) if with_controller else ()
+        evaluated = (*controller, self.measure_names, self.seconds)
+        specs, timings = self._specs(), self.timings
+        timing, spec = (each[0] if len(each) == 1 else each for each in (timings, specs))
+        spread = (self.spread,) if with_controller else ()
+        worlds = (self.worlds, self.axes, self.robots, timing, self.starts, *spread)
+        digest.update(repr((self.name, evaluated, worlds, spec)).encode())
+        if self.file and with_controller:
             digest.update(read_file(Path(self.file), "the task's file"))
         return digest.hexdigest()[:16]
 
@@ -207,7 +272,7 @@ class Task:
 
     def prepare(self) -> None:
         """Compile the controller and the measures."""
-        self.evaluate(np.zeros((1, self.parameter_count)), np.zeros(1, np.int64), 1, seconds=self.timing.period_s)
+        self.evaluate(np.zeros((1, self.parameter_count)), np.zeros(1, np.int64), 1, seconds=self.timings[0].period_s)
 
     def evaluate(self, candidates: Floats, seeds: Integers, threads: int, seconds: float | None = None) -> Floats:
         """Return the values of candidates.
@@ -238,20 +303,28 @@ class Task:
 
     def _evaluate(self, candidates: Floats, seeds: Integers, threads: int, seconds: float) -> Floats:
         count = len(candidates)
-        batch = Batch(
-            self.arenas,
-            count * self.worlds,
-            robot=self.robot,
-            robots=self.robots,
-            seed=(seeds[:, None] + np.arange(self.worlds)).ravel(),
-            starts=self._starts(seeds) if self.starts == "random" else None,
-            senses=self.controller.senses,
-            timing=self.timing,
-            threads=threads,
-        )
+        world_seeds = (seeds[:, None] + np.arange(self.worlds)).ravel()
+        starts = self._starts(seeds) if self.starts == "random" else None
+        specs, (kinds, timings) = self._specs(), self._turns(seeds)
         given = np.repeat(candidates, self.worlds, axis=0)
-        values = batch.run(self.controller, given, seconds=seconds, measures=self.measures).values
-        values = values.mean(axis=1).reshape(count, self.worlds, len(self.measures))
+        scores = np.zeros((count * self.worlds, len(self.measures)))
+        for number in np.unique(timings).tolist():
+            here = np.flatnonzero(timings == number)
+            each = [(specs[kind],) * self.robots for kind in kinds[here].tolist()]
+            batch = Batch(
+                self.arenas,
+                len(here),
+                robot=specs[0] if len(specs) == 1 else each,
+                robots=self.robots,
+                seed=world_seeds[here],
+                starts=None if starts is None else starts[here],
+                senses=self.controller.senses,
+                timing=self.timings[number],
+                threads=threads,
+            )
+            driven = batch.run(self.controller, given[here], seconds=seconds, measures=self.measures)
+            scores[here] = driven.values.mean(axis=1)
+        values = scores.reshape(count, self.worlds, len(self.measures))
         for number, name in enumerate(self.measure_names):
             if not np.isfinite(values[:, :, number]).all():
                 raise ParameterError(f"measures must be finite, but {shown(name)} was not. Check its divisions.")
@@ -265,10 +338,26 @@ class Task:
             )
         return np.column_stack([fitness, values.mean(axis=1)])
 
+    def _specs(self) -> tuple[RobotSpec, ...]:
+        """Return the robots that worlds take in turn."""
+        return tuple(specs_of(self.kinds, None, None))
+
+    def _turns(self, seeds: Integers) -> tuple[Integers, Integers]:
+        """Return the number of each world's robot and of its timing, int64 [world].
+
+        The arenas' turn comes round faster than the others': each arena gets all robots, each robot all timings. Worlds
+        with the same timing are whole rounds of the arenas, as a batch takes them.
+        """
+        world = np.arange(self.worlds)
+        turn = (seeds[:, None] % 2**32 + world // len(self.arenas)).ravel()
+        kinds = (turn + np.tile(world % len(self.arenas), len(seeds))) % len(self.kinds)
+        return kinds, turn // len(self.kinds) % len(self.timings)
+
     def _starts(self, seeds: Integers) -> Floats:
         """Return random start poses, float64 [world, robot, 3]: the same for the same seed."""
+        widest = max(self._specs(), key=lambda spec: spec.body.radius_mm)
         poses = {
-            seed: spread_starts(self.arenas, self.worlds, seed=seed, robot=self.robot, robots=self.robots)
+            seed: spread_starts(self.arenas, self.worlds, seed=seed, robot=widest, robots=self.robots)
             for seed in dict.fromkeys(seeds.tolist())
         }
         return np.concatenate([poses[seed] for seed in seeds.tolist()])

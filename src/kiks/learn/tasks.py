@@ -15,14 +15,26 @@ from kiks.control.controller_spec import Recipe, module_in
 from kiks.control.controllers import controller_of
 from kiks.errors import KiksError, ParameterError, nearest, shown
 from kiks.learn.ready_contests import CONTESTS, pursuit
-from kiks.learn.ready_tasks import TASKS, avoid, follow, gather, light, maze, maze_qd
+from kiks.learn.ready_tasks import TASKS, avoid, disperse, follow, gather, light, maze, maze_qd
 from kiks.learn.task import ROBOTS_MAX, WORLDS_MAX, Seconds, Task
 from kiks.model.arena import Arena
 from kiks.model.atomic_files import inside, path_of
 from kiks.model.data_file import OneOf, Rule, Text, Whole, check, parse_toml, read_file, record
 from kiks.model.robot import robot_names
 
-__all__ = ["CONTESTS", "TASKS", "avoid", "follow", "gather", "light", "load", "maze", "maze_qd", "pursuit"]
+__all__ = [
+    "CONTESTS",
+    "TASKS",
+    "avoid",
+    "disperse",
+    "follow",
+    "gather",
+    "light",
+    "load",
+    "maze",
+    "maze_qd",
+    "pursuit",
+]
 
 Name = Annotated[
     Text,
@@ -131,7 +143,7 @@ def _task_of(given: TaskFile, path: Path, controller: Controller | None) -> Task
         timing["think_s"] = given.think_ms / 1000
     if given.baud is not None:
         timing["baud"] = given.baud or None
-    changes["timing"] = replace(base.timing, **timing)
+    changes["timing"] = replace(base.timings[0], **timing)
     if controller is None and given.controller is not None:
         controller = controller_of(given.controller, folder)
     if controller is not None:

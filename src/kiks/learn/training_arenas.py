@@ -17,6 +17,9 @@ from kiks.model.arena import Arena, Lamp, Pose
 WALL_MM = 10.0
 """Thickness of walls [mm]."""
 
+HEAP_PITCH_MM = 75.0
+"""Distance between neighbours in a heap of robots [mm]: they see each other."""
+
 TRIED_STARTS = 2000
 """Random places among which starts in shadow are looked for."""
 
@@ -64,6 +67,17 @@ def draw(width_mm: int, height_mm: int, strokes: Sequence[Stroke], name: str, br
         distance_squared = (x_mm - begin_x - share * along_x) ** 2 + (y_mm - begin_y - share * along_y) ** 2
         cells[distance_squared <= (stroke.thickness_mm / 2) ** 2] = stroke.brightness
     return Arena.from_array(cells, name=name)
+
+
+def heap(side_mm: float, x_mm: float, y_mm: float, number: int) -> Arena:
+    """Return a square room where twenty robots start in a heap around a place, each with another heading."""
+    rng = np.random.default_rng(number)
+    columns, rows = (each.ravel() for each in np.meshgrid(np.arange(5) - 2.0, np.arange(4) - 1.5))
+    starts = tuple(
+        Pose(x_mm + HEAP_PITCH_MM * column, y_mm + HEAP_PITCH_MM * row, float(rng.uniform(-np.pi, np.pi)))
+        for column, row in zip(columns.tolist(), rows.tolist(), strict=True)
+    )
+    return replace(Arena.box(side_mm, side_mm), name=f"heap {number}", starts=starts)
 
 
 def pillars() -> Arena:

@@ -19,7 +19,11 @@ from kiks.sim.simulation import Simulation
 
 
 def simulation_of(
-    project: Project, folder: str | Path = ".", *, kinds: Sequence[str] = (), thinking: str | None = None
+    project: Project,
+    folder: str | Path = ".",
+    *,
+    kinds: Sequence[str | RobotSpec] = (),
+    thinking: str | None = None,
 ) -> Simulation:
     """Return the world of a project at its start, with turrets fitted and lines set; programs are not begun.
 
@@ -104,10 +108,7 @@ def project_of(sim: Simulation, project: Project) -> Project:
     with sim.lock:
         poses, bodies, lamps = sim.poses(), sim.bodies(), sim.lamps.copy()
         arena, radii_mm = sim.arena, [spec.body.radius_mm for spec in sim.specs]
-    starts = [
-        Pose(round(x_mm, 3), round(y_mm, 3), math.radians(round(math.degrees(heading_rad) % 360, 3)))
-        for x_mm, y_mm, heading_rad in poses.tolist()
-    ]
+    starts = [rounded_pose(*pose) for pose in poses.tolist()]
     discs = [(pose.x_mm, pose.y_mm, radius_mm) for pose, radius_mm in zip(starts, radii_mm, strict=True)]
     discs += [_disc(body) for body in bodies if not body["is_lifted"]]
     balls: list[Ball] = []
@@ -127,6 +128,16 @@ def project_of(sim: Simulation, project: Project) -> Project:
         project,
         arena=replace(arena, starts=tuple(starts), lamps=tuple(hung), balls=tuple(balls), cylinders=tuple(cylinders)),
     )
+
+
+def rounded_pose(x_mm: float, y_mm: float, heading_rad: float) -> Pose:
+    """Return a pose that a file, which holds degrees, gives back to the bit.
+
+    Example:
+        >>> rounded_pose(100.00049, 50.0, -1e-9)
+        Pose(x_mm=100.0, y_mm=50.0, heading_rad=6.283185307179586)
+    """
+    return Pose(round(x_mm, 3), round(y_mm, 3), math.radians(round(math.degrees(heading_rad) % 360, 3)))
 
 
 def _disc(body: Any) -> tuple[float, float, float]:

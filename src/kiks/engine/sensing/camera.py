@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from kiks.engine.compiling import entry, kernel
+from kiks.engine.compiling import allocating, entry, kernel
 from kiks.engine.numbers import at_instant, draw, sin_cos, stream_of
 from kiks.engine.physics.motion import moment_of
 from kiks.engine.scene import open_scene
@@ -40,7 +40,7 @@ STREAM_CAMERA = 5
 
 _EDGE_DEG = 18.0
 _PIXEL_DEG = 2.0 * _EDGE_DEG / (PIXEL_COUNT - 1)
-_SUM_COUNT = PIXEL_COUNT + 1
+_SUM_COUNT, _CHANCE_COUNT = PIXEL_COUNT + 1, 3 * PIXEL_COUNT
 _PIXEL_RAD = 0.009973310011396168  # 36/63 degrees
 _PIXEL_COS, _PIXEL_SIN = 0.999950266955943, 0.009973144676492593
 _EDGE_COS, _EDGE_SIN = 0.9510565162951535, 0.3090169943749474
@@ -131,22 +131,28 @@ def expose(grey: Any) -> Any:
 
 
 @kernel
-def darken_edges(grey: Any, noise: Any) -> Any:
-    """Limit the greys by a ceiling that falls towards the edges: 240 in the middle, 132 at 18 degrees."""
+def darken_edges(grey: Any, chance: Any) -> Any:
+    """Limit the greys by a ceiling that falls towards the edges: 240 in the middle, 132 at 18 degrees.
+
+    Args:
+        grey: The greys, float64 [64].
+        chance: A random number from 0 to 1 for each pixel, float64 [64].
+    """
     for p in range(PIXEL_COUNT):
         angle = abs(_EDGE_DEG - p * _PIXEL_DEG)
         share = angle / _EDGE_DEG
         ceiling = 240.0 - 6.0 * angle * share * math.sqrt(share)
         if angle > 5.0 and grey[p] > ceiling:
-            grey[p] = ceiling + noise[p]
+            grey[p] = ceiling + _NOISE * (2.0 * chance[p] - 1.0)
 
 
-@entry
-def take_image(scene: Any, robot: Any, tick_count: Any, time_ns: Any, is_noisy: Any, out: Any) -> Any:
+@allocating
+def take_image_in(scene: Any, world: Any, robot: Any, tick_count: Any, time_ns: Any, is_noisy: Any, out: Any) -> Any:
     """Write the image of a robot's camera at a time into `out` and return its light level.
 
     Args:
-        scene: The scene (`kiks.engine.scene.Scene.record`).
+        scene: The scene (`kiks.engine.scene.open_scene`).
+        world: Index of the world.
         robot: Index of the robot.
         tick_count: Ticks done.
         time_ns: Time [ns], at most 10 ms before the end of the last tick.
@@ -156,8 +162,7 @@ def take_image(scene: Any, robot: Any, tick_count: Any, time_ns: Any, is_noisy: 
     Returns:
         The reading of the light detector, larger for a darker scene.
     """
-    scene = open_scene(scene[0])
-    state = scene.robots[0, robot]
+    state = scene.robots[world, robot]
     x, y, heading = pose_at(state, tick_count, time_ns)
     x_before, y_before, heading_before = pose_at(state, tick_count, time_ns - TICK_NS)
     sine, cosine = sin_cos(heading)
@@ -165,17 +170,17 @@ def take_image(scene: Any, robot: Any, tick_count: Any, time_ns: Any, is_noisy: 
     turn = (heading - heading_before) * _EXPOSURE_TICKS
 
     # Three random numbers per pixel; their means for an expected image.
-    chance = np.full((3, PIXEL_COUNT), 0.5)
+    chance = stack_floats(_CHANCE_COUNT)
+    chance[:] = 0.5
     flicker = 0.5
     if is_noisy:
-        origin = at_instant(stream_of(scene.seeds[0], 0, robot, STREAM_CAMERA), time_ns)
+        origin = at_instant(stream_of(scene.seeds[world], 0, robot, STREAM_CAMERA), time_ns)
         flicker = draw(origin, 3 * PIXEL_COUNT)
-        for kind in range(3):
-            for p in range(PIXEL_COUNT):
-                chance[kind, p] = draw(origin, kind * PIXEL_COUNT + p)
+        for number in range(_CHANCE_COUNT):
+            chance[number] = draw(origin, number)
 
     distance_mm, half_width = stack_floats(PIXEL_COUNT), stack_floats(PIXEL_COUNT)
-    tracks, count, seen = other_tracks(scene, 0, robot)
+    tracks, count, seen = other_tracks(scene, world, robot)
     see_all(scene.walls, tracks, count, moment_of(tick_count, 1.0 * time_ns), seen)
     look(scene.walls, seen, count, x, y, heading, out, distance_mm)
     for p in range(PIXEL_COUNT):
@@ -186,8 +191,9 @@ def take_image(scene: Any, robot: Any, tick_count: Any, time_ns: Any, is_noisy: 
     light = (255.0 - brightest) * 7.0 + 175.0 + 50.0 * flicker + (brightest - out.mean())
 
     expose(out)
-    out += _NOISE * (2.0 * chance[0] - 1.0)
-    darken_edges(out, _NOISE * (2.0 * chance[1] - 1.0))
+    for p in range(PIXEL_COUNT):
+        out[p] += _NOISE * (2.0 * chance[p] - 1.0)
+    darken_edges(out, chance[PIXEL_COUNT:])
 
     if way_mm != 0.0 or turn != 0.0:
         shake = min(_SHAKE_PIXELS_PER_MM * abs(way_mm), _SHAKE_PIXELS)
@@ -204,7 +210,13 @@ def take_image(scene: Any, robot: Any, tick_count: Any, time_ns: Any, is_noisy: 
         out[p] = 0.25 * before + 0.5 * here + 0.25 * out[min(p + 1, PIXEL_COUNT - 1)]
         before = here
     for p in range(PIXEL_COUNT):
-        out[p] = (1.0 - _LINE_NOISE) * out[p] + _LINE_NOISE * 255.0 * chance[2, p]
+        out[p] = (1.0 - _LINE_NOISE) * out[p] + _LINE_NOISE * 255.0 * chance[2 * PIXEL_COUNT + p]
         if is_noisy:
             out[p] = min(max(0.0, np.floor(out[p] + 0.5)), 255.0)
     return np.int64(np.floor(light + 0.5))
+
+
+@entry
+def take_image(scene: Any, robot: Any, tick_count: Any, time_ns: Any, is_noisy: Any, out: Any) -> Any:
+    """Call `take_image_in` for the first world of a scene."""
+    return take_image_in(open_scene(scene[0]), 0, robot, tick_count, time_ns, is_noisy, out)

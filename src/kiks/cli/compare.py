@@ -1,0 +1,110 @@
+"""`kiks compare`, and the table of `kiks evolve --seeds`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from kiks.cli.options import written_file
+from kiks.errors import ParameterError
+
+if TYPE_CHECKING:
+    from kiks.learn.results import Result
+
+
+def compare(
+    first: Annotated[Path, typer.Argument(help="A folder of kiks evolve, best with --seeds.")],
+    second: Annotated[Path, typer.Argument(help="Another folder, with evolutions of the same task.")],
+    picture: Annotated[
+        Path | None, typer.Option(help="File of the picture; kiks-compare.png if left out.", callback=written_file)
+    ] = None,
+) -> None:
+    """Compare the evolutions in two folders: medians, exams, and the Mann-Whitney test with its effect size.
+
+    Example: kiks compare runs/linear runs/gru
+    """
+    from kiks.learn.results import check_comparable, difference, load_results
+    from kiks.learn.results_plot import save_results_plot
+
+    if first.resolve() == second.resolve():
+        raise ParameterError(f"SECOND must be another folder than FIRST, but both are {str(first)!r}.")
+    groups = {str(first): load_results(first), str(second): load_results(second)}
+    one, two = groups.values()
+    check_comparable(one, two)
+    print_groups(groups)
+    samples = {"Fitness": [[each.fitness for each in group] for group in (one, two)]}
+    if all(each.exam is not None for each in (*one, *two)):
+        samples["Exam"] = [[each.exam.share for each in group if each.exam is not None] for group in (one, two)]
+    for name, sample in samples.items():
+        found = difference(*sample)
+        typer.echo(
+            f"{name}: U = {found.u:g}, p = {found.p:.3g}, A = {found.a:.2f} ({found.effect}): the share of pairs in "
+            f"which {first} is better"
+        )
+    target = picture or Path("kiks-compare.png")
+    save_results_plot(groups, target)
+    typer.echo(f"Picture: {target}")
+
+
+def print_seeds(results: Sequence[Result]) -> None:
+    """Print a table of evolutions that differ in their seed; the last row holds medians, and how many passed."""
+    rows: list[tuple[str, ...]] = [
+        (
+            str(each.seed),
+            f"{each.fitness:.4f}",
+            str(each.generation),
+            *_exam_texts(each),
+            str(each.evaluations[-1]),
+            f"{each.seconds:.0f}",
+        )
+        for each in results
+    ]
+    _, middle, _, passed, *costs = _figures(results)
+    rows.append(("all", middle, "", passed, "", *costs))
+    _print_table(("seed", "fitness", "found in", "exam", "imperfect", "evaluations", "seconds"), rows)
+
+
+def print_groups(groups: Mapping[str, Sequence[Result]]) -> None:
+    """Print a table of groups of evolutions: quartiles and medians, and how many champions passed the exam."""
+    columns = ("folder", "runs", "quartile", "median", "quartile", "exams", "evaluations", "seconds")
+    _print_table(columns, [(name, str(len(group)), *_figures(group)) for name, group in groups.items()])
+
+
+def _figures(results: Sequence[Result]) -> tuple[str, ...]:
+    """Return quartiles and median of fitness, solved exams, and medians of evaluations and of seconds, as text."""
+    from statistics import median
+
+    from kiks.learn.results import passed_count, quartiles
+
+    passed = passed_count(results)
+    return (
+        *(f"{value:.4f}" for value in quartiles(results)),
+        "-" if passed is None else f"{passed} of {len(results)}",
+        f"{median(each.evaluations[-1] for each in results):.0f}",
+        f"{median(each.seconds for each in results):.0f}",
+    )
+
+
+def _exam_texts(result: Result) -> tuple[str, str]:
+    if result.exam is None:
+        return "-", "-"
+    exam = result.exam
+    return f"{exam.solved} of {exam.starts}", f"{exam.imperfect_solved} of {exam.imperfect_starts}"
+
+
+def _print_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print a table; the first column stands left, the numbers right."""
+    from rich.box import SIMPLE
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=SIMPLE, pad_edge=False)
+    for number, name in enumerate(columns):
+        table.add_column(name, justify="right" if number else "left", overflow="fold")
+    for row in rows:
+        table.add_row(*row)
+    console = Console(markup=False, highlight=False)
+    console.print(table)

@@ -1,0 +1,100 @@
+"""An individual of a saved evolution: any candidate of any generation, in a world of its evaluation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from kiks.errors import ParameterError, shown
+from kiks.learn import tasks
+from kiks.learn.champion import Champion
+from kiks.learn.evolution import TRIALS, WORLDS_SEED, derived_seed
+from kiks.learn.evolution_log import Folder, Identity
+from kiks.learn.task import Task
+from kiks.model.checks import check_count
+
+
+@dataclass(frozen=True)
+class Individual:
+    """A candidate of a generation.
+
+    Attributes:
+        champion: Its controller with its parameters, in the world.
+        candidate: Its number in the generation, from 0, as in the log.
+        fitness: Its fitness.
+        seconds: Time for which it drove [s].
+        kiks: Version of KiKS that evaluated it.
+    """
+
+    champion: Champion
+    candidate: int
+    fitness: float
+    seconds: float
+    kiks: str
+
+
+def individual_of(
+    folder: str | Path, generation: int, *, rank: int = 1, world: int = 0, task: Task | None = None
+) -> Individual:
+    """Return a candidate of an evolution, to drive it again.
+
+    Args:
+        folder: Folder of the evolution.
+        generation: Its generation, from 1.
+        rank: 1 for the best of the generation, 2 for the next one; equal ones by their numbers.
+        world: Number of the world of its evaluation, from 0.
+        task: The task; looked up if left out: a ready-made one, or a task file (.toml).
+
+    Raises:
+        ParameterError: If a number is out of range, the folder holds no evolution, or its task cannot be found again.
+    """
+    saved = Folder(folder)
+    identity = saved.identity()
+    count = saved.generation_count()
+    if not count:
+        raise ParameterError(f"the evolution in {str(saved.path)!r} must have a generation, but it has none yet.")
+    number = check_count("generation", generation, 1, count) - 1
+    found = _task_of(saved, identity, task)
+    # The first generation has no rival on trial.
+    shape = (identity.population + (TRIALS if number else 0), found.parameter_count)
+    arrays = saved.generation(number, shape, len(found.value_names))
+    assert arrays is not None
+    fitness = arrays["values"][: identity.population, 0]
+    order = (-fitness).argsort(kind="stable")
+    candidate = int(order[check_count("rank", rank, 1, identity.population) - 1])
+    seed = derived_seed(identity.seed, WORLDS_SEED, number)
+    champion = found.individual(arrays["candidates"][candidate], seed, world)
+    return Individual(champion, candidate, float(fitness[candidate]), found.seconds, identity.kiks)
+
+
+def _task_of(folder: Folder, identity: Identity, given: Task | None) -> Task:
+    """Return the task of an evolution.
+
+    Raises:
+        ParameterError: If it cannot be found, or was changed.
+    """
+    name, file = identity.task, identity.task_file
+    where = f"the task {shown(name)} of the evolution in {str(folder.path)!r}"
+    if given is not None:
+        task = given
+    elif file.endswith(".toml") and Path(file).is_file():
+        task = tasks.load(file)
+    elif file:
+        # A Python file runs, so a person has to name it.
+        found = "is a Python file" if file.endswith(".py") else "is not there"
+        raise ParameterError(f"{where} must be given, for its file {shown(file)} {found}. Give it: --task FILE.")
+    elif name in tasks.TASKS:
+        task = tasks.load(name)
+    else:
+        raise ParameterError(
+            f"{where} must be given, for it was made in Python. Give a Python file in which `task` is this task: "
+            "--task FILE."
+        )
+    if task.digest() != identity.task_digest and task.controller.name != identity.controller:
+        task = task.with_changes(controller=Champion.load(folder.path / "champion.toml").controller)
+    if task.digest() != identity.task_digest:
+        raise ParameterError(
+            f"{where} must be the one that was evolved, but it differs now. Give a file with the earlier task: "
+            "--task FILE."
+        )
+    return task

@@ -1,0 +1,315 @@
+"""Results of finished evolutions, one for each seed, and what two groups of them say about each other.
+
+Sources: Mann and Whitney (1947) for U; Vargha and Delaney (2000), section 5, for the effect size A and its names.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from kiks.errors import ParameterError, shown
+from kiks.learn.baselines import baselines_of
+from kiks.learn.evolution import Evolution
+from kiks.learn.evolution_log import IDENTITY, Folder
+from kiks.learn.exam import PASS_SHARE, imperfect_robots
+from kiks.model.atomic_files import path_of, replace_file
+from kiks.model.data_file import TEXT_MAX, Number, Text, Whole, check, parse_json, read_file, record
+from kiks.version import __version__
+
+Floats = NDArray[np.float64]
+
+RESULT, SUMMARY = "result.json", "summary.json"
+"""Names in the folder of an evolution, and in that of several."""
+
+FILE_BYTES_MAX = 32 << 20
+"""Largest size of a result's file [byte]."""
+
+EFFECTS = ((0.06, "negligible"), (0.14, "small"), (0.21, "medium"), (0.5, "large"))
+"""Names of effect sizes: largest |A - 0.5|, and the name."""
+
+_Count = Annotated[Whole, Field(ge=0, lt=2**63)]
+_GENERATIONS_MAX = 1_000_000
+
+
+@record
+class ExamScore:
+    """How many starts of an exam a champion solved, with its own robot and with imperfect ones."""
+
+    solved: _Count
+    starts: Annotated[Whole, Field(ge=1, lt=2**63)]
+    imperfect_solved: _Count
+    imperfect_starts: Annotated[Whole, Field(ge=1, lt=2**63)]
+    text: Text
+
+    @property
+    def is_passed(self) -> bool:
+        """Whether enough starts were solved."""
+        return self.solved >= PASS_SHARE * self.starts
+
+    @property
+    def share(self) -> float:
+        """Share of the starts that were solved."""
+        return self.solved / self.starts
+
+
+@record
+class Result:
+    """The result of a finished evolution, a file in its folder.
+
+    Attributes:
+        result: Version of the format.
+        task: Name of the task.
+        worlds_digest: The task's digest without its controller: fitness can be compared if it is the same.
+        algorithm: The algorithm.
+        controller: Name of the controller.
+        population: Number of candidates in a generation.
+        seed: The seed.
+        kiks: Version of KiKS.
+        fitness: Fitness of the champion.
+        generation: The generation that found it.
+        seconds: Time of the evolution [s of the wall clock].
+        standing: Fitness of standing still.
+        random: Median fitness of random controllers.
+        generations: Number of generations.
+        evaluations: Number of evaluations until the end of each generation that has a champion [generation]: the first
+            has none, because no rival was tried, unless it is the only one.
+        champion_fitness: Fitness of the champion then [generation].
+        exam: The exam; None if the task has none.
+    """
+
+    result: Literal[1]
+    task: Text
+    worlds_digest: Text
+    algorithm: Text
+    controller: Text
+    population: _Count
+    seed: _Count
+    kiks: Text
+    fitness: Number
+    generation: _Count
+    seconds: Annotated[Number, Field(ge=0)]
+    standing: Number
+    random: Number
+    generations: _Count
+    evaluations: Annotated[tuple[_Count, ...], Field(min_length=1, max_length=_GENERATIONS_MAX)]
+    champion_fitness: Annotated[tuple[Number, ...], Field(min_length=1, max_length=_GENERATIONS_MAX)]
+    exam: ExamScore | None = None
+
+    def __post_init__(self) -> None:
+        if len(self.evaluations) != len(self.champion_fitness):
+            raise ParameterError(
+                f"evaluations and champion_fitness must have equal lengths, but they had {len(self.evaluations)} and "
+                f"{len(self.champion_fitness)}."
+            )
+
+    def save(self, folder: Path) -> None:
+        """Write it into the folder of the evolution.
+
+        Raises:
+            ParameterError: If it cannot be written.
+        """
+        replace_file(folder / RESULT, json.dumps(asdict(self)) + "\n", "the result")
+
+
+def result_of(evolution: Evolution) -> Result:
+    """Return the result of an evolution: this examines its champion and measures baselines.
+
+    Raises:
+        ParameterError: If it has no generation.
+    """
+    task, champion = evolution.task, evolution.champion
+    score = None
+    if task.exam is not None:
+        own = task.exam.examine(champion, robots=task.robots)
+        imperfect = task.exam.examine(champion, robots=task.robots, kinds=imperfect_robots(champion)).solved
+        score = ExamScore(
+            solved=int(own.solved.sum()),
+            starts=len(own.solved),
+            imperfect_solved=int(imperfect.sum()),
+            imperfect_starts=len(imperfect),
+            text=str(own)[:TEXT_MAX],
+        )
+    baselines = baselines_of(task, evolution.seed)
+    generations = evolution.generations
+    evaluations = np.cumsum([len(each.values) for each in generations]).tolist()
+    first = min(1, len(generations) - 1)
+    fitness = [each.champion_fitness for each in generations[first:]] if first else [champion.fitness]
+    return Result(
+        result=1,
+        task=task.name,
+        worlds_digest=task.digest(with_controller=False),
+        algorithm=evolution.name,
+        controller=task.controller.name,
+        population=evolution.population,
+        seed=evolution.seed,
+        kiks=__version__,
+        fitness=champion.fitness,
+        generation=champion.generation,
+        seconds=generations[-1].seconds,
+        standing=baselines.standing,
+        random=baselines.random,
+        generations=len(generations),
+        evaluations=tuple(evaluations[first:]),
+        champion_fitness=tuple(fitness),
+        exam=score,
+    )
+
+
+# ---- folders ----
+
+
+def load_result(folder: Path) -> Result | None:
+    """Return the result of the evolution in a folder; None if it is not finished.
+
+    Raises:
+        ParameterError: If its file is broken.
+    """
+    file = folder / RESULT
+    if not file.exists():
+        return None
+    what = f"The result of an evolution {str(file)!r}"
+    data = read_file(file, what, bytes_max=FILE_BYTES_MAX)
+    found = check(Result, parse_json(data, what), what, advice="Remove the file, and evolve again.")
+    return found if found.generations == Folder(folder).generation_count() else None
+
+
+def seed_folder(folder: Path, seed: int) -> Path:
+    """Return the folder of the evolution with a seed, one of several."""
+    return folder / f"seed-{seed}"
+
+
+def load_results(folder: str | Path) -> list[Result]:
+    """Return the results of the evolutions in a folder of `kiks evolve --seeds`, by seed, or of the one in a folder.
+
+    Raises:
+        ParameterError: If it holds none, one is not finished, or they differ in more than the seed.
+    """
+    path = path_of(folder, "folder")
+    homes = [path] if (path / IDENTITY).exists() else [each.parent for each in path.glob(f"seed-*/{IDENTITY}")]
+    if not homes:
+        raise ParameterError(
+            f"{str(path)!r} must be a folder of `kiks evolve`, but it holds no evolution. Name one with {IDENTITY}, or "
+            "one of kiks evolve --seeds."
+        )
+    results = []
+    for home in homes:
+        result = load_result(home)
+        if result is None:
+            raise ParameterError(
+                f"the evolution in {str(home)!r} must be finished, but it is not. The command that began it goes on."
+            )
+        results.append(result)
+    results.sort(key=lambda each: each.seed)
+    for name in ("task", "worlds_digest", "algorithm", "controller", "population"):
+        _check_alike(results, name, f"the evolutions in {str(path)!r}", "Name a folder for each kind.")
+    return results
+
+
+def check_comparable(first: Sequence[Result], second: Sequence[Result]) -> None:
+    """Check that two groups have the same task: name, arenas, measures, worlds, robots, timing.
+
+    Raises:
+        ParameterError: If they differ, for then their fitness does.
+    """
+    for name in ("task", "worlds_digest"):
+        _check_alike([first[0], second[0]], name, "evolutions that are compared", "Compare two of one task.")
+
+
+def _check_alike(results: Sequence[Result], name: str, whose: str, advice: str) -> None:
+    values = list(dict.fromkeys(getattr(each, name) for each in results))
+    if len(values) > 1:
+        raise ParameterError(
+            f"{whose} must have the same {name}, but they have {shown(values[0])} and {shown(values[1])}. {advice}"
+        )
+
+
+def save_summary(results: Sequence[Result], folder: Path) -> None:
+    """Write the results of several evolutions without their curves, and what they have in common.
+
+    Raises:
+        ParameterError: If it cannot be written.
+    """
+    low, median, high = quartiles(results)
+    summary: dict[str, Any] = {"median_fitness": median, "quartiles_fitness": [low, high]}
+    if (passed := passed_count(results)) is not None:
+        summary["exams_passed"] = passed
+    summary["evolutions"] = [
+        {name: value for name, value in asdict(each).items() if name not in ("evaluations", "champion_fitness")}
+        | {"evaluations": each.evaluations[-1]}
+        for each in results
+    ]
+    replace_file(folder / SUMMARY, json.dumps(summary, indent=1) + "\n", "the summary")
+
+
+# ---- statistics ----
+
+
+def quartiles(results: Sequence[Result]) -> tuple[float, float, float]:
+    """Return lower quartile, median and upper quartile of the champions' fitness."""
+    low, median, high = np.percentile([each.fitness for each in results], (25, 50, 75)).tolist()
+    return low, median, high
+
+
+def passed_count(results: Sequence[Result]) -> int | None:
+    """Return the number of champions that passed the exam; None if there was none."""
+    exams = [each.exam for each in results]
+    return None if None in exams else sum(each.is_passed for each in exams if each is not None)
+
+
+@dataclass(frozen=True)
+class Difference:
+    """What the Mann-Whitney test says about two samples.
+
+    Attributes:
+        u: U of the first sample.
+        p: Two-sided p.
+        a: Vargha and Delaney's A: the probability that one of the first sample exceeds one of the second, ties half.
+    """
+
+    u: float
+    p: float
+    a: float
+
+    @property
+    def effect(self) -> str:
+        """The name of the effect size."""
+        return next(name for least, name in EFFECTS if abs(self.a - 0.5) < least or least == EFFECTS[-1][0])
+
+
+def difference(first: Sequence[float], second: Sequence[float]) -> Difference:
+    """Return what the Mann-Whitney test says about two samples.
+
+    Example:
+        >>> difference([3.0, 4.0, 5.0], [1.0, 2.0, 3.0])
+        Difference(u=8.5, p=0.1840..., a=0.944...)
+    """
+    from scipy.stats import mannwhitneyu
+
+    if len({*first, *second}) == 1:
+        return Difference(len(first) * len(second) / 2, 1.0, 0.5)
+    found = mannwhitneyu(first, second, alternative="two-sided")
+    return Difference(float(found.statistic), float(found.pvalue), float(found.statistic) / (len(first) * len(second)))
+
+
+def curves(results: Sequence[Result]) -> tuple[Floats, Floats]:
+    """Return the champions' fitness over evaluations, as far as all evolutions go.
+
+    Returns:
+        Numbers of evaluations [step], and fitness [evolution, step].
+    """
+    end = min(each.evaluations[-1] for each in results)
+    steps = np.unique([number for each in results for number in each.evaluations if number <= end])
+    # At first an evolution has no champion.
+    steps = steps[steps >= max(each.evaluations[0] for each in results)]
+    rows = [
+        np.array(each.champion_fitness)[np.searchsorted(each.evaluations, steps, side="right") - 1] for each in results
+    ]
+    return steps.astype(np.float64), np.array(rows)

@@ -1,0 +1,121 @@
+"""A champion's file carries its world and its robot, and gives both back to the bit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import kiks
+from kiks.learn.exam import EXAM_SEED, spread_starts
+from kiks.model.arena import Ball, Cylinder, Lamp, Pose
+from kiks.model.project import Project, ProjectRobot
+
+
+@kiks.controller(parameters=2)
+def ahead(sensors, memory, parameters, wheels):
+    wheels[:] = parameters
+
+
+LINEAR = kiks.controllers.linear()
+PARAMETERS = tuple(np.linspace(-3, 3, 18).tolist())
+
+
+def furnished() -> kiks.Arena:
+    walls = np.zeros((400, 500), np.uint8)
+    walls[100:150, 200:210] = 90
+    return replace(
+        kiks.Arena.from_array(walls),
+        name="furnished",
+        starts=(Pose(60.0, 70.125, 1.0), Pose(400.0, 300.0, 0.5)),
+        balls=(Ball(300.0, 200.0),),
+        cylinders=(Cylinder(100.0, 300.0),),
+        lamps=(Lamp(250.0, 200.0, 5.0),),
+    )
+
+
+def end_of(champion: kiks.Champion, seconds: float = 2.0) -> str:
+    """Return the hash of its world after some time."""
+    sim, ports = champion.simulation()
+    champion.drive(ports, seconds=seconds)
+    return sim.state_hash()
+
+
+@pytest.mark.parametrize("robot", ["khepera_ii", kiks.RobotSpec.load("khepera").with_changes(body__pulse_mm=0.081)])
+def test_a_champion_lives_in_its_world_again(robot: str | kiks.RobotSpec, tmp_path: Path) -> None:
+    world = Project(furnished(), robots=(ProjectRobot(),) * 2, seed=12345)
+    champion = kiks.Champion(LINEAR, PARAMETERS, robot=robot, world=world)
+    champion.save(tmp_path / "one.toml")
+    again = kiks.Champion.load(tmp_path / "one.toml")
+    assert again.world is not None
+    assert again.robot == robot
+    np.testing.assert_array_equal(again.world.arena.brightness, world.arena.brightness)
+    assert (again.world.seed, len(again.world.robots)) == (12345, 2)
+    sim, ports = again.simulation()
+    assert sim.poses()[:, 0].tolist() == [60.0, 400.0]
+    assert len(ports) == 2
+    assert end_of(again) == end_of(champion)
+    again.save(tmp_path / "two.toml")
+    assert kiks.Champion.load(tmp_path / "two.toml").world is not None
+    (tmp_path / "one.toml").rename(tmp_path / "other.toml")
+    assert kiks.Champion.load(tmp_path / "other.toml").robot == robot
+
+
+@pytest.mark.parametrize("name", list(kiks.tasks.TASKS))
+def test_the_world_of_a_ready_made_task_survives_its_file(name: str, tmp_path: Path) -> None:
+    task = kiks.tasks.load(name)
+    zeros = (0.0,) * task.parameter_count
+    kiks.Champion(task.controller, zeros, world=task.world()).save(tmp_path / "champion.toml")
+    again = kiks.Champion.load(tmp_path / "champion.toml").world
+    assert again is not None
+    for part in ("starts", "balls", "cylinders", "lamps", "name", "mm_per_cell"):
+        assert getattr(again.arena, part) == getattr(task.world().arena, part), part
+    np.testing.assert_array_equal(again.arena.brightness, task.exam.arenas[0].brightness)
+    assert again.seed == EXAM_SEED
+
+
+def test_the_world_begins_where_the_exam_does() -> None:
+    task = kiks.tasks.avoid()
+    poses = spread_starts(task.exam.arenas, task.exam.count, seed=EXAM_SEED, robot="khepera")[::2, 0]
+    starts = np.array(task.world().arena.starts)
+    assert starts.shape == (10, 3)
+    turned = (starts[:, 2] - poses[:, 2] + 0.1) % (2 * np.pi) - 0.1
+    np.testing.assert_allclose(np.column_stack([starts[:, :2], turned]), poses * [1, 1, 0], atol=1e-3)
+    assert task.with_changes(exam=None).world().arena.brightness is task.arenas[0].brightness
+
+
+def test_a_champion_without_a_world_drives_in_the_default_box(tmp_path: Path) -> None:
+    kiks.Champion(LINEAR, PARAMETERS).save(tmp_path / "champion.toml")
+    champion = kiks.Champion.load(tmp_path / "champion.toml")
+    assert champion.world is None
+    sim, ports = champion.simulation()
+    assert (sim.arena.name, len(ports), sim.seed) == (kiks.Arena.default().name, 1, 0)
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ('world = "../one_world.kiks"', "world must lead to a file in"),
+        ('world = "/etc/passwd"', "world must lead to a file in"),
+        ('world = "none.kiks"', "none.kiks' must exist"),
+        ('world = "broken.kiks"', "broken.kiks': kiks must be 1"),
+        ("world = 3", "world must be a text"),
+    ],
+)
+def test_wrong_worlds_are_errors(line: str, message: str, tmp_path: Path) -> None:
+    kiks.Champion(LINEAR, PARAMETERS).save(tmp_path / "one.toml")
+    (tmp_path / "broken.kiks").write_text("kiks = 2\n")
+    text = (tmp_path / "one.toml").read_text()
+    (tmp_path / "one.toml").write_text(line + "\n" + text)
+    with pytest.raises(kiks.KiksError, match=message):
+        kiks.Champion.load(tmp_path / "one.toml")
+
+
+def test_robots_and_seed_may_be_others_than_those_of_the_world() -> None:
+    champion = kiks.Champion(LINEAR, PARAMETERS, world=Project(furnished(), seed=7))
+    sim, ports = champion.simulation(robots=3, seed=8)
+    assert (len(ports), sim.seed, sim.arena.name) == (3, 8, "furnished")
+    sim, ports = champion.simulation(kiks.Arena.box(300, 300))
+    assert (len(ports), sim.seed, sim.arena.width_mm) == (1, 0, 300)

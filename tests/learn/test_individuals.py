@@ -1,0 +1,125 @@
+"""Any candidate of a saved evolution drives again as in its evaluation, to the bit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+
+import kiks
+from kiks import ParameterError
+from kiks.demos.champion import ChampionScene
+from kiks.learn.individual import individual_of
+from kiks.model.arena_file import save_arena
+from kiks.model.family import family
+
+pytestmark = pytest.mark.slow
+
+parquet = pytest.importorskip("pyarrow.parquet")
+
+KHEPERA = kiks.RobotSpec.load("khepera")
+
+
+def evolved(task: kiks.Task, folder: Path) -> kiks.Evolution:
+    evolution = kiks.Evolution(task, "ga", seed=3, population=6, folder=folder)
+    evolution.run(generations=3, executor="threads:1")
+    return evolution
+
+
+class Watched(kiks.Batch):
+    """Keeps all batches that a task makes."""
+
+    made: ClassVar[list[kiks.Batch]] = []
+
+    def __init__(self, *args: Any, **given: Any) -> None:
+        super().__init__(*args, **given)
+        self.made.append(self)
+
+
+def hashes(task: kiks.Task, parameters: Any, seed: int, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Return the hashes of the last states of the worlds of an evaluation; those with the same timing together."""
+    Watched.made = []
+    with monkeypatch.context() as patch:
+        patch.setattr("kiks.learn.task.Batch", Watched)
+        task.evaluate(np.array([parameters]), np.array([seed]), 1)
+    return [batch.state_hash(world) for batch in Watched.made for world in range(batch.world_count)]
+
+
+TASKS = {
+    "random starts": lambda: kiks.tasks.avoid(seconds=2.0, worlds=6),
+    "with things": lambda: kiks.tasks.gather(seconds=2.0, worlds=3),
+    "with a lamp": lambda: kiks.tasks.light(seconds=2.0, worlds=3),
+    "starts of the arena": lambda: kiks.tasks.maze(seconds=2.0),
+    "two robots": lambda: kiks.tasks.gather(seconds=2.0, worlds=3, robots=2, starts="arena"),
+    "a short period": lambda: kiks.tasks.avoid(seconds=1.23, worlds=3, timing=kiks.Timing(0.05, 38400, 0.0025)),
+    "families": lambda: kiks.tasks.avoid(
+        seconds=2.0, worlds=6, robot=family(KHEPERA, 4, seed=1), timing=[kiks.Timing(), kiks.Timing(0.05, 38400)]
+    ),
+}
+
+
+@pytest.mark.parametrize("name", list(TASKS))
+def test_a_demonstration_is_the_world_of_the_evaluation(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    task = TASKS[name]()
+    evolution = evolved(task, tmp_path)
+    log = parquet.read_table(tmp_path / "log.parquet").to_pydict()
+    found = individual_of(tmp_path, 2, rank=3, task=task)
+    rows = [row for row, number in enumerate(log["generation"]) if number == 2]
+    row = rows[found.candidate]
+    assert found.fitness == log["fitness"][row] == sorted(evolution.generations[1].fitness)[-3]
+    expected = hashes(task, found.champion.parameters, log["seed"][row], monkeypatch)
+    found_hashes = []
+    for world in range(task.worlds):
+        scene = ChampionScene(individual_of(tmp_path, 2, rank=3, world=world, task=task).champion)
+        scene.run(found.seconds)
+        found_hashes.append(scene.sim.state_hash())
+    if len(task.timings) == 1:
+        assert found_hashes == expected
+    assert sorted(found_hashes) == sorted(expected)
+
+
+def test_the_task_is_found_again(tmp_path: Path) -> None:
+    save_arena(kiks.Arena.box(400, 300), tmp_path / "room.toml")
+    (tmp_path / "mine.toml").write_text('task = 1\nbase = "avoid"\nseconds = 1\nworlds = 1\narenas = ["room.toml"]\n')
+    evolved(kiks.tasks.load(tmp_path / "mine.toml"), tmp_path / "out")
+    assert individual_of(tmp_path / "out", 1).seconds == 1.0
+    evolved(kiks.tasks.maze(seconds=100.0, worlds=2, controller=kiks.controllers.gru()), tmp_path / "gru")
+    assert individual_of(tmp_path / "gru", 3, world=1).champion.controller is kiks.controllers.gru()
+
+
+def test_a_task_that_cannot_be_found_is_an_error(tmp_path: Path) -> None:
+    evolved(kiks.tasks.avoid(seconds=1.0, worlds=3), tmp_path / "changed")
+    with pytest.raises(ParameterError, match="must be the one that was evolved, but it differs now"):
+        individual_of(tmp_path / "changed", 1)
+    evolved(kiks.tasks.avoid(name="mine", seconds=1.0, worlds=3), tmp_path / "own")
+    with pytest.raises(ParameterError, match=r"'mine' .* must be given, for it was made in Python.*--task FILE"):
+        individual_of(tmp_path / "own", 1)
+    file = tmp_path / "quick.py"
+    file.write_text("import kiks\ntask = kiks.tasks.avoid(seconds=1.0, worlds=3)\n")
+    evolved(kiks.tasks.load(file), tmp_path / "file")
+    with pytest.raises(ParameterError, match=r"quick.py' is a Python file. Give it: --task FILE"):
+        individual_of(tmp_path / "file", 1)
+    assert individual_of(tmp_path / "file", 1, task=kiks.tasks.load(file)).seconds == 1.0
+    (tmp_path / "nothing").mkdir()
+    with pytest.raises(ParameterError, match="nothing' must be the folder of an evolution"):
+        individual_of(tmp_path / "nothing", 1)
+    assert not list((tmp_path / "nothing").iterdir())
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"generation": 4}, "generation must be a whole number from 1 to 3"),
+        ({"generation": 1, "rank": 7}, "rank must be a whole number from 1 to 6"),
+        ({"generation": 1, "world": 3}, "world must be a whole number from 0 to 2"),
+    ],
+)
+def test_numbers_out_of_range_are_errors(given: dict[str, int], message: str, tmp_path: Path) -> None:
+    task = kiks.tasks.avoid(seconds=1.0, worlds=3)
+    evolved(task, tmp_path)
+    with pytest.raises(ParameterError, match=message):
+        individual_of(tmp_path, task=task, **given)
