@@ -37,8 +37,8 @@ def _each_once(senses: tuple[str, ...]) -> tuple[str, ...]:
 
 
 Senses = Annotated[
-    tuple[Literal["proximity", "ambient"], ...],
-    Field(min_length=1, description="Each is eight counts."),
+    tuple[Literal["proximity", "ambient", "camera"], ...],
+    Field(min_length=1, description="Each is eight counts, the camera sixteen greys."),
     AfterValidator(_each_once),
     BeforeValidator(lambda given: (given,) if isinstance(given, str) else given),
 ]

@@ -20,7 +20,7 @@ Values = Mapping[str, Floats]
 PURSUIT_MM = 470
 """Side of the arena of `pursuit` [mm] (Floreano and Nolfi 1997)."""
 
-PURSUIT_S = 30.0
+PURSUIT_S = 25.0
 """Default time that the predator has [s]."""
 
 PREDATOR_SPEED, PREY_SPEED = 10.0, 20.0
