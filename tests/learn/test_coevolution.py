@@ -18,7 +18,7 @@ import kiks
 from kiks import ParameterError
 from kiks.client.drive import Driver
 from kiks.learn.candidate_worlds import starts_of
-from kiks.learn.coevolution import _TOURNAMENT_SEED, Tournament
+from kiks.learn.coevolution import _SQUARE_SEED, TOURNAMENT_SEED, Tournament, latin_square
 from kiks.learn.evolution import derived_seed
 from kiks.learn.ready_contests import CAUGHT_MM, PREY_SPEED
 from kiks.model.arena import Pose
@@ -302,20 +302,27 @@ def test_wrong_calls_are_errors() -> None:
 def test_the_tournament_equals_a_loop_over_all_pairs() -> None:
     coevolution = run()
     tournament = coevolution.master_tournament(trials=2, executor="threads:1")
+    square = latin_square(4, derived_seed(3, _SQUARE_SEED))
     for first in range(4):
         for second in range(4):
             pair = [
                 *coevolution.champion("predator", first + 1).parameters,
                 *coevolution.champion("prey", second + 1).parameters,
             ]
-            numbers = [4 * trial + (first + second) % 4 for trial in range(2)]
-            seeds = np.array([derived_seed(3, _TOURNAMENT_SEED, number) for number in numbers])
+            numbers = [4 * trial + square[first, second] for trial in range(2)]
+            seeds = np.array([derived_seed(3, TOURNAMENT_SEED, number) for number in numbers])
             values = coevolution.contest.evaluate(np.array([pair, pair]), seeds, 1)
             np.testing.assert_array_equal(tournament.scores[:, first, second], (values[0, :2] + values[1, :2]) / 2)
     np.testing.assert_array_equal(tournament.generations, [1, 2, 3, 4])
     some = coevolution.master_tournament(trials=2, every=2, executor="threads:1")
     np.testing.assert_array_equal(some.generations, [2, 4])
     assert some.scores.shape == (2, 2, 2)
+
+
+def test_each_row_and_column_of_a_latin_square_holds_each_number_once() -> None:
+    square = latin_square(7, 1)
+    np.testing.assert_array_equal(np.sort(square, axis=0), np.tile(np.arange(7)[:, None], 7))
+    np.testing.assert_array_equal(np.sort(square, axis=1), np.tile(np.arange(7), (7, 1)))
 
 
 def test_a_tournament_knows_the_best_and_who_won(tmp_path: Path) -> None:
