@@ -101,7 +101,7 @@ class Coevolution:
     Attributes:
         contest: The contest.
         generations: The generations, in order. A row of `candidates` is one of the first side followed by one of the
-            second side; a row of `values` their mean values over their own contests, as in `contest.value_names`.
+            second side, `seeds` the seed of their first contests; a row of `values` their mean values over their own contests, as in `contest.value_names`.
 
     Raises:
         ParameterError: If an argument is out of range, or the folder holds another evolution.
@@ -198,7 +198,7 @@ class Coevolution:
         generation = Generation(
             candidates=np.concatenate(own, axis=1),
             values=values,
-            seeds=np.full(self.population, self.seed),
+            seeds=np.full(self.population, self.seeds[0]),
             population=self.population,
             champion_fitness=np.nan,
             seconds=seconds,
