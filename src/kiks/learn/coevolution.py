@@ -101,7 +101,8 @@ class Coevolution:
     Attributes:
         contest: The contest.
         generations: The generations, in order. A row of `candidates` is one of the first side followed by one of the
-            second side, `seeds` the seed of their first contests; a row of `values` their mean values over their own contests, as in `contest.value_names`.
+            second side. A row of `values` has their mean values over their own contests, as in `contest.value_names`;
+            `seeds` has the seed of the first of these.
 
     Raises:
         ParameterError: If an argument is out of range, or the folder holds another evolution.
