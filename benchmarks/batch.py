@@ -142,12 +142,18 @@ def megabytes() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
-def kheperax(folder: Path) -> Callable[[int], float]:
-    """Return what measures Kheperax with so many robots, in an environment of its own, on one core."""
+def kheperax_python(folder: Path) -> Path:
+    """Return the Python of Kheperax's own environment, which is made in the folder if it is not there."""
     python = folder / "bin" / "python"
     if not python.exists():
         subprocess.run([sys.executable, "-m", "venv", folder], check=True)
         subprocess.run([python, "-m", "pip", "install", "--quiet", *PINS], check=True)
+    return python
+
+
+def kheperax(folder: Path) -> Callable[[int], float]:
+    """Return what measures Kheperax with so many robots, in an environment of its own, on one core."""
+    python = kheperax_python(folder)
     script = Path(__file__).with_name("kheperax_peer.py")
 
     def measure(count: int) -> float:

@@ -1,10 +1,15 @@
 """How long tasks take to evolve from random, and whether their champions solve them.
 
-Run: python benchmarks/evolve.py [--json] [--seeds 5] [--task NAME ...]. For each seed the task is evolved by CMA-ES for
-the task's own number of generations, and its champion takes the exam (`kiks.Exam`): twenty starts in arenas where it
-was not trained, with the timing of a line of 9600 baud.
+Run: python benchmarks/evolve.py [--json] [--seeds 5] [--task NAME ...] [--kheperax FOLDER]. For each seed the task is
+evolved with its own algorithm, population and number of generations, and its champion takes the exam (`kiks.Exam`):
+twenty starts, with the timing of a line of 9600 baud, in arenas where it was not trained, but for the maze.
 
-* `evolve.NAME_solved`: the share of champions that pass; `evolve.NAME_s`: the median time of an evolution.
+* `evolve.NAME_solved`: the share of champions that pass; `evolve.NAME_s`: the median time of an evolution, and
+  `evolve.NAME_cpu_s` that of the processor.
+* `evolve.maze_coverage`, `evolve.maze_qd_score`: of the archive of `maze`, medians; `evolve.maze_kheperax_coverage`:
+  that of MAP-Elites in Kheperax itself, in the same maze with as many cells, candidates and evaluations
+  (benchmarks/kheperax_elites.py). Its environment is made in the folder if it is not there; without --kheperax it is
+  left out.
 * `evolve.avoid_maze_solved`, `evolve.avoid_office_solved`: the same exam in two arenas of `examples`.
 * `evolve.pursuit_s`: the median time of a co-evolution of predator and prey without its master tournament, which gives
   `evolve.pursuit_SIDE_N`, the mean fitness of the champions of each fifth of the generations against all champions of
@@ -16,7 +21,9 @@ was not trained, with the timing of a line of 9600 baud.
 from __future__ import annotations
 
 import argparse
+import json
 import statistics
+import subprocess
 import time
 from collections import Counter
 from dataclasses import replace
@@ -25,6 +32,7 @@ from pathlib import Path
 import numpy as np
 
 import kiks
+from batch import kheperax_python
 from calibration import report
 from kiks.batch.initial_state import random_starts
 from kiks.model.arena import Ball
@@ -46,19 +54,25 @@ def exams_of(task: kiks.Task) -> dict[str, kiks.Exam]:
     return exams
 
 
+def kheperax_coverage(folder: Path, task: kiks.Task, seed: int) -> float:
+    """Return the coverage of MAP-Elites in Kheperax, with the cells and the number of evaluations of a task."""
+    script = Path(__file__).with_name("kheperax_elites.py")
+    numbers = (seed, task.population, task.population * task.generations, task.axes[0].cells)
+    command = [str(kheperax_python(folder)), str(script), *map(str, numbers)]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    return float(json.loads(done.stdout.splitlines()[-1])["coverage"])
+
+
 def swarm_task() -> kiks.Task:
     """Return the task of many robots to gather as many balls in a large room."""
     room = kiks.Arena.box(SWARM_MM, SWARM_MM)
     places = random_starts(room, SWARM, seed=1, clear_mm=50)[:, :2].tolist()
     balls = tuple(Ball(x_mm, y_mm) for x_mm, y_mm in places)
-    middle_mm = SWARM_MM / 2
-    counted = (kiks.measures.gathered(middle_mm, middle_mm, radius_mm=300), kiks.measures.spread_mm)
     return kiks.tasks.gather(
         arenas=(replace(room, balls=balls),),
         robots=SWARM,
         worlds=1,
         starts="arena",
-        measures=(*counted, kiks.measures.contacts, kiks.measures.path_mm),
         exam=None,
     )
 
@@ -86,6 +100,7 @@ def main() -> None:
     arguments.add_argument("--json", action="store_true", help="one JSON object a line")
     arguments.add_argument("--seeds", type=int, default=5, help="how many evolutions of each task")
     arguments.add_argument("--task", nargs="+", choices=(*TASKS, CONTEST), default=(*TASKS, CONTEST), help="the tasks")
+    arguments.add_argument("--kheperax", type=Path, metavar="FOLDER", help="environment of Kheperax, for maze")
     arguments.add_argument("--where", default="threads", help="where candidates are evaluated")
     options = arguments.parse_args()
 
@@ -93,12 +108,20 @@ def main() -> None:
     if CONTEST in options.task:
         rows += coevolutions(range(1, options.seeds + 1), options.where)
     for name in (name for name in options.task if name != CONTEST):
-        task, wholes_s, passed = kiks.tasks.load(name), [], Counter[str]()
+        task, wholes_s, cpus_s, passed = kiks.tasks.load(name), [], [], Counter[str]()
+        coverages: dict[str, list[float]] = {"coverage": [], "qd_score": [], "kheperax_coverage": []}
         exams = exams_of(task)
         for seed in range(1, options.seeds + 1):
-            start_s = time.perf_counter()
-            champion = kiks.Evolution(task, seed=seed).run(generations=task.generations, executor=options.where)
+            start_s, start_cpu_s = time.perf_counter(), time.process_time()
+            evolution = kiks.Evolution(task, seed=seed)
+            champion = evolution.run(generations=task.generations, executor=options.where)
             wholes_s.append(time.perf_counter() - start_s)
+            cpus_s.append(time.process_time() - start_cpu_s)
+            if name == "maze" and evolution.archive is not None:
+                coverages["coverage"].append(evolution.archive.coverage)
+                coverages["qd_score"].append(evolution.archive.qd_score)
+                if options.kheperax is not None:
+                    coverages["kheperax_coverage"].append(kheperax_coverage(options.kheperax, task, seed))
             for exam_name, exam in exams.items():
                 result = exam.examine(champion)
                 passed[exam_name] += result.is_passed
@@ -107,6 +130,11 @@ def main() -> None:
                 )
         rows += [(f"evolve.{each}_solved", passed[each] / options.seeds, "of the champions") for each in exams]
         rows.append((f"evolve.{name}_s", statistics.median(wholes_s), f"s for {task.generations} generations"))
+        rows.append((f"evolve.{name}_cpu_s", statistics.median(cpus_s), "s of the processor"))
+        cells = f"of {task.generations * task.population} evaluations"
+        rows += [
+            (f"evolve.{name}_{each}", statistics.median(found), cells) for each, found in coverages.items() if found
+        ]
         if name == "avoid":
             pace = 60 * task.generations / statistics.median(wholes_s)
             rows.append(("evolve.generations_per_min", pace, "of one robot that avoids"))

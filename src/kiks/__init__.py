@@ -29,18 +29,21 @@ if TYPE_CHECKING:
     from kiks.control.measure import Measure, measure
     from kiks.errors import ArenaError, KiksError, LinkError, ParameterError
     from kiks.learn import tasks
+    from kiks.learn.archive import Archive
     from kiks.learn.champion import Champion
     from kiks.learn.coevolution import Coevolution
     from kiks.learn.contest import Contest, Side
     from kiks.learn.evolution import Evolution
     from kiks.learn.exam import Exam
     from kiks.learn.executors import executor_for
+    from kiks.learn.policy_export import champion_of_policy
     from kiks.learn.task import Axis, Task
     from kiks.model.arena import Arena
     from kiks.model.robot import RobotSpec
     from kiks.sim.simulation import Simulation
 
 __all__ = [
+    "Archive",
     "Arena",
     "ArenaError",
     "Axis",
@@ -63,6 +66,7 @@ __all__ = [
     "Task",
     "Timing",
     "__version__",
+    "champion_of_policy",
     "controller",
     "controllers",
     "drive",
@@ -78,6 +82,7 @@ __all__ = [
 ]
 
 _HOMES = {
+    "Archive": "kiks.learn.archive",
     "Arena": "kiks.model.arena",
     "ArenaError": "kiks.errors",
     "Axis": "kiks.learn.task",
@@ -99,6 +104,7 @@ _HOMES = {
     "Status": "kiks.client.khepera",
     "Task": "kiks.learn.task",
     "Timing": "kiks.batch.loop_timing",
+    "champion_of_policy": "kiks.learn.policy_export",
     "controller": "kiks.control.controller",
     "controllers": "kiks.control.controllers",
     "drive": "kiks.client.drive",

@@ -53,7 +53,7 @@ def test_a_run_leaves_its_files_and_goes_on(folder: Path) -> None:
 def test_champions_run_and_are_shown(folder: Path, tmp_path: Path) -> None:
     champion = folder / "champion.toml"
     after = kiks("run", champion, "--seconds", 2, "--seed", 5).output
-    assert "20 loops" in after
+    assert "34 loops" in after
     assert after == kiks("run", "--seconds", 2, "--seed", 5, champion).output
     said = kiks("demo", champion, "--seconds", 2, "--picture", tmp_path / "shown.png").output
     assert "contacts" in said

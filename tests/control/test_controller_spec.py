@@ -10,6 +10,8 @@ from typing import Any
 import pytest
 
 import kiks
+from kiks.control.controller_kinds import ControllerKind
+from kiks.control.controller_spec import SHAPES
 
 SHY = """
 import kiks
@@ -30,6 +32,8 @@ def plain(sensors):
         kiks.controllers.mlp(hidden=[4, 3], senses=("ambient", "proximity")),
         kiks.controllers.ctrnn(neurons=3, period_s=0.05, time_constant_s=1.0),
         kiks.controllers.gru(units=5, senses="ambient"),
+        kiks.controllers.elman(units=2, speed_limit=3),
+        kiks.controllers.plastic(neurons=2, per="neuron"),
     ],
     ids=lambda each: each.name,
 )
@@ -38,6 +42,14 @@ def test_the_same_again(controller: kiks.Controller) -> None:
     recipe = json.loads(json.dumps(controller.recipe))
     assert kiks.controllers.from_recipe(recipe) is controller
     assert recipe["kind"] == controller.name
+
+
+def test_each_kind_has_arguments_a_function_and_a_recipe() -> None:
+    assert list(SHAPES) == list(ControllerKind)
+    for kind in ControllerKind:
+        controller = kiks.controllers.from_recipe({"kind": str(kind)})
+        assert controller is getattr(kiks.controllers, kind)()
+        assert controller.name == kind
 
 
 def test_a_file(tmp_path: Path) -> None:

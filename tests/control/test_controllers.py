@@ -144,6 +144,102 @@ def test_gru() -> None:
     np.testing.assert_allclose(outputs(controller, parameters, sensors), expected, atol=1e-3)
 
 
+@pytest.mark.slow
+def test_elman() -> None:
+    controller = kiks.controllers.elman(units=3, senses=BOTH, speed_limit=8.0)
+    parameters = kiks.controllers.random_parameters(controller, 1, seed=4)[0]
+    to_units, to_wheels = taken(parameters, (20, 3), (4, 2))
+    h, expected = np.zeros(3), []
+    sensors = readings(controller)
+    for x in inputs_of(controller, sensors):
+        h = np.tanh(to_units[0] + np.concatenate([x, h]) @ to_units[1:])
+        expected.append(8.0 * np.tanh(to_wheels[0] + h @ to_wheels[1:]))
+    np.testing.assert_allclose(outputs(controller, parameters, sensors), expected, atol=1e-3)
+
+
+def covariance(w: float, x: float, y: float) -> float:
+    f = np.tanh(4 * (1 - abs(x - y)) - 2)
+    return float((1 - w) * f if f > 0 else w * f)
+
+
+HEBB_RULES = {
+    (False, False): lambda w, x, y: (1 - w) * x * y,
+    (False, True): lambda w, x, y: w * (-1 + x) * y + (1 - w) * x * y,
+    (True, False): lambda w, x, y: w * x * (-1 + y) + (1 - w) * x * y,
+    (True, True): covariance,
+}
+"""The rules of Floreano and Mondada (1996) as they wrote them, by the bits."""
+
+
+def plastic(inputs: Trace, parameters: Trace, neurons: int, *, per: str) -> tuple[Trace, Trace]:
+    """Return what the wheels do as shares of the speed limit, and the weights at the end, [sender, neuron]."""
+    sender_count = inputs.shape[1] + neurons + 1
+    table = (sender_count, neurons)
+    if per == "synapse":
+        rates, first, second = taken(parameters, table, table, table)
+        signs = np.sign(rates)
+    else:
+        given, *of_neurons = taken(parameters, (sender_count, 1), *[(1, neurons)] * 3)
+        signs = np.sign(np.broadcast_to(given, table))
+        rates, first, second = (np.broadcast_to(each, table) for each in of_neurons)
+    weights, y, wheels = np.zeros(table), np.zeros(neurons), []
+    for each in inputs:
+        x = np.concatenate([np.clip(each, 0, 1), y, [1.0]])
+        y = logistic(4 * x @ (signs * weights))
+        for sender in range(sender_count):
+            for k in range(neurons):
+                rule = HEBB_RULES[bool(first[sender, k] > 0), bool(second[sender, k] > 0)]
+                rate = abs(rates[sender, k]) / (1 + abs(rates[sender, k]))
+                weights[sender, k] += rate * rule(weights[sender, k], x[sender], y[k])
+        wheels.append(2 * y[:2] - 1)
+    return np.array(wheels), weights
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("per", ["synapse", "neuron"])
+@pytest.mark.parametrize("senses", [("proximity",), ("ambient", "proximity")], ids=len)
+def test_plastic(per: str, senses: tuple[str, ...]) -> None:
+    controller = kiks.controllers.plastic(neurons=4, per=per, senses=senses)
+    parameters = kiks.controllers.random_parameters(controller, 1, seed=6)[0]
+    sensors = readings(controller, 60)
+    inputs = inputs_of(controller, sensors)
+    expected, weights = plastic(inputs, parameters, 4, per=per)
+    np.testing.assert_allclose(outputs(controller, parameters, sensors), 10.0 * expected, atol=5e-3)
+    assert len(weights) == controller.sensor_count + 5
+    assert controller.memory_count == 4 + weights.size
+
+
+@pytest.mark.slow
+def test_the_weights_of_a_plastic_network_stay_between_0_and_1() -> None:
+    controller = kiks.controllers.plastic(neurons=3)
+    assert controller.parameter_count is not None
+    for seed, scale in ((1, 1.0), (2, 30.0), (3, 1e300)):
+        parameters = scale * kiks.controllers.random_parameters(controller, 1, seed=seed)[0]
+        memory, wheels = np.zeros(controller.memory_count), np.zeros(2)
+        for reading in readings(controller, 100, seed):
+            controller(reading, memory, parameters, wheels)
+            assert memory.min() >= 0.0
+            assert memory.max() <= 1.0 + 1e-12
+            assert abs(wheels).max() <= 10.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("per", ["synapse", "neuron"])
+def test_each_sign_rate_and_rule_of_a_plastic_network_matters(per: str) -> None:
+    controller = kiks.controllers.plastic(neurons=3, per=per)
+    assert controller.parameter_count is not None
+    parameters = kiks.controllers.random_parameters(controller, 1, seed=6)[0]
+    if per == "synapse":
+        # The bias is always active, and then plain Hebb and the postsynaptic rule are the same.
+        parameters[-3 - 36 : -36] = 1.0
+    sensors = readings(controller, 30)
+    before = outputs(controller, parameters, sensors)
+    for k in range(controller.parameter_count):
+        parameters[k] *= -2.0
+        assert (outputs(controller, parameters, sensors) != before).any(), k
+        parameters[k] /= -2.0
+
+
 def test_the_dark_is_no_input_and_light_is_one() -> None:
     controller = kiks.controllers.linear(senses=("ambient",))
     parameters = np.zeros(18)
@@ -156,9 +252,11 @@ READY_MADE = [
     kiks.controllers.linear(),
     kiks.controllers.linear(feedback=True),
     kiks.controllers.mlp(),
+    kiks.controllers.elman(units=3),
     kiks.controllers.ctrnn(neurons=3),
     kiks.controllers.gru(units=3),
 ]
+PLASTIC = kiks.controllers.plastic(neurons=3)
 
 
 @pytest.mark.slow
@@ -175,7 +273,7 @@ def test_each_parameter_matters(controller: kiks.Controller) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("controller", READY_MADE, ids=lambda each: each.name)
+@pytest.mark.parametrize("controller", [*READY_MADE, PLASTIC], ids=lambda each: each.name)
 def test_batch_and_wire_agree(controller: kiks.Controller) -> None:
     arena = kiks.Arena.box(300, 300)
     parameters = kiks.controllers.random_parameters(controller, 1, seed=7)[0]
@@ -267,6 +365,9 @@ def test_what_cannot_be_compiled_is_refused_by_its_name() -> None:
         (lambda: kiks.controllers.mlp(hidden=6), "hidden must be a list of 0 to 8 values, each a whole number"),
         (lambda: kiks.controllers.ctrnn(neurons=1), "neurons must be a whole number from 2"),
         (lambda: kiks.controllers.ctrnn(period_s=0), "period_s must be a number from 0.001 to 10, but it was 0"),
+        (lambda: kiks.controllers.elman(units=0), "units must be a whole number from 1 to 256, but it was 0"),
+        (lambda: kiks.controllers.plastic(neurons=65), "neurons must be a whole number from 2 to 64, but it was 65"),
+        (lambda: kiks.controllers.plastic(per="node"), "per must be one of 'synapse', 'neuron', but it was 'node'"),
         (lambda: kiks.controllers.gru(units=2.5), "units must be a whole number from 1 to 256, but it was 2.5"),
         (
             lambda: kiks.controllers.linear(speed_limit="fast"),

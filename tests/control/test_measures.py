@@ -110,12 +110,14 @@ def test_place_measures() -> None:
         kiks.measures.light_stay_s(radius_mm),
         kiks.measures.gathered(*PLACE_MM, radius_mm=radius_mm),
         kiks.measures.spread_mm,
+        kiks.measures.closest_mm(*PLACE_MM),
     )
     for world in range(WORLDS):
         squares = {(int(x // 50), int(y // 50)) for x, y in trace.places_mm[world]}
         assert trace.values[0, world] == len(squares) / 80
         far_mm = trace.far_mm(*PLACE_MM)[world]
         assert trace.values[1, world] == pytest.approx(far_mm[-1])
+        assert trace.values[9, world] == pytest.approx(far_mm.min())
         arrived = np.flatnonzero(far_mm <= radius_mm)
         assert trace.values[2, world] == trace.times_s[world, arrived[0] if len(arrived) else -1]
     lamp_mm = trace.far_mm(100, 350)
@@ -259,6 +261,24 @@ def test_lamps_that_do_not_burn_are_none() -> None:
     assert after(kiks.measures.light_stay_s(20.0), moment(lamps=lamps[:1])) == 0.0
 
 
+@settings(max_examples=50, deadline=None)
+@given(
+    st.lists(st.tuples(st.floats(-500, 500), st.floats(-500, 500)), max_size=8),
+    st.floats(1, 400),
+)
+def test_groups_and_closeness_follow_from_the_distances_of_pairs(
+    places_mm: list[tuple[float, float]], radius_mm: float
+) -> None:
+    bodies = np.zeros(len(places_mm), BODY)
+    bodies["x_mm"], bodies["y_mm"] = np.reshape(places_mm, (-1, 2)).T
+    squares_mm2 = (bodies["x_mm"] - bodies["x_mm"][:, None]) ** 2 + (bodies["y_mm"] - bodies["y_mm"][:, None]) ** 2
+    counts = (squares_mm2 <= radius_mm**2).sum(axis=1)
+    assert after(kiks.measures.largest_group(radius_mm), moment(bodies=bodies)) == counts.max(initial=0)
+    pairs = squares_mm2[np.tril_indices(len(places_mm), -1)]
+    wanted = (1 / (1 + pairs / 1e4)).mean() if len(pairs) else 0.0
+    assert after(kiks.measures.closeness, moment(bodies=bodies)) == pytest.approx(wanted)
+
+
 def test_measures_of_a_drive_without_steps_are_zero() -> None:
     for measure in (kiks.measures.avoidance, kiks.measures.straightness, kiks.measures.touching_share):
         assert after(measure) == 0.0
@@ -269,6 +289,7 @@ def test_the_same_arguments_make_the_same_measure() -> None:
     measures = kiks.measures
     assert measures.coverage(kiks.Arena.box(500, 300)) is measures.coverage(kiks.Arena.box(450, 250), square_mm=100)
     assert measures.gathered(1, 2, radius_mm=3) is measures.gathered(y_mm=2.0, x_mm=1.0, radius_mm=3.0)
+    assert measures.largest_group(100) is measures.largest_group()
     assert measures.wall_following() is measures.wall_following("left", counts=50)
     assert measures.beside_wall_share() is measures.beside_wall_share("left", counts=50)
     assert measures.reached_s(1, 2) is not measures.reached_s(1, 3)
@@ -289,6 +310,7 @@ def test_what_a_measure_needs_must_be_sensed() -> None:
         (lambda: kiks.measures.coverage(kiks.Arena.box(2000, 2000), square_mm=1), "at most 1000000 squares, but 1 mm"),
         (lambda: kiks.measures.goal_mm("here", 0), "x_mm must be from -1e"),
         (lambda: kiks.measures.gathered(0, 0, radius_mm=-1), "radius_mm must be from 0"),
+        (lambda: kiks.measures.largest_group(-1), "radius_mm must be from 0"),
     ],
 )
 def test_arguments_out_of_range(make: Any, message: str) -> None:

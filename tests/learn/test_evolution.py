@@ -14,6 +14,7 @@ import pytest
 
 import kiks
 from kiks import ParameterError
+from kiks.learn.algorithm_name import AlgorithmName
 from kiks.learn.task import cautious_mean
 
 pytestmark = pytest.mark.slow
@@ -41,7 +42,7 @@ def candidates_of(evolution: kiks.Evolution) -> bytes:
 # ---- seeds ----
 
 
-@pytest.mark.parametrize("algorithm", ["cma", "ga", "map-elites"])
+@pytest.mark.parametrize("algorithm", list(AlgorithmName))
 def test_the_same_seed_gives_the_same_evolution(algorithm: str) -> None:
     np.random.seed(1)
     one = run(algorithm)
@@ -160,15 +161,6 @@ def test_the_error_names_a_broken_generation_file(tmp_path: Path) -> None:
     assert len(kiks.Evolution(small(), "cma", population=8, seed=3, folder=tmp_path).generations) == 4
 
 
-@pytest.mark.parametrize("algorithm", ["ga", "map-elites"])
-def test_save_plot_writes_a_png_file(algorithm: str, tmp_path: Path) -> None:
-    from kiks.learn.baselines import Baselines
-    from kiks.learn.evolution_plot import save_plot
-
-    save_plot(run(algorithm), tmp_path / "fitness.png", Baselines(0.0, 0.1))
-    assert (tmp_path / "fitness.png").read_bytes().startswith(b"\x89PNG")
-
-
 # ---- algorithms ----
 
 
@@ -179,22 +171,6 @@ def test_algorithms_maximise_fitness(algorithm: str) -> None:
         evolution.tell(-((evolution.ask() - 0.5) ** 2).sum(axis=1))
     assert evolution.champion.fitness > -3.0
     assert evolution.generations[0].fitness.max() < -5
-
-
-def test_the_heat_map_of_map_elites() -> None:
-    evolution = kiks.Evolution(small(), "map-elites", seed=1, population=20)
-    rng = np.random.default_rng(1)
-    for _ in range(5):
-        shape = len(evolution.ask()), len(evolution.task.value_names)
-        evolution.tell(rng.uniform(0, 1, shape))
-    heat = evolution.algorithm.heat_map()  # type: ignore[attr-defined]
-    assert heat.shape == (20, 20)
-    assert 1 <= np.isfinite(heat).sum() <= 20
-
-
-def test_map_elites_needs_axes() -> None:
-    with pytest.raises(ParameterError, match="but this task has none"):
-        kiks.Evolution(small(axes=()), "map-elites")
 
 
 @pytest.mark.parametrize(

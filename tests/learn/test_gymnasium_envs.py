@@ -16,7 +16,7 @@ from pettingzoo.test import parallel_api_test
 import kiks
 import kiks.learn.gymnasium_envs
 from kiks.errors import ParameterError
-from kiks.learn.env_specs import ENV_SPECS, EnvSpec
+from kiks.learn.env_specs import ENV_SPECS, EnvSpec, without_contacts
 from kiks.learn.gymnasium_envs import KheperaEnv, KheperaVectorEnv
 from kiks.learn.pettingzoo_env import KheperaTeam
 
@@ -171,6 +171,33 @@ def test_the_sum_of_rewards_is_the_measure() -> None:
     envs.reset(seed=2)
     total = sum(envs.step(action)[1] for action in random_actions(12, 4))
     np.testing.assert_allclose(total / 12, envs.episodes.batch.values[:, 0, 0])
+
+
+@pytest.mark.slow
+def test_a_contact_lowers_the_reward() -> None:
+    free = KheperaEnv("Avoid", reward=without_contacts(kiks.measures.path_mm, 0.0))
+    costly = KheperaEnv("Avoid", reward=without_contacts(kiks.measures.path_mm, 7.0))
+    totals = []
+    for env in (free, costly):
+        env.reset(seed=1)
+        steps = [env.step(np.ones(2, np.float32)) for _ in range(60)]
+        totals.append(sum(reward for _, reward, *_ in steps))
+    contacts = steps[-1][4]["contacts"]
+    assert contacts > 0.0
+    assert totals[0] - totals[1] == pytest.approx(7.0 * contacts)
+    assert without_contacts(kiks.measures.path_mm, 7.0) is costly.episodes.spec.reward
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: without_contacts(kiks.measures.path_mm, -1), "cost must be from 0 to 1e.06, but it was -1"),
+        (lambda: without_contacts(print), "reward must be a kiks.Measure"),  # type: ignore[arg-type]
+    ],
+)
+def test_wrong_costs_of_contacts_are_errors(make: Any, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        make()
 
 
 def test_arguments_change_timing_and_response() -> None:

@@ -210,8 +210,10 @@ def of_batch(batch: kiks.Batch, h: Any) -> dict[str, Callable[[], Any]]:
         "coverage square": lambda: measures.coverage(ARENA, square_mm=h),
         "goal": lambda: measures.goal_mm(h, h),
         "reached": lambda: measures.reached_s(0, 0, radius_mm=h),
+        "closest": lambda: measures.closest_mm(h, 0),
         "near light": lambda: measures.near_light_share(h),
         "gathered": lambda: measures.gathered(0, h),
+        "largest group": lambda: measures.largest_group(h),
         "measure": lambda: kiks.measure(h),
         "measure notes": lambda: kiks.measure(notes=h)(lambda moment, notes: None),
         "controller senses": lambda: controllers.linear(senses=h),
@@ -220,6 +222,9 @@ def of_batch(batch: kiks.Batch, h: Any) -> dict[str, Callable[[], Any]]:
         "hidden units": lambda: controllers.mlp(hidden=[h]),
         "neurons": lambda: controllers.ctrnn(neurons=h),
         "units": lambda: controllers.gru(units=h),
+        "units of elman": lambda: controllers.elman(units=h),
+        "plastic neurons": lambda: controllers.plastic(neurons=h),
+        "plastic per": lambda: controllers.plastic(per=h),
     }
 
 

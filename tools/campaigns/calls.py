@@ -20,6 +20,7 @@ from tools.campaigns.runner import Campaign, Play, judge
 
 import kiks
 from kiks.clock.thinking import parse_thinking
+from kiks.control.controller_kinds import ControllerKind
 from kiks.learn.gymnasium_envs import KheperaEnv, KheperaVectorEnv
 from kiks.model.arena import Ball, Cylinder, Lamp, Pose
 from kiks.model.project import Project, ProjectRobot
@@ -246,13 +247,13 @@ def _task() -> Any:
 def _control(rng: random.Random) -> Subject:
     good = {
         "neurons": 2, "period_s": 0.1, "time_constant_s": 0.4, "senses": ("proximity",), "speed_limit": 5.0,
-        "units": 2, "feedback": False,
+        "units": 2, "feedback": False, "per": "neuron",
         "hidden": (3,), "controller": _controller(), "count": 2, "seed": 1, "folder": ".", "recipe": {"kind": "linear"},
         "arena": _box(), "square_mm": 50.0, "x_mm": 50.0, "y_mm": 50.0, "radius_mm": 50.0, "side": "left",
         "counts": 300.0,
     }  # fmt: skip
     found = {}
-    wanted = ("ctrnn", "gru", "linear", "mlp", "random_parameters", "from_recipe", "recipe_for")
+    wanted = (*ControllerKind, "random_parameters", "from_recipe", "recipe_for")
     wanted += ("coverage", "gathered", "goal_mm", "near_light_share", "reached_s", "wall_following")
     for name in wanted:
         call = getattr(kiks.controllers, name, None) or getattr(kiks.measures, name)

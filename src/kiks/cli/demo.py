@@ -62,6 +62,12 @@ def demo(
         str | None, typer.Option(help="soccer: the Python program of the left side; with its arguments, in quotes.")
     ] = None,
     right: Annotated[str | None, typer.Option(help="soccer: the program of the right side.")] = None,
+    at: Annotated[
+        str | None,
+        typer.Option(
+            help="Of a folder's archive, drive the elite of this place: a number for each axis.", metavar="X,Y"
+        ),
+    ] = None,
     generation: Annotated[
         int | None, typer.Option(help="In the folder of an evolution: drive one of this generation again.", min=1)
     ] = None,
@@ -80,8 +86,9 @@ def demo(
     avoid: wander and touch nothing. follow: follow walls. clean: push cylinders to the walls. maze: find the way out.
     camera: watch a moving ball. race: drive round a track. swarm: twenty robots spread out.
     soccer: a match of two programs. A champion's file of `kiks evolve`, or its folder: the champion drives in its
-    world. With --generation 12 --rank 3, the third best of generation 12 drives again as in its evaluation. Of
-    the folder of `kiks evolve pursuit`, predator and prey drive until they touch.
+    world. With --at X,Y, the elite of that place in the folder's archive drives. With --generation 12 --rank 3, the
+    third best of generation 12 drives again as in its evaluation. Of the folder of `kiks evolve pursuit`,
+    predator and prey drive until they touch.
 
     Example: kiks demo follow --arena examples/arenas/office.toml --seconds 300
     """
@@ -103,12 +110,13 @@ def demo(
             if is_given:
                 raise ParameterError(f"{option} must come with --generation, but that is missing. Give the generation.")
     else:
-        for option, value in (("--arena", arena), ("--seed", seed), ("--baud", baud)):
+        for option, value in (("--arena", arena), ("--seed", seed), ("--baud", baud), ("--at", at)):
             if value is not None:
                 raise ParameterError(f"{option} must be left out with --generation, but it was {shown(value)}.")
-        if not Path(behaviour).is_dir() or behaviour in list(Behaviour) or is_contest:
+    for option, value in (("--generation", generation), ("--at", at)):
+        if value is not None and (behaviour in list(Behaviour) or is_contest or not Path(behaviour).is_dir()):
             raise ParameterError(
-                "--generation must come with the folder of an evolution of one controller, but with it came "
+                f"{option} must come with the folder of an evolution of one controller, but with it came "
                 f"{shown(behaviour)}."
             )
     from kiks.drawing import check_picture
@@ -134,11 +142,9 @@ def demo(
         scene = ContestScene(behaviour, given, seed=seed or 0, baud=baud)
     else:
         from kiks.demos.champion import ChampionScene
-        from kiks.learn.champion import Champion
 
-        file = Path(behaviour, "champion.toml") if Path(behaviour).is_dir() else behaviour
         if generation is None:
-            champion = Champion.load(file)
+            champion = _champion(Path(behaviour), at)
             say_without_world(champion, given)
         else:
             champion, default_s = _individual(behaviour, generation, rank, world, task)
@@ -166,6 +172,28 @@ def _individual(folder: str, generation: int, rank: int, world: int, task: str |
     if found.champion.timing.baud is None:
         say(f"it was evaluated without a serial line; here it drives on one of {found.champion.baud} baud.")
     return found.champion, found.seconds
+
+
+def _champion(path: Path, at: str | None) -> Champion:
+    """Return the champion of a file or of a folder; with `at`, the elite there of the folder's archive.
+
+    Raises:
+        ParameterError: If there is none, or `at` is no place.
+    """
+    from kiks.learn.archive import CHAMPION, Archive
+    from kiks.learn.champion import Champion
+
+    if at is None:
+        return Champion.load(path / CHAMPION if path.is_dir() else path)
+    try:
+        place = [float(word) for word in at.split(",")]
+    except ValueError:
+        raise ParameterError(f"--at must be numbers such as 300,450, but it was {shown(at)}.") from None
+    archive = Archive.load(path)
+    elite = archive.elite_at(*place)
+    where = ", ".join(f"{axis.measure} {elite.values[axis.measure]:.4g}" for axis in archive.axes)
+    typer.echo(f"The elite nearest to {at}: {where}, fitness {elite.fitness:.4g}, of generation {elite.generation}.")
+    return archive.champion_of(elite)
 
 
 def _run(scene: Scene, behaviour: str, total_s: float, picture: Path) -> None:

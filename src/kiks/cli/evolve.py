@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import enum
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -13,8 +12,10 @@ import typer
 from kiks.cli.engine_start import ready_batch
 from kiks.cli.evolution_progress import progress_of
 from kiks.cli.options import Seed, written_folder
+from kiks.control.controller_kinds import ControllerKind
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError
+from kiks.learn.algorithm_name import AlgorithmName
 
 if TYPE_CHECKING:
     from kiks.control.controller import Controller
@@ -24,39 +25,22 @@ if TYPE_CHECKING:
     from kiks.learn.task import Task
 
 
-class AlgorithmName(enum.StrEnum):
-    """The algorithms."""
-
-    CMA = "cma"
-    GA = "ga"
-    MAP_ELITES = "map-elites"
-
-
-class ControllerKind(enum.StrEnum):
-    """The controllers that come with KiKS."""
-
-    LINEAR = "linear"
-    MLP = "mlp"
-    CTRNN = "ctrnn"
-    GRU = "gru"
-
-
 def evolve(
     task: Annotated[str, typer.Argument(help="A task (--list shows them), or a Python file that holds one.")] = "avoid",
     out: Annotated[
         Path | None,
         typer.Option(
-            help="Folder of champion, log and picture; kiks-evolve-TASK if left out.", callback=written_folder
+            help="Folder of champion, archive, log and picture; kiks-evolve-TASK if left out.", callback=written_folder
         ),
     ] = None,
     generations: Annotated[
         int | None, typer.Option(help="Generations; as many as the task wants if --seconds is not given either.", min=1)
     ] = None,
     seconds: Annotated[float | None, typer.Option(help="Begin no generation later than this [s].", min=0)] = None,
-    population: Annotated[int | None, typer.Option(help="Candidates in a generation.", min=4)] = None,
-    algorithm: Annotated[
-        AlgorithmName | None, typer.Option(help="cma if left out; map-elites for maze-qd, ga for pursuit.")
+    population: Annotated[
+        int | None, typer.Option(help="Candidates in a generation; the task's own if left out.", min=4)
     ] = None,
+    algorithm: Annotated[AlgorithmName | None, typer.Option(help="The task's own if left out.")] = None,
     controller: Annotated[
         ControllerKind | None, typer.Option(help="The controller to evolve; the task's own if left out.")
     ] = None,
@@ -71,7 +55,7 @@ def evolve(
     ] = None,
     list_: Annotated[bool, typer.Option("--list", help="List the tasks that come with KiKS.")] = False,
 ) -> None:
-    """Evolve a controller for a task, and write champion.toml, log.parquet and fitness.png.
+    """Evolve a controller for a task, and write champion.toml, archive.parquet, log.parquet and fitness.png.
 
     After Ctrl-C or a kill, the same command continues the evolution. With --seeds 10, ten evolutions run one after the
     other; a table, seeds.png and summary.json show their results. In pursuit, predator and prey evolve against each
@@ -108,7 +92,6 @@ def evolve(
     chosen = tasks.load(task)
     if controller is not None:
         chosen = tasks.load(task, _controller(controller, chosen))
-    name = algorithm or (AlgorithmName.MAP_ELITES if task == "maze-qd" else AlgorithmName.CMA)
     folder = out or Path(f"kiks-evolve-{chosen.name}")
     until = chosen.generations if generations is None and seconds is None else generations
     from kiks.learn.evolution import Evolution
@@ -121,7 +104,7 @@ def evolve(
         executor: Executor | None = None
         for number in [seed] if seeds is None else range(seed, seed + seeds):
             home = folder if seeds is None else seed_folder(folder, number)
-            evolution = Evolution(chosen, str(name), seed=number, population=population, folder=home)
+            evolution = Evolution(chosen, algorithm, seed=number, population=population, folder=home)
             if seeds is not None:
                 typer.echo(f"Seed {number}:")
             if evolution.generations:
@@ -176,6 +159,10 @@ def _tell_champion(evolution: Evolution, folder: Path) -> None:
     champion = evolution.champion
     figures = ", ".join(f"{name} {value:.4g}" for name, value in champion.measures.items())
     typer.echo(f"Champion of generation {champion.generation}: fitness {champion.fitness:.4f}   {figures}")
+    if (archive := evolution.archive) is not None:
+        filled = f"{len(archive.elites)} of {archive.cell_count} cells ({100 * archive.coverage:.1f} %)"
+        names = ", ".join(axis.measure for axis in archive.axes)
+        typer.echo(f"Archive by {names}: {filled}, QD score {archive.qd_score:.4g}   One of them: kiks demo --at")
     typer.echo(f"Folder: {folder}   See it drive: kiks demo {folder / 'champion.toml'}")
 
 
@@ -197,7 +184,9 @@ def _controller(kind: ControllerKind, task: Task) -> Controller:
     from kiks.control.controllers import from_recipe
     from kiks.learn.ready_tasks import SPEED_LIMIT
 
-    recipe: dict[str, Any] = {"kind": str(kind), "senses": list(task.controller.senses), "speed_limit": SPEED_LIMIT}
+    own = task.controller
+    limit = (own.recipe or {}).get("speed_limit", SPEED_LIMIT)
+    recipe: dict[str, Any] = {"kind": str(kind), "senses": list(own.senses), "speed_limit": limit}
     if kind is ControllerKind.CTRNN:
         recipe["period_s"] = task.timings[0].period_s
     return from_recipe(recipe)

@@ -17,6 +17,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
 
+from kiks.control.controller_kinds import ControllerKind
 from kiks.errors import ParameterError, nearest, shown
 from kiks.model.atomic_files import program_in
 from kiks.model.data_file import Number, Rule, Switch, Text, Whole, record
@@ -28,6 +29,12 @@ LAYERS_MAX, UNITS_MAX = 8, 256
 """Most hidden layers, and most units in one: scratch lies on the stack."""
 
 PERIOD_S, TIME_CONSTANT_S = 0.1, 0.4
+
+PLASTIC_NEURONS_MAX = 64
+"""Most neurons of a plastic network: each world keeps the weights of all their synapses."""
+
+POLICY_UNITS_MAX = 512
+"""Most units in a hidden layer of a policy; learners take 400 by default at most."""
 
 
 def _each_once(senses: tuple[str, ...]) -> tuple[str, ...]:
@@ -69,6 +76,16 @@ class Mlp:
 
 
 @record
+class Elman:
+    """Arguments of `kiks.controllers.elman`."""
+
+    kind: Literal["elman"]
+    units: Annotated[Units, Field(description="Hidden units that feed back to themselves.")] = 4
+    senses: Senses = ("proximity",)
+    speed_limit: SpeedLimit = SPEED_LIMIT
+
+
+@record
 class Ctrnn:
     """Arguments of `kiks.controllers.ctrnn`."""
 
@@ -91,6 +108,34 @@ class Gru:
 
 
 @record
+class Plastic:
+    """Arguments of `kiks.controllers.plastic`."""
+
+    kind: Literal["plastic"]
+    neurons: Annotated[Whole, Field(ge=2, le=PLASTIC_NEURONS_MAX, description="The first two are the wheels.")] = 3
+    per: Annotated[
+        Literal["synapse", "neuron"], Field(description="What has a rule, a sign and a learning rate of its own.")
+    ] = "synapse"
+    senses: Senses = ("proximity",)
+    speed_limit: SpeedLimit = SPEED_LIMIT
+
+
+@record
+class Policy:
+    """Arguments of `kiks.controllers.policy`."""
+
+    kind: Literal["policy"]
+    hidden: Annotated[
+        tuple[Annotated[Whole, Field(ge=1, le=POLICY_UNITS_MAX)], ...],
+        Field(max_length=LAYERS_MAX, description="One for each hidden layer."),
+    ] = (16, 16)
+    activation: Annotated[Literal["tanh", "relu"], Field(description="Of hidden units.")] = "tanh"
+    output: Annotated[Literal["clip", "tanh"], Field(description="What keeps outputs within +-1.")] = "clip"
+    senses: Senses = ("proximity",)
+    speed_limit: SpeedLimit = SPEED_LIMIT
+
+
+@record
 class InModule:
     """A user's own controller, found by importing a module."""
 
@@ -105,7 +150,18 @@ class InFile:
     name: Annotated[Text, Field(min_length=1)]
 
 
-Shape = Linear | Mlp | Ctrnn | Gru
+Shape = Linear | Mlp | Elman | Ctrnn | Gru | Plastic | Policy
+
+SHAPES: dict[ControllerKind, type[Shape]] = {
+    ControllerKind.LINEAR: Linear,
+    ControllerKind.MLP: Mlp,
+    ControllerKind.ELMAN: Elman,
+    ControllerKind.CTRNN: Ctrnn,
+    ControllerKind.GRU: Gru,
+    ControllerKind.PLASTIC: Plastic,
+    ControllerKind.POLICY: Policy,
+}
+"""The arguments of each kind."""
 
 
 def _tag(given: Any) -> str | None:
@@ -118,12 +174,15 @@ def _tag(given: Any) -> str | None:
 Recipe = Annotated[
     Annotated[Linear, Tag("linear")]
     | Annotated[Mlp, Tag("mlp")]
+    | Annotated[Elman, Tag("elman")]
     | Annotated[Ctrnn, Tag("ctrnn")]
     | Annotated[Gru, Tag("gru")]
+    | Annotated[Plastic, Tag("plastic")]
+    | Annotated[Policy, Tag("policy")]
     | Annotated[InModule, Tag("function")]
     | Annotated[InFile, Tag("file")],
     Discriminator(_tag),
-    Rule("a table with a kind (linear, mlp, ctrnn or gru), or a function, or a file and a name"),
+    Rule(f"a table with a kind ({', '.join(ControllerKind)}), or a function, or a file and a name"),
 ]
 """The recipe of a controller in a file."""
 

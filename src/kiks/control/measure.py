@@ -107,7 +107,7 @@ def measure(
         function: A function `(moment, notes)`; see `Moment` for what it sees.
         notes: Numbers that it keeps for each robot, zeros at the start.
         result: From the notes at the end, float64 [..., note], to the values, float64 [...]; the first if left out.
-        senses: The senses that must come first in `moment.sensors`: 'proximity', 'ambient' or both.
+        senses: The senses that must come first in `moment.sensors`, of 'proximity', 'ambient' and 'camera'.
 
     Raises:
         ParameterError: If it is no such function or an argument is out of range.

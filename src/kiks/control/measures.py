@@ -36,6 +36,9 @@ WALL_LOST_S = 2.0
 KEPT_S = 10.0
 """Time for which a robot must have followed a wall to score in full [s]."""
 
+CLOSE_MM = 100.0
+"""Distance of two things at which they are half close [mm]."""
+
 FULL_COUNT = 1023.0
 """Proximity that counts as 1 (khepera-protocol.md 8.4)."""
 
@@ -261,6 +264,26 @@ def _goal_mm(x_mm: float, y_mm: float) -> Measure:
     return goal_mm
 
 
+def closest_mm(x_mm: float, y_mm: float) -> Measure:
+    """How near it has come to a place, at best [mm].
+
+    Raises:
+        ParameterError: If an argument is out of range.
+    """
+    return _closest_mm(_place("x_mm", x_mm), _place("y_mm", y_mm))
+
+
+@functools.lru_cache(maxsize=256)
+def _closest_mm(x_mm: float, y_mm: float) -> Measure:
+    @measure(notes=2)
+    def closest_mm(moment: Any, notes: Any) -> None:
+        away_mm = distance_mm(moment, x_mm, y_mm)
+        notes[0] = away_mm if notes[1] == 0.0 else min(notes[0], away_mm)
+        notes[1] = 1.0
+
+    return closest_mm
+
+
 def reached_s(x_mm: float, y_mm: float, *, radius_mm: float = 50.0) -> Measure:
     """When it first came within a radius of a place [s]; if it never did, how long it has tried.
 
@@ -387,6 +410,46 @@ def _gathered(x_mm: float, y_mm: float, radius_mm: float) -> Measure:
             notes[0] += 1.0 if across * across + up * up <= radius_mm * radius_mm else 0.0
 
     return gathered
+
+
+def largest_group(radius_mm: float = 100.0) -> Measure:
+    """Largest number of balls and cylinders that have their middles within a radius of one of them, itself included.
+
+    Raises:
+        ParameterError: If the radius is out of range.
+    """
+    return _largest_group(_radius(radius_mm))
+
+
+@functools.lru_cache(maxsize=256)
+def _largest_group(radius_mm: float) -> Measure:
+    @measure
+    def largest_group(moment: Any, notes: Any) -> None:
+        notes[0] = 0.0
+        for body in moment.bodies:
+            near = 0.0
+            for other in moment.bodies:
+                across, up = other.x_mm - body.x_mm, other.y_mm - body.y_mm
+                near += 1.0 if across * across + up * up <= radius_mm * radius_mm else 0.0
+            notes[0] = max(notes[0], near)
+
+    return largest_group
+
+
+@measure
+def closeness(moment: Any, notes: Any) -> None:
+    """How close balls and cylinders are, the mean of 1 / (1 + (d / 100 mm)^2) over pairs at a distance d; 0 of none.
+
+    It grows most when things that are near each other come nearer, so it pays for each step towards a group.
+    """
+    count = moment.bodies.shape[0]
+    total = 0.0
+    for k in range(count):
+        for other in range(k):
+            across = moment.bodies[k].x_mm - moment.bodies[other].x_mm
+            up = moment.bodies[k].y_mm - moment.bodies[other].y_mm
+            total += 1.0 / (1.0 + (across * across + up * up) / (CLOSE_MM * CLOSE_MM))
+    notes[0] = total / max(0.5 * count * (count - 1), 1.0)
 
 
 @measure

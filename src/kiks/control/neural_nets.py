@@ -16,7 +16,7 @@ import numpy as np
 
 from kiks.control.controller import SENSES, reading_count
 from kiks.engine.compiling import inlined, kernel
-from kiks.engine.numbers import tanh
+from kiks.engine.numbers import exponential, tanh
 from kiks.engine.simd.stack_arrays import stack_floats
 
 DARK_COUNTS = 500.0
@@ -28,11 +28,34 @@ TIME_SCALE_LIMIT = 4.0
 GAIN = 4.0
 """What a CTRNN's weights and biases are multiplied by: from 1 on, a parameter makes a unit hold what it has."""
 
+PLASTIC_GAIN = 4.0
+"""What the sum of a plastic neuron is multiplied by: one strong synapse of an active sender nearly saturates it."""
+
 
 @kernel
 def logistic(x: Any) -> Any:
     """Return 1 / (1 + e^-x), within 4e-6."""
     return 0.5 + 0.5 * tanh(0.5 * x)
+
+
+@kernel
+def exact_tanh(x: Any) -> Any:
+    """Return the hyperbolic tangent within 3e-16, for networks that learnt with that of a mathematical library."""
+    shrunk = exponential(-2.0 * abs(x))
+    positive = (1.0 - shrunk) / (1.0 + shrunk)
+    return positive if x > 0.0 else -positive
+
+
+@kernel
+def cut(x: Any) -> Any:
+    """Return a number cut to +-1."""
+    return min(max(x, -1.0), 1.0)
+
+
+@kernel
+def rectified(x: Any) -> Any:
+    """Return a number, or 0 if it is negative."""
+    return max(x, 0.0)
 
 
 @kernel
@@ -92,8 +115,8 @@ def layer_size(input_count: int, unit_count: int) -> int:
     return (1 + input_count) * unit_count
 
 
-def layers(counts: tuple[int, ...], first: int = 0) -> Any:
-    """Return a kernel `(inputs, parameters, units)` of layers of so many numbers, with tanh between, not at the end."""
+def layers(counts: tuple[int, ...], activation: Any, first: int = 0) -> Any:
+    """Return a kernel `(inputs, parameters, units)` of layers of so many numbers; `activation` is between them."""
     input_count, unit_count = counts[:2]
 
     if len(counts) == 2:
@@ -104,21 +127,27 @@ def layers(counts: tuple[int, ...], first: int = 0) -> Any:
 
         return do_last
 
-    do_rest = layers(counts[1:], first + layer_size(input_count, unit_count))
+    do_rest = layers(counts[1:], activation, first + layer_size(input_count, unit_count))
 
     @inlined
     def do_all(inputs: Any, parameters: Any, units: Any) -> Any:
         between = stack_floats(unit_count)
         do_layer(inputs, input_count, parameters, first, between, unit_count)
         for unit in range(unit_count):
-            between[unit] = tanh(between[unit])
+            between[unit] = activation(between[unit])
         do_rest(between, parameters, units)
 
     return do_all
 
 
 def feed_forward(
-    counts: tuple[int, ...], senses: tuple[str, ...], *, has_feedback: bool, is_cut: bool, speed_limit: float
+    counts: tuple[int, ...],
+    senses: tuple[str, ...],
+    *,
+    has_feedback: bool = False,
+    activation: Any = tanh,
+    squash: Any = tanh,
+    speed_limit: float,
 ) -> Any:
     """Return the function of a controller: layers from the senses, and its last speeds if so wanted, to the wheels.
 
@@ -126,10 +155,11 @@ def feed_forward(
         counts: Inputs, units of each hidden layer, 2.
         senses: The senses of the inputs.
         has_feedback: Whether the last two inputs are the last outputs, from the memory.
-        is_cut: Whether outputs are cut to +-1; else they are their tanh.
+        activation: Kernel of hidden units.
+        squash: Kernel that keeps outputs within +-1.
         speed_limit: The speed of an output of 1 [pulses/10 ms].
     """
-    input_count, memory_count, net = counts[0], 2 * has_feedback, layers(counts)
+    input_count, memory_count, net = counts[0], 2 * has_feedback, layers(counts, activation)
     sense_count, take_senses = input_count - memory_count, senses_as_inputs(senses)
 
     def decide(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
@@ -139,10 +169,31 @@ def feed_forward(
             inputs[sense_count + k] = memory[k]
         net(inputs, parameters, outputs)
         for wheel in range(2):
-            output = min(max(outputs[wheel], -1.0), 1.0) if is_cut else tanh(outputs[wheel])
+            output = squash(outputs[wheel])
             wheels[wheel] = speed_limit * output
             if has_feedback:
                 memory[wheel] = output
+
+    return decide
+
+
+def simple_recurrent(senses: tuple[str, ...], unit_count: int, *, speed_limit: float) -> Any:
+    """Return the function of a controller: units that feed back to themselves; see `kiks.controllers.elman`."""
+    sense_count, take_senses = reading_count(senses), senses_as_inputs(senses)
+    input_count = sense_count + unit_count
+    wheels_first = layer_size(input_count, unit_count)
+
+    def decide(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+        inputs, fresh, outputs = stack_floats(input_count), stack_floats(unit_count), stack_floats(2)
+        take_senses(sensors, inputs)
+        for k in range(unit_count):
+            inputs[sense_count + k] = memory[k]
+        do_layer(inputs, input_count, parameters, 0, fresh, unit_count)
+        for k in range(unit_count):
+            memory[k] = tanh(fresh[k])
+        do_layer(memory, unit_count, parameters, wheels_first, outputs, 2)
+        for wheel in range(2):
+            wheels[wheel] = speed_limit * tanh(outputs[wheel])
 
     return decide
 
@@ -209,3 +260,72 @@ def gated(senses: tuple[str, ...], unit_count: int, *, speed_limit: float) -> An
             wheels[wheel] = speed_limit * tanh(outputs[wheel])
 
     return decide
+
+
+@kernel
+def learnt(weight: Any, before: Any, after: Any, first_bit: Any, second_bit: Any) -> Any:
+    """Return the change of a weight at a learning rate of 1; two bits choose the rule (`kiks.controllers.plastic`).
+
+    The weight and the activities of the sender before the synapse and of the neuron after it are from 0 to 1.
+    """
+    if not first_bit:
+        return after * (before - weight) if second_bit else (1.0 - weight) * before * after
+    if not second_bit:
+        return before * (after - weight)
+    alike = tanh(4.0 * (1.0 - abs(before - after)) - 2.0)
+    return ((1.0 - weight) if alike > 0.0 else weight) * alike
+
+
+def plastic(senses: tuple[str, ...], neuron_count: int, *, is_per_synapse: bool, speed_limit: float) -> Any:
+    """Return the function of a controller: neurons whose weights change; see `kiks.controllers.plastic`.
+
+    The memory holds the activity of each neuron, then the weights, [sender, neuron].
+    """
+    sense_count, take_senses = reading_count(senses), senses_as_inputs(senses)
+    sender_count = sense_count + neuron_count + 1
+    synapse_count = sender_count * neuron_count
+    # A rate stands `row` further on for the next sender, and each table `size` behind the one before.
+    row, size = (neuron_count, synapse_count) if is_per_synapse else (0, neuron_count)
+    signs_first, sign_row, sign_column = (0, neuron_count, 1) if is_per_synapse else (0, 1, 0)
+    rates_first = 0 if is_per_synapse else sender_count
+    first_bits, second_bits = rates_first + size, rates_first + 2 * size
+
+    def decide(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+        senders, totals = stack_floats(sender_count), stack_floats(neuron_count)
+        take_senses(sensors, senders)
+        for k in range(sense_count):
+            senders[k] = min(max(0.0, senders[k]), 1.0)
+        for k in range(neuron_count):
+            senders[sense_count + k] = memory[k]
+            totals[k] = 0.0
+        senders[sender_count - 1] = 1.0
+        for sender in range(sender_count):
+            for k in range(neuron_count):
+                excites = parameters[signs_first + sender * sign_row + k * sign_column] > 0.0
+                given = senders[sender] * memory[neuron_count + sender * neuron_count + k]
+                totals[k] += given if excites else -given
+        for k in range(neuron_count):
+            memory[k] = logistic(PLASTIC_GAIN * totals[k])
+        for sender in range(sender_count):
+            for k in range(neuron_count):
+                own, rule = neuron_count + sender * neuron_count + k, sender * row + k
+                rate = abs(parameters[rates_first + rule])
+                change = learnt(
+                    memory[own],
+                    senders[sender],
+                    memory[k],
+                    parameters[first_bits + rule] > 0.0,
+                    parameters[second_bits + rule] > 0.0,
+                )
+                memory[own] += rate / (1.0 + rate) * change
+        for wheel in range(2):
+            wheels[wheel] = speed_limit * (2.0 * memory[wheel] - 1.0)
+
+    return decide
+
+
+def plastic_size(sense_count: int, neuron_count: int, *, is_per_synapse: bool) -> tuple[int, int]:
+    """Return how many numbers of memory and how many parameters a plastic network has."""
+    sender_count = sense_count + neuron_count + 1
+    synapse_count = sender_count * neuron_count
+    return neuron_count + synapse_count, 3 * synapse_count if is_per_synapse else sender_count + 3 * neuron_count

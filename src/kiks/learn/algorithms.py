@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.errors import ParameterError, installing, nearest, shown
+from kiks.learn.algorithm_name import AlgorithmName
 from kiks.learn.task import SPREAD, Axis
 
 Floats = NDArray[np.float64]
@@ -29,8 +30,11 @@ class Algorithm(Protocol):
     def tell(self, fitness: Floats, behaviours: Floats) -> None:
         """Take their fitness, float64 [candidate], and their behaviours, float64 [candidate, axis]."""
 
-    def favourite(self) -> Floats:
-        """Return the best parameters according to the algorithm, float64 [parameter]."""
+    def favourite(self) -> Floats | None:
+        """Return the best parameters according to the algorithm, float64 [parameter].
+
+        None if it looks for many behaviours and prefers none: then the best one of the evolution's archive counts.
+        """
         ...
 
 
@@ -119,72 +123,152 @@ class Ga:
         return best
 
 
-class MapElites:
-    """MAP-Elites: keeps the best candidate for each cell of a map of behaviours; all of them are parents.
+class Diverse:
+    """Finds many behaviours: new candidates come from an archive of those that differ. pyribs keeps it and proposes.
 
-    A new candidate lies near an elite, moved along the line to another one (Vassiliades and Mouret 2018).
+    Behaviours are counted in cells of the axes, so that axes with different units count alike.
 
     Args:
         parameter_count: Number of parameters of a candidate.
         population: Number of candidates in a generation.
         seed: Seed of its random numbers.
-        axes: Axes of the map.
+        axes: Axes along which behaviours differ.
         spread: Standard deviation of each parameter at the beginning.
 
     Raises:
         ParameterError: If there are no axes.
     """
 
-    NEAR, ALONG = 0.1, 0.2
-    """Standard deviation of a child's distance from its parent in all directions, and along the line."""
-
     def __init__(
         self, parameter_count: int, population: int, seed: int, axes: Sequence[Axis] = (), spread: float = SPREAD
     ) -> None:
         if not axes:
             raise ParameterError(
-                "map-elites must have axes along which behaviours differ, but this task has none. Give it some."
+                "the task must have axes along which behaviours differ for this algorithm, but it has none. "
+                "Give it some, or take cma."
             )
-        archives, emitters = library("ribs.archives"), library("ribs.emitters")
-        schedulers = library("ribs.schedulers")
-        first = spread * np.random.default_rng(seed).standard_normal((population, parameter_count))
-        self.archive: Any = archives.GridArchive(
-            solution_dim=parameter_count,
-            dims=[axis.cells for axis in axes],
-            ranges=[(axis.low, axis.high) for axis in axes],
-            seed=seed,
-        )
-        emitter = emitters.IsoLineEmitter(
-            self.archive,
-            iso_sigma=self.NEAR * spread,
-            line_sigma=self.ALONG,
-            initial_solutions=first,
-            batch_size=population,
-            seed=seed,
-        )
-        self._scheduler: Any = schedulers.Scheduler(self.archive, [emitter])
+        self._low, self._high = (np.array([getattr(axis, name) for axis in axes]) for name in ("low", "high"))
+        self._cell = (self._high - self._low) / [axis.cells for axis in axes]
+        schedulers, archives = library("ribs.schedulers"), library("ribs.archives")
+        archive = self.make_archive(archives, parameter_count, [axis.cells for axis in axes], seed)
+        emitters = self.make_emitters(library("ribs.emitters"), archive, population, seed, spread)
+        self._scheduler: Any = schedulers.Scheduler(archive, emitters)
+
+    def make_archive(self, archives: Any, parameter_count: int, cells: list[int], seed: int) -> Any:
+        """Return the archive: one elite for each cell."""
+        ranges = [(0, count) for count in cells]
+        return archives.GridArchive(solution_dim=parameter_count, dims=cells, ranges=ranges, seed=seed)
+
+    def make_emitters(self, emitters: Any, archive: Any, population: int, seed: int, spread: float) -> list[Any]:
+        """Return what proposes candidates."""
+        raise NotImplementedError
 
     def ask(self) -> Floats:
         """Return the next generation."""
         return np.array(self._scheduler.ask())
 
     def tell(self, fitness: Floats, behaviours: Floats) -> None:
-        """Put candidates on the map that are better than the elites of their cells."""
-        self._scheduler.tell(fitness, behaviours)
+        """Put candidates into the archive that are new, or better than what is there.
 
-    def favourite(self) -> Floats:
-        """Return the best elite of the map."""
-        return np.array(self.archive.best_elite["solution"])
+        Raises:
+            ParameterError: If the behaviours are missing.
+        """
+        if behaviours.shape[1] != len(self._low):
+            raise ParameterError(
+                "tell() must be given fitness and measures for this algorithm, but it was given fitness alone."
+            )
+        inside = np.clip(behaviours, self._low, self._high)  # what lies beyond an end is nothing new
+        self._scheduler.tell(fitness, (inside - self._low) / self._cell)
 
-    def heat_map(self) -> Floats:
-        """Return the fitness in each cell, NaN in empty ones, float64 [cell of axis 0, ...]."""
-        heat: Floats = np.full(self.archive.dims, np.nan)
-        elites = self.archive.data(["index", "objective"], return_type="dict")
-        heat[np.unravel_index(elites["index"], self.archive.dims)] = elites["objective"]
-        return heat
+    def favourite(self) -> None:
+        """Return None: it prefers none of its behaviours."""
 
 
-ALGORITHMS: dict[str, type[Cma] | type[Ga] | type[MapElites]] = {"cma": Cma, "ga": Ga, "map-elites": MapElites}
+class MapElites(Diverse):
+    """MAP-Elites: keeps the best candidate for each cell of a map of behaviours; all of them are parents.
+
+    A new candidate lies near an elite, moved along the line to another one (Vassiliades and Mouret 2018).
+    """
+
+    NEAR, ALONG = 0.2, 0.2
+    """Standard deviation of a child's distance from its parent in all directions, and along the line."""
+
+    def make_emitters(self, emitters: Any, archive: Any, population: int, seed: int, spread: float) -> list[Any]:
+        """Return an emitter of variations of elites."""
+        first = spread * np.random.default_rng(seed).standard_normal((population, archive.solution_dim))
+        near = self.NEAR * spread
+        return [
+            emitters.IsoLineEmitter(
+                archive,
+                iso_sigma=near,
+                line_sigma=self.ALONG,
+                initial_solutions=first,
+                batch_size=population,
+                seed=seed,
+            )
+        ]
+
+
+class CmaMe(Diverse):
+    """CMA-ME: several CMA-ES that follow what improves the map most; each begins again at an elite when it finds none.
+
+    Source: Fontaine and others, Covariance matrix adaptation for the rapid illumination of behavior space, 2020.
+    """
+
+    STRATEGY = 40
+    """Number of candidates of a strategy; a larger population has several."""
+
+    RANKER, SELECTION, RESTART = "2imp", "filter", "no_improvement"
+    """What pyribs ranks candidates by, which of them it follows, and when a strategy begins again."""
+
+    def make_emitters(self, emitters: Any, archive: Any, population: int, seed: int, spread: float) -> list[Any]:
+        """Return the strategies."""
+        parts = np.array_split(np.arange(population), max(1, population // self.STRATEGY))
+        return [
+            emitters.EvolutionStrategyEmitter(
+                archive,
+                x0=np.zeros(archive.solution_dim),
+                sigma0=spread,
+                ranker=self.RANKER,
+                selection_rule=self.SELECTION,
+                restart_rule=self.RESTART,
+                batch_size=len(part),
+                seed=child,
+            )
+            for part, child in zip(parts, np.random.SeedSequence(seed).spawn(len(parts)), strict=True)
+        ]
+
+
+class Novelty(CmaMe):
+    """Novelty search: the same strategies follow what was not seen before, and fitness does not count.
+
+    Novelty is the mean distance from the nearest behaviours of an archive, which those that are novel enough enter
+    (Lehman and Stanley, Abandoning objectives, 2011).
+    """
+
+    NEIGHBOURS, NOVEL_CELLS = 15, 1.0
+    """Number of nearest behaviours that count, and the least novelty for the archive [cells]."""
+
+    RANKER, SELECTION, RESTART = "nov", "mu", "basic"
+
+    def make_archive(self, archives: Any, parameter_count: int, cells: list[int], seed: int) -> Any:
+        """Return the archive of novel behaviours."""
+        return archives.ProximityArchive(
+            solution_dim=parameter_count,
+            measure_dim=len(cells),
+            k_neighbors=self.NEIGHBOURS,
+            novelty_threshold=self.NOVEL_CELLS,
+            seed=seed,
+        )
+
+
+ALGORITHMS: dict[str, type[Cma] | type[Ga] | type[MapElites] | type[CmaMe]] = {
+    AlgorithmName.CMA: Cma,
+    AlgorithmName.GA: Ga,
+    AlgorithmName.MAP_ELITES: MapElites,
+    AlgorithmName.CMA_ME: CmaMe,
+    AlgorithmName.NOVELTY: Novelty,
+}
 """The algorithms by their names."""
 
 

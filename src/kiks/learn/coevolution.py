@@ -195,7 +195,9 @@ class Coevolution:
         own = self._populations()
         for side, algorithm in enumerate(self._algorithms):
             algorithm.tell(values[:, side], np.zeros((self.population, 0)))
-            self._favourites[side].append(algorithm.favourite())
+            favourite = algorithm.favourite()
+            best = own[side][values[:, side].argmax()] if favourite is None else favourite
+            self._favourites[side].append(best.copy())
         generation = Generation(
             candidates=np.concatenate(own, axis=1),
             values=values,

@@ -7,17 +7,22 @@ from collections.abc import Callable
 from dataclasses import field, replace
 from typing import Annotated, Any
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field
 
 from kiks.batch.initial_state import Arenas, Starts
 from kiks.batch.loop_timing import Timing
 from kiks.control.controller import check_senses, reading_count
 from kiks.control.measure import Measure, measure
-from kiks.control.measures import avoidance, near_light_share, nearest_lamp_mm, wall_following
+from kiks.control.measures import avoidance, light_approach, near_light_share, nearest_lamp_mm
 from kiks.engine.physics.motor import SPEED_MAX
 from kiks.errors import ParameterError, nearest, shown
-from kiks.learn.training_arenas import corridors, pillars
-from kiks.model.arena import Arena, Cylinder, Lamp, Pose
+from kiks.learn import ready_tasks
+from kiks.learn.task import Task
+from kiks.learn.training_arenas import pillars
+from kiks.model.arena import Arena, Cylinder, Pose
+from kiks.model.checks import check_kind, check_number
 from kiks.model.data_file import Number, Text, record
 
 _CheckedMeasure = Annotated[Measure, Field(description="Write @kiks.measure over the function.")]
@@ -69,6 +74,9 @@ class EnvSpec:
         return replace(self, **changes)
 
 
+CONTACT_COST = 5.0
+"""What a contact takes off the reward of `Follow`: as much as half a second of following at best."""
+
 ARRIVED_MM = 60.0
 """Distance to a lamp at which a robot has arrived [mm]; nearer, most light comes from above."""
 
@@ -97,20 +105,45 @@ def drawn_together(moment: Any, notes: Any) -> None:
     notes[1] = total_mm
 
 
+@functools.lru_cache(maxsize=256)
+def without_contacts(reward: Measure, cost: float = CONTACT_COST) -> Measure:
+    """Return a reward that falls by a cost with each contact; the same measure for the same arguments.
+
+    Args:
+        reward: A measure; the gain of its first note is the reward.
+        cost: What a contact takes off.
+
+    Raises:
+        ParameterError: If an argument is out of range.
+    """
+    check_kind("reward", reward, Measure, "Write @kiks.measure over the function.")
+    cost = check_number("cost", cost, 0, 1e6)
+    watch, result = reward.kernel, reward.result
+
+    def value(notes: NDArray[np.float64]) -> NDArray[np.float64]:
+        return result(np.concatenate([notes[..., :1], notes[..., 2:]], axis=-1))
+
+    @measure(notes=reward.note_count + 1, result=value, senses=reward.senses)
+    def reward_without_contacts(moment: Any, notes: Any) -> None:
+        watch(moment, notes[1:])
+        notes[0] = notes[1] - cost * moment.contact_count
+
+    return reward_without_contacts
+
+
 def avoid() -> EnvSpec:
     """Drive fast and straight, far from everything."""
     return EnvSpec("Avoid", (pillars(),), avoidance)
 
 
-def follow_wall() -> EnvSpec:
-    """Drive fast and straight with a wall on the left."""
-    return EnvSpec("FollowWall", (corridors(),), wall_following("left"))
+def follow() -> EnvSpec:
+    """Follow a wall on the left, and touch nothing: the task `follow`."""
+    return _of_task("Follow", ready_tasks.follow(), "wall_following", CONTACT_COST)
 
 
 def light() -> EnvSpec:
-    """Go to a lamp."""
-    arena = replace(Arena.box(1000, 1000), lamps=(Lamp(500, 500),))
-    return EnvSpec("Light", (arena,), nearer_to_light, near_light_share(ARRIVED_MM), ("proximity", "ambient"))
+    """Go to a lamp and stay there: the task `light`."""
+    return _of_task("Light", ready_tasks.light(), light_approach.name)
 
 
 def gather() -> EnvSpec:
@@ -127,9 +160,23 @@ def maze() -> EnvSpec:
     return EnvSpec("Maze", (arena,), nearer_to_light, near_light_share(ARRIVED_MM), senses, starts="arena")
 
 
+def _of_task(name: str, task: Task, reward: str, contact_cost: float = 0.0) -> EnvSpec:
+    """Return an environment with the arenas, senses, speed and timing of a task, and one of its measures as reward."""
+    measured = next(each for each in task.measures if each.name == reward)
+    recipe: Any = task.controller.recipe
+    return EnvSpec(
+        name,
+        task.arenas,
+        without_contacts(measured, contact_cost) if contact_cost else measured,
+        senses=task.controller.senses,
+        speed_limit=recipe["speed_limit"],
+        timing=task.timings[0],
+    )
+
+
 ENV_SPECS: dict[str, Callable[[], EnvSpec]] = {
     "Avoid": avoid,
-    "FollowWall": follow_wall,
+    "Follow": follow,
     "Light": light,
     "Gather": gather,
     "Maze": maze,

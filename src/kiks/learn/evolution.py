@@ -3,6 +3,9 @@
 Each generation drives in its own worlds, and its best candidate may have been lucky. So the candidate that the
 algorithm considers best, the rival, is tried together with the next generation. Its trial worlds stay the same for the
 whole evolution, and no generation trains in them. The best rival there is the champion.
+
+An algorithm that looks for many behaviours prefers none. Then the rivals are the elites of the archive that were not
+tried yet, the fittest first.
 """
 
 from __future__ import annotations
@@ -17,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kiks.errors import ParameterError, shown
 from kiks.learn.algorithms import Algorithm, make_algorithm
+from kiks.learn.archive import CHAMPION, Archive
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Executor
 from kiks.learn.evolution_log import Folder, Generation, Identity
@@ -28,9 +32,6 @@ from kiks.version import __version__
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
-
-POPULATION = 40
-"""Default number of candidates in a generation."""
 
 TRIALS = 8
 """Trials of a rival, each in as many worlds as a candidate of the population gets."""
@@ -47,18 +48,21 @@ class Evolution:
 
     Args:
         task: The task.
-        algorithm: 'cma' (CMA-ES), 'ga' (a genetic algorithm) or 'map-elites' (many different behaviours); or an object
-            with `ask()`, which returns candidates, float64 [candidate, parameter], each time as many, and
-            `tell(fitness, behaviours)`, float64 [candidate] and [candidate, axis]. It may have `favourite()`, which
-            returns the parameters that it considers best; else these are the best of the last generation.
+        algorithm: 'cma' (CMA-ES) or 'ga' (a genetic algorithm); for many different behaviours 'map-elites', 'cma-me'
+            or 'novelty'. The task's own if left out. Or an object with `ask()`, which returns candidates, float64
+            [candidate, parameter], each time as many, and `tell(fitness, behaviours)`, float64 [candidate] and
+            [candidate, axis]. It may have `favourite()`, which returns the parameters that it considers best; else
+            these are the best of the last generation.
         seed: Seed of all random numbers: the same seed gives the same evolution, with any number of workers.
-        population: Number of candidates in a generation; as many as `ask` returns, if the algorithm is an object.
-        folder: Folder of its generations, its champion and its log. If it holds generations of the same evolution, the
-            evolution continues after them, as if it had never stopped. Left out, nothing is written.
+        population: Number of candidates in a generation; the task's own if left out, or as many as `ask` returns, if
+            the algorithm is an object.
+        folder: Folder of its generations, its champion, its archive and its log. If it holds generations of the same
+            evolution, the evolution continues after them, as if it had never stopped. Left out, nothing is written.
 
     Attributes:
         task: The task.
-        algorithm: The state of the algorithm; 'map-elites' has its map there.
+        algorithm: The state of the algorithm.
+        archive: The best candidate of each cell of a map along the task's axes; None if it has no axes.
         generations: The generations with their values, in order.
 
     Raises:
@@ -77,7 +81,7 @@ class Evolution:
     def __init__(
         self,
         task: Task,
-        algorithm: object = "cma",
+        algorithm: object = None,
         *,
         seed: int = 0,
         population: int | None = None,
@@ -93,8 +97,9 @@ class Evolution:
             self._asked = self._candidates(None if population is None else check_count("population", population, 1))
             self.population = len(self._asked)
         else:
-            self.name = check_kind("algorithm", algorithm, str, "Or give an object with ask and tell.")
-            self.population = check_count("population", POPULATION if population is None else population, 4)
+            name = task.algorithm if algorithm is None else algorithm
+            self.name = str(check_kind("algorithm", name, str, "Or give an object with ask and tell."))
+            self.population = check_count("population", task.population if population is None else population, 4)
             self.algorithm = make_algorithm(
                 self.name,
                 task.parameter_count,
@@ -105,9 +110,12 @@ class Evolution:
             )
         self._trial_seeds = [self._seed_for(TRIAL_SEED, number) for number in range(TRIALS)]
         self._rival: Floats | None = None
+        self._tried: set[tuple[float, ...]] = set()
         self._best: Champion | None = None
-        self._earlier_s, self._start_s, self._logged_s = 0.0, perf_counter(), -np.inf
         self._world = task.world()
+        unknown = self._champion(np.zeros(task.parameter_count), np.zeros(len(task.value_names)), 0)
+        self.archive = Archive(task.axes, task.value_names, unknown) if task.axes else None
+        self._earlier_s, self._start_s, self._logged_s = 0.0, perf_counter(), -np.inf
         self._folder = None if folder is None else Folder(folder)
         if self._folder is not None:
             self._resume(self._folder)
@@ -160,7 +168,8 @@ class Evolution:
                 fitness alone, float64 [candidate]. More is better.
 
         Raises:
-            ParameterError: If the shape is wrong, a number is not finite, or `ask` was not called.
+            ParameterError: If the shape is wrong, a number is not finite, or `ask` was not called; or if fitness is
+                given alone to an algorithm that looks for many behaviours.
         """
         self._tell(values, self._earlier_s + perf_counter() - self._start_s)
         if self._folder is not None:
@@ -187,11 +196,30 @@ class Evolution:
             columns = [self.task.value_names.index(axis.measure) for axis in self.task.axes]
             behaviours = given[: self.population, columns]
         self.algorithm.tell(fitness.copy(), behaviours)
-        favourite: Any = getattr(self.algorithm, "favourite", None)
-        best = self._asked[int(fitness.argmax())] if favourite is None else favourite()
-        self._rival = check_numbers("parameters of favourite()", best, (self.task.parameter_count,))
+        if self.archive is not None and given.shape[1] == value_count:
+            self.archive.add(self._asked[: self.population], given[: self.population], len(self.generations) + 1)
+        self._rival = self._next_rival(self._asked[int(fitness.argmax())])
         self.generations.append(generation)
         self._asked = None
+
+    def _next_rival(self, best: Floats) -> Floats | None:
+        """Return the parameters to try next; None if all elites were tried.
+
+        Args:
+            best: The best candidate of the generation, for an algorithm that does not say what it prefers.
+
+        Raises:
+            ParameterError: If `favourite` returns something else than parameters.
+        """
+        favourite: Any = getattr(self.algorithm, "favourite", None)
+        preferred = best if favourite is None else favourite()
+        if preferred is not None or self.archive is None:
+            return check_numbers("parameters of favourite()", preferred, (self.task.parameter_count,))
+        untried = (each.parameters for each in self.archive.best_first() if each.parameters not in self._tried)
+        if (rival := next(untried, None)) is None:
+            return None
+        self._tried.add(rival)
+        return np.array(rival)
 
     # ---- run ----
 
@@ -245,13 +273,15 @@ class Evolution:
         return self.champion
 
     def save_log(self) -> None:
-        """Write the champion and the log into the folder, if there is one.
+        """Write the champion, the archive and the log into the folder, if there is one.
 
         Raises:
             ParameterError: If they cannot be written, or pyarrow is not installed.
         """
         if self._folder is not None and self.generations:
-            self.champion.save(self._folder.path / "champion.toml")
+            self.champion.save(self._folder.path / CHAMPION)
+            if self.archive is not None:
+                self.archive.save(self._folder.path)
             self._folder.save_log(self.generations, self.task.value_names)
             self._logged_s = perf_counter()
 
@@ -273,13 +303,13 @@ class Evolution:
         return self._champion(first.candidates[winner], first.values[winner], len(self.generations))
 
     def _champion(self, parameters: Floats, values: Floats, generation: int) -> Champion:
-        task = self.task
+        task, named = self.task, dict(zip(self.task.value_names, values.tolist(), strict=False))
         return Champion(
             controller=task.controller,
             parameters=tuple(parameters.tolist()),
             task=task.name,
             fitness=float(values[0]),
-            measures=dict(zip(task.measure_names, values[1:].tolist(), strict=False)),
+            measures={name: named[name] for name in task.measure_names if name in named},
             generation=generation,
             algorithm=self.name,
             seed=self.seed,

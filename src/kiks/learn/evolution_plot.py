@@ -1,4 +1,4 @@
-"""The picture of an evolution: its fitness over the generations, and its map of behaviours. Needs Matplotlib."""
+"""The picture of an evolution: its fitness over the generations, and its archive. Needs Matplotlib."""
 
 from __future__ import annotations
 
@@ -8,14 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from kiks.learn.algorithms import MapElites, library
+from kiks.learn.algorithms import library
+from kiks.learn.archive import Archive
 from kiks.learn.baselines import Baselines
+from kiks.learn.champion import Champion
 from kiks.learn.evolution import Evolution
+from kiks.learn.task import Axis
 from kiks.model.atomic_files import replace_file
 
 
 def save_plot(evolution: Evolution, path: str | Path, baselines: Baselines | None = None) -> None:
-    """Draw best, quartiles and median of each generation, and the champion; for 'map-elites' its map, too.
+    """Draw best, quartiles and median of each generation, and the champion; and the archive, if the task has axes.
 
     Args:
         evolution: The evolution.
@@ -26,13 +29,12 @@ def save_plot(evolution: Evolution, path: str | Path, baselines: Baselines | Non
         ParameterError: If Matplotlib is not installed, or the file cannot be written.
     """
     figures = library("matplotlib.figure")
-    algorithm = evolution.algorithm
-    has_map = isinstance(algorithm, MapElites)
-    figure = figures.Figure(figsize=(12.0 if has_map else 6.4, 4.4), layout="constrained")
-    axes = figure.subplots(1, 1 + has_map, squeeze=False)[0]
+    archive = evolution.archive
+    figure = figures.Figure(figsize=(6.4 if archive is None else 12.0, 4.4), layout="constrained")
+    axes = figure.subplots(1, 1 if archive is None else 2, squeeze=False)[0]
     _draw_fitness(axes[0], evolution, baselines)
-    if isinstance(algorithm, MapElites):
-        _draw_map(figure, axes[1], evolution, algorithm)
+    if archive is not None:
+        _draw_archive(figure, axes[1], archive, evolution.champion)
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=110)
     replace_file(path, buffer.getvalue(), "the picture")
@@ -63,16 +65,33 @@ def draw_baselines(axes: Any, baselines: Baselines) -> None:
     axes.axhline(baselines.standing, color="tab:gray", linestyle=":", linewidth=1, label="standing still")
 
 
-def _draw_map(figure: Any, axes: Any, evolution: Evolution, algorithm: MapElites) -> None:
-    heat, (across, *others) = algorithm.heat_map(), evolution.task.axes
-    filled = int(np.isfinite(heat).sum())
+def _draw_archive(figure: Any, axes: Any, archive: Archive, champion: Champion) -> None:
+    """Draw the fitness in each cell; the fittest cell and the champion are marked."""
+    heat, (across, *others) = archive.heat_map(), archive.axes
     while heat.ndim > 2:  # with more than two axes, show the best along the others
         heat = np.fmax.reduce(heat, axis=-1)
-    up = others[0] if others else None
-    extent = (across.low, across.high, *((up.low, up.high) if up else (0.0, 1.0)))
+    up = others[0] if others else Axis("", 0.0, 1.0, 1)
+    extent = (across.low, across.high, up.low, up.high)
     picture = np.atleast_2d(heat.T)
     image = axes.imshow(picture, origin="lower", extent=extent, aspect="auto", interpolation="nearest", cmap="viridis")
+    for elite in archive.best_first()[:1]:
+        corner = [axis.low + cell * _cell(axis) for axis, cell in zip((across, up), (*elite.cell, 0)[:2], strict=True)]
+        patches = library("matplotlib.patches")
+        square = patches.Rectangle(corner, _cell(across), _cell(up), fill=False, color="tab:red", label="fittest cell")
+        axes.add_patch(square)
+    place = [champion.measures.get(axis.measure, axis.low) for axis in archive.axes[:2]]
+    if not others:
+        place.append(0.5)
+    axes.plot(
+        *place, marker="*", color="tab:red", markersize=12, markeredgecolor="white", linestyle="", label="champion"
+    )
     axes.set_xlabel(across.measure)
-    axes.set_ylabel(up.measure if up else "")
-    axes.set_title(f"{filled} of {algorithm.archive.cells} cells")
+    axes.set_ylabel(up.measure)
+    axes.set_title(f"{len(archive.elites)} of {archive.cell_count} cells, QD score {archive.qd_score:.4g}")
+    axes.legend(loc="best", fontsize="small")
     figure.colorbar(image, ax=axes, label="fitness")
+
+
+def _cell(axis: Axis) -> float:
+    """Return how wide a cell of an axis is."""
+    return (axis.high - axis.low) / axis.cells

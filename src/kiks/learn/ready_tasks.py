@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kiks.batch.loop_timing import Timing
 from kiks.control import controllers, measures
 from kiks.control.controller import Controller
 from kiks.learn import training_arenas
@@ -21,10 +22,7 @@ Floats = NDArray[np.float64]
 Values = Mapping[str, Floats]
 
 SPEED_LIMIT = 8.0
-"""Highest speed of the ready-made tasks [pulses/10 ms]: 64 mm/s."""
-
-EXAM_S = 180.0
-"""Time of the exam of `maze` [s]."""
+"""Highest speed of most ready-made tasks [pulses/10 ms]: 64 mm/s."""
 
 LEAST_ROAMING = 0.2
 """Mean `roaming` from which on a robot gets around: 16 mm/s away from where it was two seconds ago."""
@@ -45,6 +43,13 @@ def without_contacts(fitness: Floats, values: Values, cost: float = CONTACT_COST
 
 # ---- avoid ----
 
+AVOID_SPEED_LIMIT, AVOID_PERIOD_S = 5.0, 0.06
+"""Highest speed [pulses/10 ms], 40 mm/s, and period of the control loop [s] of `avoid`.
+
+The sensors notice a dark thing (brightness 40) from 8 mm away. At 64 mm/s and 0.1 s a robot drives up to 6.4 mm before
+it senses the thing, and 3 mm more before its command acts.
+"""
+
 
 def avoid_fitness(values: Values) -> Floats:
     """Return the fitness of `avoid`: that of Floreano and Mondada (1994) times `roaming`."""
@@ -61,12 +66,13 @@ def avoid(controller: Controller | None = None, **changes: Any) -> Task:
     task = Task(
         "avoid",
         (training_arenas.pillars(), training_arenas.corridors(), training_arenas.wedges()),
-        controllers.linear(speed_limit=SPEED_LIMIT) if controller is None else controller,
+        controllers.linear(speed_limit=AVOID_SPEED_LIMIT) if controller is None else controller,
         (measures.avoidance, measures.roaming, measures.contacts, measures.path_mm, measures.straightness),
         fitness=avoid_fitness,
         seconds=20.0,
         worlds=12,
-        axes=(Axis("path_mm", 0, 1500), Axis("straightness", 0, 1)),
+        timing=Timing(period_s=AVOID_PERIOD_S),
+        axes=(Axis("path_mm", 0, 1000), Axis("straightness", 0, 1)),
         exam=Exam(
             (training_arenas.unseen(), training_arenas.rooms()),
             (measures.contacts, measures.roaming),
@@ -209,56 +215,80 @@ def light(controller: Controller | None = None, **changes: Any) -> Task:
 
 # ---- gather ----
 
-GATHERED = 4
-"""Cylinders in the middle that are enough to pass the exam, of six."""
+GATHER_SPEED_LIMIT = 15.0
+"""Highest speed of `gather` [pulses/10 ms]: 120 mm/s. Contacts do no harm here, and a faster robot meets more."""
+
+CYLINDERS, GATHERED = 5, 4
+"""Cylinders of `gather`, and those that must be together to pass the exam."""
+
+GROUP_MM, APART_MM = 150.0, 170.0
+"""Distance from one of them within which cylinders are together, and their least distance at the start [mm]."""
+
+FROM_WALL_MM = 90.0
+"""Least distance of cylinders from the outside of a room's walls [mm]: there a robot can get behind them."""
+
+CLOSENESS_WEIGHT = 5.0
+"""Cylinders in a group that a `closeness` of 1 is worth."""
 
 
 def gather_fitness(values: Values) -> Floats:
-    """Return the fitness of `gather`."""
-    return cautious_mean(values["gathered"] - values["spread_mm"] / 1000)
+    """Return the fitness of `gather`: cylinders in the largest group, and how close they all are, wherever it is."""
+    return cautious_mean(values["largest_group"] + CLOSENESS_WEIGHT * values["closeness"])
 
 
 def gather(controller: Controller | None = None, **changes: Any) -> Task:
-    """Return the task to push cylinders to the middle of a room.
+    """Return the task to push cylinders together, anywhere (Maris and te Boekhorst, Exploiting physical constraints, 1996).
+
+    A robot that senses proximity alone cannot know where the middle of a room is, but it notices what is near others.
 
     Args:
-        controller: The controller to evolve; gated recurrent units, which have a memory, if left out.
+        controller: The controller to evolve; a perceptron with feedback if left out.
         changes: Other arguments of `Task`.
     """
+    default = controllers.mlp(hidden=(), feedback=True, speed_limit=GATHER_SPEED_LIMIT)
     task = Task(
         "gather",
-        tuple(_with_cylinders(number) for number in range(3)),
-        controllers.gru(units=4, speed_limit=SPEED_LIMIT) if controller is None else controller,
-        (measures.gathered(300, 300, radius_mm=150), measures.spread_mm, measures.contacts, measures.path_mm),
+        tuple(room_with_cylinders(600, seed) for seed in range(8)),
+        default if controller is None else controller,
+        (measures.largest_group(GROUP_MM), measures.closeness, measures.contacts, measures.path_mm),
         fitness=gather_fitness,
         seconds=90.0,
-        worlds=12,
-        axes=(Axis("spread_mm", 0, 300), Axis("path_mm", 0, 6000)),
+        worlds=8,
+        axes=(Axis("closeness", 0, 0.6), Axis("path_mm", 0, 10_000)),
+        generations=120,
         exam=Exam(
-            tuple(_with_cylinders(number) for number in (3, 4)),
-            (measures.gathered(300, 300, radius_mm=150),),
+            tuple(room_with_cylinders(side_mm, 100 + k) for k, side_mm in enumerate((600, 560, 640, 680))),
+            (measures.largest_group(GROUP_MM),),
             gather_solved,
-            "brought four of six cylinders to the middle",
+            "brought four of five cylinders together",
         ),
-        about="push six cylinders to the middle",
+        about="push five cylinders together",
     )
     return replace(task, **changes)
 
 
 def gather_solved(values: Values) -> NDArray[np.bool_]:
-    """Return whether most cylinders were brought to the middle."""
-    return values["gathered"] >= GATHERED
+    """Return whether most cylinders were brought together."""
+    return values["largest_group"] >= GATHERED
 
 
-def _with_cylinders(number: int) -> Arena:
-    """Return an arena with six cylinders around its middle, placed differently for each number."""
-    angles = np.arange(6) * np.pi / 3 + number * 0.4
-    away_mm = 170.0 + 15.0 * ((np.arange(6) + number) % 3)
-    places = zip(300 + away_mm * np.cos(angles), 300 + away_mm * np.sin(angles), strict=True)
+def room_with_cylinders(side_mm: int, seed: int) -> Arena:
+    """Return a square room with cylinders that are far from each other and from walls, placed at random.
+
+    Args:
+        side_mm: Side of the room [mm]; smaller rooms than 500 mm may have no room for them.
+        seed: Seed of the random generator.
+    """
+    rng = np.random.default_rng(seed)
+    rows, columns = np.tril_indices(CYLINDERS, -1)
+    while True:
+        places_mm = rng.uniform(FROM_WALL_MM, side_mm - FROM_WALL_MM, (CYLINDERS, 2))
+        if np.linalg.norm(places_mm[rows] - places_mm[columns], axis=1).min() >= APART_MM:
+            break
     return replace(
-        Arena.box(600, 600),
-        name=f"cylinders {number + 1}",
-        cylinders=tuple(Cylinder(float(x), float(y)) for x, y in places),
+        Arena.box(side_mm, side_mm),
+        name=f"cylinders {seed}",
+        cylinders=tuple(Cylinder(x_mm, y_mm) for x_mm, y_mm in places_mm.tolist()),
     )
 
 
@@ -273,7 +303,7 @@ SPREAD_SHARE = 0.85
 DISPERSE_CONTACT_COST = 0.1
 """Fitness of a robot is divided by 1 plus this times its contacts."""
 
-EXAM_SIDE_MM = 1500.0
+EXAM_SIDE_MM = 1500
 """Side of the rooms of that exam [mm]."""
 
 
@@ -331,67 +361,66 @@ def disperse(controller: Controller | None = None, **changes: Any) -> Task:
 GOAL_RADIUS_MM = 100.0
 """Distance from the goal at which it counts as reached [mm]."""
 
+MAZE_SPEED_LIMIT = 20.0
+"""Highest speed in the maze [pulses/10 ms]: 160 mm/s. The shortest way to the goal is 4 m long."""
+
+GOAL_COUNTS, THRIFT_COUNTS = 2.0, 0.1
+"""Fitness for the goal, and the most that thrift adds: less than a goal that is missed once in eight trials costs."""
+
+FAR_MM = 2000.0
+"""Distance from the goal at which fitness is zero [mm]."""
+
+HALF_THRIFT_PULSES = 1e5
+"""Turns of both wheels that halve what thrift adds [pulses]: 4 m straight on."""
+
 
 def maze_fitness(values: Values) -> Floats:
-    """Return the fitness of `maze`: minus the distance to the goal, in metres."""
-    return -cautious_mean(values["goal_mm"]) / 1000
+    """Return the fitness of `maze`: more than 2 for the goal, by thrift, else nearness, from 0 to 1."""
+    thrift = THRIFT_COUNTS / (1 + values["turned_pulses"] / HALF_THRIFT_PULSES)
+    nearness = np.maximum(1 - values["closest_mm"] / FAR_MM, 0.0)
+    return cautious_mean(np.where(maze_solved(values), GOAL_COUNTS + thrift, nearness))
 
 
 def maze(controller: Controller | None = None, **changes: Any) -> Task:
-    """Return the task to end near the goal of Kheperax's maze; the direct path is a dead end.
+    """Return the task to reach the goal of Kheperax's maze; the direct path is a dead end.
+
+    The way leads away from the goal first. So an algorithm that follows fitness ends behind the first wall, and the
+    default is MAP-Elites, which looks for ways to all places.
 
     Args:
         controller: The controller to evolve; a network with eight hidden units if left out.
         changes: Other arguments of `Task`.
     """
+    goal_mm = measures.closest_mm(*training_arenas.goal_mm())
     task = Task(
         "maze",
         (training_arenas.kheperax(),),
-        controllers.mlp(hidden=(8,), speed_limit=SPEED_LIMIT) if controller is None else controller,
-        (
-            measures.goal_mm(*training_arenas.goal_mm()),
-            measures.final_x_mm,
-            measures.final_y_mm,
-            measures.turned_pulses,
-        ),
+        controllers.mlp(hidden=(8,), speed_limit=MAZE_SPEED_LIMIT) if controller is None else controller,
+        (goal_mm, measures.final_x_mm, measures.final_y_mm, measures.turned_pulses),
         fitness=maze_fitness,
-        seconds=100.0,
-        worlds=2,
+        seconds=70.0,
         axes=(Axis("final_x_mm", 0, training_arenas.SIDE_MM, 32), Axis("final_y_mm", 0, training_arenas.SIDE_MM, 32)),
         starts="arena",
+        # Larger parameters saturate the wheels: then the robot turns on the spot or shuttles.
+        spread=1.0,
+        algorithm="map-elites",
+        generations=125,
+        population=200,
         exam=Exam(
             (training_arenas.kheperax(),),
-            (measures.reached_s(*training_arenas.goal_mm(), radius_mm=GOAL_RADIUS_MM),),
+            (goal_mm,),
             maze_solved,
             "reached the goal",
-            seconds=EXAM_S,
             starts="arena",
         ),
-        about="end near the goal of the Kheperax maze",
+        about="reach the goal of the Kheperax maze; the archive holds ways to all places",
     )
     return replace(task, **changes)
 
 
 def maze_solved(values: Values) -> NDArray[np.bool_]:
-    """Return whether the robot reached the goal before the end."""
-    return values["reached_s"] < EXAM_S - 1.0
-
-
-def maze_qd_fitness(values: Values) -> Floats:
-    """Return the fitness of `maze-qd`: minus the turns of the wheels, in thousands of pulses."""
-    fitness: Floats = -values["turned_pulses"].mean(axis=1) / 1000
-    return fitness
-
-
-def maze_qd(controller: Controller | None = None, **changes: Any) -> Task:
-    """Return the task to find short paths to every place in Kheperax's maze.
-
-    Args:
-        controller: The controller to evolve; a network with eight hidden units if left out.
-        changes: Other arguments of `Task`.
-    """
-    given = {"name": "maze-qd", "fitness": maze_qd_fitness, "worlds": 1}
-    return maze(controller, **given | {"about": "reach every place in the Kheperax maze by short paths"} | changes)
+    """Return whether the robot reached the goal."""
+    return values["closest_mm"] <= GOAL_RADIUS_MM
 
 
 # ---- tasks by name ----
@@ -403,6 +432,5 @@ TASKS: dict[str, Callable[..., Task]] = {
     "gather": gather,
     "disperse": disperse,
     "maze": maze,
-    "maze-qd": maze_qd,
 }
 """The tasks that come with KiKS."""

@@ -18,12 +18,13 @@ from kiks.batch.loop_timing import Timing
 from kiks.control.controller import Controller
 from kiks.control.measure import Measure
 from kiks.errors import ParameterError, shown
+from kiks.learn.algorithm_name import AlgorithmName
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats, Integers, check_candidates
 from kiks.learn.exam import Exam, spread_starts, world_of
 from kiks.model.arena import Pose
 from kiks.model.checks import check_count, check_number
-from kiks.model.data_file import Number, Rule, Text, Whole, read_file, record
+from kiks.model.data_file import Number, OneOf, Rule, Text, Whole, read_file, record
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, specs_of
 
@@ -32,8 +33,8 @@ Fitness = Callable[[Mapping[str, Floats]], Floats]
 BATCH_WORLDS_MAX = 20_000
 """Largest number of worlds in a batch: more need more memory and run no faster."""
 
-GENERATIONS = 60
-"""Default number of generations."""
+GENERATIONS, POPULATION = 60, 40
+"""Default numbers of generations, and of candidates in a generation."""
 
 SPREAD = 3.0
 """Standard deviation of each parameter at the beginning: three times the usual scale of controllers, so that some of
@@ -102,7 +103,9 @@ class Task:
             the worlds take in turn like the robots.
         starts: 'random' for free places anywhere, or 'arena' for the starts of the arena.
         spread: Standard deviation of each parameter in the first generation.
+        algorithm: The algorithm of an evolution, unless the user says otherwise.
         generations: How many generations an evolution has, unless the user says otherwise.
+        population: How many candidates a generation has, unless the user says otherwise.
         exam: The exam of its champions.
         about: A description in one line.
         file: The user's file that defines it.
@@ -134,7 +137,9 @@ class Task:
     timing: Timings = field(default_factory=Timing)
     starts: Starts = "random"
     spread: Annotated[Number, Field(gt=0, le=1000)] = SPREAD
+    algorithm: Annotated[str, OneOf(tuple(AlgorithmName))] = AlgorithmName.CMA
     generations: Annotated[Whole, Field(ge=1)] = GENERATIONS
+    population: Annotated[Whole, Field(ge=4)] = POPULATION
     exam: Annotated[Exam | None, Field(description="kiks.Exam(arenas, measures, solved) makes one.")] = None
     about: Text = ""
     file: str = ""
@@ -217,7 +222,9 @@ class Task:
         if self.exam is not None:
             return self.exam.world(self.kinds[0], self.robots)
         poses = self._starts(np.zeros(1, np.int64)) if self.starts == "random" else None
-        return world_of(self.arenas[0], None if poses is None else poses[:: len(self.arenas), 0], self.robots, 0)
+        return world_of(
+            self.arenas[0], None if poses is None else poses[:: len(self.arenas)].reshape(-1, 3), self.robots, 0
+        )
 
     def individual(self, parameters: Floats, seed: int, world: int = 0) -> Champion:
         """Return a candidate as a champion, whose world is one of those in which it is evaluated.
@@ -236,7 +243,7 @@ class Task:
         kinds, timings = self._turns(seeds)
         arena = self.arenas[world % len(self.arenas)]
         if self.starts == "random":
-            arena = replace(arena, starts=(Pose(*self._starts(seeds)[world, 0].tolist()),))
+            arena = replace(arena, starts=tuple(Pose(*each) for each in self._starts(seeds)[world].tolist()))
         return Champion(
             controller=self.controller,
             parameters=tuple(parameters.tolist()),
@@ -307,7 +314,7 @@ class Task:
         starts = self._starts(seeds) if self.starts == "random" else None
         specs, (kinds, timings) = self._specs(), self._turns(seeds)
         given = np.repeat(candidates, self.worlds, axis=0)
-        scores = np.zeros((count * self.worlds, len(self.measures)))
+        means = np.zeros((count * self.worlds, len(self.measures)))
         for number in np.unique(timings).tolist():
             here = np.flatnonzero(timings == number)
             each = [(specs[kind],) * self.robots for kind in kinds[here].tolist()]
@@ -323,8 +330,8 @@ class Task:
                 threads=threads,
             )
             driven = batch.run(self.controller, given[here], seconds=seconds, measures=self.measures)
-            scores[here] = driven.values.mean(axis=1)
-        values = scores.reshape(count, self.worlds, len(self.measures))
+            means[here] = driven.values.mean(axis=1)
+        values = means.reshape(count, self.worlds, len(self.measures))
         for number, name in enumerate(self.measure_names):
             if not np.isfinite(values[:, :, number]).all():
                 raise ParameterError(f"measures must be finite, but {shown(name)} was not. Check its divisions.")

@@ -15,26 +15,14 @@ from kiks.control.controller_spec import Recipe, module_in
 from kiks.control.controllers import controller_of
 from kiks.errors import KiksError, ParameterError, nearest, shown
 from kiks.learn.ready_contests import CONTESTS, pursuit
-from kiks.learn.ready_tasks import TASKS, avoid, disperse, follow, gather, light, maze, maze_qd
+from kiks.learn.ready_tasks import TASKS, avoid, disperse, follow, gather, light, maze
 from kiks.learn.task import ROBOTS_MAX, WORLDS_MAX, Seconds, Task
 from kiks.model.arena import Arena
 from kiks.model.atomic_files import inside, path_of
 from kiks.model.data_file import OneOf, Rule, Text, Whole, check, parse_toml, read_file, record
 from kiks.model.robot import robot_names
 
-__all__ = [
-    "CONTESTS",
-    "TASKS",
-    "avoid",
-    "disperse",
-    "follow",
-    "gather",
-    "light",
-    "load",
-    "maze",
-    "maze_qd",
-    "pursuit",
-]
+__all__ = ["CONTESTS", "TASKS", "avoid", "disperse", "follow", "gather", "light", "load", "maze", "pursuit"]
 
 Name = Annotated[
     Text,

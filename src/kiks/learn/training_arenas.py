@@ -69,7 +69,7 @@ def draw(width_mm: int, height_mm: int, strokes: Sequence[Stroke], name: str, br
     return Arena.from_array(cells, name=name)
 
 
-def heap(side_mm: float, x_mm: float, y_mm: float, number: int) -> Arena:
+def heap(side_mm: int, x_mm: float, y_mm: float, number: int) -> Arena:
     """Return a square room where twenty robots start in a heap around a place, each with another heading."""
     rng = np.random.default_rng(number)
     columns, rows = (each.ravel() for each in np.meshgrid(np.arange(5) - 2.0, np.arange(4) - 1.5))

@@ -1,0 +1,293 @@
+"""The archive of an evolution: the best candidate of each cell of a map whose axes are measures.
+
+It follows from the candidates and their values alone, so the algorithm does not matter, and archives of different
+algorithms can be compared.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from kiks.errors import ParameterError, shown
+from kiks.learn.algorithms import library
+from kiks.learn.champion import Champion
+from kiks.learn.task import Axis
+from kiks.model.array_checks import Numbers, check_array
+from kiks.model.atomic_files import path_of, replace_file
+from kiks.model.checks import check_number
+from kiks.model.data_file import Text, check, one_line, parse_json, read_file, record
+
+Floats = NDArray[np.float64]
+
+ARCHIVE, CHAMPION = "archive.parquet", "champion.toml"
+"""Names in the folder of an evolution."""
+
+FILE_BYTES_MAX, NUMBERS_MAX = 256 << 20, 1 << 25
+"""Largest size of an archive's file [byte], and most numbers in it."""
+
+CELLS_MAX = 2**53
+"""Most cells of an archive."""
+
+_HEAD = b"kiks archive"
+_ADVICE = "Take the file that kiks evolve has written."
+
+
+@record
+class _Head:
+    """What the file says of the archive, beside the rows."""
+
+    axes: Annotated[tuple[Axis, ...], Field(min_length=1, max_length=100)]
+    values: Annotated[tuple[Text, ...], Field(min_length=1, max_length=1000)]
+
+
+@dataclass(frozen=True)
+class Elite:
+    """The best candidate of a cell.
+
+    Attributes:
+        cell: Number of the cell along each axis.
+        generation: The generation that found it.
+        values: Its values by name: fitness, then the measures.
+        parameters: Its parameters.
+    """
+
+    cell: tuple[int, ...]
+    generation: int
+    values: Mapping[str, float]
+    parameters: tuple[float, ...]
+
+    @property
+    def fitness(self) -> float:
+        """Its fitness."""
+        return self.values["fitness"]
+
+
+class Archive:
+    """An archive: the best candidate of each cell.
+
+    Args:
+        axes: Axes of the map; each names one of the values.
+        value_names: Names of the values of a candidate: fitness, then the measures.
+        champion: The champion of the evolution, or one like it: it lends controller, robot and timing to the elites.
+
+    Attributes:
+        axes: Axes of the map.
+        value_names: Names of the values of a candidate.
+        champion: The champion.
+
+    Raises:
+        ParameterError: If there are too many cells, or an axis names none of the values.
+
+    Example:
+        >>> import kiks
+        >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+        >>> evolution = kiks.Evolution(task, "map-elites", seed=1, population=8)
+        >>> _ = evolution.run(generations=2)
+        >>> archive = evolution.archive
+        >>> archive.coverage == len(archive.elites) / archive.cell_count
+        True
+    """
+
+    def __init__(self, axes: Sequence[Axis], value_names: Sequence[str], champion: Champion) -> None:
+        self.axes, self.value_names, self.champion = tuple(axes), tuple(value_names), champion
+        for axis in self.axes:
+            if axis.measure not in self.value_names:
+                raise ParameterError(
+                    f"an axis must name one of {', '.join(self.value_names)}, but it named {shown(axis.measure)}."
+                )
+        self.shape = tuple(axis.cells for axis in self.axes)
+        self.cell_count = int(np.prod([float(cells) for cells in self.shape]))
+        if self.cell_count > CELLS_MAX:
+            raise ParameterError(f"an archive must have at most 2^53 cells, but it had {self.cell_count}.")
+        self._elites: dict[tuple[int, ...], Elite] = {}
+
+    def add(self, candidates: Floats, values: Floats, generation: int) -> None:
+        """Take candidates: each stays that is better than the elite of its cell.
+
+        Args:
+            candidates: Their parameters, float64 [candidate, parameter].
+            values: Their values, float64 [candidate, value].
+            generation: The generation that found them.
+        """
+        places = values[:, [self.value_names.index(axis.measure) for axis in self.axes]]
+        fitness = values[:, self.value_names.index("fitness")]
+        for number, cell in enumerate(self._cells(places)):
+            elite = self._elites.get(cell)
+            if elite is None or fitness[number] > elite.fitness:
+                named = dict(zip(self.value_names, values[number].tolist(), strict=True))
+                self._elites[cell] = Elite(cell, generation, named, tuple(candidates[number].tolist()))
+
+    def _cells(self, places: Floats) -> Iterator[tuple[int, ...]]:
+        """Yield the cells of places, float64 [place, axis]; places beyond an end belong to the last cell."""
+        low, high, cells = (np.array([getattr(axis, name) for axis in self.axes]) for name in ("low", "high", "cells"))
+        shares = np.clip((places - low) / (high - low), 0.0, 1.0)
+        yield from map(tuple, np.minimum((shares * cells).astype(np.int64), cells - 1).tolist())
+
+    # ---- elites ----
+
+    @property
+    def elites(self) -> tuple[Elite, ...]:
+        """The elites, in the order of their cells."""
+        return tuple(self._elites[cell] for cell in sorted(self._elites))
+
+    def best_first(self) -> list[Elite]:
+        """Return the elites by their fitness, the best first; ties by cell."""
+        return sorted(self.elites, key=lambda elite: -elite.fitness)
+
+    def elite_at(self, *place: float) -> Elite:
+        """Return the elite of the cell of a place; if it is empty, that of the nearest filled one, counted in cells.
+
+        Args:
+            place: The place along each axis.
+
+        Raises:
+            ParameterError: If the place has another number of axes, or the archive is empty.
+        """
+        if len(place) != len(self.axes):
+            names = ", ".join(axis.measure for axis in self.axes)
+            raise ParameterError(f"a place must be {len(self.axes)} numbers ({names}), but it was {shown(place)}.")
+        if not self._elites:
+            raise ParameterError("the archive must hold an elite, but it is empty. Tell a generation first.")
+        numbers = [check_number(axis.measure, number) for axis, number in zip(self.axes, place, strict=True)]
+        (cell,) = self._cells(np.array([numbers]))
+        elites = self.elites
+        away = np.array([elite.cell for elite in elites]) - np.array(cell)
+        return elites[int((away**2).sum(axis=1).argmin())]
+
+    def champion_of(self, elite: Elite) -> Champion:
+        """Return an elite as a champion."""
+        measures = {name: value for name, value in elite.values.items() if name != "fitness"}
+        return replace(
+            self.champion,
+            parameters=elite.parameters,
+            fitness=elite.fitness,
+            measures=measures,
+            generation=elite.generation,
+        )
+
+    def champion_at(self, *place: float) -> Champion:
+        """Return the elite of a place, as `elite_at` finds it, as a champion.
+
+        Raises:
+            ParameterError: If the place has another number of axes, or the archive is empty.
+        """
+        return self.champion_of(self.elite_at(*place))
+
+    # ---- the whole ----
+
+    @property
+    def coverage(self) -> float:
+        """Share of the cells that are filled."""
+        return len(self._elites) / self.cell_count
+
+    @property
+    def qd_score(self) -> float:
+        """Sum of the fitness of all elites; a fitness below zero makes an elite count against it."""
+        return float(sum(elite.fitness for elite in self.elites))
+
+    def heat_map(self) -> Floats:
+        """Return the fitness in each cell, NaN in empty ones, float64 [cell of axis 0, ...]."""
+        heat: Floats = np.full(self.shape, np.nan)
+        for elite in self.elites:
+            heat[elite.cell] = elite.fitness
+        return heat
+
+    # ---- files ----
+
+    def save(self, folder: str | Path) -> None:
+        """Write `archive.parquet` into a folder, with a row for each elite.
+
+        Raises:
+            ParameterError: If it cannot be written, or pyarrow is not installed.
+        """
+        pyarrow, parquet = library("pyarrow"), library("pyarrow.parquet")
+        elites = self.elites
+        columns: dict[str, Any] = {"generation": np.array([elite.generation for elite in elites], np.int64)}
+        for number, axis in enumerate(self.axes):
+            columns[f"cell_{axis.measure}"] = np.array([elite.cell[number] for elite in elites], np.int64)
+        values = np.array([list(elite.values.values()) for elite in elites]).reshape(-1, len(self.value_names))
+        columns |= dict(zip(self.value_names, values.T, strict=True))
+        parameters = np.array([elite.parameters for elite in elites]).reshape(len(elites), -1)
+        columns |= {f"parameter_{number}": column for number, column in enumerate(parameters.T, 1)}
+        head = {"axes": [asdict(axis) for axis in self.axes], "values": self.value_names}
+        table = pyarrow.table(columns).replace_schema_metadata({_HEAD: json.dumps(head).encode()})
+        buffer = io.BytesIO()
+        # Columns without compression take no more memory than the file has bytes.
+        parquet.write_table(table, buffer, compression="none", use_dictionary=False)
+        replace_file(path_of(folder, "folder") / ARCHIVE, buffer.getvalue(), "the archive")
+
+    @classmethod
+    def load(cls, folder: str | Path) -> Archive:
+        """Read the archive in the folder of an evolution, and its champion. The champion's controller may run code.
+
+        Raises:
+            ParameterError: If there is none, a file is broken, or they do not belong together.
+        """
+        folder = path_of(folder, "folder")
+        what = f"Archive {str(folder / ARCHIVE)!r}"
+        data = read_file(folder / ARCHIVE, what, bytes_max=FILE_BYTES_MAX)
+        champion = Champion.load(folder / CHAMPION)
+        try:
+            head, columns = _read(data, len(champion.parameters))
+            archive = cls(head.axes, head.values, champion)
+        except ParameterError as broken:
+            raise ParameterError(f"{what}: {broken}") from None
+        names = [f"parameter_{number}" for number in range(1, len(champion.parameters) + 1)]
+        candidates = np.column_stack([columns[name] for name in names])
+        values = np.column_stack([columns[name] for name in archive.value_names])
+        for number, generation in enumerate(columns["generation"].tolist()):
+            row = slice(number, number + 1)
+            archive.add(candidates[row], values[row], generation)
+        return archive
+
+
+def _read(data: bytes, parameter_count: int) -> tuple[_Head, dict[str, NDArray[Any]]]:
+    """Return head and columns of a file, checked.
+
+    Raises:
+        ParameterError: If it is none of an archive.
+    """
+    pyarrow, parquet = library("pyarrow"), library("pyarrow.parquet")
+    try:
+        file = parquet.ParquetFile(pyarrow.BufferReader(data))
+        described = file.metadata
+        text = (described.metadata or {}).get(_HEAD)
+        packed = {
+            described.row_group(group).column(column).compression
+            for group in range(described.num_row_groups)
+            for column in range(described.num_columns)
+        }
+        row_count, found = described.num_rows, set(file.schema_arrow.names)
+    except Exception as failure:  # the library raises whatever it stumbles over in a damaged file
+        raise ParameterError(f"it must be a whole Parquet file, but: {one_line(failure)}. {_ADVICE}") from None
+    if text is None:
+        raise ParameterError(f"it must be an archive of KiKS, but it is another Parquet file. {_ADVICE}")
+    head = check(_Head, parse_json(text, "its head"), "its head", advice=_ADVICE)
+    names = ("generation", *head.values, *(f"parameter_{number}" for number in range(1, parameter_count + 1)))
+    if missing := [name for name in names if name not in found]:
+        raise ParameterError(
+            f"it must have a column for each value and each of the champion's {parameter_count} parameters, but "
+            f"{shown(missing[0])} is missing. Take archive and champion of the same folder."
+        )
+    if packed - {"UNCOMPRESSED"} or row_count * len(names) > NUMBERS_MAX:
+        raise ParameterError(
+            f"it must hold at most {NUMBERS_MAX} numbers without compression, but it held {row_count * len(names)}, "
+            f"{', '.join(sorted(packed)).lower() or 'none'}. {_ADVICE}"
+        )
+    try:
+        table = file.read(columns=list(names))
+        columns = {name: table.column(name).to_numpy() for name in names}
+    except Exception as failure:
+        raise ParameterError(f"it must be a whole Parquet file, but: {one_line(failure)}. {_ADVICE}") from None
+    rules = {name: Numbers((row_count,), advice=_ADVICE) for name in names}
+    rules["generation"] = Numbers((row_count,), low=0, is_whole=True, advice=_ADVICE)
+    return head, {name: check_array(column, rules[name], name) for name, column in columns.items()}

@@ -1,0 +1,299 @@
+"""A policy that another library learnt becomes a champion: its network is a compiled controller from then on.
+
+The policy may be of PyTorch, such as one of Stable-Baselines3, but nothing here imports it: a layer is what has a
+`weight` and a `bias`, and functions are known by the names of their classes.
+
+An environment shows a policy counts as shares of 1023. Controllers take proximity so too, but light as
+(500 - counts) / 500 (`kiks.controllers`). Both are linear in the counts, so the first layer absorbs the difference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.control import controllers
+from kiks.control.controller import SENSES, reading_count
+from kiks.control.neural_nets import DARK_COUNTS
+from kiks.errors import ParameterError, shown
+from kiks.learn.champion import Champion
+from kiks.learn.env_specs import EnvSpec, env_spec_of
+from kiks.model.array_checks import check_numbers
+
+Floats = NDArray[np.float64]
+Layer = tuple[Floats, Floats]
+
+FUNCTIONS = {"Tanh": "tanh", "ReLU": "relu"}
+"""Classes of PyTorch whose functions a controller has, by name."""
+
+PASSING = ("Flatten", "Identity", "Dropout")
+"""Classes of PyTorch that leave numbers as they are once a network has learnt."""
+
+ACCEPTED = (
+    "a torch.nn.Sequential, a model or a policy of Stable-Baselines3, a state_dict, or a list of pairs of arrays, "
+    "(weights [unit, input], biases [unit])"
+)
+
+
+@dataclass(frozen=True)
+class _Network:
+    """Layers, and as far as the policy says so, the functions of hidden units and of the outputs."""
+
+    layers: list[tuple[Any, Any]]
+    activation: str | None = None
+    output: str | None = None
+
+
+def champion_of_policy(
+    policy: Any,
+    spec: str | EnvSpec,
+    *,
+    activation: str | None = None,
+    output: str | None = None,
+    robot: str = "khepera",
+) -> Champion:
+    """Return a champion that drives as a policy does in its environment.
+
+    Its outputs are those of the policy without exploration, within 1e-6 of the speed limit. The network of the policy
+    consists of linear layers with tanh or ReLU between them. It gets the observations of the environment as they are,
+    and its two outputs are the actions. `Champion.save` keeps it, and `kiks run`, `kiks drive` and `kiks demo`
+    take the file.
+
+    Args:
+        policy: A `torch.nn.Sequential`; a model or a policy of Stable-Baselines3 (PPO, A2C, SAC, TD3, DDPG); a
+            `state_dict` whose names end in `weight` and `bias`; or a list of pairs of arrays, weights [unit, input] and
+            biases [unit]. The first layer comes first.
+        spec: The environment in which it learnt: an `EnvSpec` or the name of one, such as 'Avoid'.
+        activation: The function of hidden units, 'tanh' or 'relu'; not needed if the policy says it.
+        output: What keeps the actions within +-1, 'clip' or 'tanh'; if neither this nor the policy says it, 'clip'.
+        robot: The kind of robot that it drove.
+
+    Raises:
+        ParameterError: If the policy is none of these, does something else than such a network, or does not fit the
+            environment.
+
+    Example:
+        >>> import numpy as np
+        >>> import kiks
+        >>> shy = np.array([[0, 0, 0, -1, -1, -1, 0, 0], [-1, -1, -1, 0, 0, 0, 0, 0]])
+        >>> champion = kiks.champion_of_policy([(shy, [0.5, 0.5])], "Avoid")
+        >>> champion.controller.name, champion.parameters[:2]
+        ('policy', (0.5, 0.5))
+    """
+    spec = env_spec_of(spec)
+    network = _network_of(policy)
+    layers = _checked(network.layers, spec)
+    chosen = _chosen("activation", activation, network.activation)
+    if chosen is None and len(layers) > 1:
+        raise ParameterError(
+            "activation must be 'tanh' or 'relu', but it was left out and the policy does not say which. "
+            "Give the function of its hidden units."
+        )
+    controller = controllers.policy(
+        hidden=[len(biases) for _, biases in layers[:-1]],
+        activation=chosen or "tanh",
+        output=_chosen("output", output, network.output) or "clip",
+        senses=spec.senses,
+        speed_limit=spec.speed_limit,
+    )
+    layers[0] = _with_inputs_of_controllers(layers[0], spec.senses)
+    parts = [part.ravel() for weights, biases in layers for part in (biases, weights.T)]
+    return Champion(
+        controller,
+        np.concatenate(parts).tolist(),
+        task=spec.name,
+        robot=robot,
+        timing=spec.timing,
+        algorithm=type(policy).__name__ if hasattr(policy, "policy") else "",
+    )
+
+
+# ---- what a policy consists of ----
+
+
+def _network_of(policy: Any) -> _Network:
+    """Return the network of a policy, of whatever sort it is.
+
+    Raises:
+        ParameterError: If it is none that this module knows, or it has parts that no controller has.
+    """
+    if isinstance(policy, Mapping):
+        return _Network(_pairs_of(policy))
+    if isinstance(policy, list | tuple):
+        return _Network([_pair(each) for each in policy])
+    _check_is_unchanged(policy)
+    module = getattr(policy, "policy", policy)  # the policy of a learning algorithm
+    if hasattr(module, "mlp_extractor") and hasattr(module, "action_net"):
+        return _of_modules([*_parts(module.mlp_extractor.policy_net), module.action_net])
+    actor: Any = getattr(module, "actor", None)
+    if hasattr(actor, "latent_pi") and hasattr(actor, "mu"):
+        network = _of_modules([*_parts(actor.latent_pi), actor.mu])
+        return _Network(network.layers, network.activation, "tanh")
+    if hasattr(actor, "mu"):
+        return _of_modules(_parts(actor.mu))
+    if hasattr(module, "state_dict"):
+        return _of_modules(_parts(module)) if isinstance(module, Iterable) else _Network(_pairs_of(module.state_dict()))
+    raise ParameterError(f"policy must be {ACCEPTED}, but it was {shown(policy)}.")
+
+
+def _check_is_unchanged(policy: Any) -> None:
+    """Refuse a model of Stable-Baselines3 that sees or does something else than what the environment has.
+
+    Raises:
+        ParameterError: If it does.
+    """
+    normalizing = getattr(policy, "get_vec_normalize_env", lambda: None)()
+    if normalizing is not None and normalizing.norm_obs:
+        raise ParameterError(
+            "policy must see the observations of the environment, but a VecNormalize changes them. Learn without it, "
+            "or with norm_obs=False: observations are from 0 to 1 as they are."
+        )
+    module = getattr(policy, "policy", policy)
+    if getattr(module, "use_sde", False):
+        raise ParameterError(
+            "policy must have actions that depend on the observation alone, but it explores by use_sde. "
+            "Learn without it."
+        )
+    space = getattr(module, "action_space", None)
+    if space is not None and not (np.all(space.low == -1) and np.all(space.high == 1)):
+        raise ParameterError(
+            f"policy must have actions from -1 to 1, as the environment has, but it has {shown(space)}. "
+            "Learn without a wrapper of actions."
+        )
+
+
+def _parts(module: Any) -> list[Any]:
+    """Return the modules in a `torch.nn.Sequential` one by one, also of those inside it."""
+    parts: list[Any] = []
+    for each in module:
+        parts += _parts(each) if isinstance(each, Iterable) else [each]
+    return parts
+
+
+def _of_modules(modules: Sequence[Any]) -> _Network:
+    """Return the network of modules of PyTorch in their order.
+
+    Raises:
+        ParameterError: If there is one that no controller has.
+    """
+    layers: list[tuple[Any, Any]] = []
+    between: list[str] = []
+    for module in modules:
+        name = type(module).__name__
+        if name == "Linear":
+            if len(between) != len(layers):
+                raise _refused_order()
+            layers.append((module.weight, module.bias))
+        elif name in FUNCTIONS:
+            between.append(FUNCTIONS[name])
+            if len(between) != len(layers):
+                raise _refused_order()
+        elif name not in PASSING:
+            raise ParameterError(
+                f"policy must consist of linear layers, Tanh and ReLU, but it has {shown(name)}. Learn with others."
+            )
+    last = between[len(layers) - 1 :]
+    inner = set(between[: len(layers) - 1])
+    if last == ["relu"] or len(inner) > 1:
+        raise _refused_order()
+    return _Network(layers, inner.pop() if inner else None, "tanh" if last else None)
+
+
+def _refused_order() -> ParameterError:
+    return ParameterError(
+        "policy must have the same function, Tanh or ReLU, after each linear layer but the last, and Tanh or none "
+        "after that, but it has others. Learn with such a network."
+    )
+
+
+def _pairs_of(state: Mapping[str, Any]) -> list[tuple[Any, Any]]:
+    """Return the layers in a state_dict.
+
+    Raises:
+        ParameterError: If there is anything else in it.
+    """
+    names = list(state)
+    if not all(isinstance(name, str) for name in names):
+        raise ParameterError(f"policy must be {ACCEPTED}, but it was {shown(state)}.")
+    layers = [name[: -len("weight")] for name in names if name.endswith("weight")]
+    known = {layer + part for layer in layers for part in ("weight", "bias")}
+    other = next((name for name in names if name not in known), None)
+    if other is not None:
+        raise ParameterError(
+            f"policy must have a state_dict of weights and biases of linear layers alone, but it has {shown(other)}. "
+            "Give the part that maps observations to actions."
+        )
+    return [(state[layer + "weight"], state.get(layer + "bias")) for layer in layers]
+
+
+def _pair(given: Any) -> tuple[Any, Any]:
+    if not isinstance(given, list | tuple) or len(given) != 2:
+        raise ParameterError(f"policy must be {ACCEPTED}, but a member of the list was {shown(given)}.")
+    return given[0], given[1]
+
+
+# ---- its numbers ----
+
+
+def _checked(layers: Sequence[tuple[Any, Any]], spec: EnvSpec) -> list[Layer]:
+    """Return layers as arrays: each takes what the one before it gives, the first the observation of an environment.
+
+    Raises:
+        ParameterError: If they do not fit, or hold something else than finite numbers.
+    """
+    if not layers:
+        raise ParameterError(f"policy must be {ACCEPTED}, but it had no layer.")
+    checked: list[Layer] = []
+    for number, (weights, biases) in enumerate(layers):
+        matrix = check_numbers(f"the weights of layer {number + 1}", _as_array(weights), (None, None))
+        given = np.zeros(len(matrix)) if biases is None else _as_array(biases)
+        checked.append((matrix, check_numbers(f"the biases of layer {number + 1}", given, (len(matrix),))))
+    wanted = [spec.sensor_count, *(len(matrix) for matrix, _ in checked[:-1])]
+    for number, ((matrix, _), count) in enumerate(zip(checked, wanted, strict=True)):
+        if matrix.shape[1] != count:
+            raise ParameterError(
+                f"the weights of layer {number + 1} must have the shape [unit, input] with {count} inputs, but it was "
+                f"{matrix.shape}. Transpose weights that are [input, unit]."
+            )
+    if len(checked[-1][0]) != 2:
+        raise ParameterError(
+            f"policy must have two outputs, the speeds of the wheels, but it had {len(checked[-1][0])}."
+        )
+    return checked
+
+
+def _as_array(numbers: Any) -> Any:
+    """Return an array of NumPy if it is a tensor of PyTorch, which may belong to a graph or another device."""
+    for step in ("detach", "cpu"):
+        numbers = getattr(numbers, step, lambda same=numbers: same)()
+    return numbers
+
+
+def _chosen(name: str, given: str | None, found: str | None) -> str | None:
+    """Return what the caller says, else what the policy says.
+
+    Raises:
+        ParameterError: If they differ.
+    """
+    if given is not None and found is not None and given != found:
+        raise ParameterError(
+            f"{name} must be {found!r}, as the policy has it, but it was {shown(given)}. Leave it out."
+        )
+    return found if given is None else given
+
+
+def _with_inputs_of_controllers(layer: Layer, senses: tuple[str, ...]) -> Layer:
+    """Return the first layer for the inputs of controllers, in place of counts as shares of the largest one."""
+    weights, biases = layer[0].copy(), layer[1].copy()
+    if "ambient" in senses:
+        first, sense = reading_count(senses[: senses.index("ambient")]), SENSES["ambient"]
+        light = weights[:, first : first + sense.size]
+        # An input u is (500 - counts) / 500, so the share of 1023 is (1 - u) 500 / 1023.
+        light *= DARK_COUNTS / sense.most
+        biases += light.sum(axis=1)
+        light *= -1.0
+    return weights, biases

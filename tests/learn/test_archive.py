@@ -1,0 +1,297 @@
+"""Archives: the best candidate of each cell, kept in a file; algorithms that look for many behaviours."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import kiks
+from kiks import ParameterError
+from kiks.cli import app
+from kiks.learn.algorithm_name import AlgorithmName
+from kiks.learn.algorithms import ALGORITHMS, Diverse
+
+pytestmark = pytest.mark.slow
+
+pytest.importorskip("ribs")
+pytest.importorskip("cma")
+pyarrow = pytest.importorskip("pyarrow")
+parquet = pytest.importorskip("pyarrow.parquet")
+
+DIVERSE = [str(name) for name, kind in ALGORITHMS.items() if issubclass(kind, Diverse)]
+
+
+def small(**changes: Any) -> kiks.Task:
+    """Return a task that takes 10 ms to evaluate."""
+    return kiks.tasks.avoid(**{"seconds": 1.0, "worlds": 3} | changes)
+
+
+def run(algorithm: str, generations: int = 4, folder: Path | None = None, **changes: Any) -> kiks.Evolution:
+    evolution = kiks.Evolution(small(**changes), algorithm, population=8, seed=3, folder=folder)
+    evolution.run(generations=generations, executor="threads:1")
+    return evolution
+
+
+def archive_of(evolution: kiks.Evolution) -> kiks.Archive:
+    assert evolution.archive is not None
+    return evolution.archive
+
+
+def told(evolution: kiks.Evolution, seed: int, generations: int = 6) -> kiks.Evolution:
+    """Tell an evolution random values, a few of them equal."""
+    rng = np.random.default_rng(seed)
+    for _ in range(generations):
+        shape = len(evolution.ask()), len(evolution.task.value_names)
+        values = rng.uniform(-0.2, 1.2, shape)
+        values[:, :2] = values[:, :2].round(1)
+        evolution.tell(values)
+    return evolution
+
+
+# ---- algorithms ----
+
+
+def test_each_algorithm_has_a_name_and_each_task_one_of_them() -> None:
+    assert list(ALGORITHMS) == list(AlgorithmName)
+    assert {make().algorithm for make in kiks.tasks.TASKS.values()} <= set(AlgorithmName)
+
+
+@pytest.mark.parametrize("algorithm", list(ALGORITHMS))
+def test_an_evolution_goes_on_to_the_bit_with_every_algorithm(algorithm: str, tmp_path: Path) -> None:
+    np.random.seed(1)
+    whole = run(algorithm, 6, tmp_path / "whole")
+    np.random.seed(2)
+    run(algorithm, 3, tmp_path / "part")
+    part = run(algorithm, 6, tmp_path / "part")
+    for one, two in zip(whole.generations, part.generations, strict=True):
+        np.testing.assert_array_equal(one.candidates, two.candidates)
+        np.testing.assert_array_equal(one.values, two.values)
+    assert archive_of(whole).elites == archive_of(part).elites
+    for name in ("champion.toml", "archive.parquet"):
+        assert (tmp_path / "whole" / name).read_bytes() == (tmp_path / "part" / name).read_bytes()
+
+
+@pytest.mark.parametrize("algorithm", DIVERSE)
+def test_algorithms_for_many_behaviours_need_axes_and_measures(algorithm: str) -> None:
+    with pytest.raises(ParameterError, match="must have axes"):
+        kiks.Evolution(small(axes=()), algorithm)
+    evolution = kiks.Evolution(small(), algorithm, population=8)
+    with pytest.raises(ParameterError, match="must be given fitness and measures"):
+        evolution.tell(np.zeros(len(evolution.ask())))
+
+
+@pytest.mark.parametrize("algorithm", DIVERSE)
+def test_they_find_many_behaviours_where_one_gets_better(algorithm: str) -> None:
+    # The behaviour is two of the parameters; a step towards larger ones is all that fitness rewards.
+    evolution = kiks.Evolution(small(axes=(kiks.Axis("path_mm", -3, 3), kiks.Axis("straightness", -3, 3))), algorithm)
+    names = evolution.task.value_names
+    for _ in range(40):
+        candidates = evolution.ask()
+        values = np.zeros((len(candidates), len(names)))
+        values[:, 0] = candidates[:, 0]
+        values[:, names.index("path_mm")], values[:, names.index("straightness")] = candidates[:, 0], candidates[:, 1]
+        evolution.tell(values)
+    assert archive_of(evolution).coverage > 0.3
+
+
+@pytest.mark.parametrize("algorithm", DIVERSE)
+def test_the_champion_is_the_elite_that_does_best_on_trial(algorithm: str) -> None:
+    evolution = kiks.Evolution(small(), algorithm, seed=1, population=20)
+    names = evolution.task.value_names
+    fitness_of: dict[bytes, float] = {}
+    rng = np.random.default_rng(3)
+    for _ in range(8):
+        candidates = evolution.ask()
+        values = rng.uniform(0, 1, (len(candidates), len(names)))
+        for row, candidate in zip(values, candidates, strict=True):
+            row[0] = fitness_of.setdefault(candidate.tobytes(), row[0])
+        evolution.tell(values)
+    tried = [each.candidates[-1] for each in evolution.generations[1:]]
+    assert len({each.tobytes() for each in tried}) == len(tried)
+    assert evolution.champion.fitness == pytest.approx(max(fitness_of[each.tobytes()] for each in tried))
+
+
+# ---- cells ----
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_each_cell_holds_the_first_of_the_best_that_fell_into_it(seed: int) -> None:
+    evolution = told(kiks.Evolution(small(), "ga", seed=seed, population=30), seed)
+    archive, names = archive_of(evolution), evolution.task.value_names
+    best: dict[tuple[int, ...], tuple[float, list[float]]] = {}
+    for generation in evolution.generations:
+        for candidate, values in zip(generation.candidates[:30], generation.values[:30], strict=True):
+            cell = []
+            for axis in archive.axes:
+                edges = np.linspace(axis.low, axis.high, axis.cells + 1)
+                cell.append(int(np.clip(np.searchsorted(edges, values[names.index(axis.measure)], "right") - 1, 0, 19)))
+            key, quality = tuple(cell), float(values[0])
+            if key not in best or quality > best[key][0]:
+                best[key] = quality, candidate.tolist()
+    assert {elite.cell: (elite.fitness, list(elite.parameters)) for elite in archive.elites} == best
+    assert archive.coverage == len(best) / 400
+    assert archive.qd_score == pytest.approx(sum(quality for quality, _ in best.values()))
+    heat = archive.heat_map()
+    assert np.isfinite(heat).sum() == len(best)
+    assert all(heat[cell] == quality for cell, (quality, _) in best.items())
+
+
+def test_the_elite_of_a_place_is_that_of_the_nearest_filled_cell() -> None:
+    archive = archive_of(told(kiks.Evolution(small(), "ga", seed=2, population=8), 1, generations=2))
+    for elite in archive.elites:
+        pairs = zip(archive.axes, elite.cell, strict=True)
+        place = [axis.low + (k + 0.5) * (axis.high - axis.low) / axis.cells for axis, k in pairs]
+        assert archive.elite_at(*place) is elite
+        champion = archive.champion_at(*place)
+        assert (champion.parameters, champion.fitness) == (elite.parameters, elite.fitness)
+        assert set(champion.measures) == set(archive.value_names) - {"fitness"}
+    corner = archive.elite_at(-1e6, -1e6)
+    assert sum(k**2 for k in corner.cell) == min(sum(k**2 for k in elite.cell) for elite in archive.elites)
+
+
+def test_wrong_places_are_errors() -> None:
+    evolution = kiks.Evolution(small(), "ga", population=8)
+    with pytest.raises(ParameterError, match="must hold an elite, but it is empty"):
+        archive_of(evolution).elite_at(1, 1)
+    archive = archive_of(told(evolution, 1))
+    with pytest.raises(ParameterError, match=r"must be 2 numbers \(path_mm, straightness\), but it was"):
+        archive.elite_at(1)
+    with pytest.raises(ParameterError, match="straightness must be a finite number"):
+        archive.champion_at(1, float("nan"))
+
+
+# ---- files ----
+
+
+def test_an_archive_equals_the_one_loaded_from_its_folder(tmp_path: Path) -> None:
+    evolution = run("map-elites", folder=tmp_path)
+    archive, again = archive_of(evolution), kiks.Archive.load(tmp_path)
+    assert again.elites == archive.elites
+    assert (again.axes, again.value_names, again.qd_score) == (archive.axes, archive.value_names, archive.qd_score)
+    champion = again.champion_at(300, 0.5)
+    assert champion.controller is evolution.task.controller
+    assert champion.parameters == archive.champion_at(300, 0.5).parameters
+    assert (champion.algorithm, champion.seed, champion.timing) == ("map-elites", 3, evolution.task.timing)
+
+
+@pytest.mark.parametrize("data", [b"", b"nothing", b"PAR1" * 50, b"\xff" * 1000])
+def test_files_that_are_no_parquet_are_errors(data: bytes, tmp_path: Path) -> None:
+    run("map-elites", folder=tmp_path)
+    whole = (tmp_path / "archive.parquet").read_bytes()
+    for broken in (data, whole[: len(whole) // 2] + data, whole[:-100] + data):
+        (tmp_path / "archive.parquet").write_bytes(broken)
+        with pytest.raises(ParameterError, match=r"^Archive '.*archive.parquet'") as caught:
+            kiks.Archive.load(tmp_path)
+        assert len(str(caught.value).replace(str(tmp_path), "")) < 400
+
+
+def test_foreign_and_wrong_archives_are_errors(tmp_path: Path) -> None:
+    run("map-elites", folder=tmp_path)
+    file = tmp_path / "archive.parquet"
+    good = parquet.read_table(file)
+    head = good.schema.metadata[b"kiks archive"]
+
+    def changed(name: str, column: Any) -> Any:
+        return good.set_column(good.schema.names.index(name), name, [column])
+
+    rows, unnamed = len(good), head.replace(b'"path_mm"', b'"path"', 1)
+    wrong: list[tuple[Any, dict[str, Any], str]] = [
+        (good.replace_schema_metadata(None), {}, "is another Parquet file"),
+        (good.replace_schema_metadata({b"kiks archive": b"{"}), {}, "its head must be JSON"),
+        (good.replace_schema_metadata({b"kiks archive": b"{}"}), {}, "axes must be given"),
+        (good.replace_schema_metadata({b"kiks archive": unnamed}), {}, "must name one"),
+        (good.replace_schema_metadata({b"kiks archive": head.replace(b"20", b"0", 1)}), {}, "cells must be"),
+        (good.drop_columns(["parameter_3"]), {}, "'parameter_3' is missing"),
+        (good.drop_columns(["contacts"]), {}, "'contacts' is missing"),
+        (changed("fitness", pyarrow.array([float("nan")] * rows)), {}, "fitness must be finite numbers"),
+        (changed("fitness", pyarrow.array(["x"] * rows)), {}, "fitness must be finite numbers"),
+        (changed("parameter_1", pyarrow.array([None] * rows, pyarrow.float64())), {}, "parameter_1 must be finite"),
+        (changed("generation", pyarrow.array([-1] * rows)), {}, "generation must be whole numbers from 0"),
+        (good, {"compression": "gzip"}, "without compression"),
+    ]
+    for table, options, message in wrong:
+        parquet.write_table(table, file, **{"compression": "none"} | options)
+        with pytest.raises(ParameterError, match=message):
+            kiks.Archive.load(tmp_path)
+    file.unlink()
+    with pytest.raises(ParameterError, match="must exist"):
+        kiks.Archive.load(tmp_path)
+
+
+def test_too_many_cells_are_an_error() -> None:
+    axes = tuple(kiks.Axis(name, 0, 1, 10_000) for name in ("path_mm", "straightness", "avoidance", "roaming"))
+    with pytest.raises(ParameterError, match="at most 2\\^53 cells"):
+        kiks.Evolution(small(axes=axes), "ga")
+
+
+# ---- the maze ----
+
+
+def test_the_fitness_of_the_maze_puts_the_goal_before_thrift_and_thrift_before_nothing() -> None:
+    task = kiks.tasks.maze()
+    assert task.fitness is not None
+    near, far = {"closest_mm": 40.0}, {"closest_mm": 101.0}
+    cheap, dear = {"turned_pulses": 1e3}, {"turned_pulses": 3e5}
+
+    def arrays(*given: dict[str, float]) -> dict[str, Any]:
+        return {name: np.array([[value]]) for each in given for name, value in each.items()}
+
+    order = [task.fitness(arrays(*each))[0] for each in ((near, cheap), (near, dear), (far, cheap))]
+    assert order == sorted(order, reverse=True)
+    assert order[1] > order[2] + 1
+
+
+@pytest.mark.parametrize("algorithm", DIVERSE)
+def test_the_champion_of_the_maze_reaches_the_goal_though_others_are_cheaper(algorithm: str) -> None:
+    task = kiks.tasks.maze()
+    assert task.fitness is not None
+    evolution = kiks.Evolution(task, algorithm, seed=1, population=20)
+    rng = np.random.default_rng(1)
+    for _ in range(6):
+        candidates = evolution.ask()
+        # One parameter decides where a robot ends, and one of ten such places is at the goal, at the greatest cost.
+        across = np.abs(candidates[:, 0] * 1e3 % 1)
+        measured = {
+            "closest_mm": np.where(across < 0.1, 50.0, 1000.0),
+            "final_x_mm": 1800 * across,
+            "final_y_mm": 1800 * rng.uniform(size=len(candidates)),
+            "turned_pulses": 2e5 * (1 - across),
+        }
+        fitness = task.fitness({name: values[:, None] for name, values in measured.items()})
+        evolution.tell(np.column_stack([fitness, *(measured[name] for name in task.measure_names)]))
+    assert evolution.champion.measures["closest_mm"] == 50
+    assert any(elite.values["closest_mm"] == 1000 for elite in archive_of(evolution).elites)
+
+
+# ---- commands ----
+
+
+def test_a_demonstration_takes_a_folder_and_a_place_of_its_archive(tmp_path: Path) -> None:
+    archive = archive_of(run("map-elites", folder=tmp_path / "out"))
+    elite = archive.elites[-1]
+    words = ["demo", str(tmp_path / "out"), "--seconds", "1", "--picture", str(tmp_path / "seen.png")]
+    assert CliRunner().invoke(app, words).exit_code == 0
+    place = ",".join(str(elite.values[axis.measure]) for axis in archive.axes)
+    said = CliRunner().invoke(app, [*words, "--at", place])
+    assert said.exit_code == 0, said.output
+    assert f"of generation {elite.generation}." in said.output.replace("\n", " ")
+    for at, where, message in (
+        ("1,x", words[1], "must be numbers"),
+        ("1,2", "avoid", "must come with the folder of an evolution"),
+    ):
+        failed = CliRunner().invoke(app, [words[0], where, *words[2:], "--at", at])
+        assert isinstance(failed.exception, ParameterError)
+        assert message in str(failed.exception)
+
+
+def test_the_picture_shows_the_archive_of_every_algorithm(tmp_path: Path) -> None:
+    from kiks.learn.evolution_plot import save_plot
+
+    one = (kiks.Axis("path_mm", 0, 1500),)
+    for changes in ({}, {"axes": one}, {"axes": (*small().axes, kiks.Axis("contacts", 0, 5))}, {"axes": ()}):
+        save_plot(run("cma", **changes), tmp_path / "fitness.png")
+        assert (tmp_path / "fitness.png").read_bytes().startswith(b"\x89PNG")

@@ -1,0 +1,294 @@
+"""A policy that another library learnt drives as it does there, and what cannot be a controller is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import kiks
+from kiks.learn.env_specs import env_spec_of
+from kiks.learn.episode_batch import Episodes
+
+Trace = np.ndarray[Any, np.dtype[np.float64]]
+Layer = tuple[Trace, Trace]
+
+FUNCTIONS: dict[str, Any] = {"tanh": np.tanh, "relu": lambda x: np.maximum(x, 0)}
+SQUASHES: dict[str, Any] = {"tanh": np.tanh, "clip": lambda x: np.clip(x, -1, 1)}
+
+
+class Linear:
+    """A layer as PyTorch has it."""
+
+    def __init__(self, weight: Trace, bias: Trace | None) -> None:
+        self.weight, self.bias = weight, bias
+
+
+class Tanh:
+    """An activation as PyTorch has it."""
+
+
+class ReLU:
+    """Another."""
+
+
+class LayerNorm:
+    """A module that no controller has."""
+
+
+class Sequential:
+    """Modules in a row, as PyTorch has them."""
+
+    def __init__(self, modules: list[Any]) -> None:
+        self.modules = modules
+
+    def __iter__(self) -> Iterator[Any]:
+        return iter(self.modules)
+
+    def state_dict(self) -> dict[str, Any]:
+        layers = {k: each for k, each in enumerate(self) if isinstance(each, Linear)}
+        return {f"{k}.{name}": getattr(each, name) for k, each in layers.items() for name in ("weight", "bias")}
+
+
+def network(counts: tuple[int, ...], seed: int = 1) -> list[Layer]:
+    """Return layers with weights of the size that a learner leaves."""
+    rng = np.random.default_rng(seed)
+    return [
+        (2 * rng.standard_normal((units, inputs)) / np.sqrt(inputs), 0.5 * rng.standard_normal(units))
+        for inputs, units in pairwise(counts)
+    ]
+
+
+def actions_of(layers: list[Layer], seen: Trace, activation: str, output: str) -> Trace:
+    """Return what a network does with observations, [observation, wheel]."""
+    for weights, biases in layers[:-1]:
+        seen = FUNCTIONS[activation](seen @ weights.T + biases)
+    result: Trace = SQUASHES[output](seen @ layers[-1][0].T + layers[-1][1])
+    return result
+
+
+def speeds_of(champion: kiks.Champion, sensors: Trace) -> Trace:
+    """Return the speeds that a champion wants for counts, as shares of the speed limit, [reading, wheel]."""
+    wheels, parameters = np.zeros((len(sensors), 2)), np.array(champion.parameters)
+    for reading, speeds in zip(sensors, wheels, strict=True):
+        champion.controller(reading, np.zeros(0), parameters, speeds)
+    return wheels / champion.controller.recipe["speed_limit"]  # type: ignore[index]
+
+
+def counts_of(spec: Any, count: int = 200) -> Trace:
+    return np.random.default_rng(3).integers(0, 1024, (count, spec.sensor_count)).astype(float)
+
+
+def assert_equal_outputs(champion: kiks.Champion, layers: list[Layer], spec: Any, activation: str, output: str) -> None:
+    sensors = counts_of(spec)
+    expected = actions_of(layers, sensors / 1023, activation, output)
+    np.testing.assert_allclose(speeds_of(champion, sensors), expected, atol=1e-12)
+    assert expected.std() > 0.01
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "hidden", "activation", "output"),
+    [
+        ("Avoid", (64, 64), "tanh", "clip"),
+        ("Light", (256, 256), "relu", "tanh"),
+        ("Light", (400, 300), "relu", "tanh"),
+        ("Maze", (5, 4, 3), "tanh", "tanh"),
+        ("Light", (), None, "clip"),
+    ],
+)
+def test_outputs_are_those_of_the_network(
+    name: str, hidden: tuple[int, ...], activation: str | None, output: str
+) -> None:
+    spec = env_spec_of(name)
+    layers = network((spec.sensor_count, *hidden, 2))
+    champion = kiks.champion_of_policy(layers, name, activation=activation, output=output)
+    assert_equal_outputs(champion, layers, spec, activation or "tanh", output)
+
+
+@pytest.mark.slow
+def test_light_before_proximity_is_the_same_network() -> None:
+    spec = env_spec_of("Light").with_changes(senses=("ambient", "proximity"), speed_limit=7.0)
+    layers = network((16, 6, 2))
+    champion = kiks.champion_of_policy(layers, spec, activation="tanh")
+    assert champion.controller.senses == ("ambient", "proximity")
+    assert_equal_outputs(champion, layers, spec, "tanh", "clip")
+
+
+def of_torch(layers: list[Layer], activation: type = Tanh, *last: type) -> Sequential:
+    parts = [module for layer in layers for module in (Linear(*layer), activation())]
+    return Sequential([*parts[:-1], *(each() for each in last)])
+
+
+def algorithm(**policy: Any) -> SimpleNamespace:
+    """Return a model of Stable-Baselines3, as far as it is looked at."""
+    box = SimpleNamespace(low=-np.ones(2), high=np.ones(2))
+    return SimpleNamespace(policy=SimpleNamespace(action_space=box, use_sde=False, **policy))
+
+
+LAYERS = network((8, 4, 3, 2))
+FORMS: dict[str, tuple[Any, str, str]] = {
+    "sequential": (of_torch(LAYERS), "tanh", "clip"),
+    "sequential that ends in tanh": (of_torch(LAYERS, ReLU, Tanh), "relu", "tanh"),
+    "nested": (Sequential([Sequential(of_torch(LAYERS).modules[:3]), *of_torch(LAYERS).modules[3:]]), "tanh", "clip"),
+    "ppo": (
+        algorithm(
+            mlp_extractor=SimpleNamespace(policy_net=of_torch(LAYERS, Tanh, Tanh).modules[:4]),
+            action_net=Linear(*LAYERS[-1]),
+        ),
+        "tanh",
+        "clip",
+    ),
+    "sac": (
+        algorithm(actor=SimpleNamespace(latent_pi=of_torch(LAYERS, ReLU).modules[:4], mu=Linear(*LAYERS[-1]))),
+        "relu",
+        "tanh",
+    ),
+    "td3": (algorithm(actor=SimpleNamespace(mu=of_torch(LAYERS, ReLU, Tanh))), "relu", "tanh"),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", FORMS)
+def test_forms_of_a_policy(form: str) -> None:
+    policy, activation, output = FORMS[form]
+    champion = kiks.champion_of_policy(policy, "Avoid")
+    assert_equal_outputs(champion, LAYERS, env_spec_of("Avoid"), activation, output)
+    assert kiks.champion_of_policy(policy, "Avoid", activation=activation, output=output).parameters == (
+        champion.parameters
+    )
+
+
+def test_a_state_dict_is_the_same_champion() -> None:
+    state = of_torch(LAYERS).state_dict()
+    one, other = (kiks.champion_of_policy(given, "Avoid", activation="tanh") for given in (state, LAYERS))
+    assert one.parameters == other.parameters
+    assert one.controller is other.controller
+    without_biases = {name: value for name, value in state.items() if name.endswith("weight")}
+    layers = [(weights, 0 * biases) for weights, biases in LAYERS]
+    assert kiks.champion_of_policy(without_biases, "Avoid", activation="tanh").parameters == (
+        kiks.champion_of_policy(layers, "Avoid", activation="tanh").parameters
+    )
+
+
+@pytest.mark.slow
+def test_the_champion_drives_the_episode_of_the_policy(tmp_path: Path) -> None:
+    spec = env_spec_of("Light").with_changes(timing=kiks.Timing(0.05, 38400))
+    layers = network((16, 12, 2))
+    path = tmp_path / "learnt.toml"
+    kiks.champion_of_policy(layers, spec, activation="relu").save(path)
+    champion = kiks.Champion.load(path)
+    assert champion.timing == spec.timing
+    assert champion.task == "Light"
+    by_policy, by_champion = Episodes(spec, 1, threads=1), Episodes(spec, 1, threads=1)
+    for episodes in (by_policy, by_champion):
+        episodes.begin([0], [np.random.default_rng(1)])
+    seed, start = int(np.random.default_rng(1).integers(2**63 - 1)), by_policy.batch.poses[0, 0].tolist()
+    for _ in range(100):
+        by_policy.step(actions_of(layers, by_policy.observations()[0, 0].astype(np.float64), "relu", "clip")[None])
+        by_champion.step(speeds_of(champion, np.rint(1023.0 * by_champion.observations()[0].astype(np.float64))))
+    assert by_champion.batch.state_hash(0) == by_policy.batch.state_hash(0)
+    batch = kiks.Batch(spec.arenas, 1, seed=np.array([seed]), starts=start, senses=spec.senses, timing=spec.timing)
+    batch.run(champion.controller, champion.parameters, seconds=by_policy.batch.times_s[0])
+    # A step has sensed once more, a few milliseconds later.
+    np.testing.assert_allclose(batch.poses[0, 0, :2], by_policy.batch.poses[0, 0, :2], atol=2.0)
+    assert np.hypot(*(batch.poses[0, 0, :2] - start[:2])) > 10.0
+
+
+def test_exploration_and_changed_spaces_are_refused() -> None:
+    policy = FORMS["ppo"][0].policy
+    wide = SimpleNamespace(low=-3 * np.ones(2), high=3 * np.ones(2))
+    normalizing = SimpleNamespace(
+        policy=policy, get_vec_normalize_env=lambda: SimpleNamespace(norm_obs=True, norm_reward=True)
+    )
+    for changed, message in (
+        (SimpleNamespace(policy=SimpleNamespace(**vars(policy) | {"use_sde": True})), "it explores by use_sde"),
+        (SimpleNamespace(**vars(policy) | {"action_space": wide}), "must have actions from -1 to 1"),
+        (normalizing, "a VecNormalize changes them"),
+    ):
+        with pytest.raises(kiks.ParameterError, match=message):
+            kiks.champion_of_policy(changed, "Avoid")
+
+
+@pytest.mark.parametrize(
+    ("policy", "message"),
+    [
+        (None, "policy must be a torch.nn.Sequential, .* but it was None"),
+        ("model.zip", "policy must be a torch.nn.Sequential, .* but it was 'model.zip'"),
+        ([], "but it had no layer"),
+        ([np.zeros((2, 8))], "a member of the list was"),
+        ([(np.zeros((2, 8)), np.zeros(3))], r"the biases of layer 1 must be numbers of the shape \[2\]"),
+        ([(np.zeros((2, 16)), np.zeros(2))], r"with 8 inputs, but it was \(2, 16\). Transpose weights"),
+        ([(np.zeros((8, 2)), np.zeros(8))], "with 8 inputs"),
+        ([(np.zeros((4, 8)), np.zeros(4))], "must have two outputs, .* but it had 4"),
+        ([(np.full((2, 8), np.nan), np.zeros(2))], "the weights of layer 1 must be finite numbers"),
+        ([("ab", np.zeros(2))], "the weights of layer 1 must be finite numbers, but they were 'ab'"),
+        (LAYERS, "activation must be 'tanh' or 'relu', but it was left out"),
+        (network((8, 513, 2)), "activation must be"),
+        ({"log_std": np.zeros(2)}, "it has 'log_std'. Give the part that maps observations to actions"),
+        ({3: np.zeros(2)}, "policy must be a torch.nn.Sequential"),
+        (Sequential([Linear(*LAYERS[0]), LayerNorm()]), "but it has 'LayerNorm'. Learn with others"),
+        (Sequential([Linear(*LAYERS[0]), Linear(*LAYERS[1])]), "the same function, Tanh or ReLU, after each"),
+        (Sequential([Tanh(), Linear(*LAYERS[0])]), "the same function, Tanh or ReLU, after each"),
+        (of_torch(LAYERS, Tanh, ReLU), "the same function, Tanh or ReLU, after each"),
+        (of_torch(LAYERS, Tanh, Tanh, Tanh), "the same function, Tanh or ReLU, after each"),
+    ],
+)
+def test_what_is_no_policy_is_an_error(policy: Any, message: str) -> None:
+    with pytest.raises(kiks.ParameterError, match=message):
+        kiks.champion_of_policy(policy, "Avoid")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"activation": "relu"}, "activation must be 'tanh', as the policy has it, but it was 'relu'"),
+        ({"output": "hard"}, "output must be one of 'clip', 'tanh', but it was 'hard'"),
+        ({"output": ["clip"]}, "output must be"),
+        ({"spec": "Avoit"}, "Did you mean 'Avoid'"),
+        ({"spec": "Light"}, "with 16 inputs"),
+    ],
+)
+def test_options_that_do_not_fit_are_errors(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(kiks.ParameterError, match=message):
+        kiks.champion_of_policy(of_torch(LAYERS), **{"spec": "Avoid"} | options)
+
+
+def test_a_policy_of_too_many_units_is_an_error() -> None:
+    with pytest.raises(kiks.ParameterError, match=r"hidden\[0\] must be a whole number from 1 to 512, but it was 513"):
+        kiks.champion_of_policy(network((8, 513, 2)), "Avoid", activation="relu")
+
+
+@pytest.mark.slow
+def test_networks_of_pytorch() -> None:
+    torch: Any = pytest.importorskip("torch", reason="PyTorch is not installed")
+    for activation, name in ((torch.nn.Tanh, "tanh"), (torch.nn.ReLU, "relu")):
+        model = torch.nn.Sequential(
+            torch.nn.Linear(8, 64), activation(), torch.nn.Linear(64, 64), activation(), torch.nn.Linear(64, 2)
+        )
+        champion = kiks.champion_of_policy(model, "Avoid")
+        sensors = counts_of(env_spec_of("Avoid"))
+        with torch.no_grad():
+            expected = model(torch.tensor(sensors / 1023, dtype=torch.float32)).numpy().clip(-1, 1)
+        np.testing.assert_allclose(speeds_of(champion, sensors), expected, atol=1e-6)
+        state = kiks.champion_of_policy(model.state_dict(), "Avoid", activation=name)
+        assert state.parameters == champion.parameters
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["PPO", "A2C", "SAC", "TD3"])
+def test_policies_of_stable_baselines3(name: str) -> None:
+    library: Any = pytest.importorskip("stable_baselines3", reason="Stable-Baselines3, with PyTorch, is not installed")
+    from kiks.learn.gymnasium_envs import KheperaEnv
+
+    model = getattr(library, name)("MlpPolicy", KheperaEnv("Light"), seed=1, device="cpu")
+    champion = kiks.champion_of_policy(model, "Light")
+    sensors = counts_of(env_spec_of("Light"))
+    expected, _ = model.predict((sensors / 1023).astype(np.float32), deterministic=True)
+    np.testing.assert_allclose(speeds_of(champion, sensors), expected, atol=1e-6)
+    assert champion.algorithm == name
