@@ -87,8 +87,8 @@ def demo(
     camera: watch a moving ball. race: drive round a track. swarm: twenty robots spread out.
     soccer: a match of two programs. A champion's file of `kiks evolve`, or its folder: the champion drives in its
     world. With --at X,Y, the elite of that place in the folder's archive drives. With --generation 12 --rank 3, the
-    third best of generation 12 drives again as in its evaluation. The folder of `kiks evolve pursuit`: predator and
-    prey drive until they touch.
+    third best of generation 12 drives again as in its evaluation. Of the folder of `kiks evolve pursuit`,
+    predator and prey drive until they touch.
 
     Example: kiks demo follow --arena examples/arenas/office.toml --seconds 300
     """
@@ -104,6 +104,7 @@ def demo(
             raise ParameterError(
                 f"{name} must be left out with {behaviour}, but it was {shown(value)}. Other demos take it."
             )
+    is_contest = Path(behaviour).is_dir() and not Path(behaviour, "champion.toml").exists()
     if generation is None:
         for option, is_given in (("--rank", rank != 1), ("--world", world != 0), ("--task", task is not None)):
             if is_given:
@@ -113,9 +114,10 @@ def demo(
             if value is not None:
                 raise ParameterError(f"{option} must be left out with --generation, but it was {shown(value)}.")
     for option, value in (("--generation", generation), ("--at", at)):
-        if value is not None and (behaviour in list(Behaviour) or not Path(behaviour).is_dir()):
+        if value is not None and (behaviour in list(Behaviour) or is_contest or not Path(behaviour).is_dir()):
             raise ParameterError(
-                f"{option} must come with the folder of an evolution, but with it came {shown(behaviour)}."
+                f"{option} must come with the folder of an evolution of one controller, but with it came "
+                f"{shown(behaviour)}."
             )
     from kiks.drawing import check_picture
 
@@ -134,12 +136,9 @@ def demo(
         from kiks.demos.scenes import SCENES
 
         scene = SCENES[behaviour](given, seed=seed or 0, baud=baud)
-    elif _is_contest(Path(behaviour)):
+    elif is_contest:
         from kiks.demos.contest import ContestScene
 
-        for option, value in (("--generation", generation), ("--at", at)):
-            if value is not None:
-                raise ParameterError(f"{option} must be left out with a contest, but it was {shown(value)}.")
         scene = ContestScene(behaviour, given, seed=seed or 0, baud=baud)
     else:
         from kiks.demos.champion import ChampionScene
@@ -158,11 +157,6 @@ def demo(
         open_desk(Desk(scene.sim), work=work, waits=not no_wait)
     else:
         work()
-
-
-def _is_contest(path: Path) -> bool:
-    """Return whether a path is the folder of a co-evolution: it has champions, but no single one."""
-    return path.is_dir() and not (path / "champion.toml").exists() and any(path.glob("*.toml"))
 
 
 def _individual(folder: str, generation: int, rank: int, world: int, task: str | None) -> tuple[Champion, float]:

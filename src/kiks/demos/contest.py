@@ -52,7 +52,7 @@ class ContestScene(Scene):
         return self.contest.arenas[0]
 
     def make_simulation(self, arena: Arena | None) -> Simulation:
-        """Return a world of the contest at the start of the evaluation with this seed."""
+        """Return a world of the contest, at the start that its evaluation has with this seed."""
         arena = arena or self.make_arena()
         contest = self.contest.with_changes(arenas=(arena,), worlds=1)
         kinds = [self.champions[side].robot for side in self._sides]
@@ -70,12 +70,9 @@ class ContestScene(Scene):
     def prepare(self) -> None:
         """Put the champions at the wheels."""
         drivers = [self.champions[side] for side in self._sides]
-        ports = [self.sim.port(number) for number in range(1, len(drivers) + 1)]
-        for port in ports:
-            port.baudrate = self.ports[0].baudrate
         parameters = [list(each.parameters) for each in drivers]
         period_s = self.champions[0].timing.period_s
-        self.driver = Driver(ports, [each.controller for each in drivers], parameters, period_s=period_s)
+        self.driver = Driver(self.ports, [each.controller for each in drivers], parameters, period_s=period_s)
 
     def step(self) -> None:
         """Let them do a loop, and see whether they touch."""

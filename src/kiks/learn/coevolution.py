@@ -40,7 +40,7 @@ OPPONENTS = 10
 TRIALS = 2
 """Default number of contests of each pair in the tournament."""
 
-_ALGORITHM_SEED, _CONTEST_SEED, _TOURNAMENT_SEED = 10, 11, 12
+_ALGORITHM_SEED, _CONTEST_SEED, TOURNAMENT_SEED, _SQUARE_SEED = 10, 11, 12, 13
 """Purposes of seeds."""
 
 
@@ -100,7 +100,8 @@ class Coevolution:
     Attributes:
         contest: The contest.
         generations: The generations, in order. A row of `candidates` is one of the first side followed by one of the
-            second side; a row of `values` their mean values over their own contests, as in `contest.value_names`.
+            second side. A row of `values` has their mean values over their own contests, as in `contest.value_names`;
+            `seeds` has the seed of the first of these.
 
     Raises:
         ParameterError: If an argument is out of range, or the folder holds another evolution.
@@ -194,12 +195,12 @@ class Coevolution:
         for side, algorithm in enumerate(self._algorithms):
             algorithm.tell(values[:, side], np.zeros((self.population, 0)))
             favourite = algorithm.favourite()
-            assert favourite is not None  # without axes, no algorithm looks for many behaviours
-            self._favourites[side].append(favourite)
+            best = own[side][values[:, side].argmax()] if favourite is None else favourite
+            self._favourites[side].append(best.copy())
         generation = Generation(
             candidates=np.concatenate(own, axis=1),
             values=values,
-            seeds=self.seeds[: self.opponents],
+            seeds=np.full(self.population, self.seeds[0]),
             population=self.population,
             champion_fitness=np.nan,
             seconds=seconds,
@@ -337,12 +338,11 @@ class Coevolution:
         size = len(chosen)
         pairs = np.concatenate([np.repeat(first, size, axis=0), np.tile(second, (size, 1))], axis=1)
         scores = np.zeros((2, size, size))
-        # A Latin square: each row and each column of the pairs holds each start once.
-        starts = (np.arange(size)[:, None] + np.arange(size)) % size
+        starts = latin_square(size, seed_for(self.seed, _SQUARE_SEED)).ravel()
         for trial in range(trials):
             numbers = range(trial * size, (trial + 1) * size)
-            seeds = np.array([seed_for(self.seed, _TOURNAMENT_SEED, number) for number in numbers], np.int64)
-            scores += executor.evaluate(pairs, seeds[starts.ravel()])[:, :2].T.reshape(2, size, size)
+            seeds = np.array([seed_for(self.seed, TOURNAMENT_SEED, number) for number in numbers], np.int64)
+            scores += executor.evaluate(pairs, seeds[starts])[:, :2].T.reshape(2, size, size)
         return Tournament(self.contest.side_names, chosen + 1, scores / trials)
 
     # ---- folders ----
@@ -372,6 +372,16 @@ class Coevolution:
                 )
             self._tell(saved["values"], float(saved["seconds"]))
         self._earlier_s = self.generations[-1].seconds if self.generations else 0.0
+
+
+def latin_square(size: int, seed: int) -> Integers:
+    """Return a square whose rows and columns hold each number from 0 to size - 1 once, int64 [row, column].
+
+    Rows and columns are shuffled: equal numbers form no lines, which would be seen in the tournament's picture.
+    """
+    rng = np.random.default_rng(seed)
+    square: Integers = (rng.permutation(size)[:, None] + rng.permutation(size)) % size
+    return square
 
 
 def _write_table(columns: Mapping[str, NDArray[Any]], path: str | Path, what: str) -> None:

@@ -53,7 +53,7 @@ class Generation:
     Attributes:
         candidates: All evaluated candidates, float64 [candidate, parameter]: the population, then trials of a rival.
         values: Their values, float64 [candidate, value]: fitness, then measures.
-        seeds: Seeds of their worlds, int64 [candidate]; in a co-evolution, of the contests of each, int64 [opponent].
+        seeds: Seeds of their worlds, int64 [candidate]; in a co-evolution, those of their first contests.
         population: Size of the population.
         champion_fitness: Fitness of the best rival so far; NaN before the first.
         seconds: Time of its end [s of the wall clock, since the evolution began].

@@ -20,11 +20,14 @@ Values = Mapping[str, Floats]
 PURSUIT_MM = 470
 """Side of the arena of `pursuit` [mm] (Floreano and Nolfi 1997)."""
 
-PURSUIT_S = 30.0
+PURSUIT_S = 25.0
 """Default time that the predator has [s]."""
 
 PREDATOR_SPEED, PREY_SPEED = 10.0, 20.0
 """Highest speeds [pulses/10 ms], 80 and 160 mm/s: the prey is twice as fast (Floreano and Nolfi 1997)."""
+
+PURSUIT_BAUD = 38400
+"""Speed of the lines [bit/s]: at 9600 a loop with a picture of the camera would take longer than 0.1 s."""
 
 CAUGHT_MM = 57.0
 """Distance of the middles at which the prey is caught [mm]: two Kheperas of 55 mm, and 2 mm between them."""
@@ -33,17 +36,11 @@ PURSUIT_APART_MM = 100.0
 """Least gap between predator and prey at the start [mm], beyond the range of the proximity sensors."""
 
 
-PURSUIT_BAUD = 38400
-"""Speed of the lines [bit/s]: a picture takes 22 ms."""
-
-
 def pursuit(*, seconds: float = PURSUIT_S, **changes: Any) -> Contest:
     """Return the contest of a predator and a prey that is twice as fast (Floreano and Nolfi 1997).
 
-    Both sense proximity. The predator has a camera, too, and sees the prey dark before white walls.
-
-    The prey's fitness is the share of the time for which it was not caught, the predator's is the rest. What the
-    robots do after the first contact does not count.
+    Both have proximity sensors, the predator has the camera K213, too. The prey's fitness is the share of the time for
+    which it was not caught, the predator's is the rest. What the robots do after the first contact does not count.
 
     Args:
         seconds: The time that the predator has [s].
@@ -57,7 +54,7 @@ def pursuit(*, seconds: float = PURSUIT_S, **changes: Any) -> Contest:
     def predator_fitness(values: Values) -> Floats:
         return 1.0 - prey_fitness(values)
 
-    predator = controllers.mlp(hidden=(), feedback=True, senses=("proximity", "camera"), speed_limit=PREDATOR_SPEED)
+    predator = controllers.mlp(hidden=(), senses=("proximity", "camera"), feedback=True, speed_limit=PREDATOR_SPEED)
     prey = controllers.mlp(hidden=(), feedback=True, speed_limit=PREY_SPEED)
     contest = Contest(
         "pursuit",
