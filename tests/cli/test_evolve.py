@@ -59,7 +59,7 @@ def test_champions_run_and_are_shown(folder: Path, tmp_path: Path) -> None:
     assert "contacts" in said
     assert "the same on every computer" in said
     assert (tmp_path / "shown.png").exists()
-    assert "10 loops" in kiks("drive", champion, "--port", "kiks://1", "--seconds", 1).output
+    assert "17 loops" in kiks("drive", champion, "--port", "kiks://1", "--seconds", 1).output
 
 
 @pytest.mark.slow
