@@ -49,10 +49,10 @@ def hashes(task: kiks.Task, parameters: Any, seed: int, monkeypatch: pytest.Monk
 
 TASKS = {
     "random starts": lambda: kiks.tasks.avoid(seconds=2.0, worlds=6),
-    "with things": lambda: kiks.tasks.gather(seconds=2.0, worlds=3),
+    "with things": lambda: kiks.tasks.gather(seconds=2.0, worlds=8),
     "with a lamp": lambda: kiks.tasks.light(seconds=2.0, worlds=3),
     "starts of the arena": lambda: kiks.tasks.maze(seconds=2.0),
-    "two robots": lambda: kiks.tasks.gather(seconds=2.0, worlds=3, robots=2, starts="arena"),
+    "two robots": lambda: kiks.tasks.gather(seconds=2.0, worlds=8, robots=2),
     "a short period": lambda: kiks.tasks.avoid(seconds=1.23, worlds=3, timing=kiks.Timing(0.05, 38400, 0.0025)),
     "families": lambda: kiks.tasks.avoid(
         seconds=2.0, worlds=6, robot=family(KHEPERA, 4, seed=1), timing=[kiks.Timing(), kiks.Timing(0.05, 38400)]
@@ -87,8 +87,8 @@ def test_the_task_is_found_again(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text('task = 1\nbase = "avoid"\nseconds = 1\nworlds = 1\narenas = ["room.toml"]\n')
     evolved(kiks.tasks.load(tmp_path / "mine.toml"), tmp_path / "out")
     assert individual_of(tmp_path / "out", 1).seconds == 1.0
-    evolved(kiks.tasks.maze(seconds=100.0, worlds=2, controller=kiks.controllers.gru()), tmp_path / "gru")
-    assert individual_of(tmp_path / "gru", 3, world=1).champion.controller is kiks.controllers.gru()
+    evolved(kiks.tasks.maze(controller=kiks.controllers.gru()), tmp_path / "gru")
+    assert individual_of(tmp_path / "gru", 3).champion.controller is kiks.controllers.gru()
 
 
 def test_a_task_that_cannot_be_found_is_an_error(tmp_path: Path) -> None:

@@ -29,7 +29,7 @@ def values_of(task: kiks.Task, seeds: tuple[int, ...] = (5,)) -> np.ndarray:
 
 def test_a_list_of_one_is_that_robot_and_that_timing() -> None:
     alone = values_of(task_of())
-    for changes in ({"robot": KHEPERA}, {"robot": ["khepera"]}, {"timing": [kiks.Timing()]}):
+    for changes in ({"robot": KHEPERA}, {"robot": ["khepera"]}, {"timing": [task_of().timing]}):
         task = task_of(**changes)
         assert (values_of(task) == alone).all()
         assert task.digest() == task_of().digest()

@@ -104,7 +104,8 @@ def demo(
             raise ParameterError(
                 f"{name} must be left out with {behaviour}, but it was {shown(value)}. Other demos take it."
             )
-    is_contest = Path(behaviour).is_dir() and not Path(behaviour, "champion.toml").exists()
+    # The folder of a co-evolution has champions, but no single one.
+    is_contest = any(Path(behaviour).glob("*.toml")) and not Path(behaviour, "champion.toml").exists()
     if generation is None:
         for option, is_given in (("--rank", rank != 1), ("--world", world != 0), ("--task", task is not None)):
             if is_given:
