@@ -88,7 +88,7 @@ def test_two_sides_evolve_and_are_shown(tmp_path: Path, monkeypatch: pytest.Monk
     assert (tmp_path / "shown.png").exists()
     with pytest.raises(KiksError, match="--controller must be left out with pursuit"):
         kiks("evolve", "pursuit", "--controller", "gru")
-    with pytest.raises(KiksError, match=r"must have predator.toml and prey.toml, but has not"):
+    with pytest.raises(KiksError, match=r"champion.toml' must exist"):
         kiks("demo", tmp_path)
 
 
