@@ -268,7 +268,7 @@ def test_a_folder_of_another_coevolution_is_an_error(tmp_path: Path) -> None:
     ("given", "message"),
     [
         ({"contest": "pursuit"}, "contest must be"),
-        ({"algorithm": "cna"}, "Did you mean"),
+        ({"algorithm": "cna"}, "Did you mean 'cma'"),
         ({"algorithm": "map-elites"}, "must have axes"),
         ({"population": 3}, "population must be a whole number from 4"),
         ({"opponents": 0}, "opponents must be a whole number from 1"),

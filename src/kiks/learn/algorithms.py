@@ -283,7 +283,7 @@ def make_algorithm(
     if name not in ALGORITHMS:
         raise ParameterError(
             f"algorithm must be one of {', '.join(ALGORITHMS)}, or an object with ask and tell, but it was "
-            f"{shown(name)}.{nearest(str(name), ALGORITHMS)}"
+            f"{shown(name)}.{nearest(str(name), map(str, ALGORITHMS))}"
         )
     return ALGORITHMS[name](parameter_count, population, seed, axes, spread)
 
