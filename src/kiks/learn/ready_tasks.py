@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from kiks.batch.loop_timing import Timing
 from kiks.control import controllers, measures
 from kiks.control.controller import Controller
+from kiks.errors import ParameterError
 from kiks.learn import training_arenas
 from kiks.learn.candidate_worlds import cautious_mean
 from kiks.learn.exam import Exam
@@ -228,6 +229,9 @@ GROUP_MM, APART_MM = 150.0, 170.0
 FROM_WALL_MM = 90.0
 """Least distance of cylinders from the outside of a room's walls [mm]: there a robot can get behind them."""
 
+PLACES_TRIED = 10_000
+"""How often places of the cylinders are drawn."""
+
 CLOSENESS_WEIGHT = 5.0
 """Cylinders in a group that a `closeness` of 1 is worth."""
 
@@ -279,15 +283,23 @@ def room_with_cylinders(side_mm: int, seed: int) -> Arena:
     """Return a square room with cylinders that are far from each other and from walls, placed at random.
 
     Args:
-        side_mm: Side of the room [mm]; smaller rooms than 500 mm may have no room for them.
+        side_mm: Side of the room [mm].
         seed: Seed of the random generator.
+
+    Raises:
+        ParameterError: If the room is too small for them.
     """
     rng = np.random.default_rng(seed)
     rows, columns = np.tril_indices(CYLINDERS, -1)
-    while True:
+    for _ in range(PLACES_TRIED):
         places_mm = rng.uniform(FROM_WALL_MM, side_mm - FROM_WALL_MM, (CYLINDERS, 2))
         if np.linalg.norm(places_mm[rows] - places_mm[columns], axis=1).min() >= APART_MM:
             break
+    else:
+        raise ParameterError(
+            f"side_mm must leave room for {CYLINDERS} cylinders {APART_MM:g} mm apart, but it was {side_mm}. "
+            "Take 500 or more."
+        )
     return replace(
         Arena.box(side_mm, side_mm),
         name=f"cylinders {seed}",
