@@ -8,6 +8,7 @@ import threading
 import traceback
 from collections.abc import Callable
 from pathlib import Path
+from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from kiks.clock.program_clock import ProgramClock
@@ -26,7 +27,8 @@ from kiks.sim.port import Line, VirtualPort
 if TYPE_CHECKING:
     from kiks.sim.simulation import Simulation
 
-_NOT_OF_THE_PROGRAM = (str(Path(__file__).parent.parent), "<frozen runpy>", runpy.__file__)
+_NOT_OF_THE_PROGRAM = ("kiks", "runpy")
+"""Modules whose frames an error of the program does not show."""
 
 
 def run_here(sim: Simulation, program: Path, arguments: list[str], told: dict[str, int]) -> int:
@@ -214,15 +216,27 @@ def _complain(text: str) -> int:
 
 def _print_program_trace(error: BaseException) -> None:
     """Print the program's error like Python, without the frames of KiKS and runpy."""
-    report = traceback.TracebackException.from_exception(error)
-    chain: list[traceback.TracebackException | None] = [report]
-    while chain:
-        each = chain.pop()
-        if each is not None:
-            own = [frame for frame in each.stack if not frame.filename.startswith(_NOT_OF_THE_PROGRAM)]
-            each.stack = traceback.StackSummary.from_list(own)
-            chain += [each.__cause__, each.__context__, *(each.exceptions or [])]
-    print("".join(report.format()), end="", file=sys.stderr)
+    left, seen = [error], {id(error)}
+    while left:
+        each = left.pop()
+        each.__traceback__ = _program_part(each.__traceback__)
+        others = [each.__cause__, each.__context__, *getattr(each, "exceptions", ())]
+        left += [other for other in others if other is not None and id(other) not in seen]
+        seen.update(map(id, left))
+    print("".join(traceback.format_exception(error)), end="", file=sys.stderr)
+
+
+def _program_part(trace: TracebackType | None) -> TracebackType | None:
+    """Return a traceback without the frames of modules that are not the program's."""
+    frames: list[TracebackType] = []
+    while trace is not None:
+        if str(trace.tb_frame.f_globals.get("__name__")).partition(".")[0] not in _NOT_OF_THE_PROGRAM:
+            frames.append(trace)
+        trace = trace.tb_next
+    part: TracebackType | None = None
+    for frame in reversed(frames):
+        part = TracebackType(part, frame.tb_frame, frame.tb_lasti, frame.tb_lineno)
+    return part
 
 
 def _print_thread_trace(what: Any, /) -> None:
