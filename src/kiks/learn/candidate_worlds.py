@@ -48,6 +48,16 @@ def bytes_of(arenas: Sequence[Arena]) -> bytes:
     )
 
 
+def check_even(name: str, count: int, arenas: Sequence[Arena]) -> None:
+    """Check that arenas share worlds or starts evenly.
+
+    Raises:
+        ParameterError: If the count is no multiple of the number of arenas.
+    """
+    if count % len(arenas):
+        raise ParameterError(f"{name} must be a multiple of the number of arenas, {len(arenas)}, but it was {count}.")
+
+
 def batches_of(count: int, worlds: int) -> list[slice]:
     """Return the candidates of each batch, of so many worlds each."""
     size = max(1, BATCH_WORLDS_MAX // worlds)

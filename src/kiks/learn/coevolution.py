@@ -8,8 +8,7 @@ Queen! Competition in co-evolutionary robotics, Genetic Programming 1997).
 
 from __future__ import annotations
 
-import io
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -19,15 +18,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kiks.errors import ParameterError, shown
-from kiks.learn.algorithms import library, make_algorithm
+from kiks.learn.algorithms import make_algorithm
 from kiks.learn.champion import Champion
 from kiks.learn.contest import Contest
 from kiks.learn.evaluation import Executor
-from kiks.learn.evolution_log import LOG, Folder, Generation, Identity
+from kiks.learn.evolution_log import LOG, Folder, Generation, Identity, write_table
 from kiks.learn.executors import executor_for
 from kiks.learn.generation_loop import check_executor, run_generations, seed_for
 from kiks.model.array_checks import check_numbers
-from kiks.model.atomic_files import replace_file
 from kiks.model.checks import check_count, check_kind
 from kiks.version import __version__
 
@@ -78,7 +76,7 @@ class Tournament:
         places = np.meshgrid(self.generations, self.generations, indexing="ij")
         columns = {f"{side}_generation": place.ravel() for side, place in zip(self.sides, places, strict=True)}
         columns |= {side: scores.ravel() for side, scores in zip(self.sides, self.scores, strict=True)}
-        _write_table(columns, path, "the tournament")
+        write_table(columns, path, "the tournament")
 
 
 class Coevolution:
@@ -198,7 +196,7 @@ class Coevolution:
             best = own[side][values[:, side].argmax()] if favourite is None else favourite
             self._favourites[side].append(best.copy())
         generation = Generation(
-            candidates=np.concatenate(own, axis=1),
+            candidates=self._both_populations(),
             values=values,
             seeds=np.full(self.population, self.seeds[0]),
             population=self.population,
@@ -213,6 +211,10 @@ class Coevolution:
         if not self._asked:
             self._asked = [algorithm.ask() for algorithm in self._algorithms]
         return self._asked
+
+    def _both_populations(self) -> Floats:
+        """Return the candidates of both sides in one row each, float64 [candidate, parameter]."""
+        return np.concatenate(self._populations(), axis=1)
 
     def _opponents_from(self, side: int) -> Floats:
         """Return the opponents that a side provides, float64 [opponent, parameter]."""
@@ -269,7 +271,7 @@ class Coevolution:
         columns |= {name: table[:, number] for number, name in enumerate(self.contest.value_names)}
         columns["seconds"] = np.repeat([each.seconds for each in self.generations], self.population)
         columns["contests"] = np.repeat(counts * 2 * self.population * self.opponents, self.population)
-        _write_table(columns, path, "the log")
+        write_table(columns, path, "the log")
 
     # ---- results ----
 
@@ -359,18 +361,8 @@ class Coevolution:
         folder.check_identity(
             Identity(contest.name, algorithm, self.seed, self.population, controllers, contest.digest(), __version__)
         )
-        value_count = len(contest.value_names)
-        while True:
-            asked = np.concatenate(self._populations(), axis=1)
-            if (saved := folder.generation(len(self.generations), asked.shape, value_count)) is None:
-                break
-            if not np.array_equal(asked, saved["candidates"]):
-                raise ParameterError(
-                    f"the evolution in {str(folder.path)!r} must continue to the bit, but generation "
-                    f"{len(self.generations) + 1} would have other candidates here: the libraries or the computer have "
-                    "changed. Continue on the computer where it began, or take a new folder."
-                )
-            self._tell(saved["values"], float(saved["seconds"]))
+        for values, seconds in folder.saved_generations(self._both_populations, len(contest.value_names)):
+            self._tell(values, seconds)
         self._earlier_s = self.generations[-1].seconds if self.generations else 0.0
 
 
@@ -382,15 +374,3 @@ def latin_square(size: int, seed: int) -> Integers:
     rng = np.random.default_rng(seed)
     square: Integers = (rng.permutation(size)[:, None] + rng.permutation(size)) % size
     return square
-
-
-def _write_table(columns: Mapping[str, NDArray[Any]], path: str | Path, what: str) -> None:
-    """Write a Parquet file.
-
-    Raises:
-        ParameterError: If it cannot be written, or pyarrow is not installed.
-    """
-    pyarrow, parquet = library("pyarrow"), library("pyarrow.parquet")
-    buffer = io.BytesIO()
-    parquet.write_table(pyarrow.table(dict(columns)), buffer)
-    replace_file(path, buffer.getvalue(), what)

@@ -16,7 +16,15 @@ from kiks.batch.loop_timing import Timing
 from kiks.control.controller import Controller
 from kiks.control.measure import Measure
 from kiks.errors import ParameterError, shown
-from kiks.learn.candidate_worlds import Fitness, batches_of, bytes_of, fitness_of, reduced_by_value, starts_of
+from kiks.learn.candidate_worlds import (
+    Fitness,
+    batches_of,
+    bytes_of,
+    check_even,
+    fitness_of,
+    reduced_by_value,
+    starts_of,
+)
 from kiks.learn.evaluation import Floats, Integers, check_candidates
 from kiks.learn.task import MEASURES_MAX, ROBOTS_MAX, SPREAD, WORLDS_MAX, Seconds
 from kiks.model.checks import check_number
@@ -123,10 +131,7 @@ class Contest:
     __hash__ = object.__hash__
 
     def __post_init__(self) -> None:
-        if self.worlds % len(self.arenas):
-            raise ParameterError(
-                f"worlds must be a multiple of the number of arenas, {len(self.arenas)}, but it was {self.worlds}."
-            )
+        check_even("worlds", self.worlds, self.arenas)
         for what, names in (("sides", self.side_names), ("values of sides", self.value_names)):
             if len(set(names)) != len(names):
                 raise ParameterError(f"{what} must have different names, but they were {shown(names)}.")

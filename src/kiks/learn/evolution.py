@@ -101,11 +101,11 @@ class Evolution:
                 self.name,
                 task.parameter_count,
                 self.population,
-                self._seed_for(_ALGORITHM_SEED),
+                seed_for(self.seed, _ALGORITHM_SEED),
                 task.axes,
                 task.spread,
             )
-        self._trial_seeds = [self._seed_for(TRIAL_SEED, number) for number in range(TRIALS)]
+        self._trial_seeds = [seed_for(self.seed, TRIAL_SEED, number) for number in range(TRIALS)]
         self._rival: Floats | None = None
         self._tried: set[tuple[float, ...]] = set()
         self._best: Champion | None = None
@@ -154,7 +154,7 @@ class Evolution:
 
         All candidates of a population drive in the same worlds, so their fitness can be compared.
         """
-        seeds = [self._seed_for(WORLDS_SEED, len(self.generations))] * self.population
+        seeds = [seed_for(self.seed, WORLDS_SEED, len(self.generations))] * self.population
         return np.array(seeds + ([] if self._rival is None else self._trial_seeds), np.int64)
 
     def tell(self, values: ArrayLike) -> None:
@@ -291,11 +291,7 @@ class Evolution:
             world=self._world,
         )
 
-    # ---- seeds and folders ----
-
-    def _seed_for(self, purpose: int, number: int = 0) -> int:
-        """Return a seed derived from that of the evolution."""
-        return seed_for(self.seed, purpose, number)
+    # ---- folders ----
 
     def _resume(self, folder: Folder) -> None:
         """Take the generations of the folder.
@@ -308,15 +304,8 @@ class Evolution:
         folder.check_identity(
             Identity(task.name, self.name, self.seed, self.population, controller, digest, __version__, task.file)
         )
-        value_count = len(task.value_names)
-        while (saved := folder.generation(len(self.generations), self.ask().shape, value_count)) is not None:
-            if not np.array_equal(self.ask(), saved["candidates"]):
-                raise ParameterError(
-                    f"the evolution in {str(folder.path)!r} must continue to the bit, but generation "
-                    f"{len(self.generations) + 1} would have other candidates here: the libraries or the computer have "
-                    "changed. Continue on the computer where it began, or take a new folder."
-                )
-            self._tell(saved["values"], float(saved["seconds"]))
+        for values, seconds in folder.saved_generations(self.ask, len(task.value_names)):
+            self._tell(values, seconds)
         self._earlier_s = self.generations[-1].seconds if self.generations else 0.0
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -120,7 +120,7 @@ class Folder:
                     "the arguments of the evolution that it holds."
                 )
 
-    def generation(self, number: int, shape: tuple[int, int], value_count: int) -> dict[str, NDArray[Any]] | None:
+    def generation(self, number: int, shape: tuple[int, ...], value_count: int) -> dict[str, NDArray[Any]] | None:
         """Return candidates, values and seconds of a saved generation; None if there is none.
 
         Args:
@@ -141,6 +141,27 @@ class Folder:
         }
         number_count_max = shape[0] * (shape[1] + value_count) + 1
         return read_arrays(file, rules, f"Generation {str(file)!r}", numbers_max=number_count_max)
+
+    def saved_generations(self, ask: Callable[[], Floats], value_count: int) -> Iterator[tuple[Floats, float]]:
+        """Yield values and seconds of the saved generations, for an evolution that begins anew.
+
+        Args:
+            ask: Returns the candidates that the evolution has for its next generation, float64 [candidate, parameter].
+            value_count: Largest number of values of a candidate.
+
+        Raises:
+            ParameterError: If a generation has other candidates.
+        """
+        number = 0
+        while (saved := self.generation(number, ask().shape, value_count)) is not None:
+            number += 1
+            if not np.array_equal(ask(), saved["candidates"]):
+                raise ParameterError(
+                    f"the evolution in {str(self.path)!r} must continue to the bit, but generation {number} would have "
+                    "other candidates here: the libraries or the computer have changed. Continue on the computer where "
+                    "it began, or take a new folder."
+                )
+            yield saved["values"], float(saved["seconds"])
 
     def generation_count(self) -> int:
         """Return the number of saved generations."""
@@ -166,7 +187,6 @@ class Folder:
         Raises:
             ParameterError: If it cannot be written, or pyarrow is not installed.
         """
-        pyarrow, parquet = library("pyarrow"), library("pyarrow.parquet")
         counts = [len(each.values) for each in generations]
 
         def per_candidate(values: Sequence[float]) -> NDArray[Any]:
@@ -185,9 +205,19 @@ class Folder:
         columns["champion_fitness"] = per_candidate([each.champion_fitness for each in generations])
         columns["seconds"] = per_candidate([each.seconds for each in generations])
         columns["evaluations"] = per_candidate(np.cumsum(counts).tolist()).astype(np.int64)
-        buffer = io.BytesIO()
-        parquet.write_table(pyarrow.table(columns), buffer)
-        replace_file(self.path / LOG, buffer.getvalue(), "the log")
+        write_table(columns, self.path / LOG, "the log")
 
     def _file(self, number: int) -> Path:
         return self.path / GENERATIONS / f"{number + 1:06}.npz"
+
+
+def write_table(columns: Mapping[str, NDArray[Any]], path: str | Path, what: str) -> None:
+    """Write a Parquet file.
+
+    Raises:
+        ParameterError: If it cannot be written, or pyarrow is not installed.
+    """
+    pyarrow, parquet = library("pyarrow"), library("pyarrow.parquet")
+    buffer = io.BytesIO()
+    parquet.write_table(pyarrow.table(dict(columns)), buffer)
+    replace_file(path, buffer.getvalue(), what)

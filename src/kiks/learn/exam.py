@@ -19,7 +19,7 @@ from kiks.batch.batch import Batch
 from kiks.batch.initial_state import Arenas, Starts
 from kiks.control.measure import Measure
 from kiks.errors import ParameterError, shown
-from kiks.learn.candidate_worlds import spread_starts
+from kiks.learn.candidate_worlds import check_even, spread_starts
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats
 from kiks.model.arena import Arena
@@ -114,10 +114,7 @@ class Exam:
     __hash__ = object.__hash__
 
     def __post_init__(self) -> None:
-        if self.count % len(self.arenas):
-            raise ParameterError(
-                f"count must be a multiple of the number of arenas, {len(self.arenas)}, but it was {self.count}."
-            )
+        check_even("count", self.count, self.arenas)
 
     def examine(self, champion: Champion, *, robots: int = 1, kinds: Sequence[RobotSpec] | None = None) -> ExamResult:
         """Let a champion drive from all starts, with the timing of its own control loop.

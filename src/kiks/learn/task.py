@@ -17,7 +17,15 @@ from kiks.control.controller import Controller
 from kiks.control.measure import Measure
 from kiks.errors import ParameterError, shown
 from kiks.learn.algorithm_name import AlgorithmName
-from kiks.learn.candidate_worlds import Fitness, batches_of, bytes_of, fitness_of, reduced_by_value, starts_of
+from kiks.learn.candidate_worlds import (
+    Fitness,
+    batches_of,
+    bytes_of,
+    check_even,
+    fitness_of,
+    reduced_by_value,
+    starts_of,
+)
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats, Integers, check_candidates
 from kiks.learn.exam import Exam, world_of
@@ -148,10 +156,7 @@ class Task:
                 f"the controller of a task must state the number of its parameters, but {shown(self.controller)} does "
                 "not. Write @kiks.controller(parameters=COUNT) over the function."
             )
-        if self.worlds % len(self.arenas):
-            raise ParameterError(
-                f"worlds must be a multiple of the number of arenas, {len(self.arenas)}, but it was {self.worlds}."
-            )
+        check_even("worlds", self.worlds, self.arenas)
         names = self.measure_names
         if len(set(names)) != len(names):
             raise ParameterError(f"measures must have different names, but they were {shown(names)}.")
