@@ -71,9 +71,18 @@ def test_the_scores_of_pursuit_share_the_time() -> None:
     values = contest.evaluate(pairs_of(contest, 60), np.zeros(60, np.int64), 1)
     named = dict(zip(contest.value_names, values.T, strict=True))
     np.testing.assert_allclose(named["predator"] + named["prey"], 1.0)
-    np.testing.assert_array_equal(named["predator_escaped_s"], named["prey_escaped_s"])
-    assert (named["prey"] > 0.98).any()
+    np.testing.assert_array_equal(named["predator_escaped_share"], named["prey_escaped_share"])
+    assert (named["prey"] == 1.0).any()
     assert ((named["prey"] > 0.0) & (named["prey"] < 0.9)).any()
+
+
+def test_the_scores_of_pursuit_do_not_depend_on_how_its_time_is_set() -> None:
+    short, changed = small(seconds=3.0), kiks.tasks.pursuit().with_changes(seconds=3.0)
+    pairs, seeds = pairs_of(short, 8), np.arange(8)
+    np.testing.assert_array_equal(short.evaluate(pairs, seeds, 1), changed.evaluate(pairs, seeds, 1))
+    np.testing.assert_array_equal(
+        short.evaluate(pairs, seeds, 1), kiks.tasks.pursuit().evaluate(pairs, seeds, 1, seconds=3.0)
+    )
 
 
 def test_later_motion_does_not_count() -> None:

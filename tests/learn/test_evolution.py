@@ -145,7 +145,8 @@ def test_the_error_names_a_broken_generation_file(tmp_path: Path) -> None:
         {"values": np.full_like(good["values"], np.inf)},
         {"values": good["values"][:, 0]},
         {"values": np.zeros((len(good["values"]), 10**6), np.int8)},
-        {"candidates": good["candidates"][:-1]},
+        {"values": good["values"][:-1]},
+        {"candidates": good["candidates"][:-1], "values": good["values"][:-1]},
         {"candidates": good["candidates"].astype(complex)},
         {"candidates": good["candidates"].astype(object)},
     ]

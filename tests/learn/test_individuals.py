@@ -11,6 +11,7 @@ import pytest
 import kiks
 from kiks import ParameterError
 from kiks.demos.champion import ChampionScene
+from kiks.learn.evolution import TRIALS
 from kiks.learn.individual import individual_of
 from kiks.model.arena_file import save_arena
 from kiks.model.family import family
@@ -80,6 +81,22 @@ def test_a_demonstration_is_the_world_of_the_evaluation(
     if len(task.timings) == 1:
         assert found_hashes == expected
     assert sorted(found_hashes) == sorted(expected)
+
+
+def test_generations_need_no_rival_on_trial(tmp_path: Path) -> None:
+    """All candidates fall into one cell of the map, and its elite is tried once."""
+    pytest.importorskip("ribs")
+    task = kiks.tasks.avoid(seconds=1.0, worlds=3)
+    evolution = kiks.Evolution(task, "map-elites", seed=3, population=6, folder=tmp_path)
+    for _ in range(4):
+        evolution.tell(np.zeros((len(evolution.ask()), len(task.value_names))))
+    assert [len(each.candidates) - 6 for each in evolution.generations] == [0, TRIALS, 0, 0]
+    for number, generation in enumerate(evolution.generations, 1):
+        found = individual_of(tmp_path, number, rank=2, task=task)
+        assert found.champion.parameters == tuple(generation.candidates[1])
+    np.savez(tmp_path / "generations/000002.npz", candidates=np.zeros((9, 18)), values=np.zeros((9, 1)), seconds=1.0)
+    with pytest.raises(ParameterError, match="candidates must be 6 or 14, but their number was 9"):
+        individual_of(tmp_path, 2, task=task)
 
 
 def test_the_task_is_found_again(tmp_path: Path) -> None:

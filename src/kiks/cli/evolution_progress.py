@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 if TYPE_CHECKING:
-    from kiks.learn.coevolution import Coevolution
-    from kiks.learn.evolution import Evolution
+    from kiks.learn.generation_loop import Evolving
 
 EVERY_S = 5.0
 """Time between lines where there is no terminal [s]."""
@@ -19,8 +18,8 @@ EVERY_S = 5.0
 
 @contextmanager
 def progress_of(
-    evolution: Evolution | Coevolution, generations: int | None, seconds: float | None
-) -> Iterator[Callable[[Evolution | Coevolution], Any]]:
+    evolution: Evolving, generations: int | None, seconds: float | None
+) -> Iterator[Callable[[Evolving], Any]]:
     """Return a function that shows how far it is; it is called after each generation."""
     from rich.console import Console
 
@@ -40,21 +39,22 @@ def progress_of(
     def text(width: int | None = None) -> str:
         """Return how far it is, in no more than so many characters if that can be."""
         now_s = perf_counter()
-        figures, driven_s = _latest(evolution)
-        rate = driven_s / max(now_s - last_s[0], 1e-9)
+        rate = evolution.driven_s / max(now_s - last_s[0], 1e-9)
         last_s[0] = now_s
-        time = {f"{_metric(rate)} x real time": 6, f"{done_and_left()[1]:.0f} s left": 2}
+        shown = [f"{name} {value:.4f}" for name, value in evolution.figures.items()]
+        figures = {figure: 1 + 2 * number for number, figure in enumerate(shown)}
+        time = {f"{_metric(rate)} x real time": 1 + 2 * len(figures), f"{done_and_left()[1]:.0f} s left": 2}
         return _fitting({f"generation {len(evolution.generations)}": 0} | figures | time, width)
 
     if console.is_terminal:
         from rich.progress import BarColumn, Progress, TextColumn
 
-        name, bar_width = _name(evolution), min(20, console.width // 6)
+        name, bar_width = evolution.work.name, min(20, console.width // 6)
         columns = (TextColumn(name), BarColumn(bar_width), TextColumn("{task.description}"))
         with Progress(*columns, console=console, transient=True) as progress:
             bar = progress.add_task("preparing", total=1.0)
 
-            def show(_: Evolution | Coevolution) -> None:
+            def show(_: Evolving) -> None:
                 said = text(console.width - len(name) - bar_width - 2)
                 progress.update(bar, completed=done_and_left()[0], description=said)
 
@@ -62,38 +62,13 @@ def progress_of(
         return
     told_s = [-EVERY_S]
 
-    def tell(_: Evolution | Coevolution) -> None:
+    def tell(_: Evolving) -> None:
         said = text()
         if perf_counter() - told_s[0] > EVERY_S or done_and_left()[0] >= 1:
             told_s[0] = perf_counter()
             typer.echo(said)
 
     yield tell
-
-
-def _name(evolution: Evolution | Coevolution) -> str:
-    """Return the name of what is evolved for."""
-    from kiks.learn.coevolution import Coevolution
-
-    return (evolution.contest if isinstance(evolution, Coevolution) else evolution.task).name
-
-
-def _latest(evolution: Evolution | Coevolution) -> tuple[dict[str, int], float]:
-    """Return texts on the last generation, each with its importance, and for how long its robots drove [s]."""
-    from kiks.learn.coevolution import Coevolution
-
-    latest = evolution.generations[-1]
-    if isinstance(evolution, Coevolution):
-        sides = evolution.contest.side_names
-        best = {f"best {name} {latest.values[:, side].max():.3f}": 1 + 2 * side for side, name in enumerate(sides)}
-        means = {f"mean {name} {latest.values[:, side].mean():.3f}": 4 + side for side, name in enumerate(sides)}
-        return best | means, 2 * evolution.population * evolution.opponents * evolution.contest.driven_s
-    figures = {
-        f"best {latest.fitness.max():.4f}": 1,
-        f"mean {latest.fitness.mean():.4f}": 4,
-        f"champion {evolution.champion.fitness:.4f}": 3,
-    }
-    return figures, len(latest.values) * evolution.task.driven_s
 
 
 def _fitting(parts: Mapping[str, int], width: int | None) -> str:

@@ -304,8 +304,8 @@ def _reached_s(x_mm: float, y_mm: float, radius_mm: float) -> Measure:
     return reached_s
 
 
-def escaped_s(*, radius_mm: float = 57.0) -> Measure:
-    """When another robot's middle first came within a radius of its own [s]; if none did, how long it has driven.
+def escaped_share(*, radius_mm: float = 57.0) -> Measure:
+    """Share of control steps before another robot's middle first came within a radius of its own; 1 if none did.
 
     The middles of two Kheperas that touch are 55 mm apart. Control steps see where robots are: Kheperas that pass each
     other at 240 mm/s may touch between two steps, and be 56.3 mm apart at both.
@@ -316,21 +316,21 @@ def escaped_s(*, radius_mm: float = 57.0) -> Measure:
     Raises:
         ParameterError: If an argument is out of range.
     """
-    return _escaped_s(_radius(radius_mm))
+    return _escaped_share(_radius(radius_mm))
 
 
 @functools.lru_cache(maxsize=256)
-def _escaped_s(radius_mm: float) -> Measure:
-    @measure(notes=2)
-    def escaped_s(moment: Any, notes: Any) -> None:
-        if notes[1] == 0.0:
-            notes[0] = moment.time_s
-            for other in range(moment.poses.shape[0]):
-                is_near = distance_mm(moment, moment.poses[other, 0], moment.poses[other, 1]) <= radius_mm
-                if other != moment.robot and is_near:
-                    notes[1] = 1.0
+def _escaped_share(radius_mm: float) -> Measure:
+    @measure(notes=3, result=mean)
+    def escaped_share(moment: Any, notes: Any) -> None:
+        for other in range(moment.poses.shape[0]):
+            is_near = distance_mm(moment, moment.poses[other, 0], moment.poses[other, 1]) <= radius_mm
+            if other != moment.robot and is_near:
+                notes[2] = 1.0
+        notes[0] += 1.0 - notes[2]
+        notes[1] += 1.0
 
-    return escaped_s
+    return escaped_share
 
 
 # ---- what is about ----

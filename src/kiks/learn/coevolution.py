@@ -246,7 +246,7 @@ class Coevolution:
             ParameterError: If neither generations nor seconds are given, or one is out of range.
             WorkError: If the contest cannot be evaluated.
         """
-        run_generations(self, self.contest, generations=generations, seconds=seconds, executor=executor, each=each)
+        run_generations(self, generations=generations, seconds=seconds, executor=executor, each=each)
         return self.champion(0), self.champion(1)
 
     def save_log(self) -> None:
@@ -274,6 +274,23 @@ class Coevolution:
         write_table(columns, path, "the log")
 
     # ---- results ----
+
+    @property
+    def work(self) -> Contest:
+        """The contest."""
+        return self.contest
+
+    @property
+    def figures(self) -> dict[str, float]:
+        """What the last generation achieved: the best and the mean fitness of each side."""
+        of_sides = list(zip(self.contest.side_names, self.generations[-1].values.T, strict=False))
+        best = {f"best {name}": fitness.max() for name, fitness in of_sides}
+        return best | {f"mean {name}": fitness.mean() for name, fitness in of_sides}
+
+    @property
+    def driven_s(self) -> float:
+        """Total time for which the robots of the last generation drove [s]."""
+        return 2 * self.population * self.opponents * self.contest.driven_s
 
     def champion(self, side: int | str, generation: int | None = None) -> Champion:
         """Return the champion of a side in a generation: the candidate that the algorithm considers best.

@@ -243,7 +243,7 @@ class Evolution:
             ParameterError: If neither generations nor seconds are given, or one is out of range.
             WorkError: If the task cannot be evaluated.
         """
-        run_generations(self, self.task, generations=generations, seconds=seconds, executor=executor, each=each)
+        run_generations(self, generations=generations, seconds=seconds, executor=executor, each=each)
         return self.champion
 
     def save_log(self) -> None:
@@ -259,6 +259,22 @@ class Evolution:
             self._folder.save_log(self.generations, self.task.value_names)
 
     # ---- results ----
+
+    @property
+    def work(self) -> Task:
+        """The task."""
+        return self.task
+
+    @property
+    def figures(self) -> dict[str, float]:
+        """What the last generation achieved: best fitness, that of the champion, mean fitness."""
+        fitness = self.generations[-1].fitness
+        return {"best": fitness.max(), "champion": self.champion.fitness, "mean": fitness.mean()}
+
+    @property
+    def driven_s(self) -> float:
+        """Total time for which the robots of the last generation drove [s]."""
+        return len(self.generations[-1].values) * self.task.driven_s
 
     @property
     def champion(self) -> Champion:

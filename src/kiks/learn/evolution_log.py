@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -120,12 +120,15 @@ class Folder:
                     "the arguments of the evolution that it holds."
                 )
 
-    def generation(self, number: int, shape: tuple[int, ...], value_count: int) -> dict[str, NDArray[Any]] | None:
+    def generation(
+        self, number: int, candidate_counts: Collection[int], parameter_count: int, value_count: int
+    ) -> dict[str, NDArray[Any]] | None:
         """Return candidates, values and seconds of a saved generation; None if there is none.
 
         Args:
             number: Number of the generation, from 0.
-            shape: Number of candidates that it must have, and of parameters of each.
+            candidate_counts: Numbers of candidates of which it must have one.
+            parameter_count: Number of parameters of a candidate.
             value_count: Largest number of values of a candidate.
 
         Raises:
@@ -135,12 +138,16 @@ class Folder:
         if not file.exists():
             return None
         rules = {
-            "candidates": Numbers(shape, advice=_ADVICE),
-            "values": Numbers((shape[0], "value"), advice=_ADVICE),
+            "candidates": Numbers(("candidate", parameter_count), advice=_ADVICE),
+            "values": Numbers(("candidate", "value"), advice=_ADVICE),
             "seconds": Numbers((), low=0.0, advice=_ADVICE),
         }
-        number_count_max = shape[0] * (shape[1] + value_count) + 1
-        return read_arrays(file, rules, f"Generation {str(file)!r}", numbers_max=number_count_max)
+        what, numbers_max = f"Generation {str(file)!r}", max(candidate_counts) * (parameter_count + value_count) + 1
+        arrays = read_arrays(file, rules, what, numbers_max=numbers_max)
+        if (count := len(arrays["candidates"])) not in candidate_counts:
+            wanted = " or ".join(map(str, candidate_counts))
+            raise ParameterError(f"{what}: candidates must be {wanted}, but their number was {count}. {_ADVICE}")
+        return arrays
 
     def saved_generations(self, ask: Callable[[], Floats], value_count: int) -> Iterator[tuple[Floats, float]]:
         """Yield values and seconds of the saved generations, for an evolution that begins anew.
@@ -153,7 +160,7 @@ class Folder:
             ParameterError: If a generation has other candidates.
         """
         number = 0
-        while (saved := self.generation(number, ask().shape, value_count)) is not None:
+        while (saved := self.generation(number, ask().shape[:1], ask().shape[1], value_count)) is not None:
             number += 1
             if not np.array_equal(ask(), saved["candidates"]):
                 raise ParameterError(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from time import perf_counter
 from typing import Any, Protocol, TypeVar
 
@@ -18,8 +18,22 @@ LOG_EVERY_S = 10.0
 """Time between two writes of the log [s]; each writes the whole log."""
 
 
+class Named(Evaluation, Protocol):
+    """An evaluation with a name."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        ...
+
+
 class Evolving(Protocol):
-    """An evolution."""
+    """An evolution, of the controllers of a task or of both sides of a contest."""
+
+    @property
+    def work(self) -> Named:
+        """The task or the contest: it evaluates the candidates."""
+        ...
 
     @property
     def generations(self) -> Sequence[Any]:
@@ -41,13 +55,22 @@ class Evolving(Protocol):
     def save_log(self) -> None:
         """Write the results so far."""
 
+    @property
+    def figures(self) -> Mapping[str, float]:
+        """What the last generation achieved, by name, the most important first."""
+        ...
+
+    @property
+    def driven_s(self) -> float:
+        """Total time for which the robots of the last generation drove [s]."""
+        ...
+
 
 Some = TypeVar("Some", bound=Evolving)
 
 
 def run_generations(
     evolution: Some,
-    work: Evaluation,
     *,
     generations: int | None,
     seconds: float | None,
@@ -58,7 +81,6 @@ def run_generations(
 
     Args:
         evolution: The evolution.
-        work: Evaluates its candidates.
         generations: Total number of generations, including earlier ones.
         seconds: No generation begins later than this [s of the wall clock].
         executor: An open executor, or where to evaluate: see `kiks.learn.executors.executor_for`.
@@ -75,8 +97,8 @@ def run_generations(
             check_number(name, value, 0)
     check_executor(executor)
     if isinstance(executor, str):
-        with executor_for(executor, work) as opened:
-            run_generations(evolution, work, generations=generations, seconds=seconds, executor=opened, each=each)
+        with executor_for(executor, evolution.work) as opened:
+            run_generations(evolution, generations=generations, seconds=seconds, executor=opened, each=each)
         return
     begin_s, logged_s = perf_counter(), -np.inf
     try:

@@ -56,9 +56,9 @@ def individual_of(
         raise ParameterError(f"the evolution in {str(saved.path)!r} must have a generation, but it has none yet.")
     number = check_count("generation", generation, 1, count) - 1
     found = _task_of(saved, identity, task)
-    # The first generation has no rival on trial.
-    shape = (identity.population + (TRIALS if number else 0), found.parameter_count)
-    arrays = saved.generation(number, shape, len(found.value_names))
+    # There may be a rival on trial or not: the first generation has none, nor has one after all elites were tried.
+    counts = (identity.population, identity.population + TRIALS)
+    arrays = saved.generation(number, counts, found.parameter_count, len(found.value_names))
     assert arrays is not None
     fitness = arrays["values"][: identity.population, 0]
     order = (-fitness).argsort(kind="stable")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,9 +19,6 @@ Values = Mapping[str, Floats]
 PURSUIT_MM = 470
 """Side of the arena of `pursuit` [mm] (Floreano and Nolfi 1997)."""
 
-PURSUIT_S = 25.0
-"""Default time that the predator has [s]."""
-
 PREDATOR_SPEED, PREY_SPEED = 10.0, 20.0
 """Highest speeds [pulses/10 ms], 80 and 160 mm/s: the prey is twice as fast (Floreano and Nolfi 1997)."""
 
@@ -36,37 +32,39 @@ PURSUIT_APART_MM = 100.0
 """Least gap between predator and prey at the start [mm], beyond the range of the proximity sensors."""
 
 
-def pursuit(*, seconds: float = PURSUIT_S, **changes: Any) -> Contest:
+def predator_fitness(values: Values) -> Floats:
+    """Return the share of the time that is left after the prey was caught."""
+    return 1.0 - prey_fitness(values)
+
+
+def prey_fitness(values: Values) -> Floats:
+    """Return the share of the time for which the prey was not caught."""
+    escaped: Floats = values["escaped_share"].mean(axis=1)
+    return escaped
+
+
+def pursuit(**changes: Any) -> Contest:
     """Return the contest of a predator and a prey that is twice as fast (Floreano and Nolfi 1997).
 
     Both have proximity sensors, the predator has the camera K213, too. The prey's fitness is the share of the time for
     which it was not caught, the predator's is the rest. What the robots do after the first contact does not count.
 
     Args:
-        seconds: The time that the predator has [s].
         changes: Other arguments of `kiks.Contest`.
     """
-
-    def prey_fitness(values: Values) -> Floats:
-        escaped: Floats = values["escaped_s"].mean(axis=1) / seconds
-        return escaped
-
-    def predator_fitness(values: Values) -> Floats:
-        return 1.0 - prey_fitness(values)
-
     predator = controllers.mlp(hidden=(), senses=("proximity", "camera"), feedback=True, speed_limit=PREDATOR_SPEED)
     prey = controllers.mlp(hidden=(), feedback=True, speed_limit=PREY_SPEED)
     contest = Contest(
         "pursuit",
         (Side("predator", predator, predator_fitness), Side("prey", prey, prey_fitness)),
         (Arena.box(PURSUIT_MM, PURSUIT_MM),),
-        (measures.escaped_s(radius_mm=CAUGHT_MM), measures.path_mm, measures.contacts),
-        seconds=seconds,
+        (measures.escaped_share(radius_mm=CAUGHT_MM), measures.path_mm, measures.contacts),
+        seconds=25.0,
         apart_mm=PURSUIT_APART_MM,
         timing=Timing(baud=PURSUIT_BAUD),
         about="predator and prey, which evolve against each other",
     )
-    return replace(contest, **changes)
+    return contest.with_changes(**changes)
 
 
 CONTESTS: dict[str, Callable[..., Contest]] = {"pursuit": pursuit}
