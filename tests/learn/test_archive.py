@@ -211,7 +211,7 @@ def test_foreign_and_wrong_archives_are_errors(tmp_path: Path) -> None:
         (changed("fitness", pyarrow.array(["x"] * rows)), {}, "fitness must be finite numbers"),
         (changed("parameter_1", pyarrow.array([None] * rows, pyarrow.float64())), {}, "parameter_1 must be finite"),
         (changed("generation", pyarrow.array([-1] * rows)), {}, "generation must be whole numbers from 0"),
-        (good, {"compression": "gzip"}, "without compression"),
+        (pyarrow.concat_tables([good[:1]] * 10_000), {"compression": "gzip"}, "must hold its numbers as they are"),
     ]
     for table, options, message in wrong:
         parquet.write_table(table, file, **{"compression": "none"} | options)
@@ -220,6 +220,23 @@ def test_foreign_and_wrong_archives_are_errors(tmp_path: Path) -> None:
     file.unlink()
     with pytest.raises(ParameterError, match="must exist"):
         kiks.Archive.load(tmp_path)
+
+
+def test_damaged_footers_are_errors_of_one_line(tmp_path: Path) -> None:
+    """Such a footer makes pyarrow's own view of a column end the process."""
+    run("map-elites", 1, tmp_path)
+    file = tmp_path / "archive.parquet"
+    whole = file.read_bytes()
+    end = len(whole) - 8
+    messages = []
+    for place in range(end - int.from_bytes(whole[end : end + 4], "little"), end, 5):
+        file.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+        try:
+            kiks.Archive.load(tmp_path)
+        except ParameterError as error:
+            messages.append(str(error))
+    assert len(messages) > 100
+    assert all(map(str.isprintable, messages))
 
 
 def test_too_many_cells_are_an_error() -> None:

@@ -31,8 +31,10 @@ Floats = NDArray[np.float64]
 ARCHIVE, CHAMPION = "archive.parquet", "champion.toml"
 """Names in the folder of an evolution."""
 
-FILE_BYTES_MAX, NUMBERS_MAX = 256 << 20, 1 << 25
-"""Largest size of an archive's file [byte], and most numbers in it."""
+FILE_BYTES_MAX = 256 << 20
+"""Largest size of an archive's file [byte]."""
+
+_NUMBER_BYTES = 8
 
 CELLS_MAX = 2**53
 """Most cells of an archive."""
@@ -261,33 +263,32 @@ def _read(data: bytes, parameter_count: int) -> tuple[_Head, dict[str, NDArray[A
         file = parquet.ParquetFile(pyarrow.BufferReader(data))
         described = file.metadata
         text = (described.metadata or {}).get(_HEAD)
-        packed = {
-            described.row_group(group).column(column).compression
-            for group in range(described.num_row_groups)
-            for column in range(described.num_columns)
-        }
-        row_count, found = described.num_rows, set(file.schema_arrow.names)
+        row_count = sum(described.row_group(group).num_rows for group in range(described.num_row_groups))
+        found = [(field.name, field.type) for field in file.schema_arrow]
     except Exception as failure:  # the library raises whatever it stumbles over in a damaged file
         raise ParameterError(f"it must be a whole Parquet file, but: {one_line(failure)}. {_ADVICE}") from None
     if text is None:
         raise ParameterError(f"it must be an archive of KiKS, but it is another Parquet file. {_ADVICE}")
     head = check(_Head, parse_json(text, "its head"), "its head", advice=_ADVICE)
     names = ("generation", *head.values, *(f"parameter_{number}" for number in range(1, parameter_count + 1)))
-    if missing := [name for name in names if name not in found]:
+    if missing := [name for name in names if name not in dict(found)]:
         raise ParameterError(
             f"it must have a column for each value and each of the champion's {parameter_count} parameters, but "
             f"{shown(missing[0])} is missing. Take archive and champion of the same folder."
         )
-    if packed - {"UNCOMPRESSED"} or row_count * len(names) > NUMBERS_MAX:
+    rules = {name: Numbers((row_count,), advice=_ADVICE) for name in names}
+    rules["generation"] = Numbers((row_count,), low=0, is_whole=True, advice=_ADVICE)
+    for name, kind in found:
+        if name in rules and kind not in (pyarrow.int64(), pyarrow.float64()):
+            raise ParameterError(f"{name} must be {rules[name]}, but it was of type {shown(str(kind))}. {_ADVICE}")
+    if (count := row_count * len(names)) > len(data) // _NUMBER_BYTES:
         raise ParameterError(
-            f"it must hold at most {NUMBERS_MAX} numbers without compression, but it held {row_count * len(names)}, "
-            f"{', '.join(sorted(packed)).lower() or 'none'}. {_ADVICE}"
+            f"it must hold its numbers as they are, at most {len(data) // _NUMBER_BYTES} in {len(data)} bytes, but it "
+            f"held {count}. {_ADVICE}"
         )
     try:
         table = file.read(columns=list(names))
         columns = {name: table.column(name).to_numpy() for name in names}
     except Exception as failure:
         raise ParameterError(f"it must be a whole Parquet file, but: {one_line(failure)}. {_ADVICE}") from None
-    rules = {name: Numbers((row_count,), advice=_ADVICE) for name in names}
-    rules["generation"] = Numbers((row_count,), low=0, is_whole=True, advice=_ADVICE)
     return head, {name: check_array(column, rules[name], name) for name, column in columns.items()}

@@ -12,10 +12,11 @@ import json
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from kiks.errors import ParameterError, shown
 from kiks.learn.algorithms import library
@@ -38,8 +39,8 @@ class Identity:
 
     task: Text
     algorithm: Text
-    seed: Whole
-    population: Whole
+    seed: Annotated[Whole, Field(ge=0, lt=2**63)]
+    population: Annotated[Whole, Field(ge=1, lt=2**63)]
     controller: Text
     task_digest: Text
     kiks: Text

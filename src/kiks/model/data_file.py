@@ -228,7 +228,7 @@ def _check_keys_are_short(text: str) -> None:
 
 def one_line(failure: BaseException) -> str:
     """Return the text of a foreign exception, for the middle of a message."""
-    text = " ".join(str(failure).split())
+    text = " ".join("".join(sign if sign.isprintable() else " " for sign in str(failure)).split())
     if isinstance(failure, RecursionError):
         return "it is nested too deeply"
     if "set_int_max_str_digits" in text:
