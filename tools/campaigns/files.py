@@ -7,8 +7,9 @@ import io
 import os
 import random
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import redirect_stdout
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from importlib import resources
 from pathlib import Path
@@ -17,13 +18,26 @@ from typing import Any
 import numpy as np
 from tools.campaigns.hostile import BYTES_MAX, mutated, mutated_text
 from tools.campaigns.runner import SECRET, Campaign, Play
-from tools.campaigns.strange import bomb, strange_kad, strange_mat, strange_netpbm, strange_npz, strange_png
+from tools.campaigns.strange import (
+    bomb,
+    strange_kad,
+    strange_mat,
+    strange_netpbm,
+    strange_npz,
+    strange_parquet,
+    strange_png,
+)
 from tools.sensors.models import thesis
 
 import kiks
+from kiks.cli.compare import compare
 from kiks.clock.thinking import parse_thinking
+from kiks.demos.contest import ContestScene
 from kiks.desk.server.folder import decode
 from kiks.fit.samples import load_samples, nearnesses
+from kiks.learn.archive import ARCHIVE, CHAMPION
+from kiks.learn.individual import individual_of
+from kiks.learn.results import RESULT, result_of
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
 from kiks.model.arena_file import save_arena
 from kiks.model.kad import encode_kad
@@ -81,6 +95,7 @@ class Kind:
         def play(rng: random.Random) -> None:
             with tempfile.TemporaryDirectory(prefix="kiks-torture-") as folder:
                 for name, data in self.beside:
+                    (Path(folder) / name).parent.mkdir(exist_ok=True)
                     (Path(folder) / name).write_bytes(data)
                 file = Path(folder) / self.file
                 file.parent.mkdir(exist_ok=True)
@@ -132,7 +147,10 @@ def _uploaded(path: Path) -> None:
 
 
 def _champion(path: Path) -> None:
-    champion = kiks.Champion.load(path)
+    _drive_champion(kiks.Champion.load(path))
+
+
+def _drive_champion(champion: kiks.Champion) -> None:
     world = champion.world
     is_small = world is None or (world.arena.brightness.size <= CELLS_MAX and len(world.robots) <= 20)
     sim, ports = champion.simulation(None if is_small else _BOX, seed=1)
@@ -148,6 +166,42 @@ def _evolution(path: Path) -> None:
     evolution.ask()
     if evolution.generations:
         evolution.champion._text({}, {})
+
+
+def _individual(path: Path) -> None:
+    folder = path.parent if path.name == "evolution.json" else path.parents[1]
+    _drive_champion(individual_of(folder, 1, rank=2, task=_task()).champion)
+
+
+def _archive(path: Path) -> None:
+    archive = kiks.Archive.load(path.parent)
+    if archive.elites:
+        _drive_champion(archive.champion_at(*[0.5] * len(archive.axes)))
+
+
+def _result(path: Path) -> None:
+    """Compare it with a sound one, as `kiks compare` does."""
+    folder = path.parent / "sound"
+    for name, data in _finished().items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(data)
+    with redirect_stdout(io.StringIO()):
+        compare(path.parent, folder, path.parent / "compared.png")
+
+
+def _contest(path: Path) -> None:
+    scene = ContestScene(path.parent, seed=1)
+    for _ in range(3):
+        scene.step()
+    scene.sim.state_hash()
+
+
+def _coevolution(path: Path) -> None:
+    folder = path.parent if path.name == "evolution.json" else path.parents[1]
+    coevolution = kiks.Coevolution(_pursuit(), seed=3, population=4, opponents=1, folder=folder)
+    coevolution.ask()
+    if coevolution.generations:
+        coevolution.champion(0)._text({}, {})
 
 
 def _network(path: Path) -> None:
@@ -209,19 +263,44 @@ def _task() -> kiks.Task:
     return kiks.tasks.avoid(seconds=1.0, worlds=3)
 
 
-def _evolved() -> tuple[bytes, bytes, dict[str, Any]]:
-    """Return what an evolution leaves: its identity, its first generation, and the arrays of that."""
+@cache
+def _pursuit() -> kiks.Contest:
+    return kiks.tasks.pursuit(seconds=1.0)
+
+
+_IDENTITY, _GENERATION = "evolution.json", "generations/000001.npz"
+
+
+@cache
+def _finished() -> Mapping[str, bytes]:
+    """Return the files of an evolution of one generation, by name."""
     with tempfile.TemporaryDirectory() as folder:
         evolution = kiks.Evolution(_task(), "ga", seed=3, population=4, folder=folder)
-        asked = evolution.ask()
-        evolution.tell(np.linspace(0.0, 1.0, 4))
-        identity = (Path(folder) / "evolution.json").read_bytes()
-        generation = (Path(folder) / "generations" / "000001.npz").read_bytes()
-    return (
-        identity,
-        generation,
-        {"candidates": asked, "values": np.linspace(0.0, 1.0, 4)[:, None], "seconds": np.float64(1.0)},
-    )
+        values = np.outer(np.linspace(0.1, 0.9, 4), np.ones(len(_task().value_names)))
+        evolution.tell(values)
+        evolution.save_log()
+        result_of(evolution).save(Path(folder))
+        return _files_in(folder)
+
+
+@cache
+def _coevolved() -> Mapping[str, bytes]:
+    """Return the files of a co-evolution of one generation, by name."""
+    with tempfile.TemporaryDirectory() as folder:
+        coevolution = kiks.Coevolution(_pursuit(), seed=3, population=4, opponents=1, folder=folder)
+        coevolution.tell(np.zeros((8, len(_pursuit().value_names))))
+        coevolution.save_log()
+        return _files_in(folder)
+
+
+def _files_in(folder: str) -> dict[str, bytes]:
+    paths = (path for path in Path(folder).rglob("*") if path.is_file())
+    return {str(path.relative_to(folder)): path.read_bytes() for path in paths}
+
+
+def _arrays_in(generation: bytes) -> dict[str, Any]:
+    with np.load(io.BytesIO(generation)) as arrays:
+        return dict(arrays)
 
 
 _ARENA_TOML = b"""name = "sound"
@@ -258,6 +337,13 @@ brightness = 90
 _TEXT_SAMPLES = (
     "8 2 3 5 2\n" + "".join(f"TURN {n}\n0 1 2 3 4 5 6 1023\n9 8 7 6 5 4 3 2\n" for n in range(3)) + "END\n"
 ).encode()
+
+
+def _among(name: str, files: Mapping[str, bytes], file: str, read: Callable[[Path], object], text: str = "") -> Kind:
+    """Return a kind of file that lies among the other files of an evolution."""
+    beside = tuple(each for each in files.items() if each[0] != file)
+    strange = (partial(strange_npz, _arrays_in(files[file])),) if file == _GENERATION else ()
+    return Kind(name, file, [files[file]], read, text, strange, beside)
 
 
 def _kinds() -> Iterator[Kind]:
@@ -317,17 +403,20 @@ def _kinds() -> Iterator[Kind]:
         saved = (Path(folder) / "own.toml").read_bytes()
     yield Kind("champion", "own.toml", [saved], _champion, "toml")
 
-    identity, generation, arrays = _evolved()
-    there = (("evolution.json", identity), ("generations/000001.npz", generation))
-    yield Kind("evolution", "evolution.json", [identity], _evolution, "json")
-    yield Kind(
-        "generation",
-        "generations/000001.npz",
-        [generation],
-        _evolution,
-        strange=(partial(strange_npz, arrays),),
-        beside=there[:1],
+    evolved, coevolved = _finished(), _coevolved()
+    yield Kind("evolution", _IDENTITY, [evolved[_IDENTITY]], _evolution, "json")
+    yield _among("generation", evolved, _GENERATION, _evolution)
+    yield _among("individual", evolved, _GENERATION, _individual)
+    yield _among("individual_record", evolved, _IDENTITY, _individual, "json")
+    yield _among(
+        "champion_world", evolved, "champion_world.kiks", lambda path: _champion(path.parent / CHAMPION), "toml"
     )
+    archive = _among("archive", evolved, ARCHIVE, _archive)
+    yield replace(archive, strange=(partial(strange_parquet, *archive.sound),))
+    yield _among("result", evolved, RESULT, _result, "json")
+    yield _among("contest", coevolved, "prey.toml", _contest, "toml")
+    yield _among("coevolution", coevolved, _IDENTITY, _coevolution, "json")
+    yield _among("pairs", coevolved, _GENERATION, _coevolution)
 
     yield Kind("network", "own.json", [THESIS.read_bytes()[:200_000]], _network, "json")
 
