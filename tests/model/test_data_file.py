@@ -136,6 +136,7 @@ def test_files_are_files_of_a_size(tmp_path: Path) -> None:
             read_file(place, "File 'a'", error=ArenaError)
     path.write_bytes(b"abc")
     assert read_file(path, "File 'a'", bytes_max=3) == b"abc"
+    assert read_file(path, "File 'a'", bytes_max=2**80) == b"abc"
     with pytest.raises(ParameterError, match=r"File 'a' must have at most .* MiB, but it has more"):
         read_file(path, "File 'a'", bytes_max=2)
     with pytest.raises(ParameterError, match="there is no such file"):

@@ -40,7 +40,7 @@ class Identity:
     task: Text
     algorithm: Text
     seed: Annotated[Whole, Field(ge=0, lt=2**63)]
-    population: Annotated[Whole, Field(ge=1, lt=2**63)]
+    population: Annotated[Whole, Field(ge=1, le=1_000_000)]
     controller: Text
     task_digest: Text
     kiks: Text

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
 import re
 import tomllib
 import types
@@ -160,7 +161,8 @@ def read_file(path: Path, what: str, *, bytes_max: int = BYTES_MAX, error: type[
                 f"{what} must exist, but there is no such file. Check the name and the folder {str(Path.cwd())!r}."
             )
         with path.open("rb") as file:
-            data = file.read(bytes_max + 1)
+            # Python asks for the memory of as many bytes as it is told to read, though there are fewer.
+            data = file.read(min(os.fstat(file.fileno()).st_size, bytes_max) + 1)
     except (OSError, ValueError) as failure:
         if isinstance(failure, KiksError):
             raise
