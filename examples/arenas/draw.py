@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
-from kiks.demos import pitch
+from kiks.model import pitch
 
 Picture = npt.NDArray[np.uint8]
 

@@ -14,9 +14,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.demos import pitch
 from kiks.engine.scalar_math import uniform
 from kiks.errors import ParameterError, shown
+from kiks.model import pitch
 from kiks.model.robot import RobotSpec
 from kiks.ports.program_process import Command
 from kiks.ports.programs import Programs
@@ -174,9 +174,7 @@ class Match(Simulation):
 
 def scorer(x_mm: float, radius_mm: float) -> str | None:
     """Return the side that scores with a ball at x: all of the ball must be behind the line."""
-    if x_mm > pitch.RIGHT_LINE_MM + radius_mm:
-        return "left"
-    return "right" if x_mm < pitch.LEFT_LINE_MM - radius_mm else None
+    return {1: "left", -1: "right"}.get(pitch.goal_at(x_mm, radius_mm))
 
 
 def play(match: Match, players: Sequence[Command], say: Callable[[str], None] = lambda text: None) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from soccer_match import LOOK_S, Goal, Match
 
-from kiks.demos import pitch
+from kiks.model import pitch
 
 if TYPE_CHECKING:
     from PIL.Image import Image

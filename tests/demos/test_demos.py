@@ -113,7 +113,7 @@ def test_the_robots_of_a_swarm_spread_out_and_do_not_touch() -> None:
 
 def test_programs_know_only_what_a_robot_tells() -> None:
     folder = ROOT / "src" / "kiks" / "demos"
-    outside = {"scene", "scenes", "champion", "contest", "pitch", "__init__"}
+    outside = {"scene", "scenes", "champion", "contest", "__init__"}
     programs = [path for path in folder.glob("*.py") if path.stem not in outside]
     assert {path.stem for path in programs} == set(SCENES)
     programs += [ROOT / "examples/soccer" / f"{name}.py" for name in ("player", "sight", "whereabouts")]

@@ -19,7 +19,7 @@ from tests.busy import busy_computer
 from whereabouts import Whereabouts
 
 from kiks import Arena, Khepera, ParameterError
-from kiks.demos import pitch
+from kiks.model import pitch
 
 # Whole matches.
 pytestmark = pytest.mark.slow

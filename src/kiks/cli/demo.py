@@ -87,8 +87,8 @@ def demo(
     camera: watch a moving ball. race: drive round a track. swarm: twenty robots spread out.
     soccer: a match of two programs. A champion's file of `kiks evolve`, or its folder: the champion drives in its
     world. With --at X,Y, the elite of that place in the folder's archive drives. With --generation 12 --rank 3, the
-    third best of generation 12 drives again as in its evaluation. Of the folder of `kiks evolve pursuit`,
-    predator and prey drive until they touch.
+    third best of generation 12 drives again as in its evaluation. Of the folder of `kiks evolve pursuit`
+    or `football`, both champions drive until they touch, or until a goal.
 
     Example: kiks demo follow --arena examples/arenas/office.toml --seconds 300
     """

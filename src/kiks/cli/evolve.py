@@ -59,7 +59,8 @@ def evolve(
 
     After Ctrl-C or a kill, the same command continues the evolution. With --seeds 10, ten evolutions run one after the
     other; a table, seeds.png and summary.json show their results. In pursuit, predator and prey evolve against each
-    other: predator.toml and prey.toml are the champions, and tournament.png tells which of them progressed.
+    other, in football two players: predator.toml and prey.toml, or left.toml and right.toml, are the champions, and
+    tournament.png tells which of them progressed.
 
     Example: kiks evolve avoid --seed 1 --out runs/avoid
     """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
@@ -16,6 +17,7 @@ from kiks.errors import ParameterError
 from kiks.learn import tasks
 from kiks.learn.champion import Champion
 from kiks.learn.contest import Contest
+from kiks.model import pitch
 from kiks.model.arena import Arena, Pose
 from kiks.sim.simulation import Simulation
 
@@ -24,7 +26,7 @@ TOUCH_MM = 2.0
 
 
 class ContestScene(Scene):
-    """The champions of both sides drive against each other until a robot of one touches a robot of the other.
+    """The champions of both sides drive against each other until their contest ends (`ENDS`).
 
     Args:
         folder: The folder of a co-evolution, with a champion's file for each side.
@@ -44,12 +46,13 @@ class ContestScene(Scene):
     ) -> None:
         self.contest, self.champions = _load(Path(folder))
         self._sides = [side for side in range(2) for _ in range(self.contest.sides[side].robots)]
-        self.touched_s: float | None = None
+        self.end, self.open_end = ENDS[self.contest.name]
+        self.said = ""
         super().__init__(arena, seed=seed, baud=baud or self.champions[0].baud)
 
     def make_arena(self) -> Arena:
-        """Return an arena of the contest."""
-        return self.contest.arenas[0]
+        """Return an arena of the contest, which its arenas are in turn for one seed after the other."""
+        return self.contest.arenas[self.seed % len(self.contest.arenas)]
 
     def make_simulation(self, arena: Arena | None) -> Simulation:
         """Return a world of the contest, at the start that its evaluation has with this seed."""
@@ -75,23 +78,44 @@ class ContestScene(Scene):
         self.driver = Driver(self.ports, [each.controller for each in drivers], parameters, period_s=period_s)
 
     def step(self) -> None:
-        """Let them do a loop, and see whether they touch."""
+        """Let them do a loop, and see whether the contest ends."""
         self.driver.step()
+        if not self.said and (said := self.end(self)):
+            self.said = f"{said} after {self.sim.time_s:.1f} s"
+
+    def touching_sides(self) -> bool:
+        """Return whether a robot of one side touches a robot of the other."""
         robots = zip(self._sides, self.sim.poses().tolist(), self.sim.specs, strict=True)
-        for (side, pose, spec), (other_side, other_pose, other_spec) in combinations(robots, 2):
-            gap_mm = math.dist(pose[:2], other_pose[:2]) - spec.body.radius_mm - other_spec.body.radius_mm
-            if side != other_side and gap_mm <= TOUCH_MM and self.touched_s is None:
-                self.touched_s = self.sim.time_s
+        return any(
+            side != other_side
+            and math.dist(pose[:2], other_pose[:2]) - spec.body.radius_mm - other_spec.body.radius_mm <= TOUCH_MM
+            for (side, pose, spec), (other_side, other_pose, other_spec) in combinations(robots, 2)
+        )
 
     @property
     def is_over(self) -> bool:
-        """Whether they have touched."""
-        return self.touched_s is not None
+        """Whether the contest has ended."""
+        return bool(self.said)
 
     def result(self) -> str:
-        """Return when they touched."""
-        names = " and ".join(self.contest.side_names)
-        return f"{names} " + ("have not touched" if self.touched_s is None else f"touched after {self.touched_s:.1f} s")
+        """Return how it ended, and when."""
+        return self.said or self.open_end
+
+
+def _scorer(scene: ContestScene) -> str:
+    """Return who has scored. The first thing is the ball; an arena of a user's own may have none."""
+    places = [pitch.goal_at(float(ball["x_mm"]), float(ball["radius_mm"])) for ball in scene.sim.bodies()[:1]]
+    return "left scored" if 1 in places else "right scored" if -1 in places else ""
+
+
+ENDS: dict[str, tuple[Callable[[ContestScene], str], str]] = {
+    "pursuit": (
+        lambda scene: "predator and prey touched" if scene.touching_sides() else "",
+        "predator and prey have not touched",
+    ),
+    "football": (_scorer, "no goal"),
+}
+"""Of each contest: what says how it ended, or nothing while it goes on, and what is said if it does not end."""
 
 
 def _load(folder: Path) -> tuple[Contest, list[Champion]]:
@@ -108,5 +132,5 @@ def _load(folder: Path) -> tuple[Contest, list[Champion]]:
         " and ".join(f"{name}.toml" for name in make().side_names) for make in tasks.CONTESTS.values()
     )
     raise ParameterError(
-        f"the folder {str(folder)!r} must have {wanted}, but has not. `kiks evolve pursuit` makes one."
+        f"the folder {str(folder)!r} must have {wanted}, but has not. `kiks evolve` of a contest makes one."
     )

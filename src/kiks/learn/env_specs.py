@@ -18,7 +18,8 @@ from kiks.control.measures import avoidance, light_approach, near_light_share, n
 from kiks.control.senses import check_senses, reading_count
 from kiks.engine.physics.motor import SPEED_MAX
 from kiks.errors import ParameterError, nearest, shown
-from kiks.learn import ready_tasks
+from kiks.learn import football as game
+from kiks.learn import ready_contests, ready_tasks
 from kiks.learn.task import Task
 from kiks.learn.training_arenas import pillars
 from kiks.model.arena import Arena, Cylinder, Pose
@@ -38,7 +39,7 @@ class EnvSpec:
         reward: A measure whose first note accumulates; its gain in a step is the reward of that step.
         goal: A measure: an episode terminates once its first note is above zero for at least one robot of the world.
             None for environments that never terminate.
-        senses: The robots' senses, of 'proximity' and 'ambient'.
+        senses: The robots' senses, of 'proximity', 'ambient' and 'camera'.
         starts: 'random' for new free places in each episode; 'arena' for the starts of the arena.
         speed_limit: Wheel speed of action 1 [pulses/10 ms].
         timing: Timing of the control loop; that of a program on a line of 9600 baud if left out.
@@ -160,6 +161,20 @@ def maze() -> EnvSpec:
     return EnvSpec("Maze", (arena,), nearer_to_light, near_light_share(ARRIVED_MM), senses, starts="arena")
 
 
+def football() -> EnvSpec:
+    """Bring the ball into the goal of the other side."""
+    contest = ready_contests.football()
+    return EnvSpec(
+        "Football",
+        contest.arenas,
+        game.ball_gain,
+        game.is_goal,
+        ("proximity", "camera"),
+        speed_limit=ready_contests.PLAYER_SPEED,
+        timing=contest.timing,
+    )
+
+
 def _of_task(name: str, task: Task, reward: str, contact_cost: float = 0.0) -> EnvSpec:
     """Return an environment with the arenas, senses, speed and timing of a task, and one of its measures as reward."""
     measured = next(each for each in task.measures if each.name == reward)
@@ -180,6 +195,7 @@ ENV_SPECS: dict[str, Callable[[], EnvSpec]] = {
     "Light": light,
     "Gather": gather,
     "Maze": maze,
+    "Football": football,
 }
 """Functions that return the specifications, by the names of the environments."""
 

@@ -14,7 +14,7 @@ from kiks.control.controller import Controller
 from kiks.control.controller_spec import Recipe, module_in
 from kiks.control.controllers import controller_of
 from kiks.errors import KiksError, ParameterError, nearest, shown
-from kiks.learn.ready_contests import CONTESTS, pursuit
+from kiks.learn.ready_contests import CONTESTS, football, pursuit
 from kiks.learn.ready_tasks import TASKS, avoid, disperse, follow, gather, light, maze
 from kiks.learn.task import ROBOTS_MAX, WORLDS_MAX, Seconds, Task
 from kiks.model.arena import Arena
@@ -22,7 +22,7 @@ from kiks.model.atomic_files import inside, path_of
 from kiks.model.data_file import OneOf, Rule, Text, Whole, check, parse_toml, read_file, record
 from kiks.model.robot import robot_names
 
-__all__ = ["CONTESTS", "TASKS", "avoid", "disperse", "follow", "gather", "light", "load", "maze", "pursuit"]
+__all__ = ["CONTESTS", "TASKS", "avoid", "disperse", "follow", "football", "gather", "light", "load", "maze", "pursuit"]
 
 Name = Annotated[
     Text,

@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
-from kiks.demos import pitch
 from kiks.demos.scenes import oval
+from kiks.model import pitch
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
 from kiks.model.project import Project, ProjectRobot
 

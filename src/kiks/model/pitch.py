@@ -1,4 +1,4 @@
-"""The pitch on which `kiks demo soccer` plays."""
+"""The pitch of `kiks demo soccer` and of the contest `football`."""
 
 from __future__ import annotations
 
@@ -47,3 +47,8 @@ def arena(**changes: Any) -> Arena:
     """Return the pitch with both players on their marks, 250 mm before the middle."""
     starts = (Pose(365.0, MIDDLE_Y_MM, 0.0), Pose(865.0, MIDDLE_Y_MM, pi))
     return replace(Arena.from_array(picture(), name="Pitch"), starts=starts, **changes)
+
+
+def goal_at(x_mm: float, radius_mm: float) -> int:
+    """Return where a ball at x scores, for all of it must be behind the line: 1 on the right, -1 on the left, or 0."""
+    return int(x_mm > RIGHT_LINE_MM + radius_mm) - int(x_mm < LEFT_LINE_MM - radius_mm)
