@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from kiks.learn.task import Axis, Task
     from kiks.model.arena import Arena
     from kiks.model.robot import RobotSpec
+    from kiks.recording.recording import Recording
     from kiks.sim.simulation import Simulation
 
 __all__ = [
@@ -59,6 +60,7 @@ __all__ = [
     "LinkError",
     "Measure",
     "ParameterError",
+    "Recording",
     "RobotSpec",
     "Side",
     "Simulation",
@@ -98,6 +100,7 @@ _HOMES = {
     "LinkError": "kiks.errors",
     "Measure": "kiks.control.measure",
     "ParameterError": "kiks.errors",
+    "Recording": "kiks.recording.recording",
     "RobotSpec": "kiks.model.robot",
     "Side": "kiks.learn.contest",
     "Simulation": "kiks.sim.simulation",
@@ -125,6 +128,7 @@ _MODULES = {"controllers", "measures", "tasks"}
 upwards.load_arena_file.provide("kiks.model.arena_formats", "load_arena_file")
 upwards.draw_arena.provide("kiks.drawing", "arena_for_notebook")
 upwards.draw_simulation.provide("kiks.drawing", "simulation_for_notebook")
+upwards.record_simulation.provide("kiks.recording.recorder", "RunRecorder")
 upwards.show_in_browser.provide("kiks.desk.server.show", "show")
 
 if "kiks.ports.pyserial" not in serial.protocol_handler_packages:

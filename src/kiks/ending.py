@@ -45,6 +45,22 @@ def noting_endings(note: Callable[[], None]) -> Iterator[None]:
                 signal.signal(name, handler)
 
 
+@contextmanager
+def postponing_endings() -> Iterator[None]:
+    """Let Ctrl-C, SIGTERM and SIGHUP act after this instead of in its middle; in other threads they never do."""
+    before = {name: signal.getsignal(name) for name in _endings()}
+    noted: list[int] = []
+    _handle(lambda number, _frame: noted.append(number))
+    try:
+        yield
+    finally:
+        with suppress(ValueError):
+            for name, handler in before.items():
+                signal.signal(name, handler)
+        for number in noted:
+            signal.raise_signal(number)
+
+
 def send_again_what_is_dropped() -> None:
     """Send an interruption again that a callback has dropped, until it ends what runs."""
     import threading  # here, for the process is to be guarded soon after it starts

@@ -45,3 +45,6 @@ draw_simulation = Hook()
 
 show_in_browser = Hook()
 """Opens a simulation on a desk."""
+
+record_simulation = Hook()
+"""Records a simulation to a file."""

@@ -93,12 +93,9 @@ class _Rows:
         file.write(",".join(COLUMNS) + "\n")
         self.look(state)
 
-    def ticks_left(self, tick_count: int) -> int:
-        return TABLE_TICKS - tick_count % TABLE_TICKS
-
     def look(self, state: State) -> None:
-        if state.tick_count % TABLE_TICKS:
-            return
+        """Write a row for each robot."""
+        self.from_tick = self.due_tick = (state.tick_count // TABLE_TICKS + 1) * TABLE_TICKS
         time_s = f"{state.tick_count / 100:.2f}"
         robots: Any = state.robots[0]
         driven_mm = (robots["forwards_mm"] + robots["backwards_mm"]).tolist()

@@ -40,6 +40,16 @@ class SerialTiming:
         self.baud = baud
         self.character_ns = character_ns(baud)
 
+    def save(self) -> tuple[int, int, int]:
+        """Return the speed [bit/s] and until when characters are on the way to the robot and to the host [ns]."""
+        return self.baud, self.sending_until_ns, self._answering_until_ns
+
+    def restore(self, baud: int, sending_until_ns: int, answering_until_ns: int) -> None:
+        """Go back to what `save` returned; the host has read everything."""
+        self.set_baud(baud)
+        self.sending_until_ns, self._answering_until_ns = sending_until_ns, answering_until_ns
+        self.forget()
+
     @property
     def room_ns(self) -> int:
         """When a waiting sender may go on [ns]."""

@@ -54,6 +54,15 @@ class Receiver:
     def _keep(self, part: bytes) -> None:
         self._partial += part[: LINE_LIMIT + 1 - len(self._partial)]
 
+    @property
+    def partial(self) -> bytes:
+        """The line that is not complete, as far as it is kept."""
+        return bytes(self._partial)
+
+    @partial.setter
+    def partial(self, part: bytes) -> None:
+        self._partial[:] = part
+
     def clear(self) -> None:
         """Forget a line that is not complete."""
         self._partial.clear()

@@ -9,7 +9,7 @@ from typing import Protocol
 from kiks.clock.gate import Gate
 from kiks.firmware.khepera import Firmware
 from kiks.model.checks import CLOCK_END_NS, check_count
-from kiks.sim.wire import Wire
+from kiks.sim.wire import Wire, WireRecorder
 from kiks.sim.world import World
 
 
@@ -41,6 +41,26 @@ class Supervisor(Protocol):
         """Act, and choose a later `next_ns`, or raise to end the run."""
 
 
+class Recorder(WireRecorder, Protocol):
+    """Records a run without a change of it.
+
+    Attributes:
+        next_ns: When `check` is due [ns].
+        change_count: Of the world, when its changes were noted last.
+        has_lamps: Whether there are lamps, which anybody may move or switch without a count.
+    """
+
+    next_ns: int
+    change_count: int
+    has_lamps: bool
+
+    def note_changes(self) -> None:
+        """Note what was changed from outside."""
+
+    def check(self) -> None:
+        """Note the state, after all events up to `next_ns`, and choose a later `next_ns`."""
+
+
 class EventLoop:
     """Lets time pass in a world: does the events on its serial lines in their order.
 
@@ -52,6 +72,7 @@ class EventLoop:
         wires: The robots' serial lines.
         gate: Decides how far time may go while it is watched; None while nothing watches it.
         supervisor: Acts in the world at certain instants, such as a referee; None without one.
+        recorder: Records the run; None while nothing does.
     """
 
     def __init__(self, world: World, sync: Callable[[], None]) -> None:
@@ -60,6 +81,7 @@ class EventLoop:
         self.wires: list[Wire] = []
         self.gate: Gate | None = None
         self.supervisor: Supervisor | None = None
+        self.recorder: Recorder | None = None
         self._sync = sync
         self._events = EventQueue()
 
@@ -90,6 +112,15 @@ class EventLoop:
         self._advance_to(time_ns)
 
     def _advance_to(self, time_ns: int) -> None:
+        if (recorder := self.recorder) is not None:
+            if recorder.change_count != self.world.change_count or recorder.has_lamps:
+                recorder.note_changes()
+            while recorder.next_ns <= time_ns:
+                self._do_events_to(recorder.next_ns)
+                recorder.check()
+        self._do_events_to(time_ns)
+
+    def _do_events_to(self, time_ns: int) -> None:
         world, events, wires = self.world, self._events, self.wires
         wire = events.first(wires)
         while wire.next_ns is not None and wire.next_ns <= time_ns:

@@ -12,13 +12,18 @@ from kiks.units import TICK_NS
 
 
 class Watcher(Protocol):
-    """Reads the state after ticks of its own choice, and changes nothing."""
+    """Reads the state after ticks of its own choice, and changes nothing.
 
-    def ticks_left(self, tick_count: int) -> int:
-        """Return how many ticks may be done before the next call of `look`, at least one."""
+    Attributes:
+        from_tick: If the ticks happen to stop from this one on, it looks.
+        due_tick: Here they stop at the latest, so that it can.
+    """
+
+    from_tick: int
+    due_tick: int
 
     def look(self, state: State) -> None:
-        """Read the state, after at most as many ticks as were left."""
+        """Read the state, and choose the next two ticks, later than the present one."""
 
 
 class _Point(NamedTuple):
@@ -37,24 +42,20 @@ class Paths:
         state: The state; its present poses are the first point.
         points_max: Most points that are kept. When there are more, every second one is dropped, and half as many are
             added from then on. None: no limit.
+
+    Attributes:
+        from_tick: See `Watcher`.
+        due_tick: The same tick.
     """
 
     def __init__(self, period_ticks: int, state: State, points_max: int | None = None) -> None:
         self._period_ticks = period_ticks
         self._points_max = points_max
         self._points: list[_Point] = []
-        self._note(state)
-
-    def ticks_left(self, tick_count: int) -> int:
-        """Return how many ticks may be done before the next point is due."""
-        return self._period_ticks - tick_count % self._period_ticks
+        self.look(state)
 
     def look(self, state: State) -> None:
-        """Keep the poses if a point is due."""
-        if state.tick_count % self._period_ticks == 0:
-            self._note(state)
-
-    def _note(self, state: State) -> None:
+        """Keep the poses."""
         robots: Any = state.robots[0]
         bodies: Any = state.bodies[0]
         poses = np.array([robots["x_mm"], robots["y_mm"], robots["heading_rad"]])
@@ -63,6 +64,7 @@ class Paths:
         self._points.append(_Point(state.tick_count, poses, places))
         if self._points_max is not None and len(self._points) > self._points_max:
             self._thin_out()
+        self.from_tick = self.due_tick = (state.tick_count // self._period_ticks + 1) * self._period_ticks
 
     def _thin_out(self) -> None:
         """Drop every second point; the first one stays."""

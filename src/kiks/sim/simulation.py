@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
+from pathlib import Path
 from threading import RLock
 from typing import Any
 
@@ -35,7 +36,7 @@ from kiks.sim.turret_host import Turrets
 from kiks.sim.wire import Wire
 from kiks.sim.world import World
 from kiks.units import ns_from_s, s_from_ns
-from kiks.upwards import draw_simulation, show_in_browser
+from kiks.upwards import draw_simulation, record_simulation, show_in_browser
 
 
 class Simulation:
@@ -58,6 +59,7 @@ class Simulation:
     Attributes:
         world: The arena with all that stands and moves in it.
         loop: Lets time pass, event by event.
+        things: Its balls, cylinders and lamps.
         program: What the computing of the program on its ports costs.
         name: The name in its ports' URLs.
 
@@ -91,10 +93,22 @@ class Simulation:
         check_kinds(robot, response)
         robots = None if robots is None else check_count("robots", robots, 1, 1000, "Say how many you need.")
         seed = check_count("seed", seed, 0, 2**63 - 1, "Any small number will do.")
+        self._begin(
+            World(Arena.default() if arena is None else arena, specs_of(robot, robots, response), seed), thinking
+        )
+
+    @classmethod
+    def of_world(cls, world: World) -> Simulation:
+        """Return the simulation of a world at its start."""
+        sim = cls.__new__(cls)
+        sim._begin(world, "none")
+        return sim
+
+    def _begin(self, world: World, thinking: str) -> None:
         self.thinking = thinking
         self.program = ProgramClock(thinking)
-        self.world = World(Arena.default() if arena is None else arena, specs_of(robot, robots, response), seed)
-        self._things = Things(self.world)
+        self.world = world
+        self.things = Things(self.world)
         self._sensors = Sensors(self.world)
         self._firmwares: list[Firmware] = []
         self._turrets = Turrets(self.world, self._firmwares)
@@ -138,6 +152,7 @@ class Simulation:
         """Hold the lock, do the ticks that have begun, and let cameras see what was changed."""
         with self._up_to_date() as world:
             yield world
+            world.change_count += 1
             self._turrets.cameras.retake()
 
     # ---- what it consists of ----
@@ -291,7 +306,7 @@ class Simulation:
         with self._changing() as world:
             world.place_robot(index, x_mm, y_mm, heading_rad)
 
-    def add_robot(self, robot: str | RobotSpec = "khepera") -> int:
+    def add_robot(self, robot: str | RobotSpec = "khepera", *, pose: Sequence[float] | None = None) -> int:
         """Add a robot; return its number.
 
         It starts where the arena has a start for it, if that is free, else at a random place. Robots, programs and
@@ -299,6 +314,7 @@ class Simulation:
 
         Args:
             robot: Its kind: a name that `RobotSpec.load` knows, a file, or a `RobotSpec`.
+            pose: x_mm, y_mm, heading_rad, whatever is there; for those who know that it stood there.
 
         Raises:
             ParameterError: If there is no such kind.
@@ -312,7 +328,7 @@ class Simulation:
         check_kinds(robot)
         (spec,) = specs_of(robot, 1, None)
         with self._changing() as world:
-            index = world.add_robot(spec)
+            index = world.add_robot(spec, pose)
             for firmware in self._firmwares:
                 firmware.take(world.state)
             self._turrets.cameras.take_state()
@@ -341,7 +357,7 @@ class Simulation:
             b't,2,b,1,0\r\n'
         """
         index = self.index_of(robot)
-        with self._up_to_date():
+        with self._changing():
             return self._turrets.fit(index, turret)
 
     def turrets(self, robot: int) -> tuple[Turret, ...]:
@@ -441,7 +457,7 @@ class Simulation:
             197.5
         """
         with self._changing():
-            return self._things.add_body(Ball, x_mm, y_mm, changes)
+            return self.things.add_body(Ball, x_mm, y_mm, changes)
 
     def add_cylinder(self, x_mm: float, y_mm: float, **changes: Any) -> int:
         """Add a cylinder at rest; return its number.
@@ -455,7 +471,7 @@ class Simulation:
             ParameterError: If a value is out of range, or something is in the way.
         """
         with self._changing():
-            return self._things.add_body(Cylinder, x_mm, y_mm, changes)
+            return self.things.add_body(Cylinder, x_mm, y_mm, changes)
 
     def bodies(self) -> NDArray[np.void]:
         """Return a copy of the balls and cylinders: records of `kiks.engine.state.BODY`, shape [body].
@@ -483,7 +499,7 @@ class Simulation:
             ParameterError: If there is no such body, a number is out of range, or something is in the way.
         """
         with self._changing():
-            self._things.move_body(body, x_mm, y_mm, speed_mm_s, heading_rad)
+            self.things.move_body(body, x_mm, y_mm, speed_mm_s, heading_rad)
 
     def remove_body(self, body: int) -> None:
         """Remove a ball or cylinder.
@@ -492,7 +508,7 @@ class Simulation:
             ParameterError: If there is no such body.
         """
         with self._changing():
-            self._things.remove_body(body)
+            self.things.remove_body(body)
 
     def add_lamp(self, x_mm: float, y_mm: float, power_w: float = 1.0, *, is_on: bool = True) -> int:
         """Add a lamp; return its row in `lamps`, counted from 1.
@@ -501,7 +517,7 @@ class Simulation:
             ParameterError: If it would hang outside the arena, or a value is out of range.
         """
         with self._up_to_date():
-            return self._things.add_lamp(x_mm, y_mm, power_w, is_on)
+            return self.things.add_lamp(x_mm, y_mm, power_w, is_on)
 
     def remove_lamp(self, lamp: int) -> None:
         """Remove a lamp; those below it move up a row.
@@ -510,12 +526,12 @@ class Simulation:
             ParameterError: If there is no such lamp.
         """
         with self._up_to_date():
-            self._things.remove_lamp(lamp)
+            self.things.remove_lamp(lamp)
 
     def checkpoint(self) -> Checkpoint:
         """Return where everything stands, for `reset`."""
         with self._up_to_date():
-            return self._things.checkpoint()
+            return self.things.checkpoint()
 
     def reset(self, checkpoint: Checkpoint) -> None:
         """Move everything back to a checkpoint: bodies and lamps added since then go, removed ones come back.
@@ -526,7 +542,7 @@ class Simulation:
             ParameterError: If it is no checkpoint, or one of a simulation with another number of robots.
         """
         with self._changing():
-            self._things.reset(checkpoint)
+            self.things.reset(checkpoint)
 
     # ---- what sensors read ----
 
@@ -639,6 +655,22 @@ class Simulation:
             return look(world)
 
     # ---- the run as a whole ----
+
+    def record(self, file: str | Path) -> Any:
+        """Record the run to a file from now on, until `close()` or the end of `with`; `kiks.Recording` reads it.
+
+        The run is the same, to the bit. It can be replayed, looked at and gone on with from any time (docs/recording.md).
+
+        Args:
+            file: The file, which ends in .mcap; an earlier one is replaced.
+
+        Returns:
+            A `kiks.recording.recorder.RunRecorder`, with `mark(note)` for bookmarks.
+
+        Raises:
+            ParameterError: If the file cannot be written, or the simulation is recorded already.
+        """
+        return record_simulation(self, file)
 
     def record_paths(self, every_s: float = 0.1, *, points_max: int | None = None) -> None:
         """Record the paths of all robots, balls and cylinders from now on; earlier records are dropped.

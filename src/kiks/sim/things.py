@@ -41,13 +41,16 @@ class Things:
     Args:
         world: The world.
 
+    Attributes:
+        body_count: Number of bodies that there ever were: the last number given.
+
     Raises:
         ArenaError: If something has no free place where the arena puts it.
     """
 
     def __init__(self, world: World) -> None:
         self._world = world
-        self._body_count = 0
+        self.body_count = 0
         for body in world.arena.bodies:
             try:
                 self._add(body, PRESSED_MM)
@@ -75,9 +78,9 @@ class Things:
         what, name = (BALL, "ball") if isinstance(body, Ball) else (CYLINDER, "cylinder")
         free_space, state = self._world.free_space, self._world.state
         free_space.check_free(f"the place of a {name}", body.x_mm, body.y_mm, body.radius_mm, overlap_mm=overlap_mm)
-        self._body_count += 1
+        self.body_count += 1
         record = np.zeros(1, BODY)
-        record["number"], record["what"] = self._body_count, what
+        record["number"], record["what"] = self.body_count, what
         record["x_mm"], record["y_mm"], record["trail"][:] = body.x_mm, body.y_mm, (body.x_mm, body.y_mm)
         record["radius_mm"], record["brightness"] = body.radius_mm, body.brightness
         record["friction_mm_s2"], record["kick_share"] = body.friction_mm_s2, 1.0 if what == BALL else 0.0
@@ -85,7 +88,7 @@ class Things:
         bodies[:, :-1], bodies[:, -1] = state.bodies, record
         state.bodies = bodies
         self._world.rebuild_scene()
-        return self._body_count
+        return self.body_count
 
     def move_body(self, body: int, x_mm: float, y_mm: float, speed_mm_s: float, heading_rad: float) -> None:
         """Put a ball or cylinder down at a free place, rolling from there.

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 from kiks.engine.physics.gripper import find_object
@@ -136,9 +136,12 @@ class RobotSite:
         return float(self._world.arena.width_mm), float(self._world.arena.height_mm)
 
     @property
-    def lock(self) -> AbstractContextManager[Any]:
+    @contextmanager
+    def lock(self) -> Iterator[None]:
         """Hold it while you change something from outside the simulation."""
-        return self._world.lock
+        with self._world.lock:
+            yield
+            self._world.change_count += 1
 
     @property
     def time_ns(self) -> int:
@@ -147,7 +150,7 @@ class RobotSite:
 
     def pose(self) -> tuple[float, float, float]:
         """Return where the robot is: x_mm, y_mm, heading_rad."""
-        with self.lock:
+        with self._world.lock:
             self._sync()
             return self._world.pose(self._index)
 
@@ -172,13 +175,13 @@ class RobotSite:
 
     def poses(self) -> list[tuple[float, float, float]]:
         """Return where all robots are, robot 1 first."""
-        with self.lock:
+        with self._world.lock:
             self._sync()
             return [self._world.pose(index) for index in range(self._world.robot_count)]
 
     def bodies(self) -> Any:
         """Return the balls and cylinders, records of `kiks.engine.state.BODY`."""
-        with self.lock:
+        with self._world.lock:
             self._sync()
             return self._world.state.bodies[0].copy()
 

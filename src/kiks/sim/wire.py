@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from typing import NamedTuple, Protocol
 
 from kiks.clock.serial_timing import SerialTiming
 from kiks.firmware.khepera import Firmware
@@ -17,6 +18,56 @@ Hear = Callable[[bytes, int], None]
 """A callback that takes a reply, and when its last character arrives [ns]."""
 
 
+class SavedWire(NamedTuple):
+    """All that a wire and its firmware remember besides the robot's record, as JSON can hold it.
+
+    Attributes:
+        line: Of `SerialTiming.save`.
+        robot_baud: Speed at which the robot speaks [bit/s].
+        selected_baud: Speed that the mode selector asks for [bit/s].
+        demo_wakes_ns: When the demonstration of mode 0 acts next [ns]; None without it.
+        partial: The command that is not complete.
+        pending: Commands on their way: when each acts [ns], its line, and whether the host does not get the reply.
+        last_act_ns: When the last of them acts [ns].
+        orphan_count: Number of replies to come that nobody reads.
+    """
+
+    line: tuple[int, int, int]
+    robot_baud: int
+    selected_baud: int
+    demo_wakes_ns: int | None
+    partial: str
+    pending: list[tuple[int, str, bool]]
+    last_act_ns: int
+    orphan_count: int
+
+
+class WireRecorder(Protocol):
+    """Records all that comes to the wires of a world from outside, and what robots answer."""
+
+    def sent(self, robot: int, data: bytes, at_ns: int, start_ns: int, is_typed: bool) -> None:
+        """Note that characters for a robot's index were sent, when, and when the first one starts [ns]."""
+
+    def acted(self, robot: int, reply: bytes, start_ns: int, character_ns: int) -> None:
+        """Note that a robot has acted, with its reply, when that starts [ns], and the time of a character [ns]."""
+
+    def hung_up(self, robot: int) -> None:
+        """Note that the host has hung up."""
+
+    def dropped(self, robot: int, until_ns: int, now_ns: int) -> None:
+        """Note a call of `Wire.drop_after`."""
+
+    def baud_set(self, robot: int, baud: int) -> None:
+        """Note that the mode selector was turned."""
+
+    def thought(self, robot: int, from_ns: int, until_ns: int) -> None:
+        """Note that the program has thought."""
+
+
+def ignore_reply(_reply: bytes, _arrival_ns: int) -> None:
+    """Take a reply whose reader is gone."""
+
+
 class Wire:
     """One robot's line, its firmware, and the commands that have been sent but have not acted yet.
 
@@ -28,6 +79,7 @@ class Wire:
     Attributes:
         holder: Name of the program that has opened the port; None while it is free.
         log: Records what goes over the line; None while it is not watched.
+        recorder: Records the whole run; None while nothing does.
         pending: Commands on their way: when each acts [ns], its line, and what takes the reply in place of the host.
         thinks_since_ns: Since when a real program has the port, whose every gap counts as thinking [ns]; else None.
         next_ns: When the robot does something next [ns], or None while it only waits for characters.
@@ -43,6 +95,7 @@ class Wire:
         self._processing_ns = ns_from_s(firmware.spec.firmware.processing_ms * 1e-3)
         self.pending: deque[tuple[int, bytes, Hear | None]] = deque()
         self.log: WireLog | None = None
+        self.recorder: WireRecorder | None = None
         self._watcher_count = 0
         self.thinks_since_ns: int | None = None
         self._last_act_ns = 0
@@ -50,6 +103,8 @@ class Wire:
 
     def set_baud(self, baud: int) -> None:
         """Set both ends of the line to a baud rate [bit/s], as the robot's mode selector does."""
+        if self.recorder is not None:
+            self.recorder.baud_set(self._index, baud)
         self.firmware.baud = self.firmware.selected_baud = baud
         self.line.set_baud(baud)
 
@@ -62,6 +117,8 @@ class Wire:
             hear: A callback for the replies; the host reads them if left out.
         """
         start_ns = self.line.send(len(data), at_ns)
+        if self.recorder is not None:
+            self.recorder.sent(self._index, data, at_ns, start_ns, hear is not None)
         character_ns = self.line.character_ns
         lines = self.firmware.receiver.feed(data)
         for index, line in lines:
@@ -89,10 +146,15 @@ class Wire:
             self._orphan_count = max(self._orphan_count - 1, 0)
             if (log := self.log) is not None and start_ns is not None:
                 log.answer(reply, start_ns, self.line.character_ns, now_ns)
+            if self.recorder is not None:
+                sent_ns = now_ns if start_ns is None else start_ns
+                self.recorder.acted(self._index, reply, sent_ns, self.line.character_ns)
             if self.firmware.baud != self.line.baud:
                 self.line.set_baud(self.firmware.baud)
         else:
             self.firmware.run_demo(now_ns)
+            if self.recorder is not None:
+                self.recorder.acted(self._index, b"", now_ns, self.line.character_ns)
         self._plan()
 
     def _plan(self) -> None:
@@ -121,9 +183,11 @@ class Wire:
             self.log = None
 
     def think(self, from_ns: int, until_ns: int) -> None:
-        """Record that the program has thought, if the line is watched."""
+        """Record that the program has thought, if the line is watched or recorded."""
         if (log := self.log) is not None:
             log.think(from_ns, until_ns)
+        if self.recorder is not None:
+            self.recorder.thought(self._index, from_ns, until_ns)
 
     def shares(self, from_ns: int, until_ns: int) -> TimeShares | None:
         """Return where the time of a window went; None if the line is not watched."""
@@ -155,6 +219,8 @@ class Wire:
             until_ns: Commands up to this time still act [ns].
             now_ns: The time [ns]: from now on the line is free for replies.
         """
+        if self.recorder is not None:
+            self.recorder.dropped(self._index, until_ns, now_ns)
         kept = [each for each in self.pending if each[0] <= until_ns or each[2] is not None]
         dropped_count = len(self.pending) - len(kept)
         if dropped_count:
@@ -169,6 +235,35 @@ class Wire:
 
         Commands that were sent whole still act, and the robot drives on (khepera-protocol.md 11.3).
         """
+        if self.recorder is not None:
+            self.recorder.hung_up(self._index)
         self._orphan_count = len(self.pending)
         self.firmware.receiver.clear()
         self.line.forget()
+
+    def save(self) -> SavedWire:
+        """Return all that this and the firmware remember besides the robot's record and replies that wait."""
+        firmware = self.firmware
+        return SavedWire(
+            self.line.save(),
+            firmware.baud,
+            firmware.selected_baud,
+            firmware.demo_wakes_ns,
+            firmware.receiver.partial.decode("latin-1"),
+            [(act_ns, line.decode("latin-1"), hear is not None) for act_ns, line, hear in self.pending],
+            self._last_act_ns,
+            self._orphan_count,
+        )
+
+    def restore(self, saved: SavedWire) -> None:
+        """Go back to what `save` returned; nobody reads replies that came before."""
+        firmware = self.firmware
+        self.line.restore(*saved.line)
+        firmware.baud, firmware.selected_baud = saved.robot_baud, saved.selected_baud
+        firmware.demo_wakes_ns = saved.demo_wakes_ns
+        firmware.receiver.partial = saved.partial.encode("latin-1")
+        self.pending = deque(
+            (act_ns, line.encode("latin-1"), ignore_reply if is_heard else None) for act_ns, line, is_heard in saved.pending
+        )
+        self._last_act_ns, self._orphan_count = saved.last_act_ns, saved.orphan_count
+        self._plan()

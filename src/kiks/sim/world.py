@@ -39,6 +39,7 @@ class World:
         arena: The walls, and where robots start.
         specs: What each robot is.
         seed: Seed of all random numbers.
+        poses: Where robots are, float64 [robot, 3], whatever is there; where they start in the arena if left out.
 
     Attributes:
         lock: Held by every thread that reads or changes the world.
@@ -49,22 +50,27 @@ class World:
         networks: What the responses of the robots need besides rays.
         free_space: What is in the way of what.
         watchers: Objects that read the state after ticks of their own choice.
+        change_count: How often something other than time and the robots' lines has changed the world.
 
     Raises:
         ArenaError: If the arena has no free place for a robot.
     """
 
-    def __init__(self, arena: Arena, specs: Sequence[RobotSpec], seed: int) -> None:
+    def __init__(
+        self, arena: Arena, specs: Sequence[RobotSpec], seed: int, poses: NDArray[np.float64] | None = None
+    ) -> None:
         self.lock = threading.RLock()
         self.now_ns = 0
         self.seed = seed
         self.specs = list(specs)
         self.state = State.empty(world_count=1, robot_count=len(self.specs))
         self.watchers: list[Watcher] = []
+        self.change_count = 0
         self._lamps = np.array(arena.lamps, np.float64).reshape(-1, 4)
-        self._take_walls(FreeSpace(arena, self.specs, self.state))
+        self.free_space = FreeSpace(arena, self.specs, self.state)
         self._pack_specs()
-        for index, pose in enumerate(self.free_space.start_poses(seed).tolist()):
+        poses = self.free_space.start_poses(seed) if poses is None else poses
+        for index, pose in enumerate(poses.tolist()):
             self.put_robot(index, *pose)
         self.rebuild_scene()
 
@@ -81,6 +87,7 @@ class World:
     @lamps.setter
     def lamps(self, lamps: NDArray[np.float64]) -> None:
         self._lamps = check_numbers("lamps", lamps, (None, 4))
+        self.change_count += 1
         self._scene.set_lamps(self._lamps[None])
 
     def _pack_specs(self) -> None:
@@ -93,9 +100,10 @@ class World:
             self.kinds[kind : kind + 1] = pack(spec)
         self._networks = networks_for(*(spec.proximity.response for spec in self.specs))
 
-    def _take_walls(self, free_space: FreeSpace) -> None:
-        self.free_space = free_space
-        self.arena = free_space.arena
+    @property
+    def arena(self) -> Arena:
+        """The walls, and what stood in them at the beginning."""
+        return self.free_space.arena
 
     def set_arena(self, free_space: FreeSpace) -> None:
         """Replace the walls by those of another arena.
@@ -113,7 +121,11 @@ class World:
                     f"The walls must leave room for all that is there, but one would be {-gap_mm:.1f} mm inside "
                     f"{free_space.name_of(disc)} at ({x_mm:.0f}, {y_mm:.0f}) mm. Move that away first."
                 )
-        self._take_walls(free_space)
+        self.take_walls(free_space)
+
+    def take_walls(self, free_space: FreeSpace) -> None:
+        """Replace the walls, whatever would be in them."""
+        self.free_space = free_space
         self.rebuild_scene()
 
     def rebuild_scene(self) -> None:
@@ -126,16 +138,17 @@ class World:
 
     def tick_to(self, time_ns: int) -> None:
         """Do the ticks that have begun up to a time [ns]."""
-        ticks = -(-time_ns // TICK_NS) - self.state.tick_count
-        while ticks > 0:
-            count = ticks if ticks < TICKS_AT_ONCE else TICKS_AT_ONCE
+        state, end = self.state, -(-time_ns // TICK_NS)
+        while state.tick_count < end:
+            until = min(end, state.tick_count + TICKS_AT_ONCE)
             for watcher in self.watchers:
-                count = min(count, watcher.ticks_left(self.state.tick_count))
-            step.advance(self.scene, self.state.tick_count, count)
-            self.state.tick_count += count
-            ticks -= count
+                if watcher.due_tick < until:
+                    until = watcher.due_tick
+            step.advance(self.scene, state.tick_count, until - state.tick_count)
+            state.tick_count = until
             for watcher in self.watchers:
-                watcher.look(self.state)
+                if watcher.from_tick <= until:
+                    watcher.look(state)
 
     # ---- robots ----
 
@@ -183,15 +196,19 @@ class World:
         robot["trail"][:] = (x_mm, y_mm, heading_rad)
         robot["start_x_mm"], robot["start_y_mm"] = x_mm, y_mm
 
-    def add_robot(self, spec: RobotSpec) -> int:
-        """Add a robot at the arena's start pose for it, if that is free, else at a random place; return its index.
+    def add_robot(self, spec: RobotSpec, place: Sequence[float] | None = None) -> int:
+        """Add a robot; return its index.
+
+        Args:
+            spec: Its kind.
+            place: Its pose, whatever is there; if left out, the arena's start pose for it, if that is free, else a
+                random place.
 
         Raises:
             ArenaError: If there is no free place for it.
         """
         index, discs, radius_mm = self.robot_count, self.free_space.discs(), spec.body.radius_mm
-        place = None
-        if index < len(self.arena.starts):
+        if place is None and index < len(self.arena.starts):
             start = self.arena.starts[index]
             if self.free_space.obstacle(start.x_mm, start.y_mm, radius_mm, discs) is None:
                 place = tuple(start)

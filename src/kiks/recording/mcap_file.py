@@ -1,0 +1,281 @@
+"""The MCAP file of a recording: chunks with messages, and attachments between them (https://mcap.dev/spec).
+
+Chunks are found by the heads of the records, from the beginning on, so that a file without an end is read like any
+other. Nothing is read or expanded beyond its declared size, which is checked before.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import struct
+import zlib
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO, NamedTuple
+
+import lz4.frame
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, Chunk, Message, Metadata
+from mcap.stream_reader import StreamReader
+from mcap.writer import CompressionType, Writer
+
+from kiks.errors import ParameterError
+from kiks.model.atomic_files import path_of
+from kiks.version import __version__
+
+ENDING = ".mcap"
+
+PROFILE = "kiks"
+
+_MAGIC = b"\x89MCAP0\r\n"
+_HEAD = struct.Struct("<BQ")
+_CHUNK_HEAD = struct.Struct("<QQQ")
+
+RECORD_BYTES_MAX = 64 << 20
+"""Most bytes of a record that is read, and of a chunk when it is expanded."""
+
+
+class Topic(NamedTuple):
+    """A channel of a recording.
+
+    Attributes:
+        name: What viewers call it.
+        encoding: Of its messages.
+        schema: Name of their schema; none if empty.
+        schema_text: The schema, as JSON.
+    """
+
+    name: str
+    encoding: str
+    schema: str = ""
+    schema_text: str = ""
+
+
+class McapFile:
+    """A file that grows chunk by chunk.
+
+    The first chunk announces all channels, so that every chunk can be read without an index. After an error of the disk nothing more is written, and `close` raises it: a recording never ends the run.
+
+    Args:
+        path: The file; an earlier one is replaced.
+        topics: The channels.
+
+    Raises:
+        ParameterError: If its name does not end in .mcap, or it cannot be written.
+    """
+
+    def __init__(self, path: str | Path, topics: Iterable[Topic]) -> None:
+        self._path = path_of(path, "a recording's file")
+        if self._path.suffix.lower() != ENDING:
+            raise ParameterError(f"A recording's file must end in '{ENDING}', but it was {str(self._path)!r}.")
+        self._error: OSError | None = None
+        try:
+            self._stream: BinaryIO = self._path.open("wb")
+        except OSError as error:
+            raise self._unwritable(error) from None
+        self._writer = Writer(self._stream, chunk_size=RECORD_BYTES_MAX, compression=CompressionType.LZ4)
+        self._do(lambda: self._writer.start(profile=PROFILE, library=f"kiks {__version__}"))
+        self._channels = {topic: self._channel(topic) for topic in topics}
+
+    def attach(self, name: str, data: bytes, media_type: str, time_ns: int = 0) -> None:
+        """Write a file within the file."""
+        self._do(lambda: self._writer.add_attachment(0, time_ns, name, media_type, data))
+
+    def describe(self, name: str, values: Mapping[str, str]) -> None:
+        """Write texts by name."""
+        self._do(lambda: self._writer.add_metadata(name, dict(values)))
+
+    def write(self, messages: list[tuple[Topic, int, bytes]]) -> None:
+        """Write messages as one chunk: the topic of each, its time [ns] and its data."""
+
+        def add_all() -> None:
+            for topic, time_ns, data in messages:
+                self._writer.add_message(self._channels[topic], time_ns, data, time_ns)
+            self._writer.flush()
+
+        self._do(add_all)
+
+    def _channel(self, topic: Topic) -> int:
+        encoding = "jsonschema" if topic.schema else ""
+        schema = self._writer.register_schema(topic.schema, encoding, topic.schema_text.encode()) if encoding else 0
+        return self._writer.register_channel(topic.name, topic.encoding, schema)
+
+    def close(self) -> None:
+        """Write the index, and close the file.
+
+        Raises:
+            ParameterError: If something could not be written.
+        """
+        self._do(self._writer.finish)
+        try:
+            self._stream.close()
+        except OSError as error:
+            self._error = self._error or error
+        if self._error is not None:
+            raise self._unwritable(self._error)
+
+    def _do(self, write: Callable[[], None]) -> None:
+        if self._error is None:
+            try:
+                write()
+            except OSError as error:
+                self._error = error
+
+    def _unwritable(self, error: OSError) -> ParameterError:
+        return ParameterError(
+            f"a recording must go to a file that can be written, but {str(self._path)!r} cannot "
+            f"({error.strerror}). Choose another place."
+        )
+
+
+@dataclass(frozen=True)
+class FoundChunk:
+    """Where a chunk is, and of what time.
+
+    Attributes:
+        offset: Of its record in the file.
+        length: Of its record.
+        begin_ns: Time of its first message [ns].
+        end_ns: Time of its last message [ns].
+    """
+
+    offset: int
+    length: int
+    begin_ns: int
+    end_ns: int
+
+
+class McapReader:
+    """Reads a recording's file.
+
+    Args:
+        path: The file.
+
+    Attributes:
+        what: What messages call it.
+        chunks: Its whole chunks, in their order in the file.
+        attachments: Names and contents of its attachments.
+        told: Texts of its metadata, by name.
+        is_whole: Whether it has an end; else the run that wrote it was killed, or still writes.
+
+    Raises:
+        ParameterError: If it is missing or no MCAP file.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.what = f"Recording {str(path)!r}"
+        path = path_of(path, "a recording")
+        if not path.is_file():
+            raise ParameterError(f"{self.what} must exist, but there is no such file. Check its name and its folder.")
+        try:
+            self._stream = path.open("rb")
+            self._size = os.fstat(self._stream.fileno()).st_size
+        except OSError as error:
+            raise ParameterError(f"{self.what} must be readable, but: {error}. Check its rights.") from None
+        self.chunks: list[FoundChunk] = []
+        self.attachments: dict[str, bytes] = {}
+        self.told: dict[str, str] = {}
+        self._topics: dict[int, str] = {}
+        self.is_whole = False
+        if self._stream.read(len(_MAGIC)) != _MAGIC:
+            raise ParameterError(f"{self.what} must be an MCAP file, but it is none. `--record FILE` makes one.")
+        self._offset = len(_MAGIC)
+        self.find_more()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._stream.close()
+
+    def find_more(self) -> None:
+        """Find the records that were written since the last call.
+
+        Raises:
+            ParameterError: If one is too large.
+        """
+        self._size = os.fstat(self._stream.fileno()).st_size
+        while not self.is_whole and self._offset + _HEAD.size <= self._size:
+            self._stream.seek(self._offset)
+            opcode, length = _HEAD.unpack(self._stream.read(_HEAD.size))
+            end = self._offset + _HEAD.size + length
+            if end > self._size:
+                return  # what a crash has cut off
+            if length > RECORD_BYTES_MAX:
+                raise ParameterError(
+                    f"{self.what} must have records of at most {RECORD_BYTES_MAX >> 20} MiB, but one has {length} "
+                    "bytes. Is the file damaged?"
+                )
+            self._find(opcode, length)
+            self._offset = end
+
+    def _find(self, opcode: int, length: int) -> None:
+        if opcode == Opcode.CHUNK and length >= _CHUNK_HEAD.size:
+            begin_ns, end_ns, _ = _CHUNK_HEAD.unpack(self._stream.read(_CHUNK_HEAD.size))
+            self.chunks.append(FoundChunk(self._offset, _HEAD.size + length, begin_ns, end_ns))
+        elif opcode in (Opcode.ATTACHMENT, Opcode.METADATA):
+            self._stream.seek(self._offset)
+            for record in self._records(self._stream.read(_HEAD.size + length)):
+                if isinstance(record, Attachment):
+                    self.attachments[record.name] = record.data
+                elif isinstance(record, Metadata):
+                    self.told |= record.metadata
+        elif opcode == Opcode.DATA_END:
+            self.is_whole = True
+
+    def messages(self, chunk: FoundChunk) -> Iterator[tuple[str, int, bytes]]:
+        """Yield topic, time [ns] and data of each message of a chunk.
+
+        Raises:
+            ParameterError: If it is damaged.
+        """
+        if not self._topics:
+            # The first chunk says which channels there are.
+            self._topics.update((each.id, each.topic) for each in self._inside(self.chunks[0]) if isinstance(each, Channel))
+        for each in self._inside(chunk):
+            if isinstance(each, Message):
+                yield self._topics.get(each.channel_id, ""), each.log_time, each.data
+
+    def _inside(self, chunk: FoundChunk) -> Iterator[object]:
+        """Yield the records in a chunk."""
+        self._stream.seek(chunk.offset)
+        for record in self._records(self._stream.read(chunk.length)):
+            if isinstance(record, Chunk):
+                yield from self._records(self._expanded(record))
+
+    def _expanded(self, chunk: Chunk) -> bytes:
+        """Return what a chunk holds, no more than it says."""
+        if chunk.compression not in ("", "lz4"):
+            raise ParameterError(
+                f"{self.what} must have chunks without compression or with lz4, but one has {chunk.compression!r}. "
+                "KiKS writes lz4."
+            )
+        data, size = chunk.data, chunk.uncompressed_size
+        if chunk.compression and size <= RECORD_BYTES_MAX:
+            with suppress(RuntimeError, EOFError):
+                data = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=size + 1)
+        if len(data) != size or chunk.uncompressed_crc not in (0, zlib.crc32(data)):
+            raise ParameterError(f"{self.what} must have whole chunks, but one is damaged. Take another copy of it.")
+        return data
+
+    def _records(self, data: bytes) -> Iterator[object]:
+        """Yield the MCAP records in bytes.
+
+        Raises:
+            ParameterError: If one is damaged.
+        """
+        stream = io.BytesIO(data)
+        reader = StreamReader(stream, skip_magic=True, emit_chunks=True, record_size_limit=len(data))
+        records = reader.records
+        while stream.tell() < len(data):
+            try:
+                yield next(records)
+            except StopIteration:
+                return
+            except (McapError, EOFError, ValueError, struct.error, OverflowError, MemoryError) as error:
+                raise ParameterError(
+                    f"{self.what} must have whole records, but one is damaged ({error or type(error).__name__}). Take "
+                    "another copy of it."
+                ) from None

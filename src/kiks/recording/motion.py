@@ -1,0 +1,149 @@
+"""The motion of a run: robots and bodies after every third or fourth tick.
+
+A robot's record holds the poses of its last three ticks, too, so every tick's poses are there. Of the record only the
+first part is kept: body, wheels and controllers.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.engine.state import ROBOT, TRAIL_LENGTH, State
+from kiks.errors import ParameterError
+from kiks.sim.saved_state import Layout
+
+KEPT_BYTES = int((ROBOT.fields or {})["bus"][1])
+"""Bytes of a robot's record that are kept: those before the field of that name."""
+
+Look = tuple[int, bytes, bytes]
+"""The number of ticks done, the first parts of robots' records, and the records of bodies."""
+
+
+class MotionWatcher:
+    """Keeps looks until they are written, as a `kiks.sim.paths.Watcher`.
+
+    A program lets the ticks be done in pieces. It looks where such a piece ends, so that it needs no more of them.
+
+    Attributes:
+        from_tick: See `kiks.sim.paths.Watcher`.
+        due_tick: The same.
+        looks: What was seen and is not written yet.
+    """
+
+    def __init__(self, state: State) -> None:
+        self.looks: list[Look] = []
+        self._robots: NDArray[np.void] | None = None
+        self.look(state)
+
+    def look(self, state: State) -> None:
+        """Keep the records."""
+        if state.robots is not self._robots:
+            self._robots = state.robots
+            self._kept = state.robots.view(np.uint8).reshape(-1, ROBOT.itemsize)[:, :KEPT_BYTES]
+        self.from_tick, self.due_tick = state.tick_count + TRAIL_LENGTH, state.tick_count + TRAIL_LENGTH + 1
+        self.looks.append((state.tick_count, self._kept.tobytes(), state.bodies.tobytes()))
+
+
+class Motion(NamedTuple):
+    """Looks at a world while nothing came or went.
+
+    Attributes:
+        ticks: Number of ticks done at each, int64 [look].
+        robots: The first fields of `ROBOT`, shape [look, robot].
+        bodies: Records of `BODY`, shape [look, body].
+    """
+
+    ticks: NDArray[np.int64]
+    robots: NDArray[np.void]
+    bodies: NDArray[np.void]
+
+
+_HEAD = struct.Struct("<IIII")  # looks, robots, bytes of a robot, bodies
+
+
+def encode(looks: Sequence[Look], layout: Layout) -> bytes:
+    """Return a block of looks."""
+    parts: list[bytes] = []
+    begin = 0
+    for end in range(1, len(looks) + 1):
+        _, robots, bodies = looks[begin]
+        if end == len(looks) or len(looks[end][1]) != len(robots) or len(looks[end][2]) != len(bodies):
+            ticks, of_robots, of_bodies = zip(*looks[begin:end], strict=True)
+            body_count = len(bodies) // layout.body.itemsize
+            parts.append(_HEAD.pack(end - begin, len(robots) // KEPT_BYTES, KEPT_BYTES, body_count))
+            parts.append(np.array(ticks, "<i8").tobytes())
+            parts += of_robots + of_bodies
+            begin = end
+    return b"".join(parts)
+
+
+def decode(block: bytes, layout: Layout, what: str) -> Iterator[Motion]:
+    """Yield what was seen, as long as nothing came or went at once.
+
+    Args:
+        block: Of `encode`.
+        layout: That of the records.
+        what: What messages call the block.
+
+    Raises:
+        ParameterError: If it is none.
+    """
+    offset = 0
+    while offset < len(block):
+        begin = offset + _HEAD.size
+        looks, robots, robot_bytes, bodies = _HEAD.unpack_from(block, offset) if begin <= len(block) else (0, 0, 0, 0)
+        middle = begin + looks * 8
+        end = middle + looks * robots * robot_bytes
+        offset = end + looks * bodies * layout.body.itemsize
+        if not (looks and robots and 0 < robot_bytes <= layout.robot.itemsize and offset <= len(block)):
+            raise ParameterError(f"{what} must have blocks of motion, but one is damaged. Take another copy of it.")
+        yield Motion(
+            np.frombuffer(block, "<i8", looks, begin),
+            np.frombuffer(block, _first_fields(layout.robot, robot_bytes), looks * robots, middle).reshape(looks, robots),
+            layout.bodies(block[end:offset]).reshape(looks, bodies),
+        )
+
+
+def _first_fields(kind: np.dtype[np.void], size: int) -> np.dtype[np.void]:
+    """Return the type of the first bytes of records of a type."""
+    inside = [name for name, field in (kind.fields or {}).items() if field[1] + field[0].itemsize <= size]
+    return np.dtype({**_described(kind, inside), "itemsize": size})
+
+
+def _described(kind: np.dtype[np.void], names: list[str]) -> Any:
+    fields: Any = kind.fields or {}
+    return {"names": names, "formats": [fields[name][0] for name in names], "offsets": [fields[name][1] for name in names]}
+
+
+class Ticks(NamedTuple):
+    """Poses after each tick.
+
+    Attributes:
+        ticks: Number of ticks done, int64 [tick].
+        poses: x_mm, y_mm, heading_rad; float64 [tick, robot, 3].
+    """
+
+    ticks: NDArray[np.int64]
+    poses: NDArray[np.float64]
+
+
+def poses_of(motion: Motion, after_tick: int) -> Ticks:
+    """Return the poses after each tick that looks tell of.
+
+    Args:
+        motion: The looks.
+        after_tick: The tick of the look before them; -1 without one.
+    """
+    records: Any = motion.robots
+    newest = np.stack([records["x_mm"], records["y_mm"], records["heading_rad"]], axis=-1)
+    # [look, 4, robot, 3], the oldest tick first.
+    poses = np.concatenate([records["trail"][:, :, ::-1], newest[:, :, None]], axis=2).swapaxes(1, 2)
+    ticks = motion.ticks[:, None] + np.arange(-TRAIL_LENGTH, 1)
+    before = np.concatenate([[after_tick], motion.ticks[:-1]])
+    is_new = (ticks > before[:, None]) & (ticks >= 0)
+    return Ticks(ticks[is_new], poses[is_new])

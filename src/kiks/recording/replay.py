@@ -1,0 +1,102 @@
+"""A recorded run again: a simulation that its inputs move, from any time on.
+
+The simulation is a living one: what stands in the recording comes to it at the same instants, between the same events.
+It can be looked at, made to pass at any speed, and let go on without the recording.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from kiks.recording.entries import Entry, Kind
+from kiks.sim.saved_state import restore_state
+from kiks.sim.simulation import Simulation
+from kiks.sim.wire import ignore_reply
+
+if TYPE_CHECKING:
+    from kiks.recording.recording import Recording
+
+NEVER_NS = 2**62
+HASH_LENGTH = 16
+
+
+class Replay:
+    """A recorded run from a time on, as a `kiks.sim.event_loop.Supervisor` of its simulation.
+
+    Args:
+        recording: The recording.
+        time_ns: Where it begins [ns].
+        on_check: Called after each checkpoint has been reached, with its time [ns] and the hash that was recorded.
+
+    Attributes:
+        sim: The simulation.
+        next_ns: When the next input is due [ns].
+
+    Raises:
+        KiksError: If the recording is damaged there.
+    """
+
+    def __init__(
+        self,
+        recording: Recording,
+        time_ns: int = 0,
+        on_check: Callable[[int, str], None] = lambda time_ns, state_hash: None,
+    ) -> None:
+        self._recording = recording
+        self._on_check = on_check
+        self.next_ns = NEVER_NS
+        row = recording.row_before(time_ns)
+        setup, saved = recording.state_of(recording.entry(row))
+        self.sim = setup.simulation(saved.poses)
+        restore_state(self.sim, saved)
+        self._row = row
+        self._next: Entry | None = None
+        self._find_next()
+        self.sim.loop.supervisor = self
+        self.sim.advance_to(time_ns)
+
+    def let_go(self) -> Simulation:
+        """Return the simulation, which goes on without the recording from now on."""
+        self.sim.loop.supervisor = None
+        return self.sim
+
+    def act(self) -> None:
+        """Let the inputs come that are due, up to the next one before which robots act."""
+        is_due, time_ns = True, self.next_ns
+        while is_due and self._next is not None:
+            self._apply(self._next)
+            has_acted = self._find_next()
+            is_due = self.next_ns == time_ns and not has_acted
+
+    def _find_next(self) -> bool:
+        """Find the next input, if there is one; return whether robots act before it."""
+        self._next, self.next_ns, has_acted = None, NEVER_NS, False
+        if (found := self._recording.next_input(self._row)) is not None:
+            self._row, self._next, has_acted = found
+            self.next_ns = self._next.time_ns
+        return has_acted
+
+    def _apply(self, entry: Entry) -> None:
+        sim = self.sim
+        wire = sim.wires[entry.robot] if entry.robot < len(sim.wires) else sim.wires[0]
+        match entry.kind:
+            case Kind.SEND:
+                wire.send(entry.data, entry.number)
+            case Kind.TYPE:
+                wire.send(entry.data, entry.number, ignore_reply)
+            case Kind.HANG_UP:
+                wire.hang_up()
+            case Kind.SET_BAUD:
+                wire.set_baud(entry.number)
+            case Kind.DROP:
+                wire.drop_after(entry.number, entry.other)
+            case Kind.CHECK:
+                sim.sync()
+                for each in sim.wires:
+                    each.line.forget()  # replies that nobody reads would fill the line
+                self._on_check(entry.time_ns, entry.data[:HASH_LENGTH].decode("ascii", "replace"))
+            case Kind.STATE:
+                setup, saved = self._recording.state_of(entry)
+                setup.bring(sim, saved.poses)
+                restore_state(sim, saved)

@@ -1,0 +1,141 @@
+"""The tables of a recording, as arrays of records."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.recording.entries import Kind
+from kiks.recording.motion import poses_of
+from kiks.units import TICK_NS, s_from_ns
+
+if TYPE_CHECKING:
+    from kiks.recording.recording import Recording
+
+Table = NDArray[np.void]
+
+_POSES = np.dtype([("time_s", "f8"), ("robot", "i4"), ("x_mm", "f8"), ("y_mm", "f8"), ("heading_rad", "f8")])
+_WHEELS = np.dtype(
+    [
+        ("time_s", "f8"),
+        ("robot", "i4"),
+        ("left_pulses", "i8"),
+        ("right_pulses", "i8"),
+        ("left_setpoint", "i4"),
+        ("right_setpoint", "i4"),
+        ("left_speed", "i4"),
+        ("right_speed", "i4"),
+        ("is_touching", "?"),
+        ("contacts", "i8"),
+    ]
+)
+_READINGS = np.dtype([("time_s", "f8"), ("robot", "i4"), ("command", "U1"), ("counts", "i4", (8,))])
+
+
+def _seconds(ticks: NDArray[np.int64]) -> NDArray[np.float64]:
+    return ticks * TICK_NS / 1e9
+
+
+def _joined(parts: list[Table], kind: np.dtype[np.void]) -> Table:
+    return np.concatenate(parts) if parts else np.zeros(0, kind)
+
+
+def poses(recording: Recording) -> Table:
+    """Return where robots were after each tick of 10 ms: time_s, robot, x_mm, y_mm, heading_rad (not wrapped)."""
+    parts, last_tick = [], -1
+    for motion in recording.motion():
+        ticks, places = poses_of(motion, last_tick)
+        last_tick = int(motion.ticks[-1])
+        rows = np.zeros(places.shape[:2], _POSES)
+        rows["time_s"], rows["robot"] = _seconds(ticks)[:, None], np.arange(1, places.shape[1] + 1)
+        for index, name in enumerate(("x_mm", "y_mm", "heading_rad")):
+            rows[name] = places[:, :, index]
+        parts.append(rows.ravel())
+    return _joined(parts, _POSES)
+
+
+def wheels(recording: Recording) -> Table:
+    """Return what wheels did, every 40 ms.
+
+    Columns are encoder counts since the start [pulses], speeds that the program asked for and that the robot measured
+    [pulses/10 ms], whether it touches something, and how often it has begun to.
+    """
+    parts = []
+    for motion in recording.motion():
+        records: Any = motion.robots
+        rows = np.zeros(records.shape, _WHEELS)
+        rows["time_s"], rows["robot"] = _seconds(motion.ticks)[:, None], np.arange(1, records.shape[1] + 1)
+        for wheel, side in enumerate(("left", "right")):
+            rows[f"{side}_pulses"] = records["pulse_count"][:, :, wheel]
+            rows[f"{side}_setpoint"] = records["speed_setpoint"][:, :, wheel]
+            rows[f"{side}_speed"] = records["measured_speed"][:, :, wheel]
+        rows["is_touching"], rows["contacts"] = records["is_touching"] != 0, records["contact_count"]
+        parts.append(rows.ravel())
+    return _joined(parts, _WHEELS)
+
+
+def readings(recording: Recording) -> Table:
+    """Return what programs read of proximity (N) and light (O) sensors: time_s, robot, command, counts [8]."""
+    rows = []
+    for entry in recording.entries():
+        letter, _, values = entry.data.rstrip().partition(b",")
+        if entry.kind == Kind.ACT and letter in (b"n", b"o") and values.count(b",") == 7:
+            counts = tuple(map(int, values.split(b",")))
+            rows.append((s_from_ns(entry.time_ns), entry.robot + 1, letter.decode().upper(), counts))
+    return np.array(rows, _READINGS)
+
+
+def wire(recording: Recording) -> Table:
+    """Return the characters on all lines: time_s of the first one, robot, is_sent (to the robot), data."""
+    rows = []
+    for entry in recording.entries():
+        if entry.data and entry.kind in (Kind.SEND, Kind.TYPE):
+            rows.append((s_from_ns(entry.other), entry.robot + 1, True, entry.data))
+        elif entry.data and entry.kind == Kind.ACT:
+            rows.append((s_from_ns(entry.number), entry.robot + 1, False, entry.data))
+    rows.sort(key=lambda row: row[0])
+    longest = max((len(row[3]) for row in rows), default=1)
+    return np.array(rows, np.dtype([("time_s", "f8"), ("robot", "i4"), ("is_sent", "?"), ("data", f"S{longest}")]))
+
+
+def events(recording: Recording) -> Table:
+    """Return what happened: time_s, robot (0 for none), kind, text.
+
+    Kinds are 'contact', 'output' (a line that a program printed), 'bookmark', and 'change' (by a hand or a program, in
+    any other way than over a line).
+    """
+    rows: list[tuple[float, int, str, str]] = []
+    states = 0
+    for entry in recording.entries():
+        time_s = s_from_ns(entry.time_ns)
+        if entry.kind == Kind.TEXT:
+            rows.append((time_s, entry.robot + 1, "output", entry.data.decode("utf-8", "replace")))
+        elif entry.kind == Kind.MARK:
+            rows.append((time_s, 0, "bookmark", entry.data.decode("utf-8", "replace")))
+        elif entry.kind == Kind.STATE:
+            states += 1
+            if states > 1:
+                rows.append((time_s, 0, "change", ""))
+    before: dict[int, int] = {}
+    for row in wheels(recording):
+        robot, contacts = int(row["robot"]), int(row["contacts"])
+        if contacts > before.setdefault(robot, contacts):
+            rows.append((float(row["time_s"]), robot, "contact", ""))
+        before[robot] = contacts
+    rows.sort(key=lambda row: row[0])
+    longest = max((len(row[3]) for row in rows), default=1)
+    kind = np.dtype([("time_s", "f8"), ("robot", "i4"), ("kind", "U8"), ("text", f"U{max(longest, 1)}")])
+    return np.array(rows, kind)
+
+
+TABLES: Mapping[str, Callable[[Recording], Table]] = {
+    "poses": poses,
+    "wheels": wheels,
+    "readings": readings,
+    "wire": wire,
+    "events": events,
+}
+"""The tables by name."""
