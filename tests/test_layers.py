@@ -25,6 +25,7 @@ LAYERS = [
     "firmware",
     "clock",
     "sim",
+    "recording",
     "ports",
     "script",
     "client",
@@ -41,7 +42,7 @@ LAYERS = [
 
 # What of the standard library only some layers may touch.
 CLOCKS = {"time", "datetime"}
-MAY_SEE_THE_WALL_CLOCK = {"clock", "script", "client", "calibration", "learn", "desk", "toolbox", "cli"}
+MAY_SEE_THE_WALL_CLOCK = {"clock", "recording", "script", "client", "calibration", "learn", "desk", "toolbox", "cli"}
 RANDOM = {"random", "secrets"}
 MAY_HAVE_SECRETS = {"desk", "toolbox"}
 

@@ -12,6 +12,7 @@ from soccer_match import Match, Report, play
 from soccer_picture import draw_match
 
 from kiks.cli.desk import open_desk
+from kiks.cli.record import recorded
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, shown
 
@@ -25,7 +26,7 @@ SECONDS = 300.0
 def show_match(
     seconds: float | None,
     seed: int,
-    picture: Path,
+    files: tuple[Path, Path | None],
     left: str | None,
     right: str | None,
     *,
@@ -37,7 +38,7 @@ def show_match(
     Args:
         seconds: Length of the match [s]; five minutes if left out.
         seed: Seed of all random numbers.
-        picture: The picture's file.
+        files: The picture's file, and that of the recording, if there is to be one.
         left: The program of the left side with its arguments; KiKS's own player if left out.
         right: The program of the right side.
         on_desk: Whether to show the match in a browser.
@@ -56,18 +57,19 @@ def show_match(
     if on_desk:
         from kiks.desk.server.desk import Desk
 
-        open_desk(Desk(match), work=partial(_play, match, players, picture), waits=waits, goes_on=False)
+        open_desk(Desk(match), work=partial(_play, match, players, *files), waits=waits, goes_on=False)
     else:
-        _play(match, players, picture)
+        _play(match, players, *files)
 
 
-def _play(match: Match, players: list[Command], picture: Path) -> None:
+def _play(match: Match, players: list[Command], picture: Path, record: Path | None) -> None:
     """Play the match to the end, print the result, and draw it."""
     from kiks.drawing import save_picture
 
     end_as_with_ctrl_c()
     start_s = perf_counter()
-    doubt = play(match, players, say=lambda text: typer.echo(f"kiks: {text}", err=True))
+    with recorded(match, record=record, programs=[each.program for each in players]):
+        doubt = play(match, players, say=lambda text: typer.echo(f"kiks: {text}", err=True))
     speedup = match.time_s / (perf_counter() - start_s)
     save_picture(draw_match(match), picture)
     left_count, right_count = match.report.score()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import enum
 import importlib
 import sys
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,6 +13,7 @@ import typer
 from kiks.cli.desk import NoWait, WithDesk, open_desk
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.options import SeedOrOwn, load_arena, say, say_without_world, shipped_folder
+from kiks.cli.record import RecordFile, recorded
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, nearest, shown
 from kiks.version import __version__
@@ -78,6 +78,7 @@ def demo(
     task: Annotated[
         str | None, typer.Option(help="With --generation: the file of the task, if it is a Python file or was moved.")
     ] = None,
+    record: RecordFile = None,
     desk: WithDesk = False,
     no_wait: NoWait = False,
 ) -> None:
@@ -129,7 +130,7 @@ def demo(
     if is_soccer:
         sys.path.append(str(shipped_folder("examples/soccer", "player.py")))
         importlib.import_module("soccer_command").show_match(
-            seconds, seed or 0, picture, left, right, on_desk=desk, waits=not no_wait
+            seconds, seed or 0, (picture, record), left, right, on_desk=desk, waits=not no_wait
         )
         return
     given, default_s = None if arena is None else load_arena(arena), None
@@ -151,7 +152,11 @@ def demo(
             champion, default_s = _individual(behaviour, generation, rank, world, task)
         scene = ChampionScene(champion, given, seed=seed, baud=baud)
     seconds = seconds or default_s or scene.seconds
-    work = partial(_run, scene, name, seconds, picture)
+
+    def work() -> None:
+        with recorded(scene.sim, record=record):
+            _run(scene, name, seconds, picture)
+
     if desk:
         from kiks.desk.server.desk import Desk
 

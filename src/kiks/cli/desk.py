@@ -12,6 +12,7 @@ import typer
 
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.options import is_project, parse_turret, parse_words, show_log, with_robots
+from kiks.cli.record import RecordFile, recorded
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError
 
@@ -60,6 +61,7 @@ def desk(
         bool, typer.Option("--run-programs", help="Let browsers on other computers start programs, too.")
     ] = False,
     browser: Annotated[bool, typer.Option(help="Open a browser.")] = True,
+    record: RecordFile = None,
     no_wait: NoWait = False,
 ) -> None:
     """Open the desk: a world in the browser.
@@ -91,22 +93,20 @@ def desk(
     )
     commands = commands_of(project, home)
     commands[: len(begin)] = begin
-    open_desk(
-        Desk(
-            simulation_of(project, home),
-            project=project,
-            speed=project.speed,
-            folder=home,
-            owns_world=True,
-            may_run_programs=run_programs or host in LOOPBACK,
-            commands=commands,
-            is_held=not no_wait,
-        ),
-        host=host,
-        port=port,
-        browser=browser,
-        waits=not no_wait,
+    sim = simulation_of(project, home)
+    shown = Desk(
+        sim,
+        project=project,
+        speed=project.speed,
+        folder=home,
+        owns_world=True,
+        may_run_programs=run_programs or host in LOOPBACK,
+        commands=commands,
+        is_held=not no_wait,
     )
+    # A new start makes another world: the recording ends with the first one.
+    with recorded(sim, record=record, programs=[each.program for each in commands if each is not None]):
+        open_desk(shown, host=host, port=port, browser=browser, waits=not no_wait)
 
 
 def _robots(

@@ -38,13 +38,12 @@ def run_champion(
     turret: list[str] | None,
     seed: int | None,
     seconds: float,
-    picture: Path | None,
-    csv: Path | None,
+    files: tuple[Path | None, Path | None, Path | None],
     *,
     on_desk: bool,
     waits: bool,
 ) -> None:
-    """Let a champion drive all robots of a simulation, and print the result.
+    """Let a champion drive all robots of a simulation, and print the result; `files` are those of `recorded`.
 
     Raises:
         ParameterError: If the file is no champion's, or a result cannot be written.
@@ -61,7 +60,7 @@ def run_champion(
     def work() -> None:
         doubt = "it was interrupted"
         try:
-            with recorded(sim, picture, csv):
+            with recorded(sim, *files):
                 loop_count = champion.drive(ports, seconds=seconds)
             say(f"{loop_count} loops")
             doubt = ""

@@ -1,9 +1,11 @@
-"""What is left of a run: a picture of it, a table of it, and a line for each robot."""
+"""What is left of a run: a picture, a table, a recording, and a line for each robot."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+import shlex
+import sys
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from kiks.cli.options import say, written_file
+from kiks.errors import ParameterError
 from kiks.model.atomic_files import GrowingFile
 
 if TYPE_CHECKING:
@@ -21,6 +24,9 @@ TABLE_TICKS = 5
 """Ticks of 10 ms between two rows of a robot in a table."""
 
 COLUMNS = ("time_s", "robot", "x_mm", "y_mm", "heading_deg", "driven_mm", "contacts")
+
+PROGRAM_CHARACTERS_MAX = 1 << 20
+"""Most characters of a program's text in a recording."""
 
 POINTS_MAX, LEAST_POINTS_MAX = 200_000, 1000
 """Most points of all paths of a picture together, but of each path at least so many."""
@@ -49,21 +55,53 @@ Table = Annotated[
 ]
 
 
+def _recordable(param: typer.CallbackParam, value: Path | None) -> Path | None:
+    """Check the file of a recording before the run.
+
+    Raises:
+        ParameterError: If it could not be written, or its name has another ending.
+    """
+    if value is not None and value.suffix.lower() != ".mcap":
+        raise ParameterError(f"--record must name a file that ends in .mcap, but it was {str(value)!r}.")
+    return written_file(param, value)
+
+
+RecordFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--record", help="Record the whole run here, a .mcap file: kiks replay shows it again.", callback=_recordable
+    ),
+]
+
+
 @contextmanager
-def recorded(sim: Simulation, picture: Path | None, csv: Path | None) -> Iterator[None]:
+def recorded(
+    sim: Simulation,
+    picture: Path | None = None,
+    csv: Path | None = None,
+    record: Path | None = None,
+    programs: Sequence[Path] = (),
+) -> Iterator[None]:
     """Keep what happens in a world meanwhile, also if it is interrupted; the run is the same, to the bit.
 
     Args:
         sim: The world.
         picture: File of the picture that is drawn at the end; none if None.
         csv: File of the table; none if None.
+        record: File of the recording; none if None.
+        programs: The programs that drive its robots, whose texts the recording keeps.
 
     Raises:
         ParameterError: If a file cannot be written.
     """
     # A program may go to another folder.
-    picture, csv = picture and picture.absolute(), csv and csv.absolute()
+    picture, csv, record = picture and picture.absolute(), csv and csv.absolute(), record and record.absolute()
     with ExitStack() as at_the_end:
+        if record is not None:
+            from kiks.recording.recorder import RunRecorder
+
+            texts = {f"{number}-{path.name}": _text_of(path) for number, path in enumerate(programs, 1)}
+            at_the_end.enter_context(RunRecorder(sim, record, programs=texts, about={"command": _command_line()}))
         if picture is not None:
             from kiks.drawing import Trace, save_simulation
 
@@ -78,6 +116,18 @@ def recorded(sim: Simulation, picture: Path | None, csv: Path | None) -> Iterato
             # The last ticks may not have been asked for yet.
             at_the_end.callback(sim.sync)
         yield
+
+
+def _text_of(program: Path) -> str:
+    """Return the text of a program; nothing if it cannot be read, which its start will tell."""
+    try:
+        return program.read_text("utf-8", "replace")[:PROGRAM_CHARACTERS_MAX]
+    except OSError:
+        return ""
+
+
+def _command_line() -> str:
+    return shlex.join(["kiks", *sys.argv[1:]])
 
 
 class _Rows:

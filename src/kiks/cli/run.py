@@ -31,7 +31,7 @@ from kiks.cli.options import (
     with_robots,
     written_file,
 )
-from kiks.cli.record import Picture, Table, recorded, tell_run
+from kiks.cli.record import Picture, RecordFile, Table, recorded, tell_run
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, shown
 
@@ -100,6 +100,7 @@ def run(
     ] = 60.0,
     picture: Picture = None,
     csv: Table = None,
+    record: RecordFile = None,
     desk: WithDesk = False,
     no_wait: NoWait = False,
 ) -> None:
@@ -122,7 +123,9 @@ def run(
             raise ParameterError(
                 f"a champion must drive all robots alone, but {shown(arguments[0])} follows it. Leave it out."
             )
-        run_champion(program, arena, robots, turret, seed, seconds, picture, csv, on_desk=desk, waits=not no_wait)
+        run_champion(
+            program, arena, robots, turret, seed, seconds, (picture, csv, record), on_desk=desk, waits=not no_wait
+        )
         return
     kinds = robot or []
     from kiks.ports.program_process import Labels, commands_of
@@ -151,7 +154,7 @@ def run(
     check_policy(when_silent, patience)
     thinking = thinking_of(project, home) if thinking is None else thinking
     # A program may change the working folder.
-    record = None if save_thinking is None else save_thinking.absolute()
+    thoughts = None if save_thinking is None else save_thinking.absolute()
     sim = simulation_of(project, home, kinds=kinds, thinking=thinking if len(commands) == 1 else "none")
     fit_turrets(sim, turret)
     names = [each.program.name for each in commands if each is not None]
@@ -160,14 +163,15 @@ def run(
         Programs,
         robots_by_name=mapping,
         thinking=thinking,
-        record=record,
+        record=thoughts,
         when_silent=when_silent,
         patience_s=patience,
         say=say if labels is None else labels.say,
         labels=labels,
     )
+    files = (picture, csv, record, [each.program for each in commands if each is not None])
     if desk:
-        with recorded(sim, picture, csv):
+        with recorded(sim, *files):
             # If the command line has changed the robots, the desk derives the project from the simulation.
             told = None if kinds or turret else project
             _run_on_desk(
@@ -177,9 +181,9 @@ def run(
     end_as_with_ctrl_c()
     code, doubt = 1, ""
     try:
-        with recorded(sim, picture, csv):
+        with recorded(sim, *files):
             if len(commands) == 1 and commands[0] is not None:
-                code = _run_one(sim, commands[0], mapping, record)
+                code = _run_one(sim, commands[0], mapping, thoughts)
             else:
                 programs = host(sim, commands)
                 code = programs.run()

@@ -24,6 +24,7 @@ from kiks.cli.options import (
     show_log,
     with_robots,
 )
+from kiks.cli.record import RecordFile, recorded
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import LinkError
 
@@ -73,6 +74,7 @@ def serve(
     host: Annotated[
         str, typer.Option(help="Address that the TCP ports listen at; this computer's own only.")
     ] = "127.0.0.1",
+    record: RecordFile = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but warnings.")] = False,
     desk: WithDesk = False,
 ) -> None:
@@ -121,7 +123,8 @@ def serve(
             new_patience=Patience if gate is None else gate.patience,
         )
         say(_repeatability(thinking, speed, sim.robot_count if programs is None else programs))
-        server.serve()
+        with recorded(sim, record=record):
+            server.serve()
     except KeyboardInterrupt:
         state = "" if thinking == "live" else f" State {sim.state_hash()}."
         say(f"Stopped after {sim.time_s:.1f} s of simulated time.{state}")

@@ -133,7 +133,8 @@ class Columns(NamedTuple):
             if ((lengths >= 0) & (lengths <= len(block))).all() and (columns[2] >= 0).all():
                 ends = begin + lengths.cumsum()
                 if len(block) == (int(ends[-1]) if count else begin):
-                    return cls(*columns, ends, block)
+                    kind, time_ns, robot, number, other, lengths = columns
+                    return cls(kind, time_ns, robot, number, other, lengths, ends, block)
         raise ParameterError(f"{what} must have blocks of entries, but one is damaged. Take another copy of it.")
 
     def entry(self, row: int) -> Entry:
@@ -144,4 +145,7 @@ class Columns(NamedTuple):
     def entries(self) -> Sequence[Entry]:
         """Return all entries."""
         rows = zip(*(column.tolist() for column in self[:7]), strict=True)
-        return [Entry(*numbers, self.data[end - length : end]) for *numbers, length, end in rows]
+        return [
+            Entry(kind, time_ns, robot, number, other, self.data[end - length : end])
+            for kind, time_ns, robot, number, other, length, end in rows
+        ]

@@ -51,7 +51,9 @@ _BYTES = {"type": "string", "contentEncoding": "base64"}
 
 
 def _topic(name: str, schema: str, /, **properties: Any) -> Topic:
-    return Topic(name, "json", f"foxglove.{schema}", json.dumps({"title": f"foxglove.{schema}", **_object(**properties)}))
+    return Topic(
+        name, "json", f"foxglove.{schema}", json.dumps({"title": f"foxglove.{schema}", **_object(**properties)})
+    )
 
 
 WALLS = _topic(
@@ -78,9 +80,7 @@ SCENE = _topic(
             id=_TEXT,
             lifetime=_TIME,
             frame_locked=_YES_NO,
-            cylinders=_list(
-                _object(pose=_POSE, size=_VECTOR, bottom_scale=_NUMBER, top_scale=_NUMBER, color=_COLOUR)
-            ),
+            cylinders=_list(_object(pose=_POSE, size=_VECTOR, bottom_scale=_NUMBER, top_scale=_NUMBER, color=_COLOUR)),
             arrows=_list(
                 _object(
                     pose=_POSE,
@@ -98,9 +98,7 @@ POSES = _topic(
     "/tf",
     "FrameTransforms",
     transforms=_list(
-        _object(
-            timestamp=_TIME, parent_frame_id=_TEXT, child_frame_id=_TEXT, translation=_VECTOR, rotation=_TURN
-        )
+        _object(timestamp=_TIME, parent_frame_id=_TEXT, child_frame_id=_TEXT, translation=_VECTOR, rotation=_TURN)
     ),
 )
 TEXT = _topic("/log", "Log", timestamp=_TIME, level=_WHOLE, message=_TEXT, name=_TEXT, file=_TEXT, line=_WHOLE)
@@ -154,7 +152,9 @@ def scene(specs: Sequence[RobotSpec], bodies: np.ndarray[Any, np.dtype[np.void]]
         entities.append(_disc(f"robot {number}", radius_m, 0.25, time_ns) | {"arrows": [arrow]})
     for body in bodies:
         entities.append(_disc(f"body {body['number']}", float(body["radius_mm"]) / 1000, 0.9, time_ns))
-    return json.dumps({"deletions": [{"timestamp": _time(time_ns), "type": 1, "id": ""}], "entities": entities}).encode()
+    return json.dumps(
+        {"deletions": [{"timestamp": _time(time_ns), "type": 1, "id": ""}], "entities": entities}
+    ).encode()
 
 
 def _disc(name: str, radius_m: float, grey: float, time_ns: int) -> dict[str, Any]:
@@ -212,5 +212,12 @@ def poses(looks: Sequence[Look]) -> list[tuple[Topic, int, bytes]]:
 
 def text(name: str, message: str, time_ns: int) -> bytes:
     """Return a line of a program's output, or a person's note."""
-    values = {"timestamp": _time(time_ns), "level": _LEVEL_INFO, "message": message, "name": name, "file": "", "line": 0}
+    values = {
+        "timestamp": _time(time_ns),
+        "level": _LEVEL_INFO,
+        "message": message,
+        "name": name,
+        "file": "",
+        "line": 0,
+    }
     return json.dumps(values).encode()

@@ -58,7 +58,8 @@ class Topic(NamedTuple):
 class McapFile:
     """A file that grows chunk by chunk.
 
-    The first chunk announces all channels, so that every chunk can be read without an index. After an error of the disk nothing more is written, and `close` raises it: a recording never ends the run.
+    The first chunk announces all channels, so that every chunk can be read without an index. After an error of the
+    disk nothing more is written, and `close` raises it: a recording never ends the run.
 
     Args:
         path: The file; an earlier one is replaced.
@@ -95,7 +96,7 @@ class McapFile:
         def add_all() -> None:
             for topic, time_ns, data in messages:
                 self._writer.add_message(self._channels[topic], time_ns, data, time_ns)
-            self._writer.flush()
+            self._writer.flush()  # type: ignore[no-untyped-call]
 
         self._do(add_all)
 
@@ -233,7 +234,9 @@ class McapReader:
         """
         if not self._topics:
             # The first chunk says which channels there are.
-            self._topics.update((each.id, each.topic) for each in self._inside(self.chunks[0]) if isinstance(each, Channel))
+            self._topics.update(
+                (each.id, each.topic) for each in self._inside(self.chunks[0]) if isinstance(each, Channel)
+            )
         for each in self._inside(chunk):
             if isinstance(each, Message):
                 yield self._topics.get(each.channel_id, ""), each.log_time, each.data

@@ -17,7 +17,7 @@ from kiks.engine.state import ROBOT, TRAIL_LENGTH, State
 from kiks.errors import ParameterError
 from kiks.sim.saved_state import Layout
 
-KEPT_BYTES = int((ROBOT.fields or {})["bus"][1])
+KEPT_BYTES = next(field[1] for name, field in (ROBOT.fields or {}).items() if name == "bus")
 """Bytes of a robot's record that are kept: those before the field of that name."""
 
 Look = tuple[int, bytes, bytes]
@@ -104,20 +104,24 @@ def decode(block: bytes, layout: Layout, what: str) -> Iterator[Motion]:
             raise ParameterError(f"{what} must have blocks of motion, but one is damaged. Take another copy of it.")
         yield Motion(
             np.frombuffer(block, "<i8", looks, begin),
-            np.frombuffer(block, _first_fields(layout.robot, robot_bytes), looks * robots, middle).reshape(looks, robots),
+            np.frombuffer(block, _first_fields(layout.robot, robot_bytes), looks * robots, middle).reshape(
+                looks, robots
+            ),
             layout.bodies(block[end:offset]).reshape(looks, bodies),
         )
 
 
-def _first_fields(kind: np.dtype[np.void], size: int) -> np.dtype[np.void]:
+def _first_fields(kind: np.dtype[np.void], size: int) -> Any:
     """Return the type of the first bytes of records of a type."""
-    inside = [name for name, field in (kind.fields or {}).items() if field[1] + field[0].itemsize <= size]
-    return np.dtype({**_described(kind, inside), "itemsize": size})
-
-
-def _described(kind: np.dtype[np.void], names: list[str]) -> Any:
-    fields: Any = kind.fields or {}
-    return {"names": names, "formats": [fields[name][0] for name in names], "offsets": [fields[name][1] for name in names]}
+    fields: Any = {name: field for name, field in (kind.fields or {}).items() if field[1] + field[0].itemsize <= size}
+    return np.dtype(
+        {
+            "names": list(fields),
+            "formats": [field[0] for field in fields.values()],
+            "offsets": [field[1] for field in fields.values()],
+            "itemsize": size,
+        }
+    )
 
 
 class Ticks(NamedTuple):

@@ -33,7 +33,11 @@ CHUNK_S = 0.1
 """Least real time between two chunks [s]. A crash costs what came after the last chunk: at most a second of a world in
 real time, and a tenth of a second's work of one at full speed."""
 
-SEND, TYPE, ACT = int(Kind.SEND), int(Kind.TYPE), int(Kind.ACT)  # plain, for an enumeration costs a tenth of a microsecond
+SEND, TYPE, ACT = (
+    int(Kind.SEND),
+    int(Kind.TYPE),
+    int(Kind.ACT),
+)  # plain, for an enumeration costs a tenth of a microsecond
 
 WAITING_BYTES_MAX = 16 << 20
 """Most bytes of states that wait for a chunk."""

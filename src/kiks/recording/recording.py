@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,7 +107,9 @@ class Recording:
     def programs(self) -> dict[str, str]:
         """Texts of the programs that drove its robots, by name."""
         files = self._reader.attachments.items()
-        return {name[len("programs/") :]: data.decode("utf-8", "replace") for name, data in files if "programs/" in name}
+        return {
+            name[len("programs/") :]: data.decode("utf-8", "replace") for name, data in files if "programs/" in name
+        }
 
     @cached_property
     def project(self) -> Project:
@@ -122,7 +124,9 @@ class Recording:
     @property
     def robots(self) -> range:
         """Numbers of the robots that it has in the end."""
-        last = max(int(name[6:-5]) for name in self._reader.attachments if re.fullmatch(r"setup/[0-9]{1,9}\.json", name))
+        last = max(
+            int(name[6:-5]) for name in self._reader.attachments if re.fullmatch(r"setup/[0-9]{1,9}\.json", name)
+        )
         return range(1, len(self.setup(last).specs) + 1)
 
     @property

@@ -61,6 +61,13 @@ class Replay:
         self.sim.loop.supervisor = None
         return self.sim
 
+    def advance(self) -> bool:
+        """Let time pass up to the next input; return whether there was one."""
+        if self._next is None:
+            return False
+        self.sim.advance_to(self.next_ns)
+        return True
+
     def act(self) -> None:
         """Let the inputs come that are due, up to the next one before which robots act."""
         is_due, time_ns = True, self.next_ns

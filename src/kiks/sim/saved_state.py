@@ -8,7 +8,6 @@ bit.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
@@ -16,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from kiks.engine.state import BODY, MEMORY_COUNT, PIXEL_COUNT, ROBOT
+from kiks.engine.state import BODY, MEMORY_COUNT, ROBOT
 from kiks.errors import ParameterError, shown
 from kiks.firmware.k213 import PERIODS_NS
 from kiks.firmware.radio import ATTEMPTS, DATA_LIMIT
@@ -389,8 +388,8 @@ class _LayoutFile:
 
 def _fields(kind: np.dtype[np.void]) -> dict[str, Any]:
     rows = []
-    for name in kind.names or ():
-        part, offset = (kind.fields or {})[name][:2]
+    fields: Any = kind.fields
+    for name, (part, offset, *_) in fields.items():
         rows.append({"name": name, "type": part.base.str, "shape": list(part.shape), "offset": offset})
     return {"size": kind.itemsize, "fields": rows}
 
@@ -406,9 +405,7 @@ def _type_of(file: _RecordFile, what: str) -> np.dtype[np.void]:
             }
         )
     except (TypeError, ValueError) as error:
-        raise ParameterError(
-            f"{what} must describe records, but numpy says: {error}. Is the file damaged?"
-        ) from None
+        raise ParameterError(f"{what} must describe records, but numpy says: {error}. Is the file damaged?") from None
 
 
 def _converted(records: NDArray[np.void], kind: np.dtype[np.void]) -> NDArray[np.void]:

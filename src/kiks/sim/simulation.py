@@ -659,7 +659,7 @@ class Simulation:
     def record(self, file: str | Path) -> Any:
         """Record the run to a file from now on, until `close()` or the end of `with`; `kiks.Recording` reads it.
 
-        The run is the same, to the bit. It can be replayed, looked at and gone on with from any time (docs/recording.md).
+        The run is the same, to the bit. docs/recording.md says what can be done with the file.
 
         Args:
             file: The file, which ends in .mcap; an earlier one is replaced.

@@ -263,7 +263,8 @@ class Wire:
         firmware.demo_wakes_ns = saved.demo_wakes_ns
         firmware.receiver.partial = saved.partial.encode("latin-1")
         self.pending = deque(
-            (act_ns, line.encode("latin-1"), ignore_reply if is_heard else None) for act_ns, line, is_heard in saved.pending
+            (act_ns, line.encode("latin-1"), ignore_reply if is_heard else None)
+            for act_ns, line, is_heard in saved.pending
         )
         self._last_act_ns, self._orphan_count = saved.last_act_ns, saved.orphan_count
         self._plan()

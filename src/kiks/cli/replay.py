@@ -1,0 +1,125 @@
+"""`kiks replay` and `kiks table`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import typer
+
+from kiks.cli.desk import open_desk
+from kiks.cli.engine_start import ready_engine
+from kiks.cli.options import say, written_file
+from kiks.errors import ParameterError, counted
+from kiks.units import TICK_NS, s_from_ns
+from kiks.version import __version__
+
+if TYPE_CHECKING:
+    from kiks.recording.recording import Recording
+
+RecordingFile = Annotated[Path, typer.Argument(help="A recording (.mcap) of --record or sim.record.", metavar="FILE")]
+
+
+def replay(
+    file: RecordingFile,
+    check: Annotated[
+        bool, typer.Option("--check", help="Make the run again at full speed, and compare each second, to the bit.")
+    ] = False,
+    start: Annotated[float, typer.Option(help="Where to begin [s of simulated time].", min=0)] = 0.0,
+    speed: Annotated[float, typer.Option(help="Simulated seconds per real second.", min=0.001, max=1000)] = 1.0,
+) -> None:
+    """Show a recorded run again on the desk, or check that it is the same again.
+
+    The world on the desk is a living one: its sensors and lines can be watched as ever, and it can be changed.
+
+    Example: kiks replay run.mcap --check
+    """
+    ready_engine()
+    from kiks.recording.recording import Recording
+
+    with Recording(file) as recording:
+        if not recording.is_whole:
+            say(
+                f"the run that wrote {str(file)!r} was killed, or goes on: the recording ends with its last whole part."
+            )
+        if check:
+            raise typer.Exit(_check(recording))
+        from kiks.desk.server.desk import Desk
+
+        again = recording.replay(max(start, s_from_ns(recording.begin_ns)))
+        open_desk(Desk(again.sim, speed=speed))
+
+
+def _check(recording: Recording) -> int:
+    """Check a recording, and say what was found; return the exit code."""
+    from kiks.recording.check import check_recording
+
+    found = check_recording(recording)
+    version = recording.about.get("kiks", "of an unknown version")
+    if found.differs_ns is None:
+        typer.echo(
+            f"The same run again: {counted(found.equal_count, 'checkpoint')} equal, to the bit, in "
+            f"{recording.duration_s:.3f} s of simulated time."
+        )
+        return 0
+    where = f"{counted(found.equal_count, 'checkpoint')} equal, that of {s_from_ns(found.differs_ns):.3f} s differs."
+    tick = ""
+    if found.first_tick is not None:
+        tick_s = s_from_ns(found.first_tick * TICK_NS)
+        tick = f" Tick {found.first_tick} (at {tick_s:.2f} s) is the first that moves a robot otherwise."
+    typer.echo(f"Another run: {where}{tick}")
+    if version != __version__:
+        typer.echo(f"KiKS {version} has recorded it, and this is KiKS {__version__}.")
+    return 1
+
+
+def table(
+    file: RecordingFile,
+    out: Annotated[Path, typer.Argument(help="The table's file: .csv or .parquet.", callback=written_file)],
+    name: Annotated[str, typer.Option("--table", help="Which: poses, wheels, readings, wire or events.")] = "poses",
+    robot: Annotated[int | None, typer.Option(help="Of this robot alone.")] = None,
+) -> None:
+    """Write a table of a recording: where robots were, what wheels did, readings, characters, events.
+
+    Example: kiks table run.mcap readings.csv --table readings
+    """
+    from kiks.recording.recording import Recording
+
+    if out.suffix.lower() not in (".csv", ".parquet"):
+        raise ParameterError(f"OUT must end in .csv or .parquet, but it was {str(out)!r}.")
+    with Recording(file) as recording:
+        rows = recording.table(name, robot)
+    columns = {}
+    for column in rows.dtype.names or ():
+        values = rows[column]
+        if values.ndim == 1:
+            columns[column] = values
+        else:
+            columns |= {f"{column}_{index}": values[:, index] for index in range(values.shape[1])}
+    if out.suffix.lower() == ".parquet":
+        from kiks.learn.evolution_log import write_table
+
+        write_table(columns, out, "a table")
+    else:
+        _write_csv(columns, out)
+    typer.echo(f"{counted(len(rows), 'row')}: {out}")
+
+
+def _write_csv(columns: dict[str, np.ndarray[tuple[int], np.dtype[np.generic]]], path: Path) -> None:
+    import csv
+    import io
+
+    from kiks.model.atomic_files import replace_file
+
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    lists = [
+        [each.decode("latin-1").encode("unicode_escape").decode() for each in values.tolist()]
+        if values.dtype.kind == "S"
+        else values.tolist()
+        for values in columns.values()
+    ]
+    writer.writerows(zip(*lists, strict=True))
+    replace_file(path, text.getvalue(), "a table")

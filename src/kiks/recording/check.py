@@ -1,0 +1,83 @@
+"""Checks a recording: the run is made again from its inputs, and compared with what was recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.recording.motion import Motion, MotionWatcher, decode, encode, poses_of
+from kiks.recording.recording import Recording
+from kiks.recording.replay import Replay
+from kiks.sim.saved_state import Layout
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What a check has found.
+
+    Attributes:
+        equal_count: Number of checkpoints that were the same, to the bit, before the first that was not.
+        differs_ns: Time of the first one that was not [ns]; None if all were the same.
+        first_tick: The first tick after which a robot was elsewhere; None if none was.
+    """
+
+    equal_count: int
+    differs_ns: int | None = None
+    first_tick: int | None = None
+
+
+def check_recording(recording: Recording, tell: Callable[[int], None] = lambda time_ns: None) -> Checked:
+    """Make a recorded run again, and compare the state at each checkpoint.
+
+    Args:
+        recording: The recording.
+        tell: Called after each checkpoint with its time [ns].
+
+    Raises:
+        KiksError: If the recording is damaged.
+    """
+    equal: list[int] = []
+    differing: list[int] = []
+
+    def compare(time_ns: int, state_hash: str) -> None:
+        if replay.sim.state_hash() != state_hash:
+            differing.append(time_ns)
+        elif not differing:
+            equal.append(time_ns)
+        tell(time_ns)
+
+    replay = Replay(recording, recording.begin_ns, compare)
+    while not differing and replay.advance():
+        pass
+    if not differing:
+        return Checked(len(equal))
+    first_ns = max(equal, default=recording.begin_ns)
+    return Checked(len(equal), differing[0], _first_tick(recording, first_ns, differing[0]))
+
+
+def _first_tick(recording: Recording, begin_ns: int, end_ns: int) -> int | None:
+    """Return the first tick of a time after which a robot was elsewhere than recorded."""
+    replay = Replay(recording, begin_ns)
+    watcher = MotionWatcher(replay.sim.world.state)
+    begin_tick = replay.sim.world.state.tick_count
+    replay.sim.watchers.append(watcher)
+    while replay.sim.now_ns < end_ns and replay.advance():
+        pass
+    found = _by_tick(decode(encode(watcher.looks, Layout()), Layout(), "replay"))
+    recorded = _by_tick(recording.motion())
+    ticks = sorted(tick for tick in found.keys() & recorded.keys() if tick > begin_tick)
+    return next((tick for tick in ticks if not np.array_equal(found[tick], recorded[tick])), None)
+
+
+def _by_tick(motions: Iterable[Motion]) -> dict[int, NDArray[np.float64]]:
+    """Return the poses after each tick."""
+    poses: dict[int, NDArray[np.float64]] = {}
+    last_tick = -1
+    for motion in motions:
+        ticks, places = poses_of(motion, last_tick)
+        last_tick = int(motion.ticks[-1])
+        poses.update(zip(ticks.tolist(), places, strict=True))
+    return poses
