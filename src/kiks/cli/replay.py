@@ -38,17 +38,15 @@ def replay(
     ready_engine()
     from kiks.recording.recording import Recording
 
-    with Recording(file) as recording:
-        if not recording.is_whole:
-            say(
-                f"the run that wrote {str(file)!r} was killed, or goes on: the recording ends with its last whole part."
-            )
-        if check:
-            raise typer.Exit(_check(recording))
-        from kiks.desk.server.desk import Desk
+    recording = Recording(file)
+    if not recording.is_whole:
+        say(f"the run that wrote {str(file)!r} was killed, or goes on: this is what it has written so far.")
+    if check:
+        raise typer.Exit(_check(recording))
+    from kiks.desk.server.desk import Desk
 
-        again = recording.replay(max(start, s_from_ns(recording.begin_ns)))
-        open_desk(Desk(again.sim, speed=speed))
+    again = recording.replay(max(start, s_from_ns(recording.begin_ns)))
+    open_desk(Desk(again.sim, speed=speed))
 
 
 def _check(recording: Recording) -> int:
@@ -88,8 +86,7 @@ def table(
 
     if out.suffix.lower() not in (".csv", ".parquet"):
         raise ParameterError(f"OUT must end in .csv or .parquet, but it was {str(out)!r}.")
-    with Recording(file) as recording:
-        rows = recording.table(name, robot)
+    rows = Recording(file).table(name, robot)
     columns = {}
     for column in rows.dtype.names or ():
         values = rows[column]

@@ -169,27 +169,25 @@ class McapReader:
 
     def __init__(self, path: str | Path) -> None:
         self.what = f"Recording {str(path)!r}"
-        path = path_of(path, "a recording")
-        if not path.is_file():
+        self._path = path_of(path, "a recording")
+        if not self._path.is_file():
             raise ParameterError(f"{self.what} must exist, but there is no such file. Check its name and its folder.")
-        try:
-            self._stream = path.open("rb")
-            self._size = os.fstat(self._stream.fileno()).st_size
-        except OSError as error:
-            raise ParameterError(f"{self.what} must be readable, but: {error}. Check its rights.") from None
         self.chunks: list[FoundChunk] = []
         self.attachments: dict[str, bytes] = {}
         self.told: dict[str, str] = {}
         self._topics: dict[int, str] = {}
         self.is_whole = False
-        if self._stream.read(len(_MAGIC)) != _MAGIC:
-            raise ParameterError(f"{self.what} must be an MCAP file, but it is none. `--record FILE` makes one.")
+        with self._open() as stream:
+            if stream.read(len(_MAGIC)) != _MAGIC:
+                raise ParameterError(f"{self.what} must be an MCAP file, but it is none. `--record FILE` makes one.")
         self._offset = len(_MAGIC)
         self.find_more()
 
-    def close(self) -> None:
-        """Close the file."""
-        self._stream.close()
+    def _open(self) -> BinaryIO:
+        try:
+            return self._path.open("rb")
+        except OSError as error:
+            raise ParameterError(f"{self.what} must be readable, but: {error}. Check its rights.") from None
 
     def find_more(self) -> None:
         """Find the records that were written since the last call.
@@ -197,28 +195,29 @@ class McapReader:
         Raises:
             ParameterError: If one is too large.
         """
-        self._size = os.fstat(self._stream.fileno()).st_size
-        while not self.is_whole and self._offset + _HEAD.size <= self._size:
-            self._stream.seek(self._offset)
-            opcode, length = _HEAD.unpack(self._stream.read(_HEAD.size))
-            end = self._offset + _HEAD.size + length
-            if end > self._size:
-                return  # what a crash has cut off
-            if length > RECORD_BYTES_MAX:
-                raise ParameterError(
-                    f"{self.what} must have records of at most {RECORD_BYTES_MAX >> 20} MiB, but one has {length} "
-                    "bytes. Is the file damaged?"
-                )
-            self._find(opcode, length)
-            self._offset = end
+        with self._open() as stream:
+            size = os.fstat(stream.fileno()).st_size
+            while not self.is_whole and self._offset + _HEAD.size <= size:
+                stream.seek(self._offset)
+                opcode, length = _HEAD.unpack(stream.read(_HEAD.size))
+                end = self._offset + _HEAD.size + length
+                if end > size:
+                    return  # what a crash has cut off
+                if length > RECORD_BYTES_MAX:
+                    raise ParameterError(
+                        f"{self.what} must have records of at most {RECORD_BYTES_MAX >> 20} MiB, but one has {length} "
+                        "bytes. Is the file damaged?"
+                    )
+                self._find(stream, opcode, length)
+                self._offset = end
 
-    def _find(self, opcode: int, length: int) -> None:
+    def _find(self, stream: BinaryIO, opcode: int, length: int) -> None:
         if opcode == Opcode.CHUNK and length >= _CHUNK_HEAD.size:
-            begin_ns, end_ns, _ = _CHUNK_HEAD.unpack(self._stream.read(_CHUNK_HEAD.size))
+            begin_ns, end_ns, _ = _CHUNK_HEAD.unpack(stream.read(_CHUNK_HEAD.size))
             self.chunks.append(FoundChunk(self._offset, _HEAD.size + length, begin_ns, end_ns))
         elif opcode in (Opcode.ATTACHMENT, Opcode.METADATA):
-            self._stream.seek(self._offset)
-            for record in self._records(self._stream.read(_HEAD.size + length)):
+            stream.seek(self._offset)
+            for record in self._records(stream.read(_HEAD.size + length)):
                 if isinstance(record, Attachment):
                     self.attachments[record.name] = record.data
                 elif isinstance(record, Metadata):
@@ -243,8 +242,10 @@ class McapReader:
 
     def _inside(self, chunk: FoundChunk) -> Iterator[object]:
         """Yield the records in a chunk."""
-        self._stream.seek(chunk.offset)
-        for record in self._records(self._stream.read(chunk.length)):
+        with self._open() as stream:
+            stream.seek(chunk.offset)
+            data = stream.read(chunk.length)
+        for record in self._records(data):
             if isinstance(record, Chunk):
                 yield from self._records(self._expanded(record))
 

@@ -7,7 +7,6 @@ from collections import OrderedDict
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
-from types import TracebackType
 from typing import NamedTuple
 
 import numpy as np
@@ -78,20 +77,6 @@ class Recording:
                 "very beginning. `--record FILE` makes one."
             )
         self._layout = Layout.from_bytes(reader.attachments["layout.json"], reader.what)
-
-    def __enter__(self) -> Recording:
-        """Return itself."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Close the file."""
-        self.close()
-
-    def close(self) -> None:
-        """Close the file."""
-        self._reader.close()
 
     def __repr__(self) -> str:
         return f"<{self._reader.what}: {len(self.robots)} robots, {self.duration_s:.3f} s>"
@@ -191,6 +176,8 @@ class Recording:
 
     def world_at(self, time_s: float) -> Simulation:
         """Return a simulation in the state that the world had at a time. It goes on without the recording.
+
+        The programs that drove its robots have hung up: commands that they had sent still act, nobody gets the replies.
 
         Args:
             time_s: The time [s], from the beginning to the end of the recording.

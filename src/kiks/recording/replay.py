@@ -57,8 +57,10 @@ class Replay:
         self.sim.advance_to(time_ns)
 
     def let_go(self) -> Simulation:
-        """Return the simulation, which goes on without the recording from now on."""
+        """Return the simulation, which goes on without the recording from now on; its programs have hung up."""
         self.sim.loop.supervisor = None
+        for wire in self.sim.wires:
+            wire.hang_up()
         return self.sim
 
     def advance(self) -> bool:

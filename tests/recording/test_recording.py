@@ -1,0 +1,342 @@
+"""A recorded run is the same as one that is not, is made again to the bit, and can be gone on with from any time."""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, ClassVar
+
+import jsonschema
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+
+import kiks
+from kiks import Arena, Khepera, ParameterError, Recording, Simulation
+from kiks.clock.gate import Gate
+from kiks.demos.scenes import SCENES
+from kiks.firmware.general_io import GeneralIO
+from kiks.firmware.turret import Orders, Turret
+from kiks.model.arena import Lamp
+from kiks.recording import foxglove
+from kiks.recording.check import Checked, check_recording
+from kiks.sim.console import type_lines
+from kiks.sim.drag import Drags
+from kiks.sim.things import Checkpoint
+
+SECONDS = 6.3
+
+
+def drive(sim: Simulation, seconds: float, robot: int = 1) -> None:
+    """Let a robot avoid obstacles by a simple rule."""
+    khepera = Khepera(sim.port(robot))
+    end_ns = sim.now_ns + round(seconds * 1e9)
+    while sim.now_ns < end_ns:
+        values = khepera.proximity()
+        khepera.set_speed(8 - values[3] // 60, 8 - values[2] // 60)
+
+
+def recorded(sim: Simulation, file: Path, act: Callable[[Simulation], None]) -> Recording:
+    with sim.record(file):
+        act(sim)
+    assert sim.loop.recorder is None
+    assert not sim.watchers
+    return Recording(file)
+
+
+def check_again(recording: Recording, state_hash: str) -> None:
+    """Check that a recording makes the same run again, from the beginning and from each second on."""
+    checked = check_recording(recording)
+    assert checked.differs_ns is None
+    assert checked.equal_count > recording.duration_s
+    end_s = recording.end_ns / 1e9
+    assert recording.world_at(end_s).state_hash() == state_hash
+    for second in range(round(recording.begin_ns / 1e9), int(end_s)):
+        replay = recording.replay(second + 0.5)
+        while replay.advance():
+            pass
+        assert replay.sim.state_hash() == state_hash
+
+
+@pytest.mark.parametrize("name", [name for name in SCENES if name != "swarm"])
+def test_demonstrations_are_the_same_with_a_recording_and_again(name: str, tmp_path: Path) -> None:
+    alone, with_it = (SCENES[name](None, seed=3, baud=None) for _ in range(2))
+    alone.run(SECONDS)
+    recording = recorded(with_it.sim, tmp_path / "run.mcap", lambda _: with_it.run(SECONDS))
+    assert with_it.sim.state_hash() == alone.sim.state_hash()
+    check_again(recording, alone.sim.state_hash())
+
+
+def test_a_world_goes_on_from_any_time_as_it_went_on_then(tmp_path: Path) -> None:
+    """Commands that were on their way, and the line's timing, are part of the state."""
+    sim = Simulation(Arena.box(400, 400), seed=2)
+    recording = recorded(sim, tmp_path / "run.mcap", lambda sim: drive(sim, SECONDS))
+    poses = recording.table("poses")
+    for time_s in (0.0, 1.234, 3.0, 5.678):
+        world = recording.world_at(time_s)
+        assert world.time_s == pytest.approx(time_s, abs=1e-9)
+        row = poses[poses["time_s"] <= time_s][-1]
+        assert world.pose(1)[0] == pytest.approx(row["x_mm"], abs=1.0)
+        drive(world, 1.0)  # it takes commands
+        assert world.time_s > time_s + 1.0
+
+
+def test_all_that_comes_from_outside_is_part_of_the_run(tmp_path: Path) -> None:
+    """Hands, other robots, walls, lamps, turrets, wires and typed commands."""
+
+    def act(sim: Simulation) -> None:
+        drive(sim, 1.0)
+        sim.place(1, 100, 100, 0.5)
+        ball = sim.add_ball(200, 300)
+        sim.move_body(ball, 200, 300, speed_mm_s=150.0, heading_rad=1.0)
+        checkpoint = sim.checkpoint()
+        drive(sim, 1.0)
+        type_lines(sim, 1, "D,3,3")
+        sim.run(0.2)
+        assert sim.add_robot("khepera_ii") == 2
+        sim.fit(2, "k213")
+        sim.fit(1, "gripper")
+        io = sim.fit(1, "io")
+        assert isinstance(io, GeneralIO)
+        drive(sim, 1.0, robot=2)
+        io.inputs = 0x5A
+        sim.lamps[0] = 250.0, 250.0, 5.0, 1.0
+        drive(sim, 0.5)
+        sim.set_arena(Arena.box(500, 450))
+        sim.add_lamp(30, 400, 2.0)
+        drive(sim, 1.0)
+        sim.remove_body(ball)
+        sim.wires[0].set_baud(38400)
+        sim.port(1).write(b"G,1")
+        sim.wires[0].hang_up()
+        sim.port(1).write(b"D,2,2\nD,3")
+        sim.wires[0].halt(sim.now_ns)
+        sim.run(0.5)
+        sim.reset(Checkpoint(sim.poses(), checkpoint.bodies, checkpoint.lamps))
+        sim.run(1.3)
+
+    def fresh() -> Simulation:
+        arena = kiks.Arena.box(400, 420)
+        sim = Simulation(kiks.Arena(arena.brightness, 1.0, "room", lamps=(Lamp(50, 50),)), seed=5)
+        sim.fit(1, "radio")
+        return sim
+
+    alone, sim = fresh(), fresh()
+    act(alone)
+    recording = recorded(sim, tmp_path / "run.mcap", act)
+    assert sim.state_hash() == alone.state_hash()
+    check_again(recording, sim.state_hash())
+    assert recording.robots == range(1, 3)
+    assert [turret.name for turret in recording.world_at(4.0).turrets(1)] == [each.name for each in sim.turrets(1)]
+
+
+class Switch(Turret):
+    """Switches a lamp and remembers how often, in an object of its own, which no replay can know."""
+
+    number, name = 24, "Switch"
+    lamp: Any = None
+    count = 0
+
+    def switch(self) -> tuple[int, ...]:
+        """S: switch the lamp."""
+        self.count += 1
+        self.lamp[0, 3] = self.count % 2
+        return (self.count,)
+
+    orders: ClassVar[Orders] = {"S": (0, switch)}
+
+
+def test_turrets_of_users_need_not_be_there_again(tmp_path: Path) -> None:
+    arena = Arena.box(400, 420)
+    sim = Simulation(Arena(arena.brightness, 1.0, "room", lamps=(Lamp(50, 50, 25.0),)), seed=5)
+    switch = Switch()
+    switch.lamp = sim.lamps
+    sim.fit(1, switch)
+
+    def act(sim: Simulation) -> None:
+        khepera = Khepera(sim.port(1))
+        for count in range(1, 6):
+            drive(sim, 0.4)
+            assert khepera.turret(24, "S") == [count]
+            khepera.ambient()
+
+    recording = recorded(sim, tmp_path / "run.mcap", act)
+    check_again(recording, sim.state_hash())
+
+
+def test_a_hand_that_drags_while_the_world_runs(tmp_path: Path) -> None:
+    """The gate lets another thread act between two events; where that is depends on real time, the replay does not."""
+    sim = Simulation(Arena.box(500, 500), seed=4)
+    sim.gate = Gate(sim.lock, speed=30.0)
+    drags = Drags(sim)
+    is_over = threading.Event()
+
+    def drag() -> None:
+        step = 0
+        while not is_over.is_set():
+            step += 1
+            with sim.lock:
+                place = 150.0 + step % 200
+                drags.grab("hand", "robot", 0)
+                drags.move("hand", place, 250.0)
+                drags.drop("hand")
+            is_over.wait(0.003)
+
+    thread = threading.Thread(target=drag)
+
+    def act(sim: Simulation) -> None:
+        thread.start()
+        drive(sim, 5.0)
+        is_over.set()
+        thread.join()
+
+    recording = recorded(sim, tmp_path / "run.mcap", act)
+    changes = recording.table("events")
+    assert (changes["kind"] == "change").sum() > 3
+    check_again(recording, sim.state_hash())
+
+
+def test_tables_tell_what_happened(tmp_path: Path) -> None:
+    sim = Simulation(Arena.box(300, 300), robots=2, seed=1)
+    read: list[list[int]] = []
+    at: list[float] = []
+    truth: dict[int, Any] = {}
+
+    with sim.record(tmp_path / "run.mcap") as recorder:
+        khepera = Khepera(sim.port(2))
+        khepera.set_speed(10, 10)
+        for _ in range(40):
+            read.append(khepera.proximity())
+            at.append(sim.time_s)
+            sim.advance_to(-(-sim.now_ns // 10_000_000) * 10_000_000)
+            truth[sim.now_ns // 10_000_000] = sim.poses()
+        recorder.mark("half")
+        recorder.say(1, "grüße")
+        sim.run(2.0)
+    recording = Recording(tmp_path / "run.mcap")
+    poses, wheels = recording.table("poses"), recording.table("wheels", 2)
+    ticks = np.rint(poses["time_s"][poses["robot"] == 2] * 100).astype(int)
+    np.testing.assert_array_equal(ticks, np.arange(ticks[-1] + 1))
+    for tick, expected in truth.items():
+        rows = poses[np.rint(poses["time_s"] * 100) == tick]
+        np.testing.assert_array_equal(
+            np.column_stack([rows[name] for name in ("x_mm", "y_mm", "heading_rad")]), expected
+        )
+    readings = recording.table("readings")
+    assert (readings["robot"] == 2).all()
+    assert readings["counts"].tolist() == read
+    assert (readings["time_s"] < at).all()
+    assert wheels["left_setpoint"][-1] == 10
+    assert wheels["contacts"][-1] == sim.contacts(2) > 0
+    assert wheels["left_pulses"][-1] == sim.world.state.robots["pulse_count"][0, 1, 0]
+    wire = recording.table("wire", 2)
+    assert wire["data"][:2].tolist() == [b"D,10,10\n", b"d\r\n"]
+    assert (np.diff(wire["time_s"]) >= 0).all()
+    events = recording.table("events")
+    assert set(events["kind"]) == {"contact", "bookmark", "output"}
+    assert events[events["kind"] == "output"]["text"].tolist() == ["grüße"]
+    assert events[events["kind"] == "bookmark"]["text"].tolist() == ["half"]
+    with pytest.raises(ParameterError, match=r"Did you mean 'poses'"):
+        recording.table("pose")
+    with pytest.raises(ParameterError, match="from 1 to 2"):
+        recording.table("poses", 3)
+    with pytest.raises(ParameterError, match="time_s must be from 0 to"):
+        recording.world_at(99.0)
+
+
+def test_the_project_is_the_world_at_the_beginning(tmp_path: Path) -> None:
+    sim = Simulation(Arena.box(300, 300), robots=2, seed=7)
+    sim.fit(2, "k213")
+    sim.add_cylinder(60, 60)
+    before = sim.poses()
+    recording = recorded(sim, tmp_path / "run.mcap", lambda sim: drive(sim, 1.0))
+    project = recording.project
+    assert project.seed == 7
+    assert [each.turrets for each in project.robots] == [(), ("k213",)]
+    assert len(project.arena.cylinders) == 1
+    np.testing.assert_allclose([tuple(start) for start in project.arena.starts], before, atol=1e-3)
+    assert recording.about["kiks"] == kiks.__version__
+
+
+def test_another_run_is_told_with_its_first_tick(tmp_path: Path) -> None:
+    sim = Simulation(Arena.box(300, 300), seed=1)
+    recording = recorded(sim, tmp_path / "run.mcap", lambda sim: drive(sim, 4.0))
+    found = recording.next_input
+    changed_ns = []
+
+    def other(row: Any) -> Any:
+        """Leave out one command of the third second."""
+        answer = found(row)
+        if answer is not None and answer[1].data.startswith(b"D") and answer[1].time_ns > 2.1e9 and not changed_ns:
+            changed_ns.append(answer[1].time_ns)
+            answer = (answer[0], answer[1]._replace(data=b"D,-9,4\n"), answer[2])
+        return answer
+
+    def again(row: Any) -> Any:
+        answer = other(row)
+        if answer is not None and changed_ns and answer[1].time_ns == changed_ns[0]:
+            answer = (answer[0], answer[1]._replace(data=b"D,-9,4\n"), answer[2])
+        return answer
+
+    recording.next_input = again  # type: ignore[method-assign]
+    checked = check_recording(recording)
+    assert checked.equal_count == 2
+    assert checked.differs_ns == 3_000_000_000
+    assert checked.first_tick is not None
+    assert 0 < checked.first_tick * 1e7 - changed_ns[0] < 5e7
+    assert check_recording(Recording(tmp_path / "run.mcap")) == Checked(5)
+
+
+def test_foxglove_opens_it(tmp_path: Path) -> None:
+    """The library's reader finds all messages, and each keeps its schema."""
+    sim = Simulation(Arena.box(300, 200), robots=2, seed=1)
+    sim.add_ball(50, 50)
+    with sim.record(tmp_path / "run.mcap") as recorder:
+        sim.run(3.0)
+        recorder.mark("a note")
+        sim.run(1.0)
+    counts: dict[str, int] = {}
+    with (tmp_path / "run.mcap").open("rb") as file:
+        for schema, channel, message in make_reader(file, validate_crcs=True).iter_messages():
+            counts[channel.topic] = counts.get(channel.topic, 0) + 1
+            if schema is not None:
+                assert schema.name.startswith("foxglove.")
+                jsonschema.validate(json.loads(message.data), json.loads(schema.data))
+                assert message.log_time <= sim.now_ns
+    assert counts[foxglove.POSES.name] >= 2
+    assert {topic.name for topic in foxglove.TOPICS} <= set(counts)
+
+
+def test_mistakes_get_a_clear_error(tmp_path: Path) -> None:
+    sim = Simulation(seed=1)
+    with pytest.raises(ParameterError, match=r"must end in '.mcap'"):
+        sim.record(tmp_path / "run.txt")
+    with pytest.raises(ParameterError, match="cannot"):
+        sim.record(tmp_path / "none" / "run.mcap")
+    with sim.record(tmp_path / "run.mcap"), pytest.raises(ParameterError, match="must not be recorded yet"):
+        sim.record(tmp_path / "other.mcap")
+    with pytest.raises(ParameterError, match="no such file"):
+        Recording(tmp_path / "nothing.mcap")
+    (tmp_path / "text.mcap").write_text("no recording")
+    with pytest.raises(ParameterError, match="must be an MCAP file"):
+        Recording(tmp_path / "text.mcap")
+
+
+def test_a_full_disk_ends_the_recording_and_not_the_run() -> None:
+    if not Path("/dev/full").exists():
+        pytest.skip("there is no /dev/full here")
+    sim, alone = Simulation(seed=1), Simulation(seed=1)
+    link = Path("/tmp") / f"kiks-full-{id(sim)}.mcap"
+    link.symlink_to("/dev/full")
+    try:
+        recorder = sim.record(link)
+        drive(sim, 2.0)
+        drive(alone, 2.0)
+        with pytest.raises(ParameterError, match="No space left"):
+            recorder.close()
+    finally:
+        link.unlink()
+    assert sim.state_hash() == alone.state_hash()
+    assert sim.loop.recorder is None
