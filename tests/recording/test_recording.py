@@ -48,12 +48,12 @@ def recorded(sim: Simulation, file: Path, act: Callable[[Simulation], None]) -> 
 
 def check_again(recording: Recording, state_hash: str) -> None:
     """Check that a recording makes the same run again, from the beginning and from each second on."""
-    checked = check_recording(recording)
+    checked = check_recording(recording.log)
     assert checked.differs_ns is None
     assert checked.equal_count > recording.duration_s
-    end_s = recording.end_ns / 1e9
+    end_s = recording.log.end_ns / 1e9
     assert recording.world_at(end_s).state_hash() == state_hash
-    for second in range(round(recording.begin_ns / 1e9), int(end_s)):
+    for second in range(round(recording.log.begin_ns / 1e9), int(end_s)):
         replay = recording.replay(second + 0.5)
         while replay.advance():
             pass
@@ -263,7 +263,7 @@ def test_the_project_is_the_world_at_the_beginning(tmp_path: Path) -> None:
 def test_another_run_is_told_with_its_first_tick(tmp_path: Path) -> None:
     sim = Simulation(Arena.box(300, 300), seed=1)
     recording = recorded(sim, tmp_path / "run.mcap", lambda sim: drive(sim, 4.0))
-    found = recording.next_input
+    found = recording.log.next_input
     changed_ns = []
 
     def other(row: Any) -> Any:
@@ -280,13 +280,13 @@ def test_another_run_is_told_with_its_first_tick(tmp_path: Path) -> None:
             answer = (answer[0], answer[1]._replace(data=b"D,-9,4\n"), answer[2])
         return answer
 
-    recording.next_input = again  # type: ignore[method-assign]
-    checked = check_recording(recording)
+    recording.log.next_input = again  # type: ignore[method-assign]
+    checked = check_recording(recording.log)
     assert checked.equal_count == 2
     assert checked.differs_ns == 3_000_000_000
     assert checked.first_tick is not None
     assert 0 < checked.first_tick * 1e7 - changed_ns[0] < 5e7
-    assert check_recording(Recording(tmp_path / "run.mcap")) == Checked(5)
+    assert check_recording(Recording(tmp_path / "run.mcap").log) == Checked(5)
 
 
 def test_foxglove_opens_it(tmp_path: Path) -> None:

@@ -45,7 +45,7 @@ def replay(
         raise typer.Exit(_check(recording))
     from kiks.desk.server.desk import Desk
 
-    again = recording.replay(max(start, s_from_ns(recording.begin_ns)))
+    again = recording.replay(max(start, s_from_ns(recording.log.begin_ns)))
     open_desk(Desk(again.sim, speed=speed))
 
 
@@ -53,7 +53,7 @@ def _check(recording: Recording) -> int:
     """Check a recording, and say what was found; return the exit code."""
     from kiks.recording.check import check_recording
 
-    found = check_recording(recording)
+    found = check_recording(recording.log)
     version = recording.about.get("kiks", "of an unknown version")
     if found.differs_ns is None:
         typer.echo(

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from kiks.recording.log import RecordedLog
 from kiks.recording.motion import Motion, MotionWatcher, decode, encode, poses_of
-from kiks.recording.recording import Recording
 from kiks.recording.replay import Replay
 from kiks.sim.saved_state import Layout
 
@@ -29,11 +29,11 @@ class Checked:
     first_tick: int | None = None
 
 
-def check_recording(recording: Recording, tell: Callable[[int], None] = lambda time_ns: None) -> Checked:
+def check_recording(log: RecordedLog, tell: Callable[[int], None] = lambda time_ns: None) -> Checked:
     """Make a recorded run again, and compare the state at each checkpoint.
 
     Args:
-        recording: The recording.
+        log: The log of the recording.
         tell: Called after each checkpoint with its time [ns].
 
     Raises:
@@ -49,25 +49,25 @@ def check_recording(recording: Recording, tell: Callable[[int], None] = lambda t
             equal.append(time_ns)
         tell(time_ns)
 
-    replay = Replay(recording, recording.begin_ns, compare)
+    replay = Replay(log, log.begin_ns, compare)
     while not differing and replay.advance():
         pass
     if not differing:
         return Checked(len(equal))
-    first_ns = max(equal, default=recording.begin_ns)
-    return Checked(len(equal), differing[0], _first_tick(recording, first_ns, differing[0]))
+    first_ns = max(equal, default=log.begin_ns)
+    return Checked(len(equal), differing[0], _first_tick(log, first_ns, differing[0]))
 
 
-def _first_tick(recording: Recording, begin_ns: int, end_ns: int) -> int | None:
+def _first_tick(log: RecordedLog, begin_ns: int, end_ns: int) -> int | None:
     """Return the first tick of a time after which a robot was elsewhere than recorded."""
-    replay = Replay(recording, begin_ns)
+    replay = Replay(log, begin_ns)
     watcher = MotionWatcher(replay.sim.world.state)
     begin_tick = replay.sim.world.state.tick_count
     replay.sim.watchers.append(watcher)
     while replay.sim.now_ns < end_ns and replay.advance():
         pass
     found = _by_tick(decode(encode(watcher.looks, Layout()), Layout(), "replay"))
-    recorded = _by_tick(recording.motion())
+    recorded = _by_tick(log.motion())
     ticks = sorted(tick for tick in found.keys() & recorded.keys() if tick > begin_tick)
     return next((tick for tick in ticks if not np.array_equal(found[tick], recorded[tick])), None)
 

@@ -7,25 +7,21 @@ It can be looked at, made to pass at any speed, and let go on without the record
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from kiks.recording.entries import Entry, Kind
+from kiks.recording.log import HASH_LENGTH, RecordedLog
 from kiks.sim.saved_state import restore_state
 from kiks.sim.simulation import Simulation
 from kiks.sim.wire import ignore_reply
 
-if TYPE_CHECKING:
-    from kiks.recording.recording import Recording
-
 NEVER_NS = 2**62
-HASH_LENGTH = 16
 
 
 class Replay:
     """A recorded run from a time on, as a `kiks.sim.event_loop.Supervisor` of its simulation.
 
     Args:
-        recording: The recording.
+        log: The log of a recording.
         time_ns: Where it begins [ns].
         on_check: Called after each checkpoint has been reached, with its time [ns] and the hash that was recorded.
 
@@ -39,15 +35,15 @@ class Replay:
 
     def __init__(
         self,
-        recording: Recording,
+        log: RecordedLog,
         time_ns: int = 0,
         on_check: Callable[[int, str], None] = lambda time_ns, state_hash: None,
     ) -> None:
-        self._recording = recording
+        self._log = log
         self._on_check = on_check
         self.next_ns = NEVER_NS
-        row = recording.row_before(time_ns)
-        setup, saved = recording.state_of(recording.entry(row))
+        row = log.row_before(time_ns)
+        setup, saved = log.state_of(log.entry(row))
         self.sim = setup.simulation(saved.poses)
         restore_state(self.sim, saved)
         self._row = row
@@ -81,7 +77,7 @@ class Replay:
     def _find_next(self) -> bool:
         """Find the next input, if there is one; return whether robots act before it."""
         self._next, self.next_ns, has_acted = None, NEVER_NS, False
-        if (found := self._recording.next_input(self._row)) is not None:
+        if (found := self._log.next_input(self._row)) is not None:
             self._row, self._next, has_acted = found
             self.next_ns = self._next.time_ns
         return has_acted
@@ -106,6 +102,6 @@ class Replay:
                     each.line.forget()  # replies that nobody reads would fill the line
                 self._on_check(entry.time_ns, entry.data[:HASH_LENGTH].decode("ascii", "replace"))
             case Kind.STATE:
-                setup, saved = self._recording.state_of(entry)
+                setup, saved = self._log.state_of(entry)
                 setup.bring(sim, saved.poses)
                 restore_state(sim, saved)

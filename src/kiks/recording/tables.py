@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kiks.recording.entries import Kind
+from kiks.recording.log import RecordedLog
 from kiks.recording.motion import poses_of
 from kiks.units import TICK_NS, s_from_ns
-
-if TYPE_CHECKING:
-    from kiks.recording.recording import Recording
 
 Table = NDArray[np.void]
 
@@ -43,10 +41,10 @@ def _joined(parts: list[Table], kind: np.dtype[np.void]) -> Table:
     return np.concatenate(parts) if parts else np.zeros(0, kind)
 
 
-def poses(recording: Recording) -> Table:
+def poses(log: RecordedLog) -> Table:
     """Return where robots were after each tick of 10 ms: time_s, robot, x_mm, y_mm, heading_rad (not wrapped)."""
     parts, last_tick = [], -1
-    for motion in recording.motion():
+    for motion in log.motion():
         ticks, places = poses_of(motion, last_tick)
         last_tick = int(motion.ticks[-1])
         rows = np.zeros(places.shape[:2], _POSES)
@@ -57,14 +55,14 @@ def poses(recording: Recording) -> Table:
     return _joined(parts, _POSES)
 
 
-def wheels(recording: Recording) -> Table:
+def wheels(log: RecordedLog) -> Table:
     """Return what wheels did, every 40 ms.
 
     Columns are encoder counts since the start [pulses], speeds that the program asked for and that the robot measured
     [pulses/10 ms], whether it touches something, and how often it has begun to.
     """
     parts = []
-    for motion in recording.motion():
+    for motion in log.motion():
         records: Any = motion.robots
         rows = np.zeros(records.shape, _WHEELS)
         rows["time_s"], rows["robot"] = _seconds(motion.ticks)[:, None], np.arange(1, records.shape[1] + 1)
@@ -77,10 +75,10 @@ def wheels(recording: Recording) -> Table:
     return _joined(parts, _WHEELS)
 
 
-def readings(recording: Recording) -> Table:
+def readings(log: RecordedLog) -> Table:
     """Return what programs read of proximity (N) and light (O) sensors: time_s, robot, command, counts [8]."""
     rows = []
-    for entry in recording.entries():
+    for entry in log.entries():
         letter, _, values = entry.data.rstrip().partition(b",")
         if entry.kind == Kind.ACT and letter in (b"n", b"o") and values.count(b",") == 7:
             counts = tuple(map(int, values.split(b",")))
@@ -88,10 +86,10 @@ def readings(recording: Recording) -> Table:
     return np.array(rows, _READINGS)
 
 
-def wire(recording: Recording) -> Table:
+def wire(log: RecordedLog) -> Table:
     """Return the characters on all lines: time_s of the first one, robot, is_sent (to the robot), data."""
     rows = []
-    for entry in recording.entries():
+    for entry in log.entries():
         if entry.data and entry.kind in (Kind.SEND, Kind.TYPE):
             rows.append((s_from_ns(entry.other), entry.robot + 1, True, entry.data))
         elif entry.data and entry.kind == Kind.ACT:
@@ -101,7 +99,7 @@ def wire(recording: Recording) -> Table:
     return np.array(rows, np.dtype([("time_s", "f8"), ("robot", "i4"), ("is_sent", "?"), ("data", f"S{longest}")]))
 
 
-def events(recording: Recording) -> Table:
+def events(log: RecordedLog) -> Table:
     """Return what happened: time_s, robot (0 for none), kind, text.
 
     Kinds are 'contact', 'output' (a line that a program printed), 'bookmark', and 'change' (by a hand or a program, in
@@ -109,7 +107,7 @@ def events(recording: Recording) -> Table:
     """
     rows: list[tuple[float, int, str, str]] = []
     states = 0
-    for entry in recording.entries():
+    for entry in log.entries():
         time_s = s_from_ns(entry.time_ns)
         if entry.kind == Kind.TEXT:
             rows.append((time_s, entry.robot + 1, "output", entry.data.decode("utf-8", "replace")))
@@ -120,7 +118,7 @@ def events(recording: Recording) -> Table:
             if states > 1:
                 rows.append((time_s, 0, "change", ""))
     before: dict[int, int] = {}
-    for row in wheels(recording):
+    for row in wheels(log):
         robot, contacts = int(row["robot"]), int(row["contacts"])
         if contacts > before.setdefault(robot, contacts):
             rows.append((float(row["time_s"]), robot, "contact", ""))
@@ -131,7 +129,7 @@ def events(recording: Recording) -> Table:
     return np.array(rows, kind)
 
 
-TABLES: Mapping[str, Callable[[Recording], Table]] = {
+TABLES: Mapping[str, Callable[[RecordedLog], Table]] = {
     "poses": poses,
     "wheels": wheels,
     "readings": readings,

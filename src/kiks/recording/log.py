@@ -1,0 +1,154 @@
+"""The log of a recording, read block by block."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.errors import ParameterError
+from kiks.recording.entries import LAST_INPUT, Columns, Entry, Kind
+from kiks.recording.mcap_file import McapReader
+from kiks.recording.motion import Motion
+from kiks.recording.motion import decode as decode_motion
+from kiks.recording.recorder import LOG, MOTION
+from kiks.sim.saved_state import Layout, SavedState, Setup
+
+HASH_LENGTH = 16
+"""Characters of a hash, before the state of a checkpoint."""
+
+BLOCKS_KEPT = 4
+"""Blocks of the log that are kept when they were read."""
+
+
+class Row(NamedTuple):
+    """The place of an entry: which block of the log it is in, and its row there."""
+
+    block: int
+    row: int
+
+
+class RecordedLog:
+    """The log of a recording.
+
+    Args:
+        file: The file.
+
+    Attributes:
+        reader: Reads the file.
+
+    Raises:
+        ParameterError: If it is missing, damaged or no recording of KiKS.
+    """
+
+    def __init__(self, file: str | Path) -> None:
+        self.reader = reader = McapReader(file)
+        self._setups: dict[int, Setup] = {}
+        self._blocks: OrderedDict[int, Columns] = OrderedDict()
+        if "layout.json" not in reader.attachments or "setup/0.json" not in reader.attachments or not reader.chunks:
+            raise ParameterError(
+                f"{reader.what} must be a recording of KiKS, but it is another MCAP file, or the run was killed at its "
+                "very beginning. `--record FILE` makes one."
+            )
+        self._layout = Layout.from_bytes(reader.attachments["layout.json"], reader.what)
+
+    @property
+    def begin_ns(self) -> int:
+        """When it begins [ns]."""
+        return int(self._block(0).time_ns[0])
+
+    @property
+    def end_ns(self) -> int:
+        """When it ends [ns]: at its last checkpoint."""
+        columns = self._block(len(self.reader.chunks) - 1)
+        return int(columns.time_ns[_is_input(columns)].max(initial=self.reader.chunks[-1].begin_ns))
+
+    def motion(self) -> Iterator[Motion]:
+        """Yield the records of robots and bodies, every fourth tick."""
+        for chunk in self.reader.chunks:
+            for topic, _, data in self.reader.messages(chunk):
+                if topic == MOTION.name:
+                    yield from decode_motion(data, self._layout, self.reader.what)
+
+    def entries(self) -> Iterator[Entry]:
+        """Yield all entries of the log."""
+        for block in range(len(self.reader.chunks)):
+            yield from self._block(block).entries()
+
+    def find_more(self) -> None:
+        """Find what a run that goes on has written since."""
+        self.reader.find_more()
+
+    def row_before(self, time_ns: int) -> Row:
+        """Return the place of the last checkpoint at or before a time [ns], or of the first state."""
+        chunks = self.reader.chunks
+        last = max((number for number, chunk in enumerate(chunks) if chunk.begin_ns <= time_ns), default=0)
+        for block in range(last, -1, -1):
+            columns = self._block(block)
+            is_state = (columns.kind == Kind.CHECK) | (columns.kind == Kind.STATE)
+            rows = np.flatnonzero(is_state & (columns.time_ns <= max(time_ns, self.begin_ns)))
+            if len(rows):
+                return Row(block, int(rows[-1]))
+        raise self._damaged("it has no state")
+
+    def entry(self, row: Row) -> Entry:
+        """Return the entry at a place."""
+        return self._block(row.block).entry(row.row)
+
+    def next_input(self, row: Row) -> tuple[Row, Entry, bool] | None:
+        """Return the next input after a place, None after the last one.
+
+        Returns:
+            Its place, the entry, and whether robots acted between it and the place.
+        """
+        has_acted, begin = False, row.row + 1
+        for block in range(row.block, len(self.reader.chunks)):
+            kinds = self._block(block).kind
+            for next_row in range(begin, len(kinds)):
+                if kinds[next_row] <= LAST_INPUT:
+                    return Row(block, next_row), self._block(block).entry(next_row), has_acted
+                has_acted = has_acted or kinds[next_row] == Kind.ACT
+            begin = 0
+        return None
+
+    def setup(self, number: int) -> Setup:
+        """Return a setup by its number.
+
+        Raises:
+            ParameterError: If there is none.
+        """
+        if number not in self._setups:
+            name = f"setup/{number}.json"
+            if name not in self.reader.attachments:
+                raise self._damaged(f"it has no {name}")
+            self._setups[number] = Setup.from_bytes(self.reader.attachments[name], f"{self.reader.what}: {name}")
+        return self._setups[number]
+
+    def state_of(self, entry: Entry) -> tuple[Setup, SavedState]:
+        """Return the setup and the state of an entry."""
+        setup = self.setup(entry.number)
+        data = entry.data[HASH_LENGTH:] if entry.kind == Kind.CHECK else entry.data
+        return setup, SavedState.from_bytes(data, setup, self._layout, f"{self.reader.what}: state")
+
+    def _block(self, number: int) -> Columns:
+        """Return a block of the log."""
+        if number not in self._blocks:
+            found = (data for topic, _, data in self.reader.messages(self.reader.chunks[number]) if topic == LOG.name)
+            columns = Columns.of_block(next(found, b""), self.reader.what)
+            if not len(columns.kind):
+                raise self._damaged("a part has no entries")
+            self._blocks[number] = columns
+            if len(self._blocks) > BLOCKS_KEPT:
+                self._blocks.popitem(last=False)
+        return self._blocks[number]
+
+    def _damaged(self, why: str) -> ParameterError:
+        return ParameterError(f"{self.reader.what} must be whole, but {why}. Take another copy of it.")
+
+
+def _is_input(columns: Columns) -> NDArray[np.bool_]:
+    return columns.kind <= LAST_INPUT
