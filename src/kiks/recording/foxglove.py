@@ -8,6 +8,7 @@ from __future__ import annotations
 import base64
 import json
 import math
+import struct
 from collections.abc import Sequence
 from typing import Any
 
@@ -105,6 +106,8 @@ TEXT = _topic("/log", "Log", timestamp=_TIME, level=_WHOLE, message=_TEXT, name=
 
 TOPICS = (WALLS, SCENE, POSES, TEXT)
 
+_POSE_BYTES = struct.Struct("<ddd")  # with which a robot's record begins
+
 _LEVEL_INFO, _TYPE_UINT8 = 2, 1
 _STILL = {"position": {"x": 0.0, "y": 0.0, "z": 0.0}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
 
@@ -186,9 +189,8 @@ def poses(looks: Sequence[Look]) -> list[tuple[Topic, int, bytes]]:
         transforms = messages.setdefault(tick_count - tick_count % MESSAGE_TICKS, [])
         time_ns = tick_count * TICK_NS
         stamp = f'{{"timestamp":{{"sec":{time_ns // NS_PER_S},"nsec":{time_ns % NS_PER_S}}},"parent_frame_id":"arena",'
-        # A robot's record begins with its pose.
-        places = np.frombuffer(robot_bytes, np.uint8).reshape(-1, KEPT_BYTES)[:, :24].copy().view("<f8").tolist()
-        for number, (x_mm, y_mm, heading_rad) in enumerate(places, 1):
+        for number in range(1, len(robot_bytes) // KEPT_BYTES + 1):
+            x_mm, y_mm, heading_rad = _POSE_BYTES.unpack_from(robot_bytes, (number - 1) * KEPT_BYTES)
             half_rad = heading_rad / 2
             transforms.append(
                 f'{stamp}"child_frame_id":"robot {number}",'

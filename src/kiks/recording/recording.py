@@ -47,7 +47,7 @@ class Recording:
         ...     kiks.Khepera(sim.port(1)).set_speed(5, 5)
         ...     sim.run(2.5)
         >>> recording = Recording(file)
-        >>> recording.world_at(2.5).state_hash() == sim.state_hash()
+        >>> recording.world_at(sim.time_s).state_hash() == sim.state_hash()
         True
     """
 

@@ -1,0 +1,71 @@
+"""What a recording costs, and how fast any second of a long one is reached.
+
+Run: python benchmarks/record.py [--json]. `record.slowdown_percent` compares the demo `follow` at full acceleration
+with and without a recording, in turn in one process; each figure is a median. `record.seek_s` is the longest of twenty
+jumps in a recording of an hour.
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+import tempfile
+import time
+from pathlib import Path
+from statistics import median
+
+import kiks
+from calibration import calibration_loops_per_s, report
+from kiks.demos.follow import Follow
+
+ARENA = Path(__file__).parent.parent / "examples" / "arenas" / "office.toml"
+SECONDS, ROUNDS, HOUR_S, JUMPS = 300.0, 15, 3600.0, 20
+
+
+def run(seconds: float, file: Path | None) -> tuple[kiks.Simulation, float]:
+    """Return the simulation of the demo after some time, and the processor time that it took [s]."""
+    sim = kiks.Simulation(kiks.Arena.load(ARENA), seed=1)
+    robot, follow = kiks.Khepera(sim.port(1)), Follow()
+    recorder = None if file is None else sim.record(file)
+    start_s = time.process_time()
+    while sim.time_s < seconds:
+        follow.step(robot)
+    took_s = time.process_time() - start_s
+    if recorder is not None:
+        recorder.close()
+    return sim, took_s
+
+
+def main() -> None:
+    """Measure and report."""
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("--json", action="store_true", help="one JSON object a line")
+    options = arguments.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "run.mcap")
+        run(10.0, file)
+        slower, alone_s = [], []
+        for _ in range(ROUNDS):
+            (alone, without_s), (recorded, with_s) = run(SECONDS, None), run(SECONDS, file)
+            assert alone.state_hash() == recorded.state_hash()
+            slower.append(100 * (with_s / without_s - 1))
+            alone_s.append(without_s)
+        bytes_per_s = file.stat().st_size / recorded.time_s
+        run(HOUR_S, file)
+        recording, rng, jumps_s = kiks.Recording(file), random.Random(1), []
+        for _ in range(JUMPS):
+            start_s = time.perf_counter()
+            recording.world_at(rng.uniform(0.0, recording.duration_s))
+            jumps_s.append(time.perf_counter() - start_s)
+    figures = [
+        ("record.slowdown_percent", median(slower), "%"),
+        ("record.us_without", 1e6 * median(alone_s) / SECONDS, "us a simulated second, without a recording"),
+        ("record.kb_per_simulated_s", bytes_per_s / 1000, "kB"),
+        ("record.seek_s", max(jumps_s), "s"),
+        ("calibration.loops_per_s", calibration_loops_per_s(), "1/s"),
+    ]
+    report(figures, as_json=options.json)
+
+
+if __name__ == "__main__":
+    main()
