@@ -36,7 +36,9 @@ def state_of(text: str) -> str:
     return found[1]
 
 
-@pytest.mark.parametrize("command", ["desk", "demo", "run", "serve", "monitor", "calibrate", "fit", "warmup"])
+@pytest.mark.parametrize(
+    "command", ["desk", "demo", "run", "replay", "table", "serve", "monitor", "calibrate", "fit", "warmup"]
+)
 def test_every_command_has_help_with_an_example(command: str) -> None:
     result = kiks(command, "--help")
     assert result.returncode == 0
@@ -186,6 +188,8 @@ NO_RESULTS = {
     ("compare", "first"),
     ("compare", "second"),
     ("info", "file"),
+    ("replay", "file"),
+    ("table", "file"),
     ("serve", "link"),
     ("session", "listen"),
 }
@@ -195,6 +199,11 @@ RESULTS = {
     ("demo", "picture"): ("demo", "--picture", "PLACE"),
     ("run", "save_thinking"): ("run", "--save-thinking", "PLACE", WANDER),
     ("run", "picture"): ("run", "--picture", "PLACE", WANDER),
+    ("demo", "record"): ("demo", "--record", "PLACE"),
+    ("run", "record"): ("run", "--record", "PLACE", WANDER),
+    ("serve", "record"): ("serve", "--record", "PLACE"),
+    ("desk", "record"): ("desk", "--record", "PLACE"),
+    ("table", "out"): ("table", "run.mcap", "PLACE"),
     ("run", "csv"): ("run", "--csv", "PLACE", WANDER),
     ("fit", "robot"): ("fit", "wall.sam", "--robot", "PLACE"),
     ("calibrate", "out"): ("calibrate", "--port", "kiks://1", "--out", "PLACE"),

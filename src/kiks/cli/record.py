@@ -61,9 +61,10 @@ def _recordable(param: typer.CallbackParam, value: Path | None) -> Path | None:
     Raises:
         ParameterError: If it could not be written, or its name has another ending.
     """
+    value = written_file(param, value)
     if value is not None and value.suffix.lower() != ".mcap":
         raise ParameterError(f"--record must name a file that ends in .mcap, but it was {str(value)!r}.")
-    return written_file(param, value)
+    return value
 
 
 RecordFile = Annotated[

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 
 from kiks.cli.desk import open_desk
@@ -16,6 +15,8 @@ from kiks.units import TICK_NS, s_from_ns
 from kiks.version import __version__
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from kiks.recording.recording import Recording
 
 RecordingFile = Annotated[Path, typer.Argument(help="A recording (.mcap) of --record or sim.record.", metavar="FILE")]

@@ -1,0 +1,93 @@
+"""`--record` of the commands, `kiks replay --check` and `kiks table`: runs of foreign programs are made again."""
+
+from __future__ import annotations
+
+import csv
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+import serial
+from tests import forked
+from tests.cli.test_cli import KIKS, state_of
+from tests.served import GUARD_S, PROGRAMS
+
+from kiks import Recording
+
+AGAIN = "The same run again"
+
+ROUND = """
+import serial, sys, time
+port = serial.Serial(sys.argv[1], timeout=1)
+for step in range(40):
+    port.write(b"N\\n")
+    values = [int(word) for word in port.readline().split(b",")[1:]]
+    port.write(b"D,%d,%d\\n" % (6 - values[3] // 80, 6 - values[2] // 80))
+    port.readline()
+    time.sleep(0.03)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robots", [1, 2])
+def test_programs_are_recorded_with_their_texts(robots: int, tmp_path: Path) -> None:
+    (tmp_path / "round.py").write_text(ROUND)
+    words = [word for _ in range(robots) for word in ("round.py", "COM1")]
+    alone = forked.run("run", "--robots", str(robots), *words, cwd=tmp_path)
+    result = forked.run("run", "--robots", str(robots), "--record", "run.mcap", *words, cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert state_of(result.stderr) == state_of(alone.stderr)
+    recording = Recording(tmp_path / "run.mcap")
+    assert list(recording.programs.values()) == [ROUND] * robots
+    assert recording.about["command"].startswith("kiks run --robots")
+    assert len(recording.table("readings", robots)) == 40
+    assert AGAIN in forked.run("replay", "--check", "run.mcap", cwd=tmp_path).stdout
+    for file in ("readings.csv", "readings.parquet"):
+        told = forked.run("table", "run.mcap", file, "--table", "readings", "--robot", "1", cwd=tmp_path)
+        assert told.stdout.startswith("40 rows"), told.stderr
+    with (tmp_path / "readings.csv").open(newline="") as table:
+        rows = list(csv.DictReader(table))
+    assert [int(row["counts_7"]) for row in rows] == recording.table("readings", 1)["counts"][:, 7].tolist()
+
+
+@pytest.mark.slow
+def test_a_match_with_a_referee_is_made_again(tmp_path: Path) -> None:
+    result = forked.run("demo", "soccer", "--seconds", "20", "--record", "match.mcap", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert AGAIN in forked.run("replay", "match.mcap", "--check", cwd=tmp_path).stdout
+
+
+@pytest.mark.slow
+def test_what_a_killed_server_has_recorded_is_made_again(tmp_path: Path) -> None:
+    """A foreign client in real time; the server has no chance to end the file."""
+    link, command = tmp_path / "robot", [*KIKS, "serve", "--link", "robot", "--record", "run.mcap", "--tcp", "0"]
+    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        while "repeatable" not in (line := process.stdout.readline()).lower():
+            assert line
+        with serial.Serial(str(link), timeout=GUARD_S) as port:
+            for step in range(60):
+                port.write(b"D,%d,5\nN\n" % (step % 9))
+                assert port.readline() + port.readline()
+        process.send_signal(signal.SIGKILL)
+    result = forked.run("replay", "run.mcap", "--check", cwd=tmp_path)
+    assert AGAIN in result.stdout
+    assert "was killed, or goes on" in result.stderr
+    sent = Recording(tmp_path / "run.mcap").table("wire")
+    assert len(sent[sent["is_sent"]]) > 10
+
+
+def test_mistakes_end_in_one_clear_line(tmp_path: Path) -> None:
+    (tmp_path / "text.mcap").write_text("no recording")
+    for words, told in (
+        (("replay", "none.mcap"), "no such file"),
+        (("replay", "text.mcap", "--check"), "must be an MCAP file"),
+        (("table", "text.mcap", "out.csv"), "must be an MCAP file"),
+        (("table", "text.mcap", "out.xlsx"), "must end in .csv or .parquet"),
+        (("run", "--record", "run.txt", str(PROGRAMS / "drive.py")), "ends in .mcap"),
+    ):
+        result = forked.run(*words, cwd=tmp_path)
+        assert result.returncode == 2
+        assert told in result.stderr
+        assert "Traceback" not in result.stderr
