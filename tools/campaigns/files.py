@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from tools.campaigns import recordings
 from tools.campaigns.hostile import BYTES_MAX, mutated, mutated_text
 from tools.campaigns.runner import SECRET, Campaign, Play
 from tools.campaigns.strange import (
@@ -417,6 +418,8 @@ def _kinds() -> Iterator[Kind]:
     yield _among("contest", coevolved, "prey.toml", _contest, "toml")
     yield _among("coevolution", coevolved, _IDENTITY, _coevolution, "json")
     yield _among("pairs", coevolved, _GENERATION, _coevolution)
+
+    yield Kind("recording", "own.mcap", [recordings.sound()], recordings.use, strange=(recordings.strange_recording,))
 
     yield Kind("network", "own.json", [THESIS.read_bytes()[:200_000]], _network, "json")
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.errors import ParameterError
+from kiks.model.checks import CLOCK_END_NS
 
 
 class Kind(IntEnum):
@@ -98,6 +99,9 @@ class EntryList:
         return block
 
 
+ROBOTS_MAX = 1000
+"""Most robots of a world."""
+
 _COLUMN_COUNT = 6
 _COUNT = struct.Struct("<I")
 
@@ -130,7 +134,11 @@ class Columns(NamedTuple):
         if count >= 0 and len(block) >= begin:
             columns = np.frombuffer(block, "<i8", count * _COLUMN_COUNT, _COUNT.size).reshape(count, _COLUMN_COUNT).T
             lengths = columns[-1]
-            if ((lengths >= 0) & (lengths <= len(block))).all() and (columns[2] >= 0).all():
+            limits = ((0, 2**31), (0, CLOCK_END_NS), (0, ROBOTS_MAX - 1), *[(-(2**63), 2**63 - 1)] * 2, (0, len(block)))
+            is_sound = (
+                (columns >= low) & (columns <= high) for columns, (low, high) in zip(columns, limits, strict=True)
+            )
+            if all(each.all() for each in is_sound):
                 ends = begin + lengths.cumsum()
                 if len(block) == (int(ends[-1]) if count else begin):
                     kind, time_ns, robot, number, other, lengths = columns

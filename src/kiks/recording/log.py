@@ -17,6 +17,7 @@ from kiks.recording.motion import Motion
 from kiks.recording.motion import decode as decode_motion
 from kiks.recording.recorder import LOG, MOTION
 from kiks.sim.saved_state import Layout, SavedState, Setup
+from kiks.units import s_from_ns
 
 HASH_LENGTH = 16
 """Characters of a hash, before the state of a checkpoint."""
@@ -65,7 +66,7 @@ class RecordedLog:
     def end_ns(self) -> int:
         """When it ends [ns]: at its last checkpoint."""
         columns = self._block(len(self.reader.chunks) - 1)
-        return int(columns.time_ns[_is_input(columns)].max(initial=self.reader.chunks[-1].begin_ns))
+        return int(columns.time_ns[_is_input(columns)].max(initial=columns.time_ns[0]))
 
     def motion(self) -> Iterator[Motion]:
         """Yield the records of robots and bodies, every fourth tick."""
@@ -93,7 +94,7 @@ class RecordedLog:
             rows = np.flatnonzero(is_state & (columns.time_ns <= max(time_ns, self.begin_ns)))
             if len(rows):
                 return Row(block, int(rows[-1]))
-        raise self._damaged("it has no state")
+        raise self.damaged("it has no state")
 
     def entry(self, row: Row) -> Entry:
         """Return the entry at a place."""
@@ -124,7 +125,7 @@ class RecordedLog:
         if number not in self._setups:
             name = f"setup/{number}.json"
             if name not in self.reader.attachments:
-                raise self._damaged(f"it has no {name}")
+                raise self.damaged(f"it has no {name}")
             self._setups[number] = Setup.from_bytes(self.reader.attachments[name], f"{self.reader.what}: {name}")
         return self._setups[number]
 
@@ -132,7 +133,10 @@ class RecordedLog:
         """Return the setup and the state of an entry."""
         setup = self.setup(entry.number)
         data = entry.data[HASH_LENGTH:] if entry.kind == Kind.CHECK else entry.data
-        return setup, SavedState.from_bytes(data, setup, self._layout, f"{self.reader.what}: state")
+        saved = SavedState.from_bytes(data, setup, self._layout, f"{self.reader.what}: state")
+        if saved.now_ns != entry.time_ns:
+            raise self.damaged(f"a state of {s_from_ns(saved.now_ns):.3f} s is at {s_from_ns(entry.time_ns):.3f} s")
+        return setup, saved
 
     def _block(self, number: int) -> Columns:
         """Return a block of the log."""
@@ -140,13 +144,14 @@ class RecordedLog:
             found = (data for topic, _, data in self.reader.messages(self.reader.chunks[number]) if topic == LOG.name)
             columns = Columns.of_block(next(found, b""), self.reader.what)
             if not len(columns.kind):
-                raise self._damaged("a part has no entries")
+                raise self.damaged("a part has no entries")
             self._blocks[number] = columns
             if len(self._blocks) > BLOCKS_KEPT:
                 self._blocks.popitem(last=False)
         return self._blocks[number]
 
-    def _damaged(self, why: str) -> ParameterError:
+    def damaged(self, why: str) -> ParameterError:
+        """Return the error that says why it is not whole."""
         return ParameterError(f"{self.reader.what} must be whole, but {why}. Take another copy of it.")
 
 

@@ -34,6 +34,7 @@ PROFILE = "kiks"
 _MAGIC = b"\x89MCAP0\r\n"
 _HEAD = struct.Struct("<BQ")
 _CHUNK_HEAD = struct.Struct("<QQQ")
+_CRC = struct.Struct("<I")
 
 RECORD_BYTES_MAX = 64 << 20
 """Most bytes of a record that is read, and of a chunk when it is expanded."""
@@ -217,8 +218,14 @@ class McapReader:
             self.chunks.append(FoundChunk(self._offset, _HEAD.size + length, begin_ns, end_ns))
         elif opcode in (Opcode.ATTACHMENT, Opcode.METADATA):
             stream.seek(self._offset)
-            for record in self._records(stream.read(_HEAD.size + length)):
+            data = stream.read(_HEAD.size + length)
+            for record in self._records(data):
                 if isinstance(record, Attachment):
+                    # The checksum at the end is of all of the record before it.
+                    if _CRC.unpack(data[-_CRC.size :])[0] not in (0, zlib.crc32(data[_HEAD.size : -_CRC.size])):
+                        raise ParameterError(
+                            f"{self.what} must have whole attachments, but one is damaged. Take another copy of it."
+                        )
                     self.attachments[record.name] = record.data
                 elif isinstance(record, Metadata):
                     self.told |= record.metadata

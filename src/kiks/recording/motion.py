@@ -13,9 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.engine.state import ROBOT, TRAIL_LENGTH, State
+from kiks.engine.state import BODY, ROBOT, TRAIL_LENGTH, State
 from kiks.errors import ParameterError
-from kiks.sim.saved_state import Layout
+from kiks.model.checks import CLOCK_END_NS
+from kiks.sim.saved_state import Layout, converted
+from kiks.units import TICK_NS
 
 KEPT_BYTES = next(field[1] for name, field in (ROBOT.fields or {}).items() if name == "bus")
 """Bytes of a robot's record that are kept: those before the field of that name."""
@@ -63,6 +65,12 @@ class Motion(NamedTuple):
     bodies: NDArray[np.void]
 
 
+TICKS_MAX = CLOCK_END_NS // TICK_NS
+"""Last tick that a clock reaches."""
+
+MOTION_BYTES_MAX = 256 << 20
+"""Most bytes of a block's records."""
+
 _HEAD = struct.Struct("<IIII")  # looks, robots, bytes of a robot, bodies
 
 
@@ -100,13 +108,16 @@ def decode(block: bytes, layout: Layout, what: str) -> Iterator[Motion]:
         middle = begin + looks * 8
         end = middle + looks * robots * robot_bytes
         offset = end + looks * bodies * layout.body.itemsize
-        if not (looks and robots and 0 < robot_bytes <= layout.robot.itemsize and offset <= len(block)):
+        is_whole = looks and robots and 0 < robot_bytes <= layout.robot.itemsize and offset <= len(block)
+        # Records may be larger in this version than in the file.
+        is_small = looks * (robots * KEPT_BYTES + bodies * BODY.itemsize) <= MOTION_BYTES_MAX
+        ticks = np.frombuffer(block, "<i8", looks if is_whole else 0, begin if is_whole else 0)
+        if not (is_whole and is_small and ticks[0] >= 0 and ticks[-1] <= TICKS_MAX and (np.diff(ticks) >= 0).all()):
             raise ParameterError(f"{what} must have blocks of motion, but one is damaged. Take another copy of it.")
+        of_robots = np.frombuffer(block, _first_fields(layout.robot, robot_bytes), looks * robots, middle)
         yield Motion(
-            np.frombuffer(block, "<i8", looks, begin),
-            np.frombuffer(block, _first_fields(layout.robot, robot_bytes), looks * robots, middle).reshape(
-                looks, robots
-            ),
+            ticks,
+            converted(of_robots, _KEPT).reshape(looks, robots),
             layout.bodies(block[end:offset]).reshape(looks, bodies),
         )
 
@@ -122,6 +133,9 @@ def _first_fields(kind: np.dtype[np.void], size: int) -> Any:
             "itemsize": size,
         }
     )
+
+
+_KEPT = _first_fields(ROBOT, KEPT_BYTES)
 
 
 class Ticks(NamedTuple):

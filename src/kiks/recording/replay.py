@@ -8,11 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from kiks.model.checks import CLOCK_END_NS
 from kiks.recording.entries import Entry, Kind
 from kiks.recording.log import HASH_LENGTH, RecordedLog
+from kiks.recording.recorder import CHECK_NS
 from kiks.sim.saved_state import restore_state
 from kiks.sim.simulation import Simulation
 from kiks.sim.wire import ignore_reply
+from kiks.units import s_from_ns
 
 NEVER_NS = 2**62
 
@@ -44,9 +47,11 @@ class Replay:
         self.next_ns = NEVER_NS
         row = log.row_before(time_ns)
         setup, saved = log.state_of(log.entry(row))
+        if time_ns - saved.now_ns > CHECK_NS:
+            raise log.damaged(f"a part is missing after {s_from_ns(saved.now_ns):.3f} s")
         self.sim = setup.simulation(saved.poses)
         restore_state(self.sim, saved)
-        self._row = row
+        self._row, self._row_ns = row, saved.now_ns
         self._next: Entry | None = None
         self._find_next()
         self.sim.loop.supervisor = self
@@ -80,19 +85,29 @@ class Replay:
         if (found := self._log.next_input(self._row)) is not None:
             self._row, self._next, has_acted = found
             self.next_ns = self._next.time_ns
+            if not 0 <= self.next_ns - self._row_ns <= CHECK_NS:
+                raise self._log.damaged(f"a part is missing after {s_from_ns(self._row_ns):.3f} s")
+            self._row_ns = self.next_ns
         return has_acted
+
+    def _sent_ns(self, entry: Entry) -> int:
+        if not 0 <= entry.number <= CLOCK_END_NS:
+            raise self._log.damaged("characters were sent at no time of its clock")
+        return entry.number
 
     def _apply(self, entry: Entry) -> None:
         sim = self.sim
         wire = sim.wires[entry.robot] if entry.robot < len(sim.wires) else sim.wires[0]
         match entry.kind:
             case Kind.SEND:
-                wire.send(entry.data, entry.number)
+                wire.send(entry.data, self._sent_ns(entry))
             case Kind.TYPE:
-                wire.send(entry.data, entry.number, ignore_reply)
+                wire.send(entry.data, self._sent_ns(entry), ignore_reply)
             case Kind.HANG_UP:
                 wire.hang_up()
             case Kind.SET_BAUD:
+                if not 75 <= entry.number <= 4_000_000:
+                    raise self._log.damaged(f"it sets a line to {entry.number} bit/s")
                 wire.set_baud(entry.number)
             case Kind.DROP:
                 wire.drop_after(entry.number, entry.other)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kiks.errors import ParameterError
 from kiks.recording.entries import Kind
 from kiks.recording.log import RecordedLog
 from kiks.recording.motion import poses_of
@@ -31,6 +33,12 @@ _WHEELS = np.dtype(
     ]
 )
 _READINGS = np.dtype([("time_s", "f8"), ("robot", "i4"), ("command", "U1"), ("counts", "i4", (8,))])
+
+
+_COUNTS = re.compile(rb"[0-9]{1,9}(,[0-9]{1,9}){7}")
+
+TEXT_BYTES_MAX = 1 << 30
+"""Most bytes of a table's column of texts, each of which takes as many as the longest."""
 
 
 def _seconds(ticks: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -80,7 +88,7 @@ def readings(log: RecordedLog) -> Table:
     rows = []
     for entry in log.entries():
         letter, _, values = entry.data.rstrip().partition(b",")
-        if entry.kind == Kind.ACT and letter in (b"n", b"o") and values.count(b",") == 7:
+        if entry.kind == Kind.ACT and letter in (b"n", b"o") and _COUNTS.fullmatch(values):
             counts = tuple(map(int, values.split(b",")))
             rows.append((s_from_ns(entry.time_ns), entry.robot + 1, letter.decode().upper(), counts))
     return np.array(rows, _READINGS)
@@ -95,7 +103,7 @@ def wire(log: RecordedLog) -> Table:
         elif entry.data and entry.kind == Kind.ACT:
             rows.append((s_from_ns(entry.number), entry.robot + 1, False, entry.data))
     rows.sort(key=lambda row: row[0])
-    longest = max((len(row[3]) for row in rows), default=1)
+    longest = _longest(log, [len(row[3]) for row in rows])
     return np.array(rows, np.dtype([("time_s", "f8"), ("robot", "i4"), ("is_sent", "?"), ("data", f"S{longest}")]))
 
 
@@ -124,9 +132,24 @@ def events(log: RecordedLog) -> Table:
             rows.append((float(row["time_s"]), robot, "contact", ""))
         before[robot] = contacts
     rows.sort(key=lambda row: row[0])
-    longest = max((len(row[3]) for row in rows), default=1)
+    longest = _longest(log, [4 * len(row[3]) for row in rows]) // 4
     kind = np.dtype([("time_s", "f8"), ("robot", "i4"), ("kind", "U8"), ("text", f"U{max(longest, 1)}")])
     return np.array(rows, kind)
+
+
+def _longest(log: RecordedLog, lengths: Sequence[int]) -> int:
+    """Return the greatest of the lengths of a column's texts, at least 1.
+
+    Raises:
+        ParameterError: If all of them together would be too long.
+    """
+    longest = max(lengths, default=1)
+    if longest * len(lengths) > TEXT_BYTES_MAX:
+        raise ParameterError(
+            f"{log.reader.what} must have texts that fit into a table, but one has {longest} bytes, and there are "
+            f"{len(lengths)} rows. Read `entries()` one by one."
+        )
+    return longest
 
 
 TABLES: Mapping[str, Callable[[RecordedLog], Table]] = {

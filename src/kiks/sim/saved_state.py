@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from kiks.engine.physics.gripper import ARM_MAX, JAWS_MAX
 from kiks.engine.state import BODY, MEMORY_COUNT, ROBOT
 from kiks.errors import ParameterError, shown
 from kiks.firmware.k213 import PERIODS_NS
@@ -31,9 +32,12 @@ from kiks.sim.simulation import Simulation
 from kiks.sim.turret_host import NAMES, name_of
 from kiks.sim.wire import SavedWire
 from kiks.sim.world import World
+from kiks.units import TICK_NS
 
 Instant = Annotated[Whole, Field(ge=-CLOCK_END_NS, le=2 * CLOCK_END_NS)]
 Count = Annotated[Whole, Field(ge=0, le=2**62)]
+Line = Annotated[str, Field(max_length=LINE_LIMIT + 1, pattern=r"^[\x00-\xff]*$")]
+"""Bytes of a line, as characters of Latin-1."""
 
 
 # ---- what a world consists of ----
@@ -155,6 +159,9 @@ class Setup:
             ParameterError: If turrets do not fit.
         """
         with sim.lock:
+            # No robot may look from a place that the new walls do not have.
+            for index, pose in enumerate(poses[: sim.robot_count].tolist()):
+                sim.world.put_robot(index, *pose)
             if sim.arena is not self.arena:
                 sim.world.take_walls(FreeSpace(self.arena, sim.specs, sim.world.state))
             for spec, pose in zip(self.specs[sim.robot_count :], poses[sim.robot_count :].tolist(), strict=True):
@@ -200,8 +207,8 @@ class _WireFile:
     robot_baud: Baud
     selected_baud: Baud
     demo_wakes_ns: Instant | None
-    partial: Annotated[str, Field(max_length=LINE_LIMIT + 1)]
-    pending: tuple[tuple[Instant, Annotated[str, Field(max_length=LINE_LIMIT + 1)], Switch], ...]
+    partial: Line
+    pending: tuple[tuple[Instant, Line, Switch], ...]
     last_act_ns: Instant
     orphan_count: Count
 
@@ -359,11 +366,11 @@ class Layout:
 
     def robots(self, data: bytes) -> NDArray[np.void]:
         """Return the records of robots in bytes: those of this version."""
-        return _converted(np.frombuffer(data, self.robot), ROBOT)
+        return converted(np.frombuffer(data, self.robot), ROBOT)
 
     def bodies(self, data: bytes) -> NDArray[np.void]:
         """Return the records of bodies in bytes: those of this version."""
-        return _converted(np.frombuffer(data, self.body), BODY)
+        return converted(np.frombuffer(data, self.body), BODY)
 
 
 @record
@@ -408,7 +415,7 @@ def _type_of(file: _RecordFile, what: str) -> np.dtype[np.void]:
         raise ParameterError(f"{what} must describe records, but numpy says: {error}. Is the file damaged?") from None
 
 
-def _converted(records: NDArray[np.void], kind: np.dtype[np.void]) -> NDArray[np.void]:
+def converted(records: NDArray[np.void], kind: np.dtype[np.void]) -> NDArray[np.void]:
     """Return records with the fields of another type that they have, and zeros for those that they have not."""
     if records.dtype == kind:
         return records
@@ -422,16 +429,32 @@ def _converted(records: NDArray[np.void], kind: np.dtype[np.void]) -> NDArray[np
 _NUMBER_MAX = 1e12
 """Largest magnitude of a number in a record, far beyond any that a run reaches."""
 
-_LIMITS = {
+_LIMITS: dict[str, tuple[float, float] | None] = {
     "camera_period": (0, len(PERIODS_NS) - 1),
     "radio_attempt": (0, ATTEMPTS),
     "radio_to_length": (0, DATA_LIMIT),
     "radio_from_length": (0, DATA_LIMIT),
     "motor_mode": (0, 2),
+    "profile_speed": (1, 127),
+    "profile_acceleration": (1, 255),
+    "motor_speed": (-1e4, 1e4),
+    "arm": (-1, ARM_MAX + 1),
+    "arm_target": (-1, ARM_MAX + 1),
+    "jaws": (-1, JAWS_MAX + 10),
     "brightness": (0, 255),
     "radius_mm": (1e-3, 1e4),
+    "velocity_x": (-1e6, 1e6),
+    "velocity_y": (-1e6, 1e6),
+    "friction_mm_s2": (0, 1e6),
+    "kick_share": (0, 1),
+    "hold_ahead_mm": (-1e4, 1e4),
+    "hold_aside_mm": (-1e4, 1e4),
+    "turret_memory": None,
 }
-"""Lowest and highest values of fields that kernels trust."""
+"""Lowest and highest values of fields that kernels trust; None for those that may hold any number, or none."""
+
+_BEYOND_MM = 1000.0
+"""How far beyond the walls a body may be, as a gripper lifts it over a thin one [mm]."""
 
 _TIMES = ("camera_taken_ns", "radio_starts_ns", "radio_ends_ns", "radio_ended_ns", "battle_ns")
 
@@ -442,15 +465,22 @@ def _check_records(saved: SavedState, arena: Arena, what: str) -> None:
     Raises:
         ParameterError: If a value is out of range.
     """
-    for records in (saved.robots, saved.bodies):
+    limits: dict[str, tuple[float, float] | None] = {
+        **_LIMITS,
+        **dict.fromkeys(_TIMES, (-1, CLOCK_END_NS)),
+        "held_row": (0, saved.bodies.shape[1]),
+        "holder": (0, saved.robots.shape[1]),
+    }
+    ticks = -(-saved.now_ns // TICK_NS)
+    _check_range(np.array(saved.tick_count), ticks, ticks, f"tick_count of {what}")
+    for records, beyond_mm in ((saved.robots, 0.0), (saved.bodies, _BEYOND_MM)):
         for name in records.dtype.names or ():
-            low, high = _LIMITS.get(name, (-_NUMBER_MAX, _NUMBER_MAX))
-            low, high = (-1, CLOCK_END_NS) if name in _TIMES else (low, high)
-            low, high = (0, saved.bodies.shape[1]) if name == "held_row" else (low, high)
-            _check_range(records[name], low, high, f"{name} of {what}")
+            limit = limits.get(name, (-_NUMBER_MAX, _NUMBER_MAX))
+            if limit is not None:
+                _check_range(records[name], *limit, f"{name} of {what}")
         for x, y in ((records["x_mm"], records["y_mm"]), (records["trail"][..., 0], records["trail"][..., 1])):
-            _check_range(x, 0, arena.width_mm, f"x_mm of {what}")
-            _check_range(y, 0, arena.height_mm, f"y_mm of {what}")
+            _check_range(x, -beyond_mm, arena.width_mm + beyond_mm, f"x_mm of {what}")
+            _check_range(y, -beyond_mm, arena.height_mm + beyond_mm, f"y_mm of {what}")
     _check_range(np.nan_to_num(saved.lamps), -_NUMBER_MAX, _NUMBER_MAX, f"lamps of {what}")
 
 

@@ -1,0 +1,360 @@
+"""Recordings whose run was killed, that were cut off, or that hold anything: read as far as they go, or refused."""
+
+from __future__ import annotations
+
+import json
+import random
+import resource
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+
+import lz4.frame
+import numpy as np
+import pytest
+from mcap.opcode import Opcode
+from tests.at_length import share
+from tools.campaigns.recordings import Parts, sound, sound_parts, use
+
+import kiks
+from kiks.errors import KiksError, ParameterError
+from kiks.recording import motion
+from kiks.recording.check import check_recording
+from kiks.recording.entries import Entry, Kind
+from kiks.recording.recorder import CHECK_NS
+
+KILLS = share(3, 100)
+"""How many runs are killed."""
+
+CUTS = share(40, 1000)
+"""How many recordings are cut off, and how many have bytes flipped."""
+
+MEMORY_MB = 400
+"""Most memory that reading may add, however little the file is [MB]."""
+
+RUN = """
+import sys, kiks
+from kiks.recording import recorder
+recorder.CHUNK_S = 0.0  # of a world in real time, each checkpoint makes a chunk
+sim = kiks.Simulation(kiks.Arena.box(600, 300), seed=1)
+sim.place(1, 100, 150, 0)
+sim.add_ball(300, 150)
+port = sim.port(1)
+port.write(b"D,7,5\\n")
+with sim.record(sys.argv[1]):
+    while True:
+        port.write(b"N\\n")
+        sim.run(0.25)
+        print(sim.now_ns, flush=True)
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "run.mcap"
+
+
+def refused(file: Path) -> str:
+    """Return why a recording is refused."""
+    with pytest.raises(KiksError) as caught:
+        use(file)
+    text = str(caught.value)
+    assert text.isprintable()
+    assert len(text) <= 500
+    return text
+
+
+def is_read(file: Path) -> bool:
+    """Say whether a recording can be read; any error but KiKS's own goes on."""
+    with suppress(KiksError):
+        use(file)
+        return True
+    return False
+
+
+# ---- a killed run ----
+
+
+@pytest.mark.slow
+def test_a_killed_run_lacks_at_most_a_second(file: Path) -> None:
+    rng = random.Random(1)
+    for _ in range(KILLS):
+        run = subprocess.Popen([sys.executable, "-c", RUN, str(file)], stdout=subprocess.PIPE)
+        assert run.stdout is not None
+        with run, run.stdout as out:
+            lines = [int(next(out)) for _ in range(rng.randint(1, 300))]
+            for _ in range(rng.randint(0, 100_000)):
+                pass
+            run.kill()
+            lines += [int(line) for line in out if line.endswith(b"\n")]
+        with kiks.Recording(file) as recording:
+            assert not recording.is_whole
+            assert recording.end_ns >= lines[-1] - CHECK_NS
+            checked = check_recording(recording)
+            assert checked.differs_ns is None
+            assert checked.equal_count == recording.end_ns // CHECK_NS
+
+
+# ---- cut off, and flipped ----
+
+
+def test_a_recording_can_be_cut_off_anywhere(file: Path) -> None:
+    data, rng = sound(), random.Random(2)
+    is_good = []
+    for end in [*range(10), *(rng.randrange(len(data)) for _ in range(CUTS)), len(data) - 1]:
+        file.write_bytes(data[:end])
+        is_good.append(is_read(file))
+    assert not any(is_good[:10])
+    assert is_good[-1]
+
+
+def test_flipped_bytes_are_noticed_or_lie_elsewhere(file: Path) -> None:
+    """Whatever was flipped: what is said of the run is true."""
+    data, rng = sound(), random.Random(3)
+    file.write_bytes(data)
+    with kiks.Recording(file) as recording:
+        whole = recording.table("wheels")
+    for _ in range(CUTS):
+        flipped = bytearray(data)
+        flipped[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
+        file.write_bytes(flipped)
+        if is_read(file):
+            with kiks.Recording(file) as recording:
+                assert check_recording(recording).differs_ns is None
+                assert np.isin(recording.table("wheels"), whole).all()
+
+
+def test_a_flipped_byte_of_an_attachment_is_noticed(file: Path) -> None:
+    data = sound()
+    place = data.index(b'"seed": 1') + len(b'"seed": ')
+    file.write_bytes(data[:place] + b"2" + data[place + 1 :])
+    assert "whole attachments" in refused(file)
+
+
+def test_parts_written_again_are_the_same_recording(file: Path) -> None:
+    sound_parts().save(file)
+    use(file)
+
+
+def test_a_part_that_is_missing_is_noticed(file: Path) -> None:
+    parts = sound_parts()
+    replace(parts, blocks=[parts.blocks[0], *parts.blocks[2:]]).save(file)
+    assert "a part is missing after 0.000 s" in refused(file)
+
+
+def test_no_time_is_far_from_the_last_state(file: Path) -> None:
+    parts = sound_parts().with_entry(
+        lambda entry: entry.kind == Kind.STATE, lambda entry: entry._replace(time_ns=10**18)
+    )
+    parts.save(file)
+    with kiks.Recording(file) as recording, pytest.raises(ParameterError, match="a part is missing after 2.300 s"):
+        recording.replay()
+
+
+# ---- what kernels trust ----
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("holder", 3),
+        ("holder", -1),
+        ("held_row", 7),
+        ("camera_period", 200),
+        ("motor_mode", 3),
+        ("profile_acceleration", 0),
+        ("radio_to_length", 17),
+        ("x_mm", np.nan),
+        ("x_mm", -1001),
+        ("y_mm", 1e300),
+        ("trail", np.inf),
+        ("heading_rad", np.nan),
+        ("motor_speed", 1e9),
+        ("radius_mm", 0),
+        ("velocity_x", 1e9),
+        ("friction_mm_s2", -1),
+        ("kick_share", 1e6),
+        ("jaws", 1e9),
+        ("hold_aside_mm", 1e9),
+        ("battle_ns", 2.0**62),
+    ],
+)
+def test_no_state_holds_what_kernels_cannot_take(name: str, value: float, file: Path) -> None:
+    sound_parts().with_records(name, value).save(file)
+    assert f"{name if name != 'trail' else ''}" in refused(file)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -1e300])
+def test_memory_of_turrets_holds_any_number(value: float, file: Path) -> None:
+    sound_parts().with_records("turret_memory", value).save(file)
+    with kiks.Recording(file) as recording:
+        recording.world_at(0.0).run(0.5)
+
+
+def test_what_a_gripper_lifts_over_a_thin_wall_can_be_recorded(file: Path) -> None:
+    sim = kiks.Simulation(kiks.Arena.box(300, 300, wall_mm=1), seed=1)
+    sim.fit(1, "gripper")
+    sim.place(1, 150, 150, 0)
+    sim.add_ball(195, 150, radius_mm=10)
+    port = sim.port(1)
+    with sim.record(file):
+        for command in (b"T,1,E,255\n", b"T,1,D,1\n", b"T,1,E,100\n", b"D,8,8\n"):
+            port.write(command)
+            sim.run(2.0)
+    assert sim.bodies()["is_lifted"].all()
+    assert sim.bodies()["x_mm"].max() > 300
+    use(file)
+
+
+def _with_head(parts: Parts, change: Callable[[dict[str, object]], None]) -> Parts:
+    def changed(entry: Entry) -> Entry:
+        line, _, rest = entry.data.partition(b"\n")
+        head = json.loads(line)
+        change(head)
+        return entry._replace(data=json.dumps(head).encode() + b"\n" + rest)
+
+    return parts.with_entry(lambda entry: entry.kind == Kind.STATE, changed)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("robots", 3), ("robots", 10**9), ("bodies", 99_999), ("lamps", -1), ("tick_count", 2**62), ("now_ns", 10**18)],
+)
+def test_no_state_lies_about_itself(name: str, value: int, file: Path) -> None:
+    _with_head(sound_parts(), lambda head: head.update({name: value})).save(file)
+    refused(file)
+
+
+def test_lines_are_of_bytes(file: Path) -> None:
+    def change(head: dict[str, object]) -> None:
+        head["wires"][0][4] = "\u20ac"  # type: ignore[index]
+
+    _with_head(sound_parts(), change).save(file)
+    assert "partial" in refused(file)
+
+
+# ---- the log and the motion ----
+
+
+@pytest.mark.parametrize(
+    ("kind", "changes"),
+    [
+        (Kind.CHECK, {"time_ns": 2**62}),
+        (Kind.CHECK, {"time_ns": 0}),
+        (Kind.CHECK, {"number": 1}),
+        (Kind.SEND, {"time_ns": -5}),
+        (Kind.SEND, {"number": -(2**63)}),
+        (Kind.SEND, {"robot": 2**62}),
+        (Kind.SEND, {"kind": Kind.SET_BAUD, "number": 0}),
+        (Kind.SEND, {"kind": -1}),
+        (Kind.SEND, {"kind": Kind.STATE}),
+    ],
+)
+def test_no_entry_of_the_log_holds_anything(kind: Kind, changes: dict[str, int], file: Path) -> None:
+    sound_parts().with_entry(lambda entry: entry.kind == kind, lambda entry: entry._replace(**changes)).save(file)
+    refused(file)
+
+
+@pytest.mark.parametrize("reply", [b"n,1,2,3,4,5,6,7,x\r\n", b"n," + b"9" * 5000 + b",0" * 7 + b"\r\n"])
+def test_replies_that_are_no_readings_are_none(reply: bytes, file: Path) -> None:
+    sound_parts().with_entry(
+        lambda entry: entry.data.startswith((b"n,", b"o,")), lambda entry: entry._replace(data=reply)
+    ).save(file)
+    with kiks.Recording(file) as recording:
+        assert not len(recording.table("readings"))
+
+
+@pytest.mark.parametrize(
+    "block",
+    [
+        b"\0" * 16,
+        np.array([2**32 - 1] * 4, "<u4").tobytes(),
+        np.array([1, 1, 10**6, 0], "<u4").tobytes() + bytes(10**6),
+        np.array([1, 1, motion.KEPT_BYTES, 0], "<u4").tobytes() + b"\xff" * (8 + motion.KEPT_BYTES),
+    ],
+)
+def test_motion_that_is_none_is_refused(block: bytes, file: Path) -> None:
+    parts = sound_parts()
+    replace(parts, blocks=[(entries, block) for entries, _ in parts.blocks]).save(file)
+    assert "blocks of motion" in refused(file)
+
+
+def test_records_may_lack_fields(file: Path) -> None:
+    parts = sound_parts()
+    layout = json.loads(parts.attachments["layout.json"])
+    layout["robot"]["fields"] = [field for field in layout["robot"]["fields"] if field["name"] not in ("trail", "led")]
+    attachments = {**parts.attachments, "layout.json": json.dumps(layout).encode()}
+    replace(parts, attachments=attachments).save(file)
+    with kiks.Recording(file) as recording:
+        assert len(recording.table("poses"))
+
+
+@pytest.mark.parametrize("kind", ["<i3", "|99", "<f99999999999", "|u2", "O", "<i16"])
+def test_layouts_are_of_numbers(kind: str, file: Path) -> None:
+    parts = sound_parts()
+    layout = json.loads(parts.attachments["layout.json"])
+    layout["robot"]["fields"][0]["type"] = kind
+    attachments = {**parts.attachments, "layout.json": json.dumps(layout).encode()}
+    replace(parts, attachments=attachments).save(file)
+    refused(file)
+
+
+# ---- memory ----
+
+
+def _chunk(size: int, declared: int) -> bytes:
+    """Return the record of a chunk of zeros, packed, that says another size."""
+    packed = lz4.frame.compress(bytes(size))
+    words = np.array([0, 0, declared], "<u8").tobytes() + bytes(4)
+    body = words + b"\x03\0\0\0lz4" + len(packed).to_bytes(8, "little") + packed
+    return bytes([Opcode.CHUNK]) + len(body).to_bytes(8, "little") + body
+
+
+@pytest.mark.parametrize(
+    "tail",
+    [
+        pytest.param(lambda: _chunk(1 << 30, 1000), id="bomb"),
+        pytest.param(lambda: _chunk(1 << 30, 1 << 30), id="honest bomb"),
+        pytest.param(lambda: _chunk(1000, 2**63), id="lie"),
+        pytest.param(lambda: bytes([Opcode.CHUNK]) + b"\xff" * 8, id="endless"),
+        pytest.param(lambda: bytes([Opcode.ATTACHMENT]) + (1 << 40).to_bytes(8, "little"), id="terabyte"),
+    ],
+)
+def test_a_file_takes_no_more_memory_than_its_size_allows(tail: Callable[[], bytes], file: Path) -> None:
+    data = sound()
+    file.write_bytes(data[: data.rindex(bytes([Opcode.DATA_END, 4]) + bytes(7))] + tail())
+    size = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * resource.getpagesize()
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (size + (MEMORY_MB << 20), before[1]))
+    try:
+        is_read(file)
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, before)
+
+
+def test_an_arena_of_gigabytes_is_refused(file: Path) -> None:
+    parts = sound_parts()
+    setup = json.loads(parts.attachments["setup/0.json"])
+    setup["arena"] = "kiks = 1\n[walls]\nsize_mm = [1000000, 1000000]\n"
+    replace(parts, attachments={**parts.attachments, "setup/0.json": json.dumps(setup).encode()}).save(file)
+    refused(file)
+
+
+@pytest.mark.parametrize(("name", "value"), [("robots", [0] * 10**6), ("robots", [5]), ("turrets", [["k999"], []])])
+def test_setups_are_of_what_there_is(name: str, value: object, file: Path) -> None:
+    parts = sound_parts()
+    setup = json.loads(parts.attachments["setup/0.json"]) | {name: value}
+    replace(parts, attachments={**parts.attachments, "setup/0.json": json.dumps(setup).encode()}).save(file)
+    refused(file)
+
+
+def test_a_table_of_texts_is_no_larger_than_memory(file: Path) -> None:
+    parts = sound_parts()
+    long, short = (Entry(Kind.TEXT, 0, 0, 0, 0, b"x" * length) for length in (10**6, 1))
+    (first, seen), *others = parts.blocks
+    replace(parts, blocks=[([*first, long, *[short] * 1000], seen), *others]).save(file)
+    with kiks.Recording(file) as recording, pytest.raises(ParameterError, match="fit into a table"):
+        recording.table("events")
