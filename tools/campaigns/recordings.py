@@ -164,7 +164,13 @@ def _field(rng: random.Random, parts: Parts) -> Parts:
     name = rng.choice((*ROBOT.names, *BODY.names))
     try:
         return parts.with_records(name, float(rng.choice(NUMBERS)))
-    except (ValueError, OverflowError, KeyError, TypeError):  # another mutation has left no records there
+    except (
+        ValueError,
+        OverflowError,
+        KeyError,
+        TypeError,
+        RecursionError,
+    ):  # another mutation has left no records there
         return parts
 
 
