@@ -90,12 +90,12 @@ def test_a_killed_run_lacks_at_most_a_second(file: Path) -> None:
                 pass
             run.kill()
             lines += [int(line) for line in out if line.endswith(b"\n")]
-        with kiks.Recording(file) as recording:
-            assert not recording.is_whole
-            assert recording.end_ns >= lines[-1] - CHECK_NS
-            checked = check_recording(recording)
-            assert checked.differs_ns is None
-            assert checked.equal_count == recording.end_ns // CHECK_NS
+        recording = kiks.Recording(file)
+        assert not recording.is_whole
+        assert recording.log.end_ns >= lines[-1] - CHECK_NS
+        checked = check_recording(recording.log)
+        assert checked.differs_ns is None
+        assert checked.equal_count == recording.log.end_ns // CHECK_NS
 
 
 # ---- cut off, and flipped ----
@@ -115,16 +115,16 @@ def test_flipped_bytes_are_noticed_or_lie_elsewhere(file: Path) -> None:
     """Whatever was flipped: what is said of the run is true."""
     data, rng = sound(), random.Random(3)
     file.write_bytes(data)
-    with kiks.Recording(file) as recording:
-        whole = recording.table("wheels")
+    recording = kiks.Recording(file)
+    whole = recording.table("wheels")
     for _ in range(CUTS):
         flipped = bytearray(data)
         flipped[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
         file.write_bytes(flipped)
         if is_read(file):
-            with kiks.Recording(file) as recording:
-                assert check_recording(recording).differs_ns is None
-                assert np.isin(recording.table("wheels"), whole).all()
+            recording = kiks.Recording(file)
+            assert check_recording(recording.log).differs_ns is None
+            assert np.isin(recording.table("wheels"), whole).all()
 
 
 def test_a_flipped_byte_of_an_attachment_is_noticed(file: Path) -> None:
@@ -150,7 +150,8 @@ def test_no_time_is_far_from_the_last_state(file: Path) -> None:
         lambda entry: entry.kind == Kind.STATE, lambda entry: entry._replace(time_ns=10**18)
     )
     parts.save(file)
-    with kiks.Recording(file) as recording, pytest.raises(ParameterError, match=r"a part is missing after 2\.300 s"):
+    recording = kiks.Recording(file)
+    with pytest.raises(ParameterError, match=r"a part is missing after 2\.300 s"):
         recording.replay()
 
 
@@ -190,8 +191,8 @@ def test_no_state_holds_what_kernels_cannot_take(name: str, value: float, file: 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -1e300])
 def test_memory_of_turrets_holds_any_number(value: float, file: Path) -> None:
     sound_parts().with_records("turret_memory", value).save(file)
-    with kiks.Recording(file) as recording:
-        recording.world_at(0.0).run(0.5)
+    recording = kiks.Recording(file)
+    recording.world_at(0.0).run(0.5)
 
 
 def test_what_a_gripper_lifts_over_a_thin_wall_can_be_recorded(file: Path) -> None:
@@ -263,8 +264,8 @@ def test_replies_that_are_no_readings_are_none(reply: bytes, file: Path) -> None
     sound_parts().with_entry(
         lambda entry: entry.data.startswith((b"n,", b"o,")), lambda entry: entry._replace(data=reply)
     ).save(file)
-    with kiks.Recording(file) as recording:
-        assert not len(recording.table("readings"))
+    recording = kiks.Recording(file)
+    assert not len(recording.table("readings"))
 
 
 @pytest.mark.parametrize(
@@ -288,8 +289,8 @@ def test_records_may_lack_fields(file: Path) -> None:
     layout["robot"]["fields"] = [field for field in layout["robot"]["fields"] if field["name"] not in ("trail", "led")]
     attachments = {**parts.attachments, "layout.json": json.dumps(layout).encode()}
     replace(parts, attachments=attachments).save(file)
-    with kiks.Recording(file) as recording:
-        assert len(recording.table("poses"))
+    recording = kiks.Recording(file)
+    assert len(recording.table("poses"))
 
 
 @pytest.mark.parametrize("kind", ["<i3", "|99", "<f99999999999", "|u2", "O", "<i16"])
@@ -356,5 +357,6 @@ def test_a_table_of_texts_is_no_larger_than_memory(file: Path) -> None:
     long, short = (Entry(Kind.TEXT, 0, 0, 0, 0, b"x" * length) for length in (10**6, 1))
     (first, seen), *others = parts.blocks
     replace(parts, blocks=[([*first, long, *[short] * 1000], seen), *others]).save(file)
-    with kiks.Recording(file) as recording, pytest.raises(ParameterError, match="fit into a table"):
+    recording = kiks.Recording(file)
+    with pytest.raises(ParameterError, match="fit into a table"):
         recording.table("events")

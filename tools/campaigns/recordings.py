@@ -47,7 +47,6 @@ class Parts:
         for chunk in reader.chunks:
             data = {topic: data for topic, _, data in reader.messages(chunk)}
             parts.blocks.append((list(Columns.of_block(data[LOG.name], "log").entries()), data[MOTION.name]))
-        reader.close()
         return parts
 
     def save(self, path: Path) -> None:
@@ -218,19 +217,19 @@ def use(path: Path) -> None:
         except kiks.KiksError as error:
             errors.append(error)
 
-    with kiks.Recording(path) as recording:
-        for name in TABLES:
-            attempt(lambda name=name: recording.table(name))  # type: ignore[misc]
-        attempt(lambda: check_recording(recording))
-        attempt(lambda: _go_on(recording))
-        attempt(lambda: repr(recording) and recording.programs and recording.project.to_bytes())
+    recording = kiks.Recording(path)
+    for name in TABLES:
+        attempt(lambda name=name: recording.table(name))  # type: ignore[misc]
+    attempt(lambda: check_recording(recording.log))
+    attempt(lambda: _go_on(recording))
+    attempt(lambda: repr(recording) and recording.programs and recording.project.to_bytes())
     if errors:
         raise errors[0]
 
 
 def _go_on(recording: kiks.Recording) -> None:
     """Look at the world in the middle, and let it go on."""
-    sim = recording.world_at((recording.begin_ns + recording.end_ns) / 2e9)
+    sim = recording.world_at((recording.log.begin_ns + recording.log.end_ns) / 2e9)
     sim.run(0.5)
     sim.look()
     sim.state_hash()
