@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Iterable
+from typing import Any
 
 
 class KiksError(Exception):
@@ -82,3 +84,22 @@ def counted(count: int, noun: str) -> str:
         ('1 robot', '3 robots')
     """
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def library(name: str, extra: str = "learn") -> Any:
+    """Return a module of a library that not every user has installed.
+
+    Args:
+        name: Its name.
+        extra: The extra of KiKS that installs it.
+
+    Raises:
+        ParameterError: If it is not installed.
+    """
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        package = name.partition(".")[0]
+        raise ParameterError(
+            f"This needs {package}, but it cannot be imported ({error}). {installing(extra)}."
+        ) from None

@@ -6,14 +6,13 @@ seed and values give the same candidates. So an evolution resumes by telling all
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.errors import ParameterError, installing, nearest, shown
+from kiks.errors import ParameterError, library, nearest, shown
 from kiks.learn.algorithm_name import AlgorithmName
 from kiks.learn.task import SPREAD, Axis
 
@@ -286,18 +285,3 @@ def make_algorithm(
             f"{shown(name)}.{nearest(str(name), map(str, ALGORITHMS))}"
         )
     return ALGORITHMS[name](parameter_count, population, seed, axes, spread)
-
-
-def library(name: str) -> Any:
-    """Return a module of the libraries for learning.
-
-    Raises:
-        ParameterError: If it is not installed.
-    """
-    try:
-        return importlib.import_module(name)
-    except ImportError as error:
-        package = name.partition(".")[0]
-        raise ParameterError(
-            f"This needs {package}, but it cannot be imported ({error}). {installing('learn')}."
-        ) from None

@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from kiks.errors import ParameterError, shown
-from kiks.learn.algorithms import library
+from kiks.errors import ParameterError, library, shown
 from kiks.learn.champion import Champion
 from kiks.learn.task import Axis
 from kiks.model.array_checks import Numbers, check_array

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from kiks.learn.algorithms import library
+from kiks.errors import library
 from kiks.learn.coevolution import Coevolution, Tournament
 from kiks.model.atomic_files import replace_file
 

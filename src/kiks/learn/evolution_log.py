@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from kiks.errors import ParameterError, shown
-from kiks.learn.algorithms import library
+from kiks.errors import ParameterError, library, shown
 from kiks.model.array_checks import Numbers, read_arrays
 from kiks.model.atomic_files import make_folder, path_of, replace_file
 from kiks.model.data_file import Text, Whole, check, parse_json, read_file, record

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from kiks.learn.algorithms import library
+from kiks.errors import library
 from kiks.learn.archive import Archive
 from kiks.learn.baselines import Baselines
 from kiks.learn.champion import Champion

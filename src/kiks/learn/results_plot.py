@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from kiks.learn.algorithms import library
+from kiks.errors import library
 from kiks.learn.baselines import Baselines
 from kiks.learn.evolution_plot import draw_baselines
 from kiks.learn.exam import PASS_SHARE

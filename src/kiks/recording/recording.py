@@ -79,6 +79,17 @@ class Recording:
         """The world at the beginning, with its robots and its seed."""
         return self.project_at(s_from_ns(self.log.begin_ns))
 
+    @cached_property
+    def setup(self) -> Setup:
+        """The arena, the kinds of its robots and their turrets at the beginning."""
+        return self.log.setup(0)
+
+    @property
+    def title(self) -> str:
+        """A line that says what ran."""
+        what = ", ".join(self.programs) or self.about.get("arena", "")
+        return f"{what}, seed {self.setup.seed}, {self.duration_s:.1f} s"
+
     def project_at(self, time_s: float) -> Project:
         """Return the world at a time as a project, with robots, bodies and lamps where they are then."""
         sim = self.world_at(time_s)

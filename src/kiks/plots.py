@@ -1,0 +1,177 @@
+"""Figures of recordings: paths, readings, speeds, places and time. They need Matplotlib.
+
+A recording has a column, so that several stand side by side.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kiks.errors import ParameterError, library
+from kiks.model.arena import Arena
+from kiks.model.atomic_files import replace_file
+from kiks.recording.analysis import odometry, time_shares
+from kiks.recording.recording import Recording
+from kiks.units import s_from_ns
+
+TYPES = (".png", ".svg", ".pdf")
+
+COLUMN_INCHES, DOTS_PER_INCH = 5.6, 160
+
+HEAT_MM = 20.0
+"""Side of a cell of the heat map [mm]."""
+
+POINTS_MAX = 4000
+"""Most points of a line over time."""
+
+ROWS = (1.25, 1.0, 0.8, 0.8, 0.28)
+"""Relative heights of the rows."""
+
+
+def save_plot(recordings: Sequence[Recording], path: str | Path, *, robot: int = 1) -> None:
+    """Draw recordings side by side: paths, where robots were, readings, speeds, and where the time went.
+
+    Args:
+        recordings: The recordings.
+        path: The picture's file, .png, .svg or .pdf.
+        robot: Number of the robot whose readings, speeds and time are drawn.
+
+    Raises:
+        ParameterError: If Matplotlib is not installed, the file cannot be written, or there is no such robot.
+    """
+    kind = Path(path).suffix.lower()
+    if kind not in TYPES:
+        raise ParameterError(f"a plot must go to a file that ends in {', '.join(TYPES)}, but it was {str(path)!r}.")
+    buffer = io.BytesIO()
+    # Without dates, the same recording gives the same file.
+    dated = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(kind)
+    figure_of(recordings, robot=robot).savefig(buffer, format=kind[1:], dpi=DOTS_PER_INCH, metadata=dated)
+    replace_file(path, buffer.getvalue(), "a plot")
+
+
+def figure_of(recordings: Sequence[Recording], *, robot: int = 1) -> Any:
+    """Return the figure of `save_plot`, a `matplotlib.figure.Figure`.
+
+    Raises:
+        ParameterError: If Matplotlib is not installed, or a recording has no such robot.
+    """
+    for recording in recordings:
+        if robot not in recording.robots:
+            raise ParameterError(f"robot must be from 1 to {len(recording.robots)}, but it was {robot}.")
+    figure = library("matplotlib.figure", "plot").Figure(
+        figsize=(COLUMN_INCHES * len(recordings), 2.6 * sum(ROWS)), layout="constrained"
+    )
+    axes = figure.subplots(len(ROWS), len(recordings), squeeze=False, height_ratios=ROWS)
+    for column, recording in zip(axes.T, recordings, strict=True):
+        column[0].set_title(recording.title, fontsize="medium")
+        _draw_paths(column[0], recording)
+        _draw_heat(column[1], recording)
+        _draw_readings(column[2], recording, robot)
+        _draw_speeds(column[3], recording, robot)
+        _draw_time(column[4], recording, robot)
+    return figure
+
+
+def _draw_arena(axes: Any, arena: Arena) -> None:
+    extent = (0.0, arena.width_mm, 0.0, arena.height_mm)
+    axes.imshow(np.where(arena.brightness > 0, 0.35, 1.0), cmap="gray", vmin=0, vmax=1, origin="lower", extent=extent)
+    axes.set_aspect("equal")
+    axes.set_xlabel("x [mm]")
+    axes.set_ylabel("y [mm]")
+
+
+def _draw_paths(axes: Any, recording: Recording) -> None:
+    """Draw where robots drove, where their wheels say that they drove, and where they began to touch something."""
+    setup = recording.setup
+    _draw_arena(axes, setup.arena)
+    poses, wheels = recording.table("poses"), recording.table("wheels")
+    for number in recording.robots:
+        path, counts = poses[poses["robot"] == number], wheels[wheels["robot"] == number]
+        colour = f"C{(number - 1) % 10}"
+        axes.plot(path["x_mm"], path["y_mm"], color=colour, linewidth=1.2, label=f"robot {number}")
+        axes.plot(path["x_mm"][:1], path["y_mm"][:1], "o", color=colour, markersize=4)
+        if len(recording.robots) == 1:
+            body = setup.specs[0].body
+            pulses = np.column_stack([counts["left_pulses"], counts["right_pulses"]])
+            start = np.array([path[name][0] for name in ("x_mm", "y_mm", "heading_rad")])
+            guess = odometry(pulses, start, body.pulse_mm, body.wheel_base_mm)
+            axes.plot(guess[:, 0], guess[:, 1], color="C1", linewidth=0.9, linestyle="--", label="odometry")
+        rises = np.flatnonzero(np.diff(counts["contacts"]) > 0) + 1
+        touched = np.searchsorted(path["time_s"], counts["time_s"][rises]).clip(max=len(path) - 1)
+        axes.plot(
+            path["x_mm"][touched],
+            path["y_mm"][touched],
+            "x",
+            color="tab:red",
+            markersize=5,
+            label="contacts" if number == recording.robots[-1] and len(touched) else None,
+        )
+    axes.set_xlim(0, setup.arena.width_mm)
+    axes.set_ylim(0, setup.arena.height_mm)
+    if len(recording.robots) <= 6:
+        axes.legend(fontsize="x-small", loc="upper right")
+
+
+def _draw_heat(axes: Any, recording: Recording) -> None:
+    """Draw for how long robots were in which part of the arena."""
+    arena, poses = recording.setup.arena, recording.table("poses")
+    cells = [np.arange(0.0, size_mm + HEAT_MM, HEAT_MM) for size_mm in (arena.width_mm, arena.height_mm)]
+    seconds, x_edges, y_edges = np.histogram2d(poses["x_mm"], poses["y_mm"], bins=cells)
+    _draw_arena(axes, arena)
+    shown = np.ma.masked_equal(seconds.T * 0.01, 0.0)
+    mesh = axes.pcolormesh(x_edges, y_edges, shown, cmap="viridis", alpha=0.9)
+    axes.figure.colorbar(mesh, ax=axes, label="seconds")
+    axes.set_xlim(0, arena.width_mm)
+    axes.set_ylim(0, arena.height_mm)
+
+
+def _draw_readings(axes: Any, recording: Recording, robot: int) -> None:
+    """Draw what the program read of the proximity sensors."""
+    table = recording.table("readings", robot)
+    table = _thinned(table[table["command"] == "N"])
+    for sensor in range(8):
+        axes.plot(table["time_s"], table["counts"][:, sensor], linewidth=0.7, label=str(sensor))
+    axes.set_ylabel("proximity")
+    axes.set_xlabel("time [s]")
+    axes.grid(alpha=0.3)
+    if len(table):
+        axes.legend(fontsize="xx-small", ncols=8, loc="upper right", title="sensor", title_fontsize="xx-small")
+    else:
+        axes.text(0.5, 0.5, "no command N", transform=axes.transAxes, ha="center", va="center", color="gray")
+
+
+def _draw_speeds(axes: Any, recording: Recording, robot: int) -> None:
+    """Draw the speeds of the wheels, as asked for and as measured."""
+    table = _thinned(recording.table("wheels", robot))
+    for side, colour in (("left", "C0"), ("right", "C3")):
+        axes.plot(table["time_s"], table[f"{side}_speed"], color=colour, linewidth=0.7, label=side)
+        axes.plot(table["time_s"], table[f"{side}_setpoint"], color=colour, linewidth=0.7, linestyle=":")
+    axes.set_ylabel("pulses/10 ms")
+    axes.set_xlabel("time [s]")
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize="x-small", ncols=2, loc="upper right", title="dotted: asked for", title_fontsize="xx-small")
+
+
+def _draw_time(axes: Any, recording: Recording, robot: int) -> None:
+    """Draw where the time went: a bar of the shares of line, robot, thinking and waiting."""
+    shares = time_shares(recording.log, robot)
+    begin_s = 0.0
+    names = ("on the line", "robot", "thinking", "waiting")
+    for name, share_ns, colour in zip(names, shares, ("C0", "C2", "C1", "lightgray"), strict=True):
+        share_s = s_from_ns(share_ns)
+        percent = 100 * share_ns / max(shares.window_ns, 1)
+        axes.barh([0], [share_s], left=begin_s, color=colour, label=f"{name} {percent:.1f} %")
+        begin_s += share_s
+    axes.set_yticks([])
+    axes.set_xlabel(f"where the time of robot {robot} went [s]")
+    axes.legend(fontsize="x-small", ncols=4, loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
+
+
+def _thinned(table: Any) -> Any:
+    """Return a table with no more rows than a line can show."""
+    return table[:: max(-(-len(table) // POINTS_MAX), 1)]

@@ -1,0 +1,63 @@
+"""What follows from a recording: where its odometry would put a robot, and where the milliseconds went."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.recording.entries import Kind
+from kiks.recording.log import RecordedLog
+from kiks.sim.wire_log import Span, TimeShares, share_time
+
+
+def odometry(
+    pulses: NDArray[np.int64], start: NDArray[np.float64], pulse_mm: float, wheel_base_mm: float
+) -> NDArray[np.float64]:
+    """Return where a robot would be by its wheels alone.
+
+    Between two counts the wheels roll without slipping, and the robot drives the chord of an arc.
+
+    Args:
+        pulses: Counts of the left and the right wheel [pulses], int64 [count, 2].
+        start: x_mm, y_mm, heading_rad at the first of them.
+        pulse_mm: Way of a wheel for a pulse [mm].
+        wheel_base_mm: Distance of the wheels [mm].
+
+    Returns:
+        x_mm, y_mm, heading_rad at each count, float64 [count, 3].
+
+    Example:
+        >>> odometry(np.array([[0, 0], [1250, 1250]]), np.zeros(3), 0.08, 53.0)[-1].tolist()
+        [100.0, 0.0, 0.0]
+    """
+    left_mm, right_mm = np.diff(pulses, axis=0).T * pulse_mm
+    turns = (right_mm - left_mm) / wheel_base_mm
+    ways_mm = (left_mm + right_mm) / 2 * np.sinc(turns / (2 * np.pi))
+    headings = start[2] + np.concatenate([[0.0], turns.cumsum()])
+    middles = headings[:-1] + turns / 2
+    x_mm = start[0] + np.concatenate([[0.0], (ways_mm * np.cos(middles)).cumsum()])
+    y_mm = start[1] + np.concatenate([[0.0], (ways_mm * np.sin(middles)).cumsum()])
+    return np.column_stack([x_mm, y_mm, headings])
+
+
+def time_shares(log: RecordedLog, robot: int) -> TimeShares:
+    """Return where the time of a recording went on the line of a robot, by its number."""
+    link: list[Span] = []
+    robot_spans: list[Span] = []
+    thinking: list[Span] = []
+    sent: list[tuple[int, int]] = []
+    for entry in log.entries():
+        if entry.robot != robot - 1:
+            continue
+        if entry.kind in (Kind.SEND, Kind.TYPE):
+            sent.append((entry.other, len(entry.data)))
+        elif entry.kind == Kind.THINK:
+            thinking.append((entry.number, entry.other))
+        elif entry.kind == Kind.ACT:
+            # The reply tells how long a character takes.
+            begin_ns = max((begin + count * entry.other for begin, count in sent), default=entry.time_ns)
+            link += [(begin, begin + count * entry.other) for begin, count in sent]
+            link.append((entry.number, entry.number + len(entry.data) * entry.other))
+            robot_spans.append((begin_ns, entry.time_ns))
+            sent.clear()
+    return share_time((log.begin_ns, log.end_ns), link=link, robot=robot_spans, thinking=thinking)
