@@ -32,6 +32,7 @@ LAYERS = [
     "calibration",
     "batch",
     "drawing",
+    "plots",
     "learn",
     "demos",
     "fit",

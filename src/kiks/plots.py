@@ -47,10 +47,11 @@ def save_plot(recordings: Sequence[Recording], path: str | Path, *, robot: int =
     kind = Path(path).suffix.lower()
     if kind not in TYPES:
         raise ParameterError(f"a plot must go to a file that ends in {', '.join(TYPES)}, but it was {str(path)!r}.")
-    buffer = io.BytesIO()
-    # Without dates, the same recording gives the same file.
+    figure, buffer = figure_of(recordings, robot=robot), io.BytesIO()
+    # Without dates and random names, the same recording gives the same file.
     dated = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(kind)
-    figure_of(recordings, robot=robot).savefig(buffer, format=kind[1:], dpi=DOTS_PER_INCH, metadata=dated)
+    with library("matplotlib", "plot").rc_context({"svg.hashsalt": "kiks"}):
+        figure.savefig(buffer, format=kind[1:], dpi=DOTS_PER_INCH, metadata=dated)
     replace_file(path, buffer.getvalue(), "a plot")
 
 
@@ -66,6 +67,7 @@ def figure_of(recordings: Sequence[Recording], *, robot: int = 1) -> Any:
     figure = library("matplotlib.figure", "plot").Figure(
         figsize=(COLUMN_INCHES * len(recordings), 2.6 * sum(ROWS)), layout="constrained"
     )
+    figure.get_layout_engine().set(h_pad=0.12)  # room for the legends between the rows
     axes = figure.subplots(len(ROWS), len(recordings), squeeze=False, height_ratios=ROWS)
     for column, recording in zip(axes.T, recordings, strict=True):
         column[0].set_title(recording.title, fontsize="medium")
@@ -114,7 +116,8 @@ def _draw_paths(axes: Any, recording: Recording) -> None:
     axes.set_xlim(0, setup.arena.width_mm)
     axes.set_ylim(0, setup.arena.height_mm)
     if len(recording.robots) <= 6:
-        axes.legend(fontsize="x-small", loc="upper right")
+        legend = axes.legend(fontsize="x-small", loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+        legend.set_in_layout(False)
 
 
 def _draw_heat(axes: Any, recording: Recording) -> None:
@@ -136,11 +139,11 @@ def _draw_readings(axes: Any, recording: Recording, robot: int) -> None:
     table = _thinned(table[table["command"] == "N"])
     for sensor in range(8):
         axes.plot(table["time_s"], table["counts"][:, sensor], linewidth=0.7, label=str(sensor))
-    axes.set_ylabel("proximity")
+    axes.set_ylabel("proximity, sensors 0 to 7")
     axes.set_xlabel("time [s]")
     axes.grid(alpha=0.3)
     if len(table):
-        axes.legend(fontsize="xx-small", ncols=8, loc="upper right", title="sensor", title_fontsize="xx-small")
+        _legend_above(axes, 8)
     else:
         axes.text(0.5, 0.5, "no command N", transform=axes.transAxes, ha="center", va="center", color="gray")
 
@@ -150,11 +153,12 @@ def _draw_speeds(axes: Any, recording: Recording, robot: int) -> None:
     table = _thinned(recording.table("wheels", robot))
     for side, colour in (("left", "C0"), ("right", "C3")):
         axes.plot(table["time_s"], table[f"{side}_speed"], color=colour, linewidth=0.7, label=side)
-        axes.plot(table["time_s"], table[f"{side}_setpoint"], color=colour, linewidth=0.7, linestyle=":")
+        asked = f"{side}, asked for"
+        axes.plot(table["time_s"], table[f"{side}_setpoint"], color=colour, linewidth=0.7, linestyle=":", label=asked)
     axes.set_ylabel("pulses/10 ms")
     axes.set_xlabel("time [s]")
     axes.grid(alpha=0.3)
-    axes.legend(fontsize="x-small", ncols=2, loc="upper right", title="dotted: asked for", title_fontsize="xx-small")
+    _legend_above(axes, 4)
 
 
 def _draw_time(axes: Any, recording: Recording, robot: int) -> None:
@@ -169,7 +173,14 @@ def _draw_time(axes: Any, recording: Recording, robot: int) -> None:
         begin_s += share_s
     axes.set_yticks([])
     axes.set_xlabel(f"where the time of robot {robot} went [s]")
-    axes.legend(fontsize="x-small", ncols=4, loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
+    _legend_above(axes, 4)
+
+
+def _legend_above(axes: Any, columns: int) -> None:
+    """Put a legend over the axes, where it hides no line and takes no width from them."""
+    place = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.97), "frameon": False}
+    legend = axes.legend(fontsize="xx-small", ncols=columns, columnspacing=1.0, handlelength=1.4, **place)
+    legend.set_in_layout(False)
 
 
 def _thinned(table: Any) -> Any:

@@ -37,7 +37,7 @@ def state_of(text: str) -> str:
 
 
 @pytest.mark.parametrize(
-    "command", ["desk", "demo", "run", "replay", "table", "serve", "monitor", "calibrate", "fit", "warmup"]
+    "command", ["desk", "demo", "run", "replay", "plot", "table", "serve", "monitor", "calibrate", "fit", "warmup"]
 )
 def test_every_command_has_help_with_an_example(command: str) -> None:
     result = kiks(command, "--help")
@@ -189,6 +189,7 @@ NO_RESULTS = {
     ("compare", "second"),
     ("info", "file"),
     ("replay", "file"),
+    ("plot", "files"),
     ("table", "file"),
     ("serve", "link"),
     ("session", "listen"),
@@ -203,6 +204,7 @@ RESULTS = {
     ("run", "record"): ("run", "--record", "PLACE", WANDER),
     ("serve", "record"): ("serve", "--record", "PLACE"),
     ("desk", "record"): ("desk", "--record", "PLACE"),
+    ("plot", "out"): ("plot", "run.mcap", "--out", "PLACE"),
     ("table", "out"): ("table", "run.mcap", "PLACE"),
     ("run", "csv"): ("run", "--csv", "PLACE", WANDER),
     ("fit", "robot"): ("fit", "wall.sam", "--robot", "PLACE"),

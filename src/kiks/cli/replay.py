@@ -1,4 +1,4 @@
-"""`kiks replay` and `kiks table`."""
+"""`kiks replay`, `kiks plot` and `kiks table`: what is done with recordings."""
 
 from __future__ import annotations
 
@@ -71,6 +71,26 @@ def _check(recording: Recording) -> int:
     if version != __version__:
         typer.echo(f"KiKS {version} has recorded it, and this is KiKS {__version__}.")
     return 1
+
+
+def plot(
+    files: Annotated[list[Path], typer.Argument(help="Recordings (.mcap), side by side.", metavar="FILE...")],
+    out: Annotated[
+        Path | None,
+        typer.Option(help="The picture: .png, .svg or .pdf; kiks-plot.png if left out.", callback=written_file),
+    ] = None,
+    robot: Annotated[int, typer.Option(help="The robot whose readings, speeds and time are drawn.", min=1)] = 1,
+) -> None:
+    """Draw recordings: paths and odometry, where robots were, readings, speeds, and where the milliseconds went.
+
+    Example: kiks plot avoid.mcap maze.mcap --out both.pdf
+    """
+    from kiks.plots import save_plot
+    from kiks.recording.recording import Recording
+
+    path = out or Path("kiks-plot.png")
+    save_plot([Recording(file) for file in files], path, robot=robot)
+    typer.echo(f"Picture: {path}")
 
 
 def table(

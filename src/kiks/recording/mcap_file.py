@@ -158,6 +158,7 @@ class McapReader:
         path: The file.
 
     Attributes:
+        path: The file.
         what: What messages call it.
         chunks: Its whole chunks, in their order in the file.
         attachments: Names and contents of its attachments.
@@ -170,8 +171,8 @@ class McapReader:
 
     def __init__(self, path: str | Path) -> None:
         self.what = f"Recording {str(path)!r}"
-        self._path = path_of(path, "a recording")
-        if not self._path.is_file():
+        self.path = path_of(path, "a recording")
+        if not self.path.is_file():
             raise ParameterError(f"{self.what} must exist, but there is no such file. Check its name and its folder.")
         self.chunks: list[FoundChunk] = []
         self.attachments: dict[str, bytes] = {}
@@ -186,7 +187,7 @@ class McapReader:
 
     def _open(self) -> BinaryIO:
         try:
-            return self._path.open("rb")
+            return self.path.open("rb")
         except OSError as error:
             raise ParameterError(f"{self.what} must be readable, but: {error}. Check its rights.") from None
 

@@ -1,0 +1,84 @@
+"""Figures of recordings show what was recorded."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import kiks
+from kiks import Arena, Khepera, ParameterError, Recording
+from kiks.plots import figure_of, save_plot
+from kiks.recording.analysis import odometry, time_shares
+from kiks.sim.simulation import Simulation
+
+pytest.importorskip("matplotlib")
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    file = tmp_path_factory.mktemp("recording") / "run.mcap"
+    sim = Simulation(Arena.box(300, 260), seed=3, thinking="fixed:4")
+    robot = Khepera(sim.port(1))
+    with sim.record(file):
+        while sim.time_s < 8.0:
+            values = robot.proximity()
+            robot.set_speed(9 - values[3] // 40, 9 - values[2] // 60)
+    return Recording(file)
+
+
+def test_odometry_follows_a_robot_that_touches_nothing() -> None:
+    sim = Simulation(Arena.box(900, 900), seed=1)
+    robot, body = Khepera(sim.port(1)), sim.spec.body
+    sim.place(1, 450, 450, 0.3)
+    pulses, poses = [robot.encoders()], [sim.pose(1)]
+    for left, right in ((6, 9), (9, 4), (-5, 5), (3, 12)):
+        robot.set_speed(left, right)
+        for _ in range(20):
+            sim.run(0.1)
+            poses.append(sim.pose(1))
+            pulses.append(tuple(sim.world.state.robots["pulse_count"][0, 0].tolist()))
+    guess = odometry(np.array(pulses), np.array(poses[0]), body.pulse_mm, body.wheel_base_mm)
+    # Counts are latched every 10 ms, and whole.
+    np.testing.assert_allclose(guess[:, :2], np.array(poses)[:, :2], atol=4.0)
+    assert abs(guess[-1, 2] - poses[-1][2]) < 0.05
+
+
+def test_the_shares_of_time_are_those_of_the_line(recording: Recording) -> None:
+    shares = time_shares(recording.log, 1)
+    assert shares.window_ns == recording.log.end_ns - recording.log.begin_ns
+    characters = sum(len(data) for data in recording.table("wire")["data"].tolist())
+    assert shares.link_ns == pytest.approx(characters * 11e9 / 9600, rel=0.01)
+    # A program thinks after each reply that it has read.
+    exchanges = len(recording.table("wire")) / 2
+    assert shares.thinking_ns == pytest.approx(exchanges * 4e6, rel=0.03)
+
+
+def test_a_figure_has_a_column_for_each_recording(recording: Recording) -> None:
+    figure = figure_of([recording, recording])
+    titles = [axes.get_title() for axes in figure.axes if axes.get_title()]
+    assert titles == [recording.title] * 2
+    path = figure.axes[0].lines[0]
+    poses = recording.table("poses")
+    np.testing.assert_array_equal(path.get_xdata(), poses["x_mm"])
+    readings = figure.axes[4].lines
+    assert len(readings) == 8
+    np.testing.assert_array_equal(readings[2].get_ydata(), recording.table("readings")["counts"][:, 2])
+
+
+@pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
+def test_the_same_recording_gives_the_same_picture(ending: str, recording: Recording, tmp_path: Path) -> None:
+    files = [tmp_path / f"{name}.{ending}" for name in ("one", "two")]
+    for file in files:
+        save_plot([recording], file)
+    assert files[0].read_bytes() == files[1].read_bytes()
+    assert files[0].stat().st_size > 10_000
+
+
+def test_mistakes_get_a_clear_error(recording: Recording, tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="robot must be from 1 to 1"):
+        save_plot([recording], tmp_path / "plot.png", robot=2)
+    with pytest.raises(ParameterError, match=r"ends in .png, .svg, .pdf"):
+        save_plot([recording], tmp_path / "plot.gif")
+    assert kiks.Recording(recording.log.reader.path).title == recording.title
