@@ -77,7 +77,7 @@ def test_two_sides_evolve_and_are_shown(tmp_path: Path, monkeypatch: pytest.Monk
     folder = tmp_path / "out"
     words = ("evolve", "pursuit", "--seed", 1, "--population", 4, "--out", folder, "--generations")
     said = kiks(*words, 2).output
-    assert re.search(r"\nGeneration 1: predator 0\.\d\d   prey 0\.\d\d   (the \w+ won|a tie)\n", said)
+    assert re.search(r"\nGeneration 1: predator [01]\.\d\d   prey [01]\.\d\d   (the \w+ won|a tie)\n", said)
     assert re.search(r"\nBest against all generations: predator of generation [12] \(.*\), prey of generation", said)
     names = {path.name for path in folder.iterdir()}
     pictures = {"fitness.png", "tournament.png", "tournament.parquet"}
