@@ -33,10 +33,10 @@ def end_as_with_ctrl_c() -> None:
 
 
 @contextmanager
-def noting_endings(note: Callable[[], None]) -> Iterator[None]:
-    """Call something at Ctrl-C, SIGTERM and SIGHUP meanwhile, and go on; only in the main thread."""
+def noting_endings(note: Callable[[int], object]) -> Iterator[None]:
+    """Call something with the signal at Ctrl-C, SIGTERM and SIGHUP meanwhile, and go on; only in the main thread."""
     before = {name: signal.getsignal(name) for name in _endings()}
-    _handle(lambda _number, _frame: note())
+    _handle(lambda number, _frame: note(number))
     try:
         yield
     finally:
@@ -48,15 +48,11 @@ def noting_endings(note: Callable[[], None]) -> Iterator[None]:
 @contextmanager
 def postponing_endings() -> Iterator[None]:
     """Let Ctrl-C, SIGTERM and SIGHUP act after this instead of in its middle; in other threads they never do."""
-    before = {name: signal.getsignal(name) for name in _endings()}
     noted: list[int] = []
-    _handle(lambda number, _frame: noted.append(number))
     try:
-        yield
+        with noting_endings(noted.append):
+            yield
     finally:
-        with suppress(ValueError):
-            for name, handler in before.items():
-                signal.signal(name, handler)
         for number in noted:
             signal.raise_signal(number)
 

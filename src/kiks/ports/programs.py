@@ -302,7 +302,7 @@ class Programs:
         try:
             self._grace = Patience(GRACE_S)
             # The programs get the signal, too, and may still stop their robots.
-            with noting_endings(self._note_signal):
+            with noting_endings(lambda _number: self._note_signal()):
                 while any(not handle.has_been_reported for handle in self.handles) or self._scheduler.participants:
                     if self._signals and (self._signals > 1 or self._grace.left_s() == 0):
                         return INTERRUPTED
