@@ -17,6 +17,7 @@ from kiks.model.arena import Arena
 from kiks.model.atomic_files import replace_file
 from kiks.recording.analysis import odometry, time_shares
 from kiks.recording.recording import Recording
+from kiks.recording.tables import Table
 from kiks.units import s_from_ns
 
 TYPES = (".png", ".svg", ".pdf")
@@ -71,10 +72,11 @@ def figure_of(recordings: Sequence[Recording], *, robot: int = 1) -> Any:
     axes = figure.subplots(len(ROWS), len(recordings), squeeze=False, height_ratios=ROWS)
     for column, recording in zip(axes.T, recordings, strict=True):
         column[0].set_title(recording.title, fontsize="medium")
-        _draw_paths(column[0], recording)
-        _draw_heat(column[1], recording)
-        _draw_readings(column[2], recording, robot)
-        _draw_speeds(column[3], recording, robot)
+        poses, wheels = recording.table("poses"), recording.table("wheels")
+        _draw_paths(column[0], recording, poses, wheels)
+        _draw_heat(column[1], recording.setup.arena, poses)
+        _draw_readings(column[2], recording.table("readings", robot))
+        _draw_speeds(column[3], wheels[wheels["robot"] == robot])
         _draw_time(column[4], recording, robot)
     return figure
 
@@ -87,11 +89,10 @@ def _draw_arena(axes: Any, arena: Arena) -> None:
     axes.set_ylabel("y [mm]")
 
 
-def _draw_paths(axes: Any, recording: Recording) -> None:
+def _draw_paths(axes: Any, recording: Recording, poses: Table, wheels: Table) -> None:
     """Draw where robots drove, where their wheels say that they drove, and where they began to touch something."""
     setup = recording.setup
     _draw_arena(axes, setup.arena)
-    poses, wheels = recording.table("poses"), recording.table("wheels")
     for number in recording.robots:
         path, counts = poses[poses["robot"] == number], wheels[wheels["robot"] == number]
         colour = f"C{(number - 1) % 10}"
@@ -120,9 +121,8 @@ def _draw_paths(axes: Any, recording: Recording) -> None:
         legend.set_in_layout(False)
 
 
-def _draw_heat(axes: Any, recording: Recording) -> None:
+def _draw_heat(axes: Any, arena: Arena, poses: Table) -> None:
     """Draw for how long robots were in which part of the arena."""
-    arena, poses = recording.setup.arena, recording.table("poses")
     cells = [np.arange(0.0, size_mm + HEAT_MM, HEAT_MM) for size_mm in (arena.width_mm, arena.height_mm)]
     seconds, x_edges, y_edges = np.histogram2d(poses["x_mm"], poses["y_mm"], bins=cells)
     _draw_arena(axes, arena)
@@ -133,9 +133,8 @@ def _draw_heat(axes: Any, recording: Recording) -> None:
     axes.set_ylim(0, arena.height_mm)
 
 
-def _draw_readings(axes: Any, recording: Recording, robot: int) -> None:
+def _draw_readings(axes: Any, table: Table) -> None:
     """Draw what the program read of the proximity sensors."""
-    table = recording.table("readings", robot)
     table = _thinned(table[table["command"] == "N"])
     for sensor in range(8):
         axes.plot(table["time_s"], table["counts"][:, sensor], linewidth=0.7, label=str(sensor))
@@ -148,9 +147,9 @@ def _draw_readings(axes: Any, recording: Recording, robot: int) -> None:
         axes.text(0.5, 0.5, "no command N", transform=axes.transAxes, ha="center", va="center", color="gray")
 
 
-def _draw_speeds(axes: Any, recording: Recording, robot: int) -> None:
+def _draw_speeds(axes: Any, table: Table) -> None:
     """Draw the speeds of the wheels, as asked for and as measured."""
-    table = _thinned(recording.table("wheels", robot))
+    table = _thinned(table)
     for side, colour in (("left", "C0"), ("right", "C3")):
         axes.plot(table["time_s"], table[f"{side}_speed"], color=colour, linewidth=0.7, label=side)
         asked = f"{side}, asked for"
@@ -183,6 +182,6 @@ def _legend_above(axes: Any, columns: int) -> None:
     legend.set_in_layout(False)
 
 
-def _thinned(table: Any) -> Any:
+def _thinned(table: Table) -> Table:
     """Return a table with no more rows than a line can show."""
     return table[:: max(-(-len(table) // POINTS_MAX), 1)]

@@ -72,7 +72,7 @@ def pursuit(**changes: Any) -> Contest:
 
 
 def football_fitness(values: Values) -> Floats:
-    """Return the mean of goals and of the ball's place, from -1 to 1; 0 if nobody touches the ball."""
+    """Return the mean of goals and of the ball's place, from -1 to 1; 0 if no robot touches the ball."""
     scores: Floats = (values["goals"] + values["ball_ahead"]).mean(axis=1) / 2.0
     return scores
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,12 +29,11 @@ class Checked:
     first_tick: int | None = None
 
 
-def check_recording(log: RecordedLog, tell: Callable[[int], None] = lambda time_ns: None) -> Checked:
+def check_recording(log: RecordedLog) -> Checked:
     """Make a recorded run again, and compare the state at each checkpoint.
 
     Args:
         log: The log of the recording.
-        tell: Called after each checkpoint with its time [ns].
 
     Raises:
         KiksError: If the recording is damaged.
@@ -47,7 +46,6 @@ def check_recording(log: RecordedLog, tell: Callable[[int], None] = lambda time_
             differing.append(time_ns)
         elif not differing:
             equal.append(time_ns)
-        tell(time_ns)
 
     replay = Replay(log, log.begin_ns, compare)
     while not differing and replay.advance():

@@ -69,7 +69,7 @@ class RecordedLog:
         return int(columns.time_ns[_is_input(columns)].max(initial=columns.time_ns[0]))
 
     def motion(self) -> Iterator[Motion]:
-        """Yield the records of robots and bodies, every fourth tick."""
+        """Yield the records of robots and bodies, after every third or fourth tick."""
         for chunk in self.reader.chunks:
             for topic, _, data in self.reader.messages(chunk):
                 if topic == MOTION.name:

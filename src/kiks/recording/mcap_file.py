@@ -136,19 +136,17 @@ class McapFile:
 
 @dataclass(frozen=True)
 class FoundChunk:
-    """Where a chunk is, and of what time.
+    """Where a chunk is, and when it begins.
 
     Attributes:
         offset: Of its record in the file.
         length: Of its record.
         begin_ns: Time of its first message [ns].
-        end_ns: Time of its last message [ns].
     """
 
     offset: int
     length: int
     begin_ns: int
-    end_ns: int
 
 
 class McapReader:
@@ -215,8 +213,8 @@ class McapReader:
 
     def _find(self, stream: BinaryIO, opcode: int, length: int) -> None:
         if opcode == Opcode.CHUNK and length >= _CHUNK_HEAD.size:
-            begin_ns, end_ns, _ = _CHUNK_HEAD.unpack(stream.read(_CHUNK_HEAD.size))
-            self.chunks.append(FoundChunk(self._offset, _HEAD.size + length, begin_ns, end_ns))
+            begin_ns, _, _ = _CHUNK_HEAD.unpack(stream.read(_CHUNK_HEAD.size))
+            self.chunks.append(FoundChunk(self._offset, _HEAD.size + length, begin_ns))
         elif opcode in (Opcode.ATTACHMENT, Opcode.METADATA):
             stream.seek(self._offset)
             data = stream.read(_HEAD.size + length)

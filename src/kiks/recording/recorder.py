@@ -33,11 +33,11 @@ CHUNK_S = 0.1
 """Least real time between two chunks [s]. A crash costs what came after the last chunk: at most a second of a world in
 real time, and a tenth of a second's work of one at full speed."""
 
-SEND, TYPE, ACT = (
-    int(Kind.SEND),
-    int(Kind.TYPE),
-    int(Kind.ACT),
-)  # plain, for an enumeration costs a tenth of a microsecond
+PROGRAMS = "programs/"
+"""Folder of the programs' texts in the file."""
+
+SEND, TYPE, ACT = (int(kind) for kind in (Kind.SEND, Kind.TYPE, Kind.ACT))
+"""Kinds of most entries, as plain numbers: an enumeration costs a tenth of a microsecond."""
 
 WAITING_BYTES_MAX = 16 << 20
 """Most bytes of states that wait for a chunk."""
@@ -79,6 +79,7 @@ class RunRecorder:
         self._chunk_ns = sim.now_ns
         self._setup: tuple[Any, ...] = ()
         self._setup_count = 0
+        self._drawn: tuple[int, bytes] = (0, b"")
         self._own_turrets: set[int] = set()
         self._messages: list[tuple[Topic, int, bytes]] = []
         with sim.lock:
@@ -87,7 +88,7 @@ class RunRecorder:
             self.next_ns = (sim.now_ns // CHECK_NS + 1) * CHECK_NS
             self._file.attach("layout.json", Layout().to_bytes(), "application/json")
             for name, text in (programs or {}).items():
-                self._file.attach(f"programs/{name}", text.encode(), "text/x-python")
+                self._file.attach(PROGRAMS + name, text.encode(), "text/x-python")
             told = {"kiks": __version__, "thinking": sim.thinking, "arena": sim.arena.name, **(about or {})}
             self._file.describe("run", told)
             self._note_state()
@@ -161,9 +162,11 @@ class RunRecorder:
         data = state_bytes(sim)
         self._entries.add(Kind.STATE, world.now_ns, 0, self._setup_count - 1, 0, data)
         self._waiting_bytes += len(data)
-        self._messages.append(
-            (foxglove.SCENE, world.now_ns, foxglove.scene(world.specs, world.state.bodies[0], world.now_ns))
-        )
+        drawn = sim.robot_count, world.state.bodies["number"].tobytes()
+        if drawn != self._drawn:
+            self._drawn = drawn
+            scene = foxglove.scene(world.specs, world.state.bodies[0], world.now_ns)
+            self._messages.append((foxglove.SCENE, world.now_ns, scene))
 
     def _note_setup(self) -> None:
         sim, now_ns = self._sim, self._world.now_ns

@@ -15,6 +15,7 @@ from kiks.model.checks import check_number
 from kiks.model.project import Project
 from kiks.recording import tables
 from kiks.recording.log import RecordedLog
+from kiks.recording.recorder import PROGRAMS
 from kiks.recording.replay import Replay
 from kiks.sim.from_project import project_of
 from kiks.sim.saved_state import Setup
@@ -70,9 +71,8 @@ class Recording:
     def programs(self) -> dict[str, str]:
         """Texts of the programs that drove its robots, by name."""
         files = self._reader.attachments.items()
-        return {
-            name[len("programs/") :]: data.decode("utf-8", "replace") for name, data in files if "programs/" in name
-        }
+        found = {name: data.decode("utf-8", "replace") for name, data in files if name.startswith(PROGRAMS)}
+        return {name.removeprefix(PROGRAMS): text for name, text in found.items()}
 
     @cached_property
     def project(self) -> Project:
@@ -143,7 +143,7 @@ class Recording:
     def world_at(self, time_s: float) -> Simulation:
         """Return a simulation in the state that the world had at a time. It goes on without the recording.
 
-        The programs that drove its robots have hung up: commands that they had sent still act, nobody gets the replies.
+        The programs that drove its robots have hung up: their last commands still act, and the replies are dropped.
 
         Args:
             time_s: The time [s], from the beginning to the end of the recording.

@@ -114,7 +114,7 @@ class Replay:
             case Kind.CHECK:
                 sim.sync()
                 for each in sim.wires:
-                    each.line.forget()  # replies that nobody reads would fill the line
+                    each.line.forget()  # unread replies would fill the line
                 self._on_check(entry.time_ns, entry.data[:HASH_LENGTH].decode("ascii", "replace"))
             case Kind.STATE:
                 setup, saved = self._log.state_of(entry)

@@ -29,7 +29,7 @@ class SavedWire(NamedTuple):
         partial: The command that is not complete.
         pending: Commands on their way: when each acts [ns], its line, and whether the host does not get the reply.
         last_act_ns: When the last of them acts [ns].
-        orphan_count: Number of replies to come that nobody reads.
+        orphan_count: Number of replies to come that are dropped.
     """
 
     line: tuple[int, int, int]
@@ -256,7 +256,7 @@ class Wire:
         )
 
     def restore(self, saved: SavedWire) -> None:
-        """Go back to what `save` returned; nobody reads replies that came before."""
+        """Go back to what `save` returned; replies that came before are dropped."""
         firmware = self.firmware
         self.line.restore(*saved.line)
         firmware.baud, firmware.selected_baud = saved.robot_baud, saved.selected_baud
