@@ -213,7 +213,7 @@ def test_the_table_says_where_each_robot_was(tmp_path: Path) -> None:
     x_mm, y_mm, _ = sims[0].pose(1)
     assert [float(value) for value in rows[-2][2:4]] == pytest.approx([x_mm, y_mm], abs=6e-4)
     assert rows[-2][5:] == [f"{sims[0].travelled_mm(1):.3f}", str(sims[0].contacts(1))]
-    assert not sims[0].watchers
+    assert not sims[0].world.watchers
 
 
 def test_what_was_interrupted_is_kept(tmp_path: Path) -> None:
@@ -266,7 +266,7 @@ def test_paths_stay_whole_if_ctrl_c_comes_while_a_point_is_kept() -> None:
         tick_count=sim.world.state.tick_count, robots=sim.world.state.robots, bodies=Interrupted()
     )
     with pytest.raises(KeyboardInterrupt):
-        sim.watchers[0].look(state)
+        sim.world.watchers[0].look(state)
     assert sim.paths().tolist() == before
 
 

@@ -23,8 +23,9 @@ import kiks
 from kiks.errors import KiksError, ParameterError
 from kiks.recording import motion
 from kiks.recording.check import check_recording
-from kiks.recording.entries import Entry, Kind
+from kiks.recording.entries import Entry
 from kiks.recording.recorder import CHECK_NS
+from kiks.sim.run_log import Kind
 
 KILLS = share(3, 100)
 """How many runs are killed."""

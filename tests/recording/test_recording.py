@@ -42,7 +42,7 @@ def recorded(sim: Simulation, file: Path, act: Callable[[Simulation], None]) -> 
     with sim.record(file):
         act(sim)
     assert sim.loop.recorder is None
-    assert not sim.watchers
+    assert not sim.world.watchers
     return Recording(file)
 
 

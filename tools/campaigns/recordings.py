@@ -18,11 +18,12 @@ from tools.campaigns.hostile import NUMBERS, mutated, mutated_text
 import kiks
 from kiks.engine.state import BODY, ROBOT
 from kiks.recording.check import check_recording
-from kiks.recording.entries import Columns, Entry, EntryList, Kind
+from kiks.recording.entries import Columns, Entry, block_of
 from kiks.recording.mcap_file import McapFile, McapReader
 from kiks.recording.recorder import LOG, MOTION
 from kiks.recording.replay import HASH_LENGTH
 from kiks.recording.tables import TABLES
+from kiks.sim.run_log import Kind
 
 
 @dataclass(frozen=True)
@@ -56,11 +57,10 @@ class Parts:
             file.attach(name, data, "application/json")
         file.describe("run", self.told)
         for entries, motion in self.blocks:
-            waiting = EntryList()
-            for entry in entries:
-                waiting.add(*entry)
             time_ns = min(max(entries[0].time_ns, 0), 2**63) if entries else 0
-            file.write([(LOG, time_ns, waiting.take()), (MOTION, time_ns, motion)])
+            file.write(
+                [(LOG, time_ns, block_of([value for entry in entries for value in entry])), (MOTION, time_ns, motion)]
+            )
         file.close()
 
     def with_entry(self, is_meant: Callable[[Entry], bool], change: Callable[[Entry], Entry]) -> Parts:

@@ -112,8 +112,8 @@ def recorded(
             file = GrowingFile(csv, "--csv")
             at_the_end.callback(file.close)
             rows = _Rows(file, sim.world.state)
-            sim.watchers.append(rows)
-            at_the_end.callback(sim.watchers.remove, rows)
+            sim.world.watch(rows)
+            at_the_end.callback(sim.world.unwatch, rows)
             # The last ticks may not have been asked for yet.
             at_the_end.callback(sim.sync)
         yield

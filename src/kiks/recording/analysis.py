@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.recording.entries import Kind
 from kiks.recording.log import RecordedLog
+from kiks.sim.run_log import Kind
 from kiks.sim.wire_log import Span, TimeShares, share_time
 
 

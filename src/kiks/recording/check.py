@@ -61,7 +61,7 @@ def _first_tick(log: RecordedLog, begin_ns: int, end_ns: int) -> int | None:
     replay = Replay(log, begin_ns)
     watcher = MotionWatcher(replay.sim.world.state)
     begin_tick = replay.sim.world.state.tick_count
-    replay.sim.watchers.append(watcher)
+    replay.sim.world.watch(watcher)
     while replay.sim.now_ns < end_ns and replay.advance():
         pass
     found = _by_tick(decode(encode(watcher.looks, Layout()), Layout(), "replay"))

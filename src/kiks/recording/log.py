@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.errors import ParameterError
-from kiks.recording.entries import LAST_INPUT, Columns, Entry, Kind
+from kiks.recording.entries import Columns, Entry
 from kiks.recording.mcap_file import McapReader
 from kiks.recording.motion import Motion
 from kiks.recording.motion import decode as decode_motion
 from kiks.recording.recorder import LOG, MOTION
+from kiks.sim.run_log import LAST_INPUT, Kind
 from kiks.sim.saved_state import Layout, SavedState, Setup
 from kiks.units import s_from_ns
 

@@ -47,8 +47,9 @@ class MotionWatcher:
         if state.robots is not self._robots:
             self._robots = state.robots
             self._kept = state.robots.view(np.uint8).reshape(-1, ROBOT.itemsize)[:, :KEPT_BYTES]
-        self.from_tick, self.due_tick = state.tick_count + TRAIL_LENGTH, state.tick_count + TRAIL_LENGTH + 1
-        self.looks.append((state.tick_count, self._kept.tobytes(), state.bodies.tobytes()))
+        tick = state.tick_count
+        self.from_tick, self.due_tick = tick + TRAIL_LENGTH, tick + TRAIL_LENGTH + 1
+        self.looks.append((tick, self._kept.tobytes(), state.bodies.tobytes() if state.bodies.size else b""))
 
 
 class Motion(NamedTuple):

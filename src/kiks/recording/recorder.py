@@ -7,7 +7,7 @@ run is the same with it, to the bit.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -15,9 +15,10 @@ from typing import Any
 from kiks.ending import postponing_endings
 from kiks.errors import ParameterError
 from kiks.recording import foxglove, motion
-from kiks.recording.entries import EntryList, Kind
+from kiks.recording.entries import block_of
 from kiks.recording.mcap_file import McapFile, Topic
 from kiks.recording.motion import MotionWatcher
+from kiks.sim.run_log import ACT, CHECK, MARK, STATE, TEXT, Clock, NotedEntry
 from kiks.sim.saved_state import Layout, Setup, TurretOfUser, state_bytes
 from kiks.sim.simulation import Simulation
 from kiks.units import NS_PER_S
@@ -36,9 +37,6 @@ real time, and a tenth of a second's work of one at full speed."""
 PROGRAMS = "programs/"
 """Folder of the programs' texts in the file."""
 
-SEND, TYPE, ACT = (int(kind) for kind in (Kind.SEND, Kind.TYPE, Kind.ACT))
-"""Kinds of most entries, as plain numbers: an enumeration costs a tenth of a microsecond."""
-
 WAITING_BYTES_MAX = 16 << 20
 """Most bytes of states that wait for a chunk."""
 
@@ -54,8 +52,9 @@ class RunRecorder:
 
     Attributes:
         next_ns: When the next checkpoint is due [ns].
+        note: Takes an entry.
+        clock: The world's.
         change_count: Of the world, when its changes were noted last.
-        has_lamps: Whether there are lamps.
 
     Raises:
         ParameterError: If the file cannot be written, or the simulation is being recorded already.
@@ -73,14 +72,15 @@ class RunRecorder:
             raise ParameterError(f"{sim} must not be recorded yet, but it is. End that recording first.")
         self._sim, self._world, self._loop = sim, sim.world, sim.loop
         self._file = McapFile(path, (LOG, MOTION, *foxglove.TOPICS))
-        self._entries = EntryList()
-        self._add_numbers, self._add_data = self._entries.numbers.extend, self._entries.data.append
+        self.clock: Clock = self._world
+        # In one list: to keep a tuple for each entry would make Python's garbage collection slow.
+        self._entries: list[int | bytes] = []
+        self.note: Callable[[NotedEntry], object] = self._entries.extend
         self._waiting_bytes = 0
         self._chunk_ns = sim.now_ns
         self._setup: tuple[Any, ...] = ()
         self._setup_count = 0
         self._drawn: tuple[int, bytes] = (0, b"")
-        self._own_turrets: set[int] = set()
         self._messages: list[tuple[Topic, int, bytes]] = []
         with sim.lock:
             sim.sync()
@@ -91,8 +91,8 @@ class RunRecorder:
                 self._file.attach(PROGRAMS + name, text.encode(), "text/x-python")
             told = {"kiks": __version__, "thinking": sim.thinking, "arena": sim.arena.name, **(about or {})}
             self._file.describe("run", told)
-            self._note_state()
-            sim.watchers.append(self._motion)
+            self.note_state()
+            sim.world.watch(self._motion)
             self._loop.recorder = self
             self._write_chunk()
 
@@ -122,45 +122,27 @@ class RunRecorder:
             self._loop.recorder = None
             for wire in self._sim.wires:
                 wire.recorder = None
-            self._sim.watchers.remove(self._motion)
+            self._world.unwatch(self._motion)
             self._file.close()
 
     # ---- from outside ----
-
-    def sent(self, robot: int, data: bytes, at_ns: int, start_ns: int, is_typed: bool) -> None:
-        """Note that characters for a robot's index were sent, when, and when the first one starts [ns]."""
-        self._add_numbers((TYPE if is_typed else SEND, self._world.now_ns, robot, at_ns, start_ns, len(data)))
-        self._add_data(data)
-
-    def hung_up(self, robot: int) -> None:
-        """Note that the host has hung up."""
-        self._entries.add(Kind.HANG_UP, self._world.now_ns, robot, 0, 0, b"")
-
-    def dropped(self, robot: int, until_ns: int, now_ns: int) -> None:
-        """Note a call of `Wire.drop_after`."""
-        self._entries.add(Kind.DROP, self._world.now_ns, robot, until_ns, now_ns, b"")
-
-    def baud_set(self, robot: int, baud: int) -> None:
-        """Note that the mode selector was turned."""
-        self._entries.add(Kind.SET_BAUD, self._world.now_ns, robot, baud, 0, b"")
 
     def note_changes(self) -> None:
         """Note what was changed from outside."""
         world = self._world
         if world.change_count != self.change_count or world.lamps.tobytes() != self._lamps:
-            self._note_state()
+            self.note_state()
 
-    def _note_state(self) -> None:
+    def note_state(self) -> None:
         """Note all that the simulation is, as something was changed, or at the beginning."""
         sim, world = self._sim, self._world
         self.change_count, self._lamps = world.change_count, world.lamps.tobytes()
-        self.has_lamps = self._lamps != b""
         setup = (world.arena, *world.specs, *(turret for wire in sim.wires for turret in wire.firmware.fitted))
         if len(setup) != len(self._setup) or any(a is not b for a, b in zip(setup, self._setup, strict=True)):
             self._setup = setup
             self._note_setup()
         data = state_bytes(sim)
-        self._entries.add(Kind.STATE, world.now_ns, 0, self._setup_count - 1, 0, data)
+        self.note((STATE, world.now_ns, 0, self._setup_count - 1, 0, data))
         self._waiting_bytes += len(data)
         drawn = sim.robot_count, world.state.bodies["number"].tobytes()
         if drawn != self._drawn:
@@ -173,39 +155,25 @@ class RunRecorder:
         setup = Setup.of(sim)
         self._file.attach(f"setup/{self._setup_count}.json", setup.to_bytes(), "application/json", now_ns)
         self._setup_count += 1
-        self._own_turrets = {
-            index for index, turrets in enumerate(setup.turrets) if any(isinstance(t, TurretOfUser) for t in turrets)
-        }
-        for wire in sim.wires:
-            wire.recorder = self
+        for wire, turrets in zip(sim.wires, setup.turrets, strict=True):
+            has_own = any(isinstance(turret, TurretOfUser) for turret in turrets)
+            wire.recorder = _OwnTurretRecorder(self) if has_own else self
         self._messages.append((foxglove.WALLS, now_ns, foxglove.walls(sim.arena, now_ns)))
 
-    # ---- what follows from it ----
-
-    def acted(self, robot: int, reply: bytes, start_ns: int, character_ns: int) -> None:
-        """Note that a robot has acted, with its reply, when that starts [ns], and the time of a character [ns]."""
-        self._add_numbers((ACT, self._world.now_ns, robot, start_ns, character_ns, len(reply)))
-        self._add_data(reply)
-        if robot in self._own_turrets:
-            # What a turret of a user's own does, no replay can know.
-            self._note_state()
-
-    def thought(self, robot: int, from_ns: int, until_ns: int) -> None:
-        """Note that the program has thought."""
-        self._entries.add(Kind.THINK, until_ns, robot, from_ns, until_ns, b"")
+    # ---- what people and programs say ----
 
     def say(self, robot: int, line: str) -> None:
         """Note a line that the program of a robot's index has printed."""
         with self._sim.lock:
             now_ns = self._world.now_ns
-            self._entries.add(Kind.TEXT, now_ns, robot, 0, 0, line.encode())
+            self.note((TEXT, now_ns, robot, 0, 0, line.encode()))
             self._messages.append((foxglove.TEXT, now_ns, foxglove.text(f"robot {robot + 1}", line, now_ns)))
 
     def mark(self, note: str) -> None:
         """Set a bookmark at this time."""
         with self._sim.lock:
             now_ns = self._world.now_ns
-            self._entries.add(Kind.MARK, now_ns, 0, 0, 0, note.encode())
+            self.note((MARK, now_ns, 0, 0, 0, note.encode()))
             self._messages.append((foxglove.TEXT, now_ns, foxglove.text("bookmark", note, now_ns)))
 
     # ---- the file ----
@@ -221,7 +189,7 @@ class RunRecorder:
     def _note_check(self) -> None:
         data = state_bytes(self._sim)
         state_hash = self._world.state.hash().encode()
-        self._entries.add(Kind.CHECK, self._world.now_ns, 0, self._setup_count - 1, 0, state_hash + data)
+        self.note((CHECK, self._world.now_ns, 0, self._setup_count - 1, 0, state_hash + data))
         # Motion has 25 looks in this time.
         self._waiting_bytes += 25 * len(data)
 
@@ -229,7 +197,9 @@ class RunRecorder:
         """Write what waits."""
         looks, self._motion.looks = self._motion.looks, []
         messages, self._messages = self._messages, []
-        blocks = [(LOG, self._chunk_ns, self._entries.take()), (MOTION, self._chunk_ns, motion.encode(looks, _LAYOUT))]
+        entries = block_of(self._entries)
+        self._entries.clear()
+        blocks = [(LOG, self._chunk_ns, entries), (MOTION, self._chunk_ns, motion.encode(looks, _LAYOUT))]
         self._chunk_ns = self._world.now_ns
         self._file.write(blocks + messages + foxglove.poses(looks))
         self._waiting_bytes = 0
@@ -237,3 +207,21 @@ class RunRecorder:
 
 
 _LAYOUT = Layout()
+
+
+class _OwnTurretRecorder:
+    """Takes entries of a robot with a turret of a user's own: no replay can know what that does.
+
+    Args:
+        recorder: Takes them all.
+    """
+
+    def __init__(self, recorder: RunRecorder) -> None:
+        self._recorder = recorder
+        self.clock: Clock = recorder.clock
+        self.note: Callable[[NotedEntry], object] = self._note
+
+    def _note(self, entry: NotedEntry) -> None:
+        self._recorder.note(entry)
+        if entry[0] == ACT:
+            self._recorder.note_state()

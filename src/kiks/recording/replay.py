@@ -9,15 +9,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from kiks.model.checks import CLOCK_END_NS
-from kiks.recording.entries import Entry, Kind
+from kiks.recording.entries import Entry
 from kiks.recording.log import HASH_LENGTH, RecordedLog
 from kiks.recording.recorder import CHECK_NS
+from kiks.sim.read_completion import NEVER_NS
+from kiks.sim.run_log import Kind
 from kiks.sim.saved_state import restore_state
 from kiks.sim.simulation import Simulation
 from kiks.sim.wire import ignore_reply
 from kiks.units import s_from_ns
-
-NEVER_NS = 2**62
 
 
 class Replay:

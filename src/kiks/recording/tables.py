@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.errors import ParameterError
-from kiks.recording.entries import Kind
 from kiks.recording.log import RecordedLog
 from kiks.recording.motion import poses_of
+from kiks.sim.run_log import Kind
 from kiks.units import TICK_NS, s_from_ns
 
 Table = NDArray[np.void]

@@ -9,7 +9,9 @@ from typing import Protocol
 from kiks.clock.gate import Gate
 from kiks.firmware.khepera import Firmware
 from kiks.model.checks import CLOCK_END_NS, check_count
-from kiks.sim.wire import Wire, WireRecorder
+from kiks.sim.read_completion import NEVER_NS
+from kiks.sim.run_log import WireRecorder
+from kiks.sim.wire import Wire
 from kiks.sim.world import World
 
 
@@ -46,13 +48,9 @@ class Recorder(WireRecorder, Protocol):
 
     Attributes:
         next_ns: When `check` is due [ns].
-        change_count: Of the world, when its changes were noted last.
-        has_lamps: Whether there are lamps, which anybody may move or switch without a count.
     """
 
     next_ns: int
-    change_count: int
-    has_lamps: bool
 
     def note_changes(self) -> None:
         """Note what was changed from outside."""
@@ -72,7 +70,6 @@ class EventLoop:
         wires: The robots' serial lines.
         gate: Decides how far time may go while it is watched; None while nothing watches it.
         supervisor: Acts in the world at certain instants, such as a referee; None without one.
-        recorder: Records the run; None while nothing does.
     """
 
     def __init__(self, world: World, sync: Callable[[], None]) -> None:
@@ -81,9 +78,26 @@ class EventLoop:
         self.wires: list[Wire] = []
         self.gate: Gate | None = None
         self.supervisor: Supervisor | None = None
-        self.recorder: Recorder | None = None
+        self._recorder: Recorder | None = None
+        # From when on the recorder must be asked: one comparison for each piece of time.
+        self._record_ns = NEVER_NS
+        world.on_change = self._ask_recorder
         self._sync = sync
         self._events = EventQueue()
+
+    @property
+    def recorder(self) -> Recorder | None:
+        """Records the run; None while nothing does."""
+        return self._recorder
+
+    @recorder.setter
+    def recorder(self, recorder: Recorder | None) -> None:
+        self._recorder = recorder
+        self._ask_recorder()
+
+    def _ask_recorder(self) -> None:
+        """Let the recorder look for changes before time passes."""
+        self._record_ns = NEVER_NS if self._recorder is None else -1
 
     def add_wire(self, firmware: Firmware) -> None:
         """Add the serial line of one more robot."""
@@ -112,12 +126,13 @@ class EventLoop:
         self._advance_to(time_ns)
 
     def _advance_to(self, time_ns: int) -> None:
-        if (recorder := self.recorder) is not None:
-            if recorder.change_count != self.world.change_count or recorder.has_lamps:
-                recorder.note_changes()
+        recorder = self._recorder
+        if time_ns >= self._record_ns and recorder is not None:
+            recorder.note_changes()
             while recorder.next_ns <= time_ns:
                 self._do_events_to(recorder.next_ns)
                 recorder.check()
+            self._record_ns = -1 if self.world.lamps_are_lent else recorder.next_ns
         self._do_events_to(time_ns)
 
     def _do_events_to(self, time_ns: int) -> None:

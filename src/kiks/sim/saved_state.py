@@ -329,7 +329,7 @@ def restore_state(sim: Simulation, saved: SavedState) -> None:
         sim.things.body_count = saved.body_count
         for wire, saved_wire in zip(sim.wires, saved.wires, strict=True):
             wire.restore(saved_wire)
-        world.change_count += 1
+        world.note_change()
 
 
 # ---- records in files ----

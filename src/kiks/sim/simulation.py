@@ -26,7 +26,7 @@ from kiks.sim.event_loop import EventLoop
 from kiks.sim.explanation import Explanation, LightExplanation, explain_ambient, explain_proximity
 from kiks.sim.free_space import FreeSpace
 from kiks.sim.local_line import LocalLine
-from kiks.sim.paths import Paths, Watcher
+from kiks.sim.paths import Paths
 from kiks.sim.port import VirtualPort
 from kiks.sim.registry import Registry
 from kiks.sim.sensors import Sensors
@@ -152,7 +152,7 @@ class Simulation:
         """Hold the lock, do the ticks that have begun, and let cameras see what was changed."""
         with self._up_to_date() as world:
             yield world
-            world.change_count += 1
+            world.note_change()
             self._turrets.cameras.retake()
 
     # ---- what it consists of ----
@@ -193,11 +193,6 @@ class Simulation:
         return self.loop.wires
 
     @property
-    def watchers(self) -> list[Watcher]:
-        """Objects that read the state after ticks of their own choice."""
-        return self.world.watchers
-
-    @property
     def gate(self) -> Gate | None:
         """Decides how far time may go while it is watched; None while nothing watches it."""
         return self.loop.gate
@@ -215,11 +210,12 @@ class Simulation:
         Raises:
             ParameterError: If it is set to anything but finite numbers of that shape.
         """
-        return self.world.lamps
+        return self.world.lend_lamps()
 
     @lamps.setter
     def lamps(self, lamps: NDArray[np.float64]) -> None:
         self.world.lamps = lamps
+        self.world.lend_lamps()
 
     # ---- time ----
 
@@ -689,9 +685,10 @@ class Simulation:
         if points_max is not None:
             check_count("points_max", points_max, 2, 10**9, "Take 10000.")
         with self._up_to_date() as world:
-            world.watchers = [each for each in world.watchers if each is not self._paths]
+            if self._paths is not None:
+                world.unwatch(self._paths)
             self._paths = Paths(round(ticks), world.state, points_max)
-            world.watchers.append(self._paths)
+            world.watch(self._paths)
 
     def paths(self) -> NDArray[np.float64]:
         """Return the paths since `record_paths`, float64 [robot, point, 4]: time_s, x_mm, y_mm, heading_rad.

@@ -141,7 +141,7 @@ class RobotSite:
         """Hold it while you change something from outside the simulation."""
         with self._world.lock:
             yield
-            self._world.change_count += 1
+            self._world.note_change()
 
     @property
     def time_ns(self) -> int:

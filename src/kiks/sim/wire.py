@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from kiks.clock.serial_timing import SerialTiming
 from kiks.firmware.khepera import Firmware
+from kiks.sim.run_log import ACT, DROP, HANG_UP, SEND, SET_BAUD, THINK, TYPE, WireRecorder
 from kiks.sim.wire_log import TimeShares, WireLog
 from kiks.units import ns_from_s
 
@@ -40,28 +41,6 @@ class SavedWire(NamedTuple):
     pending: list[tuple[int, str, bool]]
     last_act_ns: int
     orphan_count: int
-
-
-class WireRecorder(Protocol):
-    """Records all that comes to the wires of a world from outside, and what robots answer."""
-
-    def sent(self, robot: int, data: bytes, at_ns: int, start_ns: int, is_typed: bool) -> None:
-        """Note that characters for a robot's index were sent, when, and when the first one starts [ns]."""
-
-    def acted(self, robot: int, reply: bytes, start_ns: int, character_ns: int) -> None:
-        """Note that a robot has acted, with its reply, when that starts [ns], and the time of a character [ns]."""
-
-    def hung_up(self, robot: int) -> None:
-        """Note that the host has hung up."""
-
-    def dropped(self, robot: int, until_ns: int, now_ns: int) -> None:
-        """Note a call of `Wire.drop_after`."""
-
-    def baud_set(self, robot: int, baud: int) -> None:
-        """Note that the mode selector was turned."""
-
-    def thought(self, robot: int, from_ns: int, until_ns: int) -> None:
-        """Note that the program has thought."""
 
 
 def ignore_reply(_reply: bytes, _arrival_ns: int) -> None:
@@ -103,8 +82,7 @@ class Wire:
 
     def set_baud(self, baud: int) -> None:
         """Set both ends of the line to a baud rate [bit/s], as the robot's mode selector does."""
-        if self.recorder is not None:
-            self.recorder.baud_set(self._index, baud)
+        self._note(SET_BAUD, baud)
         self.firmware.baud = self.firmware.selected_baud = baud
         self.line.set_baud(baud)
 
@@ -117,8 +95,9 @@ class Wire:
             hear: A callback for the replies; the host reads them if left out.
         """
         start_ns = self.line.send(len(data), at_ns)
-        if self.recorder is not None:
-            self.recorder.sent(self._index, data, at_ns, start_ns, hear is not None)
+        if (recorder := self.recorder) is not None:
+            kind = SEND if hear is None else TYPE
+            recorder.note((kind, recorder.clock.now_ns, self._index, at_ns, start_ns, data))
         character_ns = self.line.character_ns
         lines = self.firmware.receiver.feed(data)
         for index, line in lines:
@@ -146,16 +125,20 @@ class Wire:
             self._orphan_count = max(self._orphan_count - 1, 0)
             if (log := self.log) is not None and start_ns is not None:
                 log.answer(reply, start_ns, self.line.character_ns, now_ns)
-            if self.recorder is not None:
+            if (recorder := self.recorder) is not None:
                 sent_ns = now_ns if start_ns is None else start_ns
-                self.recorder.acted(self._index, reply, sent_ns, self.line.character_ns)
+                recorder.note((ACT, now_ns, self._index, sent_ns, self.line.character_ns, reply))
             if self.firmware.baud != self.line.baud:
                 self.line.set_baud(self.firmware.baud)
         else:
             self.firmware.run_demo(now_ns)
-            if self.recorder is not None:
-                self.recorder.acted(self._index, b"", now_ns, self.line.character_ns)
+            self._note(ACT, now_ns, self.line.character_ns)
         self._plan()
+
+    def _note(self, kind: int, number: int = 0, other: int = 0) -> None:
+        """Note an entry of the run, if it is recorded."""
+        if (recorder := self.recorder) is not None:
+            recorder.note((kind, recorder.clock.now_ns, self._index, number, other, b""))
 
     def _plan(self) -> None:
         """Schedule the robot's next event."""
@@ -186,8 +169,7 @@ class Wire:
         """Record that the program has thought, if the line is watched or recorded."""
         if (log := self.log) is not None:
             log.think(from_ns, until_ns)
-        if self.recorder is not None:
-            self.recorder.thought(self._index, from_ns, until_ns)
+        self._note(THINK, from_ns, until_ns)
 
     def shares(self, from_ns: int, until_ns: int) -> TimeShares | None:
         """Return where the time of a window went; None if the line is not watched."""
@@ -219,8 +201,7 @@ class Wire:
             until_ns: Commands up to this time still act [ns].
             now_ns: The time [ns]: from now on the line is free for replies.
         """
-        if self.recorder is not None:
-            self.recorder.dropped(self._index, until_ns, now_ns)
+        self._note(DROP, until_ns, now_ns)
         kept = [each for each in self.pending if each[0] <= until_ns or each[2] is not None]
         dropped_count = len(self.pending) - len(kept)
         if dropped_count:
@@ -235,8 +216,7 @@ class Wire:
 
         Commands that were sent whole still act, and the robot drives on (khepera-protocol.md 11.3).
         """
-        if self.recorder is not None:
-            self.recorder.hung_up(self._index)
+        self._note(HANG_UP)
         self._orphan_count = len(self.pending)
         self.firmware.receiver.clear()
         self.line.forget()

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,9 @@ from kiks.units import TICK_NS
 TICKS_AT_ONCE = 10_000
 """Most ticks of one kernel call, so that Python can react to Ctrl-C: some milliseconds for a lone robot."""
 
+NEVER_TICK = 2**62
+"""A tick that never comes."""
+
 
 class World:
     """An arena with robots, balls, cylinders and lamps. Time passes in ticks.
@@ -51,6 +54,8 @@ class World:
         free_space: What is in the way of what.
         watchers: Objects that read the state after ticks of their own choice.
         change_count: How often something other than time and the robots' lines has changed the world.
+        on_change: Called at each of these changes.
+        lamps_are_lent: Whether a caller has the array of lamps, and may write to it without a word.
 
     Raises:
         ArenaError: If the arena has no free place for a robot.
@@ -64,8 +69,11 @@ class World:
         self.seed = seed
         self.specs = list(specs)
         self.state = State.empty(world_count=1, robot_count=len(self.specs))
-        self.watchers: list[Watcher] = []
+        self.watchers: tuple[Watcher, ...] = ()
+        self._from_tick = self._due_tick = NEVER_TICK
         self.change_count = 0
+        self.on_change: Callable[[], None] = lambda: None
+        self.lamps_are_lent = False
         self._lamps = np.array(arena.lamps, np.float64).reshape(-1, 4)
         self.free_space = FreeSpace(arena, self.specs, self.state)
         self._pack_specs()
@@ -87,8 +95,19 @@ class World:
     @lamps.setter
     def lamps(self, lamps: NDArray[np.float64]) -> None:
         self._lamps = check_numbers("lamps", lamps, (None, 4))
-        self.change_count += 1
+        self.note_change()
         self._scene.set_lamps(self._lamps[None])
+
+    def lend_lamps(self) -> NDArray[np.float64]:
+        """Return the lamps to a caller who may write to them."""
+        self.lamps_are_lent = True
+        self.on_change()
+        return self._lamps
+
+    def note_change(self) -> None:
+        """Note that something other than time and the robots' lines has changed the world."""
+        self.change_count += 1
+        self.on_change()
 
     def _pack_specs(self) -> None:
         """Pack the constants of all kinds of robots for the engine, and note the kind of each robot."""
@@ -140,15 +159,30 @@ class World:
         """Do the ticks that have begun up to a time [ns]."""
         state, end = self.state, -(-time_ns // TICK_NS)
         while state.tick_count < end:
-            until = min(end, state.tick_count + TICKS_AT_ONCE)
-            for watcher in self.watchers:
-                if watcher.due_tick < until:
-                    until = watcher.due_tick
+            until = min(end, state.tick_count + TICKS_AT_ONCE, self._due_tick)
             step.advance(self.scene, state.tick_count, until - state.tick_count)
             state.tick_count = until
-            for watcher in self.watchers:
-                if watcher.from_tick <= until:
-                    watcher.look(state)
+            if until >= self._from_tick:
+                self._look()
+
+    def watch(self, watcher: Watcher) -> None:
+        """Let an object read the state after ticks of its own choice."""
+        self.watchers = (*self.watchers, watcher)
+        self._look()
+
+    def unwatch(self, watcher: Watcher) -> None:
+        """Stop that, if it was watching."""
+        self.watchers = tuple(each for each in self.watchers if each is not watcher)
+        self._look()
+
+    def _look(self) -> None:
+        """Let watchers look that are due, and find out when the next ones are."""
+        from_tick = due_tick = NEVER_TICK
+        for watcher in self.watchers:
+            if watcher.from_tick <= self.state.tick_count:
+                watcher.look(self.state)
+            from_tick, due_tick = min(from_tick, watcher.from_tick), min(due_tick, watcher.due_tick)
+        self._from_tick, self._due_tick = from_tick, due_tick
 
     # ---- robots ----
 
