@@ -177,11 +177,15 @@ class World:
 
     def _look(self) -> None:
         """Let watchers look that are due, and find out when the next ones are."""
+        state = self.state
         from_tick = due_tick = NEVER_TICK
         for watcher in self.watchers:
-            if watcher.from_tick <= self.state.tick_count:
-                watcher.look(self.state)
-            from_tick, due_tick = min(from_tick, watcher.from_tick), min(due_tick, watcher.due_tick)
+            if watcher.from_tick <= state.tick_count:
+                watcher.look(state)
+            if watcher.from_tick < from_tick:
+                from_tick = watcher.from_tick
+            if watcher.due_tick < due_tick:
+                due_tick = watcher.due_tick
         self._from_tick, self._due_tick = from_tick, due_tick
 
     # ---- robots ----
