@@ -25,6 +25,9 @@ for step in range(40):
     values = [int(word) for word in port.readline().split(b",")[1:]]
     port.write(b"D,%d,%d\\n" % (6 - values[3] // 80, 6 - values[2] // 80))
     port.readline()
+    if step % 10 == 0:
+        print("step", step, end="")
+        print(file=sys.stdout)
     time.sleep(0.03)
 """
 
@@ -42,6 +45,14 @@ def test_programs_are_recorded_with_their_texts(robots: int, tmp_path: Path) -> 
     assert list(recording.programs.values()) == [ROUND] * robots
     assert recording.about["command"].startswith("kiks run --robots")
     assert len(recording.table("readings", robots)) == 40
+    lines = [row for row in recording.table("events") if row["kind"] == "output"]
+    for robot in range(1, robots + 1):
+        assert [row["text"] for row in lines if row["robot"] == robot] == ["step 0", "step 10", "step 20", "step 30"]
+    assert "step 30" in result.stdout
+    if robots == 1:
+        # After the readings of its steps.
+        steps_s = recording.table("readings")["time_s"][::10]
+        assert [float(row["time_s"]) for row in lines] == pytest.approx(steps_s, abs=0.06)
     assert AGAIN in forked.run("replay", "--check", "run.mcap", cwd=tmp_path).stdout
     for file in ("readings.csv", "readings.parquet"):
         told = forked.run("table", "run.mcap", file, "--table", "readings", "--robot", "1", cwd=tmp_path)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -117,6 +117,42 @@ def recorded(
             # The last ticks may not have been asked for yet.
             at_the_end.callback(sim.sync)
         yield
+
+
+@contextmanager
+def noting_output(sim: Simulation) -> Iterator[None]:
+    """Note the lines that the program of robot 1, in this process, prints meanwhile, if the world is recorded."""
+    recorder = sim.loop.recorder
+    if recorder is None:
+        yield
+        return
+    with ExitStack() as at_the_end:
+        for stream in (sys.stdout, sys.stderr):
+            at_the_end.enter_context(_noting(stream, lambda line: recorder.say(0, line)))
+        yield
+
+
+@contextmanager
+def _noting(stream: Any, note: Callable[[str], None]) -> Iterator[None]:
+    """Note the lines that are written to a stream meanwhile; it stays the same object with the same file."""
+    write, unfinished = stream.write, [""]
+
+    def written(text: str) -> int:
+        count: int = write(text)
+        *lines, unfinished[0] = (unfinished[0] + text).split("\n")
+        for line in lines:
+            note(line)
+        if len(unfinished[0]) > PROGRAM_CHARACTERS_MAX:
+            unfinished[0] = ""
+        return count
+
+    stream.write = written
+    try:
+        yield
+    finally:
+        stream.write = write
+        if unfinished[0]:
+            note(unfinished[0])
 
 
 def _text_of(program: Path) -> str:

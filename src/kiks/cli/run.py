@@ -31,7 +31,7 @@ from kiks.cli.options import (
     with_robots,
     written_file,
 )
-from kiks.cli.record import Picture, RecordFile, Table, recorded, tell_run
+from kiks.cli.record import Picture, RecordFile, Table, noting_output, recorded, tell_run
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, shown
 
@@ -231,7 +231,8 @@ def _run_one(sim: Simulation, command: Command, told: dict[str, int], record: Pa
     from kiks.script.runner import run_here
 
     try:
-        return run_here(sim, command.program, command.arguments, told)
+        with noting_output(sim):
+            return run_here(sim, command.program, command.arguments, told)
     finally:
         if record is not None:
             from kiks.clock.thinking import save_thinking

@@ -373,6 +373,11 @@ class Programs:
         """Return the suffix of a program's own files."""
         return f".{number}" if self._are_numbered else ""
 
+    def _note_line(self, robot: int, line: bytes) -> None:
+        """Note a line of a program's output, if the world is recorded."""
+        if (recorder := self.sim.loop.recorder) is not None:
+            recorder.say(robot - 1, line.decode(errors="replace").rstrip("\r"))
+
     def _add(self, command: Command, robot: int) -> Handle:
         """Start a program's process, if it may start, and add the program."""
         self.permission.check(command)
@@ -392,6 +397,7 @@ class Programs:
                     keeps_output=self._keeps_output,
                     writer=None if self._labels is None else self._labels.writer(number, command.program.name),
                     on_end=lambda: self._end(handle),
+                    on_line=lambda line: self._note_line(robot, line),
                 )
             except KiksError:
                 participant.close()

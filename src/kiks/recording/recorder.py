@@ -38,7 +38,13 @@ PROGRAMS = "programs/"
 """Folder of the programs' texts in the file."""
 
 WAITING_BYTES_MAX = 16 << 20
-"""Most bytes of states that wait for a chunk."""
+"""Most bytes of states and lines that wait for a chunk."""
+
+LINE_CHARACTERS_MAX = 10_000
+"""Most characters that are kept of a line that a program prints."""
+
+ENTRY_BYTES = 500
+"""Bytes that an entry takes while it waits, besides its data: about."""
 
 
 class RunRecorder:
@@ -163,11 +169,17 @@ class RunRecorder:
     # ---- what people and programs say ----
 
     def say(self, robot: int, line: str) -> None:
-        """Note a line that the program of a robot's index has printed."""
+        """Note a line that the program of a robot's index has printed; of a long one, the beginning."""
         with self._sim.lock:
-            now_ns = self._world.now_ns
-            self.note((TEXT, now_ns, robot, 0, 0, line.encode()))
-            self._messages.append((foxglove.TEXT, now_ns, foxglove.text(f"robot {robot + 1}", line, now_ns)))
+            if self._loop.recorder is not self:
+                return  # a program may print longer than it is recorded
+            now_ns, text = self._world.now_ns, line[:LINE_CHARACTERS_MAX]
+            data = text.encode("utf-8", "replace")
+            self.note((TEXT, now_ns, robot, 0, 0, data))
+            self._messages.append((foxglove.TEXT, now_ns, foxglove.text(f"robot {robot + 1}", text, now_ns)))
+            # A program may print for ever while no simulated time passes.
+            self._waiting_bytes += 2 * len(data) + ENTRY_BYTES
+            self._write_if_due()
 
     def mark(self, note: str) -> None:
         """Set a bookmark at this time."""
@@ -182,9 +194,7 @@ class RunRecorder:
         """Note the state, after all events up to `next_ns`, and choose a later `next_ns`."""
         self._note_check()
         self.next_ns += CHECK_NS
-        if time.monotonic() >= self._chunk_at_s or self._waiting_bytes > WAITING_BYTES_MAX:
-            with postponing_endings():
-                self._write_chunk()
+        self._write_if_due()
 
     def _note_check(self) -> None:
         data = state_bytes(self._sim)
@@ -192,6 +202,11 @@ class RunRecorder:
         self.note((CHECK, self._world.now_ns, 0, self._setup_count - 1, 0, state_hash + data))
         # Motion has 25 looks in this time.
         self._waiting_bytes += 25 * len(data)
+
+    def _write_if_due(self) -> None:
+        if time.monotonic() >= self._chunk_at_s or self._waiting_bytes > WAITING_BYTES_MAX:
+            with postponing_endings():
+                self._write_chunk()
 
     def _write_chunk(self) -> None:
         """Write what waits."""
