@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
+from kiks import Recording
 from kiks.cli import app
 from kiks.errors import KiksError
 
@@ -41,8 +42,14 @@ def test_a_run_leaves_its_files_and_goes_on(folder: Path) -> None:
     names = {path.name for path in folder.iterdir()}
     assert {"champion.toml", "log.parquet", "fitness.png", "generations", "evolution.json"} <= names
     task = folder.parent / "quick.py"
-    said = kiks("evolve", task, "--seed", 1, "--population", 8, "--generations", 4, "--out", folder).output
+    words = ("evolve", task, "--seed", 1, "--population", 8, "--generations", 4, "--out", folder)
+    said = kiks(*words, "--record", folder / "run.mcap").output
     assert "Continuing after generation 3" in said
+    recording = Recording(folder / "run.mcap")
+    assert recording.duration_s == pytest.approx(180.0, abs=0.1)
+    assert recording.programs == {"1-champion.toml": (folder / "champion.toml").read_text()}
+    with pytest.raises(KiksError, match="--record must be of one evolution, but there are 2"):
+        kiks(*words, "--seeds", 2, "--record", folder / "run.mcap")
     assert re.search(r"\nExam: (not )?solved, \d+ of 20 starts \(got around", said)
     assert re.search(r"\nWith ten imperfect robots: \d+ of 200 starts\n", said)
     with pytest.raises(KiksError, match="must hold the same evolution, but its seed is 1, not 2"):

@@ -60,7 +60,7 @@ def run_champion(
     def work() -> None:
         doubt = "it was interrupted"
         try:
-            with recorded(sim, *files):
+            with recorded(sim, *files, programs=[file]):
                 loop_count = champion.drive(ports, seconds=seconds)
             say(f"{loop_count} loops")
             doubt = ""

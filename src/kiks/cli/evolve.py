@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
-from kiks.cli.engine_start import ready_batch
+from kiks.cli.engine_start import ready_batch, ready_engine
 from kiks.cli.evolution_progress import progress_of
 from kiks.cli.options import Seed, written_folder
+from kiks.cli.record import RecordFile, recorded
 from kiks.control.controller_kinds import ControllerKind
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError
@@ -53,6 +54,7 @@ def evolve(
         str | None,
         typer.Option(help="Evaluate on a Ray cluster: its address, auto, or local; on all cores here if left out."),
     ] = None,
+    record: RecordFile = None,
     list_: Annotated[bool, typer.Option("--list", help="List the tasks that come with KiKS.")] = False,
 ) -> None:
     """Evolve a controller for a task, and write champion.toml, archive.parquet, log.parquet and fitness.png.
@@ -60,7 +62,7 @@ def evolve(
     After Ctrl-C or a kill, the same command continues the evolution. With --seeds 10, ten evolutions run one after the
     other; a table, seeds.png and summary.json show their results. In pursuit, predator and prey evolve against each
     other, in football two players: predator.toml and prey.toml, or left.toml and right.toml, are the champions, and
-    tournament.png tells which of them progressed.
+    tournament.png tells which of them progressed. --record keeps the champion's drive from the first start of its exam.
 
     Example: kiks evolve avoid --seed 1 --out runs/avoid
     """
@@ -76,7 +78,7 @@ def evolve(
     if task in tasks.CONTESTS:
         from kiks.cli.coevolve import coevolve
 
-        for option, value in (("--controller", controller), ("--seeds", seeds)):
+        for option, value in (("--controller", controller), ("--seeds", seeds), ("--record", record)):
             if value is not None:
                 raise ParameterError(f"{option} must be left out with {task}, but it was {value}.")
         coevolve(
@@ -90,6 +92,11 @@ def evolve(
             where="threads" if ray is None else _ray(ray),
         )
         return
+    if record is not None and seeds is not None:
+        raise ParameterError(
+            f"--record must be of one evolution, but there are {seeds}. Record a champion later: kiks run "
+            "FOLDER/champion.toml --record FILE."
+        )
     chosen = tasks.load(task)
     if controller is not None:
         chosen = tasks.load(task, _controller(controller, chosen))
@@ -118,6 +125,8 @@ def evolve(
                     evolution.run(generations=until, seconds=seconds, executor=executor, each=show)
                 if evolution.generations:
                     results.append(_finish(evolution, home))
+                    if record is not None:
+                        _record(evolution, home, record)
             except KeyboardInterrupt:
                 _stop(evolution, home)
     if seeds is not None and results:
@@ -140,6 +149,18 @@ def _finish(evolution: Evolution, folder: Path) -> Result:
         typer.echo(exam.text)
         typer.echo(f"With ten imperfect robots: {exam.imperfect_solved} of {exam.imperfect_starts} starts")
     return result
+
+
+def _record(evolution: Evolution, folder: Path, file: Path) -> None:
+    """Record the champion in its world, which is the first start of the exam, for as long as an exam takes."""
+    ready_engine()
+    from kiks.learn.archive import CHAMPION
+
+    exam, champion = evolution.task.exam, evolution.champion
+    sim, ports = champion.simulation()
+    with recorded(sim, record=file, programs=[folder / CHAMPION]):
+        champion.drive(ports, seconds=evolution.task.seconds if exam is None else exam.seconds)
+    typer.echo(f"Recording: {file}   See it: kiks replay {file}")
 
 
 def _stop(evolution: Evolution, folder: Path) -> NoReturn:
