@@ -51,8 +51,10 @@ class RunRecorder:
         path: The file, which ends in .mcap.
         programs: Texts of the programs that drive its robots, by name.
         about: What else belongs to the run, such as the command that started it.
+        gives_way: Whether it ends when another recording of the simulation begins; else that one is refused.
 
     Attributes:
+        path: The file.
         next_ns: When the next checkpoint is due [ns].
         change_count: Of the world, when its changes were noted last.
         has_lamps: Whether there are lamps.
@@ -68,9 +70,14 @@ class RunRecorder:
         *,
         programs: Mapping[str, str] | None = None,
         about: Mapping[str, str] | None = None,
+        gives_way: bool = False,
     ) -> None:
-        if sim.loop.recorder is not None:
+        earlier = sim.loop.recorder
+        if isinstance(earlier, RunRecorder) and earlier.gives_way:
+            earlier.close()
+        elif earlier is not None:
             raise ParameterError(f"{sim} must not be recorded yet, but it is. End that recording first.")
+        self.path, self.gives_way = Path(path).absolute(), gives_way
         self._sim, self._world, self._loop = sim, sim.world, sim.loop
         self._file = McapFile(path, (LOG, MOTION, *foxglove.TOPICS))
         self._entries = EntryList()
@@ -115,15 +122,20 @@ class RunRecorder:
         with self._sim.lock, postponing_endings():
             if self._loop.recorder is not self:
                 return
-            self.note_changes()
-            self._note_check()
-            self._motion.look(self._world.state)
-            self._write_chunk()
+            self.flush()
             self._loop.recorder = None
             for wire in self._sim.wires:
                 wire.recorder = None
             self._sim.watchers.remove(self._motion)
             self._file.close()
+
+    def flush(self) -> None:
+        """Write all that has happened up to now, with the present state, so that a reader of the file finds it."""
+        with self._sim.lock, postponing_endings():
+            self.note_changes()
+            self._note_check()
+            self._motion.look(self._world.state)
+            self._write_chunk()
 
     # ---- from outside ----
 
