@@ -77,7 +77,8 @@ class RunRecorder:
             earlier.close()
         elif earlier is not None:
             raise ParameterError(f"{sim} must not be recorded yet, but it is. End that recording first.")
-        self.path, self.gives_way = Path(path).absolute(), gives_way
+        self.path = Path(path).absolute()
+        self.gives_way: bool = gives_way
         self._sim, self._world, self._loop = sim, sim.world, sim.loop
         self._file = McapFile(path, (LOG, MOTION, *foxglove.TOPICS))
         self._entries = EntryList()
@@ -128,6 +129,16 @@ class RunRecorder:
                 wire.recorder = None
             self._sim.watchers.remove(self._motion)
             self._file.close()
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether something could not be written; then nothing more is."""
+        return self._file.has_failed
+
+    @property
+    def byte_count(self) -> int:
+        """Number of bytes in the file so far."""
+        return self._file.byte_count
 
     def flush(self) -> None:
         """Write all that has happened up to now, with the present state, so that a reader of the file finds it."""

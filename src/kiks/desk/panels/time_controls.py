@@ -92,7 +92,7 @@ class TimePanel:
     def _refresh(self) -> None:
         """Show the present state, which another browser may have changed."""
         desk = self._desk
-        word, icon = ("Run", "play_arrow") if desk.gate.is_paused else ("Pause", "pause")
+        word, icon = ("Run", "play_arrow") if desk.is_paused else ("Pause", "pause")
         if self._run.props.get("aria-label") != word:
             self._run.props(f'icon={icon} aria-label="{word}"')
             self._run_tip.text = f"{word} (space)"
@@ -101,7 +101,7 @@ class TimePanel:
 
     @told
     async def _toggle(self) -> None:
-        await (self._desk.go_on() if self._desk.gate.is_paused else self._desk.pause())
+        await (self._desk.go_on() if self._desk.is_paused else self._desk.pause())
         self._refresh()
 
     @told
