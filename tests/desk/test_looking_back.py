@@ -441,7 +441,7 @@ def test_programs_run_again_up_to_a_time(tmp_path: Path) -> None:
         run(desk.go_on())
         until(lambda: desk.sim.now_ns > 2 * NS_PER_S)
         run(desk.looking.look_at(1_500_000_000))
-        with pytest.raises(ParameterError, match="none of this desk began with the world"):
+        with pytest.raises(ParameterError, match="no program of this desk began with this part"):
             run(desk.run_again_to_here())
         run(desk.looking.look_at(500_000_000))
         assert desk.why_not_again() == ""

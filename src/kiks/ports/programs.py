@@ -392,6 +392,7 @@ class Programs:
                     keeps_output=self._keeps_output,
                     writer=None if self._labels is None else self._labels.writer(number, command.program.name),
                     on_end=lambda: self._end(handle),
+                    hear=lambda line: self._record_line(robot, line),
                 )
             except KiksError:
                 participant.close()
@@ -402,6 +403,11 @@ class Programs:
         self._scheduler.join(participant)
         self.handles.append(handle)
         return handle
+
+    def _record_line(self, robot: int, line: str) -> None:
+        recorder = self.sim.loop.recorder
+        if recorder is not None:
+            recorder.say(robot - 1, line)
 
     def _end(self, handle: Handle) -> None:
         """Free the robots of a stopped program: here, because `round` may be waiting at the gate."""

@@ -7,6 +7,7 @@ run is the same with it, to the bit.
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
@@ -38,6 +39,9 @@ PROGRAMS = "programs/"
 
 SEND, TYPE, ACT = (int(kind) for kind in (Kind.SEND, Kind.TYPE, Kind.ACT))
 """Kinds of most entries, as plain numbers: an enumeration costs a tenth of a microsecond."""
+
+LINES_MAX = 1000
+"""Most lines of output that wait for a chunk; of more, the oldest are dropped."""
 
 WAITING_BYTES_MAX = 16 << 20
 """Most bytes of states that wait for a chunk."""
@@ -90,6 +94,7 @@ class RunRecorder:
         self._drawn: tuple[int, bytes] = (0, b"")
         self._own_turrets: set[int] = set()
         self._messages: list[tuple[Topic, int, bytes]] = []
+        self._lines: deque[tuple[int, int, str]] = deque(maxlen=LINES_MAX)
         with sim.lock:
             sim.sync()
             self._motion = MotionWatcher(self._world.state)
@@ -218,11 +223,8 @@ class RunRecorder:
         self._entries.add(Kind.THINK, until_ns, robot, from_ns, until_ns, b"")
 
     def say(self, robot: int, line: str) -> None:
-        """Note a line that the program of a robot's index has printed."""
-        with self._sim.lock:
-            now_ns = self._world.now_ns
-            self._entries.add(Kind.TEXT, now_ns, robot, 0, 0, line.encode())
-            self._messages.append((foxglove.TEXT, now_ns, foxglove.text(f"robot {robot + 1}", line, now_ns)))
+        """Note a line that the program of a robot's index has printed; from any thread, which waits for nothing."""
+        self._lines.append((self._world.now_ns, robot, line))
 
     def mark(self, note: str) -> None:
         """Set a bookmark at this time."""
@@ -250,6 +252,10 @@ class RunRecorder:
 
     def _write_chunk(self) -> None:
         """Write what waits."""
+        while self._lines:
+            now_ns, robot, line = self._lines.popleft()
+            self._entries.add(Kind.TEXT, now_ns, robot, 0, 0, line.encode())
+            self._messages.append((foxglove.TEXT, now_ns, foxglove.text(f"robot {robot + 1}", line, now_ns)))
         looks, self._motion.looks = self._motion.looks, []
         messages, self._messages = self._messages, []
         blocks = [(LOG, self._chunk_ns, self._entries.take()), (MOTION, self._chunk_ns, motion.encode(looks, _LAYOUT))]

@@ -374,8 +374,10 @@ class Desk:
         run = self.looking.run
         if not self.owns_world:
             return "a program outside holds this world"
+        if not self.looking.has_present:
+            return "a recording keeps what programs have sent, not how they were started"
         if run is None:
-            return "none of this desk began with the world that was recorded here"
+            return "no program of this desk began with this part of the run"
         if run.project.thinking.startswith("live"):
             return "their thinking is live: it takes real time, so no run is like another"
         return ""
