@@ -5,7 +5,7 @@ Nothing sleeps: `until` lets the page draw its next picture, again and again, un
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -17,6 +17,7 @@ from kiks.desk.server.show import Shown
 from kiks.model.arena import Arena
 from kiks.model.arena_objects import Ball, Cylinder, Lamp, Pose
 from kiks.model.project import Project, ProjectRobot
+from kiks.ports.program_process import Command
 from kiks.sim.from_project import simulation_of
 from kiks.sim.simulation import Simulation
 
@@ -50,11 +51,21 @@ def make_project() -> Project:
     return Project(arena, robots=(ProjectRobot(turrets=("k213",)), ProjectRobot(turrets=("gripper",))), seed=3)
 
 
-def open_desk(folder: Path, project: Project | None = None) -> Shown:
-    """Show a world that goes on by itself."""
+def open_desk(folder: Path, project: Project | None = None, commands: Sequence[Command | None] = ()) -> Shown:
+    """Show a world that goes on by itself, with programs."""
     project = project or make_project()
     sim = simulation_of(project, folder)
-    shown = Shown(Desk(sim, project=project, folder=folder, owns_world=True, may_run_programs=True), port=0)
+    desk = Desk(
+        sim,
+        project=project,
+        folder=folder,
+        owns_world=True,
+        may_run_programs=True,
+        commands=commands,
+        is_held=True,
+    )
+    shown = Shown(desk, port=0)
+    desk.begin()
     shown.drive()
     return shown
 
@@ -141,6 +152,13 @@ class Visitor:
     def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
         self.pull(start, end)
         self.let_go()
+
+    def drag_refused(self) -> None:
+        """Try to drag robot 1, and wait for the message that the past stays as it was."""
+        x_mm, y_mm, _ = self.sim.pose(1)
+        self.pull((x_mm, y_mm), (x_mm + 40, y_mm))
+        expect(self.at("arena-notice")).to_contain_text("this is its past")
+        self.page.mouse.up()
 
     def write(self, text: str) -> None:
         """Put a text into the editor as if it were pasted."""

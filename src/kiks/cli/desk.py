@@ -161,7 +161,7 @@ def open_desk(
     try:
         if browser:
             shown.browse()
-        if waits and (desk.has_beginners or work is not None):
+        if waits and (desk.has_beginners or work is not None or desk.past is not None):
             typer.echo("The run begins when a page shows it; with --no-wait it begins at once.")
             desk.is_seen.wait()
         desk.begin()

@@ -32,7 +32,8 @@ def replay(
 ) -> None:
     """Show a recorded run again on the desk, or check that it is the same again.
 
-    The world on the desk is a living one: its sensors and lines can be watched as ever, and it can be changed.
+    The world on the desk is a living one: its sensors and lines can be watched as ever. The time bar below it goes to
+    any time, forwards and backwards, and to each event; from any time a person can go on without the recording.
 
     Example: kiks replay run.mcap --check
     """
@@ -45,9 +46,13 @@ def replay(
     if check:
         raise typer.Exit(_check(recording))
     from kiks.desk.server.desk import Desk
+    from kiks.recording.replay import Replay
 
-    again = recording.replay(max(start, s_from_ns(recording.log.begin_ns)))
-    open_desk(Desk(again.sim, speed=speed))
+    # What goes on until a person lets the recording go: a world that stands still.
+    world = Replay(recording.log, recording.log.begin_ns).let_go()
+    desk = Desk(world, project=recording.project, speed=speed, owns_world=True, may_run_programs=True)
+    desk.looking.show_recording(file, recording.time_ns(max(start, s_from_ns(recording.log.begin_ns))))
+    open_desk(desk)
 
 
 def _check(recording: Recording) -> int:

@@ -220,7 +220,7 @@ def _run_on_desk(
 
     def end(sim: Simulation) -> None:
         # The page shows the last state until a person lets time pass.
-        desk.gate.pause(sim.now_ns)
+        desk.present.gate.pause(sim.now_ns)
         _tell(sim, thinking, desk.programs.doubt)
 
     open_desk(desk, waits=waits, programs_ended=end)

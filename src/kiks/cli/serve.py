@@ -107,7 +107,7 @@ def serve(
     ports = _Ports(sim, pty, link, tcp, rfc2217, host, say)
     server = None
     shown = _show_desk(sim, speed) if desk else None
-    gate = None if shown is None else shown.desk.gate
+    gate = None if shown is None else shown.desk.present.gate
     end_as_with_ctrl_c()  # so that the links are removed
     try:
         ports.open()

@@ -95,7 +95,7 @@ class Process:
             child processes end with it. Otherwise it has the terminal.
         writer: Writes its output to the terminal, if the output is not kept; None: the program writes it itself.
         on_end: Called by that thread after the end.
-        on_line: Called by another thread with each line of output that does not go straight to the terminal.
+        hear: Called with each line of its output, unless the program writes that itself.
 
     Attributes:
         output: Its output; None if it is not kept.
@@ -113,11 +113,11 @@ class Process:
         keeps_output: bool,
         writer: OutputWriter | None = None,
         on_end: Callable[[], None],
-        on_line: Callable[[bytes], None],
+        hear: Callable[[str], None],
     ) -> None:
         self.output: RingBuffer[OutputLine] | None = RingBuffer(OUTPUT_LIMIT) if keeps_output else None
         self._writer = _OutputKeeper(self.output) if self.output is not None else writer
-        self._on_end, self._on_line = on_end, on_line
+        self._on_end, self._hear = on_end, hear
         self._popen: subprocess.Popen[bytes] | None = None
         self._is_over = threading.Event()
         has_started = threading.Event()
@@ -188,7 +188,7 @@ class Process:
             assert popen.stdout is not None
             assert popen.stderr is not None
             pipes = {popen.stdout: False, popen.stderr: True}
-            reader = threading.Thread(target=_read_output, args=(pipes, self._writer, self._on_line), daemon=True)
+            reader = threading.Thread(target=_read_output, args=(pipes, self._writer, self._hear), daemon=True)
             reader.start()
             popen.wait()
             if self.output is not None:
@@ -319,7 +319,7 @@ def _label(number: int, name: str) -> str:
     return f"{number} {name}"
 
 
-def _read_output(pipes: dict[IO[bytes], bool], writer: OutputWriter, on_line: Callable[[bytes], None]) -> None:
+def _read_output(pipes: dict[IO[bytes], bool], writer: OutputWriter, hear: Callable[[str], None]) -> None:
     """Read the output of a process until its end."""
     with selectors.DefaultSelector() as selector:
         unfinished = {}
@@ -340,13 +340,13 @@ def _read_output(pipes: dict[IO[bytes], bool], writer: OutputWriter, on_line: Ca
                     lines += [rest] if rest else []
                     rest = b""
                 unfinished[is_error] = rest
+                for line in lines:
+                    hear(_output_line(line, is_error).text)
                 try:
                     writer.take(lines, is_error)
                 except OSError:
                     # The reader has gone. Closing the pipe reports that to the program.
                     piece = b""
-                for line in lines:
-                    on_line(line)
                 if not piece:
                     selector.unregister(key.fileobj)
                     key.fileobj.close()  # type: ignore[union-attr]

@@ -373,11 +373,6 @@ class Programs:
         """Return the suffix of a program's own files."""
         return f".{number}" if self._are_numbered else ""
 
-    def _note_line(self, robot: int, line: bytes) -> None:
-        """Note a line of a program's output, if the world is recorded."""
-        if (recorder := self.sim.loop.recorder) is not None:
-            recorder.say(robot - 1, line.decode(errors="replace").rstrip("\r"))
-
     def _add(self, command: Command, robot: int) -> Handle:
         """Start a program's process, if it may start, and add the program."""
         self.permission.check(command)
@@ -397,7 +392,7 @@ class Programs:
                     keeps_output=self._keeps_output,
                     writer=None if self._labels is None else self._labels.writer(number, command.program.name),
                     on_end=lambda: self._end(handle),
-                    on_line=lambda line: self._note_line(robot, line),
+                    hear=lambda line: self._record_line(robot, line),
                 )
             except KiksError:
                 participant.close()
@@ -408,6 +403,11 @@ class Programs:
         self._scheduler.join(participant)
         self.handles.append(handle)
         return handle
+
+    def _record_line(self, robot: int, line: str) -> None:
+        recorder = self.sim.loop.recorder
+        if recorder is not None:
+            recorder.say(robot - 1, line)
 
     def _end(self, handle: Handle) -> None:
         """Free the robots of a stopped program: here, because `round` may be waiting at the gate."""

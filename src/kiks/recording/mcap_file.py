@@ -83,6 +83,16 @@ class McapFile:
         self._do(lambda: self._writer.start(profile=PROFILE, library=f"kiks {__version__}"))
         self._channels = {topic: self._channel(topic) for topic in topics}
 
+    @property
+    def has_failed(self) -> bool:
+        """Whether something could not be written; then nothing more is."""
+        return self._error is not None
+
+    @property
+    def byte_count(self) -> int:
+        """Number of bytes up to the last chunk."""
+        return self._stream.tell()
+
     def attach(self, name: str, data: bytes, media_type: str, time_ns: int = 0) -> None:
         """Write a file within the file."""
         self._do(lambda: self._writer.add_attachment(0, time_ns, name, media_type, data))

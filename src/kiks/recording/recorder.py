@@ -7,6 +7,7 @@ run is the same with it, to the bit.
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import TracebackType
@@ -37,14 +38,14 @@ real time, and a tenth of a second's work of one at full speed."""
 PROGRAMS = "programs/"
 """Folder of the programs' texts in the file."""
 
+LINES_MAX = 20_000
+"""Most lines of output that wait for a chunk; of more, the oldest are dropped."""
+
+LINE_CHARACTERS_MAX = 1000
+"""Most characters that are kept of a line of output."""
+
 WAITING_BYTES_MAX = 16 << 20
-"""Most bytes of states and lines that wait for a chunk."""
-
-LINE_CHARACTERS_MAX = 10_000
-"""Most characters that are kept of a line that a program prints."""
-
-ENTRY_BYTES = 500
-"""Bytes that an entry takes while it waits, besides its data: about."""
+"""Most bytes of states that wait for a chunk."""
 
 
 class RunRecorder:
@@ -55,8 +56,10 @@ class RunRecorder:
         path: The file, which ends in .mcap.
         programs: Texts of the programs that drive its robots, by name.
         about: What else belongs to the run, such as the command that started it.
+        gives_way: Whether it ends when another recording of the simulation begins; else that one is refused.
 
     Attributes:
+        path: The file.
         next_ns: When the next checkpoint is due [ns].
         note: Takes an entry.
         clock: The world's.
@@ -73,9 +76,15 @@ class RunRecorder:
         *,
         programs: Mapping[str, str] | None = None,
         about: Mapping[str, str] | None = None,
+        gives_way: bool = False,
     ) -> None:
-        if sim.loop.recorder is not None:
+        earlier = sim.loop.recorder
+        if isinstance(earlier, RunRecorder) and earlier.gives_way:
+            earlier.close()
+        elif earlier is not None:
             raise ParameterError(f"{sim} must not be recorded yet, but it is. End that recording first.")
+        self.path = Path(path).absolute()
+        self.gives_way: bool = gives_way
         self._sim, self._world, self._loop = sim, sim.world, sim.loop
         self._file = McapFile(path, (LOG, MOTION, *foxglove.TOPICS))
         self.clock: Clock = self._world
@@ -88,6 +97,7 @@ class RunRecorder:
         self._setup_count = 0
         self._drawn: tuple[int, bytes] = (0, b"")
         self._messages: list[tuple[Topic, int, bytes]] = []
+        self._lines: deque[tuple[int, int, str]] = deque(maxlen=LINES_MAX)
         with sim.lock:
             sim.sync()
             self._motion = MotionWatcher(self._world.state)
@@ -121,15 +131,30 @@ class RunRecorder:
         with self._sim.lock, postponing_endings():
             if self._loop.recorder is not self:
                 return
-            self.note_changes()
-            self._note_check()
-            self._motion.look(self._world.state)
-            self._write_chunk()
+            self.flush()
             self._loop.recorder = None
             for wire in self._sim.wires:
                 wire.recorder = None
             self._world.unwatch(self._motion)
             self._file.close()
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether something could not be written; then nothing more is."""
+        return self._file.has_failed
+
+    @property
+    def byte_count(self) -> int:
+        """Number of bytes in the file so far."""
+        return self._file.byte_count
+
+    def flush(self) -> None:
+        """Write all that has happened up to now, with the present state, so that a reader of the file finds it."""
+        with self._sim.lock, postponing_endings():
+            self.note_changes()
+            self._note_check()
+            self._motion.look(self._world.state)
+            self._write_chunk()
 
     # ---- from outside ----
 
@@ -169,17 +194,8 @@ class RunRecorder:
     # ---- what people and programs say ----
 
     def say(self, robot: int, line: str) -> None:
-        """Note a line that the program of a robot's index has printed; of a long one, the beginning."""
-        with self._sim.lock:
-            if self._loop.recorder is not self:
-                return  # a program may print longer than it is recorded
-            now_ns, text = self._world.now_ns, line[:LINE_CHARACTERS_MAX]
-            data = text.encode("utf-8", "replace")
-            self.note((TEXT, now_ns, robot, 0, 0, data))
-            self._messages.append((foxglove.TEXT, now_ns, foxglove.text(f"robot {robot + 1}", text, now_ns)))
-            # A program may print for ever while no simulated time passes.
-            self._waiting_bytes += 2 * len(data) + ENTRY_BYTES
-            self._write_if_due()
+        """Note a line that the program of a robot's index has printed; from any thread, which waits for nothing."""
+        self._lines.append((self._world.now_ns, robot, line[:LINE_CHARACTERS_MAX]))
 
     def mark(self, note: str) -> None:
         """Set a bookmark at this time."""
@@ -194,7 +210,10 @@ class RunRecorder:
         """Note the state, after all events up to `next_ns`, and choose a later `next_ns`."""
         self._note_check()
         self.next_ns += CHECK_NS
-        self._write_if_due()
+        is_full = self._waiting_bytes > WAITING_BYTES_MAX or len(self._lines) > LINES_MAX // 2
+        if is_full or time.monotonic() >= self._chunk_at_s:
+            with postponing_endings():
+                self._write_chunk()
 
     def _note_check(self) -> None:
         data = state_bytes(self._sim)
@@ -203,13 +222,12 @@ class RunRecorder:
         # Motion has 25 looks in this time.
         self._waiting_bytes += 25 * len(data)
 
-    def _write_if_due(self) -> None:
-        if time.monotonic() >= self._chunk_at_s or self._waiting_bytes > WAITING_BYTES_MAX:
-            with postponing_endings():
-                self._write_chunk()
-
     def _write_chunk(self) -> None:
         """Write what waits."""
+        while self._lines:
+            now_ns, robot, line = self._lines.popleft()
+            self.note((TEXT, now_ns, robot, 0, 0, line.encode("utf-8", "replace")))
+            self._messages.append((foxglove.TEXT, now_ns, foxglove.text(f"robot {robot + 1}", line, now_ns)))
         looks, self._motion.looks = self._motion.looks, []
         messages, self._messages = self._messages, []
         entries = block_of(self._entries)

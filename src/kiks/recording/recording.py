@@ -162,9 +162,17 @@ class Recording:
         Raises:
             ParameterError: If the recording has no such time.
         """
-        return Replay(self.log, self.log.begin_ns if time_s is None else self._time_ns(time_s))
+        return Replay(self.log, self.log.begin_ns if time_s is None else self.time_ns(time_s))
 
-    def _time_ns(self, time_s: float) -> int:
+    def time_ns(self, time_s: float) -> int:
+        """Return a time of the recording [ns].
+
+        Args:
+            time_s: The time [s].
+
+        Raises:
+            ParameterError: If the recording has no such time.
+        """
         begin_s, end_s = s_from_ns(self.log.begin_ns), s_from_ns(self.log.end_ns)
         time_s = check_number("time_s", time_s, begin_s, end_s, "That is where the recording begins and ends.")
         return min(max(ns_from_s(time_s), self.log.begin_ns), self.log.end_ns)

@@ -6,18 +6,42 @@ It can be looked at, made to pass at any speed, and let go on without the record
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Callable
+from typing import NamedTuple
 
 from kiks.model.checks import CLOCK_END_NS
 from kiks.recording.entries import Entry
-from kiks.recording.log import HASH_LENGTH, RecordedLog
+from kiks.recording.log import HASH_LENGTH, RecordedLog, Row
 from kiks.recording.recorder import CHECK_NS
 from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.run_log import Kind
-from kiks.sim.saved_state import restore_state
+from kiks.sim.saved_state import Layout, SavedState, Setup, restore_state, state_bytes
 from kiks.sim.simulation import Simulation
 from kiks.sim.wire import ignore_reply
-from kiks.units import s_from_ns
+from kiks.units import NS_PER_S, s_from_ns
+
+KEPT_NS = NS_PER_S // 10
+"""Simulated time between two places that a replay keeps on its way [ns]."""
+
+KEPT_COUNT = 32
+"""How many places a replay keeps: those of the last seconds that it was sent to."""
+
+
+class Place(NamedTuple):
+    """Where a replay may begin.
+
+    Attributes:
+        row: The last entry that was applied.
+        row_ns: When that was [ns].
+        setup: What the world consists of.
+        saved: All that changes.
+    """
+
+    row: Row
+    row_ns: int
+    setup: Setup
+    saved: SavedState
 
 
 class Replay:
@@ -45,17 +69,69 @@ class Replay:
         self._log = log
         self._on_check = on_check
         self.next_ns = NEVER_NS
-        row = log.row_before(time_ns)
-        setup, saved = log.state_of(log.entry(row))
-        if time_ns - saved.now_ns > CHECK_NS:
-            raise log.damaged(f"a part is missing after {s_from_ns(saved.now_ns):.3f} s")
-        self.sim = setup.simulation(saved.poses)
-        restore_state(self.sim, saved)
-        self._row, self._row_ns = row, saved.now_ns
         self._next: Entry | None = None
-        self._find_next()
+        self._kept: OrderedDict[int, Place] = OrderedDict()
+        place = self._recorded_before(time_ns)
+        self.sim = place.setup.simulation(place.saved.poses)
+        self._begin(place)
         self.sim.loop.supervisor = self
         self.sim.advance_to(time_ns)
+
+    def go_to(self, time_ns: int) -> bool:
+        """Go to another time of the recording, back or on, with the same simulation.
+
+        Args:
+            time_ns: The time [ns].
+
+        Returns:
+            Whether that was possible: a simulation gets robots and turrets, but never loses them. Where the world has
+            fewer of them, nothing has changed, and another replay can begin there.
+
+        Raises:
+            KiksError: If the recording is damaged there.
+        """
+        sim = self.sim
+        if not 0 <= time_ns - sim.now_ns <= CHECK_NS:
+            # Places between two checkpoints make steps back cheap.
+            place = self._kept.get(time_ns // KEPT_NS) or self._recorded_before(time_ns)
+            if not self._is_part_of(place.setup):
+                return False
+            place.setup.bring(sim, place.saved.poses)
+            self._begin(place)
+            for wire in sim.wires:
+                wire.restart_log(sim.now_ns)
+        while sim.now_ns < time_ns:
+            sim.advance_to(min((sim.now_ns // KEPT_NS + 1) * KEPT_NS, time_ns))
+            if sim.now_ns % KEPT_NS == 0:
+                self._keep()
+        return True
+
+    def _recorded_before(self, time_ns: int) -> Place:
+        row = self._log.row_before(time_ns)
+        setup, saved = self._log.state_of(self._log.entry(row))
+        if time_ns - saved.now_ns > CHECK_NS:
+            raise self._log.damaged(f"a part is missing after {s_from_ns(saved.now_ns):.3f} s")
+        return Place(row, saved.now_ns, setup, saved)
+
+    def _begin(self, place: Place) -> None:
+        restore_state(self.sim, place.saved)
+        self._row, self._row_ns, self._setup = place.row, place.row_ns, place.setup
+        self._find_next()
+
+    def _keep(self) -> None:
+        """Keep the present place, if it is new."""
+        number = self.sim.now_ns // KEPT_NS
+        if number not in self._kept:
+            saved = SavedState.from_bytes(state_bytes(self.sim), self._setup, Layout(), "a place of a replay")
+            self._kept[number] = Place(self._row, self._row_ns, self._setup, saved)
+            if len(self._kept) > KEPT_COUNT:
+                self._kept.popitem(last=False)
+
+    def _is_part_of(self, setup: Setup) -> bool:
+        """Return whether a setup has all robots and turrets of the simulation."""
+        counts = [len(wire.firmware.fitted) for wire in self.sim.wires]
+        others = [len(turrets) for turrets in setup.turrets]
+        return len(counts) <= len(others) and all(a <= b for a, b in zip(counts, others, strict=False))
 
     def let_go(self) -> Simulation:
         """Return the simulation, which goes on without the recording from now on; its programs have hung up."""
@@ -76,6 +152,7 @@ class Replay:
         is_due, time_ns = True, self.next_ns
         while is_due and self._next is not None:
             self._apply(self._next)
+            self._row, self._row_ns = self._next_row, self.next_ns
             has_acted = self._find_next()
             is_due = self.next_ns == time_ns and not has_acted
 
@@ -83,11 +160,10 @@ class Replay:
         """Find the next input, if there is one; return whether robots act before it."""
         self._next, self.next_ns, has_acted = None, NEVER_NS, False
         if (found := self._log.next_input(self._row)) is not None:
-            self._row, self._next, has_acted = found
+            self._next_row, self._next, has_acted = found
             self.next_ns = self._next.time_ns
             if not 0 <= self.next_ns - self._row_ns <= CHECK_NS:
                 raise self._log.damaged(f"a part is missing after {s_from_ns(self._row_ns):.3f} s")
-            self._row_ns = self.next_ns
         return has_acted
 
     def _sent_ns(self, entry: Entry) -> int:
@@ -117,6 +193,6 @@ class Replay:
                     each.line.forget()  # unread replies would fill the line
                 self._on_check(entry.time_ns, entry.data[:HASH_LENGTH].decode("ascii", "replace"))
             case Kind.STATE:
-                setup, saved = self._log.state_of(entry)
-                setup.bring(sim, saved.poses)
+                self._setup, saved = self._log.state_of(entry)
+                self._setup.bring(sim, saved.poses)
                 restore_state(sim, saved)

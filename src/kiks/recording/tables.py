@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.errors import ParameterError
+from kiks.recording.events import EventReader
 from kiks.recording.log import RecordedLog
 from kiks.recording.motion import poses_of
 from kiks.sim.run_log import Kind
@@ -110,29 +111,11 @@ def wire(log: RecordedLog) -> Table:
 def events(log: RecordedLog) -> Table:
     """Return what happened: time_s, robot (0 for none), kind, text.
 
-    Kinds are 'contact', 'output' (a line that a program printed), 'bookmark', and 'change' (by a hand or a program, in
-    any other way than over a line).
+    `kiks.recording.events.Event` says which kinds there are.
     """
-    rows: list[tuple[float, int, str, str]] = []
-    states = 0
-    for entry in log.entries():
-        time_s = s_from_ns(entry.time_ns)
-        if entry.kind == Kind.TEXT:
-            rows.append((time_s, entry.robot + 1, "output", entry.data.decode("utf-8", "replace")))
-        elif entry.kind == Kind.MARK:
-            rows.append((time_s, 0, "bookmark", entry.data.decode("utf-8", "replace")))
-        elif entry.kind == Kind.STATE:
-            states += 1
-            if states > 1:
-                rows.append((time_s, 0, "change", ""))
-    before: dict[int, int] = {}
-    for row in wheels(log):
-        robot, contacts = int(row["robot"]), int(row["contacts"])
-        if contacts > before.setdefault(robot, contacts):
-            rows.append((float(row["time_s"]), robot, "contact", ""))
-        before[robot] = contacts
-    rows.sort(key=lambda row: row[0])
-    longest = _longest(log, [4 * len(row[3]) for row in rows]) // 4
+    rows = EventReader(log).read()
+    rows.sort(key=lambda row: row.time_s)
+    longest = _longest(log, [4 * len(row.text) for row in rows]) // 4
     kind = np.dtype([("time_s", "f8"), ("robot", "i4"), ("kind", "U8"), ("text", f"U{max(longest, 1)}")])
     return np.array(rows, kind)
 

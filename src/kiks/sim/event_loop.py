@@ -56,7 +56,7 @@ class Recorder(WireRecorder, Protocol):
         """Note what was changed from outside."""
 
     def say(self, robot: int, line: str) -> None:
-        """Note a line that the program of a robot's index has printed."""
+        """Note a line that the program of a robot's index has printed; from any thread, which waits for nothing."""
 
     def check(self) -> None:
         """Note the state, after all events up to `next_ns`, and choose a later `next_ns`."""

@@ -165,6 +165,11 @@ class Wire:
         if self._watcher_count == 0:
             self.log = None
 
+    def restart_log(self, now_ns: int) -> None:
+        """Begin the record of a watched line anew, as the world has gone to another time [ns]."""
+        if self.log is not None:
+            self.log = WireLog(now_ns)
+
     def think(self, from_ns: int, until_ns: int) -> None:
         """Record that the program has thought, if the line is watched or recorded."""
         if (log := self.log) is not None:

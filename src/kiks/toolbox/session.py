@@ -75,7 +75,7 @@ class Session:
         Raises:
             LinkError: If there is none yet.
         """
-        return self._present_desk().sim
+        return self._present_desk().present.sim
 
     @property
     def url(self) -> str:
@@ -152,7 +152,7 @@ class Session:
         """
         with self.lock:
             desk = self._present_desk()
-            sim = desk.sim
+            sim = desk.present.sim
             robots: list[int] = [wanted, *range(1, sim.robot_count + 1)]
             for robot in robots:
                 is_there = robot <= sim.robot_count
@@ -207,7 +207,7 @@ class Session:
             return
         desk = self.desk
         assert desk is not None
-        is_seen = desk.gate.speed is not None and desk.project.thinking == "live" and len(self.clients) == 1
+        is_seen = desk.present.gate.speed is not None and desk.project.thinking == "live" and len(self.clients) == 1
         has_lived = is_seen and any(client.live(SLICE_NS) for client in self.clients)
         desk.programs.round(0 if has_lived else WAIT_S)
         desk.clear_away()
@@ -215,7 +215,7 @@ class Session:
     def let_go(self) -> None:
         """Let time pass even if the world is paused, when all clients have left."""
         if self.desk is not None:
-            self.desk.gate.close()
+            self.desk.present.gate.close()
 
     def close(self) -> None:
         """End the world and all programs in it."""

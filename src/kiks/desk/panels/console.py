@@ -102,13 +102,13 @@ class ConsolePanel:
     @told
     async def _send(self) -> None:
         desk, text, robot = self._desk, (self._line.value or "").strip(), self._of_robot()
-        sent = await desk.do(lambda sim: type_lines(sim, robot, text))
+        sent = await desk.change(lambda sim: type_lines(sim, robot, text))
         self._history.add(text)
         self._line.value = ""
         self._waiting += sent
         for typed in sent:
             self._rows.push(f"{typed.time_s:8.3f} → {typed.text}", classes="wire-row wire-sent")
-        if desk.gate.is_paused:
+        if desk.is_paused:
             ui.notify("Time is paused. Press space to run it; then the robot answers.")
 
     def _back(self) -> None:

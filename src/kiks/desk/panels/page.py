@@ -1,4 +1,4 @@
-"""The page: the arena on the left, the time controls above it, and tabs with panels on the right."""
+"""The page: the arena on the left, time controls above and below it, and tabs with panels on the right."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from kiks.desk.panels.editor import EditorPanel
 from kiks.desk.panels.monitor import MonitorPanel
 from kiks.desk.panels.programs import ProgramsPanel
 from kiks.desk.panels.settings import SettingsPanel
+from kiks.desk.panels.time_bar import TimeBar
 from kiks.desk.panels.time_controls import TimePanel
 from kiks.desk.panels.view import ViewPanel
 from kiks.desk.panels.wire import WirePanel
@@ -25,6 +26,8 @@ PRIMARY, ACCENT, POSITIVE = "#174a63", "#b85c00", "#1b7a34"
 lighter: see `STYLE`."""
 
 HINT = "Drag a robot to move it, its rim to turn it. Click it to see its readings."
+
+PAST_HINT = "Space plays the recording. Drag the bar to any time; its marks say what happened."
 
 MEMORY = """<script>
 try {
@@ -63,9 +66,11 @@ class Page:
             ui.space()
             tools = ui.row().classes("items-center no-wrap gap-1")
         with ui.splitter(value=64, limits=(30, 100)).classes("desk-body") as halves:
-            with halves.before:
-                self._view = ArenaView(feed, on_pick=self._pick, on_draw=self._draw)
-                ui.label(HINT).classes("desk-hint")
+            with halves.before, ui.column().classes("desk-stage"):
+                with ui.element("div").classes("desk-arena"):
+                    self._view = ArenaView(feed, on_pick=self._pick, on_draw=self._draw)
+                    ui.label(HINT if desk.past is None else PAST_HINT).classes("desk-hint")
+                TimeBar(desk, feed)
             with halves.after, ui.column().classes("w-full gap-0 no-wrap"):
                 self._build_tabs(feed)
         with tools:

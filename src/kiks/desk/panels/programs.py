@@ -154,6 +154,7 @@ class ProgramsPanel:
 
     @told
     async def _stop(self, handle: Handle) -> None:
+        self._desk.check_present()
         self._desk.programs.stop(handle)
         self.refresh()
 
@@ -299,13 +300,14 @@ class ProgramsPanel:
             KiksError: If it cannot start.
         """
         desk, programs = self._desk, self._desk.programs
+        desk.check_present()
         for handle in list(programs.handles):
             if handle.robot == robot and handle.is_running:
                 programs.stop(handle)
                 while handle.is_running:
                     await asyncio.sleep(POLL_S)
-        handle = await desk.do(lambda _: programs.start(command, robot))
+        handle = await desk.change(lambda _: programs.start(command, robot))
         self._show(handle)
         self.refresh()
-        if desk.gate.is_paused:
+        if desk.is_paused:
             ui.notify("Time is paused. Press space to run it; then the program continues.")

@@ -69,7 +69,9 @@ class TimePanel:
         self._run = ui.button(on_click=self._toggle).props("round unelevated color=accent data-testid=run")
         with self._run:
             self._run_tip = ui.tooltip("")
-        icon_button("skip_next", "Step", "step", self._step, look=BAR).tooltip("Run for one step, then pause (key: .)")
+        icon_button("skip_next", "Step", "step", self._step, look=BAR).tooltip(
+            "Run for one step, then pause (key: .). The key , goes back by one step"
+        )
         self._step_s = _select(STEPS, 0.01, "Size of a step", "step-size", "5rem")
         self._speed = _select(SPEEDS, self._shown_speed(), "Speed of time", "speed", "8.5rem")
         self._speed.on_value_change(self._set_speed)
@@ -92,7 +94,7 @@ class TimePanel:
     def _refresh(self) -> None:
         """Show the present state, which another browser may have changed."""
         desk = self._desk
-        word, icon = ("Run", "play_arrow") if desk.gate.is_paused else ("Pause", "pause")
+        word, icon = ("Run", "play_arrow") if desk.is_paused else ("Pause", "pause")
         if self._run.props.get("aria-label") != word:
             self._run.props(f'icon={icon} aria-label="{word}"')
             self._run_tip.text = f"{word} (space)"
@@ -101,12 +103,17 @@ class TimePanel:
 
     @told
     async def _toggle(self) -> None:
-        await (self._desk.go_on() if self._desk.gate.is_paused else self._desk.pause())
+        await (self._desk.go_on() if self._desk.is_paused else self._desk.pause())
         self._refresh()
 
     @told
     async def _step(self) -> None:
         await self._desk.step(self._step_s.value)
+        self._refresh()
+
+    @told
+    async def _step_back(self) -> None:
+        await self._desk.looking.move_by(-self._step_s.value)
         self._refresh()
 
     @told
@@ -131,6 +138,8 @@ class TimePanel:
             await self._toggle()
         elif event.key == ".":
             await self._step()
+        elif event.key == ",":
+            await self._step_back()
 
 
 def _select(choices: dict[float, str], value: float, word: str, name: str, width: str) -> ui.select:

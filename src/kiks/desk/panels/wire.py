@@ -8,7 +8,7 @@ from kiks.desk.panels.console import ConsolePanel
 from kiks.desk.panels.widgets import icon_button
 from kiks.desk.server.desk import Desk
 from kiks.sim.wire import Wire
-from kiks.sim.wire_log import Piece, TimeShares
+from kiks.sim.wire_log import Piece, TimeShares, WireLog
 from kiks.units import NS_PER_S, s_from_ns
 
 REFRESH_S = 0.2
@@ -55,6 +55,7 @@ class WirePanel:
         self._desk = desk
         self._sim: object = None
         self._watched: Wire | None = None
+        self._log: WireLog | None = None
         self._next_piece = 0
         self._is_held = False
         ui.add_css(CSS)
@@ -149,6 +150,9 @@ class WirePanel:
             self._let_go()
             self._watched = wire
             wire.watch(sim.now_ns)
+        if wire.log is not self._log:
+            # Another line, or the world has gone to another time.
+            self._log = wire.log
             self._show_again()
         if wire.log is None:
             return

@@ -5,15 +5,18 @@ from __future__ import annotations
 import asyncio
 import logging
 import threading
-import time
-from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
 from kiks.clock.gate import Gate
+from kiks.desk.server.comparison import Comparison, Instant
+from kiks.desk.server.desk_world import DeskWorld, Speedometer
+from kiks.desk.server.looking_back import LookingBack
+from kiks.desk.server.player import Player
 from kiks.desk.server.scripts import EXAMPLES
+from kiks.desk.server.timeline import Run
 from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, robot_names
@@ -24,58 +27,6 @@ from kiks.sim.from_project import project_of, simulation_of
 from kiks.sim.ring_buffer import RingBuffer
 from kiks.sim.simulation import Simulation
 from kiks.sim.turret_host import name_of
-
-WINDOW_NS = 1_000_000_000
-"""Window of the momentary speed [ns of real time]."""
-
-
-class Speedometer:
-    """Measures how fast simulated time passes, from samples of both clocks.
-
-    Args:
-        wall_ns: Monotonic clock [ns]; tests pass their own.
-
-    Attributes:
-        average: Simulated seconds per real second since the start, without pauses.
-        momentary: Simulated seconds per real second over the last second.
-
-    Example:
-        >>> wall = [0]
-        >>> meter = Speedometer(wall_ns=lambda: wall[0])
-        >>> meter.note(0, is_paused=False)
-        >>> wall[0] = 1_000_000_000
-        >>> meter.note(5_000_000_000, is_paused=False)
-        >>> meter.average, meter.momentary
-        (5.0, 5.0)
-    """
-
-    def __init__(self, *, wall_ns: Callable[[], int] = time.monotonic_ns) -> None:
-        self.average = 0.0
-        self.momentary = 0.0
-        self._wall_ns = wall_ns
-        self._last: tuple[int, int] | None = None
-        self._running_ns = self._passed_ns = 0
-        self._recent: deque[tuple[int, int]] = deque()
-
-    def note(self, now_ns: int, *, is_paused: bool) -> None:
-        """Take a sample at the simulated time `now_ns` [ns]."""
-        wall_ns = self._wall_ns()
-        if self._last is not None:
-            last_wall_ns, last_ns = self._last
-            self._passed_ns += now_ns - last_ns
-            # A single step during a pause takes hardly any real time.
-            self._running_ns += 0 if is_paused else wall_ns - last_wall_ns
-        self._last = wall_ns, now_ns
-        self._recent.append(self._last)
-        while wall_ns - self._recent[0][0] > WINDOW_NS and len(self._recent) > 2:
-            self._recent.popleft()
-        first_wall_ns, first_ns = self._recent[0]
-        self.momentary = (now_ns - first_ns) / (wall_ns - first_wall_ns) if wall_ns > first_wall_ns else 0.0
-        self.average = self._passed_ns / self._running_ns if self._running_ns else 0.0
-
-
-RETRY_S = 0.02
-"""Period at which a request is offered again while no thread moves the world [s]."""
 
 NEWS_LIMIT = 200
 """Number of messages to people that are kept."""
@@ -103,13 +54,11 @@ class Desk:
         is_held: Whether programs wait for `begin`; else they start at once.
 
     Attributes:
-        sim: The world.
+        present: The world that goes on.
+        looking: How people look back.
         project: The project it was built from.
-        gate: Where its time passes.
-        hands: The things that people hold.
-        programs: The programs in it.
+        programs: The programs in the present world.
         is_seen: Set when a page has shown it for the first time.
-        meter: Measures how fast its time passes.
         scene: Counts up whenever a thing appears, disappears or changes its looks.
         news: Messages to people, the newest last.
     """
@@ -133,26 +82,71 @@ class Desk:
         self.scene = 0
         self.news: RingBuffer[str] = RingBuffer(NEWS_LIMIT)
         self.is_seen = threading.Event()
+        self.looking = LookingBack(lambda: self.present, self.say)
         self._has_begun = not is_held
         self._commands = self._granted = list(commands)
         self._new_programs = new_programs or self._usual_programs
         self._retired: list[Programs] = []
         self.project = foreign_project(sim) if project is None else project
-        self._take(sim, speed)
+        self._take(DeskWorld(sim, speed), self._commands)
 
-    def _take(self, sim: Simulation, speed: float | None) -> None:
-        gate = Gate(sim.lock, speed=speed)
+    def _take(self, world: DeskWorld, commands: Sequence[Command | None], *, is_branch: bool = False) -> None:
+        """Show another present world, with programs that begin with it."""
+        sim = world.sim
         # First, because it may fail: then the old world stays.
-        programs = self._new_programs(sim, self._commands, gate)
+        programs = self._new_programs(sim, commands, world.gate)
         programs.permission = self._permission()
         if self._has_begun:
             programs.begin()
-        self.sim, self.gate, self.programs = sim, gate, programs
-        self.hands = Drags(sim)
-        self.meter = Speedometer()
+        if is_branch:
+            self.looking.branch(sim)
+        else:
+            self.looking.begin(sim, self._run(sim))
+        self.present, self.programs = world, programs
         self._mark = sim.checkpoint()
-        sim.gate = gate
+        sim.gate = world.gate
+        self.looking.stop()
         self.tell()
+
+    def _run(self, sim: Simulation) -> Run | None:
+        """Return how a world begins, if its programs can run again."""
+        is_own = self.owns_world and sim.now_ns == 0 and self.has_beginners
+        return Run(self.project, self._commands) if is_own else None
+
+    @property
+    def past(self) -> Player | None:
+        """What is shown of the past; None while the present is shown."""
+        return self.looking.past
+
+    @property
+    def shown(self) -> DeskWorld:
+        """The world that browsers show: that of the past, if there is one."""
+        return self.past or self.present
+
+    @property
+    def sim(self) -> Simulation:
+        """The world that browsers show."""
+        return self.shown.sim
+
+    @property
+    def gate(self) -> Gate:
+        """Where the time of that world passes."""
+        return self.shown.gate
+
+    @property
+    def hands(self) -> Drags:
+        """The things that people hold in that world."""
+        return self.shown.hands
+
+    @property
+    def meter(self) -> Speedometer:
+        """Measures how fast the time of that world passes."""
+        return self.shown.meter
+
+    def keep_past(self) -> None:
+        """Record the world from now on, and each later one, so that people can look back."""
+        with self.present.sim.lock:
+            self.looking.keep(self._run(self.present.sim))
 
     @property
     def has_beginners(self) -> bool:
@@ -160,13 +154,15 @@ class Desk:
         return any(command is not None for command in self._commands)
 
     def begin(self) -> None:
-        """Start the programs of this world; those of later worlds start with them.
+        """Start the programs of this world; those of later worlds start with them. A recording is played.
 
         Raises:
             KiksError: If one of them cannot start.
         """
         self._has_begun = True
         self.programs.begin()
+        if (past := self.past) is not None:
+            past.gate.ask(past.go_on)
 
     def _usual_programs(self, sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
         return Programs(
@@ -210,15 +206,29 @@ class Desk:
 
         The function must not let time pass.
         """
-        sim, gate = self.sim, self.gate
-        future = gate.ask(lambda: act(sim))
-        if future.done():
-            return future.result()
-        # The thread that moves the world serves the request, unless it has just stopped.
-        served = asyncio.wrap_future(future)
-        while not (await asyncio.wait([served], timeout=RETRY_S))[0]:
-            gate.serve()
-        return served.result()
+        return await self.shown.do(act)
+
+    async def change(self, act: Callable[[Simulation], Done]) -> Done:
+        """Do that with a function that changes the world.
+
+        Raises:
+            ParameterError: If the past is shown.
+        """
+        self.check_present()
+        return await self.do(act)
+
+    def check_present(self) -> None:
+        """Check that the present is shown, which may be changed.
+
+        Raises:
+            ParameterError: If the past is shown.
+        """
+        if self.past is not None:
+            back = "'Back to now' or " if self.looking.has_present else ""
+            raise ParameterError(
+                f"the world must be the present one to be changed, but this is its past. Press {back}'Go on from here' "
+                "below the arena first."
+            )
 
     # ---- another world ----
 
@@ -240,26 +250,37 @@ class Desk:
         """
         await self._put(self.project, self._commands)
 
-    async def _put(self, project: Project, commands: Sequence[Command | None]) -> None:
+    async def _put(self, project: Project, commands: Sequence[Command | None], until: Instant | None = None) -> None:
+        """Begin the world of a project; up to an instant, if there is one, at full speed."""
+        self._check_owns()
+        sim = await asyncio.to_thread(simulation_of, project, self.folder)
+        old, before = self.present, (self.project, self._commands)
+        world = DeskWorld(sim, old.gate.speed)
+        if until is not None:
+            sim.loop.supervisor = Comparison(sim, until, self.say)
+            world.gate.pause(until.time_ns)
+        elif old.is_paused and self.past is None:
+            world.pause()
+        self.project, self._commands = project, self._permitted(commands)
+        try:
+            self._replace(world, self._commands)
+        except KiksError:
+            self.project, self._commands = before
+            raise
+
+    def _replace(self, world: DeskWorld, commands: Sequence[Command | None], *, is_branch: bool = False) -> None:
+        old, programs = self.present, self.programs
+        self._take(world, commands, is_branch=is_branch)
+        # Last: the thread that moves the world ends them at once, and then needs the new ones.
+        self._retired.append(programs)
+        old.gate.close()
+
+    def _check_owns(self) -> None:
         if not self.owns_world:
             raise LinkError(
                 "the world must be this desk's own to be replaced, but a program outside holds it. Begin it again "
                 "there, or open another desk: kiks desk."
             )
-        sim = await asyncio.to_thread(simulation_of, project, self.folder)
-        old, programs, before = self.gate, self.programs, (self.project, self._commands)
-        is_paused = old.is_paused
-        self.project, self._commands = project, self._permitted(commands)
-        try:
-            self._take(sim, old.speed)
-        except KiksError:
-            self.project, self._commands = before
-            raise
-        # Last: the thread that moves the world ends them at once, and then needs the new ones.
-        self._retired.append(programs)
-        if is_paused:
-            self.gate.pause(sim.now_ns)
-        old.close()
 
     def clear_away(self) -> None:
         """End the programs of replaced worlds; called by the thread that moves the world."""
@@ -273,26 +294,34 @@ class Desk:
             ArenaError: If there is no room for a thing that a gripper holds up.
         """
         sim, project = self.sim, self.project
-        return replace(await self.do(lambda _: project_of(sim, project)), speed=self.gate.speed)
+        return replace(await self.do(lambda _: project_of(sim, project)), speed=self.present.gate.speed)
 
     # ---- time ----
 
+    @property
+    def is_paused(self) -> bool:
+        """Whether the time of the world that is shown stands still."""
+        return self.shown.is_paused
+
     async def pause(self) -> None:
         """Pause simulated time."""
-        await self.do(lambda sim: self.gate.pause(sim.now_ns))
+        world = self.shown
+        await world.do(lambda _: world.pause())
 
     async def go_on(self) -> None:
-        """Resume simulated time."""
-        await self.do(lambda sim: self.gate.go_on())
+        """Resume simulated time; where the past ends, the present goes on, and a recording begins again.
+
+        Raises:
+            KiksError: If the recording is damaged.
+        """
+        await self.looking.turn_at_the_end()
+        world = self.shown
+        await world.do(lambda _: world.go_on())
 
     async def step(self, seconds: float) -> None:
         """Let `seconds` of simulated time pass, then pause."""
-
-        def begin(sim: Simulation) -> None:
-            self.gate.pause(sim.now_ns)
-            self.gate.step(seconds)
-
-        await self.do(begin)
+        world = self.shown
+        await world.do(lambda _: world.step(seconds))
 
     async def set_speed(self, speed: float | None) -> None:
         """Set the speed [simulated seconds per real second]; None for full speed.
@@ -300,23 +329,87 @@ class Desk:
         Raises:
             ParameterError: If it is out of range.
         """
-        await self.do(lambda sim: self.gate.set_speed(speed, sim.now_ns))
+        world = self.shown
+        await world.do(lambda _: world.set_speed(speed))
+
+    # ---- branches ----
+
+    async def go_on_from_here(self) -> None:
+        """Let the world of the past go on from its time as the desk's world, paused; its programs have hung up.
+
+        Raises:
+            LinkError: If the world cannot be replaced, or the present is shown.
+            KiksError: If it cannot begin.
+        """
+        past = self._past_to_leave()
+        sim = await past.do(lambda _: past.let_go())
+        world = DeskWorld(sim, self.present.gate.speed)
+        world.pause()
+        if len(self.project.robots) != sim.robot_count:
+            self.project = foreign_project(sim)
+        try:
+            self._replace(world, (), is_branch=True)
+        except KiksError:
+            self.looking.stop()
+            raise
+
+    async def run_again_to_here(self) -> None:
+        """Begin the world of the past again with its programs, at full speed up to the time that is shown.
+
+        Raises:
+            LinkError: If the world cannot be replaced, or the present is shown.
+            ParameterError: If its programs cannot run again.
+            KiksError: If it cannot begin.
+        """
+        past = self._past_to_leave()
+        if reason := self.why_not_again():
+            raise ParameterError(f"programs must be able to run again, but {reason}.")
+        run = self.looking.run
+        assert run is not None
+        until = await past.do(lambda sim: Instant(sim.now_ns, sim.state_hash()))
+        await self._put(run.project, run.commands, until)
+
+    def why_not_again(self) -> str:
+        """Return why the programs cannot run again up to the time that is shown; empty if they can."""
+        run = self.looking.run
+        if not self.owns_world:
+            return "a program outside holds this world"
+        if not self.looking.has_present:
+            return "a recording keeps what programs have sent, not how they were started"
+        if run is None:
+            return "no program of this desk began with this part of the run"
+        if run.project.thinking.startswith("live"):
+            return "their thinking is live: it takes real time, so no run is like another"
+        return ""
+
+    def _past_to_leave(self) -> Player:
+        self._check_owns()
+        if self.past is None:
+            raise LinkError("the past must be shown to go on from there. Move the time bar back first.")
+        return self.past
 
     # ---- checkpoints ----
 
     async def mark(self) -> None:
-        """Take a checkpoint for `reset`."""
-        self._mark = await self.do(lambda sim: sim.checkpoint())
+        """Take a checkpoint for `reset`.
+
+        Raises:
+            ParameterError: If the past is shown.
+        """
+        self._mark = await self.change(lambda sim: sim.checkpoint())
 
     async def reset(self) -> None:
-        """Restore the last checkpoint, or the initial state; time and programs go on."""
+        """Restore the last checkpoint, or the initial state; time and programs go on.
+
+        Raises:
+            ParameterError: If the past is shown.
+        """
 
         def restore(sim: Simulation) -> None:
-            self.hands.drop_all()
-            self._leave_if_empty()
+            self.present.drop_all()
             sim.reset(self._mark)
 
-        await self.do(restore)
+        await self.change(restore)
 
     # ---- hands ----
 
@@ -324,40 +417,38 @@ class Desk:
         """Let the hand of `owner` take a thing.
 
         Raises:
-            ParameterError: If there is no such thing, or another hand has it.
+            ParameterError: If there is no such thing, another hand has it, or the past is shown.
         """
+        world = self.present
 
         def take(_sim: Simulation) -> None:
-            if self.hands.are_empty:
-                self.gate.keep(self.hands.keep)
+            if world.hands.are_empty:
+                world.gate.keep(world.hands.keep)
             try:
-                self.hands.grab(owner, what, index)
+                world.hands.grab(owner, what, index)
             finally:
-                self._leave_if_empty()
+                world.leave_if_empty()
 
-        await self.do(take)
+        await self.change(take)
 
     async def drop(self, owner: str) -> None:
         """Let the hand of `owner` drop what it holds."""
+        world = self.shown
 
         def let_go(_sim: Simulation) -> None:
-            if not self.hands.are_empty:
-                self.hands.drop(owner)
-                self._leave_if_empty()
+            if not world.hands.are_empty:
+                world.hands.drop(owner)
+                world.leave_if_empty()
 
-        await self.do(let_go)
-
-    def _leave_if_empty(self) -> None:
-        """Remove the keeper from the gate when all hands are empty."""
-        if self.hands.are_empty:
-            self.gate.leave(self.hands.keep)
+        await world.do(let_go)
 
     def close(self) -> None:
-        """End the programs and release the world."""
-        self.gate.close()
+        """End the programs, release the world, and forget its past."""
+        self.looking.close()
+        self.present.gate.close()
         self.clear_away()
         self.programs.close()
-        self.sim.gate = None
+        self.present.sim.gate = None
 
 
 class NewsHandler(logging.Handler):

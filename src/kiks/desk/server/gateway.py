@@ -15,8 +15,11 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.frames import arena_picture, describe_scene, describe_shapes, pack_frame
+from kiks.desk.server.timeline import Mark, thinned
 from kiks.errors import KiksError, ParameterError
+from kiks.model.checks import SECONDS_MAX
 from kiks.sim.simulation import Simulation
+from kiks.units import ns_from_s, s_from_ns
 
 FRAME_S = 0.04
 """Frame period [s]."""
@@ -26,6 +29,9 @@ DRAG_FRAME_S = 0.015
 
 SHAPES_FRAMES = 10
 """Number of frames between two checks of the turrets' shapes."""
+
+TEND_S = 1.0
+"""Period at which the past is kept and read [s]."""
 
 IN_FLIGHT = 3
 """Maximum number of unacknowledged frames of one browser."""
@@ -45,6 +51,7 @@ class Viewer:
         in_flight: Number of unacknowledged frames.
         scene: Number of the last scene sent.
         shapes: The last shapes sent.
+        bar: The last description of the time bar sent.
         newest: The next frame to send.
         texts: Messages to send before that frame.
     """
@@ -54,6 +61,7 @@ class Viewer:
         self.in_flight = 0
         self.scene = -1
         self.shapes: dict[str, Any] = {}
+        self.bar: dict[str, Any] = {}
         self.newest: bytes | None = None
         self.texts: list[str] = []
         self._wake = asyncio.Event()
@@ -103,9 +111,13 @@ class Gateway:
         self._wake = asyncio.Event()
         self._has_moved = False
         self._seen: tuple[Any, ...] = ()
+        self._seeking: set[asyncio.Task[None]] = set()
         self._scene: dict[str, Any] = {}
         self._picture: tuple[Any, bytes] = (None, b"")
         self._shapes: dict[str, Any] = {}
+        self._bar: dict[str, Any] = {}
+        self._bar_state: dict[str, Any] = {}
+        self._marks: list[Mark] | None = None
         self._frame_count = 0
 
     # ---- sending ----
@@ -114,6 +126,7 @@ class Gateway:
         """Send frames to all browsers that are ready, until the gateway is closed."""
         loop = asyncio.get_running_loop()
         due_s = loop.time()
+        tending = asyncio.create_task(self._tend())
         while not self._is_closed:
             due_s = max(due_s + FRAME_S, loop.time())
             alarm = loop.call_at(due_s, self._wake.set)
@@ -125,6 +138,13 @@ class Gateway:
             self._wake.clear()
             if any(viewer.is_ready for viewer in self._viewers):
                 self._show(await self._desk.do(self._look))
+        tending.cancel()
+
+    async def _tend(self) -> None:
+        """Keep the past of the world."""
+        while True:
+            await self._desk.looking.tend()
+            await asyncio.sleep(TEND_S)
 
     def _look(self, sim: Simulation) -> bytes:
         desk = self._desk
@@ -141,16 +161,33 @@ class Gateway:
         self._frame_count += 1
         if self._frame_count % SHAPES_FRAMES == 0 and (shapes := describe_shapes(sim)) != self._shapes:
             self._shapes = shapes
-        desk.meter.note(sim.now_ns, is_paused=desk.gate.is_paused)
+        desk.meter.note(sim.now_ns, is_paused=desk.is_paused)
+        self._describe_bar()
         return pack_frame(
             sim,
             scene=self._scene["scene"],
-            is_paused=desk.gate.is_paused,
-            is_driven=desk.programs.drive,
+            is_paused=desk.is_paused,
+            is_driven=desk.programs.drive and desk.past is None,
             speed_now=desk.meter.momentary,
             speed_average=desk.meter.average,
             is_held=desk.hands.holds,
         )
+
+    def _describe_bar(self) -> None:
+        """Describe the time bar, if it has changed: browsers know from frames where it stands."""
+        looking = self._desk.looking
+        past, span = looking.past, looking.span
+        state: dict[str, Any] = {
+            "kind": "bar",
+            "begin_s": None if span is None else s_from_ns(span.begin_ns),
+            "end_s": None if span is None or past is None else s_from_ns(span.end_ns),
+            "is_past": past is not None,
+            "has_present": looking.has_present,
+            "is_backwards": past is not None and past.is_backwards,
+        }
+        if looking.marks is not self._marks or state != self._bar_state:
+            self._marks, self._bar_state = looking.marks, state
+            self._bar = {**state, "marks": [(*mark[:2], mark.text) for mark in thinned(looking.marks, span)]}
 
     def _show(self, frame: bytes) -> None:
         number = self._scene["scene"]
@@ -161,6 +198,9 @@ class Gateway:
             if viewer.shapes is not self._shapes:
                 viewer.shapes = self._shapes
                 viewer.tell(self._shapes)
+            if viewer.bar != self._bar:
+                viewer.bar = self._bar
+                viewer.tell(self._bar)
             if viewer.is_ready:
                 viewer.show(frame)
 
@@ -219,6 +259,9 @@ class Gateway:
             self._desk.is_seen.set()
             return
         desk, name = self._desk, viewer.name
+        if kind == "seek":
+            self._seek(viewer, ns_from_s(_number(message, "time_s", SECONDS_MAX)))
+            return
         if kind == "grab":
             await desk.grab(name, message.get("what", ""), message.get("index", -1))
         elif kind == "move":
@@ -231,10 +274,25 @@ class Gateway:
             await desk.drop(name)
         else:
             raise ParameterError(
-                f"a message must be one of ack, grab, move, turn and drop, but it was {kind[:80]!r}. Reload the page."
+                f"a message must be one of ack, grab, move, turn, drop and seek, but it was {kind[:80]!r}. Reload the "
+                "page."
             )
         self._has_moved = True
         self._wake.set()
+
+    def _seek(self, viewer: Viewer, time_ns: int) -> None:
+        """Show the past at a time [ns], while the browser's next messages are received: the last time counts."""
+
+        async def seek() -> None:
+            try:
+                await self._desk.looking.look_at(time_ns)
+            except KiksError as error:
+                viewer.tell({"kind": "error", "text": str(error)})
+            self._wake.set()
+
+        task = asyncio.create_task(seek())
+        self._seeking.add(task)
+        task.add_done_callback(self._seeking.discard)
 
 
 def _parse(text: str) -> dict[str, Any]:
@@ -247,10 +305,10 @@ def _parse(text: str) -> dict[str, Any]:
     return message
 
 
-def _number(message: dict[str, Any], name: str) -> float:
+def _number(message: dict[str, Any], name: str, most: float = NUMBER_MAX) -> float:
     value = message.get(name)
-    if not isinstance(value, int | float) or not abs(value) <= NUMBER_MAX:
+    if not isinstance(value, int | float) or not abs(value) <= most:
         raise ParameterError(
-            f"{name} must be a number of at most {NUMBER_MAX:g}, but it was {repr(value)[:80]}. Reload the page."
+            f"{name} must be a number of at most {most:g}, but it was {repr(value)[:80]}. Reload the page."
         )
     return float(value)

@@ -118,6 +118,7 @@ class Editing:
         await self.draw(lambda sketch: sketch.begin(arena))
 
     async def _do(self, act: Callable[[Sketch], object], take_back: Callable[[Sketch], object]) -> None:
+        self._desk.check_present()
         async with self._lock:
             await self._follow()
             sketch = self._sketch

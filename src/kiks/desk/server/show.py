@@ -56,7 +56,7 @@ class Driver:
     def stop(self) -> None:
         """End `run`; from any thread."""
         self._is_over.set()
-        self._desk.gate.close()
+        self._desk.present.gate.close()
 
 
 def has_screen() -> bool:
@@ -94,6 +94,7 @@ class Shown:
         with desk.sim.lock:
             # Compile the code for frames before the first browser waits for it.
             pack_frame(desk.sim, scene=0)
+        desk.keep_past()
         SERVER.start(host=host, port=port)
         self._served = SERVER.open(desk)
         self.url = SERVER.url(self._served.number)

@@ -6,9 +6,10 @@
 
    feed.scene       the newest scene message (arena, robots, bodies) or null
    feed.frame       the newest frame (see frame.js) or null; it always belongs to feed.scene
+   feed.bar         the newest description of the time bar (see time_bar.js) or null
    feed.connection  "connecting", "open", "lost" (it reconnects by itself) or "gone" (the desk is closed)
-   feed.on(what, callback) subscribes to "scene", "shapes", "frame", "connection" or "error" (a message of the server)
-                    and returns a function that unsubscribes.
+   feed.on(what, callback) subscribes to "scene", "shapes", "bar", "frame", "connection" or "error" (a message of the
+                    server) and returns a function that unsubscribes.
    feed.send(object) sends a message and returns whether there was a connection.
 
    A hidden page does not acknowledge frames: the server pauses, and sends the newest frame when the page is visible
@@ -16,7 +17,7 @@
 
 import { Frame } from "./frame.js";
 
-const HAPPENINGS = ["scene", "shapes", "frame", "connection", "error"];
+const HAPPENINGS = ["scene", "shapes", "bar", "frame", "connection", "error"];
 /** Number of frames for one acknowledgement, which costs the server a tenth of a frame. */
 const ACKNOWLEDGED_TOGETHER = 2;
 const FIRST_PAUSE_MS = 250;
@@ -29,6 +30,7 @@ export class Feed {
     this.path = path;
     this.scene = null;
     this.frame = null;
+    this.bar = null;
     this.connection = "connecting";
     this.frames_received = 0;
     this.bytes_received = 0;
@@ -80,6 +82,9 @@ export class Feed {
     } else if (message.kind === "shapes" && this.scene) {
       this.scene.robots.forEach((robot, index) => (robot.shapes = message.robots[index] ?? robot.shapes));
       this._tell("shapes", this.scene);
+    } else if (message.kind === "bar") {
+      this.bar = message;
+      this._tell("bar", message);
     } else if (message.kind === "error") {
       this._tell("error", message.text);
     } else if (message.kind === "gone") {

@@ -48,6 +48,7 @@ export class Stage {
     this._dresses.observe(document.body, { attributeFilter: ["class"] });
     this._resize();
     if (this.feed.scene) this._takeScene(this.feed.scene);
+    if (this.feed.bar) this._takeBar(this.feed.bar);
     this._say(this.feed.connection);
     this._beat = requestAnimationFrame((now_ms) => this._tick(now_ms));
   }
@@ -159,6 +160,7 @@ export class Stage {
         this._isWanted = true;
       }),
       this.feed.on("frame", (frame) => this.topView.trails.add(frame)),
+      this.feed.on("bar", (bar) => this._takeBar(bar)),
       this.feed.on("connection", (connection) => {
         if (connection !== "open") this.hand.forget();
         this._say(connection);
@@ -166,6 +168,8 @@ export class Stage {
       this.feed.on("error", (text) => this._object(text)),
     ];
   }
+
+  _takeBar({ is_past }) { this.root.classList.toggle("kiks-past", is_past); }
 
   async _takeScene(scene) {
     this.hand.forget();

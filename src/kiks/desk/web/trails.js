@@ -19,6 +19,8 @@ export class Trails {
 
   /** Add the places of a frame. */
   add(frame) {
+    if (frame.time_s < this._time_s) this.clear(); // the world has gone back
+    this._time_s = frame.time_s;
     for (let index = 0; index < frame.robot_count; index++) {
       const way = (this.ways[index] ??= []), { x_mm, y_mm } = frame.robot(index), end = way.length;
       if (end) {

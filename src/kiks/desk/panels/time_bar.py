@@ -1,0 +1,218 @@
+"""The time bar below the arena: back to any time of the run, to what happened, and on from there."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+from nicegui import ui
+from nicegui.element import Element
+from nicegui.events import KeyEventArguments
+
+from kiks.desk.panels.widgets import icon_button, told
+from kiks.desk.server.desk import Desk
+from kiks.units import s_from_ns
+
+_WEB = Path(__file__).parents[1] / "web"
+
+SHORT_S, LONG_S = 0.1, 1.0
+"""Steps of the buttons [s]."""
+
+REFRESH_S = 0.25
+"""Period at which changes by other browsers are shown [s]."""
+
+NOT_OWN = "Another program owns this world, so it cannot be replaced here"
+
+INTRO = (
+    "The world lives on from this moment. Time is paused first, so that you can change something: drag a robot, draw a "
+    "wall, start another program."
+)
+BY_HAND = (
+    "The programs that drove the robots have hung up. Each robot carries on with its last command, until you type a "
+    "command or start a program."
+)
+BY_PROGRAMS = (
+    "KiKS starts the world over with the same seed and runs {programs} again, at full speed up to this moment. Then "
+    "time is paused, and the programs go on with all that they remember. What people changed by hand is not repeated; "
+    "a message tells whether the run is the same."
+)
+
+
+class TimeSlider(Element, component=_WEB / "time_bar.js", esm={"kiks-desk": str(_WEB)}):
+    """The slider of the time bar.
+
+    Args:
+        feed: Path of the WebSocket that frames come from; all components of a page share one.
+    """
+
+    def __init__(self, feed: str = "/desk/feed") -> None:
+        super().__init__()
+        ui.add_css(_WEB / "time_bar.css")
+        self._props["feed"] = feed
+
+
+class TimeBar:
+    """The slider with its buttons.
+
+    Args:
+        desk: The desk.
+        feed: Path of the WebSocket that frames come from.
+    """
+
+    def __init__(self, desk: Desk, feed: str) -> None:
+        self._desk = desk
+        looking = desk.looking
+        self._keys: dict[str, Callable[[], Awaitable[None]]] = {}
+        with ui.element("div").classes("desk-bar").props('role="group" aria-label="Time bar"') as self._bar:
+            TimeSlider(feed)
+            with ui.row().classes("desk-bar-buttons items-center no-wrap gap-1"):
+                self._add("first_page", "Event before", "event-before", "u", lambda: self._jump(is_before=True))
+                self._add("keyboard_double_arrow_left", "1 s back", "back-long", "J", lambda: looking.move_by(-LONG_S))
+                self._add("keyboard_arrow_left", "0.1 s back", "back-short", "j", lambda: looking.move_by(-SHORT_S))
+                self._backwards = self._add(
+                    "play_arrow", "Play backwards", "play-backwards", "r", self._toggle_backwards
+                ).classes("desk-bar-backwards")
+                self._play = self._add("play_arrow", "Play", "play", "k", self._toggle)
+                self._onwards = [
+                    self._add("keyboard_arrow_right", "0.1 s on", "on-short", "l", lambda: looking.move_by(SHORT_S)),
+                    self._add("keyboard_double_arrow_right", "1 s on", "on-long", "L", lambda: looking.move_by(LONG_S)),
+                    self._add("last_page", "Event after", "event-after", "o", lambda: self._jump(is_before=False)),
+                ]
+                self._state = ui.label().classes("desk-bar-state q-ml-sm").props("data-testid=bar-state")
+                ui.space()
+                self._now = _long_button("Back to now", "update", "back-to-now", self._back_to_now)
+                self._now.tooltip("Show the present world again; it goes on as if nothing had been")
+                self._branch = _long_button("Go on from here", "call_split", "go-on-from-here", self._ask)
+                self._branch.props("unelevated color=accent")
+                with self._branch:
+                    self._branch_tip = ui.tooltip("")
+        with ui.dialog() as self._dialog, ui.card().classes("gap-3").style("max-width: 620px"):
+            self._build_dialog()
+        ui.keyboard(on_key=self._press, ignore=["input", "select", "textarea"])
+        ui.timer(REFRESH_S, self.refresh)
+        self.refresh()
+
+    def _add(self, icon: str, label: str, name: str, key: str, act: Callable[[], Awaitable[object]]) -> ui.button:
+        async def acted() -> None:
+            await act()
+            self.refresh()
+
+        shown = told(acted)
+        self._keys[key] = shown
+        keys = f"Shift and {key}" if key.isupper() else key
+        return icon_button(icon, label, name, shown).tooltip(f"{label} (key: {keys})")
+
+    def refresh(self) -> None:
+        """Show the present state, which another browser may have changed."""
+        desk = self._desk
+        past, has_present = desk.past, desk.looking.has_present
+        self._bar.set_visibility(desk.looking.span is not None)
+        self._bar.classes(add="is-past") if past else self._bar.classes(remove="is-past")
+        self._state.text = "Now" if past is None else "Past" if has_present else "Recording"
+        is_backwards = past is not None and past.is_backwards
+        for button, word, goes in (
+            (self._backwards, "Play backwards", is_backwards),
+            (self._play, "Play", not desk.is_paused and not is_backwards),
+        ):
+            word = "Pause" if goes else word
+            if button.props.get("aria-label") != word:
+                button.props(f'icon={"pause" if goes else "play_arrow"} aria-label="{word}"')
+        for button in self._onwards:
+            button.set_enabled(past is not None)
+        self._now.set_visibility(past is not None and has_present)
+        self._branch.set_visibility(past is not None)
+        self._branch.set_enabled(desk.owns_world)
+        self._branch_tip.text = "Let the world live on from this moment" if desk.owns_world else NOT_OWN
+
+    # ---- in the past ----
+
+    async def _toggle_backwards(self) -> None:
+        past = self._desk.past
+        await (self._desk.pause() if past is not None and past.is_backwards else self._desk.looking.go_back())
+
+    async def _toggle(self) -> None:
+        past = self._desk.past
+        goes = not self._desk.is_paused and not (past is not None and past.is_backwards)
+        await (self._desk.pause() if goes else self._desk.go_on())
+
+    async def _jump(self, *, is_before: bool) -> None:
+        mark = await self._desk.looking.jump(is_before=is_before)
+        if mark is None:
+            ui.notify(f"Nothing happened {'before' if is_before else 'after'} this.")
+
+    @told
+    async def _back_to_now(self) -> None:
+        await self._desk.looking.back_to_now()
+        self.refresh()
+
+    async def _press(self, event: KeyEventArguments) -> None:
+        if not event.action.keydown or event.modifiers.ctrl or event.modifiers.alt or event.modifiers.meta:
+            return
+        act = self._keys.get(str(event.key))
+        if act is not None and self._desk.looking.span is not None:
+            await act()
+
+    # ---- on from here ----
+
+    def _build_dialog(self) -> None:
+        self._title = ui.label().classes("text-h6").props('role="heading" aria-level="2"')
+        self._intro = ui.label().classes("text-body2")
+        with ui.card().props("flat bordered").classes("w-full gap-2"):
+            ui.label("With the robots in your hands").classes("text-subtitle1 text-weight-medium")
+            ui.label(BY_HAND).classes("text-body2")
+            go = ui.button("Go on", icon="pan_tool", on_click=self._go_on).mark("branch-by-hand")
+            go.props("no-caps unelevated color=primary data-testid=branch-by-hand")
+        with ui.card().props("flat bordered").classes("w-full gap-2"):
+            ui.label("With the programs run again").classes("text-subtitle1 text-weight-medium")
+            self._again_words = ui.label().classes("text-body2").props("data-testid=branch-words")
+            self._again = ui.button("Run again", icon="replay", on_click=self._run_again).mark("branch-by-programs")
+            self._again.props("no-caps unelevated color=primary data-testid=branch-by-programs")
+        with ui.row().classes("w-full justify-end"):
+            ui.button("Cancel", on_click=self._dialog.close).props("flat no-caps data-testid=branch-cancel")
+
+    @told
+    async def _ask(self) -> None:
+        """Say what going on does, and ask how."""
+        desk = self._desk
+        await desk.pause()
+        self._title.text = f"Go on from {_clock(desk.sim.now_ns)}"
+        end = _clock(desk.present.sim.now_ns)
+        self._intro.text = f"{INTRO} The run that has come to {end} ends." if desk.looking.has_present else INTRO
+        reason, run = desk.why_not_again(), desk.looking.run
+        self._again.set_enabled(not reason)
+        if reason or run is None:
+            self._again_words.text = f"Not here: {reason}."
+        else:
+            names = ", ".join(command.program.name for command in run.commands if command is not None)
+            self._again_words.text = BY_PROGRAMS.format(programs=names)
+        self._dialog.open()
+
+    @told
+    async def _go_on(self) -> None:
+        self._dialog.close()
+        await self._desk.go_on_from_here()
+        self.refresh()
+        ui.notify("The world is yours. Change something, then press space to let time pass.")
+
+    @told
+    async def _run_again(self) -> None:
+        self._dialog.close()
+        await self._desk.run_again_to_here()
+        self.refresh()
+
+
+def _clock(time_ns: int) -> str:
+    """Return a time as the clock shows it.
+
+    Example:
+        >>> _clock(72_345_000_000)
+        '1:12.34'
+    """
+    minutes, seconds = divmod(int(s_from_ns(time_ns) * 100 + 1e-6), 6000)
+    return f"{minutes}:{seconds // 100:02d}.{seconds % 100:02d}"
+
+
+def _long_button(text: str, icon: str, name: str, act: Callable[[], Awaitable[None]]) -> ui.button:
+    """Build a button whose text goes where there is no room for it."""
+    button = ui.button(text, icon=icon, on_click=act).props(f'dense no-caps padding="3px 10px" data-testid={name}')
+    return button.props(f'aria-label="{text}"').classes("desk-bar-long").mark(name)

@@ -1,0 +1,82 @@
+"""What happened in a run, for people: contacts, lines of output, bookmarks, changes by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.recording.log import RecordedLog
+from kiks.sim.run_log import Kind
+from kiks.units import TICK_NS, s_from_ns
+
+
+class Event(NamedTuple):
+    """One thing that happened.
+
+    Attributes:
+        time_s: When [s].
+        robot: Number of the robot; 0 for none.
+        kind: 'contact', 'output' (a line that a program printed), 'bookmark', or 'change' (by a hand or a program, in
+            any other way than over a line).
+        text: Of an output or a bookmark.
+    """
+
+    time_s: float
+    robot: int
+    kind: str
+    text: str
+
+
+class EventReader:
+    """Reads the events of a recording, which may grow meanwhile.
+
+    Args:
+        log: The log of the recording.
+    """
+
+    def __init__(self, log: RecordedLog) -> None:
+        self._log = log
+        self._block = 0
+        self._has_begun = False
+        self._contacts: NDArray[np.int64] = np.zeros(0, np.int64)
+
+    def read(self) -> list[Event]:
+        """Return the events since the last call, in their order.
+
+        Raises:
+            KiksError: If the recording is damaged there.
+        """
+        events: list[Event] = []
+        while self._block < self._log.block_count:
+            # Both of one block at once: an error leaves no half of it behind.
+            events += sorted([*self._of_entries(), *self._of_motion()], key=lambda event: event.time_s)
+            self._block += 1
+        return events
+
+    def _of_entries(self) -> Iterator[Event]:
+        for entry in self._log.entries_of(self._block):
+            time_s = s_from_ns(entry.time_ns)
+            if entry.kind == Kind.TEXT:
+                yield Event(time_s, entry.robot + 1, "output", entry.data.decode("utf-8", "replace"))
+            elif entry.kind == Kind.MARK:
+                yield Event(time_s, 0, "bookmark", entry.data.decode("utf-8", "replace"))
+            elif entry.kind == Kind.STATE:
+                # The first state is the beginning.
+                if self._has_begun:
+                    yield Event(time_s, 0, "change", "")
+                self._has_begun = True
+
+    def _of_motion(self) -> Iterator[Event]:
+        """Yield an event for each robot that has begun to touch something between two looks."""
+        for motion in self._log.motion_of(self._block):
+            records: Any = motion.robots
+            counts: NDArray[np.int64] = records["contact_count"].astype(np.int64)
+            before = counts[:1].copy()
+            known = min(len(self._contacts), counts.shape[1])
+            before[0, :known] = self._contacts[:known]
+            self._contacts = counts[-1]
+            for look, robot in np.argwhere(np.diff(counts, axis=0, prepend=before) > 0).tolist():
+                yield Event(s_from_ns(int(motion.ticks[look]) * TICK_NS), robot + 1, "contact", "")

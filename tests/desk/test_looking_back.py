@@ -1,0 +1,478 @@
+"""Looking back on a desk, without a browser: the past equals what was, and the present does not notice."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Callable, Coroutine, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+import pytest
+
+from kiks import Arena, Khepera, Recording, Simulation
+from kiks.desk.server.desk import Desk
+from kiks.desk.server.show import Driver
+from kiks.desk.server.timeline import Mark, next_mark
+from kiks.errors import LinkError, ParameterError
+from kiks.model.project import Project
+from kiks.ports.program_process import Command
+from kiks.recording.mcap_file import McapReader
+from kiks.sim.from_project import simulation_of
+from kiks.units import NS_PER_S
+
+GUARD_S = 60.0
+
+ROUND = """
+import sys, serial
+port = serial.Serial("kiks", timeout=1)
+for step in range(200):
+    port.write(b"N\\n")
+    counts = [int(word) for word in port.readline().split(b",")[1:]]
+    port.write(b"D,%d,%d\\n" % (9 - counts[3] // 60, 9 - counts[2] // 70))
+    port.readline()
+"""
+
+Fact = TypeVar("Fact")
+
+
+def run(work: Coroutine[Any, Any, Fact]) -> Fact:
+    return asyncio.run(work)
+
+
+def until(fact: Callable[[], Fact]) -> Fact:
+    """Wait for a condition."""
+    waited = threading.Event()
+    for _ in range(int(GUARD_S / 0.005)):
+        if found := fact():
+            return found
+        waited.wait(0.005)
+    raise AssertionError("what was waited for did not come")
+
+
+def drive(sim: Simulation, seconds: float, hashes: dict[int, str] | None = None) -> None:
+    """Let a program drive robot 1 about, and note the state after each of its steps."""
+    end_s = sim.time_s + seconds
+    khepera, step = Khepera(sim.port(1)), 0
+    while sim.time_s < end_s:
+        step += 1
+        near = khepera.proximity()
+        khepera.set_speed(9 - near[3] // 60 - step % 3, 9 - near[2] // 70)
+        if hashes is not None:
+            hashes[sim.now_ns] = sim.state_hash()
+
+
+@contextmanager
+def desk_of(sim: Simulation, **options: Any) -> Iterator[Desk]:
+    desk = Desk(sim, speed=None, **options)
+    desk.keep_past()
+    yield desk
+    desk.close()
+
+
+def make_sim() -> Simulation:
+    sim = Simulation(Arena.box(400, 400), robots=2, seed=5)
+    sim.place(1, 100, 100, 0.0)
+    sim.place(2, 300, 300, 0.0)
+    sim.add_ball(200, 200)
+    return sim
+
+
+def state_of(desk: Desk) -> tuple[int, str]:
+    return run(desk.do(lambda sim: (sim.now_ns, sim.state_hash())))
+
+
+# ---- the present and the past ----
+
+
+def test_the_past_equals_what_was_and_the_present_goes_on_unchanged() -> None:
+    alone = make_sim()
+    drive(alone, 4.0)
+    drive(alone, 1.0)
+    sim, hashes = make_sim(), {}
+    with desk_of(sim) as desk:
+        drive(sim, 4.0, hashes)
+        now_ns, now_hash = sim.now_ns, sim.state_hash()
+        times = list(hashes)
+        for time_ns in [times[-1], times[3], times[len(times) // 2], times[len(times) // 2 - 1], *times[::7]]:
+            run(desk.looking.look_at(time_ns))
+            assert desk.sim is not sim
+            assert state_of(desk) == (time_ns, hashes[time_ns])
+        run(desk.looking.look_at(10**15))
+        assert state_of(desk) == (now_ns, now_hash)
+        run(desk.looking.back_to_now())
+        assert desk.sim is sim
+        assert not desk.is_paused
+        drive(sim, 1.0)
+        assert sim.state_hash() == alone.state_hash()
+        run(desk.looking.look_at(sim.now_ns - 500_000_000))
+        assert desk.sim.now_ns == sim.now_ns - 500_000_000
+    assert sim.loop.recorder is None
+    assert sim.gate is None
+
+
+def test_a_program_that_waits_at_the_gate_goes_on_as_if_nothing_had_been() -> None:
+    alone = make_sim()
+    drive(alone, 3.0)
+    sim = make_sim()
+    with desk_of(sim) as desk:
+        running = threading.Thread(target=lambda: drive(sim, 3.0))
+        running.start()
+        for _ in range(3):
+            before_ns = sim.now_ns
+            until(lambda before_ns=before_ns: sim.now_ns > before_ns or not running.is_alive())
+            run(desk.looking.look_at(sim.now_ns // 2))
+            assert desk.sim.now_ns <= sim.now_ns
+            run(desk.looking.back_to_now())
+        running.join(GUARD_S)
+        assert sim.state_hash() == alone.state_hash()
+
+
+def test_a_world_that_stood_still_stands_still_again() -> None:
+    sim = make_sim()
+    with desk_of(sim) as desk:
+        drive(sim, 0.5)
+        run(desk.pause())
+        run(desk.looking.look_at(100_000_000))
+        run(desk.looking.back_to_now())
+        assert desk.is_paused
+        run(desk.go_on())
+
+
+def test_the_past_is_played_up_to_the_present(tmp_path: Path) -> None:
+    sim, hashes = make_sim(), {}
+    with desk_of(sim) as desk:
+        drive(sim, 3.0, hashes)
+        run(desk.pause())
+        run(desk.looking.look_at(0))
+        run(desk.step(0.25))
+        until(lambda: desk.sim.now_ns == 250_000_000)
+        run(desk.go_on())
+        until(lambda: desk.is_paused)
+        assert state_of(desk) == (sim.now_ns, sim.state_hash())
+        run(desk.looking.move_by(-0.1))
+        assert desk.sim.now_ns == sim.now_ns - 100_000_000
+        run(desk.looking.move_by(1.0))
+        assert desk.sim.now_ns == sim.now_ns
+        # Where the past ends, the present goes on.
+        run(desk.go_on())
+        assert desk.sim is sim
+        assert not desk.is_paused
+
+
+def test_backwards_shows_what_was(tmp_path: Path) -> None:
+    """Whatever instants it shows on its way, robots and balls are where they were."""
+    sim, hashes = make_sim(), {}
+    with desk_of(sim) as desk:
+        drive(sim, 3.0, hashes)
+        run(desk.set_speed(5.0))
+        run(desk.looking.go_back())
+        assert not desk.is_paused
+        seen: dict[int, np.ndarray[Any, Any]] = {}
+
+        def is_at_the_beginning() -> bool:
+            time_ns, poses = run(desk.do(lambda sim: (sim.now_ns, sim.poses())))
+            seen[time_ns] = poses
+            return time_ns == 0
+
+        until(is_at_the_beginning)
+        until(lambda: desk.is_paused)
+        times = list(seen)
+        assert times == sorted(times, reverse=True)
+        assert len(times) > 3
+        desk.looking._timeline.flush()
+        recording = Recording(desk.looking._timeline.parts[-1].file)
+        for time_ns, poses in seen.items():
+            np.testing.assert_array_equal(recording.world_at(time_ns / 1e9).poses(), poses)
+
+
+def test_two_seeks_at_once_show_the_last_time() -> None:
+    sim = make_sim()
+    with desk_of(sim) as desk:
+        drive(sim, 2.0)
+
+        async def drag() -> None:
+            await asyncio.gather(*(desk.looking.look_at(step * 10_000_000) for step in range(150)))
+
+        run(drag())
+        assert desk.sim.now_ns == 1_490_000_000
+
+
+# ---- what may not be done ----
+
+
+def test_the_past_cannot_be_changed(tmp_path: Path) -> None:
+    sim = make_sim()
+    with desk_of(sim) as desk:
+        drive(sim, 0.5)
+        run(desk.grab("hand", "robot", 0))
+        run(desk.looking.look_at(0))
+        assert desk.present.hands.are_empty
+        for act in (desk.grab("hand", "robot", 0), desk.mark(), desk.reset(), desk.change(lambda sim: None)):
+            with pytest.raises(ParameterError, match=r"this is its past\. Press 'Back to now'"):
+                run(act)
+
+
+def test_without_a_past_a_desk_says_so() -> None:
+    desk = Desk(make_sim())
+    with pytest.raises(LinkError, match="must be recorded"):
+        run(desk.looking.look_at(0))
+    with pytest.raises(LinkError, match="must be recorded"):
+        run(desk.looking.go_back())
+    desk.close()
+
+
+def test_a_recording_of_the_user_takes_the_place_of_the_desks_own(tmp_path: Path) -> None:
+    sim, hashes = make_sim(), {}
+    with desk_of(sim) as desk:
+        drive(sim, 1.0, hashes)
+        with sim.record(tmp_path / "run.mcap"):
+            run(desk.looking.tend())
+            drive(sim, 1.0, hashes)
+            run(desk.looking.look_at(next(iter(hashes))))
+            run(desk.looking.back_to_now())
+        run(desk.looking.tend())
+        drive(sim, 1.0, hashes)
+        for time_ns in list(hashes)[::9]:
+            run(desk.looking.look_at(time_ns))
+            assert state_of(desk) == (time_ns, hashes[time_ns])
+        assert len(desk.looking._timeline.parts) == 3
+    assert Recording(tmp_path / "run.mcap").is_whole
+
+
+def test_a_long_past_is_kept_in_parts_and_the_oldest_goes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("kiks.desk.server.timeline.PART_BYTES_MAX", 1)
+    sim, hashes = make_sim(), {}
+    with desk_of(sim) as desk:
+        for _ in range(6):
+            drive(sim, 1.0, hashes)
+            run(desk.looking.tend())
+        span = desk.looking.span
+        assert span is not None
+        assert span.begin_ns > NS_PER_S
+        assert span.end_ns == sim.now_ns
+        run(desk.pause())
+        run(desk.looking.look_at(0))
+        assert desk.sim.now_ns == span.begin_ns
+        # Forwards and backwards across the parts.
+        run(desk.go_on())
+        until(lambda: desk.is_paused)
+        assert state_of(desk) == (sim.now_ns, sim.state_hash())
+        run(desk.set_speed(10.0))
+        run(desk.looking.go_back())
+        until(lambda: desk.is_paused)
+        assert desk.sim.now_ns == span.begin_ns
+        for time_ns in [each for each in hashes if each >= span.begin_ns][::11]:
+            run(desk.looking.look_at(time_ns))
+            assert state_of(desk) == (time_ns, hashes[time_ns])
+
+
+# ---- a recording ----
+
+
+def recorded(file: Path) -> dict[int, str]:
+    sim, hashes = make_sim(), {}
+    with sim.record(file) as recorder:
+        drive(sim, 1.5, hashes)
+        recorder.mark("half")
+        recorder.flush()
+        recorder.say(0, "hello")
+        sim.place(1, 200, 100, 0)
+        drive(sim, 1.5, hashes)
+        Khepera(sim.port(1)).set_speed(20, 20)
+        sim.run(3.0)
+        hashes[sim.now_ns] = sim.state_hash()
+    return hashes
+
+
+@contextmanager
+def replaying(file: Path, time_ns: int = 0) -> Iterator[Desk]:
+    recording = Recording(file)
+    desk = Desk(recording.world_at(0), project=recording.project, speed=None, owns_world=True)
+    desk.looking.show_recording(file, time_ns)
+    desk.keep_past()
+    driver = Driver(desk)
+    thread = threading.Thread(target=driver.run, daemon=True)
+    thread.start()
+    yield desk
+    driver.stop()
+    thread.join(GUARD_S)
+    desk.close()
+
+
+def test_a_recording_is_shown_played_and_begun_again_at_its_end(tmp_path: Path) -> None:
+    hashes = recorded(tmp_path / "run.mcap")
+    with replaying(tmp_path / "run.mcap", list(hashes)[5]) as desk:
+        assert state_of(desk) == list(hashes.items())[5]
+        desk.begin()
+        until(lambda: desk.is_paused)
+        assert state_of(desk) == list(hashes.items())[-1]
+        run(desk.set_speed(0.001))
+        run(desk.go_on())
+        assert desk.sim.now_ns < NS_PER_S
+        with pytest.raises(LinkError, match="gone on from"):
+            run(desk.looking.back_to_now())
+
+
+def test_events_are_found_on_the_way(tmp_path: Path) -> None:
+    recorded(tmp_path / "run.mcap")
+    with replaying(tmp_path / "run.mcap") as desk:
+        marks = desk.looking.marks
+        kinds = [mark.kind for mark in marks]
+        assert kinds.count("bookmark") == kinds.count("output") == kinds.count("change") == 1
+        assert "contact" in kinds
+        assert {"half", "robot 1: hello", "changed by hand", "robot 1 touches something"} <= {m.text for m in marks}
+        found: list[Mark] = []
+        while (mark := run(desk.looking.jump(is_before=False))) is not None:
+            assert desk.sim.time_s == mark.time_s
+            found.append(mark)
+        times = list(dict.fromkeys(mark.time_s for mark in marks))
+        assert [mark.time_s for mark in found] == times
+        while (mark := run(desk.looking.jump(is_before=True))) is not None:
+            found.append(mark)
+        assert [mark.time_s for mark in found[len(times) :]] == times[-2::-1]
+        assert next_mark(marks, 0, is_before=True) is None
+
+
+def test_what_a_killed_run_has_left_is_shown(tmp_path: Path) -> None:
+    hashes = recorded(tmp_path / "run.mcap")
+    whole = (tmp_path / "run.mcap").read_bytes()
+    last = McapReader(tmp_path / "run.mcap").chunks[-1]
+    (tmp_path / "cut.mcap").write_bytes(whole[: last.offset + last.length // 2])
+    with replaying(tmp_path / "cut.mcap") as desk:
+        span = desk.looking.span
+        assert span is not None
+        times = [time_ns for time_ns in hashes if time_ns <= span.end_ns]
+        assert 0 < len(times) < len(hashes)
+        run(desk.looking.look_at(times[-1]))
+        assert state_of(desk) == (times[-1], hashes[times[-1]])
+        run(desk.looking.look_at(10**12))
+        assert desk.sim.now_ns == span.end_ns
+
+
+# ---- branches ----
+
+
+def test_from_a_time_of_a_recording_a_person_goes_on(tmp_path: Path) -> None:
+    hashes = recorded(tmp_path / "run.mcap")
+    time_ns, state_hash = list(hashes.items())[30]
+    with replaying(tmp_path / "run.mcap", time_ns) as desk:
+        run(desk.go_on_from_here())
+        assert desk.past is None
+        assert desk.is_paused
+        assert state_of(desk) == (time_ns, state_hash)
+        sim = desk.sim
+        assert sim is desk.present.sim
+        run(desk.grab("hand", "robot", 0))
+        run(desk.drop("hand"))
+        run(desk.go_on())
+        until(lambda: sim.now_ns > time_ns + NS_PER_S)
+        # The bar reaches from the beginning of the recording through the branch to now.
+        run(desk.pause())
+        now_ns, now_hash = state_of(desk)
+        span = desk.looking.span
+        assert span is not None
+        assert span == (0, now_ns)
+        for at_ns in list(hashes)[:30:7]:
+            run(desk.looking.look_at(at_ns))
+            assert state_of(desk) == (at_ns, hashes[at_ns])
+        run(desk.looking.look_at(now_ns))
+        assert state_of(desk) == (now_ns, now_hash)
+        # And again from an earlier time.
+        run(desk.looking.look_at(list(hashes)[10]))
+        run(desk.go_on_from_here())
+        assert state_of(desk) == list(hashes.items())[10]
+        assert desk.looking.span == (0, list(hashes)[10])
+
+
+def make_project(folder: Path) -> tuple[Project, list[Command | None]]:
+    (folder / "round.py").write_text(ROUND)
+    return Project(Arena.box(400, 400), seed=3), [Command(folder / "round.py")]
+
+
+@contextmanager
+def with_programs(folder: Path) -> Iterator[Desk]:
+    project, commands = make_project(folder)
+    desk = Desk(
+        simulation_of(project, folder), project=project, speed=None, folder=folder, owns_world=True, commands=commands,
+        is_held=True,
+    )  # fmt: skip
+    desk.keep_past()
+    driver = Driver(desk)
+    thread = threading.Thread(target=driver.run, daemon=True)
+    desk.begin()
+    thread.start()
+    yield desk
+    driver.stop()
+    thread.join(GUARD_S)
+    desk.close()
+
+
+def told(desk: Desk) -> list[str]:
+    return desk.news.since(0)[1]
+
+
+@pytest.mark.slow
+def test_programs_run_again_up_to_a_time(tmp_path: Path) -> None:
+    with with_programs(tmp_path) as desk:
+        first = desk.sim
+        until(lambda: first.now_ns > 2 * NS_PER_S)
+        run(desk.looking.look_at(1_234_500_000))
+        there = state_of(desk)
+        assert desk.why_not_again() == ""
+        run(desk.run_again_to_here())
+        assert desk.past is None
+        again = desk.sim
+        assert again is not first
+        until(lambda: again.now_ns == 1_234_500_000)
+        until(lambda: any("the same run, to the bit" in text for text in told(desk)))
+        assert state_of(desk) == there
+        assert desk.is_paused
+        # The program is at work, and goes on.
+        assert desk.programs.handles[0].is_running
+        run(desk.go_on())
+        until(lambda: again.now_ns > 2 * NS_PER_S)
+        # From a branch, the programs cannot run again, but from before it.
+        run(desk.looking.look_at(NS_PER_S))
+        run(desk.go_on_from_here())
+        assert not desk.programs.handles
+        run(desk.go_on())
+        until(lambda: desk.sim.now_ns > 2 * NS_PER_S)
+        run(desk.looking.look_at(1_500_000_000))
+        with pytest.raises(ParameterError, match="no program of this desk began with this part"):
+            run(desk.run_again_to_here())
+        run(desk.looking.look_at(500_000_000))
+        assert desk.why_not_again() == ""
+
+
+@pytest.mark.slow
+def test_a_run_that_was_changed_by_hand_is_not_the_same_again(tmp_path: Path) -> None:
+    with with_programs(tmp_path) as desk:
+        first = desk.sim
+        until(lambda: first.now_ns > NS_PER_S)
+        run(desk.do(lambda sim: sim.place(1, 100, 300, 1.0)))
+        changed_ns = first.now_ns
+        until(lambda: first.now_ns > changed_ns + NS_PER_S)
+        run(desk.looking.look_at(changed_ns + NS_PER_S // 2))
+        run(desk.run_again_to_here())
+        until(lambda: any("not the run that was recorded" in text for text in told(desk)))
+
+
+def test_a_desk_that_holds_the_world_of_another_program_has_no_branches() -> None:
+    sim = make_sim()
+    with desk_of(sim) as desk:
+        drive(sim, 0.3)
+        run(desk.looking.look_at(0))
+        for act in (desk.go_on_from_here, desk.run_again_to_here):
+            with pytest.raises(LinkError, match="must be this desk's own"):
+                run(act())
+        assert desk.why_not_again()
+
+
+def test_temporary_recordings_are_deleted() -> None:
+    with desk_of(make_sim()) as desk:
+        folder = desk.looking._timeline.parts[0].file.parent
+        assert folder.exists()
+    assert not folder.exists()
