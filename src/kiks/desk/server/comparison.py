@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from kiks.recording.replay import NEVER_NS
+from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.simulation import Simulation
 from kiks.units import s_from_ns
 
