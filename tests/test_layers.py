@@ -31,6 +31,7 @@ LAYERS = [
     "client",
     "calibration",
     "batch",
+    "sheet",
     "drawing",
     "plots",
     "learn",
