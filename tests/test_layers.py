@@ -34,6 +34,7 @@ LAYERS = [
     "sheet",
     "drawing",
     "plots",
+    "films",
     "learn",
     "demos",
     "fit",

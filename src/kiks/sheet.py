@@ -51,6 +51,11 @@ def path_colour(index: int, robot_count: int, share: float) -> Colour:
     end: Colour = (*_PATH_END, 200)
     if robot_count > 1:
         begin, end = ((*robot_colour(index, robot_count), opacity) for opacity in (90, 200))
+    return mixed(begin, end, share)
+
+
+def mixed(begin: Colour, end: Colour, share: float) -> Colour:
+    """Return a colour between two: the first at a share of 0, the second at 1."""
     return tuple(round(a + (b - a) * share) for a, b in zip(begin, end, strict=True))
 
 

@@ -68,17 +68,17 @@ class RecordedLog:
         columns = self._block(len(self.reader.chunks) - 1)
         return int(columns.time_ns[_is_input(columns)].max(initial=columns.time_ns[0]))
 
-    def motion(self) -> Iterator[Motion]:
-        """Yield the records of robots and bodies, after every third or fourth tick."""
-        for chunk in self.reader.chunks:
+    def motion(self, block: int = 0) -> Iterator[Motion]:
+        """Yield the records of robots and bodies, after every third or fourth tick, from a block on."""
+        for chunk in self.reader.chunks[block:]:
             for topic, _, data in self.reader.messages(chunk):
                 if topic == MOTION.name:
                     yield from decode_motion(data, self._layout, self.reader.what)
 
-    def entries(self) -> Iterator[Entry]:
-        """Yield all entries of the log."""
-        for block in range(len(self.reader.chunks)):
-            yield from self._block(block).entries()
+    def entries(self, block: int = 0) -> Iterator[Entry]:
+        """Yield all entries of the log, from a block on."""
+        for number in range(block, len(self.reader.chunks)):
+            yield from self._block(number).entries()
 
     def find_more(self) -> None:
         """Find what a run that goes on has written since."""
