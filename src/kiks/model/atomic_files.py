@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path, PurePosixPath
 
-from kiks.errors import ParameterError, shown
+from kiks.errors import KiksError, ParameterError, shown
 
 NAME_BYTES_MAX, PATH_BYTES_MAX = 255, 4000
 """Most bytes of a file's name, and of a path, less than Linux allows."""
@@ -147,6 +147,8 @@ def file_beside(path: str | Path, what: str) -> Iterator[Path]:
         _take_rights(beside, target)
         os.replace(beside, target)
         _settle(target.parent)
+    except KiksError:  # one may be an OSError, too
+        raise
     except OSError as error:
         raise _unwritable(what, "file", path, error) from error
     finally:
