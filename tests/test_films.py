@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from PIL import Image, ImageSequence
+from tests.model.test_atomic_files import full_disk
 
 from kiks import Arena, Khepera, ParameterError, Recording, Simulation
 from kiks.cli.film import film
@@ -210,6 +211,32 @@ def test_an_interrupted_film_leaves_the_earlier_file(recording: Recording, tmp_p
         save_film(recording, file, size=(64, 64), on_picture=interrupt)
     assert file.read_bytes() == b"earlier"
     assert list(tmp_path.iterdir()) == [file]
+
+
+@pytest.mark.parametrize("ending", ["mp4", "gif", "webp"])
+def test_on_a_full_disk_the_earlier_file_stays(ending: str, recording: Recording, tmp_path: Path) -> None:
+    file = tmp_path / f"film.{ending}"
+    file.write_bytes(b"earlier")
+    for bytes_left in (0, 1000, 6000):
+        with full_disk(bytes_left), pytest.raises(ParameterError, match="a film must go to a file that can be written"):
+            save_film(recording, file, size=(320, 240))
+        assert [path.name for path in tmp_path.iterdir()] == [file.name]
+        assert file.read_bytes() == b"earlier"
+
+
+def test_a_link_stays_and_a_folder_is_refused(recording: Recording, tmp_path: Path) -> None:
+    file, link, folder = (tmp_path / name for name in ("film.gif", "link.gif", "folder.gif"))
+    file.write_bytes(b"earlier")
+    file.chmod(0o604)
+    link.symlink_to(file)
+    save_film(recording, link, size=(64, 64), fps=1)
+    assert link.is_symlink()
+    assert file.stat().st_mode & 0o777 == 0o604
+    assert len(pictures(file)) > 1
+    folder.mkdir()
+    for path in (folder, Path("/dev/null")):
+        with pytest.raises(ParameterError, match="a film must go to a file that"):
+            save_film(recording, path, size=(64, 64))
 
 
 def mistakes() -> Iterator[tuple[str, dict[str, object], str]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -68,17 +68,30 @@ class RecordedLog:
         columns = self._block(len(self.reader.chunks) - 1)
         return int(columns.time_ns[_is_input(columns)].max(initial=columns.time_ns[0]))
 
-    def motion(self, block: int = 0) -> Iterator[Motion]:
-        """Yield the records of robots and bodies, after every third or fourth tick, from a block on."""
-        for chunk in self.reader.chunks[block:]:
-            for topic, _, data in self.reader.messages(chunk):
-                if topic == MOTION.name:
-                    yield from decode_motion(data, self._layout, self.reader.what)
+    @property
+    def block_count(self) -> int:
+        """Number of blocks that have been found."""
+        return len(self.reader.chunks)
 
-    def entries(self, block: int = 0) -> Iterator[Entry]:
-        """Yield all entries of the log, from a block on."""
-        for number in range(block, len(self.reader.chunks)):
-            yield from self._block(number).entries()
+    def motion(self) -> Iterator[Motion]:
+        """Yield the records of robots and bodies, after every third or fourth tick."""
+        for block in range(self.block_count):
+            yield from self.motion_of(block)
+
+    def motion_of(self, block: int) -> Iterator[Motion]:
+        """Yield those records of a block."""
+        for topic, _, data in self.reader.messages(self.reader.chunks[block]):
+            if topic == MOTION.name:
+                yield from decode_motion(data, self._layout, self.reader.what)
+
+    def entries(self) -> Iterator[Entry]:
+        """Yield all entries of the log."""
+        for block in range(self.block_count):
+            yield from self.entries_of(block)
+
+    def entries_of(self, block: int) -> Sequence[Entry]:
+        """Return the entries of a block."""
+        return self._block(block).entries()
 
     def find_more(self) -> None:
         """Find what a run that goes on has written since."""

@@ -75,7 +75,7 @@ def moments(log: RecordedLog, times_ns: Sequence[int]) -> Iterator[Moment]:
     """
     block, told = log.row_before(times_ns[0]).block, _Told()
     # The last tick before a block may stand in the one before.
-    ticks, entries = _ticks(log, max(block - 1, 0)), log.entries(block)
+    ticks, entries = _ticks(log, max(block - 1, 0)), _entries(log, block)
     now, later, entry = next(ticks, None), next(ticks, None), next(entries, None)
     if now is None:
         raise log.damaged("it has no motion")
@@ -112,15 +112,22 @@ class _Told:
             self.readings[entry.robot] = reading[1]
 
 
+def _entries(log: RecordedLog, first_block: int) -> Iterator[Entry]:
+    """Yield the entries from a block on."""
+    for block in range(first_block, log.block_count):
+        yield from log.entries_of(block)
+
+
 def _ticks(log: RecordedLog, first_block: int) -> Iterator[Tick]:
+    """Yield the ticks from a block on."""
     last_tick = -1
-    for motion in log.motion(first_block):
-        ticks = ticks_of(motion, last_tick)
-        last_tick = int(motion.ticks[-1])
-        for number, poses, places, look in zip(
-            ticks.ticks.tolist(), ticks.poses, ticks.places, ticks.looks.tolist(), strict=True
-        ):
-            yield Tick(number, poses, places, motion.robots[look], motion.bodies[look])
+    for block in range(first_block, log.block_count):
+        for motion in log.motion_of(block):
+            ticks = ticks_of(motion, last_tick)
+            last_tick = int(motion.ticks[-1])
+            rows = zip(ticks.ticks.tolist(), ticks.poses, ticks.places, ticks.looks.tolist(), strict=True)
+            for number, poses, places, look in rows:
+                yield Tick(number, poses, places, motion.robots[look], motion.bodies[look])
 
 
 def _between(now: Tick, later: Tick | None, time_ns: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -53,6 +53,7 @@ class RunRecorder:
         about: What else belongs to the run, such as the command that started it.
 
     Attributes:
+        path: The file.
         next_ns: When the next checkpoint is due [ns].
         change_count: Of the world, when its changes were noted last.
         has_lamps: Whether there are lamps.
@@ -71,6 +72,7 @@ class RunRecorder:
     ) -> None:
         if sim.loop.recorder is not None:
             raise ParameterError(f"{sim} must not be recorded yet, but it is. End that recording first.")
+        self.path = Path(path).absolute()
         self._sim, self._world, self._loop = sim, sim.world, sim.loop
         self._file = McapFile(path, (LOG, MOTION, *foxglove.TOPICS))
         self._entries = EntryList()
@@ -115,15 +117,20 @@ class RunRecorder:
         with self._sim.lock, postponing_endings():
             if self._loop.recorder is not self:
                 return
-            self.note_changes()
-            self._note_check()
-            self._motion.look(self._world.state)
-            self._write_chunk()
+            self.flush()
             self._loop.recorder = None
             for wire in self._sim.wires:
                 wire.recorder = None
             self._sim.watchers.remove(self._motion)
             self._file.close()
+
+    def flush(self) -> None:
+        """Write all that has happened up to now, with the present state, so that a reader of the file finds it."""
+        with self._sim.lock, postponing_endings():
+            self.note_changes()
+            self._note_check()
+            self._motion.look(self._world.state)
+            self._write_chunk()
 
     # ---- from outside ----
 
