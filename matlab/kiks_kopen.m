@@ -47,4 +47,10 @@ simulator(sprintf('open %d %.10g', -settings(1), settings(2)));
 open_ports('add', -settings(1));
 ref = settings([1 1 1 1]);
 kiks_ksend(['B' char(10)], ref);
+try
+    movie('begin', -settings(1));
+catch failure
+    kiks_kclose(ref);
+    rethrow(failure);
+end
 end

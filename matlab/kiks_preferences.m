@@ -85,7 +85,9 @@ KIKS_MMPERPIXEL = 2;
 % Without effect: paths are kept completely.
 KIKS_TRACE_MAX = 8^5;
 
-% Without effect: films are not recorded yet.
+% The film that the next kiks_kopen begins and kiks_kclose ends (see kiks_recordmovie); '' for none.
 KIKS_MOVIENAME = '';
+
+% Without effect: films are H.264, in a quality of their own.
 KIKS_MOVIECOMPRESSION = 'Indeo5';
 KIKS_MOVIEQUALITY = 50;

@@ -13,6 +13,8 @@ function kiks_quit(silent)
 
 open_ports('remove', 0);
 if simulator('--is-running', [])
+    movie('stop', 0);
+    movie('save', 0);
     simulator('--end', []);
     if nargin < 1 || isempty(silent) || ~any(silent)
         disp('The KiKS session has ended.');

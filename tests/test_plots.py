@@ -77,7 +77,7 @@ def test_the_same_recording_gives_the_same_picture(ending: str, recording: Recor
 
 
 def test_mistakes_get_a_clear_error(recording: Recording, tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match="robot must be from 1 to 1"):
+    with pytest.raises(ParameterError, match="robot must be a whole number from 1 to 1"):
         save_plot([recording], tmp_path / "plot.png", robot=2)
     with pytest.raises(ParameterError, match=r"ends in .png, .svg, .pdf"):
         save_plot([recording], tmp_path / "plot.gif")

@@ -17,7 +17,12 @@ world = world_request(plain_text(arena), colormask, preferences);
 settings = setting_requests(preferences);
 is_new = ~is_active();
 cellfun(@simulator, settings, 'UniformOutput', false);
+if is_new
+    movie('forget', 0);
+end
+movie('stop', 0);
 simulator(world);
+movie('save', 0);
 % The ports belonged to the old world.
 open_ports('remove', 0);
 if is_new

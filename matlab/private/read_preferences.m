@@ -64,8 +64,8 @@ switch name
         reason = 'the simulator''s rays and movements are exact';
     case 'KIKS_TRACE_MAX'
         reason = 'paths are kept whole';
-    case {'KIKS_MOVIENAME', 'KIKS_MOVIECOMPRESSION', 'KIKS_MOVIEQUALITY'}
-        reason = 'films are not recorded yet';
+    case {'KIKS_MOVIECOMPRESSION', 'KIKS_MOVIEQUALITY'}
+        reason = 'films are H.264, in a quality of their own';
     otherwise
         return
 end
@@ -84,6 +84,8 @@ check(row_text(p.KIKS_EMULATED_CPU) || isempty(p.KIKS_EMULATED_CPU) || is_positi
     'KIKS_EMULATED_CPU', p.KIKS_EMULATED_CPU, 'the name of a computer or its index', '''300 MHz Celeron-A''');
 check(row_text(p.KIKS_ROBOT) && ~isempty(p.KIKS_ROBOT), 'KIKS_ROBOT', p.KIKS_ROBOT, ...
     '''Khepera'', ''Khepera_II'' or a robot''s file', '''Khepera''');
+check(row_text(p.KIKS_MOVIENAME) || isempty(p.KIKS_MOVIENAME), 'KIKS_MOVIENAME', p.KIKS_MOVIENAME, ...
+    'the name of a film', '''run.mp4''');
 check(row_text(p.KIKS_RESPONSE), 'KIKS_RESPONSE', p.KIKS_RESPONSE, 'the name of a response', '''''');
 check(isequal(p.KIKS_NOISE, 0) || isequal(p.KIKS_NOISE, 1), 'KIKS_NOISE', p.KIKS_NOISE, '0 or 1', '1');
 check(row_text(p.KIKS_TURRETS), 'KIKS_TURRETS', p.KIKS_TURRETS, 'names of turrets with blanks between', ...

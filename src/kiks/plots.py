@@ -63,8 +63,7 @@ def figure_of(recordings: Sequence[Recording], *, robot: int = 1) -> Any:
         ParameterError: If Matplotlib is not installed, or a recording has no such robot.
     """
     for recording in recordings:
-        if robot not in recording.robots:
-            raise ParameterError(f"robot must be from 1 to {len(recording.robots)}, but it was {robot}.")
+        recording.check_robot(robot)
     figure = library("matplotlib.figure", "plot").Figure(
         figsize=(COLUMN_INCHES * len(recordings), 2.6 * sum(ROWS)), layout="constrained"
     )

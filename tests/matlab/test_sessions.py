@@ -270,7 +270,7 @@ def test_the_speed_of_octave_changes_nothing(tmp_path: Path) -> None:
 TAKES_ANYTHING = re.findall(
     r"\w+",
     """
-    kiks_setup kiks_quit kiks_kiksnet kiks_recordmovie kiks_preferences kiks_siminfo_objects kiks_siminfo_speed
+    kiks_setup kiks_quit kiks_kiksnet kiks_preferences kiks_siminfo_objects kiks_siminfo_speed
     kiks_tif2arena kiks_mm2p kiks_p2mm kclose
     """,
 )
@@ -287,6 +287,9 @@ WRONG_REFS = ["[]", "5", "'xxxx'", "[-7 -7 -7 -7]", "[-1 -1]", "[-1.5 -1.5 -1.5 
 
 WRONG = [
     *(f"{name}({ref})" for name in ONLY_REF for ref in WRONG_REFS),
+    "kiks_recordmovie(5)",
+    "kiks_recordmovie({})",
+    "kiks_recordmovie(['ab'; 'cd'])",
     "kSetSpeed(ref, NaN, 1)",
     "kSetSpeed(ref, [1 2], 1)",
     "kSetSpeed(ref, 'a', 'b')",
@@ -439,6 +442,7 @@ PREFERENCES = {
     "KIKS_ROBOT": "'Roomba'",
     "KIKS_RESPONSE": "'guess'",
     "KIKS_NOISE": "2",
+    "KIKS_MOVIENAME": "5",
     "KIKS_TURRETS": "'laser'",
     "KIKS_ROBOTS": "0.5",
     "KIKS_ARENA_CODING": "'other'",
@@ -451,6 +455,7 @@ PREFERENCES = {
 FORGOTTEN = [
     *(f"{name}()" for name in ONLY_REF),
     *(f"{name}({{1, 2, 3, 4}})" for name in ONLY_REF),
+    "kiks_recordmovie()",
     "kcmd()",
     "kcmd(ref)",
     "kcmd(ref, ['a'; 'b'])",

@@ -565,3 +565,71 @@ def test_a_robot_may_be_a_file(session: Session, tmp_path: Path) -> None:
     assert session.world.specs[1].body.pulse_mm == 0.082, "a robot that is added is of the same kind"
     ask(f"set robot {tmp_path / 'none.toml'}")
     assert "none.toml" in ask.refused("world default")
+
+
+# ---- films ----
+
+
+def test_a_film_shows_the_time_in_which_it_was_made(session: Session, tmp_path: Path) -> None:
+    ask = begun(session)
+    ask("open 1 9600")
+    ask("pause 1")
+    ask(f"film 1 {tmp_path}/run.webp")
+    ask("pause 2")
+    ask("film_stop")
+    ask("pause 3")
+    assert ask("film_save") == "51"
+    assert (tmp_path / "run.webp").stat().st_size > 1000
+    assert ask("film_save") == "0"
+    assert session.world.loop.recorder is None
+
+
+def test_a_film_does_not_change_the_run(session: Session, tmp_path: Path) -> None:
+    states = []
+    for film in (None, f"film 1 {tmp_path}/run.webp"):
+        ask = begun(session, "seed 3")
+        ask("open 1 9600")
+        if film is not None:
+            ask(film)
+        ask("ask 1 D,5,7")
+        ask("pause 1")
+        ask("film_stop")
+        states.append(ask("state"))
+        ask("film_save")
+    assert states[0] == states[1]
+
+
+def test_films_that_cannot_be_made_are_refused(session: Session, tmp_path: Path) -> None:
+    ask = begun(session)
+    assert "port -1 must be open" in ask.refused(f"film 1 {tmp_path}/run.webp")
+    ask("open 1 9600")
+    assert "a film must go to a file that ends in .mp4, .gif, .webp" in ask.refused(f"film 1 {tmp_path}/run.avi")
+    assert "a film must go to a file that can be written" in ask.refused(f"film 1 {tmp_path}/no/run.mp4")
+    ask(f"film 1 {tmp_path}/run.mp4")
+    assert "a program must make one film at a time" in ask.refused(f"film 1 {tmp_path}/two.mp4")
+    assert "a film must end after it begins" in ask.refused("film_save")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_client_that_leaves_has_its_film(session: Session, tmp_path: Path) -> None:
+    ask = begun(session)
+    ask("open 1 9600")
+    ask(f"film 1 {tmp_path}/run.webp")
+    ask("pause 1")
+    ask.client.leave()
+    assert (tmp_path / "run.webp").stat().st_size > 1000
+
+
+def test_an_interrupted_film_is_given_up(tmp_path: Path) -> None:
+    pending = AwaitedAnswer()
+    with running(Session()) as session:
+        ask = Asker(session)
+        ask.client = SessionClient(session, 1, pending)
+        ask("set thinking none")
+        ask("open 1 9600")
+        ask(f"film 1 {tmp_path}/run.webp")
+        ask("pause 1")
+        ask("film_stop")
+        pending.is_cancelled = True
+        assert "the film must be waited for, but the program was interrupted" in ask.refused("film_save")
+        assert not list(tmp_path.iterdir())

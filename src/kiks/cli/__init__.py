@@ -13,6 +13,7 @@ from kiks.cli.demo import demo
 from kiks.cli.desk import desk
 from kiks.cli.drive import drive
 from kiks.cli.evolve import evolve
+from kiks.cli.film import film
 from kiks.cli.fit import fit
 from kiks.cli.matlab import matlab
 from kiks.cli.monitor import monitor
@@ -41,6 +42,7 @@ for _command in (
     evolve,
     compare,
     replay,
+    film,
     plot,
     table,
     serve,

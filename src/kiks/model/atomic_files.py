@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path, PurePosixPath
 
-from kiks.errors import ParameterError, shown
+from kiks.errors import KiksError, ParameterError, shown
 
 NAME_BYTES_MAX, PATH_BYTES_MAX = 255, 4000
 """Most bytes of a file's name, and of a path, less than Linux allows."""
@@ -121,6 +121,40 @@ class GrowingFile:
             if is_other:
                 with suppress(OSError):
                     self._beside.unlink()
+
+
+@contextmanager
+def file_beside(path: str | Path, what: str) -> Iterator[Path]:
+    """Yield the path of a file for a library to write, which replaces another when it is complete.
+
+    Args:
+        path: The file that it replaces, as for `replace_file`; no pipe.
+        what: Its name in messages.
+
+    Raises:
+        ParameterError: If it cannot be written; an earlier file is then as it was.
+    """
+    beside: Path | None = None
+    try:
+        target = _target(path_of(path, what))
+        if target.exists() and not target.is_file():
+            raise OSError(None, "it is no file")
+        beside = _name_beside(target)
+        _write(beside, b"", 0o666)
+        yield beside
+        with beside.open("rb") as file:
+            os.fsync(file.fileno())
+        _take_rights(beside, target)
+        os.replace(beside, target)
+        _settle(target.parent)
+    except KiksError:  # one may be an OSError, too
+        raise
+    except OSError as error:
+        raise _unwritable(what, "file", path, error) from error
+    finally:
+        if beside is not None:
+            with suppress(OSError):
+                beside.unlink()
 
 
 def check_writable(path: str | Path, what: str, *, is_new: bool = False) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.recording.log import RecordedLog
-from kiks.recording.motion import Motion, MotionWatcher, decode, encode, poses_of
+from kiks.recording.motion import Motion, MotionWatcher, decode, encode, ticks_of
 from kiks.recording.replay import Replay
 from kiks.sim.saved_state import Layout
 
@@ -75,7 +75,7 @@ def _by_tick(motions: Iterable[Motion]) -> dict[int, NDArray[np.float64]]:
     poses: dict[int, NDArray[np.float64]] = {}
     last_tick = -1
     for motion in motions:
-        ticks, places = poses_of(motion, last_tick)
+        ticks = ticks_of(motion, last_tick)
         last_tick = int(motion.ticks[-1])
-        poses.update(zip(ticks.tolist(), places, strict=True))
+        poses.update(zip(ticks.ticks.tolist(), ticks.poses, strict=True))
     return poses

@@ -140,29 +140,37 @@ _KEPT = _first_fields(ROBOT, KEPT_BYTES)
 
 
 class Ticks(NamedTuple):
-    """Poses after each tick.
+    """Robots and bodies after each tick.
 
     Attributes:
         ticks: Number of ticks done, int64 [tick].
         poses: x_mm, y_mm, heading_rad; float64 [tick, robot, 3].
+        places: x_mm, y_mm; float64 [tick, body, 2].
+        looks: Which look tells of the tick, int64 [tick].
     """
 
     ticks: NDArray[np.int64]
     poses: NDArray[np.float64]
+    places: NDArray[np.float64]
+    looks: NDArray[np.int64]
 
 
-def poses_of(motion: Motion, after_tick: int) -> Ticks:
-    """Return the poses after each tick that looks tell of.
+def ticks_of(motion: Motion, after_tick: int) -> Ticks:
+    """Return each tick that looks tell of.
 
     Args:
         motion: The looks.
         after_tick: The tick of the look before them; -1 without one.
     """
-    records: Any = motion.robots
-    newest = np.stack([records["x_mm"], records["y_mm"], records["heading_rad"]], axis=-1)
-    # [look, 4, robot, 3], the oldest tick first.
-    poses = np.concatenate([records["trail"][:, :, ::-1], newest[:, :, None]], axis=2).swapaxes(1, 2)
     ticks = motion.ticks[:, None] + np.arange(-TRAIL_LENGTH, 1)
     before = np.concatenate([[after_tick], motion.ticks[:-1]])
     is_new = (ticks > before[:, None]) & (ticks >= 0)
-    return Ticks(ticks[is_new], poses[is_new])
+    poses = _with_trail(motion.robots, ("x_mm", "y_mm", "heading_rad"))
+    places = _with_trail(motion.bodies, ("x_mm", "y_mm"))
+    return Ticks(ticks[is_new], poses[is_new], places[is_new], np.nonzero(is_new)[0])
+
+
+def _with_trail(records: Any, fields: Sequence[str]) -> NDArray[np.float64]:
+    """Return fields of records [look, thing] with their trail: [look, 4, thing, field], the oldest tick first."""
+    newest = np.stack([records[field] for field in fields], axis=-1)
+    return np.concatenate([records["trail"][:, :, ::-1], newest[:, :, None]], axis=2).swapaxes(1, 2)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.errors import ParameterError, nearest, shown
-from kiks.model.checks import check_number
+from kiks.model.checks import check_count, check_number
 from kiks.model.project import Project
 from kiks.recording import tables
 from kiks.recording.log import RecordedLog
@@ -103,6 +103,19 @@ class Recording:
         )
         return range(1, len(self.log.setup(last).specs) + 1)
 
+    def check_robot(self, robot: object, advice: str = "", name: str = "robot") -> int:
+        """Return the number of a robot.
+
+        Args:
+            robot: The number.
+            advice: What else the message says.
+            name: What it is called there.
+
+        Raises:
+            ParameterError: If it has no such robot.
+        """
+        return check_count(name, robot, 1, len(self.robots), advice)
+
     @property
     def duration_s(self) -> float:
         """How long it is [s of simulated time]."""
@@ -131,10 +144,8 @@ class Recording:
                 f"name must be one of {', '.join(map(repr, tables.TABLES))}, but it was {shown(name)}."
                 f"{nearest(str(name), list(tables.TABLES))}"
             )
-        if robot is not None and robot not in self.robots:
-            raise ParameterError(
-                f"robot must be from 1 to {len(self.robots)}, but it was {shown(robot)}. Leave it out for all."
-            )
+        if robot is not None:
+            self.check_robot(robot, "Leave it out for all.")
         table = tables.TABLES[name](self.log)
         return table if robot is None else table[table["robot"] == robot]
 
@@ -164,15 +175,16 @@ class Recording:
         """
         return Replay(self.log, self.log.begin_ns if time_s is None else self.time_ns(time_s))
 
-    def time_ns(self, time_s: float) -> int:
+    def time_ns(self, time_s: float, name: str = "time_s") -> int:
         """Return a time of the recording [ns].
 
         Args:
             time_s: The time [s].
+            name: What messages call it.
 
         Raises:
             ParameterError: If the recording has no such time.
         """
         begin_s, end_s = s_from_ns(self.log.begin_ns), s_from_ns(self.log.end_ns)
-        time_s = check_number("time_s", time_s, begin_s, end_s, "That is where the recording begins and ends.")
+        time_s = check_number(name, time_s, begin_s, end_s, "That is where the recording begins and ends.")
         return min(max(ns_from_s(time_s), self.log.begin_ns), self.log.end_ns)

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.errors import ParameterError
+from kiks.recording.entries import Entry
 from kiks.recording.events import EventReader
 from kiks.recording.log import RecordedLog
-from kiks.recording.motion import poses_of
+from kiks.recording.motion import ticks_of
 from kiks.sim.run_log import Kind
 from kiks.units import TICK_NS, s_from_ns
 
@@ -54,7 +55,7 @@ def poses(log: RecordedLog) -> Table:
     """Return where robots were after each tick of 10 ms: time_s, robot, x_mm, y_mm, heading_rad (not wrapped)."""
     parts, last_tick = [], -1
     for motion in log.motion():
-        ticks, places = poses_of(motion, last_tick)
+        ticks, places, *_ = ticks_of(motion, last_tick)
         last_tick = int(motion.ticks[-1])
         rows = np.zeros(places.shape[:2], _POSES)
         rows["time_s"], rows["robot"] = _seconds(ticks)[:, None], np.arange(1, places.shape[1] + 1)
@@ -88,11 +89,17 @@ def readings(log: RecordedLog) -> Table:
     """Return what programs read of proximity (N) and light (O) sensors: time_s, robot, command, counts [8]."""
     rows = []
     for entry in log.entries():
-        letter, _, values = entry.data.rstrip().partition(b",")
-        if entry.kind == Kind.ACT and letter in (b"n", b"o") and _COUNTS.fullmatch(values):
-            counts = tuple(map(int, values.split(b",")))
-            rows.append((s_from_ns(entry.time_ns), entry.robot + 1, letter.decode().upper(), counts))
+        if (reading := reading_of(entry)) is not None:
+            rows.append((s_from_ns(entry.time_ns), entry.robot + 1, *reading))
     return np.array(rows, _READINGS)
+
+
+def reading_of(entry: Entry) -> tuple[str, tuple[int, ...]] | None:
+    """Return what a program read of eight sensors by an entry: N or O, and the counts; None for another entry."""
+    letter, _, values = entry.data.rstrip().partition(b",")
+    if entry.kind == Kind.ACT and letter in (b"n", b"o") and _COUNTS.fullmatch(values):
+        return letter.decode().upper(), tuple(map(int, values.split(b",")))
+    return None
 
 
 def wire(log: RecordedLog) -> Table:

@@ -151,6 +151,17 @@ def _checkpoint(client: SessionClient, words: str) -> str:
     return ""
 
 
+def _film(client: SessionClient, words: str) -> str:
+    number, _, path = words.partition(" ")
+    client.begin_film(port_of(number), Path(_path(path)))
+    return ""
+
+
+def _film_stop(client: SessionClient, words: str) -> str:
+    client.stop_film()
+    return ""
+
+
 def _reset(client: SessionClient, words: str) -> str:
     client.do(lambda sim: None)
     client.session.reset()
@@ -216,6 +227,9 @@ REQUESTS: dict[str, Act] = {
     "print": _print,
     "checkpoint": _checkpoint,
     "reset": _reset,
+    "film": _film,
+    "film_stop": _film_stop,
+    "film_save": lambda client, words: str(client.save_film()),
     "state": lambda client, words: client.do(lambda sim: sim.state_hash()),
     "open": _open,
     "close": _close,

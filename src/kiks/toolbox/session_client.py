@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TypeVar
 
 from kiks.clock.program_clock import ProgramClock
-from kiks.errors import LinkError
+from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.model.arena import Arena
 from kiks.ports.local_link import AwaitedAnswer, LocalConnection, PendingAnswer, SharedLine
 from kiks.ports.messages import Kind
 from kiks.sim.port import VirtualPort
 from kiks.sim.simulation import Simulation
 from kiks.toolbox.session import Session
+from kiks.toolbox.session_film import SessionFilm
 from kiks.units import s_from_ns
 
 ANSWER_S = 10.0
@@ -22,6 +25,8 @@ ANSWER_S = 10.0
 
 SILENCE_S = 0.1
 """Silence after which all replies have arrived [s of simulated time]."""
+
+_log = logging.getLogger("kiks.toolbox")
 
 Result = TypeVar("Result")
 
@@ -70,6 +75,7 @@ class SessionClient:
         ports: The open ports by number: 1 for port -1.
         openings: The last opening of each port in this world.
         asked: Number of the port that the present request concerns; 0 for none.
+        film: The film that it makes of the world; None for none.
     """
 
     def __init__(self, session: Session, number: int, pending: PendingAnswer | None = None) -> None:
@@ -80,6 +86,7 @@ class SessionClient:
         self.asked = 0
         self.ports: dict[int, OpenPort] = {}
         self.openings: dict[int, OpenPort] = {}
+        self.film: SessionFilm | None = None
         self._sim: Simulation | None = None
         self._connection: LocalConnection | None = None
         session.clients.append(self)
@@ -148,6 +155,11 @@ class SessionClient:
         self._lose_world()
         self.session.release_robots(self)
         self.session.clients.remove(self)
+        if self.film is not None:
+            try:
+                self.film.save(lambda done, count: None)
+            except KiksError as error:
+                _log.warning("%s", error)
 
     def cancel(self) -> None:
         """Cancel the request under way; from any thread."""
@@ -205,6 +217,44 @@ class SessionClient:
         finally:
             port.timeout = ANSWER_S
         return heard.decode("ascii", errors="replace")
+
+    # ---- the film ----
+
+    def begin_film(self, number: int, path: Path) -> None:
+        """Make a film of the world from now on.
+
+        Args:
+            number: Of the port whose robot's readings are shown.
+            path: The film's file.
+
+        Raises:
+            ParameterError: If it cannot be written, or another film is made already.
+        """
+        robot = self.opened(number).robot
+        if self.film is not None:
+            raise ParameterError("a program must make one film at a time, but it makes one. Call kiks_kclose first.")
+        self.film = self.do(lambda sim: SessionFilm(sim, path, robot))
+
+    def stop_film(self) -> None:
+        """End the film at the program's time, if there is one."""
+        film = self.film
+        if film is not None and self._sim is self.session.world:
+            self.do(lambda sim: film.stop())
+        elif film is not None:
+            film.stop()
+
+    def save_film(self) -> int:
+        """Make the file of the film; return the number of its pictures, 0 without a film.
+
+        Raises:
+            KiksError: If it cannot be written, or the program no longer waits for it.
+        """
+        film, self.film = self.film, None
+        return 0 if film is None else film.save(lambda done, count: self._check_pending())
+
+    def _check_pending(self) -> None:
+        if self._pending.is_cancelled:
+            raise LinkError("the film must be waited for, but the program was interrupted: it is lost.")
 
     # ---- time ----
 

@@ -1,0 +1,54 @@
+function movie(what, number)
+% movie  The film that kiks_recordmovie has asked for.
+%
+%   movie('begin', number)   films from now on if KIKS_MOVIENAME names a film and none is made; number: port's
+%   movie('stop', number)    ends the film that began with this port, 0: with any, at this time
+%   movie('save', number)    makes its file, and forgets its name
+%   movie('forget', number)  the simulator's process has ended, and its film with it
+%
+%   After a film has been stopped, time may pass in the world until it is saved.
+
+persistent port file
+switch what
+    case 'begin'
+        if isempty(port)
+            preferences = read_preferences();
+            if ~isempty(preferences.KIKS_MOVIENAME)
+                file = movie_file(preferences.KIKS_MOVIENAME);
+                simulator(sprintf('film %d %s', number, escaped(file)));
+                port = number;
+            end
+        end
+    case 'stop'
+        if is_meant(port, number)
+            simulator('film_stop');
+        end
+    case 'save'
+        if is_meant(port, number)
+            port = [];
+            global KIKS_MOVIENAME
+            KIKS_MOVIENAME = '';
+            try
+                count = str2double(simulator('film_save'));
+                kiks_status(sprintf('kiks_recordmovie: %d pictures are in %s', count, file), 1);
+            catch failure
+                kiks_status(['kiks_recordmovie: ' one_line(failure.message)], 1);
+            end
+        end
+    case 'forget'
+        port = [];
+end
+end
+
+function yes = is_meant(port, number)
+yes = ~isempty(port) && any(number == [0 port]);
+end
+
+function file = movie_file(name)
+% The file of a name: films are MP4 unless the name asks for another kind that there is.
+[folder, stem, ending] = fileparts(name);
+if ~any(strcmpi(ending, {'.mp4', '.gif', '.webp'}))
+    ending = '.mp4';
+end
+file = absolute_path(fullfile(folder, [stem ending]));
+end

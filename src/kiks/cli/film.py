@@ -1,0 +1,75 @@
+"""`kiks film`: makes films of recordings."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from kiks.cli.options import written_file
+from kiks.cli.replay import RecordingFile
+from kiks.errors import ParameterError, counted, shown
+
+
+def film(
+    file: RecordingFile,
+    out: Annotated[Path, typer.Argument(help="The film: .mp4, .gif or .webp.", callback=written_file)],
+    size: Annotated[str, typer.Option(help="Width and height [pixels].")] = "1280x720",
+    fps: Annotated[int, typer.Option(help="Pictures per second.")] = 25,
+    speed: Annotated[float, typer.Option(help="Simulated seconds per second of the film.")] = 1.0,
+    start: Annotated[float | None, typer.Option(help="Where to begin [s of simulated time].")] = None,
+    end: Annotated[float | None, typer.Option(help="Where to end [s of simulated time].")] = None,
+    robot: Annotated[
+        int | None, typer.Option(help="The robot whose readings are shown; the followed one, else 1, if left out.")
+    ] = None,
+    follow: Annotated[int | None, typer.Option(help="The robot that stays in the middle.")] = None,
+    zoom: Annotated[
+        float | None, typer.Option(help="With --follow: how much larger the arena is than a whole one; 3 if left out.")
+    ] = None,
+    plain: Annotated[
+        bool, typer.Option("--plain", help="The world alone, without trails, clock and readings.")
+    ] = False,
+) -> None:
+    """Make a film of a recording: the world from above with trails, and what a robot reads beside it.
+
+    Example: kiks film run.mcap run.mp4 --speed 4 --follow 1
+    """
+    from kiks.films.film import save_film
+    from kiks.recording.recording import Recording
+
+    words = re.fullmatch(r"([0-9]{1,5})x([0-9]{1,5})", size)
+    if words is None:
+        raise ParameterError(f"--size must be a width and a height like 1280x720, but it was {shown(size)}.")
+    with _progress_bar(out.name) as show:
+        count = save_film(
+            Recording(file),
+            out,
+            size=(int(words[1]), int(words[2])),
+            fps=fps,
+            speed=speed,
+            start_s=start,
+            end_s=end,
+            robot=robot,
+            follow=follow,
+            zoom=zoom,
+            is_plain=plain,
+            on_picture=show,
+        )
+    typer.echo(f"Film: {out}   {counted(count, 'picture')}, {count / fps:.1f} s")
+
+
+@contextmanager
+def _progress_bar(name: str) -> Iterator[Callable[[int, int], None]]:
+    """Return a function that shows on a terminal how many of all pictures are done."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = Console()
+    columns = (TextColumn(name), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+        bar = progress.add_task("", total=None)
+        yield lambda done, count: progress.update(bar, completed=done, total=count)

@@ -1,0 +1,134 @@
+"""Films of the run: a dialog that asks which part of the recording, makes the film, and downloads it."""
+
+from __future__ import annotations
+
+import asyncio
+import tempfile
+from pathlib import Path
+
+from nicegui import ui
+
+from kiks.desk.panels.widgets import told
+from kiks.desk.server.desk import Desk
+from kiks.errors import ParameterError
+from kiks.films.film import FPS, save_film
+from kiks.films.video_file import ENDINGS
+from kiks.recording.recorder import RunRecorder
+from kiks.recording.recording import Recording
+from kiks.sim.simulation import Simulation
+from kiks.units import s_from_ns
+
+LAST_S = 10.0
+"""How much of the run is filmed if nothing else is chosen [s]."""
+
+LENGTH_MAX_S = 300.0
+"""Longest film [s]."""
+
+SHOW_S = 0.2
+"""Period at which it is shown how much of the film is done [s of real time]."""
+
+
+class FilmDialog:
+    """The dialog.
+
+    Args:
+        desk: The desk.
+    """
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+        self._done = 0.0
+        self._is_given_up = False
+        with ui.dialog() as self._dialog, ui.card().classes("gap-2"):
+            ui.label("Make a film of the run").classes("text-h6")
+            with ui.row().classes("no-wrap items-end"):
+                self._start = _number("From [s]", "film-start")
+                self._end = _number("To [s]", "film-end")
+                self._speed = _number("Times real time", "film-speed", 1.0)
+            self._follow = ui.select({0: "the whole arena"}, value=0, label="What is seen")
+            self._follow.props("dense data-testid=film-follow").classes("w-full")
+            self._kind = ui.toggle(list(ENDINGS), value=ENDINGS[0]).props("dense no-caps data-testid=film-kind")
+            self._bar = ui.linear_progress(0.0, show_value=False).props('aria-label="How much of the film is done"')
+            with ui.row().classes("w-full justify-end"):
+                ui.button("Close", on_click=self._dialog.close).props("flat no-caps data-testid=film-close")
+                self._make_button = ui.button("Make it", icon="movie", on_click=self._make)
+                self._make_button.props("no-caps data-testid=film-make")
+        self._dialog.on_value_change(self._give_up)
+        self._timer = ui.timer(SHOW_S, lambda: self._bar.set_value(self._done), active=False)
+
+    @told
+    async def open(self) -> None:
+        """Show it, with the last seconds of the run chosen."""
+        begin_s, end_s = await self._desk.do(lambda sim: _flushed(sim)[1:])
+        self._start.value, self._end.value = round(max(begin_s, end_s - LAST_S), 3), round(end_s, 3)
+        robots = {number: f"robot {name}, in the middle" for number, name in enumerate(self._desk.names(), 1)}
+        self._follow.set_options({0: "the whole arena", **robots}, value=0)
+        self._dialog.open()
+
+    @told
+    async def _make(self) -> None:
+        start_s, end_s, speed = self._start.value, self._end.value, self._speed.value
+        if None in (start_s, end_s, speed):
+            raise ParameterError("A film needs a beginning, an end and a speed. Write all three numbers.")
+        if speed > 0 and (end_s - start_s) / speed > LENGTH_MAX_S:
+            raise ParameterError(
+                f"A film must be at most {LENGTH_MAX_S:g} s long, but it would be {(end_s - start_s) / speed:g} s. "
+                "Choose less of the run, or more times real time."
+            )
+        file, _, _ = await self._desk.do(_flushed)
+        name = f"kiks-film{self._kind.value}"
+        self._done, self._is_given_up = 0.0, False
+        self._make_button.disable()
+        self._timer.activate()
+        try:
+            data = await asyncio.to_thread(self._film, file, name, start_s, end_s, speed, self._follow.value or None)
+        finally:
+            self._timer.deactivate()
+            self._bar.set_value(0.0)
+            self._make_button.enable()
+        ui.download.content(data, name)
+
+    def _film(self, file: Path, name: str, start_s: float, end_s: float, speed: float, follow: int | None) -> bytes:
+        """Make a film, in a thread of its own, and return its file."""
+        recording = Recording(file)
+        with tempfile.TemporaryDirectory(prefix="kiks-film-") as folder:
+            path = Path(folder, name)
+            save_film(
+                recording,
+                path,
+                fps=FPS,
+                speed=speed,
+                start_s=start_s,
+                # What is shown is rounded.
+                end_s=min(end_s, s_from_ns(recording.log.end_ns)),
+                follow=follow,
+                on_picture=self._show,
+            )
+            return path.read_bytes()
+
+    def _show(self, done: int, count: int) -> None:
+        self._done = done / count
+        if self._is_given_up:
+            raise ParameterError("The dialog must stay open until the film is made, but it was closed: there is none.")
+
+    def _give_up(self) -> None:
+        self._is_given_up = not self._dialog.value
+
+
+def _flushed(sim: Simulation) -> tuple[Path, float, float]:
+    """Return the file of a world's recording up to now, and when it begins and ends [s].
+
+    Raises:
+        ParameterError: If it is not recorded.
+    """
+    recorder = sim.loop.recorder
+    if not isinstance(recorder, RunRecorder):
+        raise ParameterError("A film needs a recording, but this run is not recorded. Add --record run.mcap.")
+    recorder.flush()
+    log = Recording(recorder.path).log
+    return recorder.path, s_from_ns(log.begin_ns), s_from_ns(log.end_ns)
+
+
+def _number(label: str, name: str, value: float | None = None) -> ui.number:
+    number = ui.number(label, value=value, min=0.0).props(f"dense data-testid={name}")
+    return number.classes("w-28")

@@ -1,0 +1,154 @@
+"""Makes films of recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from kiks.errors import ParameterError, shown
+from kiks.films.panel import Panel
+from kiks.films.stage import Pixels, Stage
+from kiks.films.video_file import ENDINGS, GIF, MP4, VideoFile
+from kiks.model.atomic_files import file_beside, path_of
+from kiks.model.checks import check_count, check_number
+from kiks.recording.moments import moments
+from kiks.recording.recording import Recording
+from kiks.units import NS_PER_S, s_from_ns
+
+SIZE, FPS = (1280, 720), 25
+"""Width and height of a film, and its pictures per second, if nothing else is asked for."""
+
+SIDE_MIN, SIDE_MAX = 64, 4096
+"""Least and most pixels of a side."""
+
+FPS_MAX, GIF_FPS_MAX = 120, 50
+"""Most pictures per second; browsers show a GIF with more of them slower than it is."""
+
+SPEED_MIN, SPEED_MAX = 0.001, 1000.0
+"""Least and most simulated seconds per second of a film."""
+
+ZOOM, ZOOM_MAX = 3.0, 20.0
+"""Zoom of a film that follows a robot, and the most."""
+
+SAMPLE_COUNT = 16
+"""Pictures whose colours a GIF has."""
+
+
+def save_film(
+    recording: Recording,
+    path: str | Path,
+    *,
+    size: tuple[int, int] = SIZE,
+    fps: int = FPS,
+    speed: float = 1.0,
+    start_s: float | None = None,
+    end_s: float | None = None,
+    robot: int | None = None,
+    follow: int | None = None,
+    zoom: float | None = None,
+    is_plain: bool = False,
+    on_picture: Callable[[int, int], object] = lambda done, count: None,
+) -> int:
+    """Make a film of a recording: the world from above with trails, and what a robot reads beside it.
+
+    Args:
+        recording: The recording.
+        path: The film's file: .mp4 (H.264), .gif or .webp.
+        size: Width and height [pixels]; of an MP4, an odd one becomes one less.
+        fps: Pictures per second.
+        speed: Simulated seconds per second of the film.
+        start_s: Where it begins [s]; the beginning of the recording if left out.
+        end_s: Where it ends [s]; the end of the recording if left out.
+        robot: Number of the robot whose readings are shown; the followed one, else 1, if left out.
+        follow: Number of the robot that stays in the middle; if left out, the whole arena is seen.
+        zoom: How much larger the arena is than one that is seen as a whole; 3 if left out, with `follow` alone.
+        is_plain: Whether the world is alone, without trails, clock and readings.
+        on_picture: Called after each picture with the number of pictures done and of all.
+
+    Returns:
+        The number of pictures.
+
+    Raises:
+        ParameterError: If a value is out of range, the file cannot be written, or the recording is damaged.
+
+    Example:
+        >>> import tempfile, kiks
+        >>> folder = Path(tempfile.mkdtemp())
+        >>> sim = kiks.Simulation(kiks.Arena.box(300, 300))
+        >>> with sim.record(folder / "run.mcap"):
+        ...     sim.run(1.0)
+        >>> save_film(Recording(folder / "run.mcap"), folder / "run.webp", size=(160, 120), fps=10)
+        11
+    """
+    ending = check_film(path)
+    width, height = (check_count(f"the {name} of size", side, SIDE_MIN, SIDE_MAX) for name, side in _named(size))
+    if ending == MP4:
+        # H.264 halves the resolution of colours.
+        width, height = width // 2 * 2, height // 2 * 2
+    fps = check_count("fps", fps, 1, GIF_FPS_MAX if ending == GIF else FPS_MAX)
+    speed = check_number("speed", speed, SPEED_MIN, SPEED_MAX)
+    if follow is None and zoom is not None:
+        raise ParameterError(f"zoom must be left out where no robot is followed, but it was {zoom}. Add follow.")
+    follow = None if follow is None else recording.check_robot(follow, name="follow")
+    zoom = 1.0 if follow is None else check_number("zoom", ZOOM if zoom is None else zoom, 1.0, ZOOM_MAX)
+    robot = recording.check_robot((follow or 1) if robot is None else robot)
+    times_ns = _times_ns(recording, start_s, end_s, speed / fps)
+
+    def pictures(times_ns: Sequence[int]) -> Iterator[Pixels]:
+        picture = np.zeros((height, width, 3), np.uint8)
+        panel = None if is_plain else Panel((width, height), robot=robot - 1, speed=speed)
+        left = width - (0 if panel is None else panel.width)
+        index = None if follow is None else follow - 1
+        stage = Stage((left, height), follow=index, zoom=zoom, has_trails=not is_plain)
+        for number, moment in enumerate(moments(recording.log, times_ns)):
+            stage.draw(moment, number / len(times_ns), picture[:, :left])
+            if panel is not None:
+                panel.draw(moment, picture)
+            yield picture
+
+    sampled = np.linspace(0, len(times_ns) - 1, SAMPLE_COUNT).astype(int)
+    samples = pictures([times_ns[index] for index in sampled.tolist()])
+    with file_beside(path, "a film") as beside, VideoFile(beside, ending, (width, height), fps, samples) as film:
+        for number, picture in enumerate(pictures(times_ns), 1):
+            film.add(picture)
+            on_picture(number, len(times_ns))
+    return len(times_ns)
+
+
+def check_film(path: str | Path) -> str:
+    """Return the ending of a film's file.
+
+    Raises:
+        ParameterError: If it is none of a film.
+    """
+    ending = path_of(path, "a film's file").suffix.lower()
+    if ending not in ENDINGS:
+        raise ParameterError(
+            f"a film must go to a file that ends in {', '.join(ENDINGS)}, but it was {shown(str(path))}."
+        )
+    return ending
+
+
+def _named(size: object) -> Iterator[tuple[str, object]]:
+    """Yield the names of width and height, and what they are."""
+    if not isinstance(size, Sequence) or len(size) != 2:
+        raise ParameterError(f"size must be a width and a height, but it was {shown(size)}. Give (1280, 720).")
+    return zip(("width", "height"), size, strict=True)
+
+
+def _times_ns(recording: Recording, start_s: float | None, end_s: float | None, step_s: float) -> list[int]:
+    """Return the instants of the pictures [ns]: from the beginning on, up to the end."""
+    log = recording.log
+    begin_ns = log.begin_ns if start_s is None else recording.time_ns(start_s, "start_s")
+    end_ns = log.end_ns if end_s is None else recording.time_ns(end_s, "end_s")
+    if begin_ns >= end_ns:
+        raise ParameterError(
+            f"a film must end after it begins, but it begins at {s_from_ns(begin_ns):g} s and ends at "
+            f"{s_from_ns(end_ns):g} s. The recording goes from {s_from_ns(log.begin_ns):g} to "
+            f"{s_from_ns(log.end_ns):g} s."
+        )
+    step_ns = step_s * NS_PER_S
+    count = int((end_ns - begin_ns) / step_ns + 1e-6) + 1
+    return [min(begin_ns + round(number * step_ns), end_ns) for number in range(count)]

@@ -1,0 +1,196 @@
+"""The world of a film from above, picture after picture.
+
+Walls, lamps and trails stay from picture to picture on a base, a picture of the whole arena. A picture is the part of
+the base that the camera sees, with robots, balls and cylinders on it. Each of them is drawn on a patch of the picture,
+as large as itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.errors import ParameterError
+from kiks.model.arena import Arena
+from kiks.recording.moments import LEAP_MM, Moment
+from kiks.sheet import (
+    FINER,
+    FLOOR,
+    LAMP_MM,
+    Place,
+    Sheet,
+    lamp_reach_mm,
+    mixed,
+    path_colour,
+    path_mm,
+    robot_colour,
+    tint,
+    wall_picture,
+)
+
+Pixels = NDArray[np.uint8]
+"""A picture, [row, column, red or green or blue]."""
+
+OUTSIDE = (228, 231, 236)
+
+MARGIN = 0.02
+"""Share of a side that is left free around an arena."""
+
+BASE_PIXELS_MAX = 64 << 20
+"""Most pixels of the whole arena."""
+
+TRAIL_PIXELS, PIECE_PIXELS = 2.0, 4.0
+"""Least width of a trail, and least length of the pieces by which it grows [pixels]."""
+
+BODY_TRAIL_MM = 2.4
+"""Width of the trail of a ball or cylinder [mm]."""
+
+
+class Canvas:
+    """A picture on which things are drawn, in millimetres.
+
+    Args:
+        pixels: The picture.
+        scale: Pixels of it a millimetre.
+        left_mm: Place of its left side [mm].
+        top_mm: Place of its upper side [mm].
+    """
+
+    def __init__(self, pixels: Pixels, scale: float, left_mm: float, top_mm: float) -> None:
+        self.pixels, self.scale, self.left_mm, self.top_mm = pixels, scale, left_mm, top_mm
+
+    @contextmanager
+    def patch(self, places: Sequence[Sequence[float]], margin_mm: float) -> Iterator[Sheet]:
+        """Return a sheet of the part of the picture around places, and put it back with what was drawn on it.
+
+        Args:
+            places: The places [mm].
+            margin_mm: How far around them [mm].
+        """
+        from PIL import Image
+
+        columns = [(x_mm - self.left_mm) * self.scale for x_mm, *_ in places]
+        rows = [(self.top_mm - y_mm) * self.scale for _, y_mm, *_ in places]
+        margin = margin_mm * self.scale + 2  # a line is at least a pixel wide
+        height, width = self.pixels.shape[:2]
+        # Of what lies outside, a pixel at the edge, on which it is not seen.
+        left = min(max(math.floor(min(columns) - margin), 0), width - 1)
+        top = min(max(math.floor(min(rows) - margin), 0), height - 1)
+        right = min(max(math.ceil(max(columns) + margin), left + 1), width)
+        bottom = min(max(math.ceil(max(rows) + margin), top + 1), height)
+        part = self.pixels[top:bottom, left:right]
+        image = Image.fromarray(part).resize((FINER * (right - left), FINER * (bottom - top)), Image.Resampling.NEAREST)
+        yield Sheet(image, FINER * self.scale, self.left_mm + left / self.scale, self.top_mm - top / self.scale)
+        part[...] = np.asarray(image.reduce(FINER))
+
+
+class Stage:
+    """Draws the world of a film.
+
+    Args:
+        size: Width and height of the pictures.
+        follow: Index of the robot that stays in the middle; None: the whole arena is seen.
+        zoom: How much larger the arena is than one that is seen as a whole.
+        has_trails: Whether robots, balls and cylinders leave trails.
+    """
+
+    def __init__(self, size: tuple[int, int], *, follow: int | None, zoom: float, has_trails: bool) -> None:
+        self._size, self._follow, self._zoom, self._has_trails = size, follow, zoom, has_trails
+        self._empty = np.full((size[1], size[0], 3), OUTSIDE, np.uint8)
+        self._arena: Arena | None = None
+        self._lamps = b""
+        self._base = Canvas(self._empty, 1.0, 0.0, 0.0)
+        self._clean = self._empty
+        self._ends: dict[tuple[str, int], Place] = {}
+
+    def draw(self, moment: Moment, share: float, picture: Pixels) -> None:
+        """Draw a moment.
+
+        Args:
+            moment: The moment, later than the one before it.
+            share: How much of the film is over, 0 to 1.
+            picture: Where it is drawn, of the size of the stage.
+        """
+        if moment.setup.arena is not self._arena or moment.lamps.tobytes() != self._lamps:
+            self._draw_base(moment)
+        if self._has_trails:
+            self._leave_trails(moment, share)
+        view = self._view(moment, picture)
+        for body in moment.bodies:
+            with view.patch([(float(body["x_mm"]), float(body["y_mm"]))], float(body["radius_mm"])) as sheet:
+                sheet.body(body)
+        for index, (pose, spec) in enumerate(zip(moment.poses.tolist(), moment.setup.specs, strict=False)):
+            with view.patch([pose[:2]], spec.body.radius_mm) as sheet:
+                sheet.robot(pose, spec.body.radius_mm, robot_colour(index, len(moment.poses)), str(index + 1))
+
+    def _view(self, moment: Moment, picture: Pixels) -> Canvas:
+        """Return a canvas of the picture, with what the camera sees of the base."""
+        base, (width, height) = self._base, self._size
+        rows, columns = base.pixels.shape[:2]
+        column, row = columns / 2, rows / 2
+        if self._follow is not None and self._follow < len(moment.poses):
+            x_mm, y_mm, _ = moment.poses[self._follow].tolist()
+            column, row = x_mm * base.scale, (base.top_mm - y_mm) * base.scale
+        left, top = round(column - width / 2), round(row - height / 2)
+        picture[...] = self._empty
+        of_base = np.s_[max(top, 0) : max(top + height, 0), max(left, 0) : max(left + width, 0)]
+        seen = base.pixels[of_base]
+        down, right = max(-top, 0), max(-left, 0)
+        picture[down : down + seen.shape[0], right : right + seen.shape[1]] = seen
+        return Canvas(picture, base.scale, left / base.scale, base.top_mm - top / base.scale)
+
+    def _draw_base(self, moment: Moment) -> None:
+        """Draw walls and lamps; trails stay where they are."""
+        arena = moment.setup.arena
+        width, height = self._size
+        scale = (1 - 2 * MARGIN) * min(width / arena.width_mm, height / arena.height_mm) * self._zoom
+        size = max(round(arena.width_mm * scale), 1), max(round(arena.height_mm * scale), 1)
+        if size[0] * size[1] > BASE_PIXELS_MAX:
+            raise ParameterError(
+                f"the whole arena must have at most {BASE_PIXELS_MAX} pixels, but with a zoom of {self._zoom:g} it has "
+                f"{size[0]} x {size[1]}. Zoom less, or make the film smaller."
+            )
+        clean = Canvas(np.array(wall_picture(arena, size)), scale, 0.0, arena.height_mm)
+        for x_mm, y_mm, power_w, is_on in moment.lamps.tolist():
+            place, reach_mm = (x_mm, y_mm), max(lamp_reach_mm(power_w) if is_on else 0.0, LAMP_MM)
+            with clean.patch([place], reach_mm) as sheet:
+                sheet.lamp(place, power_w, is_on=bool(is_on))
+        pixels = clean.pixels.copy()
+        if self._arena is not None and self._clean.shape == pixels.shape:
+            is_trail = (self._base.pixels != self._clean).any(axis=-1)
+            pixels[is_trail] = self._base.pixels[is_trail]
+        self._base, self._clean = Canvas(pixels, scale, 0.0, arena.height_mm), clean.pixels
+        self._arena, self._lamps = arena, moment.lamps.tobytes()
+
+    def _leave_trails(self, moment: Moment, share: float) -> None:
+        """Let trails grow to where robots, balls and cylinders are."""
+        lines: dict[tuple[str, int], list[Place]] = {}
+        least_mm = PIECE_PIXELS / self._base.scale
+        ways = [(tick.poses, tick.bodies, tick.places) for tick in moment.passed] or [
+            (moment.poses, moment.bodies, np.column_stack([moment.bodies["x_mm"], moment.bodies["y_mm"]]))
+        ]
+        for poses, bodies, places in ways:
+            things = [("robot", index, pose) for index, pose in enumerate(poses.tolist())]
+            things += [("body", *thing) for thing in zip(bodies["number"].tolist(), places.tolist(), strict=True)]
+            for what, number, (x_mm, y_mm, *_) in things:
+                key, place = (what, number), (x_mm, y_mm)
+                way_mm = math.dist(self._ends.setdefault(key, place), place)
+                if way_mm > LEAP_MM + least_mm:
+                    self._ends[key] = place
+                elif way_mm > least_mm:
+                    lines.setdefault(key, [self._ends[key]]).append(place)
+                    self._ends[key] = place
+        tints = {int(body["number"]): tint(body) for body in moment.bodies}
+        for (what, number), line in lines.items():
+            if what == "robot":
+                colour, width_mm = path_colour(number, len(moment.poses), share), path_mm(len(moment.poses))
+            else:
+                colour, width_mm = (*tints.get(number, FLOOR), 200), BODY_TRAIL_MM
+            width_mm = max(width_mm, TRAIL_PIXELS / self._base.scale)
+            with self._base.patch(line, width_mm) as sheet:
+                # Opaque, for where two pieces meet, no darker spot must arise.
+                sheet.line(line, mixed(FLOOR, colour[:3], colour[3] / 255), width_mm)

@@ -1,0 +1,80 @@
+"""Files of films: pictures one after the other, as MP4 (H.264), GIF or WebP."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from fractions import Fraction
+from pathlib import Path
+from types import TracebackType
+from typing import cast
+
+import numpy as np
+
+from kiks.films.palette import Palette
+from kiks.films.stage import Pixels
+
+MP4, GIF, WEBP = ".mp4", ".gif", ".webp"
+
+ENDINGS = (MP4, GIF, WEBP)
+
+_CODECS = {MP4: ("libx264", "yuv420p"), GIF: ("gif", "pal8"), WEBP: ("libwebp_anim", "bgra")}
+_OPTIONS = {
+    # Flat colours and still walls: `animation` keeps edges sharp.
+    MP4: {"preset": "veryfast", "crf": "20", "tune": "animation"},
+    GIF: {},
+    # Drawings take half the bytes of a lossy film.
+    WEBP: {"lossless": "1", "compression_level": "2"},
+}
+_CONTAINERS = {MP4: {"movflags": "+faststart"}, GIF: {"loop": "0"}, WEBP: {"loop": "0"}}
+
+
+class VideoFile:
+    """A film's file; the end of `with` writes what is left.
+
+    Args:
+        path: The file.
+        ending: Its kind, of `ENDINGS`.
+        size: Width and height of the pictures.
+        fps: Pictures per second.
+        samples: Some of the pictures, whose colours a GIF has; others need none.
+    """
+
+    def __init__(self, path: Path, ending: str, size: tuple[int, int], fps: int, samples: Iterable[Pixels]) -> None:
+        import av
+        from av.video.stream import VideoStream
+
+        self._palette = Palette(samples) if ending == GIF else None
+        self._count, self._time_base = 0, Fraction(1, fps)
+        codec, pixel_format = _CODECS[ending]
+        self._container = av.open(str(path), "w", format=ending[1:], container_options=_CONTAINERS[ending])
+        self._stream = cast(VideoStream, self._container.add_stream(codec, rate=fps, options=_OPTIONS[ending]))
+        self._stream.width, self._stream.height = size
+        self._stream.pix_fmt = pixel_format
+
+    def add(self, picture: Pixels) -> None:
+        """Append a picture."""
+        import av
+
+        if self._palette is None:
+            frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
+        else:
+            # PyAV wants alpha, red, green and blue.
+            colours = np.insert(self._palette.colours, 0, 255, axis=1)
+            frame = av.VideoFrame.from_ndarray((self._palette.indices(picture), colours), format="pal8")  # type: ignore[arg-type]
+        frame.pts, frame.time_base = self._count, self._time_base
+        self._count += 1
+        self._container.mux(self._stream.encode(frame))
+
+    def __enter__(self) -> VideoFile:
+        """Return itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close the file, complete if there was no error."""
+        try:
+            if kind is None:
+                self._container.mux(self._stream.encode(None))
+        finally:
+            self._container.close()

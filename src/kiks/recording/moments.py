@@ -1,0 +1,156 @@
+"""What a recording tells of moments: walls, lamps, robots, balls and cylinders, and what programs read last."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.engine.sensing.proximity import pose_of
+from kiks.engine.state import ROBOT
+from kiks.recording.entries import Entry
+from kiks.recording.log import RecordedLog
+from kiks.recording.motion import ticks_of
+from kiks.recording.tables import reading_of
+from kiks.sim.run_log import Kind
+from kiks.sim.saved_state import Setup
+from kiks.units import TICK_NS
+
+LEAP_MM = 50.0
+"""What moves that far within a tick was moved by a hand [mm]: no robot drives 5 m/s."""
+
+
+class Tick(NamedTuple):
+    """Robots and bodies after a tick.
+
+    Attributes:
+        number: Of ticks done.
+        poses: Of robots: x_mm, y_mm, heading_rad; float64 [robot, 3].
+        places: Of bodies: x_mm, y_mm; float64 [body, 2].
+        robots: The first fields of `ROBOT`, as they were at most three ticks later, [robot].
+        bodies: Records of `BODY`, as they were at most three ticks later, [body].
+    """
+
+    number: int
+    poses: NDArray[np.float64]
+    places: NDArray[np.float64]
+    robots: NDArray[np.void]
+    bodies: NDArray[np.void]
+
+
+class Moment(NamedTuple):
+    """What a recording tells of an instant.
+
+    Attributes:
+        time_ns: When [ns].
+        setup: The walls and the kinds of robots.
+        lamps: x_mm, y_mm, power_w, and 1 for on or 0 for off; float64 [lamp, 4].
+        poses: Of robots: x_mm, y_mm, heading_rad; float64 [robot, 3].
+        robots: The first fields of `ROBOT`, at most a tick before, [robot].
+        bodies: Records of `BODY`, with their places at this instant, [body].
+        readings: The last reply to `N` by a robot's index: eight counts.
+        passed: The ticks since the moment before.
+    """
+
+    time_ns: int
+    setup: Setup
+    lamps: NDArray[np.float64]
+    poses: NDArray[np.float64]
+    robots: NDArray[np.void]
+    bodies: NDArray[np.void]
+    readings: Mapping[int, Sequence[int]]
+    passed: Sequence[Tick]
+
+
+def moments(log: RecordedLog, times_ns: Sequence[int]) -> Iterator[Moment]:
+    """Yield what a recording tells of instants.
+
+    Args:
+        log: The log of the recording.
+        times_ns: The instants [ns], at least one, in their order, within the recording.
+
+    Raises:
+        ParameterError: If the recording is damaged there.
+    """
+    block, told = log.row_before(times_ns[0]).block, _Told()
+    # The last tick before a block may stand in the one before.
+    ticks, entries = _ticks(log, max(block - 1, 0)), _entries(log, block)
+    now, later, entry = next(ticks, None), next(ticks, None), next(entries, None)
+    if now is None:
+        raise log.damaged("it has no motion")
+    for number, time_ns in enumerate(times_ns):
+        passed = []
+        while later is not None and later.number * TICK_NS <= time_ns:
+            passed.append(later)
+            now, later = later, next(ticks, None)
+        while entry is not None and entry.time_ns <= time_ns:
+            told.take(log, entry)
+            entry = next(entries, None)
+        if told.setup is None:
+            raise log.damaged("it has no state")
+        poses, places = _between(now, later, time_ns)
+        bodies: Any = now.bodies.copy()
+        bodies["x_mm"], bodies["y_mm"] = places.T
+        before = passed if number else ()
+        yield Moment(time_ns, told.setup, told.lamps, poses, now.robots, bodies, told.readings, before)
+
+
+class _Told:
+    """What the entries up to an instant have told."""
+
+    def __init__(self) -> None:
+        self.setup: Setup | None = None
+        self.lamps = np.zeros((0, 4))
+        self.readings: dict[int, Sequence[int]] = {}
+
+    def take(self, log: RecordedLog, entry: Entry) -> None:
+        if entry.kind in (Kind.STATE, Kind.CHECK):
+            self.setup, saved = log.state_of(entry)
+            self.lamps = saved.lamps
+        elif (reading := reading_of(entry)) is not None and reading[0] == "N":
+            self.readings[entry.robot] = reading[1]
+
+
+def _entries(log: RecordedLog, first_block: int) -> Iterator[Entry]:
+    """Yield the entries from a block on."""
+    for block in range(first_block, log.block_count):
+        yield from log.entries_of(block)
+
+
+def _ticks(log: RecordedLog, first_block: int) -> Iterator[Tick]:
+    """Yield the ticks from a block on."""
+    last_tick = -1
+    for block in range(first_block, log.block_count):
+        for motion in log.motion_of(block):
+            ticks = ticks_of(motion, last_tick)
+            last_tick = int(motion.ticks[-1])
+            rows = zip(ticks.ticks.tolist(), ticks.poses, ticks.places, ticks.looks.tolist(), strict=True)
+            for number, poses, places, look in rows:
+                yield Tick(number, poses, places, motion.robots[look], motion.bodies[look])
+
+
+def _between(now: Tick, later: Tick | None, time_ns: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return poses and places at a time from one tick on, up to the next."""
+    since_ns = time_ns - now.number * TICK_NS
+    if later is None or later.number != now.number + 1 or since_ns <= 0:
+        return now.poses, now.places
+    poses, places = now.poses.copy(), now.places.copy()
+    if len(now.poses) == len(later.poses):
+        records: Any = np.zeros((1, len(poses)), ROBOT)
+        records["trail"][0, :, 0] = now.poses
+        for axis, field in enumerate(("x_mm", "y_mm", "heading_rad")):
+            records[field][0] = later.poses[:, axis]
+        for index in np.flatnonzero(~leapt(now.poses, later.poses)).tolist():
+            poses[index] = pose_of(records, later.number, time_ns, index)
+    if np.array_equal(now.bodies["number"], later.bodies["number"]):
+        drives = ~leapt(now.places, later.places)
+        places[drives] += (later.places - now.places)[drives] * (since_ns / TICK_NS)
+    return poses, places
+
+
+def leapt(before: NDArray[np.float64], after: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which of the things at places or poses [thing, ...] a hand has moved to others."""
+    ways_mm: NDArray[np.float64] = np.hypot(*(after - before)[:, :2].T)
+    return ways_mm > LEAP_MM

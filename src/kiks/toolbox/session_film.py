@@ -1,0 +1,55 @@
+"""The film that a program makes of a session's world, from when it opens a port until it closes it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from kiks.films.film import check_film, save_film
+from kiks.model.atomic_files import check_writable
+from kiks.recording.recorder import RunRecorder
+from kiks.recording.recording import Recording
+from kiks.sim.simulation import Simulation
+
+
+class SessionFilm:
+    """Records a world from now on, and makes a film of it in the end.
+
+    Args:
+        sim: The world.
+        path: The film's file, .mp4, .gif or .webp.
+        robot: Number of the robot whose readings are shown.
+
+    Raises:
+        ParameterError: If the file cannot be written, or the world is being recorded already.
+    """
+
+    def __init__(self, sim: Simulation, path: Path, robot: int) -> None:
+        check_film(path)
+        check_writable(path, "a film")
+        self._path, self._robot = path, robot
+        self._folder = TemporaryDirectory(prefix="kiks-film-")
+        self._recording = Path(self._folder.name, "run.mcap")
+        try:
+            self._recorder = RunRecorder(sim, self._recording)
+        except BaseException:
+            self._folder.cleanup()
+            raise
+
+    def stop(self) -> None:
+        """End the film with the present state."""
+        self._recorder.close()
+
+    def save(self, on_picture: Callable[[int, int], object]) -> int:
+        """Make the film, and return the number of its pictures.
+
+        Args:
+            on_picture: See `save_film`.
+
+        Raises:
+            ParameterError: If the film cannot be written, or no time has passed.
+        """
+        with self._folder:
+            self.stop()
+            return save_film(Recording(self._recording), self._path, robot=self._robot, on_picture=on_picture)

@@ -1,0 +1,93 @@
+"""The desk films the run that it shows, and gives the film to the browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("nicegui", reason="the desk needs NiceGUI")
+pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
+
+import av
+from playwright.sync_api import expect
+from tests.desk.visitor import Visitor
+
+from kiks.films.film import FPS
+
+pytestmark = pytest.mark.slow
+
+
+def pictures(file: Path) -> list[np.ndarray]:
+    with av.open(str(file)) as container:
+        return [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+
+
+def pass_time(visitor: Visitor, seconds: float) -> None:
+    """Let time pass in the paused world."""
+    end_ns = visitor.sim.now_ns + round(seconds * 1e9)
+    visitor.choose("step-size", "1 s")
+    while visitor.sim.now_ns < end_ns:
+        now_ns = visitor.sim.now_ns
+        visitor.at("step").click()
+        visitor.until(lambda now_ns=now_ns: visitor.sim.now_ns > now_ns)
+
+
+def test_a_part_of_the_run_is_filmed_and_downloaded(visitor: Visitor, tmp_path: Path) -> None:
+    visitor.pause()
+    with visitor.sim.record(tmp_path / "run.mcap"):
+        begin_s = visitor.sim.time_s
+        pass_time(visitor, 12.0)
+        visitor.at("film").click()
+        expect(visitor.at("film-make")).to_be_visible()
+        start_s, end_s = (float(visitor.at(f"film-{name}").input_value()) for name in ("start", "end"))
+        assert end_s == pytest.approx(visitor.sim.time_s, abs=0.01)
+        assert start_s == pytest.approx(end_s - 10.0, abs=0.01)
+        assert start_s > begin_s
+        visitor.at("film-end").fill(f"{start_s + 4:g}")
+        visitor.at("film-speed").fill("2")
+        visitor.choose("film-follow", "robot 2, in the middle")
+        visitor.picture("film_dialog")
+        with visitor.page.expect_download() as download:
+            visitor.at("film-make").click()
+        download.value.save_as(tmp_path / download.value.suggested_filename)
+        seen = pictures(tmp_path / "kiks-film.mp4")
+        assert len(seen) == pytest.approx(4 / 2 * FPS + 1, abs=1)
+        expect(visitor.at("film-make")).to_be_enabled()
+
+
+def test_mistakes_are_told(visitor: Visitor, tmp_path: Path) -> None:
+    visitor.pause()
+    visitor.at("film").click()
+    visitor.told("this run is not recorded. Add --record run.mcap")
+    with visitor.sim.record(tmp_path / "run.mcap"):
+        pass_time(visitor, 2.0)
+        visitor.at("film").click()
+        expect(visitor.at("film-make")).to_be_visible()
+        end_s = visitor.at("film-end").input_value()
+        for name, value, words in (
+            ("end", "0", "end_s must be from"),
+            ("end", "", "A film needs a beginning, an end and a speed"),
+            ("start", "1e6", "start_s must be from"),
+            ("speed", "0", "speed must be from 0.001 to 1000"),
+            ("speed", "0.001", "A film must be at most 300 s long"),
+        ):
+            before = visitor.at(f"film-{name}").input_value()
+            visitor.at(f"film-{name}").fill(value)
+            visitor.at("film-make").click()
+            visitor.told(words)
+            visitor.at(f"film-{name}").fill(before)
+        assert visitor.at("film-end").input_value() == end_s
+
+
+def test_a_closed_dialog_gives_the_film_up(visitor: Visitor, tmp_path: Path) -> None:
+    visitor.pause()
+    with visitor.sim.record(tmp_path / "run.mcap"):
+        pass_time(visitor, 6.0)
+        visitor.at("film").click()
+        visitor.at("film-speed").fill("0.02")
+        visitor.at("film-make").click()
+        expect(visitor.at("film-make")).to_be_disabled()
+        visitor.at("film-close").click()
+        visitor.told("The dialog must stay open until the film is made")

@@ -1,0 +1,293 @@
+"""Films of recordings show what was recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image, ImageSequence
+from tests.model.test_atomic_files import full_disk
+
+from kiks import Arena, Khepera, ParameterError, Recording, Simulation
+from kiks.cli.film import film
+from kiks.films.film import save_film
+from kiks.films.stage import MARGIN, OUTSIDE
+from kiks.recording import recorder
+from kiks.sheet import robot_colour
+
+WIDTH_MM, HEIGHT_MM, SECONDS = 400.0, 300.0, 6.0
+GREEN = robot_colour(0, 1)
+
+Pixels = NDArray[np.uint8]
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    """A robot drives around a cylinder; after 3 s a wall is drawn. Each second is a chunk."""
+    file = tmp_path_factory.mktemp("recording") / "run.mcap"
+    sim = Simulation(Arena.box(int(WIDTH_MM), int(HEIGHT_MM)), seed=3)
+    sim.place(1, 100, 80, 0.3)
+    sim.add_cylinder(200, 150)
+    robot = Khepera(sim.port(1))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(recorder, "CHUNK_S", 0.0)
+        with sim.record(file):
+            robot.set_speed(9, 5)
+            while sim.time_s < SECONDS:
+                robot.proximity()
+                if sim.time_s > 3 and sim.arena.brightness[40, 350] == 0:
+                    walls = np.flipud(sim.arena.brightness).copy()
+                    walls[240:280, 330:370] = 100
+                    sim.set_arena(Arena.from_array(walls))
+    return Recording(file)
+
+
+def pictures(file: Path) -> list[Pixels]:
+    """Return the pictures of a film, decoded by a library of its own for each kind."""
+    if file.suffix == ".webp":  # FFmpeg decodes no WebP that moves
+        with Image.open(file) as image:
+            return [np.asarray(each.convert("RGB")) for each in ImageSequence.Iterator(image)]
+    with av.open(str(file)) as container:
+        return [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+
+
+def pixel(picture: Pixels, x_mm: float, y_mm: float) -> tuple[float, float]:
+    """Return where a place is in a film of the whole arena: column and row."""
+    height, width = picture.shape[:2]
+    scale = (1 - 2 * MARGIN) * min(width / WIDTH_MM, height / HEIGHT_MM)
+    return width / 2 + (x_mm - WIDTH_MM / 2) * scale, height / 2 - (y_mm - HEIGHT_MM / 2) * scale
+
+
+def green_place(picture: Pixels) -> tuple[float, float]:
+    """Return the middle of what has the colour of the robot: column and row."""
+    distances = np.abs(picture.astype(int) - GREEN).max(axis=-1)
+    rows, columns = np.nonzero(distances < 25)
+    assert len(rows) > 50
+    return (columns.min() + columns.max()) / 2, (rows.min() + rows.max()) / 2
+
+
+def pose_at(recording: Recording, time_s: float) -> tuple[float, float]:
+    poses = recording.table("poses")
+    row = poses[np.searchsorted(poses["time_s"], time_s + 1e-9) - 1]
+    return float(row["x_mm"]), float(row["y_mm"])
+
+
+@pytest.mark.parametrize("ending", ["mp4", "gif", "webp"])
+def test_the_robot_is_where_the_recording_has_it(ending: str, recording: Recording, tmp_path: Path) -> None:
+    file = tmp_path / f"film.{ending}"
+    count = save_film(recording, file, size=(320, 240), fps=10, is_plain=True, start_s=1.0, end_s=5.0)
+    seen = pictures(file)
+    assert count == len(seen) == 41
+    for index in (0, 13, 40):
+        assert seen[index].shape == (240, 320, 3)
+        wanted = pixel(seen[index], *pose_at(recording, 1.0 + index / 10))
+        assert green_place(seen[index]) == pytest.approx(wanted, abs=1.5)
+
+
+@pytest.mark.parametrize("ending", ["mp4", "gif"])
+@pytest.mark.parametrize(("fps", "speed"), [(25, 1.0), (30, 4.0), (7, 0.5)])
+def test_a_film_lasts_as_long_as_its_pictures(
+    ending: str, fps: int, speed: float, recording: Recording, tmp_path: Path
+) -> None:
+    file = tmp_path / f"film.{ending}"
+    count = save_film(recording, file, size=(96, 64), fps=fps, speed=speed, end_s=4.0)
+    assert count == int(4.0 / speed * fps) + 1
+    with av.open(str(file)) as container:
+        times_s = [float(frame.pts * frame.time_base) for frame in container.decode(video=0)]
+    assert len(times_s) == count
+    # The clock of a GIF has hundredths.
+    np.testing.assert_allclose(times_s, np.arange(count) / fps, atol=0.0051 if ending == "gif" else 1e-4)
+
+
+def test_a_webp_lasts_as_long_as_its_pictures(recording: Recording, tmp_path: Path) -> None:
+    file = tmp_path / "film.webp"
+    save_film(recording, file, size=(96, 64), fps=20, end_s=2.0)
+    with Image.open(file) as image:
+        durations_ms = []
+        for each in ImageSequence.Iterator(image):
+            each.load()
+            durations_ms.append(each.info["duration"])
+        assert image.info["loop"] == 0
+    # What does not change between pictures is one longer picture.
+    assert sum(durations_ms) == pytest.approx(41 * 50, abs=51)
+
+
+def test_the_followed_robot_stays_in_the_middle(recording: Recording, tmp_path: Path) -> None:
+    file = tmp_path / "film.webp"
+    save_film(recording, file, size=(200, 150), fps=5, follow=1, zoom=4, is_plain=True)
+    places = [green_place(picture) for picture in pictures(file)]
+    np.testing.assert_allclose(places, [(99.5, 74.5)] * len(places), atol=1.5)
+
+
+def test_zoom_makes_it_larger(recording: Recording, tmp_path: Path) -> None:
+    areas = []
+    for zoom in (2, 4):
+        file = tmp_path / f"{zoom}.webp"
+        save_film(recording, file, size=(200, 150), fps=1, follow=1, zoom=zoom, is_plain=True, end_s=0.5)
+        areas.append(np.count_nonzero(np.abs(pictures(file)[0].astype(int) - GREEN).max(axis=-1) < 25))
+    assert areas[1] / areas[0] == pytest.approx(4, rel=0.15)
+
+
+def test_walls_and_trails_come_as_they_came(recording: Recording, tmp_path: Path) -> None:
+    file = tmp_path / "film.webp"
+    save_film(recording, file, size=(320, 240), fps=10)
+    seen = pictures(file)
+    column, row = map(round, pixel(seen[0], 350, 40))
+    assert min(seen[25][row, column]) > 200
+    assert max(seen[35][row, column]) < 150
+    # The floor where the robot was at 2 s: under the robot then, its trail later, also after the wall came.
+    column, row = map(round, pixel(seen[0], *pose_at(recording, 0.0)))
+    colour = np.abs(seen[-1][row - 1 : row + 2, column - 1 : column + 2].astype(int) - (246, 243, 236)).max()
+    assert colour > 40
+
+
+def test_readings_stand_beside_it(recording: Recording, tmp_path: Path) -> None:
+    file = tmp_path / "film.webp"
+    save_film(recording, file, size=(1280, 720), fps=2, end_s=2.0)
+    counts = recording.table("readings")["counts"]
+    times_s = recording.table("readings")["time_s"]
+    for index, picture in enumerate(pictures(file)):
+        if not index:
+            continue
+        wanted = counts[np.searchsorted(times_s, index / 2, side="right") - 1]
+        panel = picture[200:340, 1030:].astype(int)
+        for sensor, count in enumerate(wanted.tolist()):
+            bar = panel[:, round(20 + (sensor + 0.5) * 210 / 8)]
+            is_filled = bar.max(axis=-1) - bar.min(axis=-1) > 60
+            assert np.count_nonzero(is_filled) == pytest.approx(min(count / 1023, 1) * 140, abs=1.5)
+
+
+@pytest.mark.parametrize(("size", "shown"), [((321, 241), (320, 240)), ((65, 333), (64, 332)), ((333, 65), (332, 64))])
+def test_odd_sizes(size: tuple[int, int], shown: tuple[int, int], recording: Recording, tmp_path: Path) -> None:
+    for ending, (width, height) in (("mp4", shown), ("gif", size), ("webp", size)):
+        file = tmp_path / f"film.{ending}"
+        save_film(recording, file, size=size, fps=2)
+        assert pictures(file)[-1].shape == (height, width, 3)
+
+
+def test_a_film_of_a_killed_run_ends_with_what_there_is(recording: Recording, tmp_path: Path) -> None:
+    data = recording.log.reader.path.read_bytes()
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(data[: len(data) * 2 // 3])
+    part = Recording(cut)
+    assert not part.is_whole
+    assert 1 < part.duration_s < SECONDS - 0.9
+    count = save_film(part, tmp_path / "film.webp", size=(320, 240), fps=10, is_plain=True)
+    assert count == int(part.duration_s * 10 + 1e-6) + 1
+    last = pictures(tmp_path / "film.webp")[-1]
+    wanted = pixel(last, *pose_at(part, (count - 1) / 10))
+    assert green_place(last) == pytest.approx(wanted, abs=1.5)
+
+
+def test_the_same_recording_gives_the_same_film(recording: Recording, tmp_path: Path) -> None:
+    for ending in ("mp4", "gif", "webp"):
+        files = [tmp_path / f"{name}.{ending}" for name in ("one", "two")]
+        for file in files:
+            save_film(recording, file, size=(160, 120), fps=5)
+        assert files[0].read_bytes() == files[1].read_bytes()
+
+
+def test_pictures_are_counted(recording: Recording, tmp_path: Path) -> None:
+    told: list[tuple[int, int]] = []
+    count = save_film(
+        recording, tmp_path / "film.mp4", size=(64, 64), fps=5, on_picture=lambda *words: told.append(words)
+    )
+    assert told == [(number, count) for number in range(1, count + 1)]
+
+
+def test_an_interrupted_film_leaves_the_earlier_file(recording: Recording, tmp_path: Path) -> None:
+    file = tmp_path / "film.mp4"
+    file.write_bytes(b"earlier")
+
+    def interrupt(done: int, count: int) -> None:
+        if done == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        save_film(recording, file, size=(64, 64), on_picture=interrupt)
+    assert file.read_bytes() == b"earlier"
+    assert list(tmp_path.iterdir()) == [file]
+
+
+@pytest.mark.parametrize("ending", ["mp4", "gif", "webp"])
+def test_on_a_full_disk_the_earlier_file_stays(ending: str, recording: Recording, tmp_path: Path) -> None:
+    file = tmp_path / f"film.{ending}"
+    file.write_bytes(b"earlier")
+    for bytes_left in (0, 1000, 6000):
+        with full_disk(bytes_left), pytest.raises(ParameterError, match="a film must go to a file that can be written"):
+            save_film(recording, file, size=(320, 240))
+        assert [path.name for path in tmp_path.iterdir()] == [file.name]
+        assert file.read_bytes() == b"earlier"
+
+
+def test_a_link_stays_and_a_folder_is_refused(recording: Recording, tmp_path: Path) -> None:
+    file, link, folder = (tmp_path / name for name in ("film.gif", "link.gif", "folder.gif"))
+    file.write_bytes(b"earlier")
+    file.chmod(0o604)
+    link.symlink_to(file)
+    save_film(recording, link, size=(64, 64), fps=1)
+    assert link.is_symlink()
+    assert file.stat().st_mode & 0o777 == 0o604
+    assert len(pictures(file)) > 1
+    folder.mkdir()
+    for path in (folder, Path("/dev/null")):
+        with pytest.raises(ParameterError, match="a film must go to a file that"):
+            save_film(recording, path, size=(64, 64))
+
+
+def mistakes() -> Iterator[tuple[str, dict[str, object], str]]:
+    yield "film.avi", {}, r"a film must go to a file that ends in .mp4, .gif, .webp, but it was"
+    yield "no/film.mp4", {}, "a film must go to a file that can be written"
+    yield "film.mp4", {"size": (63, 64)}, "the width of size must be a whole number from 64 to 4096, but it was 63"
+    yield "film.mp4", {"size": (64, 5000)}, "the height of size must be"
+    yield "film.mp4", {"size": 7}, "size must be a width and a height"
+    yield "film.mp4", {"fps": 0}, "fps must be a whole number from 1 to 120"
+    yield "film.gif", {"fps": 51}, "fps must be a whole number from 1 to 50"
+    yield "film.mp4", {"speed": 0}, "speed must be from 0.001 to 1000"
+    yield "film.mp4", {"robot": 2}, "robot must be a whole number from 1 to 1, but it was 2"
+    yield "film.mp4", {"follow": 2}, "follow must be a whole number from 1 to 1, but it was 2"
+    yield "film.mp4", {"zoom": 2}, "zoom must be left out where no robot is followed"
+    yield "film.mp4", {"zoom": 0.5, "follow": 1}, "zoom must be from 1 to 20"
+    yield "film.mp4", {"zoom": 20, "follow": 1, "size": (4096, 4096)}, "the whole arena must have at most"
+    yield "film.mp4", {"start_s": 7}, "start_s must be from 0 to"
+    yield "film.mp4", {"end_s": 100}, "end_s must be from 0 to"
+    yield (
+        "film.mp4",
+        {"start_s": 2, "end_s": 2},
+        "a film must end after it begins, but it begins at 2 s and ends at 2 s",
+    )
+    yield "film.mp4", {"start_s": 3, "end_s": 2}, "a film must end after it begins"
+
+
+@pytest.mark.parametrize(("name", "values", "words"), list(mistakes()))
+def test_mistakes_get_a_clear_error(
+    name: str, values: dict[str, object], words: str, recording: Recording, tmp_path: Path
+) -> None:
+    with pytest.raises(ParameterError, match=words):
+        save_film(recording, tmp_path / name, **values)
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_command(recording: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    film(recording.log.reader.path, tmp_path / "film.mp4", size="200x100", start=1.0, end=2.0)
+    assert capsys.readouterr().out == f"Film: {tmp_path}/film.mp4   26 pictures, 1.0 s\n"
+    seen = pictures(tmp_path / "film.mp4")
+    assert len(seen) == 26
+    assert seen[0].shape == (100, 200, 3)
+    np.testing.assert_allclose(seen[0][0, 0], OUTSIDE, atol=4)
+    for size in ("200", "x", "axb", "-1x5", "1280x720x3"):
+        with pytest.raises(ParameterError, match="--size must be a width and a height like 1280x720"):
+            film(recording.log.reader.path, tmp_path / "film.mp4", size=size)
+
+
+def test_colours_that_a_gif_has_are_those_of_the_picture(recording: Recording, tmp_path: Path) -> None:
+    for ending in ("gif", "webp"):
+        save_film(recording, tmp_path / f"film.{ending}", size=(640, 400), fps=2)
+    for lossy, exact in zip(pictures(tmp_path / "film.gif"), pictures(tmp_path / "film.webp"), strict=True):
+        errors = np.abs(lossy.astype(int) - exact).max(axis=-1)
+        assert np.count_nonzero(errors > 2) < 0.01 * errors.size
+        assert errors.max() < 40
