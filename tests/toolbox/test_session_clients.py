@@ -516,7 +516,7 @@ def test_random_requests_get_an_answer(
             assert len(told) < 500, words[:80]
             assert told.isprintable(), words[:80]
             # What is wrong with a file says the reader of files.
-            assert len(words) <= 80 or words[:81] not in told or name in ("read", "save")
+            assert len(words) <= 80 or words[:81] not in told or name in ("read", "record", "save")
     assert ask("active") == "1"
     for setting in ("seed", "robot", "robots", "response", "turrets", "thinking", "programs", "latency_s"):
         ask(f"set {setting} ")

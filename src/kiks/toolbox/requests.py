@@ -151,6 +151,12 @@ def _checkpoint(client: SessionClient, words: str) -> str:
     return ""
 
 
+def _record(client: SessionClient, words: str) -> str:
+    path = Path(_path(words)) if words else None
+    client.do(lambda sim: client.session.record(path))
+    return ""
+
+
 def _film(client: SessionClient, words: str) -> str:
     number, _, path = words.partition(" ")
     client.begin_film(port_of(number), Path(_path(path)))
@@ -227,6 +233,7 @@ REQUESTS: dict[str, Act] = {
     "print": _print,
     "checkpoint": _checkpoint,
     "reset": _reset,
+    "record": _record,
     "film": _film,
     "film_stop": _film_stop,
     "film_save": lambda client, words: str(client.save_film()),

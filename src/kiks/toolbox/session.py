@@ -15,6 +15,7 @@ from kiks.model.arena import Arena
 from kiks.model.project import Project
 from kiks.ports.program_process import Command
 from kiks.ports.programs import Programs
+from kiks.recording.recorder import RunRecorder
 from kiks.sim.from_project import simulation_of, spec_of
 from kiks.sim.simulation import Simulation
 from kiks.toolbox.preferences import Settings
@@ -67,6 +68,7 @@ class Session:
         self._shown: Shown | None = None
         self._has_world = threading.Event()
         self._traced: Simulation | None = None
+        self._recorder: RunRecorder | None = None
 
     @property
     def world(self) -> Simulation:
@@ -110,6 +112,7 @@ class Session:
                 if self._has_window:
                     self._show()
             else:
+                self.record(None)
                 self.desk.folder = folder.resolve()
                 asyncio.run(self.desk.replace(project))
             self.owners.clear()
@@ -139,6 +142,19 @@ class Session:
         if self._traced is not self.world:
             self._traced = self.world
             self._traced.record_paths(PATH_PERIOD_S)
+
+    def record(self, path: Path | None) -> None:
+        """Record this world from now on, until it ends or the next call; with None, record no more.
+
+        Raises:
+            ParameterError: If the file cannot be written, or a film is being made of the world.
+        """
+        with self.lock:
+            recorder, self._recorder = self._recorder, None
+            if recorder is not None:
+                recorder.close()
+            if path is not None:
+                self._recorder = RunRecorder(self.world, path)
 
     def take_robot(self, owner: object, wanted: int) -> int:
         """Assign a robot to a client: the wanted, a free or a new one; return its number.
@@ -219,6 +235,7 @@ class Session:
 
     def close(self) -> None:
         """End the world and all programs in it."""
+        self.record(None)
         if self._shown is not None:
             self._shown.close()
         elif self.desk is not None:
