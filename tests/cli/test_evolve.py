@@ -163,8 +163,8 @@ def test_seeds_evolve_one_after_another_and_are_compared(folder: Path, tmp_path:
     said = kiks(*words, "--seeds", 2).output
     assert {path.name for path in out.iterdir()} == {"seed-1", "seed-2", "seeds.png", "summary.json"}
     assert (out / "seed-1/champion.toml").read_bytes() == (folder / "champion.toml").read_bytes()
-    assert re.search(r"\n 1 +-?\d\.\d{4} +\d +\d+ of 20 +\d+ of 200 +40 ", said)
-    assert re.search(r"\n all +-?\d\.\d{4} +\d of 2 +40 ", said)
+    assert re.search(r"\n 1 +-?\d\.\d{4} +\d +\d+ of 20 +\d+ of 200 +44 ", said)
+    assert re.search(r"\n all +-?\d\.\d{4} +\d of 2 +44 ", said)
     again = kiks(*words, "--seeds", 3).output
     assert "Continuing after generation 3" in again
     assert (out / "seed-3/result.json").exists()

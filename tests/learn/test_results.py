@@ -198,7 +198,9 @@ def test_the_result_of_an_evolution(tmp_path: Path) -> None:
     result = result_of(evolution)
     result.save(tmp_path)
     assert load_results(tmp_path) == [result]
-    assert (result.generations, result.evaluations) == (3, (24, 40))
+    assert evolution.finals is not None
+    assert (result.generations, result.evaluations) == (3, (24, 40, 40 + evolution.finals.evaluation_count))
+    assert result.seconds == evolution.finals.seconds > evolution.generations[-1].seconds
     assert result.fitness == result.champion_fitness[-1] == evolution.champion.fitness
     assert result.exam is not None
     assert (result.exam.starts, result.exam.imperfect_starts) == (20, 200)

@@ -54,8 +54,8 @@ def coevolve(
     until = contest.generations if generations is None and seconds is None else generations
     end_as_with_ctrl_c()
     try:
-        with progress_of(coevolution, until, seconds) as show:
-            coevolution.run(generations=until, seconds=seconds, executor=where, each=show)
+        with progress_of(coevolution, until, seconds) as progress:
+            coevolution.run(generations=until, seconds=seconds, executor=where, each=progress.each)
         if coevolution.generations:
             _finish(coevolution, folder, where)
     except KeyboardInterrupt:

@@ -4,23 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import typer
 
 if TYPE_CHECKING:
+    from kiks.learn.finals import Finals
     from kiks.learn.generation_loop import Evolving
 
 EVERY_S = 5.0
 """Time between lines where there is no terminal [s]."""
 
 
+@dataclass(frozen=True)
+class Progress:
+    """Functions that show how far an evolution is.
+
+    Attributes:
+        each: Called after each generation.
+        each_round: Called before each round of its finals.
+    """
+
+    each: Callable[[Evolving], Any]
+    each_round: Callable[[Finals], Any]
+
+
 @contextmanager
-def progress_of(
-    evolution: Evolving, generations: int | None, seconds: float | None
-) -> Iterator[Callable[[Evolving], Any]]:
-    """Return a function that shows how far it is; it is called after each generation."""
+def progress_of(evolution: Evolving, generations: int | None, seconds: float | None) -> Iterator[Progress]:
+    """Return functions that show how far an evolution is."""
     from rich.console import Console
 
     console = Console()
@@ -47,18 +60,23 @@ def progress_of(
         return _fitting({f"generation {len(evolution.generations)}": 0} | figures | time, width)
 
     if console.is_terminal:
-        from rich.progress import BarColumn, Progress, TextColumn
+        from rich.progress import BarColumn, TextColumn
+        from rich.progress import Progress as Bars
 
         name, bar_width = evolution.work.name, min(20, console.width // 6)
         columns = (TextColumn(name), BarColumn(bar_width), TextColumn("{task.description}"))
-        with Progress(*columns, console=console, transient=True) as progress:
-            bar = progress.add_task("preparing", total=1.0)
+        with Bars(*columns, console=console, transient=True) as bars:
+            bar = bars.add_task("preparing", total=1.0)
 
             def show(_: Evolving) -> None:
                 said = text(console.width - len(name) - bar_width - 2)
-                progress.update(bar, completed=done_and_left()[0], description=said)
+                bars.update(bar, completed=done_and_left()[0], description=said)
 
-            yield show
+            def show_round(finals: Finals) -> None:
+                said = f"finals: {finals.sizes[finals.round]} candidates"
+                bars.update(bar, completed=finals.round / len(finals.sizes), description=said)
+
+            yield Progress(show, show_round)
         return
     told_s = [-EVERY_S]
 
@@ -68,7 +86,11 @@ def progress_of(
             told_s[0] = perf_counter()
             typer.echo(said)
 
-    yield tell
+    def tell_round(finals: Finals) -> None:
+        if not finals.round:
+            typer.echo(f"Finals: {len(finals.finalists)} candidates, {finals.evaluation_count} evaluations")
+
+    yield Progress(tell, tell_round)
 
 
 def _fitting(parts: Mapping[str, int], width: int | None) -> str:

@@ -121,8 +121,14 @@ def evolve(
                 executor = executor or stack.enter_context(
                     executor_for("threads" if ray is None else _ray(ray), chosen)
                 )
-                with progress_of(evolution, until, seconds) as show:
-                    evolution.run(generations=until, seconds=seconds, executor=executor, each=show)
+                with progress_of(evolution, until, seconds) as progress:
+                    evolution.run(
+                        generations=until,
+                        seconds=seconds,
+                        executor=executor,
+                        each=progress.each,
+                        each_round=progress.each_round,
+                    )
                 if evolution.generations:
                     results.append(_finish(evolution, home))
                     if record is not None:
@@ -177,7 +183,7 @@ def _stop(evolution: Evolution, folder: Path) -> NoReturn:
 
 
 def _tell_champion(evolution: Evolution, folder: Path) -> None:
-    """Print what the champion achieved on trial, and where it is."""
+    """Print what the champion achieved in the finals, or on trial before them, and where it is."""
     champion = evolution.champion
     figures = ", ".join(f"{name} {value:.4g}" for name, value in champion.measures.items())
     typer.echo(f"Champion of generation {champion.generation}: fitness {champion.fitness:.4f}   {figures}")

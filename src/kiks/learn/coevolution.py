@@ -23,8 +23,7 @@ from kiks.learn.champion import Champion
 from kiks.learn.contest import Contest
 from kiks.learn.evaluation import Executor
 from kiks.learn.evolution_log import LOG, Folder, Generation, Identity, write_table
-from kiks.learn.executors import executor_for
-from kiks.learn.generation_loop import check_executor, run_generations, seed_for
+from kiks.learn.generation_loop import opened, run_generations, seed_for
 from kiks.model.array_checks import check_numbers
 from kiks.model.checks import check_count, check_kind
 from kiks.version import __version__
@@ -345,10 +344,6 @@ class Coevolution:
             WorkError: If the contest cannot be evaluated.
         """
         trials, every = check_count("trials", trials, 1, 10_000), check_count("every", every, 1)
-        check_executor(executor)
-        if isinstance(executor, str):
-            with executor_for(executor, self.contest) as opened:
-                return self.master_tournament(trials=trials, every=every, executor=opened)
         count = len(self.generations)
         if not count:
             raise ParameterError("tell() must be called for a generation before a tournament, but it was not.")
@@ -358,10 +353,11 @@ class Coevolution:
         pairs = np.concatenate([np.repeat(first, size, axis=0), np.tile(second, (size, 1))], axis=1)
         scores = np.zeros((2, size, size))
         starts = latin_square(size, seed_for(self.seed, _SQUARE_SEED)).ravel()
-        for trial in range(trials):
-            numbers = range(trial * size, (trial + 1) * size)
-            seeds = np.array([seed_for(self.seed, TOURNAMENT_SEED, number) for number in numbers], np.int64)
-            scores += executor.evaluate(pairs, seeds[starts])[:, :2].T.reshape(2, size, size)
+        with opened(executor, self.contest) as evaluator:
+            for trial in range(trials):
+                numbers = range(trial * size, (trial + 1) * size)
+                seeds = np.array([seed_for(self.seed, TOURNAMENT_SEED, number) for number in numbers], np.int64)
+                scores += evaluator.evaluate(pairs, seeds[starts])[:, :2].T.reshape(2, size, size)
         return Tournament(self.contest.side_names, chosen + 1, scores / trials)
 
     # ---- folders ----

@@ -6,11 +6,15 @@ whole evolution, and no generation trains in them. The best rival there is the c
 
 An algorithm that looks for many behaviours prefers none. Then the rivals are the elites of the archive that were not
 tried yet, the fittest first.
+
+The best of many rivals may have been lucky in its trials, too. So at the end of a run, the best rivals drive in the
+finals (`kiks.learn.finals`), with the best elites of such an algorithm. The winner is the champion.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any, TypeGuard
@@ -24,7 +28,8 @@ from kiks.learn.archive import CHAMPION, Archive
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Executor
 from kiks.learn.evolution_log import Folder, Generation, Identity
-from kiks.learn.generation_loop import run_generations, seed_for
+from kiks.learn.finals import Contender, Finals, finalists_of
+from kiks.learn.generation_loop import opened, run_generations, seed_for
 from kiks.learn.task import Task
 from kiks.model.array_checks import check_numbers
 from kiks.model.checks import check_count, check_kind
@@ -61,6 +66,7 @@ class Evolution:
         algorithm: The state of the algorithm.
         archive: The best candidate of each cell of a map along the task's axes; None if it has no axes.
         generations: The generations with their values, in order.
+        finals: The finals, if they were held after the last generation; else None.
 
     Raises:
         ParameterError: If an argument is out of range, or the folder holds another evolution.
@@ -87,6 +93,7 @@ class Evolution:
         self.task = check_kind("task", task, Task, "kiks.tasks.load() returns one.")
         self.seed = check_count("seed", seed, most=2**63 - 1)
         self.generations: list[Generation] = []
+        self.finals: Finals | None = None
         self._asked: Floats | None = None
         self.algorithm: Algorithm
         if is_algorithm(algorithm):
@@ -106,11 +113,12 @@ class Evolution:
                 task.spread,
             )
         self._trial_seeds = [seed_for(self.seed, TRIAL_SEED, number) for number in range(TRIALS)]
-        self._rival: Floats | None = None
-        self._tried: set[tuple[float, ...]] = set()
+        self._rival: Contender | None = None
+        self._tried: dict[Contender, float] = {}  # mean fitness of their trials
+        self._tries_elites = False
         self._best: Champion | None = None
         self._world = task.world()
-        unknown = self._champion(np.zeros(task.parameter_count), np.zeros(len(task.value_names)), 0)
+        unknown = self._champion(Contender((0.0,) * task.parameter_count, 0), np.zeros(len(task.value_names)))
         self.archive = Archive(task.axes, task.value_names, unknown) if task.axes else None
         self._earlier_s, self._start_s = 0.0, perf_counter()
         self._folder = None if folder is None else Folder(folder)
@@ -130,7 +138,7 @@ class Evolution:
         if self._asked is None:
             asked = self._candidates(self.population)
             if self._rival is not None:
-                asked = np.concatenate([asked, np.tile(self._rival, (TRIALS, 1))])
+                asked = np.concatenate([asked, np.tile(self._rival.parameters, (TRIALS, 1))])
             self._asked = asked
         return self._asked.copy()
 
@@ -168,9 +176,13 @@ class Evolution:
             ParameterError: If the shape is wrong, a number is not finite, or `ask` was not called; or if fitness is
                 given alone to an algorithm that looks for many behaviours.
         """
-        self._tell(values, self._earlier_s + perf_counter() - self._start_s)
+        self._tell(values, self._now_s())
         if self._folder is not None:
             self._folder.save(len(self.generations) - 1, self.generations[-1])
+
+    def _now_s(self) -> float:
+        """Return the time since the evolution began [s of the wall clock]."""
+        return self._earlier_s + perf_counter() - self._start_s
 
     def _tell(self, values: ArrayLike, seconds: float) -> None:
         if self._asked is None:
@@ -184,8 +196,11 @@ class Evolution:
                 f"but their shape was {given.shape}."
             )
         fitness, trials = given[: self.population, 0], given[self.population :]
-        if self._rival is not None and (self._best is None or trials[:, 0].mean() > self._best.fitness):
-            self._best = self._champion(self._rival, trials.mean(axis=0), len(self.generations))
+        if self._rival is not None:
+            means = trials.mean(axis=0)
+            self._tried[self._rival] = float(means[0])
+            if self._best is None or means[0] > self._best.fitness:
+                self._best = self._champion(self._rival, means)
         best_fitness = np.nan if self._best is None else self._best.fitness
         generation = Generation(self._asked, given, self.seeds, self.population, best_fitness, seconds)
         behaviours = np.zeros((self.population, 0))
@@ -197,10 +212,10 @@ class Evolution:
             self.archive.add(self._asked[: self.population], given[: self.population], len(self.generations) + 1)
         self._rival = self._next_rival(self._asked[int(fitness.argmax())])
         self.generations.append(generation)
-        self._asked = None
+        self._asked = self.finals = None
 
-    def _next_rival(self, best: Floats) -> Floats | None:
-        """Return the parameters to try next; None if all elites were tried.
+    def _next_rival(self, best: Floats) -> Contender | None:
+        """Return the candidate to try next; None if all elites were tried.
 
         Args:
             best: The best candidate of the generation, for an algorithm that does not say what it prefers.
@@ -210,13 +225,16 @@ class Evolution:
         """
         favourite: Any = getattr(self.algorithm, "favourite", None)
         preferred = best if favourite is None else favourite()
-        if preferred is not None or self.archive is None:
-            return check_numbers("parameters of favourite()", preferred, (self.task.parameter_count,))
-        untried = (each.parameters for each in self.archive.best_first() if each.parameters not in self._tried)
-        if (rival := next(untried, None)) is None:
-            return None
-        self._tried.add(rival)
-        return np.array(rival)
+        self._tries_elites = preferred is None and self.archive is not None
+        if self._tries_elites:
+            return next((elite for elite in self._elites() if elite not in self._tried), None)
+        preferred = check_numbers("parameters of favourite()", preferred, (self.task.parameter_count,))
+        return Contender(tuple(preferred.tolist()), len(self.generations) + 1)
+
+    def _elites(self) -> Iterator[Contender]:
+        """Yield the elites of the archive, the best first."""
+        if self.archive is not None:
+            yield from (Contender(each.parameters, each.generation) for each in self.archive.best_first())
 
     # ---- run ----
 
@@ -227,14 +245,16 @@ class Evolution:
         seconds: float | None = None,
         executor: Executor | str = "threads",
         each: Callable[[Evolution], Any] | None = None,
+        each_round: Callable[[Finals], Any] | None = None,
     ) -> Champion:
-        """Evolve.
+        """Evolve, and hold the finals.
 
         Args:
             generations: Total number of generations, including earlier ones.
             seconds: No generation begins later than this [s of the wall clock].
             executor: An open executor, or where to evaluate: see `kiks.learn.executors.executor_for`.
             each: Called after each generation.
+            each_round: Called before each round of the finals.
 
         Returns:
             The champion.
@@ -243,8 +263,49 @@ class Evolution:
             ParameterError: If neither generations nor seconds are given, or one is out of range.
             WorkError: If the task cannot be evaluated.
         """
-        run_generations(self, generations=generations, seconds=seconds, executor=executor, each=each)
+        finish = partial(self.hold_finals, each_round=each_round)
+        run_generations(self, generations=generations, seconds=seconds, executor=executor, each=each, finish=finish)
         return self.champion
+
+    def hold_finals(
+        self, executor: Executor | str = "threads", *, each_round: Callable[[Finals], Any] | None = None
+    ) -> Champion:
+        """Hold the finals, unless they were held after this generation; `run` does so at its end.
+
+        A single rival, or none, has no finals.
+
+        Args:
+            executor: An open executor, or where to evaluate: see `kiks.learn.executors.executor_for`.
+            each_round: Called before each round.
+
+        Returns:
+            The champion.
+
+        Raises:
+            ParameterError: Before the first generation, or if the executor is none.
+            WorkError: If the task cannot be evaluated.
+        """
+        finals = None if self.finals else self._new_finals()
+        if finals is not None:
+            with opened(executor, self.task) as evaluator:
+                while not finals.is_over:
+                    if each_round is not None:
+                        each_round(finals)
+                    finals.tell(evaluator.evaluate(finals.ask(), finals.seeds))
+            finals.seconds = self._now_s()
+            if self._folder is not None:
+                self._folder.save_finals(len(self.generations) - 1, finals)
+            self.finals = finals
+        return self.champion
+
+    def _new_finals(self) -> Finals | None:
+        """Return finals before their first round; None if there are too few finalists."""
+        rivals = sorted(self._tried, key=lambda each: -self._tried[each])
+        finalists = finalists_of(rivals, self._elites() if self._tries_elites else ())
+        if len(finalists) < 2:
+            return None
+        evaluations = sum(len(each.values) for each in self.generations)
+        return Finals(finalists, self.seed, evaluations, len(self.task.value_names))
 
     def save_log(self) -> None:
         """Write the champion, the archive and the log into the folder, if there is one.
@@ -278,28 +339,32 @@ class Evolution:
 
     @property
     def champion(self) -> Champion:
-        """The best rival so far; before the first trial, the best candidate of the first generation.
+        """The winner of the finals; before these, the best rival; before the first trial, the best candidate.
 
         Raises:
             ParameterError: Before the first generation.
         """
+        if self.finals is not None:
+            winner = self.finals.winner
+            return self._champion(self.finals.finalists[winner], self.finals.means(winner))
         if self._best is not None:
             return self._best
         if not self.generations:
             raise ParameterError("tell() must be called for a generation before there is a champion, but it was not.")
         first = self.generations[-1]
-        winner = int(first.fitness.argmax())
-        return self._champion(first.candidates[winner], first.values[winner], len(self.generations))
+        best = int(first.fitness.argmax())
+        contender = Contender(tuple(first.candidates[best].tolist()), len(self.generations))
+        return self._champion(contender, first.values[best])
 
-    def _champion(self, parameters: Floats, values: Floats, generation: int) -> Champion:
+    def _champion(self, contender: Contender, values: Floats) -> Champion:
         task, named = self.task, dict(zip(self.task.value_names, values.tolist(), strict=False))
         return Champion(
             controller=task.controller,
-            parameters=tuple(parameters.tolist()),
+            parameters=contender.parameters,
             task=task.name,
             fitness=float(values[0]),
             measures={name: named[name] for name in task.measure_names if name in named},
-            generation=generation,
+            generation=contender.generation,
             algorithm=self.name,
             seed=self.seed,
             robot=task.kinds[0],
@@ -323,6 +388,12 @@ class Evolution:
         for values, seconds in folder.saved_generations(self.ask, len(task.value_names)):
             self._tell(values, seconds)
         self._earlier_s = self.generations[-1].seconds if self.generations else 0.0
+        finals = self._new_finals()
+        saved = None if finals is None else folder.saved_finals(len(self.generations) - 1, finals)
+        if finals is not None and saved is not None:
+            values, finals.seconds = saved
+            finals.tell_all(values)
+            self.finals = finals
 
 
 def is_algorithm(algorithm: object) -> TypeGuard[Algorithm]:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from kiks.errors import ParameterError, library, shown
+from kiks.learn.finals import Finals
 from kiks.model.array_checks import Numbers, read_arrays
 from kiks.model.atomic_files import make_folder, path_of, replace_file
 from kiks.model.data_file import Text, Whole, check, parse_json, read_file, record
@@ -30,6 +31,7 @@ IDENTITY, GENERATIONS, LOG = "evolution.json", "generations", "log.parquet"
 """Names in the folder."""
 
 _ADVICE = "Remove the file, and those after it."
+_FINALS_ADVICE = "Remove the file: then the finals are held again."
 
 
 @record
@@ -188,6 +190,48 @@ class Folder:
         np.savez(buffer, candidates=generation.candidates, values=generation.values, seconds=seconds)
         replace_file(self._file(number), buffer.getvalue(), "a generation")
 
+    def saved_finals(self, number: int, finals: Finals) -> tuple[Floats, float] | None:
+        """Return the values of saved finals, float64 [evaluation, value], and their seconds; None if there are none.
+
+        Args:
+            number: Number of the generation after which they were held, from 0.
+            finals: Finals with the same finalists, before their first round.
+
+        Raises:
+            ParameterError: If the file is broken, or holds other finalists.
+        """
+        file, what = self._finals_file(number), f"Finals {str(self._finals_file(number))!r}"
+        if not file.exists():
+            return None
+        finalists, count = finals.candidates, finals.evaluation_count
+        rules = {
+            "finalists": Numbers(finalists.shape, advice=_FINALS_ADVICE),
+            "values": Numbers((count, finals.value_count), advice=_FINALS_ADVICE),
+            "seconds": Numbers((), low=0.0, advice=_FINALS_ADVICE),
+        }
+        # Beside these the file holds the finalist and the seed of each evaluation.
+        numbers_max = finalists.size + count * (finals.value_count + 2) + 1
+        arrays = read_arrays(file, rules, what, numbers_max=numbers_max)
+        if not np.array_equal(finalists, arrays["finalists"]):
+            raise ParameterError(f"{what} must have the finalists of this evolution, but has others. {_FINALS_ADVICE}")
+        return arrays["values"], float(arrays["seconds"])
+
+    def save_finals(self, number: int, finals: Finals) -> None:
+        """Save finals that are over.
+
+        Args:
+            number: Number of the generation after which they were held, from 0.
+            finals: The finals.
+
+        Raises:
+            ParameterError: If they cannot be written.
+        """
+        numbers, seeds, values = finals.evaluated
+        arrays: dict[str, Any] = {"finalists": finals.candidates, "finalist": numbers, "seed": seeds, "values": values}
+        buffer = io.BytesIO()
+        np.savez(buffer, **arrays, seconds=np.float64(finals.seconds))
+        replace_file(self._finals_file(number), buffer.getvalue(), "finals")
+
     def save_log(self, generations: Sequence[Generation], value_names: Sequence[str]) -> None:
         """Write the log of all generations, a row for each evaluation: the population, then the trials of a rival.
 
@@ -216,6 +260,9 @@ class Folder:
 
     def _file(self, number: int) -> Path:
         return self.path / GENERATIONS / f"{number + 1:06}.npz"
+
+    def _finals_file(self, number: int) -> Path:
+        return self.path / GENERATIONS / f"{number + 1:06}_finals.npz"
 
 
 def write_table(columns: Mapping[str, NDArray[Any]], path: str | Path, what: str) -> None:

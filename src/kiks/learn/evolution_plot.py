@@ -16,6 +16,15 @@ from kiks.learn.evolution import Evolution
 from kiks.learn.task import Axis
 from kiks.model.atomic_files import replace_file
 
+CHAMPION_MARK: dict[str, Any] = {
+    "marker": "*",
+    "color": "tab:red",
+    "markersize": 12,
+    "markeredgecolor": "white",
+    "linestyle": "",
+}
+"""How the champion is drawn."""
+
 
 def save_plot(evolution: Evolution, path: str | Path, baselines: Baselines | None = None) -> None:
     """Draw best, quartiles and median of each generation, and the champion; and the archive, if the task has axes.
@@ -50,6 +59,8 @@ def _draw_fitness(axes: Any, evolution: Evolution, baselines: Baselines | None) 
     axes.plot(numbers, best, color="tab:green", linewidth=1, label="best of the generation")
     champions = [each.champion_fitness for each in generations]
     axes.plot(numbers, champions, color="tab:red", drawstyle="steps-post", label="champion, on trial")
+    if evolution.finals is not None:
+        axes.plot(len(generations), evolution.champion.fitness, **CHAMPION_MARK, label="champion, in the finals")
     if baselines is not None:
         draw_baselines(axes, baselines)
     axes.set_xlabel("generation")
@@ -82,9 +93,7 @@ def _draw_archive(figure: Any, axes: Any, archive: Archive, champion: Champion) 
     place = [champion.measures.get(axis.measure, axis.low) for axis in archive.axes[:2]]
     if not others:
         place.append(0.5)
-    axes.plot(
-        *place, marker="*", color="tab:red", markersize=12, markeredgecolor="white", linestyle="", label="champion"
-    )
+    axes.plot(*place, **CHAMPION_MARK, label="champion")
     axes.set_xlabel(across.measure)
     axes.set_ylabel(up.measure)
     axes.set_title(f"{len(archive.elites)} of {archive.cell_count} cells, QD score {archive.qd_score:.4g}")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from time import perf_counter
 from typing import Any, Protocol, TypeVar
 
@@ -76,6 +77,7 @@ def run_generations(
     seconds: float | None,
     executor: Executor | str,
     each: Callable[[Some], Any] | None,
+    finish: Callable[[Executor], Any] | None = None,
 ) -> None:
     """Evolve.
 
@@ -85,6 +87,7 @@ def run_generations(
         seconds: No generation begins later than this [s of the wall clock].
         executor: An open executor, or where to evaluate: see `kiks.learn.executors.executor_for`.
         each: Called after each generation.
+        finish: Called with the open executor after the last generation, unless the run is interrupted.
 
     Raises:
         ParameterError: If neither generations nor seconds are given, or one is out of range.
@@ -95,33 +98,42 @@ def run_generations(
     for name, value in (("generations", generations), ("seconds", seconds)):
         if value is not None:
             check_number(name, value, 0)
-    check_executor(executor)
-    if isinstance(executor, str):
-        with executor_for(executor, evolution.work) as opened:
-            run_generations(evolution, generations=generations, seconds=seconds, executor=opened, each=each)
-        return
-    begin_s, logged_s = perf_counter(), -np.inf
-    try:
-        while (generations is None or len(evolution.generations) < generations) and (
-            seconds is None or perf_counter() - begin_s < seconds
-        ):
-            evolution.tell(executor.evaluate(evolution.ask(), evolution.seeds))
-            if perf_counter() - logged_s > LOG_EVERY_S:
-                evolution.save_log()
-                logged_s = perf_counter()
-            if each is not None:
-                each(evolution)
-    finally:
-        evolution.save_log()
+    with opened(executor, evolution.work) as evaluator:
+        begin_s, logged_s = perf_counter(), -np.inf
+        try:
+            while (generations is None or len(evolution.generations) < generations) and (
+                seconds is None or perf_counter() - begin_s < seconds
+            ):
+                evolution.tell(evaluator.evaluate(evolution.ask(), evolution.seeds))
+                if perf_counter() - logged_s > LOG_EVERY_S:
+                    evolution.save_log()
+                    logged_s = perf_counter()
+                if each is not None:
+                    each(evolution)
+            if finish is not None:
+                finish(evaluator)
+        finally:
+            evolution.save_log()
 
 
-def check_executor(executor: object) -> None:
-    """Check that this is an executor, or the place of one.
+@contextmanager
+def opened(executor: Executor | str, work: Evaluation) -> Iterator[Executor]:
+    """Return an open executor as it is; of a place, an executor there, which closes at the end.
+
+    Args:
+        executor: An open executor, or where to evaluate: see `kiks.learn.executors.executor_for`.
+        work: Evaluates candidates.
 
     Raises:
         ParameterError: If it is neither.
+        WorkError: If the work raises when it is prepared.
     """
-    if not isinstance(executor, Executor | str):
+    if isinstance(executor, str):
+        with executor_for(executor, work) as here:
+            yield here
+    elif isinstance(executor, Executor):
+        yield executor
+    else:
         raise ParameterError(f"executor must be an Executor or a text such as 'threads', but it was {shown(executor)}.")
 
 

@@ -75,13 +75,13 @@ class Result:
         kiks: Version of KiKS.
         fitness: Fitness of the champion.
         generation: The generation that found it.
-        seconds: Time of the evolution [s of the wall clock].
+        seconds: Time of the evolution with its finals [s of the wall clock].
         standing: Fitness of standing still.
         random: Median fitness of random controllers.
         generations: Number of generations.
-        evaluations: Number of evaluations until the end of each generation that has a champion [generation]: the first
-            has none, because no rival was tried, unless it is the only one.
-        champion_fitness: Fitness of the champion then [generation].
+        evaluations: Number of evaluations until the end of each generation that has a champion, and of the finals, if
+            there were any [step]. The first generation has none, because no rival was tried, unless it is the only one.
+        champion_fitness: Fitness of the champion then [step].
         exam: The exam; None if the task has none.
     """
 
@@ -138,10 +138,13 @@ def result_of(evolution: Evolution) -> Result:
             text=str(own)[:TEXT_MAX],
         )
     baselines = baselines_of(task, evolution.seed)
-    generations = evolution.generations
+    generations, finals = evolution.generations, evolution.finals
     evaluations = np.cumsum([len(each.values) for each in generations]).tolist()
     first = min(1, len(generations) - 1)
     fitness = [each.champion_fitness for each in generations[first:]] if first else [champion.fitness]
+    if finals is not None:
+        evaluations.append(evaluations[-1] + finals.evaluation_count)
+        fitness.append(champion.fitness)
     return Result(
         result=1,
         task=task.name,
@@ -153,7 +156,7 @@ def result_of(evolution: Evolution) -> Result:
         kiks=__version__,
         fitness=champion.fitness,
         generation=champion.generation,
-        seconds=generations[-1].seconds,
+        seconds=(finals or generations[-1]).seconds,
         standing=baselines.standing,
         random=baselines.random,
         generations=len(generations),
