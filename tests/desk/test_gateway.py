@@ -41,6 +41,7 @@ class Browser:
     def __init__(self, socket: ClientConnection) -> None:
         self.socket = socket
         self.scene: dict[str, Any] = {}
+        self.bar: dict[str, Any] = {}
 
     def say(self, kind: str, **words: object) -> None:
         self.socket.send(json.dumps({"kind": kind, **words}))
@@ -53,6 +54,8 @@ class Browser:
         told: dict[str, Any] = json.loads(message)
         if told["kind"] == "scene":
             self.scene = told
+        elif told["kind"] == "bar":
+            self.bar = told
         return told
 
     def frame(self) -> bytes:
@@ -166,6 +169,8 @@ def test_two_browsers_may_drag_at_once(shown: Shown) -> None:
             '{"kind": "move", "x_mm": {"a": [1]}, "y_mm": 3}',
             f'{{"kind": "grab", "what": {"[" * 400}0{"]" * 400}}}',
         ),
+        *('{"kind": "seek"}', '{"kind": "seek", "time_s": "now"}', '{"kind": "seek", "time_s": NaN}'),
+        *('{"kind": "seek", "time_s": 1e400}', '{"kind": "seek", "time_s": -1e10}', '{"kind": "seek", "time_s": []}'),
         *('{"kind": "grab", "what": "robot", "index": 1e400}', '{"kind": "grab", "what": "robot", "index": -1}'),
         *(f'{{"kind": "grab", "what": "robot", "index": {"9" * 400}}}', f'{{"kind": "{"x" * 100_000}"}}'),
     ],
@@ -190,6 +195,28 @@ def test_malformed_messages_get_an_error(shown: Shown, text: str) -> None:
 def test_requests_of_other_pages_or_without_the_token_are_refused(shown: Shown, options: dict[str, Any]) -> None:
     with pytest.raises(InvalidStatus, match="403"), browsing(shown, **options):
         pass
+
+
+def test_a_seek_shows_the_past_and_all_browsers_are_told(shown: Shown) -> None:
+    sim = shown.desk.sim
+    sim.gate.set_speed(None, sim.now_ns) if sim.gate is not None else None
+    sim.run(2.0)
+    with browsing(shown) as one, browsing(shown) as two:
+        for time_s, there_s in ((0.5, 0.5), (99.0, 2.0), (-7, 0.0)):
+            one.say("seek", time_s=time_s)
+            for browser in (one, two):
+                frame = browser.wait_for(
+                    lambda frame, there_s=there_s: struct.unpack_from("<d", frame, 8)[0] == there_s
+                )
+                assert struct.unpack_from("<H", frame, 2)[0] & 1, "it stands still"
+                assert browser.bar["is_past"]
+                assert (browser.bar["begin_s"], browser.bar["end_s"]) == (0.0, 2.0)
+        one.say("grab", what="robot", index=0)
+        while not (isinstance(heard := one.hear(), dict) and heard["kind"] == "error"):
+            pass
+        assert "this is its past" in heard["text"]
+    assert shown.desk.present.sim is sim
+    assert sim.now_ns == 2_000_000_000
 
 
 def course(sim: kiks.Simulation) -> str:

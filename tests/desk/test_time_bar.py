@@ -100,6 +100,7 @@ def test_a_recording_is_played_stepped_and_jumped_through(replay: Visitor) -> No
     visitor.told("Nothing happened before this.")
     page.keyboard.press("o")
     at_time(visitor, marks[1].time_s)
+    expect(visitor.at("bar-event")).to_contain_text(marks[1].text)
     box = page.locator(".kiks-bar-bookmark").bounding_box()
     assert box is not None
     page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 10)

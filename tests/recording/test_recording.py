@@ -22,6 +22,9 @@ from kiks.firmware.turret import Orders, Turret
 from kiks.model.arena import Lamp
 from kiks.recording import foxglove
 from kiks.recording.check import Checked, check_recording
+from kiks.recording.events import EventReader
+from kiks.recording.log import RecordedLog
+from kiks.recording.replay import Replay
 from kiks.sim.console import type_lines
 from kiks.sim.drag import Drags
 from kiks.sim.things import Checkpoint
@@ -58,6 +61,30 @@ def check_again(recording: Recording, state_hash: str) -> None:
         while replay.advance():
             pass
         assert replay.sim.state_hash() == state_hash
+    check_jumps(recording, state_hash)
+
+
+def check_jumps(recording: Recording, state_hash: str) -> None:
+    """Check that one replay that goes to and fro is everywhere what a new one is, and ends as the run did."""
+    rng, log = np.random.default_rng(1), recording.log
+    replay = recording.replay()
+    times_ns = rng.integers(log.begin_ns, log.end_ns, 10, endpoint=True).tolist()
+    # Steps back, too, which may begin at places that it has kept.
+    for time_ns in [each - back * 70_000_000 for each in times_ns for back in (0, 1, 2)]:
+        time_ns = max(time_ns, log.begin_ns)
+        there = Replay(log, time_ns)
+        if not replay.go_to(time_ns):
+            assert there.sim.robot_count < replay.sim.robot_count or has_fewer_turrets(there.sim, replay.sim)
+            replay = there
+        assert replay.sim.now_ns == time_ns
+        assert replay.sim.state_hash() == there.sim.state_hash()
+    while replay.advance():
+        pass
+    assert replay.sim.state_hash() == state_hash
+
+
+def has_fewer_turrets(sim: Simulation, other: Simulation) -> bool:
+    return any(len(sim.turrets(robot)) < len(other.turrets(robot)) for robot in range(1, sim.robot_count + 1))
 
 
 @pytest.mark.parametrize("name", [name for name in SCENES if name != "swarm"])
@@ -244,6 +271,42 @@ def test_tables_tell_what_happened(tmp_path: Path) -> None:
         recording.table("poses", 3)
     with pytest.raises(ParameterError, match="time_s must be from 0 to"):
         recording.world_at(99.0)
+
+
+def test_events_of_a_recording_that_grows_are_read_as_they_come(tmp_path: Path) -> None:
+    sim = Simulation(Arena.box(300, 300), robots=2, seed=1)
+    found = []
+    with sim.record(tmp_path / "run.mcap") as recorder:
+        log = RecordedLog(tmp_path / "run.mcap")
+        reader = EventReader(log)
+        for count in range(4):
+            drive(sim, 0.7)
+            Khepera(sim.port(2)).set_speed(12, 12)
+            recorder.mark(str(count))
+            recorder.flush()
+            log.find_more()
+            found += reader.read()
+            assert found[-1].kind == "bookmark"
+            assert log.end_ns == sim.now_ns
+            assert Replay(log, sim.now_ns).sim.state_hash() == sim.state_hash()
+    log.find_more()
+    found += reader.read()
+    table = Recording(tmp_path / "run.mcap").table("events")
+    assert [(event.time_s, event.robot, event.kind, event.text) for event in found] == table.tolist()
+    assert {"contact", "bookmark"} <= set(table["kind"])
+
+
+def test_the_record_of_a_watched_line_begins_anew_at_another_time(tmp_path: Path) -> None:
+    sim = Simulation(Arena.box(300, 300), seed=1)
+    replay = recorded(sim, tmp_path / "run.mcap", lambda sim: drive(sim, 3.0)).replay(2.5)
+    wire = replay.sim.wires[0]
+    wire.watch(replay.sim.now_ns)
+    replay.sim.advance_to(2_900_000_000)
+    assert wire.log is not None
+    assert wire.log.pieces.count
+    replay.go_to(1_500_000_000)
+    assert wire.log is not None
+    assert all(piece.first_ns < 1_600_000_000 for piece in wire.log.pieces.since(0)[1])
 
 
 def test_the_project_is_the_world_at_the_beginning(tmp_path: Path) -> None:

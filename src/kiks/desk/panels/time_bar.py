@@ -21,6 +21,9 @@ SHORT_S, LONG_S = 0.1, 1.0
 REFRESH_S = 0.25
 """Period at which changes by other browsers are shown [s]."""
 
+HAPPENING_S = 0.02
+"""Longest time between an event and the time at which it is told of [s]."""
+
 NOT_OWN = "Another program owns this world, so it cannot be replaced here"
 
 INTRO = (
@@ -79,7 +82,11 @@ class TimeBar:
                     self._add("last_page", "Event after", "event-after", "o", lambda: self._jump(is_before=False)),
                 ]
                 self._state = ui.label().classes("desk-bar-state q-ml-sm").props("data-testid=bar-state")
-                ui.space()
+                self._event = (
+                    ui.label()
+                    .classes("desk-bar-event col ellipsis text-caption")
+                    .props('aria-live=polite data-testid="bar-event"')
+                )
                 self._now = _long_button("Back to now", "update", "back-to-now", self._back_to_now)
                 self._now.tooltip("Show the present world again; it goes on as if nothing had been")
                 self._branch = _long_button("Go on from here", "call_split", "go-on-from-here", self._ask)
@@ -109,6 +116,7 @@ class TimeBar:
         self._bar.set_visibility(desk.looking.span is not None)
         self._bar.classes(add="is-past") if past else self._bar.classes(remove="is-past")
         self._state.text = "Now" if past is None else "Past" if has_present else "Recording"
+        self._event.text = "" if past is None else self._happening(past.sim.time_s)
         is_backwards = past is not None and past.is_backwards
         for button, word, goes in (
             (self._backwards, "Play backwards", is_backwards),
@@ -123,6 +131,14 @@ class TimeBar:
         self._branch.set_visibility(past is not None)
         self._branch.set_enabled(desk.owns_world)
         self._branch_tip.text = "Let the world live on from this moment" if desk.owns_world else NOT_OWN
+
+    def _happening(self, time_s: float) -> str:
+        """Return what happens at a time [s], in a line."""
+        return "; ".join(
+            mark.text.replace("\n", "; ")
+            for mark in self._desk.looking.marks
+            if abs(mark.time_s - time_s) < HAPPENING_S
+        )
 
     # ---- in the past ----
 
