@@ -35,6 +35,9 @@ ZOOM, ZOOM_MAX = 3.0, 20.0
 
 VIEWS: dict[str, type[Stage | SolidStage]] = {"top": Stage, "3d": SolidStage}
 
+PICTURES_MAX = 1_000_000
+"""Most pictures of a film."""
+
 SAMPLE_COUNT = 16
 """Pictures whose colours a GIF has."""
 
@@ -96,7 +99,7 @@ def save_film(
     speed = check_number("speed", speed, SPEED_MIN, SPEED_MAX)
     if follow is None and zoom is not None:
         raise ParameterError(f"zoom must be left out where no robot is followed, but it was {zoom}. Add follow.")
-    if view not in VIEWS:
+    if view not in tuple(VIEWS):
         raise ParameterError(f"view must be one of {', '.join(map(repr, VIEWS))}, but it was {shown(view)}.")
     follow = None if follow is None else recording.check_robot(follow, name="follow")
     zoom = 1.0 if follow is None else check_number("zoom", ZOOM if zoom is None else zoom, 1.0, ZOOM_MAX)
@@ -158,4 +161,9 @@ def _times_ns(recording: Recording, start_s: float | None, end_s: float | None, 
         )
     step_ns = step_s * NS_PER_S
     count = int((end_ns - begin_ns) / step_ns + 1e-6) + 1
+    if count > PICTURES_MAX:
+        raise ParameterError(
+            f"a film must have at most {PICTURES_MAX} pictures, but it would have {count}. Choose less of the "
+            "recording, or a greater speed."
+        )
     return [min(begin_ns + round(number * step_ns), end_ns) for number in range(count)]
