@@ -14,6 +14,7 @@ from tests.model.test_atomic_files import full_disk
 
 from kiks import Arena, Khepera, ParameterError, Recording, Simulation
 from kiks.cli.film import film
+from kiks.films import film as film_of_recording
 from kiks.films.film import save_film
 from kiks.films.stage import MARGIN, OUTSIDE
 from kiks.recording import recorder
@@ -248,6 +249,7 @@ def mistakes() -> Iterator[tuple[str, dict[str, object], str]]:
     yield "film.mp4", {"fps": 0}, "fps must be a whole number from 1 to 120"
     yield "film.gif", {"fps": 51}, "fps must be a whole number from 1 to 50"
     yield "film.mp4", {"speed": 0}, "speed must be from 0.001 to 1000"
+    yield "film.mp4", {"view": ["top"]}, "view must be one of 'top', '3d'"
     yield "film.mp4", {"robot": 2}, "robot must be a whole number from 1 to 1, but it was 2"
     yield "film.mp4", {"follow": 2}, "follow must be a whole number from 1 to 1, but it was 2"
     yield "film.mp4", {"zoom": 2}, "zoom must be left out where no robot is followed"
@@ -270,6 +272,12 @@ def test_mistakes_get_a_clear_error(
     with pytest.raises(ParameterError, match=words):
         save_film(recording, tmp_path / name, **values)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_film_without_end_is_refused(recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(film_of_recording, "PICTURES_MAX", 100)
+    with pytest.raises(ParameterError, match="a film must have at most 100 pictures, but it would have 151"):
+        save_film(recording, tmp_path / "film.mp4", start_s=0.5, end_s=2.0, fps=100)
 
 
 def test_the_command(recording: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

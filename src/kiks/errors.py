@@ -41,7 +41,10 @@ def nearest(given: str, known: Iterable[str]) -> str:
 
 
 def installing(extra: str) -> str:
-    """Return how the libraries of an extra are installed, 'learn', 'plot' or 'ray': KiKS itself is in no index yet.
+    """Return how the libraries of an extra are installed: KiKS itself is in no index yet.
+
+    Args:
+        extra: The extra: 'learn', 'plot', 'ray' or 'render'.
 
     Example:
         >>> installing("learn")

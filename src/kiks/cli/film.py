@@ -30,6 +30,7 @@ def film(
     zoom: Annotated[
         float | None, typer.Option(help="With --follow: how much larger the arena is than a whole one; 3 if left out.")
     ] = None,
+    view: Annotated[str, typer.Option(help="From where: top, or 3d, in space.")] = "top",
     plain: Annotated[
         bool, typer.Option("--plain", help="The world alone, without trails, clock and readings.")
     ] = False,
@@ -56,6 +57,7 @@ def film(
             robot=robot,
             follow=follow,
             zoom=zoom,
+            view=view,
             is_plain=plain,
             on_picture=show,
         )

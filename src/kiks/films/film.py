@@ -9,6 +9,7 @@ import numpy as np
 
 from kiks.errors import ParameterError, shown
 from kiks.films.panel import Panel
+from kiks.films.solid_stage import SolidStage
 from kiks.films.stage import Pixels, Stage
 from kiks.films.video_file import ENDINGS, GIF, MP4, VideoFile
 from kiks.model.atomic_files import file_beside, path_of
@@ -32,6 +33,11 @@ SPEED_MIN, SPEED_MAX = 0.001, 1000.0
 ZOOM, ZOOM_MAX = 3.0, 20.0
 """Zoom of a film that follows a robot, and the most."""
 
+VIEWS: dict[str, type[Stage | SolidStage]] = {"top": Stage, "3d": SolidStage}
+
+PICTURES_MAX = 1_000_000
+"""Most pictures of a film."""
+
 SAMPLE_COUNT = 16
 """Pictures whose colours a GIF has."""
 
@@ -48,6 +54,7 @@ def save_film(
     robot: int | None = None,
     follow: int | None = None,
     zoom: float | None = None,
+    view: str = "top",
     is_plain: bool = False,
     on_picture: Callable[[int, int], object] = lambda done, count: None,
 ) -> int:
@@ -64,6 +71,7 @@ def save_film(
         robot: Number of the robot whose readings are shown; the followed one, else 1, if left out.
         follow: Number of the robot that stays in the middle; if left out, the whole arena is seen.
         zoom: How much larger the arena is than one that is seen as a whole; 3 if left out, with `follow` alone.
+        view: 'top', from above, or '3d', in space; that needs VTK.
         is_plain: Whether the world is alone, without trails, clock and readings.
         on_picture: Called after each picture with the number of pictures done and of all.
 
@@ -91,6 +99,8 @@ def save_film(
     speed = check_number("speed", speed, SPEED_MIN, SPEED_MAX)
     if follow is None and zoom is not None:
         raise ParameterError(f"zoom must be left out where no robot is followed, but it was {zoom}. Add follow.")
+    if view not in tuple(VIEWS):
+        raise ParameterError(f"view must be one of {', '.join(map(repr, VIEWS))}, but it was {shown(view)}.")
     follow = None if follow is None else recording.check_robot(follow, name="follow")
     zoom = 1.0 if follow is None else check_number("zoom", ZOOM if zoom is None else zoom, 1.0, ZOOM_MAX)
     robot = recording.check_robot((follow or 1) if robot is None else robot)
@@ -101,7 +111,7 @@ def save_film(
         panel = None if is_plain else Panel((width, height), robot=robot - 1, speed=speed)
         left = width - (0 if panel is None else panel.width)
         index = None if follow is None else follow - 1
-        stage = Stage((left, height), follow=index, zoom=zoom, has_trails=not is_plain)
+        stage = VIEWS[view]((left, height), follow=index, zoom=zoom, has_trails=not is_plain)
         for number, moment in enumerate(moments(recording.log, times_ns)):
             stage.draw(moment, number / len(times_ns), picture[:, :left])
             if panel is not None:
@@ -151,4 +161,9 @@ def _times_ns(recording: Recording, start_s: float | None, end_s: float | None, 
         )
     step_ns = step_s * NS_PER_S
     count = int((end_ns - begin_ns) / step_ns + 1e-6) + 1
+    if count > PICTURES_MAX:
+        raise ParameterError(
+            f"a film must have at most {PICTURES_MAX} pictures, but it would have {count}. Choose less of the "
+            "recording, or a greater speed."
+        )
     return [min(begin_ns + round(number * step_ns), end_ns) for number in range(count)]

@@ -88,71 +88,46 @@ class Canvas:
         part[...] = np.asarray(image.reduce(FINER))
 
 
-class Stage:
-    """Draws the world of a film.
+class Ground:
+    """The base: floor, walls, lamps and trails of the whole arena.
 
     Args:
-        size: Width and height of the pictures.
-        follow: Index of the robot that stays in the middle; None: the whole arena is seen.
-        zoom: How much larger the arena is than one that is seen as a whole.
         has_trails: Whether robots, balls and cylinders leave trails.
+
+    Attributes:
+        arena: What was drawn last; None before the first moment.
+        canvas: The base.
     """
 
-    def __init__(self, size: tuple[int, int], *, follow: int | None, zoom: float, has_trails: bool) -> None:
-        self._size, self._follow, self._zoom, self._has_trails = size, follow, zoom, has_trails
-        self._empty = np.full((size[1], size[0], 3), OUTSIDE, np.uint8)
-        self._arena: Arena | None = None
+    def __init__(self, *, has_trails: bool) -> None:
+        self.arena: Arena | None = None
+        self.canvas = Canvas(np.zeros((1, 1, 3), np.uint8), 1.0, 0.0, 0.0)
+        self._clean = self.canvas.pixels
+        self._has_trails = has_trails
         self._lamps = b""
-        self._base = Canvas(self._empty, 1.0, 0.0, 0.0)
-        self._clean = self._empty
         self._ends: dict[tuple[str, int], Place] = {}
 
-    def draw(self, moment: Moment, share: float, picture: Pixels) -> None:
-        """Draw a moment.
+    def draw(self, moment: Moment, share: float, scale: float) -> None:
+        """Bring it up to a moment.
 
         Args:
             moment: The moment, later than the one before it.
             share: How much of the film is over, 0 to 1.
-            picture: Where it is drawn, of the size of the stage.
+            scale: Pixels a millimetre; it changes with the arena alone.
         """
-        if moment.setup.arena is not self._arena or moment.lamps.tobytes() != self._lamps:
-            self._draw_base(moment)
+        if moment.setup.arena is not self.arena or moment.lamps.tobytes() != self._lamps:
+            self._draw_still(moment, scale)
         if self._has_trails:
             self._leave_trails(moment, share)
-        view = self._view(moment, picture)
-        for body in moment.bodies:
-            with view.patch([(float(body["x_mm"]), float(body["y_mm"]))], float(body["radius_mm"])) as sheet:
-                sheet.body(body)
-        for index, (pose, spec) in enumerate(zip(moment.poses.tolist(), moment.setup.specs, strict=False)):
-            with view.patch([pose[:2]], spec.body.radius_mm) as sheet:
-                sheet.robot(pose, spec.body.radius_mm, robot_colour(index, len(moment.poses)), str(index + 1))
 
-    def _view(self, moment: Moment, picture: Pixels) -> Canvas:
-        """Return a canvas of the picture, with what the camera sees of the base."""
-        base, (width, height) = self._base, self._size
-        rows, columns = base.pixels.shape[:2]
-        column, row = columns / 2, rows / 2
-        if self._follow is not None and self._follow < len(moment.poses):
-            x_mm, y_mm, _ = moment.poses[self._follow].tolist()
-            column, row = x_mm * base.scale, (base.top_mm - y_mm) * base.scale
-        left, top = round(column - width / 2), round(row - height / 2)
-        picture[...] = self._empty
-        of_base = np.s_[max(top, 0) : max(top + height, 0), max(left, 0) : max(left + width, 0)]
-        seen = base.pixels[of_base]
-        down, right = max(-top, 0), max(-left, 0)
-        picture[down : down + seen.shape[0], right : right + seen.shape[1]] = seen
-        return Canvas(picture, base.scale, left / base.scale, base.top_mm - top / base.scale)
-
-    def _draw_base(self, moment: Moment) -> None:
+    def _draw_still(self, moment: Moment, scale: float) -> None:
         """Draw walls and lamps; trails stay where they are."""
         arena = moment.setup.arena
-        width, height = self._size
-        scale = (1 - 2 * MARGIN) * min(width / arena.width_mm, height / arena.height_mm) * self._zoom
         size = max(round(arena.width_mm * scale), 1), max(round(arena.height_mm * scale), 1)
         if size[0] * size[1] > BASE_PIXELS_MAX:
             raise ParameterError(
-                f"the whole arena must have at most {BASE_PIXELS_MAX} pixels, but with a zoom of {self._zoom:g} it has "
-                f"{size[0]} x {size[1]}. Zoom less, or make the film smaller."
+                f"the whole arena must have at most {BASE_PIXELS_MAX} pixels, but it would have {size[0]} x {size[1]}. "
+                "Zoom less, or make the film smaller."
             )
         clean = Canvas(np.array(wall_picture(arena, size)), scale, 0.0, arena.height_mm)
         for x_mm, y_mm, power_w, is_on in moment.lamps.tolist():
@@ -160,16 +135,16 @@ class Stage:
             with clean.patch([place], reach_mm) as sheet:
                 sheet.lamp(place, power_w, is_on=bool(is_on))
         pixels = clean.pixels.copy()
-        if self._arena is not None and self._clean.shape == pixels.shape:
-            is_trail = (self._base.pixels != self._clean).any(axis=-1)
-            pixels[is_trail] = self._base.pixels[is_trail]
-        self._base, self._clean = Canvas(pixels, scale, 0.0, arena.height_mm), clean.pixels
-        self._arena, self._lamps = arena, moment.lamps.tobytes()
+        if self.arena is not None and self._clean.shape == pixels.shape:
+            is_trail = (self.canvas.pixels != self._clean).any(axis=-1)
+            pixels[is_trail] = self.canvas.pixels[is_trail]
+        self.canvas, self._clean = Canvas(pixels, scale, 0.0, arena.height_mm), clean.pixels
+        self.arena, self._lamps = arena, moment.lamps.tobytes()
 
     def _leave_trails(self, moment: Moment, share: float) -> None:
         """Let trails grow to where robots, balls and cylinders are."""
         lines: dict[tuple[str, int], list[Place]] = {}
-        least_mm = PIECE_PIXELS / self._base.scale
+        least_mm = PIECE_PIXELS / self.canvas.scale
         ways = [(tick.poses, tick.bodies, tick.places) for tick in moment.passed] or [
             (moment.poses, moment.bodies, np.column_stack([moment.bodies["x_mm"], moment.bodies["y_mm"]]))
         ]
@@ -190,7 +165,58 @@ class Stage:
                 colour, width_mm = path_colour(number, len(moment.poses), share), path_mm(len(moment.poses))
             else:
                 colour, width_mm = (*tints.get(number, FLOOR), 200), BODY_TRAIL_MM
-            width_mm = max(width_mm, TRAIL_PIXELS / self._base.scale)
-            with self._base.patch(line, width_mm) as sheet:
+            width_mm = max(width_mm, TRAIL_PIXELS / self.canvas.scale)
+            with self.canvas.patch(line, width_mm) as sheet:
                 # Opaque, for where two pieces meet, no darker spot must arise.
                 sheet.line(line, mixed(FLOOR, colour[:3], colour[3] / 255), width_mm)
+
+
+class Stage:
+    """Draws the world of a film.
+
+    Args:
+        size: Width and height of the pictures.
+        follow: Index of the robot that stays in the middle; None: the whole arena is seen.
+        zoom: How much larger the arena is than one that is seen as a whole.
+        has_trails: Whether robots, balls and cylinders leave trails.
+    """
+
+    def __init__(self, size: tuple[int, int], *, follow: int | None, zoom: float, has_trails: bool) -> None:
+        self._size, self._follow, self._zoom = size, follow, zoom
+        self._empty = np.full((size[1], size[0], 3), OUTSIDE, np.uint8)
+        self._ground = Ground(has_trails=has_trails)
+
+    def draw(self, moment: Moment, share: float, picture: Pixels) -> None:
+        """Draw a moment.
+
+        Args:
+            moment: The moment, later than the one before it.
+            share: How much of the film is over, 0 to 1.
+            picture: Where it is drawn, of the size of the stage.
+        """
+        arena, (width, height) = moment.setup.arena, self._size
+        whole = min(width / arena.width_mm, height / arena.height_mm)
+        self._ground.draw(moment, share, (1 - 2 * MARGIN) * whole * self._zoom)
+        view = self._view(moment, picture)
+        for body in moment.bodies:
+            with view.patch([(float(body["x_mm"]), float(body["y_mm"]))], float(body["radius_mm"])) as sheet:
+                sheet.body(body)
+        for index, (pose, spec) in enumerate(zip(moment.poses.tolist(), moment.setup.specs, strict=False)):
+            with view.patch([pose[:2]], spec.body.radius_mm) as sheet:
+                sheet.robot(pose, spec.body.radius_mm, robot_colour(index, len(moment.poses)), str(index + 1))
+
+    def _view(self, moment: Moment, picture: Pixels) -> Canvas:
+        """Return a canvas of the picture, with what the camera sees of the base."""
+        base, (width, height) = self._ground.canvas, self._size
+        rows, columns = base.pixels.shape[:2]
+        column, row = columns / 2, rows / 2
+        if self._follow is not None and self._follow < len(moment.poses):
+            x_mm, y_mm, _ = moment.poses[self._follow].tolist()
+            column, row = x_mm * base.scale, (base.top_mm - y_mm) * base.scale
+        left, top = round(column - width / 2), round(row - height / 2)
+        picture[...] = self._empty
+        of_base = np.s_[max(top, 0) : max(top + height, 0), max(left, 0) : max(left + width, 0)]
+        seen = base.pixels[of_base]
+        down, right = max(-top, 0), max(-left, 0)
+        picture[down : down + seen.shape[0], right : right + seen.shape[1]] = seen
+        return Canvas(picture, base.scale, left / base.scale, base.top_mm - top / base.scale)
