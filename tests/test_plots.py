@@ -55,6 +55,20 @@ def test_the_shares_of_time_are_those_of_the_line(recording: Recording) -> None:
     assert shares.thinking_ns == pytest.approx(exchanges * 4e6, rel=0.03)
 
 
+def test_a_run_is_plotted_while_it_is_recorded(tmp_path: Path) -> None:
+    sim = Simulation(Arena.box(300, 260), seed=3)
+    with pytest.raises(ParameterError, match="must be recorded while it is plotted"):
+        sim.plot()
+    with sim.record(tmp_path / "run.mcap"):
+        Khepera(sim.port(1)).set_speed(5, 4)
+        sim.run(1.5)
+        lines = sim.plot().axes[0].lines
+    x_mm, y_mm = lines[0].get_data()
+    assert (x_mm[-1], y_mm[-1]) == pytest.approx(sim.pose(1)[:2], abs=0.5)  # within the last tick
+    again = Recording(tmp_path / "run.mcap").plot().axes[0].lines[0]
+    np.testing.assert_array_equal(again.get_xdata(), x_mm)
+
+
 def test_a_figure_has_a_column_for_each_recording(recording: Recording) -> None:
     figure = figure_of([recording, recording])
     titles = [axes.get_title() for axes in figure.axes if axes.get_title()]

@@ -16,8 +16,10 @@ from kiks.errors import ParameterError, library
 from kiks.model.arena import Arena
 from kiks.model.atomic_files import replace_file
 from kiks.recording.analysis import odometry, time_shares
+from kiks.recording.recorder import RunRecorder
 from kiks.recording.recording import Recording
 from kiks.recording.tables import Table
+from kiks.sim.simulation import Simulation
 from kiks.units import s_from_ns
 
 TYPES = (".png", ".svg", ".pdf")
@@ -78,6 +80,21 @@ def figure_of(recordings: Sequence[Recording], *, robot: int = 1) -> Any:
         _draw_speeds(column[3], wheels[wheels["robot"] == robot])
         _draw_time(column[4], recording, robot)
     return figure
+
+
+def figure_of_run(sim: Simulation, *, robot: int = 1) -> Any:
+    """Return the figure of a run that is being recorded; see `figure_of`.
+
+    Raises:
+        ParameterError: If it is not, Matplotlib is not installed, or there is no such robot.
+    """
+    recorder = sim.loop.recorder
+    if not isinstance(recorder, RunRecorder):
+        raise ParameterError(
+            f"{sim} must be recorded while it is plotted, but it is not. Begin with: with sim.record('run.mcap'):"
+        )
+    recorder.flush()
+    return figure_of([Recording(recorder.path)], robot=robot)
 
 
 def _draw_arena(axes: Any, arena: Arena) -> None:

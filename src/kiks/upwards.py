@@ -48,3 +48,9 @@ show_in_browser = Hook()
 
 record_simulation = Hook()
 """Records a simulation to a file."""
+
+plot_simulation = Hook()
+"""Draws figures of a simulation that is being recorded."""
+
+plot_recordings = Hook()
+"""Draws figures of recordings."""

@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from kiks.sim.from_project import project_of
 from kiks.sim.saved_state import Setup
 from kiks.sim.simulation import Simulation
 from kiks.units import ns_from_s, s_from_ns
+from kiks.upwards import plot_recordings
 
 
 class Recording:
@@ -174,6 +176,20 @@ class Recording:
             ParameterError: If the recording has no such time.
         """
         return Replay(self.log, self.log.begin_ns if time_s is None else self.time_ns(time_s))
+
+    def plot(self, *, robot: int = 1) -> Any:
+        """Draw the run: paths and odometry, where robots were, readings, speeds, and where the time went.
+
+        Args:
+            robot: Number of the robot whose readings, speeds and time are drawn.
+
+        Returns:
+            A Matplotlib figure, which notebooks show.
+
+        Raises:
+            ParameterError: If Matplotlib is not installed, or there is no such robot.
+        """
+        return plot_recordings([self], robot=robot)
 
     def time_ns(self, time_s: float, name: str = "time_s") -> int:
         """Return a time of the recording [ns].

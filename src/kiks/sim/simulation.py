@@ -36,7 +36,7 @@ from kiks.sim.turret_host import Turrets
 from kiks.sim.wire import Wire
 from kiks.sim.world import World
 from kiks.units import ns_from_s, s_from_ns
-from kiks.upwards import draw_simulation, record_simulation, show_in_browser
+from kiks.upwards import draw_simulation, plot_simulation, record_simulation, show_in_browser
 
 
 class Simulation:
@@ -667,6 +667,20 @@ class Simulation:
             ParameterError: If the file cannot be written, or the simulation is recorded already.
         """
         return record_simulation(self, file)
+
+    def plot(self, *, robot: int = 1) -> Any:
+        """Draw the run that is being recorded: paths and odometry, readings, speeds, and where the time went.
+
+        Args:
+            robot: Number of the robot whose readings, speeds and time are drawn.
+
+        Returns:
+            A Matplotlib figure, which notebooks show.
+
+        Raises:
+            ParameterError: If the run is not being recorded, Matplotlib is not installed, or there is no such robot.
+        """
+        return plot_simulation(self, robot=robot)
 
     def record_paths(self, every_s: float = 0.1, *, points_max: int | None = None) -> None:
         """Record the paths of all robots, balls and cylinders from now on; earlier records are dropped.
