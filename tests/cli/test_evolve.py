@@ -50,8 +50,12 @@ def test_a_run_leaves_its_files_and_goes_on(folder: Path) -> None:
     assert recording.programs == {"1-champion.toml": (folder / "champion.toml").read_text()}
     with pytest.raises(KiksError, match="--record must be of one evolution, but there are 2"):
         kiks(*words, "--seeds", 2, "--record", folder / "run.mcap")
+    assert re.search(r"\nFinals: [23] candidates, \d+ evaluations\n", said)
     assert re.search(r"\nExam: (not )?solved, \d+ of 20 starts \(got around", said)
     assert re.search(r"\nWith ten imperfect robots: \d+ of 200 starts\n", said)
+    again = kiks(*words).output
+    assert "Finals" not in again
+    assert again.splitlines()[-5:] == said.splitlines()[-6:-1]
     with pytest.raises(KiksError, match="must hold the same evolution, but its seed is 1, not 2"):
         kiks("evolve", task, "--seed", 2, "--population", 8, "--generations", 4, "--out", folder)
 

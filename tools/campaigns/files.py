@@ -269,7 +269,7 @@ def _pursuit() -> kiks.Contest:
     return kiks.tasks.pursuit(seconds=1.0)
 
 
-_IDENTITY, _GENERATION = "evolution.json", "generations/000001.npz"
+_IDENTITY, _GENERATION, _FINALS = "evolution.json", "generations/000001.npz", "generations/000006_finals.npz"
 
 
 @cache
@@ -281,6 +281,14 @@ def _finished() -> Mapping[str, bytes]:
         evolution.tell(values)
         evolution.save_log()
         result_of(evolution).save(Path(folder))
+        return _files_in(folder)
+
+
+@cache
+def _with_finals() -> Mapping[str, bytes]:
+    """Return the files of an evolution with finals, by name."""
+    with tempfile.TemporaryDirectory() as folder:
+        kiks.Evolution(_task(), "ga", seed=3, population=4, folder=folder).run(generations=6)
         return _files_in(folder)
 
 
@@ -343,7 +351,7 @@ _TEXT_SAMPLES = (
 def _among(name: str, files: Mapping[str, bytes], file: str, read: Callable[[Path], object], text: str = "") -> Kind:
     """Return a kind of file that lies among the other files of an evolution."""
     beside = tuple(each for each in files.items() if each[0] != file)
-    strange = (partial(strange_npz, _arrays_in(files[file])),) if file == _GENERATION else ()
+    strange = (partial(strange_npz, _arrays_in(files[file])),) if file.endswith(".npz") else ()
     return Kind(name, file, [files[file]], read, text, strange, beside)
 
 
@@ -407,6 +415,7 @@ def _kinds() -> Iterator[Kind]:
     evolved, coevolved = _finished(), _coevolved()
     yield Kind("evolution", _IDENTITY, [evolved[_IDENTITY]], _evolution, "json")
     yield _among("generation", evolved, _GENERATION, _evolution)
+    yield _among("finals", _with_finals(), _FINALS, _evolution)
     yield _among("individual", evolved, _GENERATION, _individual)
     yield _among("individual_record", evolved, _IDENTITY, _individual, "json")
     yield _among(

@@ -1,0 +1,363 @@
+"""Finals: the best of the finalists wins, however it is evaluated, and a resumed evolution has the same champion."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import kiks
+from kiks import ParameterError
+from kiks.learn.algorithm_name import AlgorithmName
+from kiks.learn.evaluation import Executor
+from kiks.learn.finals import FINALISTS, FINALS_SEED, SHARE, Contender, Finals, finalists_of
+from kiks.learn.generation_loop import seed_for
+from kiks.learn.results import result_of
+
+pytest.importorskip("cma")
+pytest.importorskip("ribs")
+pytest.importorskip("pyarrow")
+
+
+def contenders(count: int) -> list[Contender]:
+    return [Contender((float(number), 1.0), number + 1) for number in range(count)]
+
+
+def small(**changes: Any) -> kiks.Task:
+    """Return a task that takes 10 ms to evaluate."""
+    return kiks.tasks.avoid(**{"seconds": 1.0, "worlds": 3} | changes)
+
+
+def evolution_of(algorithm: str = "cma", folder: Path | None = None, **given: Any) -> kiks.Evolution:
+    return kiks.Evolution(small(), algorithm, population=8, folder=folder, **{"seed": 3} | given)
+
+
+def run(algorithm: str = "cma", folder: Path | None = None, generations: int = 6, **given: Any) -> kiks.Evolution:
+    evolution = evolution_of(algorithm, folder)
+    evolution.run(generations=generations, **{"executor": "threads:1"} | given)
+    return evolution
+
+
+def finals_of(evolution: kiks.Evolution) -> Finals:
+    assert evolution.finals is not None
+    return evolution.finals
+
+
+def outcome(evolution: kiks.Evolution) -> tuple[Any, ...]:
+    """Return all that finals decide, to the bit."""
+    champion, finals = evolution.champion, finals_of(evolution)
+    told = tuple(part.tobytes() for part in finals.evaluated)
+    return finals.finalists, told, champion.parameters, champion.fitness, champion.measures, champion.generation
+
+
+def noisy(candidates: Any, seeds: Any, noise: float = 1.0) -> Any:
+    """Return values whose first follows from the first parameter, and noise from the seed; a second value is extra."""
+    fitness = [
+        candidate[0] + noise * np.random.default_rng([int(seed), int(candidate[0])]).standard_normal()
+        for candidate, seed in zip(candidates, seeds, strict=True)
+    ]
+    return np.column_stack([fitness, candidates[:, 0]])
+
+
+# ---- rounds ----
+
+
+def slow_winner(count: int, evaluations: int, seed: int, noise: float) -> tuple[int, list[float]]:
+    """Return the winner and its mean values: each finalist by itself, each world by itself, plain lists."""
+    sizes = [count]
+    while sizes[-1] > 2:
+        sizes.append(-(-sizes[-1] // 2))
+    each = 1
+    while sum(size * (each + 1) * 2**turn for turn, size in enumerate(sizes)) <= int(SHARE * evaluations):
+        each += 1
+    left, seen, begin = list(range(count)), {number: [] for number in range(count)}, 0
+    for turn in range(len(sizes)):
+        for number in left:
+            for world in range(begin, begin + each * 2**turn):
+                world_seed = seed_for(seed, FINALS_SEED, world)
+                seen[number].append(noisy(np.array([[float(number), 1.0]]), [world_seed], noise)[0])
+        begin += each * 2**turn
+        ranked = sorted(left, key=lambda number: (-np.mean([values[0] for values in seen[number]]), number))
+        left = ranked[: -(-len(left) // 2)]
+    (winner,) = left
+    return winner, np.mean(seen[winner], axis=0).tolist()
+
+
+@given(st.integers(2, 40), st.integers(0, 2000), st.integers(0, 99), st.sampled_from([0.0, 1.0, 10.0]))
+def test_the_winner_is_that_of_a_slow_count(count: int, evaluations: int, seed: int, noise: float) -> None:
+    finals = Finals(contenders(count), seed, evaluations, 2)
+    driven = 0
+    while not finals.is_over:
+        asked, seeds = finals.ask(), finals.seeds
+        driven += len(asked)
+        finals.tell(noisy(asked, seeds, noise))
+    winner, means = slow_winner(count, evaluations, seed, noise)
+    assert finals.winner == winner
+    assert finals.means(winner).tolist() == pytest.approx(means)
+    assert driven == finals.evaluation_count <= max(SHARE * evaluations, sum(finals.sizes) * 2 ** len(finals.sizes))
+
+
+def test_all_that_are_left_drive_in_the_same_new_worlds() -> None:
+    finals = Finals(contenders(16), 5, 2880, 2)
+    assert (finals.sizes, finals.worlds) == ([16, 8, 4, 2], [4, 8, 16, 32])
+    known: set[int] = set()
+    for size, count in zip(finals.sizes, finals.worlds, strict=True):
+        asked, seeds = finals.ask(), finals.seeds
+        assert Counter(asked[:, 0].tolist()) == dict.fromkeys(range(16 - size, 16), count)
+        of_finalist = [seeds[asked[:, 0] == number].tolist() for number in range(16 - size, 16)]
+        assert all(each == of_finalist[0] for each in of_finalist)
+        assert len({*of_finalist[0]} - known) == count
+        known |= {*of_finalist[0]}
+        finals.tell(np.column_stack([asked[:, 0], asked[:, 0]]))
+    assert (finals.winner, finals.is_over) == (15, True)
+
+
+def test_of_equal_finalists_the_first_wins() -> None:
+    finals = Finals(contenders(7), 1, 0, 1)
+    while not finals.is_over:
+        finals.tell(np.zeros((len(finals.ask()), 1)))
+    assert finals.winner == 0
+
+
+def test_wrong_values_are_errors() -> None:
+    finals = Finals(contenders(4), 1, 0, 2)
+    for values in (np.zeros((4, 1)), np.zeros((3, 2)), np.full((4, 2), np.nan)):
+        with pytest.raises(ParameterError, match="values must be"):
+            finals.tell(values)
+    assert finals.round == 0
+
+
+def test_each_finalist_is_there_once() -> None:
+    rivals = [Contender((float(number // 2),), number) for number in range(60)]
+    assert finalists_of(rivals) == rivals[: 2 * FINALISTS : 2]
+    elites = [Contender((float(number),), 99) for number in range(14, 60)]
+    assert finalists_of(rivals, elites) == rivals[: 2 * FINALISTS : 2] + elites[2:FINALISTS]
+
+
+# ---- evolutions ----
+
+
+class Scripted(Executor):
+    """Evaluates by a function of candidates and seeds."""
+
+    def __init__(self, function: Any) -> None:
+        super().__init__()
+        self.function = function
+
+    def _open(self) -> None:
+        pass
+
+    def _close(self) -> None:
+        pass
+
+    def _evaluate(self, candidates: Any, seeds: Any) -> Any:
+        return self.function(candidates, seeds)
+
+
+def never(*_: Any) -> Any:
+    raise AssertionError("nothing is to be evaluated")
+
+
+class Numbered:
+    """Proposes candidates whose parameters are all the number of their generation."""
+
+    generation = 0
+
+    def ask(self) -> Any:
+        return np.full((4, 18), float(self.generation))
+
+    def tell(self, fitness: Any, behaviours: Any) -> None:
+        self.generation += 1
+
+
+def test_a_rival_that_was_lucky_in_its_trials_loses() -> None:
+    evolution = kiks.Evolution(small(), Numbered(), seed=1)
+    trials, best, lucky = set(evolution._trial_seeds), 17, 4
+    width = len(evolution.task.value_names)
+
+    def values(candidates: Any, seeds: Any) -> Any:
+        number, is_trial = candidates[:, 0], np.isin(seeds, list(trials))
+        noise = np.array([np.random.default_rng(int(seed)).standard_normal() for seed in seeds])
+        luck = 100.0 * (is_trial & (number == lucky))
+        return np.tile((luck + noise - np.abs(number - best))[:, None], width)
+
+    before = []
+    with Scripted(values) as executor:
+        evolution.run(generations=30, executor=executor, each=lambda each: before.append(each.champion))
+    assert before[-1].parameters[0] == lucky
+    assert evolution.champion.parameters[0] == best
+    assert evolution.champion.generation == best + 1
+    assert before[-1].fitness > 50 > evolution.champion.fitness
+    finals = finals_of(evolution)
+    numbers, seeds, told = finals.evaluated
+    assert evolution.champion.fitness == told[numbers == finals.winner, 0].mean()
+    assert not trials & set(seeds.tolist())
+    assert not {seed for each in evolution.generations for seed in each.seeds.tolist()} & set(seeds.tolist())
+
+
+@pytest.mark.slow
+def test_threads_and_blocks_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
+    first = outcome(run())
+    assert outcome(run(executor="threads:2")) == first
+    evolution = evolution_of()
+    with kiks.executor_for("threads:1", evolution.task) as one:
+
+        def by_blocks(candidates: Any, seeds: Any) -> Any:
+            blocks = [slice(begin, begin + 3) for begin in range(0, len(candidates), 3)]
+            return np.concatenate([one.evaluate(candidates[block], seeds[block]) for block in blocks])
+
+        with Scripted(by_blocks) as executor:
+            evolution.run(generations=6, executor=executor)
+    assert outcome(evolution) == first
+    monkeypatch.setattr("kiks.learn.candidate_worlds.BATCH_WORLDS_MAX", 6)
+    assert outcome(run()) == first
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("algorithm", list(AlgorithmName))
+def test_a_continued_evolution_holds_finals_at_its_new_end(algorithm: str, tmp_path: Path) -> None:
+    whole = run(algorithm, tmp_path / "whole")
+    early = run(algorithm, tmp_path / "part", 4)
+    assert len(finals_of(early).finalists) < len(finals_of(whole).finalists)
+    rest = run(algorithm, tmp_path / "part")
+    early.run(generations=6, executor="threads:1")
+    assert outcome(rest) == outcome(early) == outcome(whole)
+    part = (tmp_path / "part/champion.toml").read_bytes()
+    assert part == (tmp_path / "whole/champion.toml").read_bytes()
+    assert kiks.Champion.load(tmp_path / "part/champion.toml").fitness == whole.champion.fitness
+
+
+@pytest.mark.slow
+def test_the_finals_of_a_complete_folder_are_not_held_again(tmp_path: Path) -> None:
+    whole = run("map-elites", tmp_path)
+    again = evolution_of("map-elites", tmp_path)
+    assert outcome(again) == outcome(whole)
+    with Scripted(never) as executor:
+        again.run(generations=6, executor=executor, each_round=never)
+    assert outcome(again) == outcome(whole)
+    assert result_of(again).seconds == finals_of(whole).seconds
+
+
+KILLED = """
+import os, signal, sys, kiks
+def kill(finals):
+    if finals.round == 1:
+        os.kill(os.getpid(), signal.SIGKILL)
+task = kiks.tasks.avoid(seconds=1.0, worlds=3)
+evolution = kiks.Evolution(task, "cma", population=8, seed=3, folder=sys.argv[1])
+evolution.run(generations=6, executor="threads:1", each_round=kill)
+"""
+
+
+@pytest.mark.slow
+def test_finals_in_which_the_process_was_killed_are_held_again(tmp_path: Path) -> None:
+    ended = subprocess.run([sys.executable, "-c", KILLED, str(tmp_path / "killed")], check=False)
+    assert ended.returncode == -signal.SIGKILL
+    again = evolution_of(folder=tmp_path / "killed")
+    assert (len(again.generations), again.finals) == (6, None)
+    whole = run(folder=tmp_path / "whole")
+    again.run(generations=6, executor="threads:1")
+    assert outcome(again) == outcome(whole)
+    assert (tmp_path / "killed/champion.toml").read_bytes() == (tmp_path / "whole/champion.toml").read_bytes()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("when", ["each", "each_round"])
+def test_an_interrupted_evolution_holds_no_finals(when: str, tmp_path: Path) -> None:
+    def interrupt(state: Any) -> None:
+        if when == "each_round" or len(state.generations) == 5:
+            raise KeyboardInterrupt
+
+    evolution = evolution_of(folder=tmp_path)
+    with pytest.raises(KeyboardInterrupt):
+        evolution.run(generations=6, executor="threads:1", **{when: interrupt})
+    assert evolution.finals is None
+    assert not list(tmp_path.glob("generations/*finals*"))
+    best = evolution.generations[-1].champion_fitness
+    assert evolution.champion.fitness == kiks.Champion.load(tmp_path / "champion.toml").fitness == best
+    assert outcome(run(folder=tmp_path)) == outcome(run())
+
+
+@pytest.mark.slow
+def test_one_rival_alone_has_no_finals() -> None:
+    evolution = run(generations=2, each_round=never)
+    assert evolution.finals is None
+    assert evolution.champion.fitness == evolution.generations[-1].champion_fitness
+
+
+@pytest.mark.slow
+def test_elites_take_part_where_an_algorithm_prefers_none() -> None:
+    evolution = evolution_of("map-elites", seed=2)
+    rng = np.random.default_rng(1)
+    for _ in range(5):
+        evolution.tell(rng.uniform(0, 1, (len(evolution.ask()), len(evolution.task.value_names))))
+    assert evolution.archive is not None
+    elites = evolution.archive.best_first()
+    tried = {tuple(each.candidates[-1].tolist()) for each in evolution.generations[1:]}
+    chosen = next(elite for elite in elites if elite.parameters not in tried)
+    width = len(evolution.task.value_names)
+    with Scripted(lambda found, _: np.tile((found == chosen.parameters).all(axis=1)[:, None], width) * 1.0) as executor:
+        champion = evolution.hold_finals(executor)
+    assert (champion.parameters, champion.fitness, champion.generation) == (chosen.parameters, 1.0, chosen.generation)
+    finalists = {each.parameters for each in finals_of(evolution).finalists}
+    assert finalists == tried | {elite.parameters for elite in elites[:FINALISTS]}
+    other = run("cma")
+    assert other.archive is not None
+    assert not {each.parameters for each in finals_of(other).finalists} & {
+        each.parameters for each in other.archive.elites
+    }
+
+
+@pytest.mark.slow
+def test_finals_after_ask_and_tell() -> None:
+    evolution = evolution_of()
+    with pytest.raises(ParameterError, match="before there is a champion"):
+        evolution.hold_finals()
+    with kiks.executor_for("threads:1", evolution.task) as executor:
+        for _ in range(6):
+            evolution.tell(executor.evaluate(evolution.ask(), evolution.seeds))
+        rounds: list[int] = []
+        champion = evolution.hold_finals(executor, each_round=lambda finals: rounds.append(len(finals.ask())))
+    assert sum(rounds) == finals_of(evolution).evaluation_count
+    assert champion.parameters == evolution.champion.parameters == run().champion.parameters
+    evolution.tell(np.zeros(len(evolution.ask())))
+    assert evolution.finals is None
+    assert evolution.champion.fitness == evolution.generations[-1].champion_fitness
+
+
+@pytest.mark.slow
+def test_the_error_names_a_broken_file_of_finals(tmp_path: Path) -> None:
+    whole = run(folder=tmp_path)
+    file = tmp_path / "generations/000006_finals.npz"
+    with np.load(file) as saved:
+        good = dict(saved)
+    assert good["seed"].tolist() == finals_of(whole).evaluated[1].tolist()
+    again = small().evaluate(good["finalists"][good["finalist"]], good["seed"], 1)
+    assert again.tolist() == good["values"].tolist()
+    wrong: list[dict[str, Any]] = [
+        {"values": good["values"][:-1]},
+        {"values": np.full_like(good["values"], np.nan)},
+        {"finalists": good["finalists"][:-1]},
+        {"seconds": np.float64(-1)},
+    ]
+    for change in wrong:
+        np.savez(file, **good | change)
+        with pytest.raises(ParameterError, match=rf"000006_finals.npz': {next(iter(change))} .* are held again"):
+            evolution_of(folder=tmp_path)
+    np.savez(file, **good | {"finalists": good["finalists"] + 1})
+    with pytest.raises(ParameterError, match="must have the finalists of this evolution, but has others"):
+        evolution_of(folder=tmp_path)
+    for data in (b"", b"nothing", file.read_bytes()[:-30]):
+        file.write_bytes(data)
+        with pytest.raises(ParameterError, match=r"Finals '.*000006_finals.npz' must be a whole .npz file"):
+            evolution_of(folder=tmp_path)
+    file.unlink()
+    assert outcome(run(folder=tmp_path)) == outcome(whole)
