@@ -200,3 +200,18 @@ def test_errors_are_one_clear_line(words: tuple[str, ...], message: str, tmp_pat
     assert result.returncode == 2
     assert message in result.stderr
     assert "Traceback" not in result.stderr
+
+
+def test_a_recording_is_shown_from_a_time_on(tmp_path: Path) -> None:
+    recorded = forked.run("run", "--record", "run.mcap", DRIVE, "COM1", "5", "3", "5", cwd=tmp_path)
+    assert recorded.returncode == 0, recorded.stderr
+    with started("replay", "run.mcap", "--start", "0.1", folder=tmp_path) as (process, output):
+        url = url_of(output)
+        assert line_with(output, "The run begins when a page shows it")
+        show_page(url)
+        process.send_signal(signal.SIGINT)
+        assert line_with(output, "Stopped after")
+        assert process.wait(GUARD_S) == 0
+    late = forked.run("replay", "run.mcap", "--start", "99", cwd=tmp_path)
+    assert late.returncode == 2
+    assert "time_s must be from 0 to" in late.stderr

@@ -460,6 +460,24 @@ def test_a_run_that_was_changed_by_hand_is_not_the_same_again(tmp_path: Path) ->
         until(lambda: any("not the run that was recorded" in text for text in told(desk)))
 
 
+def test_another_world_has_another_past(tmp_path: Path) -> None:
+    with with_programs(tmp_path) as desk:
+        first = desk.sim
+        until(lambda: first.now_ns > NS_PER_S)
+        file = desk.looking._timeline.parts[0].file
+        run(desk.start_over())
+        assert desk.sim is not first
+        assert not file.exists()
+        until(lambda: desk.sim.now_ns > NS_PER_S)
+        assert not desk.is_paused
+        run(desk.looking.look_at(NS_PER_S // 2))
+        run(desk.start_over())
+        assert desk.past is None
+        assert not desk.is_paused
+        assert desk.looking.span is not None
+        assert desk.looking.span.begin_ns == 0
+
+
 def test_a_desk_that_holds_the_world_of_another_program_has_no_branches() -> None:
     sim = make_sim()
     with desk_of(sim) as desk:

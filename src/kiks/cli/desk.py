@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from kiks.sim.simulation import Simulation
 
 WithDesk = Annotated[bool, typer.Option("--desk", help="Show the world in a browser, at first in real time.")]
+CTRL_C_S = 0.5
+"""Longest wait until Ctrl-C acts [s]."""
+
 NoWait = Annotated[bool, typer.Option("--no-wait", help="Begin at once, without waiting for the first page.")]
 
 
@@ -163,14 +166,20 @@ def open_desk(
             shown.browse()
         if waits and (desk.has_beginners or work is not None or desk.past is not None):
             typer.echo("The run begins when a page shows it; with --no-wait it begins at once.")
-            desk.is_seen.wait()
+            _wait_for(desk.is_seen)
         desk.begin()
         if work is not None:
             work()
         if goes_on:
             Driver(desk, programs_ended).run()
-        threading.Event().wait()
+        _wait_for(threading.Event())
     except KeyboardInterrupt:
         typer.echo(f"Stopped after {desk.sim.time_s:.1f} s of simulated time.")
     finally:
         shown.close()
+
+
+def _wait_for(event: threading.Event) -> None:
+    """Wait for an event or Ctrl-C: a signal that comes just before a wait acts after it, so no wait may be long."""
+    while not event.wait(CTRL_C_S):
+        pass

@@ -255,17 +255,22 @@ class Desk:
         self._check_owns()
         sim = await asyncio.to_thread(simulation_of, project, self.folder)
         old, before = self.present, (self.project, self._commands)
+        was_paused = old.is_paused
         world = DeskWorld(sim, old.gate.speed)
         if until is not None:
             sim.loop.supervisor = Comparison(sim, until, self.say)
             world.gate.pause(until.time_ns)
-        elif old.is_paused and self.past is None:
+        elif was_paused and self.past is None:
             world.pause()
         self.project, self._commands = project, self._permitted(commands)
+        # Its recording ends without a wait for the thread that moves it.
+        await old.do(lambda _: old.pause())
         try:
             self._replace(world, self._commands)
         except KiksError:
             self.project, self._commands = before
+            if not was_paused:
+                await old.do(lambda _: old.go_on())
             raise
 
     def _replace(self, world: DeskWorld, commands: Sequence[Command | None], *, is_branch: bool = False) -> None:
