@@ -13,7 +13,7 @@ from kiks.cli.demo import demo
 from kiks.cli.desk import desk
 from kiks.cli.drive import drive
 from kiks.cli.evolve import evolve
-from kiks.cli.film import film
+from kiks.cli.film import film, photo
 from kiks.cli.fit import fit
 from kiks.cli.matlab import matlab
 from kiks.cli.monitor import monitor
@@ -43,6 +43,7 @@ for _command in (
     compare,
     replay,
     film,
+    photo,
     plot,
     table,
     serve,

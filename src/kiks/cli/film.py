@@ -1,4 +1,4 @@
-"""`kiks film`: makes films of recordings."""
+"""`kiks film` and `kiks photo`: films and photos of recordings."""
 
 from __future__ import annotations
 
@@ -42,14 +42,11 @@ def film(
     from kiks.films.film import save_film
     from kiks.recording.recording import Recording
 
-    words = re.fullmatch(r"([0-9]{1,5})x([0-9]{1,5})", size)
-    if words is None:
-        raise ParameterError(f"--size must be a width and a height like 1280x720, but it was {shown(size)}.")
     with _progress_bar(out.name) as show:
         count = save_film(
             Recording(file),
             out,
-            size=(int(words[1]), int(words[2])),
+            size=_parse_size(size),
             fps=fps,
             speed=speed,
             start_s=start,
@@ -62,6 +59,35 @@ def film(
             on_picture=show,
         )
     typer.echo(f"Film: {out}   {counted(count, 'picture')}, {count / fps:.1f} s")
+
+
+def photo(
+    file: RecordingFile,
+    out: Annotated[Path, typer.Argument(help="The photo: .png or .jpg.", callback=written_file)],
+    time: Annotated[float | None, typer.Option(help="When [s of simulated time]; the end if left out.")] = None,
+    size: Annotated[str, typer.Option(help="Width and height [pixels].")] = "1280x720",
+    follow: Annotated[int | None, typer.Option(help="The robot that is in the middle.")] = None,
+    zoom: Annotated[
+        float | None, typer.Option(help="With --follow: how much larger the arena is than a whole one; 3 if left out.")
+    ] = None,
+    samples: Annotated[int, typer.Option(help="Rays through a pixel: more are slower and less grainy.")] = 48,
+) -> None:
+    """Take a photo of a recorded world: with light, shadows and lamps, as a camera would see it. It needs Mitsuba.
+
+    Example: kiks photo run.mcap run.png --time 12.5 --follow 1
+    """
+    from kiks.films.photo import save_photo
+    from kiks.recording.recording import Recording
+
+    save_photo(Recording(file), out, time_s=time, size=_parse_size(size), follow=follow, zoom=zoom, samples=samples)
+    typer.echo(f"Photo: {out}")
+
+
+def _parse_size(size: str) -> tuple[int, int]:
+    words = re.fullmatch(r"([0-9]{1,5})x([0-9]{1,5})", size)
+    if words is None:
+        raise ParameterError(f"--size must be a width and a height like 1280x720, but it was {shown(size)}.")
+    return int(words[1]), int(words[2])
 
 
 @contextmanager

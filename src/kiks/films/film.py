@@ -91,18 +91,15 @@ def save_film(
         11
     """
     ending = check_film(path)
-    width, height = (check_count(f"the {name} of size", side, SIDE_MIN, SIDE_MAX) for name, side in _named(size))
+    width, height = checked_size(size)
     if ending == MP4:
         # H.264 halves the resolution of colours.
         width, height = width // 2 * 2, height // 2 * 2
     fps = check_count("fps", fps, 1, GIF_FPS_MAX if ending == GIF else FPS_MAX)
     speed = check_number("speed", speed, SPEED_MIN, SPEED_MAX)
-    if follow is None and zoom is not None:
-        raise ParameterError(f"zoom must be left out where no robot is followed, but it was {zoom}. Add follow.")
     if view not in tuple(VIEWS):
         raise ParameterError(f"view must be one of {', '.join(map(repr, VIEWS))}, but it was {shown(view)}.")
-    follow = None if follow is None else recording.check_robot(follow, name="follow")
-    zoom = 1.0 if follow is None else check_number("zoom", ZOOM if zoom is None else zoom, 1.0, ZOOM_MAX)
+    follow, zoom = checked_follow(recording, follow, zoom)
     robot = recording.check_robot((follow or 1) if robot is None else robot)
     times_ns = _times_ns(recording, start_s, end_s, speed / fps)
 
@@ -141,11 +138,31 @@ def check_film(path: str | Path) -> str:
     return ending
 
 
-def _named(size: object) -> Iterator[tuple[str, object]]:
-    """Yield the names of width and height, and what they are."""
+def checked_size(size: object) -> tuple[int, int]:
+    """Return the size of a film.
+
+    Raises:
+        ParameterError: If it is none.
+    """
     if not isinstance(size, Sequence) or len(size) != 2:
         raise ParameterError(f"size must be a width and a height, but it was {shown(size)}. Give (1280, 720).")
-    return zip(("width", "height"), size, strict=True)
+    width = check_count("the width of size", size[0], SIDE_MIN, SIDE_MAX)
+    return width, check_count("the height of size", size[1], SIDE_MIN, SIDE_MAX)
+
+
+def checked_follow(recording: Recording, follow: object, zoom: object) -> tuple[int | None, float]:
+    """Return the number of the followed robot, and the zoom.
+
+    Raises:
+        ParameterError: If there is no such robot, or the zoom is out of range or without one.
+    """
+    if follow is None and zoom is not None:
+        raise ParameterError(f"zoom must be left out where no robot is followed, but it was {shown(zoom)}. Add follow.")
+    if follow is None:
+        return None, 1.0
+    return recording.check_robot(follow, name="follow"), check_number(
+        "zoom", ZOOM if zoom is None else zoom, 1.0, ZOOM_MAX
+    )
 
 
 def _times_ns(recording: Recording, start_s: float | None, end_s: float | None, step_s: float) -> list[int]:

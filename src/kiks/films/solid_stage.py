@@ -154,15 +154,9 @@ class SolidStage:
         top = vtk.vtkPlaneSource()
         for set_corner, corner in ((top.SetOrigin, (-1, -1)), (top.SetPoint1, (1, -1)), (top.SetPoint2, (-1, 1))):
             set_corner(corner[0] * radius_mm, corner[1] * radius_mm, ROBOT_MM + 0.5)
-        scale = TOP_PIXELS / (2 * radius_mm)
-        canvas = Canvas(np.zeros((TOP_PIXELS, TOP_PIXELS, 3), np.uint8), scale, -radius_mm, radius_mm)
-        with canvas.patch([(0.0, 0.0)], radius_mm) as sheet:
-            sheet.robot((0.0, 0.0, 0.0), radius_mm, colour, name)
-        rows, columns = np.indices((TOP_PIXELS, TOP_PIXELS)) - (TOP_PIXELS - 1) / 2
-        is_robot = np.hypot(rows, columns) < TOP_PIXELS / 2 - 1
         texture = vtk.vtkTexture()
         texture.InterpolateOn()
-        texture.SetInputData(self._image(np.dstack([canvas.pixels, np.uint8(255) * is_robot])))
+        texture.SetInputData(self._image(robot_top(radius_mm, colour, name)))
         part = self._actor(top)
         part.SetTexture(texture)
         part.GetProperty().LightingOff()
@@ -187,21 +181,12 @@ class SolidStage:
 
     def _aim(self, moment: Moment) -> None:
         """Let the camera look from the south at the whole arena, or at the followed robot."""
-        arena = moment.setup.arena
-        place = [arena.width_mm / 2, arena.height_mm / 2]
-        if self._follow is not None and self._follow < len(moment.poses):
-            place = moment.poses[self._follow, :2].tolist()
         width, height = self._window.GetSize()
-        half = math.tan(math.radians(VIEW_DEG) / 2)
-        sine, cosine = math.sin(math.radians(ELEVATION_DEG)), math.cos(math.radians(ELEVATION_DEG))
-        # The near edge of the floor is the widest, and the floor is foreshortened.
-        wide = arena.width_mm / (2 * half * width / height) + arena.height_mm / 2 * cosine
-        high = arena.height_mm / 2 * (sine / half + cosine)
-        away_mm = MARGIN * max(wide, high) / self._zoom
         camera = self._renderer.GetActiveCamera()
+        focus, place = camera_places(moment, self._follow, self._zoom, width / height)
         camera.SetViewAngle(VIEW_DEG)
-        camera.SetFocalPoint(*place, ROBOT_MM)
-        camera.SetPosition(place[0], place[1] - away_mm * cosine, ROBOT_MM + away_mm * sine)
+        camera.SetFocalPoint(*focus)
+        camera.SetPosition(*place)
         camera.SetViewUp(0.0, 0.0, 1.0)
         self._renderer.ResetCameraClippingRange()
 
@@ -247,6 +232,40 @@ class SolidStage:
         flat = np.ascontiguousarray(pixels[::-1]).reshape(-1, depth)
         image.GetPointData().SetScalars(self._numpy.numpy_to_vtk(flat, deep=True))
         return image
+
+
+def camera_places(
+    moment: Moment, follow: int | None, zoom: float, aspect: float
+) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Return what a camera in the south looks at, and where it is [mm].
+
+    Args:
+        moment: What it sees.
+        follow: Index of the robot in the middle; None for the arena.
+        zoom: How much larger the arena is than one that is seen as a whole.
+        aspect: Width of the picture by its height.
+    """
+    arena = moment.setup.arena
+    x_mm, y_mm = arena.width_mm / 2, arena.height_mm / 2
+    if follow is not None and follow < len(moment.poses):
+        x_mm, y_mm = moment.poses[follow, :2].tolist()
+    half = math.tan(math.radians(VIEW_DEG) / 2)
+    sine, cosine = math.sin(math.radians(ELEVATION_DEG)), math.cos(math.radians(ELEVATION_DEG))
+    # The near edge of the floor is the widest, and the floor is foreshortened.
+    wide = arena.width_mm / (2 * half * aspect) + arena.height_mm / 2 * cosine
+    high = arena.height_mm / 2 * (sine / half + cosine)
+    away_mm = MARGIN * max(wide, high) / zoom
+    return (x_mm, y_mm, ROBOT_MM), (x_mm, y_mm - away_mm * cosine, ROBOT_MM + away_mm * sine)
+
+
+def robot_top(radius_mm: float, colour: Colour, name: str) -> Pixels:
+    """Return how a robot that heads to the right looks from above, with a fourth part that says where it is."""
+    scale = TOP_PIXELS / (2 * radius_mm)
+    canvas = Canvas(np.zeros((TOP_PIXELS, TOP_PIXELS, 3), np.uint8), scale, -radius_mm, radius_mm)
+    with canvas.patch([(0.0, 0.0)], radius_mm) as sheet:
+        sheet.robot((0.0, 0.0, 0.0), radius_mm, colour, name)
+    rows, columns = np.indices((TOP_PIXELS, TOP_PIXELS)) - (TOP_PIXELS - 1) / 2
+    return np.dstack([canvas.pixels, np.uint8(255) * (np.hypot(rows, columns) < TOP_PIXELS / 2 - 1)])
 
 
 def wall_boxes(arena: Arena) -> dict[int, list[tuple[float, float, float, float]]]:

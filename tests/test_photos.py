@@ -1,0 +1,76 @@
+"""Photos of recordings have the light of their world."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+
+from kiks import Arena, ParameterError, Recording, Simulation
+from kiks.films.photo import save_photo
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    """A ball on the left; a lamp on the right goes out after a second."""
+    file = tmp_path_factory.mktemp("recording") / "run.mcap"
+    sim = Simulation(Arena.box(400, 300), seed=3)
+    sim.place(1, 200, 150, 0.0)
+    sim.add_ball(80, 150)
+    sim.add_lamp(330, 150, 2.0)
+    with sim.record(file):
+        sim.run(1.0)
+        sim.lamps[0, 3] = 0
+        sim.run(1.0)
+    return Recording(file)
+
+
+def taken(recording: Recording, folder: Path, **values: object) -> NDArray[np.float64]:
+    pytest.importorskip("mitsuba")
+    save_photo(recording, folder / "photo.png", size=(160, 120), samples=16, **values)
+    with Image.open(folder / "photo.png") as image:
+        return np.asarray(image.convert("RGB")).astype(float)
+
+
+def test_lamps_light_the_floor(recording: Recording, tmp_path: Path) -> None:
+    lit, dark = taken(recording, tmp_path, time_s=0.5), taken(recording, tmp_path)
+    assert lit.shape == (120, 160, 3)
+    right, left = np.s_[50:80, 110:135], np.s_[50:80, 5:25]
+    assert lit[right].mean() > dark[right].mean() + 15
+    assert abs(lit[left].mean() - dark[left].mean()) < lit[right].mean() - dark[right].mean()
+    # The ball is orange, the robot in the middle green.
+    ball, robot = dark[50:75, 25:45], dark[55:65, 74:86]
+    assert (ball[..., 0] - ball[..., 2]).max() > 80
+    assert (robot[..., 1] - robot[..., 0]).max() > 15
+
+
+def test_the_followed_robot_is_in_the_middle(recording: Recording, tmp_path: Path) -> None:
+    picture = taken(recording, tmp_path, follow=1)
+    rows, columns = np.nonzero(picture[..., 1] - picture[..., 0] > 15)
+    assert len(rows) > 300
+    assert columns.mean() == pytest.approx(80, abs=6)
+    assert rows.mean() == pytest.approx(64, abs=10)
+
+
+def test_mistakes_get_a_clear_error(recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for values, words in (
+        ({"time_s": 9}, "time_s must be from 0 to 2"),
+        ({"samples": 0}, "samples must be a whole number from 1 to 4096"),
+        ({"size": (1, 1)}, "the width of size must be"),
+        ({"follow": 2}, "follow must be a whole number from 1 to 1"),
+        ({"zoom": 2}, "zoom must be left out"),
+    ):
+        with pytest.raises(ParameterError, match=words):
+            save_photo(recording, tmp_path / "photo.png", **values)
+    with pytest.raises(ParameterError, match="a picture must go to a file"):
+        save_photo(recording, tmp_path / "photo.mp4")
+    monkeypatch.setitem(sys.modules, "mitsuba", None)
+    with pytest.raises(ParameterError, match=r"This needs mitsuba, but it cannot be imported .*\[render\]"):
+        save_photo(recording, tmp_path / "photo.png")
+    assert not list(tmp_path.iterdir())
