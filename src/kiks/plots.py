@@ -6,7 +6,7 @@ A recording has a column, so that several stand side by side.
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,15 @@ POINTS_MAX = 4000
 ROWS = (1.25, 1.0, 0.8, 0.8, 0.28)
 """Relative heights of the rows."""
 
+PANELS = {
+    "paths": (5.6, 4.6),
+    "places": (5.6, 4.6),
+    "readings": (11.2, 2.6),
+    "speeds": (11.2, 2.6),
+    "time": (11.2, 1.1),
+}
+"""The rows, and how wide and high each is where it stands alone [inches]."""
+
 
 def save_plot(recordings: Sequence[Recording], path: str | Path, *, robot: int = 1) -> None:
     """Draw recordings side by side: paths, where robots were, readings, speeds, and where the time went.
@@ -48,12 +57,34 @@ def save_plot(recordings: Sequence[Recording], path: str | Path, *, robot: int =
     kind = Path(path).suffix.lower()
     if kind not in TYPES:
         raise ParameterError(f"a plot must go to a file that ends in {', '.join(TYPES)}, but it was {str(path)!r}.")
-    figure, buffer = figure_of(recordings, robot=robot), io.BytesIO()
-    # Without dates and random names, the same recording gives the same file.
-    dated = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(kind)
+    replace_file(path, _file_of(figure_of(recordings, robot=robot), kind[1:]), "a plot")
+
+
+def panels_of(recording: Recording, *, robot: int = 1) -> dict[str, bytes]:
+    """Return what `save_plot` draws of one recording as single pictures, by the names of `PANELS`, in SVG.
+
+    Raises:
+        ParameterError: If Matplotlib is not installed, or the recording has no such robot.
+    """
+    _check_robot(recording, robot)
+    pictures = {}
+    for name, draw in _drawings(recording, robot).items():
+        figure = library("matplotlib.figure", "plot").Figure(figsize=PANELS[name], layout="constrained")
+        draw(figure.subplots())
+        for axes in figure.axes:
+            if axes.get_legend() is not None:
+                axes.get_legend().set_in_layout(True)  # no other axes need the same width
+        pictures[name] = _file_of(figure, "svg")
+    return pictures
+
+
+def _file_of(figure: Any, kind: str) -> bytes:
+    """Return the file of a figure. Without dates and random names, the same recording gives the same file."""
+    dated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
+    buffer = io.BytesIO()
     with library("matplotlib", "plot").rc_context({"svg.hashsalt": "kiks"}):
-        figure.savefig(buffer, format=kind[1:], dpi=DOTS_PER_INCH, metadata=dated)
-    replace_file(path, buffer.getvalue(), "a plot")
+        figure.savefig(buffer, format=kind, dpi=DOTS_PER_INCH, metadata=dated)
+    return buffer.getvalue()
 
 
 def figure_of(recordings: Sequence[Recording], *, robot: int = 1) -> Any:
@@ -63,8 +94,7 @@ def figure_of(recordings: Sequence[Recording], *, robot: int = 1) -> Any:
         ParameterError: If Matplotlib is not installed, or a recording has no such robot.
     """
     for recording in recordings:
-        if robot not in recording.robots:
-            raise ParameterError(f"robot must be from 1 to {len(recording.robots)}, but it was {robot}.")
+        _check_robot(recording, robot)
     figure = library("matplotlib.figure", "plot").Figure(
         figsize=(COLUMN_INCHES * len(recordings), 2.6 * sum(ROWS)), layout="constrained"
     )
@@ -72,13 +102,26 @@ def figure_of(recordings: Sequence[Recording], *, robot: int = 1) -> Any:
     axes = figure.subplots(len(ROWS), len(recordings), squeeze=False, height_ratios=ROWS)
     for column, recording in zip(axes.T, recordings, strict=True):
         column[0].set_title(recording.title, fontsize="medium")
-        poses, wheels = recording.table("poses"), recording.table("wheels")
-        _draw_paths(column[0], recording, poses, wheels)
-        _draw_heat(column[1], recording.setup.arena, poses)
-        _draw_readings(column[2], recording.table("readings", robot))
-        _draw_speeds(column[3], wheels[wheels["robot"] == robot])
-        _draw_time(column[4], recording, robot)
+        for axes_of_row, draw in zip(column, _drawings(recording, robot).values(), strict=True):
+            draw(axes_of_row)
     return figure
+
+
+def _check_robot(recording: Recording, robot: int) -> None:
+    if robot not in recording.robots:
+        raise ParameterError(f"robot must be from 1 to {len(recording.robots)}, but it was {robot}.")
+
+
+def _drawings(recording: Recording, robot: int) -> dict[str, Callable[[Any], None]]:
+    """Return functions that draw the rows on axes, by the names of `PANELS`."""
+    poses, wheels = recording.table("poses"), recording.table("wheels")
+    return {
+        "paths": lambda axes: _draw_paths(axes, recording, poses, wheels),
+        "places": lambda axes: _draw_heat(axes, recording.setup.arena, poses),
+        "readings": lambda axes: _draw_readings(axes, recording.table("readings", robot)),
+        "speeds": lambda axes: _draw_speeds(axes, wheels[wheels["robot"] == robot]),
+        "time": lambda axes: _draw_time(axes, recording, robot),
+    }
 
 
 def _draw_arena(axes: Any, arena: Arena) -> None:

@@ -16,7 +16,7 @@ from kiks.cli.evolve import evolve
 from kiks.cli.fit import fit
 from kiks.cli.matlab import matlab
 from kiks.cli.monitor import monitor
-from kiks.cli.replay import plot, replay, table
+from kiks.cli.replay import page, plot, replay, table
 from kiks.cli.run import RunCommand, run
 from kiks.cli.schema import schema
 from kiks.cli.serve import serve
@@ -42,6 +42,7 @@ for _command in (
     compare,
     replay,
     plot,
+    page,
     table,
     serve,
     matlab,

@@ -15,6 +15,7 @@
    again. */
 
 import { Frame } from "./frame.js";
+import { Happenings } from "./happenings.js";
 
 const HAPPENINGS = ["scene", "shapes", "frame", "connection", "error"];
 /** Number of frames for one acknowledgement, which costs the server a tenth of a frame. */
@@ -24,25 +25,18 @@ const LONGEST_PAUSE_MS = 5000;
 /** Longest period between two frames that is interpolated; beyond it, things would seem to lag. */
 const LONGEST_INTERVAL_MS = 120;
 
-export class Feed {
+export class Feed extends Happenings {
   constructor(path = "/desk/feed") {
+    super(HAPPENINGS);
     this.path = path;
-    this.scene = null;
-    this.frame = null;
     this.connection = "connecting";
     this.frames_received = 0;
     this.bytes_received = 0;
-    this._listeners = Object.fromEntries(HAPPENINGS.map((what) => [what, new Set()]));
     this._pause_ms = FIRST_PAUSE_MS;
     this._owed = 0;
     document.addEventListener("visibilitychange", () => this._wake());
     addEventListener("online", () => this._wake());
     this._connect();
-  }
-
-  on(what, callback) {
-    this._listeners[what].add(callback);
-    return () => this._listeners[what].delete(callback);
   }
 
   send(message) {
@@ -78,8 +72,7 @@ export class Feed {
       if (robot_count !== message.robots.length || body_count !== message.bodies.length) this.frame = null;
       this._tell("scene", message);
     } else if (message.kind === "shapes" && this.scene) {
-      this.scene.robots.forEach((robot, index) => (robot.shapes = message.robots[index] ?? robot.shapes));
-      this._tell("shapes", this.scene);
+      this._takeShapes(message);
     } else if (message.kind === "error") {
       this._tell("error", message.text);
     } else if (message.kind === "gone") {
@@ -120,13 +113,14 @@ export class Feed {
     this.connection = connection;
     this._tell("connection", connection);
   }
-
-  _tell(what, news) {
-    for (const callback of [...this._listeners[what]]) callback(news);
-  }
 }
 
 let feed = null;
+
+/** Give the components of this page another feed, before the first of them is made. */
+export function setPageFeed(other) {
+  feed = other;
+}
 
 /** Return the feed of this page; the first caller's path counts. */
 export function pageFeed(path) {
