@@ -33,14 +33,8 @@ POINTS_MAX = 4000
 ROWS = (1.25, 1.0, 0.8, 0.8, 0.28)
 """Relative heights of the rows."""
 
-PANELS = {
-    "paths": (5.6, 4.6),
-    "places": (5.6, 4.6),
-    "readings": (11.2, 2.6),
-    "speeds": (11.2, 2.6),
-    "time": (11.2, 1.1),
-}
-"""The rows, and how wide and high each is where it stands alone [inches]."""
+PANELS = {"paths": 0.0, "places": 0.0, "readings": 2.6, "speeds": 2.6, "time": 1.3}
+"""The rows, and how high each is where it stands alone [inches]; 0 for as high as the arena makes it."""
 
 
 def save_plot(recordings: Sequence[Recording], path: str | Path, *, robot: int = 1) -> None:
@@ -68,8 +62,11 @@ def panels_of(recording: Recording, *, robot: int = 1) -> dict[str, bytes]:
     """
     _check_robot(recording, robot)
     pictures = {}
+    arena = recording.setup.arena
+    arena_inches = min(max(0.75 * COLUMN_INCHES * arena.height_mm / arena.width_mm + 0.6, 2.0), COLUMN_INCHES)
     for name, draw in _drawings(recording, robot).items():
-        figure = library("matplotlib.figure", "plot").Figure(figsize=PANELS[name], layout="constrained")
+        size = (2 * COLUMN_INCHES, PANELS[name]) if PANELS[name] else (COLUMN_INCHES, arena_inches)
+        figure = library("matplotlib.figure", "plot").Figure(figsize=size, layout="constrained")
         draw(figure.subplots())
         for axes in figure.axes:
             if axes.get_legend() is not None:
@@ -170,7 +167,8 @@ def _draw_heat(axes: Any, arena: Arena, poses: Table) -> None:
     seconds, x_edges, y_edges = np.histogram2d(poses["x_mm"], poses["y_mm"], bins=cells)
     _draw_arena(axes, arena)
     shown = np.ma.masked_equal(seconds.T * 0.01, 0.0)
-    mesh = axes.pcolormesh(x_edges, y_edges, shown, cmap="viridis", alpha=0.9)
+    # As vectors, its cells would be most of a large picture.
+    mesh = axes.pcolormesh(x_edges, y_edges, shown, cmap="viridis", alpha=0.9, rasterized=True)
     axes.figure.colorbar(mesh, ax=axes, label="seconds")
     axes.set_xlim(0, arena.width_mm)
     axes.set_ylim(0, arena.height_mm)

@@ -12,7 +12,7 @@ from pygments import highlight
 from pygments.formatters import HtmlFormatter
 from pygments.lexers import PythonLexer, TextLexer
 
-from kiks.desk.hand_in.film import Film
+from kiks.desk.hand_in.run_frames import RunFrames
 from kiks.errors import counted
 from kiks.recording.analysis import all_time_shares
 from kiks.recording.recording import Recording
@@ -67,12 +67,12 @@ class RobotNumbers:
     shares: tuple[float, ...]
 
 
-def contents_of(recording: Recording, film: Film, robot: int) -> dict[str, Any]:
+def contents_of(recording: Recording, frames: RunFrames, robot: int) -> dict[str, Any]:
     """Return what `web/run_page.html` needs to tell of a recording, by name.
 
     Args:
         recording: The recording.
-        film: Its film.
+        frames: The frames of the run.
         robot: Number of the robot whose wire is shown.
     """
     events, programs, file = recording.table("events"), _programs(recording), recording.log.reader.path.name
@@ -80,7 +80,7 @@ def contents_of(recording: Recording, film: Film, robot: int) -> dict[str, Any]:
     return {
         "what_ran": names or f"A run in arena {_arena(recording)}",
         "parts": (
-            _kinds(film),
+            _kinds(frames),
             f"arena {_arena(recording)}",
             clock_text(recording.duration_s),
             f"seed {recording.setup.seed}",
@@ -88,9 +88,9 @@ def contents_of(recording: Recording, film: Film, robot: int) -> dict[str, Any]:
         "is_whole": recording.is_whole,
         "begin_s": s_from_ns(recording.log.begin_ns),
         "end_s": s_from_ns(recording.log.end_ns),
-        "robot_count": max(len(scene["robots"]) for scene in film.scenes),
-        "facts": _facts(recording, film),
-        "numbers": _numbers(recording, film),
+        "robot_count": max(len(scene["robots"]) for scene in frames.scenes),
+        "facts": _facts(recording, frames),
+        "numbers": _numbers(recording, frames),
         "events": events[:MOMENTS_MAX].tolist(),
         "more_events": max(len(events) - MOMENTS_MAX, 0),
         "kinds": sorted(set(events["kind"].tolist())),
@@ -118,33 +118,33 @@ def _arena(recording: Recording) -> str:
     return recording.setup.arena.name or "an arena"
 
 
-def _kinds(film: Film) -> str:
-    """Return how many robots of which kinds there are in the end."""
-    kinds = Counter(spec.name for spec in film.last.specs)
-    return ", ".join(f"{count} {kind}" for kind, count in kinds.items())
+def _kinds(frames: RunFrames) -> str:
+    """Return which robots there are in the end."""
+    kinds = Counter(spec.name for spec in frames.last.specs)
+    return ", ".join(f"{count} x {kind}" if count > 1 else kind for kind, count in kinds.items())
 
 
-def _facts(recording: Recording, film: Film) -> list[tuple[str, str]]:
+def _facts(recording: Recording, frames: RunFrames) -> list[tuple[str, str]]:
     """Return what ran, as names and values."""
-    about, arena, sim = recording.about, recording.setup.arena, film.first
+    about, arena, sim = recording.about, recording.setup.arena, frames.first
     turrets = [
         f"{', '.join(turret.name for turret in sim.turrets(number))} on robot {number}"
         for number in range(1, sim.robot_count + 1)
         if sim.turrets(number)
     ]
-    things = Counter(body["what"] for body in film.scenes[0]["bodies"]) + Counter(lamp=len(sim.lamps))
-    made_again = f"{film.equal_count} of {counted(film.checkpoint_count, 'checkpoint')} the same, to the bit"
-    if not film.checkpoint_count:
+    things = Counter(body["what"] for body in frames.scenes[0]["bodies"]) + Counter(lamp=len(sim.lamps))
+    made_again = f"{frames.equal_count} of {counted(frames.checkpoint_count, 'checkpoint')} the same, to the bit"
+    if not frames.checkpoint_count:
         made_again = "it has no checkpoint"
     rows = [
         ("Duration", f"{recording.duration_s:.3f} s of simulated time"),
         ("Arena", f"{_arena(recording)}, {arena.width_mm:g} x {arena.height_mm:g} mm"),
-        ("Robots", _kinds(film)),
+        ("Robots", _kinds(frames)),
         ("Turrets", "; ".join(turrets)),
         ("Also in it", ", ".join(counted(count, what) for what, count in things.items())),
         ("Seed", str(recording.setup.seed)),
         ("Thinking time", about.get("thinking", "")),
-        ("State at the end", film.state_hash),
+        ("State at the end", frames.state_hash),
         ("Made again for this page", made_again),
         ("Recorded by", f"KiKS {about.get('kiks', 'of an unknown version')}"),
         ("Page made by", f"KiKS {__version__}"),
@@ -153,22 +153,22 @@ def _facts(recording: Recording, film: Film) -> list[tuple[str, str]]:
     return [(name, value) for name, value in rows if value]
 
 
-def _numbers(recording: Recording, film: Film) -> list[RobotNumbers]:
+def _numbers(recording: Recording, frames: RunFrames) -> list[RobotNumbers]:
     """Return the table of numbers: what each robot did meanwhile."""
-    robots = range(1, min(film.last.robot_count, ROBOTS_MAX) + 1)
+    robots = range(1, min(frames.last.robot_count, ROBOTS_MAX) + 1)
     wire = recording.table("wire")
     replies = Counter(wire["robot"][~wire["is_sent"]].tolist())
     rows = []
     for number, shares in zip(robots, all_time_shares(recording.log, robots), strict=True):
-        was_there = number <= film.first.robot_count
-        driven_mm = film.last.travelled_mm(number) - (film.first.travelled_mm(number) if was_there else 0)
+        was_there = number <= frames.first.robot_count
+        driven_mm = frames.last.travelled_mm(number) - (frames.first.travelled_mm(number) if was_there else 0)
         rows.append(
             RobotNumbers(
                 number=number,
-                kind=film.last.specs[number - 1].name,
+                kind=frames.last.specs[number - 1].name,
                 driven_m=driven_mm / 1000,
                 mean_mm_per_s=driven_mm / recording.duration_s if recording.duration_s else 0.0,
-                contacts=film.last.contacts(number) - (film.first.contacts(number) if was_there else 0),
+                contacts=frames.last.contacts(number) - (frames.first.contacts(number) if was_there else 0),
                 commands=replies[number],
                 shares=_percents(shares),
             )

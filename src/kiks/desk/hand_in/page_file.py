@@ -16,7 +16,7 @@ from markupsafe import Markup
 
 from kiks.desk.hand_in.bundle import bundle
 from kiks.desk.hand_in.contents import clock_text, contents_of
-from kiks.desk.hand_in.film import PERIOD_NS, Film
+from kiks.desk.hand_in.run_frames import PERIOD_NS, RunFrames
 from kiks.model.atomic_files import replace_file
 from kiks.plots import panels_of
 from kiks.recording.recording import Recording
@@ -59,7 +59,7 @@ def save_page(
             be written.
     """
     figures = panels_of(recording, robot=robot)
-    film = Film(recording.log, on_progress)
+    frames = RunFrames(recording.log, on_progress)
     script = bundle(WEB / "run_page.js")
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(WEB),
@@ -70,17 +70,17 @@ def save_page(
     )
     environment.filters["clock"] = clock_text
     page = environment.get_template("run_page.html").render(
-        contents_of(recording, film, robot),
+        contents_of(recording, frames, robot),
         title=title,
         robot=robot,
         figures=[
             (name, head, text.format(robot=robot), base64.b64encode(figures[name]).decode())
             for name, (head, text) in FIGURES.items()
         ],
-        film=film,
-        packed=film.pack(),
-        is_coarse=film.period_ns > PERIOD_NS,
-        period_s=s_from_ns(film.period_ns),
+        frames=frames,
+        packed=frames.pack(),
+        is_coarse=frames.period_ns > PERIOD_NS,
+        period_s=s_from_ns(frames.period_ns),
         version=__version__,
         script=Markup(script),
         script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),

@@ -15,7 +15,6 @@
    again. */
 
 import { Frame } from "./frame.js";
-import { Happenings } from "./happenings.js";
 
 const HAPPENINGS = ["scene", "shapes", "frame", "connection", "error"];
 /** Number of frames for one acknowledgement, which costs the server a tenth of a frame. */
@@ -25,18 +24,25 @@ const LONGEST_PAUSE_MS = 5000;
 /** Longest period between two frames that is interpolated; beyond it, things would seem to lag. */
 const LONGEST_INTERVAL_MS = 120;
 
-export class Feed extends Happenings {
+export class Feed {
   constructor(path = "/desk/feed") {
-    super(HAPPENINGS);
     this.path = path;
+    this.scene = null;
+    this.frame = null;
     this.connection = "connecting";
     this.frames_received = 0;
     this.bytes_received = 0;
+    this._listeners = Object.fromEntries(HAPPENINGS.map((what) => [what, new Set()]));
     this._pause_ms = FIRST_PAUSE_MS;
     this._owed = 0;
     document.addEventListener("visibilitychange", () => this._wake());
     addEventListener("online", () => this._wake());
     this._connect();
+  }
+
+  on(what, callback) {
+    this._listeners[what].add(callback);
+    return () => this._listeners[what].delete(callback);
   }
 
   send(message) {
@@ -72,7 +78,8 @@ export class Feed extends Happenings {
       if (robot_count !== message.robots.length || body_count !== message.bodies.length) this.frame = null;
       this._tell("scene", message);
     } else if (message.kind === "shapes" && this.scene) {
-      this._takeShapes(message);
+      this.scene.robots.forEach((robot, index) => (robot.shapes = message.robots[index] ?? robot.shapes));
+      this._tell("shapes", this.scene);
     } else if (message.kind === "error") {
       this._tell("error", message.text);
     } else if (message.kind === "gone") {
@@ -112,6 +119,10 @@ export class Feed extends Happenings {
   _say(connection) {
     this.connection = connection;
     this._tell("connection", connection);
+  }
+
+  _tell(what, news) {
+    for (const callback of [...this._listeners[what]]) callback(news);
   }
 }
 

@@ -45,7 +45,7 @@ export class Player {
     else if (isOther) return;
     else if (key === "ArrowRight" || key === "ArrowLeft") {
       const way = key === "ArrowRight" ? 1 : -1;
-      this.seek(event.shiftKey ? this.feed.neighbour(way) : this.time_s + way * LEAP_S);
+      this.seek(event.shiftKey ? this.feed.neighbour(this.time_s, way) : this.time_s + way * LEAP_S);
     } else if (key === "Home") this.seek(this.feed.begin_s);
     else if (key === "End") this.seek(this.feed.end_s);
     else return;

@@ -1,12 +1,12 @@
-/* The feed of a page without a desk: the frames of a recorded run, at the time that is asked for.
+/* The feed of a page without a desk: it hears the messages of a recorded run and sees its frames, at the time that is
+   asked for.
 
-   It has the fields of feed.js. `show(time_s)` passes all frames up to a time, one by one, so that trails and curves
-   get them all. Another time may be far away: then it tells "jump", and passes the frames just before that time. */
+   `show(time_s)` passes all frames up to a time, one by one, so that trails and curves get them all. Another time may be
+   far away: then it calls `onJump`, and passes the frames just before that time. */
 
+import { Feed } from "./feed.js";
 import { Frame } from "./frame.js";
-import { Happenings } from "./happenings.js";
 
-const HAPPENINGS = ["scene", "shapes", "frame", "connection", "error", "jump"];
 /** Most frames that are passed one by one. */
 const MOST_PASSED = 3000;
 const LENGTH_BYTES = 4;
@@ -18,19 +18,19 @@ class RecordedFrame extends Frame {
   share() { return this.part; }
 }
 
-/** Unpack the text of kiks/desk/hand_in/film.py: {period_s, scenes, shapes, groups: [{size, count, bytes}]}. */
-export async function unpackFilm(text) {
+/** Unpack the text of kiks/desk/hand_in/run_frames.py: {period_s, scenes, shapes, groups: [{size, count, bytes}]}. */
+export async function unpackRun(text) {
   const packed = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
   const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
   let at = LENGTH_BYTES + new DataView(bytes.buffer).getUint32(0, true);
-  const film = JSON.parse(new TextDecoder().decode(bytes.subarray(LENGTH_BYTES, at)));
-  for (const group of film.groups) {
+  const run = JSON.parse(new TextDecoder().decode(bytes.subarray(LENGTH_BYTES, at)));
+  for (const group of run.groups) {
     group.bytes = sumUp(bytes.subarray(at, at + group.size * group.count), group.size, group.count);
     at += group.size * group.count;
   }
-  for (const { arena } of film.scenes) arena.picture = film.pictures[arena.picture];
-  return film;
+  for (const { arena } of run.scenes) arena.picture = run.pictures[arena.picture];
+  return run;
 }
 
 /** Return frames from the differences of their bytes, which come column by column. */
@@ -41,13 +41,13 @@ function sumUp(differences, size, count) {
   return frames;
 }
 
-export class RecordedFeed extends Happenings {
-  constructor(film) {
-    super(HAPPENINGS);
-    this.connection = "open";
-    this.frames_received = this.bytes_received = 0;
-    this._film = film;
-    this._heads = film.groups.flatMap(({ bytes, size, count }) =>
+export class RecordedFeed extends Feed {
+  /** `run` is that of `unpackRun`. */
+  constructor(run) {
+    super();
+    this.onJump = () => {};
+    this._run = run;
+    this._heads = run.groups.flatMap(({ bytes, size, count }) =>
       Array.from({ length: count }, (_, k) => new DataView(bytes.buffer, k * size, size)));
     this._index = -1;
     this._shapes = null;
@@ -56,18 +56,20 @@ export class RecordedFeed extends Happenings {
     this.show(this.begin_s);
   }
 
-  /** Nothing can be changed in a recorded run. */
-  send() { return false; }
+  /** There is no desk. */
+  _connect() { this.connection = "open"; }
 
-  /** The time of the frame before the one that is shown (-1), or after it (1). */
-  neighbour(way) {
-    return this._time(Math.min(Math.max(this._index + way, 0), this._heads.length - 1));
+  /** The time of the next frame after a time (way 1), or of the last one before it (way -1). */
+  neighbour(time_s, way) {
+    const index = this._indexAt(time_s), isThere = Math.abs(this._time(index) - time_s) < 1e-6;
+    const next = way < 0 || isThere ? index + way : index;
+    return this._time(Math.min(Math.max(next, 0), this._heads.length - 1));
   }
 
   /** Show a time; robots are between the frames before and after it. */
   show(time_s) {
     const next = this._indexAt(time_s), isNear = next >= this._index && next - this._index <= MOST_PASSED;
-    if (!isNear) this._tell("jump", time_s);
+    if (!isNear) this.onJump();
     for (let k = isNear ? this._index + 1 : this._firstBefore(next); k <= next; k++) this._pass(k);
     const end_s = this._time(next), begin_s = this.frame.previous ? this.frame.previous.time_s : end_s;
     this.frame.part = end_s > begin_s ? Math.min(Math.max((time_s - begin_s) / (end_s - begin_s), 0), 1) : 1;
@@ -79,7 +81,7 @@ export class RecordedFeed extends Happenings {
 
   /** Return the index of the first frame at or after a time. */
   _indexAt(time_s) {
-    const guess = Math.ceil((time_s - this.begin_s) / this._film.period_s - 1e-6);
+    const guess = Math.ceil((time_s - this.begin_s) / this._run.period_s - 1e-6);
     return Math.min(Math.max(guess, 0), this._heads.length - 1);
   }
 
@@ -95,20 +97,18 @@ export class RecordedFeed extends Happenings {
     const frame = new RecordedFrame(buffer.slice(byteOffset, byteOffset + byteLength), 0);
     this.frames_received++;
     this.bytes_received += byteLength;
-    const scene = this._film.scenes[frame.scene];
-    if (scene !== this.scene) {
-      this.scene = scene;
-      this.frame = this._shapes = null;
-      this._tell("scene", scene);
-    } else if (this.frame && this._index === index - 1) {
+    if (frame.scene !== this.scene?.scene) {
+      this._hear(JSON.stringify(this._run.scenes[frame.scene]));
+      this._shapes = null;
+    } else if (this._index === index - 1) {
       this.frame.previous = null;
       this.frame.part = 1;
       frame.previous = this.frame;
     }
-    const shapes = this._film.shapes.findLast(([from]) => from <= index)[1];
+    const shapes = this._run.shapes.findLast(([from]) => from <= index)[1];
     if (shapes !== this._shapes) {
       this._shapes = shapes;
-      this._takeShapes(shapes);
+      this._hear(JSON.stringify(shapes));
     }
     this._index = index;
     this.frame = frame;

@@ -2,7 +2,7 @@
 
 import { setPageFeed } from "./feed.js";
 import { Player } from "./player.js";
-import { RecordedFeed, unpackFilm } from "./recorded_feed.js";
+import { RecordedFeed, unpackRun } from "./recorded_feed.js";
 import { RecordedMonitor } from "./recorded_monitor.js";
 import { Stage } from "./stage.js";
 
@@ -13,7 +13,7 @@ const at = (id) => document.getElementById(id);
 const all = (selector) => [...document.querySelectorAll(selector)];
 
 async function start() {
-  const feed = new RecordedFeed(await unpackFilm(at("film").textContent));
+  const feed = new RecordedFeed(await unpackRun(at("frames").textContent));
   setPageFeed(feed);
   const parts = ["root", "top", "topPane", "solidPane", "notice", "live"].map((name) => [name, at(name)]);
   const stage = new Stage(Object.fromEntries(parts), "", (event, pick) => event === "pick" && choose(pick));
@@ -22,7 +22,7 @@ async function start() {
     { play: at("play"), slider: at("slider"), marks: at("marks"), clock: at("clock"), speed: at("speed") },
     feed, JSON.parse(at("moments").textContent));
 
-  feed.on("jump", () => stage.clearTrails());
+  feed.onJump = () => stage.clearTrails();
   at("root").addEventListener("keydown", (event) => stage.press(event));
   at("fit").addEventListener("click", () => stage.fit());
   const layers = all("#layers input");

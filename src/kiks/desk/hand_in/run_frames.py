@@ -1,7 +1,7 @@
-"""The film of a recorded run: the frames and messages that browsers of a desk would get, at a fixed period.
+"""The frames and messages that browsers of a desk would get of a recorded run, at a fixed period.
 
 The run is made again for it, and compared with the recording at each checkpoint. Where it differs, it goes on from the
-recorded state, so a film always shows the run that was recorded.
+recorded state, so the frames always show the run that was recorded.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from kiks.sim.simulation import Simulation
 from kiks.units import TICK_NS, s_from_ns
 
 PERIOD_NS = 4 * TICK_NS
-"""Period of the frames [ns], that of a desk; a long film has twice the period, four times, and so on."""
+"""Period of the frames [ns], that of a desk; a long run has twice the period, four times, and so on."""
 
 FRAME_BYTES_MAX = 16 << 20
 """Most bytes of all frames together. Packed, they take a sixth of it or less."""
@@ -31,7 +31,7 @@ FRAME_BYTES_MAX = 16 << 20
 _LENGTH = struct.Struct("<I")
 
 
-class Film:
+class RunFrames:
     """The frames of a recorded run.
 
     Args:
@@ -75,9 +75,9 @@ class Film:
             self._take()
             if len(self.frames) % 100 == 0:
                 on_progress((time_ns - begin_ns) / (end_ns - begin_ns))
-        self._go_to(end_ns)
         while self._replay.advance():
             pass
+        self._go_to(end_ns)
         if end_ns > begin_ns:
             self._take()
         self.last = self._replay.sim
