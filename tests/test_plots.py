@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import kiks
 from kiks import Arena, Khepera, ParameterError, Recording
-from kiks.plots import figure_of, save_plot
+from kiks.plots import PANELS, ROWS, figure_of, panels_of, save_plot
 from kiks.recording.analysis import odometry, time_shares
 from kiks.sim.simulation import Simulation
 
@@ -53,6 +55,26 @@ def test_the_shares_of_time_are_those_of_the_line(recording: Recording) -> None:
     # A program thinks after each reply that it has read.
     exchanges = len(recording.table("wire")) / 2
     assert shares.thinking_ns == pytest.approx(exchanges * 4e6, rel=0.03)
+
+
+def test_a_notebook_shows_the_figures(recording: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
+    shown = recording._repr_png_()
+    assert shown is not None
+    with Image.open(io.BytesIO(shown[0])) as picture:
+        assert picture.width > shown[1]["width"] > 400
+    monkeypatch.setattr("kiks.plots.find_spec", lambda name: None)
+    assert recording._repr_png_() is None
+
+
+def test_panels_are_the_rows_of_the_figure(recording: Recording) -> None:
+    panels = panels_of(recording)
+    assert list(panels) == list(PANELS)
+    assert len(PANELS) == len(ROWS)
+    for name, legend in (("paths", "odometry"), ("readings", "7"), ("speeds", "asked for"), ("time", "thinking")):
+        assert legend in panels[name].decode(), name
+    assert panels == panels_of(recording)
+    with pytest.raises(ParameterError, match="robot must be from 1 to 1"):
+        panels_of(recording, robot=2)
 
 
 def test_a_figure_has_a_column_for_each_recording(recording: Recording) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -73,6 +74,13 @@ def panels_of(recording: Recording, *, robot: int = 1) -> dict[str, bytes]:
                 axes.get_legend().set_in_layout(True)  # no other axes need the same width
         pictures[name] = _file_of(figure, "svg")
     return pictures
+
+
+def recording_for_notebook(recording: Recording) -> tuple[bytes, dict[str, int]] | None:
+    """Return the figures of a recording as a PNG, and how wide a notebook shows it; nothing without Matplotlib."""
+    if find_spec("matplotlib") is None:
+        return None
+    return _file_of(figure_of([recording]), "png"), {"width": round(COLUMN_INCHES * 96)}
 
 
 def _file_of(figure: Any, kind: str) -> bytes:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from kiks import upwards
 from kiks.errors import ParameterError, nearest, shown
 from kiks.model.checks import check_number
 from kiks.model.project import Project
@@ -59,6 +60,11 @@ class Recording:
 
     def __repr__(self) -> str:
         return f"<{self._reader.what}: {len(self.robots)} robots, {self.duration_s:.3f} s>"
+
+    def _repr_png_(self) -> tuple[bytes, dict[str, int]] | None:
+        """Return its figures, which notebooks show; nothing without Matplotlib."""
+        picture: tuple[bytes, dict[str, int]] | None = upwards.draw_recording(self)
+        return picture
 
     # ---- what ran ----
 
