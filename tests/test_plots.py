@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import kiks
 from kiks import Arena, Khepera, ParameterError, Recording
-from kiks.plots import figure_of, save_plot
+from kiks.plots import PANELS, ROWS, figure_of, panels_of, save_plot
 from kiks.recording.analysis import odometry, time_shares
 from kiks.sim.simulation import Simulation
 
@@ -67,6 +69,26 @@ def test_a_run_is_plotted_while_it_is_recorded(tmp_path: Path) -> None:
     assert (x_mm[-1], y_mm[-1]) == pytest.approx(sim.pose(1)[:2], abs=0.5)  # within the last tick
     again = Recording(tmp_path / "run.mcap").plot().axes[0].lines[0]
     np.testing.assert_array_equal(again.get_xdata(), x_mm)
+
+
+def test_a_notebook_shows_the_figures(recording: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
+    shown = recording._repr_png_()
+    assert shown is not None
+    with Image.open(io.BytesIO(shown[0])) as picture:
+        assert picture.width > shown[1]["width"] > 400
+    monkeypatch.setattr("kiks.plots.find_spec", lambda name: None)
+    assert recording._repr_png_() is None
+
+
+def test_panels_are_the_rows_of_the_figure(recording: Recording) -> None:
+    panels = panels_of(recording)
+    assert list(panels) == list(PANELS)
+    assert len(PANELS) == len(ROWS)
+    for name, legend in (("paths", "odometry"), ("readings", "7"), ("speeds", "asked for"), ("time", "thinking")):
+        assert legend in panels[name].decode(), name
+    assert panels == panels_of(recording)
+    with pytest.raises(ParameterError, match="robot must be from 1 to 1"):
+        panels_of(recording, robot=2)
 
 
 def test_a_figure_has_a_column_for_each_recording(recording: Recording) -> None:

@@ -128,6 +128,7 @@ _MODULES = {"controllers", "measures", "tasks"}
 upwards.load_arena_file.provide("kiks.model.arena_formats", "load_arena_file")
 upwards.draw_arena.provide("kiks.drawing", "arena_for_notebook")
 upwards.draw_simulation.provide("kiks.drawing", "simulation_for_notebook")
+upwards.draw_recording.provide("kiks.plots", "recording_for_notebook")
 upwards.record_simulation.provide("kiks.recording.recorder", "RunRecorder")
 upwards.plot_simulation.provide("kiks.plots", "figure_of_run")
 upwards.plot_recordings.provide("kiks.plots", "figure_of")

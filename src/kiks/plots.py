@@ -6,7 +6,8 @@ A recording has a column, so that several stand side by side.
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,9 @@ POINTS_MAX = 4000
 ROWS = (1.25, 1.0, 0.8, 0.8, 0.28)
 """Relative heights of the rows."""
 
+PANELS = {"paths": 0.0, "places": 0.0, "readings": 2.6, "speeds": 2.6, "time": 1.3}
+"""The rows, and how high each is where it stands alone [inches]; 0 for as high as the arena makes it."""
+
 
 def save_plot(recordings: Sequence[Recording], path: str | Path, *, robot: int = 1) -> None:
     """Draw recordings side by side: paths, where robots were, readings, speeds, and where the time went.
@@ -50,12 +54,44 @@ def save_plot(recordings: Sequence[Recording], path: str | Path, *, robot: int =
     kind = Path(path).suffix.lower()
     if kind not in TYPES:
         raise ParameterError(f"a plot must go to a file that ends in {', '.join(TYPES)}, but it was {str(path)!r}.")
-    figure, buffer = figure_of(recordings, robot=robot), io.BytesIO()
-    # Without dates and random names, the same recording gives the same file.
-    dated = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(kind)
+    replace_file(path, _file_of(figure_of(recordings, robot=robot), kind[1:]), "a plot")
+
+
+def panels_of(recording: Recording, *, robot: int = 1) -> dict[str, bytes]:
+    """Return what `save_plot` draws of one recording as single pictures, by the names of `PANELS`, in SVG.
+
+    Raises:
+        ParameterError: If Matplotlib is not installed, or the recording has no such robot.
+    """
+    recording.check_robot(robot)
+    pictures = {}
+    arena = recording.setup.arena
+    arena_inches = min(max(0.75 * COLUMN_INCHES * arena.height_mm / arena.width_mm + 0.6, 2.0), COLUMN_INCHES)
+    for name, draw in _drawings(recording, robot).items():
+        size = (2 * COLUMN_INCHES, PANELS[name]) if PANELS[name] else (COLUMN_INCHES, arena_inches)
+        figure = library("matplotlib.figure", "plot").Figure(figsize=size, layout="constrained")
+        draw(figure.subplots())
+        for axes in figure.axes:
+            if axes.get_legend() is not None:
+                axes.get_legend().set_in_layout(True)  # no other axes need the same width
+        pictures[name] = _file_of(figure, "svg")
+    return pictures
+
+
+def recording_for_notebook(recording: Recording) -> tuple[bytes, dict[str, int]] | None:
+    """Return the figures of a recording as a PNG, and how wide a notebook shows it; nothing without Matplotlib."""
+    if find_spec("matplotlib") is None:
+        return None
+    return _file_of(figure_of([recording]), "png"), {"width": round(COLUMN_INCHES * 96)}
+
+
+def _file_of(figure: Any, kind: str) -> bytes:
+    """Return the file of a figure. Without dates and random names, the same recording gives the same file."""
+    dated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
+    buffer = io.BytesIO()
     with library("matplotlib", "plot").rc_context({"svg.hashsalt": "kiks"}):
-        figure.savefig(buffer, format=kind[1:], dpi=DOTS_PER_INCH, metadata=dated)
-    replace_file(path, buffer.getvalue(), "a plot")
+        figure.savefig(buffer, format=kind, dpi=DOTS_PER_INCH, metadata=dated)
+    return buffer.getvalue()
 
 
 def figure_of(recordings: Sequence[Recording], *, robot: int = 1) -> Any:
@@ -73,12 +109,8 @@ def figure_of(recordings: Sequence[Recording], *, robot: int = 1) -> Any:
     axes = figure.subplots(len(ROWS), len(recordings), squeeze=False, height_ratios=ROWS)
     for column, recording in zip(axes.T, recordings, strict=True):
         column[0].set_title(recording.title, fontsize="medium")
-        poses, wheels = recording.table("poses"), recording.table("wheels")
-        _draw_paths(column[0], recording, poses, wheels)
-        _draw_heat(column[1], recording.setup.arena, poses)
-        _draw_readings(column[2], recording.table("readings", robot))
-        _draw_speeds(column[3], wheels[wheels["robot"] == robot])
-        _draw_time(column[4], recording, robot)
+        for axes_of_row, draw in zip(column, _drawings(recording, robot).values(), strict=True):
+            draw(axes_of_row)
     return figure
 
 
@@ -95,6 +127,18 @@ def figure_of_run(sim: Simulation, *, robot: int = 1) -> Any:
         )
     recorder.flush()
     return figure_of([Recording(recorder.path)], robot=robot)
+
+
+def _drawings(recording: Recording, robot: int) -> dict[str, Callable[[Any], None]]:
+    """Return functions that draw the rows on axes, by the names of `PANELS`."""
+    poses, wheels = recording.table("poses"), recording.table("wheels")
+    return {
+        "paths": lambda axes: _draw_paths(axes, recording, poses, wheels),
+        "places": lambda axes: _draw_heat(axes, recording.setup.arena, poses),
+        "readings": lambda axes: _draw_readings(axes, recording.table("readings", robot)),
+        "speeds": lambda axes: _draw_speeds(axes, wheels[wheels["robot"] == robot]),
+        "time": lambda axes: _draw_time(axes, recording, robot),
+    }
 
 
 def _draw_arena(axes: Any, arena: Arena) -> None:
@@ -143,7 +187,8 @@ def _draw_heat(axes: Any, arena: Arena, poses: Table) -> None:
     seconds, x_edges, y_edges = np.histogram2d(poses["x_mm"], poses["y_mm"], bins=cells)
     _draw_arena(axes, arena)
     shown = np.ma.masked_equal(seconds.T * 0.01, 0.0)
-    mesh = axes.pcolormesh(x_edges, y_edges, shown, cmap="viridis", alpha=0.9)
+    # As vectors, its cells would be most of a large picture.
+    mesh = axes.pcolormesh(x_edges, y_edges, shown, cmap="viridis", alpha=0.9, rasterized=True)
     axes.figure.colorbar(mesh, ax=axes, label="seconds")
     axes.set_xlim(0, arena.width_mm)
     axes.set_ylim(0, arena.height_mm)

@@ -43,6 +43,9 @@ draw_arena = Hook()
 draw_simulation = Hook()
 """Draws a simulation for a notebook."""
 
+draw_recording = Hook()
+"""Draws the figures of a recording for a notebook."""
+
 show_in_browser = Hook()
 """Opens a simulation on a desk."""
 

@@ -57,6 +57,11 @@ def test_programs_are_recorded_with_their_texts(robots: int, tmp_path: Path) -> 
     for file in ("readings.csv", "readings.parquet"):
         told = forked.run("table", "run.mcap", file, "--table", "readings", "--robot", "1", cwd=tmp_path)
         assert told.stdout.startswith("40 rows"), told.stderr
+    told = forked.run("page", "run.mcap", "--title", "Exercise 3", "--robot", str(robots), cwd=tmp_path)
+    assert told.stdout.startswith("Page: run.html"), told.stderr
+    page = (tmp_path / "run.html").read_text()
+    assert "<h1>Exercise 3</h1>" in page
+    assert "kiks run --robots" in page
     with (tmp_path / "readings.csv").open(newline="") as table:
         rows = list(csv.DictReader(table))
     assert [int(row["counts_7"]) for row in rows] == recording.table("readings", 1)["counts"][:, 7].tolist()
@@ -96,6 +101,8 @@ def test_mistakes_end_in_one_clear_line(tmp_path: Path) -> None:
         (("replay", "text.mcap", "--check"), "must be an MCAP file"),
         (("table", "text.mcap", "out.csv"), "must be an MCAP file"),
         (("table", "text.mcap", "out.xlsx"), "must end in .csv or .parquet"),
+        (("page", "text.mcap"), "must be an MCAP file"),
+        (("page", "text.mcap", "none/page.html"), "OUT must go to a file that can be written"),
         (("run", "--record", "run.txt", str(PROGRAMS / "drive.py")), "ends in .mcap"),
     ):
         result = forked.run(*words, cwd=tmp_path)

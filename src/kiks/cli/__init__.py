@@ -17,7 +17,7 @@ from kiks.cli.film import film, photo
 from kiks.cli.fit import fit
 from kiks.cli.matlab import matlab
 from kiks.cli.monitor import monitor
-from kiks.cli.replay import plot, replay, table
+from kiks.cli.replay import page, plot, replay, table
 from kiks.cli.run import RunCommand, run
 from kiks.cli.schema import schema
 from kiks.cli.serve import serve
@@ -45,6 +45,7 @@ for _command in (
     film,
     photo,
     plot,
+    page,
     table,
     serve,
     matlab,

@@ -1,4 +1,4 @@
-"""`kiks replay`, `kiks plot` and `kiks table`: what is done with recordings."""
+"""`kiks replay`, `kiks plot`, `kiks page` and `kiks table`: what is done with recordings."""
 
 from __future__ import annotations
 
@@ -96,6 +96,38 @@ def plot(
     path = out or Path("kiks-plot.png")
     save_plot([Recording(file) for file in files], path, robot=robot)
     typer.echo(f"Picture: {path}")
+
+
+def page(
+    file: RecordingFile,
+    out: Annotated[
+        Path | None, typer.Argument(help="The page; FILE with .html if left out.", callback=written_file)
+    ] = None,
+    title: Annotated[str | None, typer.Option(help="Its title; the programs' names if left out.")] = None,
+    robot: Annotated[int, typer.Option(help="The robot whose readings, speeds, time and wire are shown.", min=1)] = 1,
+) -> None:
+    """Make of a recording one HTML file to hand in: a player, figures, numbers, programs, and how to run it again.
+
+    The page needs no network and no KiKS: any browser opens it.
+
+    Example: kiks page run.mcap --title "Exercise 3, Ada Lovelace"
+    """
+    ready_engine()
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from kiks.desk.hand_in.page_file import save_page
+    from kiks.recording.recording import Recording
+
+    recording = Recording(file)
+    path = out or file.with_suffix(".html")
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
+        task = progress.add_task("making the run again", total=1.0)
+        save_page(
+            recording, path, title=title, robot=robot, on_progress=lambda share: progress.update(task, completed=share)
+        )
+    typer.echo(f"Page: {path}, {path.stat().st_size / 1e6:.1f} MB")
 
 
 def table(

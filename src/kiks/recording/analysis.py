@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -42,22 +45,36 @@ def odometry(
 
 def time_shares(log: RecordedLog, robot: int) -> TimeShares:
     """Return where the time of a recording went on the line of a robot, by its number."""
-    link: list[Span] = []
-    robot_spans: list[Span] = []
-    thinking: list[Span] = []
-    sent: list[tuple[int, int]] = []
+    return all_time_shares(log, [robot])[0]
+
+
+def all_time_shares(log: RecordedLog, robots: Sequence[int]) -> list[TimeShares]:
+    """Return where the time of a recording went on the lines of robots, by their numbers."""
+    lines = {robot - 1: _Line() for robot in robots}
     for entry in log.entries():
-        if entry.robot != robot - 1:
+        line = lines.get(entry.robot)
+        if line is None:
             continue
         if entry.kind in (Kind.SEND, Kind.TYPE):
-            sent.append((entry.other, len(entry.data)))
+            line.sent.append((entry.other, len(entry.data)))
         elif entry.kind == Kind.THINK:
-            thinking.append((entry.number, entry.other))
+            line.thinking.append((entry.number, entry.other))
         elif entry.kind == Kind.ACT:
             # The reply tells how long a character takes.
-            begin_ns = max((begin + count * entry.other for begin, count in sent), default=entry.time_ns)
-            link += [(begin, begin + count * entry.other) for begin, count in sent]
-            link.append((entry.number, entry.number + len(entry.data) * entry.other))
-            robot_spans.append((begin_ns, entry.time_ns))
-            sent.clear()
-    return share_time((log.begin_ns, log.end_ns), link=link, robot=robot_spans, thinking=thinking)
+            begin_ns = max((begin + count * entry.other for begin, count in line.sent), default=entry.time_ns)
+            line.link += [(begin, begin + count * entry.other) for begin, count in line.sent]
+            line.link.append((entry.number, entry.number + len(entry.data) * entry.other))
+            line.robot.append((begin_ns, entry.time_ns))
+            line.sent.clear()
+    window = log.begin_ns, log.end_ns
+    return [share_time(window, link=each.link, robot=each.robot, thinking=each.thinking) for each in lines.values()]
+
+
+@dataclass
+class _Line:
+    """What took time on a robot's line; of what was sent and has no reply yet: when it began, and its characters."""
+
+    link: list[Span] = field(default_factory=list)
+    robot: list[Span] = field(default_factory=list)
+    thinking: list[Span] = field(default_factory=list)
+    sent: list[tuple[int, int]] = field(default_factory=list)

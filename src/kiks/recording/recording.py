@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kiks import upwards
 from kiks.errors import ParameterError, nearest, shown
 from kiks.model.checks import check_count, check_number
 from kiks.model.project import Project
@@ -22,7 +23,6 @@ from kiks.sim.from_project import project_of
 from kiks.sim.saved_state import Setup
 from kiks.sim.simulation import Simulation
 from kiks.units import ns_from_s, s_from_ns
-from kiks.upwards import plot_recordings
 
 
 class Recording:
@@ -61,6 +61,11 @@ class Recording:
 
     def __repr__(self) -> str:
         return f"<{self._reader.what}: {len(self.robots)} robots, {self.duration_s:.3f} s>"
+
+    def _repr_png_(self) -> tuple[bytes, dict[str, int]] | None:
+        """Return its figures, which notebooks show; nothing without Matplotlib."""
+        picture: tuple[bytes, dict[str, int]] | None = upwards.draw_recording(self)
+        return picture
 
     # ---- what ran ----
 
@@ -189,7 +194,7 @@ class Recording:
         Raises:
             ParameterError: If Matplotlib is not installed, or there is no such robot.
         """
-        return plot_recordings([self], robot=robot)
+        return upwards.plot_recordings([self], robot=robot)
 
     def time_ns(self, time_s: float, name: str = "time_s") -> int:
         """Return a time of the recording [ns].

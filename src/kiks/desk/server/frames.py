@@ -159,6 +159,12 @@ def _pack_cameras(sim: Simulation) -> NDArray[np.void]:
     return packed
 
 
+def scene_key(sim: Simulation) -> tuple[Any, ...]:
+    """Return what is another when a scene message no longer holds: the world, walls, bodies, lamps or turrets."""
+    turret_count = sum(len(wire.firmware.fitted) for wire in sim.wires)
+    return sim, sim.arena, len(sim.lamps), turret_count, *sim.world.state.bodies["number"][0].tolist()
+
+
 def describe_scene(sim: Simulation, scene: int, names: Sequence[str] | None = None) -> dict[str, Any]:
     """Return the message to browsers with all data that frames leave out.
 

@@ -14,7 +14,7 @@ from typing import Any
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from kiks.desk.server.desk import Desk
-from kiks.desk.server.frames import arena_picture, describe_scene, describe_shapes, pack_frame
+from kiks.desk.server.frames import arena_picture, describe_scene, describe_shapes, pack_frame, scene_key
 from kiks.desk.server.timeline import Mark, thinned
 from kiks.errors import KiksError, ParameterError
 from kiks.model.checks import SECONDS_MAX
@@ -149,10 +149,8 @@ class Gateway:
     def _look(self, sim: Simulation) -> bytes:
         desk = self._desk
         sim.sync()
-        seen = (sim, sim.arena, desk.scene, len(sim.lamps), *sim.world.state.bodies["number"][0].tolist())
-        turrets = sum(len(wire.firmware.fitted) for wire in sim.wires)
-        if (*seen, turrets) != self._seen:
-            self._seen = (*seen, turrets)
+        if (seen := (desk.scene, *scene_key(sim))) != self._seen:
+            self._seen = seen
             self._scene = describe_scene(sim, self._scene.get("scene", 0) + 1, desk.names())
             self._scene["arena"]["picture"] = f"/desk/{self._number}/arena/{self._scene['scene']}.png"
             if self._picture[0] is not sim.arena:

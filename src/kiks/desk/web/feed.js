@@ -133,6 +133,11 @@ export class Feed {
 
 let feed = null;
 
+/** Give the components of this page another feed, before the first of them is made. */
+export function setPageFeed(other) {
+  feed = other;
+}
+
 /** Return the feed of this page; the first caller's path counts. */
 export function pageFeed(path) {
   feed ??= new Feed(path);

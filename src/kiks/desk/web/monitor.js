@@ -31,6 +31,7 @@ export class Monitor {
     this._history = new History();
     this._look = null;
     this._isWanted = true;
+    this._areFactsOld = false;
     this._facts_ms = 0;
     this._isSeen = false;
     this._ends = [
@@ -98,8 +99,16 @@ export class Monitor {
     this._beat = requestAnimationFrame((later_ms) => this._tick(later_ms));
     const { scene, frame } = this.feed, isDark = this.isDark;
     if (!this._isSeen || !this._look || !frame || this.index >= frame.robot_count) return;
-    if (!this._isWanted && isDark === this._wasDark) return;
+    if (this._isWanted || isDark !== this._wasDark) this._draw(scene, frame, isDark);
+    if (!this._areFactsOld || now_ms - this._facts_ms < FACTS_MS) return;
+    this._areFactsOld = false;
+    this._facts_ms = now_ms;
+    this._tell("facts", { rows: factsOf(scene, frame, this.index), hasCamera: frame.camera(this.index) !== null });
+  }
+
+  _draw(scene, frame, isDark) {
     this._isWanted = false;
+    this._areFactsOld = true;
     this._wasDark = isDark;
     this.frames_drawn++;
     const chosen = this.chosen?.sensor ?? -1;
@@ -112,9 +121,6 @@ export class Monitor {
     const robot = frame.robot(this.index);
     this._writeNumbers(robot, isDark);
     this._writeWheels(robot);
-    if (now_ms - this._facts_ms < FACTS_MS) return;
-    this._facts_ms = now_ms;
-    this._tell("facts", { rows: factsOf(scene, frame, this.index), hasCamera: camera !== null });
   }
 
   _writeNumbers(robot, isDark) {

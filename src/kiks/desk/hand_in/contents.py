@@ -1,0 +1,211 @@
+"""What the page of a recording tells: facts, numbers of each robot, events, programs' texts, the wire, commands."""
+
+from __future__ import annotations
+
+import shlex
+from collections import Counter
+from dataclasses import dataclass
+from typing import Any
+
+from markupsafe import Markup
+from pygments import highlight
+from pygments.formatters import HtmlFormatter
+from pygments.lexers import PythonLexer, TextLexer
+
+from kiks.desk.hand_in.run_frames import RunFrames
+from kiks.errors import counted
+from kiks.recording.analysis import all_time_shares
+from kiks.recording.recording import Recording
+from kiks.recording.tables import Table
+from kiks.sim.wire_log import TimeShares
+from kiks.units import s_from_ns
+from kiks.version import __version__
+
+MOMENTS_MAX = 1000
+"""Most events in the list, which then holds the first ones."""
+
+MARKS_MAX = 20_000
+"""Most marks above the slider."""
+
+PROGRAM_CHARACTERS_MAX = 100_000
+"""Most characters of a program's text on the page."""
+
+WIRE_LINES = 8
+"""Lines of the wire that are shown at the beginning and at the end."""
+
+ROBOTS_MAX = 100
+"""Most robots in the table of numbers."""
+
+
+@dataclass(frozen=True)
+class Program:
+    """A program's text on the page.
+
+    Attributes:
+        name: Name of its file.
+        drivers: Which of the programs it was, such as "1, 2": several may have the same text.
+        text: The text, cut if it is too long, in colours.
+        is_cut: Whether it was cut.
+    """
+
+    name: str
+    drivers: str
+    text: Markup
+    is_cut: bool
+
+
+@dataclass(frozen=True)
+class RobotNumbers:
+    """A robot's row in the table of numbers; `shares` are percent of the time."""
+
+    number: int
+    kind: str
+    driven_m: float
+    mean_mm_per_s: float
+    contacts: int
+    commands: int
+    shares: tuple[float, ...]
+
+
+def contents_of(recording: Recording, frames: RunFrames, robot: int) -> dict[str, Any]:
+    """Return what `web/run_page.html` needs to tell of a recording, by name.
+
+    Args:
+        recording: The recording.
+        frames: The frames of the run.
+        robot: Number of the robot whose wire is shown.
+    """
+    events, programs, file = recording.table("events"), _programs(recording), recording.log.reader.path.name
+    names = ", ".join(dict.fromkeys(program.name for program in programs))
+    return {
+        "what_ran": names or f"A run in arena {_arena(recording)}",
+        "parts": (
+            _kinds(frames),
+            f"arena {_arena(recording)}",
+            clock_text(recording.duration_s),
+            f"seed {recording.setup.seed}",
+        ),
+        "is_whole": recording.is_whole,
+        "begin_s": s_from_ns(recording.log.begin_ns),
+        "end_s": s_from_ns(recording.log.end_ns),
+        "robot_count": max(len(scene["robots"]) for scene in frames.scenes),
+        "facts": _facts(recording, frames),
+        "numbers": _numbers(recording, frames),
+        "events": events[:MOMENTS_MAX].tolist(),
+        "more_events": max(len(events) - MOMENTS_MAX, 0),
+        "kinds": sorted(set(events["kind"].tolist())),
+        "moments": [[round(time_s, 3), kind] for time_s, kind in events[["time_s", "kind"]][:MARKS_MAX].tolist()],
+        "programs": programs,
+        "wire": _wire(recording.table("wire", robot)),
+        "command": recording.about.get("command", ""),
+        "check": shlex.join(["kiks", "replay", "--check", file]),
+        "watch": shlex.join(["kiks", "replay", file]),
+    }
+
+
+def clock_text(time_s: float) -> str:
+    """Return a time as the desk's clock shows it.
+
+    Example:
+        >>> clock_text(83.456)
+        '1:23.45'
+    """
+    hundredths = int(time_s * 100 + 1e-6)
+    return f"{hundredths // 6000}:{hundredths // 100 % 60:02d}.{hundredths % 100:02d}"
+
+
+def _arena(recording: Recording) -> str:
+    return recording.setup.arena.name or "an arena"
+
+
+def _kinds(frames: RunFrames) -> str:
+    """Return which robots there are in the end."""
+    kinds = Counter(spec.name for spec in frames.last.specs)
+    return ", ".join(f"{count} x {kind}" if count > 1 else kind for kind, count in kinds.items())
+
+
+def _facts(recording: Recording, frames: RunFrames) -> list[tuple[str, str]]:
+    """Return what ran, as names and values."""
+    about, arena, sim = recording.about, recording.setup.arena, frames.first
+    turrets = [
+        f"{', '.join(turret.name for turret in sim.turrets(number))} on robot {number}"
+        for number in range(1, sim.robot_count + 1)
+        if sim.turrets(number)
+    ]
+    things = Counter(body["what"] for body in frames.scenes[0]["bodies"]) + Counter(lamp=len(sim.lamps))
+    made_again = f"{frames.equal_count} of {counted(frames.checkpoint_count, 'checkpoint')} the same, to the bit"
+    if not frames.checkpoint_count:
+        made_again = "it has no checkpoint"
+    rows = [
+        ("Duration", f"{recording.duration_s:.3f} s of simulated time"),
+        ("Arena", f"{_arena(recording)}, {arena.width_mm:g} x {arena.height_mm:g} mm"),
+        ("Robots", _kinds(frames)),
+        ("Turrets", "; ".join(turrets)),
+        ("Also in it", ", ".join(counted(count, what) for what, count in things.items())),
+        ("Seed", str(recording.setup.seed)),
+        ("Thinking time", about.get("thinking", "")),
+        ("State at the end", frames.state_hash),
+        ("Made again for this page", made_again),
+        ("Recorded by", f"KiKS {about.get('kiks', 'of an unknown version')}"),
+        ("Page made by", f"KiKS {__version__}"),
+        ("Recording", recording.log.reader.path.name),
+    ]
+    return [(name, value) for name, value in rows if value]
+
+
+def _numbers(recording: Recording, frames: RunFrames) -> list[RobotNumbers]:
+    """Return the table of numbers: what each robot did meanwhile."""
+    robots = range(1, min(frames.last.robot_count, ROBOTS_MAX) + 1)
+    wire = recording.table("wire")
+    replies = Counter(wire["robot"][~wire["is_sent"]].tolist())
+    rows = []
+    for number, shares in zip(robots, all_time_shares(recording.log, robots), strict=True):
+        was_there = number <= frames.first.robot_count
+        driven_mm = frames.last.travelled_mm(number) - (frames.first.travelled_mm(number) if was_there else 0)
+        rows.append(
+            RobotNumbers(
+                number=number,
+                kind=frames.last.specs[number - 1].name,
+                driven_m=driven_mm / 1000,
+                mean_mm_per_s=driven_mm / recording.duration_s if recording.duration_s else 0.0,
+                contacts=frames.last.contacts(number) - (frames.first.contacts(number) if was_there else 0),
+                commands=replies[number],
+                shares=_percents(shares),
+            )
+        )
+    return rows
+
+
+def _percents(shares: TimeShares) -> tuple[float, ...]:
+    return tuple(100 * share_ns / max(shares.window_ns, 1) for share_ns in shares)
+
+
+def _programs(recording: Recording) -> list[Program]:
+    """Return the programs' texts, each once."""
+    drivers: dict[tuple[str, str], list[str]] = {}
+    for numbered, text in recording.programs.items():
+        number, _, name = numbered.partition("-")
+        drivers.setdefault((name, text), []).append(number)
+    return [
+        Program(name, ", ".join(numbers), _in_colours(name, text), len(text) > PROGRAM_CHARACTERS_MAX)
+        for (name, text), numbers in drivers.items()
+    ]
+
+
+def _in_colours(name: str, text: str) -> Markup:
+    """Return a program's text as HTML, in which Pygments has escaped it."""
+    lexer: Any = (PythonLexer if name.endswith(".py") else TextLexer)(stripnl=False, ensurenl=False)
+    return Markup(highlight(text[:PROGRAM_CHARACTERS_MAX], lexer, HtmlFormatter(nowrap=True)))
+
+
+def _wire(wire: Table) -> list[tuple[float, bool, str] | None]:
+    """Return the first and the last lines of a wire: when, whether sent to the robot, what. None stands between."""
+    first, last = (
+        [(time_s, is_sent, _printable(data)) for time_s, _, is_sent, data in rows.tolist()]
+        for rows in (wire[:WIRE_LINES], wire[max(len(wire) - WIRE_LINES, WIRE_LINES) :])
+    )
+    return [*first, None, *last] if len(wire) > 2 * WIRE_LINES else [*first, *last]
+
+
+def _printable(data: bytes) -> str:
+    return data.decode("latin-1").encode("unicode_escape").decode()

@@ -1,0 +1,90 @@
+"""Makes of a recording one HTML file that needs no network: what ran, a player, figures, numbers, programs, commands.
+
+All texts of a recording reach the page through a template that escapes them, and the page's security policy lets
+nothing run but its own script, named by its hash: what is in a recording never becomes markup or script.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+
+import jinja2
+from markupsafe import Markup
+
+from kiks.desk.hand_in.bundle import bundle
+from kiks.desk.hand_in.contents import clock_text, contents_of
+from kiks.desk.hand_in.run_frames import PERIOD_NS, RunFrames
+from kiks.model.atomic_files import replace_file
+from kiks.plots import panels_of
+from kiks.recording.recording import Recording
+from kiks.units import s_from_ns
+from kiks.version import __version__
+
+WEB = Path(__file__).parents[1] / "web"
+
+STYLES = ("arena_view.css", "monitor_view.css", "run_page.css")
+
+FIGURES = {
+    "paths": ("Paths", "Where robots drove, and where the wheels of a lone robot say that it did"),
+    "places": ("Places", "How long robots were in which part of the arena"),
+    "readings": ("Readings", "What the program read of the proximity sensors of robot {robot}"),
+    "speeds": ("Speeds", "How fast the wheels of robot {robot} turned, and how fast they should"),
+    "time": ("Time", "Where the milliseconds of robot {robot} went"),
+}
+"""Title of each figure, and a sentence."""
+
+
+def save_page(
+    recording: Recording,
+    path: str | Path,
+    *,
+    title: str | None = None,
+    robot: int = 1,
+    on_progress: Callable[[float], None] = lambda share: None,
+) -> None:
+    """Write the page of a recording.
+
+    Args:
+        recording: The recording.
+        path: The page's file.
+        title: Its title; the programs' names if left out.
+        robot: Number of the robot whose readings, speeds, time and wire are shown.
+        on_progress: Called now and then with the share that is done.
+
+    Raises:
+        KiksError: If Matplotlib is not installed, there is no such robot, the recording is damaged, or the file cannot
+            be written.
+    """
+    figures = panels_of(recording, robot=robot)
+    frames = RunFrames(recording.log, on_progress)
+    script = bundle(WEB / "run_page.js")
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(WEB),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["clock"] = clock_text
+    page = environment.get_template("run_page.html").render(
+        contents_of(recording, frames, robot),
+        title=title,
+        robot=robot,
+        figures=[
+            (name, head, text.format(robot=robot), base64.b64encode(figures[name]).decode())
+            for name, (head, text) in FIGURES.items()
+        ],
+        frames=frames,
+        packed=frames.pack(),
+        is_coarse=frames.period_ns > PERIOD_NS,
+        period_s=s_from_ns(frames.period_ns),
+        version=__version__,
+        script=Markup(script),
+        script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
+        style=Markup("\n".join((WEB / name).read_text("utf-8") for name in STYLES)),
+    )
+    # The name of a file may hold what is no text.
+    replace_file(path, page.encode("utf-8", "replace"), "a page")

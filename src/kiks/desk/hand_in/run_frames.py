@@ -1,0 +1,167 @@
+"""The frames and messages that browsers of a desk would get of a recorded run, at a fixed period.
+
+The run is made again for it, and compared with the recording at each checkpoint. Where it differs, it goes on from the
+recorded state, so the frames always show the run that was recorded.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import struct
+import zlib
+from collections.abc import Callable
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+
+from kiks.desk.server.frames import arena_picture, describe_scene, describe_shapes, pack_frame, scene_key
+from kiks.recording.log import RecordedLog
+from kiks.recording.replay import Replay
+from kiks.sim.simulation import Simulation
+from kiks.units import TICK_NS, s_from_ns
+
+PERIOD_NS = 4 * TICK_NS
+"""Period of the frames [ns], that of a desk; a long run has twice the period, four times, and so on."""
+
+FRAME_BYTES_MAX = 16 << 20
+"""Most bytes of all frames together. Packed, they take a sixth of it or less."""
+
+_LENGTH = struct.Struct("<I")
+
+
+class RunFrames:
+    """The frames of a recorded run.
+
+    Args:
+        log: The log of the recording.
+        on_progress: Called now and then with the share that is done.
+
+    Attributes:
+        period_ns: Time between two frames [ns]; the last one may come earlier.
+        frames: Of `pack_frame`. The scene of each is an index of `scenes`.
+        scenes: Messages of `describe_scene`; `picture` of the arena is an index of `pictures`.
+        pictures: Walls, as PNG.
+        shapes: Messages of `describe_shapes`, and from which frame on each holds.
+        first: The world at the beginning.
+        last: The world at the end.
+        checkpoint_count: Number of checkpoints.
+        equal_count: How many of them were the same, to the bit.
+        state_hash: The recorded hash of the state at the last checkpoint.
+
+    Raises:
+        KiksError: If the recording is damaged.
+    """
+
+    def __init__(self, log: RecordedLog, on_progress: Callable[[float], None] = lambda share: None) -> None:
+        self._log = log
+        self.frames: list[bytes] = []
+        self.scenes: list[dict[str, Any]] = []
+        self.pictures: list[bytes] = []
+        self.shapes: list[tuple[int, dict[str, Any]]] = []
+        self.checkpoint_count = self.equal_count = 0
+        self.state_hash = ""
+        self._key: tuple[Any, ...] = ()
+        self._arena: Any = None
+        self._is_other = False
+        self.first = Replay(log, log.begin_ns).sim
+        self._replay = Replay(log, log.begin_ns, self._compare)
+        self._take()
+        begin_ns, end_ns = log.begin_ns, log.end_ns
+        self.period_ns = _period_ns(end_ns - begin_ns, len(self.frames[0]))
+        for time_ns in range(begin_ns + self.period_ns, end_ns, self.period_ns):
+            self._go_to(time_ns)
+            self._take()
+            if len(self.frames) % 100 == 0:
+                on_progress((time_ns - begin_ns) / (end_ns - begin_ns))
+        while self._replay.advance():
+            pass
+        self._go_to(end_ns)
+        if end_ns > begin_ns:
+            self._take()
+        self.last = self._replay.sim
+        on_progress(1.0)
+
+    def _go_to(self, time_ns: int) -> None:
+        self._replay.sim.advance_to(time_ns)
+        if self._is_other:
+            self._is_other = False
+            self._replay = Replay(self._log, time_ns, self._compare)
+
+    def _compare(self, time_ns: int, state_hash: str) -> None:
+        self.state_hash = state_hash
+        self.checkpoint_count += 1
+        if self._replay.sim.state_hash() == state_hash:
+            self.equal_count += 1
+        else:
+            self._is_other = True
+
+    def _take(self) -> None:
+        """Add a frame of the present state."""
+        sim = self._replay.sim
+        with sim.lock:
+            sim.sync()
+            if self._key != (key := scene_key(sim)):
+                self._key = key
+                self._take_scene(sim)
+            shapes = describe_shapes(sim)
+            if not self.shapes or self.shapes[-1][1] != shapes:
+                self.shapes.append((len(self.frames), shapes))
+            self.frames.append(pack_frame(sim, scene=len(self.scenes) - 1))
+
+    def _take_scene(self, sim: Simulation) -> None:
+        """Add the present scene if it differs from the last one."""
+        if sim.arena is not self._arena:
+            self._arena = sim.arena
+            picture = arena_picture(sim.arena)
+            if picture not in self.pictures:
+                self.pictures.append(picture)
+            self._picture = self.pictures.index(picture)
+        number = len(self.scenes)
+        scene = describe_scene(sim, number)
+        scene["arena"]["picture"] = self._picture
+        if not self.scenes or scene != self.scenes[-1] | {"scene": number}:
+            self.scenes.append(scene)
+            self.shapes.append((len(self.frames), describe_shapes(sim)))
+
+    def pack(self) -> str:
+        """Return all of it as text: Base64 of zlib's format. `web/recorded_feed.js` unpacks it.
+
+        It begins with the length of a JSON text and that text. The frames follow in groups of equal size. Each group
+        holds the differences of each frame's bytes from the frame before it, the first byte of all frames before the
+        second one: most bytes change seldom, or by little.
+        """
+        groups = [(size, list(group)) for size, group in groupby(self.frames, len)]
+        head = {
+            "period_s": s_from_ns(self.period_ns),
+            "groups": [{"size": size, "count": len(frames)} for size, frames in groups],
+            "scenes": self.scenes,
+            "shapes": self.shapes,
+            "pictures": [f"data:image/png;base64,{base64.b64encode(each).decode()}" for each in self.pictures],
+        }
+        text = json.dumps(head, separators=(",", ":")).encode()
+        packer = zlib.compressobj(9)
+        parts = [packer.compress(_LENGTH.pack(len(text)) + text)]
+        for size, frames in groups:
+            table = np.frombuffer(b"".join(frames), np.uint8).reshape(len(frames), size)
+            table = np.diff(table, axis=0, prepend=np.uint8(0))
+            parts.append(packer.compress(np.ascontiguousarray(table.T).tobytes()))
+        return base64.b64encode(b"".join([*parts, packer.flush()])).decode()
+
+
+def _period_ns(duration_ns: int, frame_bytes: int) -> int:
+    """Return the shortest period with which all frames have room.
+
+    Args:
+        duration_ns: Length of the run [ns].
+        frame_bytes: Size of a frame.
+
+    Example:
+        >>> _period_ns(300 * 10**9, 272), _period_ns(3600 * 10**9, 272)
+        (40000000, 80000000)
+    """
+    period_ns = PERIOD_NS
+    while duration_ns // period_ns * frame_bytes > FRAME_BYTES_MAX:
+        period_ns *= 2
+    return period_ns

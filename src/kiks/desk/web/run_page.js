@@ -1,0 +1,115 @@
+/* The page of a recorded run (see kiks/desk/hand_in): the player with the desk's own views, and what belongs to it. */
+
+import { setPageFeed } from "./feed.js";
+import { Player } from "./player.js";
+import { RecordedFeed, unpackRun } from "./recorded_feed.js";
+import { RecordedMonitor } from "./recorded_monitor.js";
+import { Stage } from "./stage.js";
+
+const TOLD_MS = 2000;
+const TOO_OLD = "This browser is too old for the player. Everything else on this page can be read.";
+
+const at = (id) => document.getElementById(id);
+const all = (selector) => [...document.querySelectorAll(selector)];
+
+async function start() {
+  const feed = new RecordedFeed(await unpackRun(at("frames").textContent));
+  setPageFeed(feed);
+  const parts = ["root", "top", "topPane", "solidPane", "notice", "live"].map((name) => [name, at(name)]);
+  const stage = new Stage(Object.fromEntries(parts), "", (event, pick) => event === "pick" && choose(pick));
+  const monitor = new RecordedMonitor(at("monitor"), at("facts"));
+  const player = new Player(
+    { play: at("play"), slider: at("slider"), marks: at("marks"), clock: at("clock"), speed: at("speed") },
+    feed, JSON.parse(at("moments").textContent));
+
+  feed.onJump = () => stage.clearTrails();
+  at("root").addEventListener("keydown", (event) => stage.press(event));
+  at("fit").addEventListener("click", () => stage.fit());
+  const layers = all("#layers input");
+  const show = () => stage.setShow(Object.fromEntries(layers.map(({ name, checked }) => [name, checked])));
+  for (const layer of layers) layer.addEventListener("change", show);
+  show();
+
+  const robots = at("robot"), follow = at("follow");
+  function look() {
+    monitor.setRobot(Number(robots.value));
+    stage.setFollow(follow.checked ? Number(robots.value) : -1);
+  }
+  function choose({ what, index }) {
+    if (what !== "robot" && what !== "sensor") return;
+    robots.value = index;
+    look();
+  }
+  for (const control of [robots, follow]) control.addEventListener("change", look);
+  look();
+  followPage(stage, monitor, player);
+  listMoments(player);
+  window.kiksPage = { feed, player, stage };
+}
+
+/** Use dark colours where the system does. */
+function followPage(stage, monitor, player) {
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  const dress = () => {
+    document.body.classList.toggle("body--dark", dark.matches);
+    stage.setDark(dark.matches);
+    monitor.dress();
+    player.paintMarks();
+  };
+  dark.addEventListener("change", dress);
+  dress();
+}
+
+/** A click on a line of the list goes to its time; the last line before the shown time is marked. */
+function listMoments(player) {
+  const list = at("list"), lines = all("#list button"), times = lines.map((line) => Number(line.dataset.time));
+  let marked = null;
+  lines.forEach((line, k) => line.addEventListener("click", () => player.seek(times[k])));
+  for (const box of all("#kinds input"))
+    box.addEventListener("change", () => list.classList.toggle(`without-${box.name}`, !box.checked));
+  const mark = () => {
+    const next = times.findLastIndex((time_s) => time_s <= player.time_s + 1e-6), line = lines[next] ?? null;
+    if (line === marked) return;
+    marked?.classList.remove("now");
+    line?.classList.add("now");
+    marked = line;
+    if (line && player.isPlaying) list.scrollTop = line.offsetTop - list.offsetTop - list.clientHeight / 2;
+  };
+  player.feed.on("frame", mark);
+}
+
+/** Buttons that copy or save the text of an element. */
+function offerTexts() {
+  for (const button of all("button[data-copy]"))
+    button.addEventListener("click", async () => {
+      const hasCopied = await copy(at(button.dataset.copy));
+      button.textContent = hasCopied ? "Copied" : "Press Ctrl-C";
+      setTimeout(() => (button.textContent = "Copy"), TOLD_MS);
+    });
+  for (const button of all("button[data-save]"))
+    button.addEventListener("click", () => {
+      const link = document.createElement("a");
+      link.href = URL.createObjectURL(new Blob([at(button.dataset.save).textContent], { type: "text/plain" }));
+      link.download = button.dataset.name;
+      link.click();
+      setTimeout(() => URL.revokeObjectURL(link.href), TOLD_MS);
+    });
+}
+
+/** Copy the text of an element, or select it where the browser forbids that. */
+async function copy(element) {
+  try {
+    await navigator.clipboard.writeText(element.textContent);
+    return true;
+  } catch {
+    getSelection().selectAllChildren(element);
+    return false;
+  }
+}
+
+offerTexts();
+if ("DecompressionStream" in window) start();
+else {
+  at("notice").textContent = TOO_OLD;
+  at("notice").hidden = false;
+}

@@ -1,0 +1,381 @@
+"""The page of a recording: it holds what was recorded, needs no network, and plays in a browser from a file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("matplotlib", reason="the page has figures")
+pytest.importorskip("nicegui", reason="the desk needs NiceGUI")
+
+from kiks import Arena, Khepera, ParameterError, Recording, Simulation
+from kiks.desk.hand_in.bundle import bundle
+from kiks.desk.hand_in.page_file import WEB, save_page
+from kiks.desk.hand_in.run_frames import RunFrames
+from kiks.recording.entries import Entry
+from kiks.recording.recorder import RunRecorder
+from kiks.recording.replay import Replay
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+    from tests.desk.visits import NewPage
+
+EVIL = (
+    "</script><script>document.title = 'evil'</script><img src=x onerror=\"document.title = 'evil'\">{{ 123457 * 2 }}"
+)
+
+
+def drive(sim: Simulation, seconds: float) -> None:
+    """Let all robots avoid obstacles by a simple rule."""
+    robots, end_ns = [Khepera(sim.port(number)) for number in range(1, sim.robot_count + 1)], sim.now_ns + seconds * 1e9
+    while sim.now_ns < end_ns:
+        for robot in robots:
+            values = robot.proximity()
+            robot.set_speed(8 - values[3] // 60, 8 - values[2] // 60)
+
+
+def recorded(file: Path, seconds: float) -> Path:
+    sim = Simulation(Arena.box(500, 400), seed=3)
+    with sim.record(file):
+        drive(sim, seconds)
+    return file
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recording of one robot, five minutes long."""
+    return recorded(tmp_path_factory.mktemp("plain") / "run.mcap", 300)
+
+
+@pytest.fixture(scope="module")
+def plain_page(plain: Path) -> Path:
+    """Its page."""
+    return page_of(plain, plain.parent)
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recording of one robot."""
+    return recorded(tmp_path_factory.mktemp("short") / "short.mcap", 12)
+
+
+@pytest.fixture(scope="module")
+def rich(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recording with turrets, balls, lamps, other walls, another robot, notes, and hostile texts."""
+    file = tmp_path_factory.mktemp("rich") / "rich.mcap"
+    sim = Simulation(Arena.from_array(np.zeros((400, 600), np.uint8), name=EVIL), seed=5, robots=2, thinking="fixed:3")
+    sim.fit(1, "k213")
+    sim.add_ball(500, 60)
+    sim.add_lamp(60, 60)
+    programs = {"1-drive.py": f"print('hello')\n# {EVIL}\n", f"2-{EVIL}.py": "", "3-notes.txt": EVIL}
+    with RunRecorder(sim, file, programs=programs, about={"command": f"kiks run {EVIL}"}) as recorder:
+        drive(sim, 3)
+        recorder.mark(f"turn {EVIL}")
+        recorder.say(1, f"here {EVIL}")
+        drive(sim, 2)
+        sim.add_ball(80, 340)
+        drive(sim, 2)
+        walls = np.zeros((400, 600), np.uint8)
+        walls[-6:, 200:300] = 255
+        sim.set_arena(Arena.from_array(walls, name=EVIL))
+        drive(sim, 2)
+        sim.add_robot()
+        drive(sim, 3)
+    return file
+
+
+class Tags(HTMLParser):
+    """Collects tags with their attributes, and all text outside scripts and styles."""
+
+    def __init__(self, page: Path) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.text = ""
+        self.feed(page.read_text("utf-8"))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_data(self, data: str) -> None:
+        if self.tags and self.tags[-1][0] not in ("script", "style"):
+            self.text += data
+
+
+def page_of(file: Path, folder: Path, **options: Any) -> Path:
+    save_page(Recording(file), folder / "page.html", **options)
+    return folder / "page.html"
+
+
+def test_five_minutes_of_a_robot_are_small_and_load_nothing(plain: Path, plain_page: Path) -> None:
+    assert plain_page.stat().st_size < 3_000_000
+    found = Tags(plain_page)
+    links = [value for _, attrs in found.tags for name, value in attrs.items() if name in ("src", "href", "srcset")]
+    assert len(links) == 6
+    assert all(link is not None and link.startswith("data:") for link in links)
+    style = re.search(r"<style>(.*?)</style>", plain_page.read_text(), re.DOTALL)
+    assert style is not None
+    assert "url(" not in style[1]
+    assert "@import" not in style[1]
+    recording = Recording(plain)
+    for told in ("kiks replay --check run.mcap", recording.world_at(recording.duration_s).state_hash(), "box, 500"):
+        assert told in found.text
+
+
+def test_the_same_recording_gives_the_same_page(short: Path, tmp_path: Path) -> None:
+    shares: list[float] = []
+    first, second = (page_of(short, tmp_path, on_progress=shares.append).read_bytes() for _ in range(2))
+    assert first == second
+    half = shares[: len(shares) // 2]
+    assert half == sorted(half)
+    assert (half[-1], len(half)) == (1, 4)
+
+
+def test_no_text_becomes_markup(rich: Path, tmp_path: Path) -> None:
+    found = Tags(page_of(rich, tmp_path, title=EVIL, robot=2))
+    assert [tag for tag, _ in found.tags].count("script") == 3
+    assert all(str(attrs["src"]).startswith("data:") for tag, attrs in found.tags if tag == "img")
+    assert not [attrs for _, attrs in found.tags if any(name.startswith("on") for name in attrs)]
+    # In the title, its heading, what ran, the arena, a program, its name, the notes, the command ...
+    assert found.text.count(EVIL) >= 9
+    assert "246914" not in found.text
+
+
+def test_the_numbers_are_those_of_the_run(rich: Path, tmp_path: Path) -> None:
+    recording, found = Recording(rich), Tags(page_of(rich, tmp_path))
+    sim = recording.world_at(recording.duration_s)
+    for number in (1, 2):
+        replies = recording.table("wire", number)
+        told = f"{sim.travelled_mm(number) / 1000:.2f} m", f"{sim.contacts(number)}{(~replies['is_sent']).sum()}"
+        assert all(each in found.text for each in told)
+    assert "2 x Khepera" not in found.text
+    assert "3 x Khepera" in found.text
+    assert "1 ball, 1 lamp" in found.text
+    assert "K213 linear vision on robot 1" in found.text
+
+
+def test_there_is_a_scene_for_each_change(rich: Path) -> None:
+    run = RunFrames(Recording(rich).log)
+    counts = [(len(scene["robots"]), len(scene["bodies"]), scene["arena"]["picture"]) for scene in run.scenes]
+    assert counts == [(2, 1, 0), (2, 2, 0), (2, 2, 1), (3, 2, 1)]
+    assert run.equal_count == run.checkpoint_count > 10
+    assert run.state_hash == run.last.state_hash()
+
+
+def test_a_long_run_has_a_longer_period(short: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("kiks.desk.hand_in.run_frames.FRAME_BYTES_MAX", 50_000)
+    run = RunFrames(Recording(short).log)
+    assert run.period_ns == 80_000_000
+    assert sum(map(len, run.frames)) < 50_000
+    assert "the player has its state every 0.08 s" in Tags(page_of(short, tmp_path)).text
+
+
+def test_frames_keep_to_the_recording_where_the_run_differs(
+    short: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Another version of KiKS might make another run; here robots get no speeds."""
+    apply: Callable[[Replay, Entry], None] = Replay._apply
+
+    def apply_some(self: Replay, entry: Entry) -> None:
+        if not entry.data.startswith(b"D"):
+            apply(self, entry)
+
+    monkeypatch.setattr(Replay, "_apply", apply_some)
+    recording = Recording(short)
+    run = RunFrames(recording.log)
+    assert run.equal_count < 10
+    assert len(run.scenes) == 1
+    poses = recording.table("poses")
+    for second in (2, 5, 11):
+        shown = np.frombuffer(run.frames[25 * second], "<f4", 3, 32)
+        row = poses[np.searchsorted(poses["time_s"], second - 1e-6)]
+        np.testing.assert_allclose(shown[:2], (row["x_mm"], row["y_mm"]), atol=1e-3)
+    assert "checkpoints differ" in Tags(page_of(short, tmp_path)).text
+
+
+def test_what_a_killed_run_has_written_becomes_a_page(short: Path, tmp_path: Path) -> None:
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(short.read_bytes()[: short.stat().st_size // 2])
+    found = Tags(page_of(cut, tmp_path))
+    assert "was killed" in found.text
+    assert f"{Recording(cut).duration_s:.3f} s of simulated time" in found.text
+
+
+def test_a_run_without_time_becomes_a_page(tmp_path: Path) -> None:
+    sim = Simulation(Arena.box(300, 300), seed=1)
+    with sim.record(tmp_path / "none.mcap"):
+        pass
+    assert "0.000 s of simulated time" in Tags(page_of(tmp_path / "none.mcap", tmp_path)).text
+
+
+def test_mistakes_are_told(short: Path, tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="robot must be from 1 to 1"):
+        page_of(short, tmp_path, robot=2)
+    with pytest.raises(ParameterError, match="a page must"):
+        save_page(Recording(short), tmp_path / "none" / "page.html")
+
+
+def test_a_bundle_takes_no_module_that_it_does_not_understand(tmp_path: Path) -> None:
+    for text in ('import Vue from "vue";', "export default 5;", 'import * as all from "./other.js";'):
+        (tmp_path / "entry.js").write_text(text)
+        with pytest.raises(AssertionError, match=r"entry\.js has what no bundle can have"):
+            bundle(tmp_path / "entry.js")
+    assert '"solid_view.js"] =' not in bundle(WEB / "run_page.js")
+
+
+# ---- in a browser ----
+
+
+@pytest.fixture
+def visit(new_page: NewPage) -> Callable[..., Page]:
+    """Open a page of a file, without a network; nothing but the file itself may be asked for."""
+
+    def open_file(file: Path, width: int = 1280, height: int = 800, **options: Any) -> Page:
+        page = new_page(width, height, offline=True, **options)
+        asked: list[str] = []
+        page.on("request", lambda request: asked.append(request.url))
+        page.goto(file.as_uri())
+        page.wait_for_function("() => window.kiksPage?.stage.frames_drawn > 0")
+        assert {url.partition(":")[0] for url in asked if url != file.as_uri()} <= {"data", "blob"}
+        return page
+
+    return open_file
+
+
+def shown_pose(page: Page, time_s: float, robot: int = 0) -> list[float]:
+    pose: list[float] = page.evaluate(
+        """([time_s, robot]) => {
+            const { feed } = kiksPage;
+            feed.show(time_s);
+            const { x_mm, y_mm, heading_rad } = feed.frame.pose(robot);
+            return [x_mm, y_mm, heading_rad];
+        }""",
+        [time_s, robot],
+    )
+    return pose
+
+
+@pytest.mark.slow
+def test_the_player_shows_what_was_recorded(plain: Path, plain_page: Path, visit: Callable[..., Page]) -> None:
+    page, recording = visit(plain_page), Recording(plain)
+    poses = recording.table("poses")
+    # Near and far, forwards and backwards, at frames and between them.
+    for time_s in (0.0, 0.04, 0.1, 7.0, 290.0, 290.02, 12.34, 12.3, 299.99):
+        row = poses[np.searchsorted(poses["time_s"], time_s - 1e-6)]
+        x_mm, y_mm, heading_rad = shown_pose(page, time_s)
+        assert (x_mm, y_mm) == pytest.approx((row["x_mm"], row["y_mm"]), abs=0.15)
+        assert np.cos(heading_rad - row["heading_rad"]) > 0.999
+    for time_s in (4.0, 200.0):
+        shown_pose(page, time_s)
+        readings = page.evaluate("[...kiksPage.feed.frame.robot(0).proximity]")
+        assert readings == recording.world_at(time_s).look().proximity[0].tolist()
+
+
+@pytest.mark.slow
+def test_the_player_plays_jumps_and_ends(plain_page: Path, visit: Callable[..., Page]) -> None:
+    page = visit(plain_page)
+    clock, play = page.locator("#clock"), page.locator("#play")
+    assert clock.text_content() == "0:00.00"
+    play.click()
+    page.wait_for_function("() => kiksPage.player.time_s > 0.2")
+    play.click()
+    assert page.evaluate("kiksPage.player.isPlaying") is False
+    page.locator("#slider").fill("123.4")
+    page.wait_for_function("() => document.getElementById('clock').textContent === '2:03.40'")
+    assert page.evaluate("kiksPage.feed.frame.time_s") == pytest.approx(123.4, abs=0.04)
+    assert page.evaluate("kiksPage.stage.topView.trails.ways[0].length") > 100
+    page.locator("h1").click()
+    for key, time_s in (
+        ("ArrowRight", 124.4),
+        ("ArrowLeft", 123.4),
+        ("Shift+ArrowRight", 123.44),
+        ("Shift+ArrowLeft", 123.4),
+    ):
+        page.keyboard.press(key)
+        assert page.evaluate("kiksPage.player.time_s") == pytest.approx(time_s, abs=1e-6)
+    page.locator("#speed").select_option("30")
+    page.locator("#slider").fill("299")
+    page.locator("h1").click()
+    page.keyboard.press("Space")
+    page.wait_for_function("() => !kiksPage.player.isPlaying && kiksPage.player.time_s === kiksPage.feed.end_s")
+    assert page.locator(".times").inner_text().replace(" ", "").split("/")[0] == clock.inner_text()
+    page.keyboard.press("Space")
+    page.wait_for_function("() => kiksPage.player.isPlaying && kiksPage.player.time_s < 290")
+
+
+@pytest.mark.slow
+def test_a_page_shows_changes_robots_and_events(rich: Path, tmp_path: Path, visit: Callable[..., Page]) -> None:
+    page = visit(page_of(rich, tmp_path), color_scheme="dark")
+    title = page.title()
+    assert "evil" not in title.split("'")[0]
+    assert title == page.locator("h1").text_content()
+    counts = "[kiksPage.feed.frame.robot_count, kiksPage.feed.frame.body_count, kiksPage.feed.scene.scene]"
+    end_s = page.evaluate("kiksPage.feed.end_s")
+    for time_s, count in ((end_s, [3, 2, 3]), (6.0, [2, 2, 1]), (1.0, [2, 1, 0]), (8.0, [2, 2, 2])):
+        page.evaluate("(time_s) => kiksPage.player.seek(time_s)", time_s)
+        page.wait_for_function("(time_s) => kiksPage.player._shown_s === time_s", arg=time_s)
+        assert page.evaluate(counts) == count
+    page.wait_for_function("() => kiksPage.stage._raster?.cells.some((cell) => cell === 255)")
+    assert page.evaluate("kiksPage.feed.frame.lamp_count") == 1
+
+    # The third robot is not there yet; the second one has no camera.
+    page.locator("#robot").select_option(index=2)
+    assert page.get_by_text("This robot is not there at this time.").is_visible()
+    page.locator("#robot").select_option(index=0)
+    page.locator(".kiks-camera").wait_for()
+    page.locator("#robot").select_option(index=1)
+    page.locator(".kiks-camera").wait_for(state="hidden")
+    x, y = page.evaluate("kiksPage.stage.toClient(kiksPage.feed.frame.pose(0).x_mm, kiksPage.feed.frame.pose(0).y_mm)")
+    page.mouse.click(x, y)
+    assert page.locator("#robot").input_value() == "0"
+    before = shown_pose(page, 8.0)
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 80, y + 40, steps=4)
+    page.mouse.up()
+    assert shown_pose(page, 8.0) == before
+
+    lines = page.locator("#list li.output button")
+    lines.click()
+    page.wait_for_function("() => document.querySelector('#list .now')?.parentElement.className === 'output'")
+    time_s = Recording(rich).table("events")["time_s"][Recording(rich).table("events")["kind"] == "output"][0]
+    assert page.evaluate("kiksPage.player.time_s") == pytest.approx(time_s)
+    page.locator("#kinds input[name=output]").uncheck()
+    lines.wait_for(state="hidden")
+    with page.expect_download() as saved:
+        page.locator("button[data-save=program-1]").click()
+    assert saved.value.suggested_filename == "drive.py"
+    assert saved.value.path().read_text() == Recording(rich).programs["1-drive.py"]
+    assert page.title() == title
+
+
+@pytest.mark.slow
+def test_a_narrow_page_and_one_without_time_fit(tmp_path: Path, rich: Path, visit: Callable[..., Page]) -> None:
+    sim = Simulation(Arena.box(300, 300), seed=1)
+    with sim.record(tmp_path / "none.mcap"):
+        pass
+    for file in (tmp_path / "none.mcap", rich):
+        page = visit(page_of(file, tmp_path), 380, 700)
+        assert page.evaluate("document.documentElement.scrollWidth") <= 380
+        page.locator("#play").click()
+
+
+@pytest.mark.slow
+def test_nothing_else_runs_in_a_page(short: Path, tmp_path: Path, browser: Browser) -> None:
+    """Even if a text became markup, the page's policy would not let it run."""
+    file = page_of(short, tmp_path)
+    hostile = '<main><script>window.evil = 1</script><img src="data:," onerror="window.evil = 2">'
+    file.write_text(file.read_text().replace("<main>", hostile))
+    page = browser.new_page(offline=True)
+    refused: list[str] = []
+    page.on("console", lambda said: refused.append(said.text) if said.type == "error" else None)
+    page.goto(file.as_uri())
+    page.wait_for_function("() => window.kiksPage")
+    assert page.evaluate("window.evil") is None
+    assert sum("Content Security Policy" in text for text in refused) == 2
+    page.close()
