@@ -24,6 +24,11 @@ def pictures(file: Path) -> list[np.ndarray]:
         return [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
 
 
+def open_dialog(visitor: Visitor) -> None:
+    visitor.tab("arena")
+    visitor.at("film").click()
+
+
 def pass_time(visitor: Visitor, seconds: float) -> None:
     """Let time pass in the paused world."""
     end_ns = visitor.sim.now_ns + round(seconds * 1e9)
@@ -39,7 +44,7 @@ def test_a_part_of_the_run_is_filmed_and_downloaded(visitor: Visitor, tmp_path: 
     with visitor.sim.record(tmp_path / "run.mcap"):
         begin_s = visitor.sim.time_s
         pass_time(visitor, 12.0)
-        visitor.at("film").click()
+        open_dialog(visitor)
         expect(visitor.at("film-make")).to_be_visible()
         start_s, end_s = (float(visitor.at(f"film-{name}").input_value()) for name in ("start", "end"))
         assert end_s == pytest.approx(visitor.sim.time_s, abs=0.01)
@@ -59,11 +64,11 @@ def test_a_part_of_the_run_is_filmed_and_downloaded(visitor: Visitor, tmp_path: 
 
 def test_mistakes_are_told(visitor: Visitor, tmp_path: Path) -> None:
     visitor.pause()
-    visitor.at("film").click()
+    open_dialog(visitor)
     visitor.told("this run is not recorded. Add --record run.mcap")
     with visitor.sim.record(tmp_path / "run.mcap"):
         pass_time(visitor, 2.0)
-        visitor.at("film").click()
+        open_dialog(visitor)
         expect(visitor.at("film-make")).to_be_visible()
         end_s = visitor.at("film-end").input_value()
         for name, value, words in (
@@ -85,7 +90,7 @@ def test_a_closed_dialog_gives_the_film_up(visitor: Visitor, tmp_path: Path) -> 
     visitor.pause()
     with visitor.sim.record(tmp_path / "run.mcap"):
         pass_time(visitor, 6.0)
-        visitor.at("film").click()
+        open_dialog(visitor)
         visitor.at("film-speed").fill("0.02")
         visitor.at("film-make").click()
         expect(visitor.at("film-make")).to_be_disabled()

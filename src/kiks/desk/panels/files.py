@@ -1,4 +1,4 @@
-"""Opening and saving: files of the desk's folder, examples, uploads and downloads."""
+"""Opening and saving: files of the desk's folder, examples, uploads, downloads and films."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import PurePosixPath
 from nicegui import ui
 from nicegui.events import UploadEventArguments
 
+from kiks.desk.panels.film import FilmDialog
 from kiks.desk.panels.widgets import text_button, told
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.example_worlds import EXAMPLES
@@ -58,6 +59,7 @@ class FilesPanel:
             self._name.tooltip("Name in the folder; .kiks saves the world, .kad an arena for the Matlab KiKS")
             text_button("Save", "save", "save", "Save the world with everything where it is now", self._save)
             text_button("", "download", "download", "Download the world under this name instead", self._download)
+            text_button("", "movie", "film", "Make a film of the run and download it", FilmDialog(self._desk).open)
 
     def _build_upload(self) -> None:
         with ui.row().classes("w-full items-center no-wrap gap-1"):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from nicegui import ui
 
 from kiks.desk.panels.arena_view import SHOWN, ArenaView
-from kiks.desk.panels.film import FilmDialog
 from kiks.desk.panels.widgets import BAR, icon_button
 from kiks.desk.server.desk import Desk
 
@@ -70,7 +69,6 @@ class ViewPanel:
         with _button("contrast", "Light or dark", "dark"), ui.menu():
             for text, value in (("Same as the system", None), ("Light", False), ("Dark", True)):
                 ui.menu_item(text, on_click=lambda value=value: dark.set_value(value))
-        _button("movie", "Make a film of the run", "film").on_click(FilmDialog(desk).open)
         _button("help_outline", "Help", "help").on_click(self._help.open)
 
     def _list_robots(self) -> None:
