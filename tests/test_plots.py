@@ -87,7 +87,7 @@ def test_panels_are_the_rows_of_the_figure(recording: Recording) -> None:
     for name, legend in (("paths", "odometry"), ("readings", "7"), ("speeds", "asked for"), ("time", "thinking")):
         assert legend in panels[name].decode(), name
     assert panels == panels_of(recording)
-    with pytest.raises(ParameterError, match="robot must be from 1 to 1"):
+    with pytest.raises(ParameterError, match="robot must be a whole number from 1 to 1"):
         panels_of(recording, robot=2)
 
 
