@@ -146,6 +146,17 @@ def test_no_text_becomes_markup(rich: Path, tmp_path: Path) -> None:
     assert "246914" not in found.text
 
 
+def test_long_texts_are_cut(tmp_path: Path) -> None:
+    sim = Simulation(Arena.box(300, 300), seed=1)
+    with RunRecorder(sim, tmp_path / "long.mcap", programs={"1-long.py": "x = 1\n" * 200_000}) as recorder:
+        recorder.say(0, "word " * 100_000)
+        Khepera(sim.port(1)).proximity()
+    page = page_of(tmp_path / "long.mcap", tmp_path)
+    assert page.stat().st_size < 3_000_000
+    assert "The text is longer: the recording holds all of it." in Tags(page).text
+    assert "word word …" in Tags(page).text
+
+
 def test_the_numbers_are_those_of_the_run(rich: Path, tmp_path: Path) -> None:
     recording, found = Recording(rich), Tags(page_of(rich, tmp_path))
     sim = recording.world_at(recording.duration_s)
@@ -172,7 +183,7 @@ def test_a_long_run_has_a_longer_period(short: Path, monkeypatch: pytest.MonkeyP
     run = RunFrames(Recording(short).log)
     assert run.period_ns == 80_000_000
     assert sum(map(len, run.frames)) < 50_000
-    assert "the player has its state every 0.08 s" in Tags(page_of(short, tmp_path)).text
+    assert "the player has the state every 0.08 s" in Tags(page_of(short, tmp_path)).text
 
 
 def test_frames_keep_to_the_recording_where_the_run_differs(
@@ -363,6 +374,11 @@ def test_a_narrow_page_and_one_without_time_fit(tmp_path: Path, rich: Path, visi
         page = visit(page_of(file, tmp_path), 380, 700)
         assert page.evaluate("document.documentElement.scrollWidth") <= 380
         page.locator("#play").click()
+        page.evaluate("kiksPage.player.seek(kiksPage.feed.end_s)")
+        page.wait_for_function(
+            "() => document.getElementById('facts').textContent.includes(kiksPage.feed.frame.robot(0).x_mm.toFixed(1))"
+            " && kiksPage.player._shown_s === kiksPage.feed.end_s"
+        )
 
 
 @pytest.mark.slow

@@ -30,6 +30,9 @@ MARKS_MAX = 20_000
 PROGRAM_CHARACTERS_MAX = 100_000
 """Most characters of a program's text on the page."""
 
+LINE_CHARACTERS_MAX = 500
+"""Most characters of an event, and of a line of the wire."""
+
 WIRE_LINES = 8
 """Lines of the wire that are shown at the beginning and at the end."""
 
@@ -91,7 +94,7 @@ def contents_of(recording: Recording, frames: RunFrames, robot: int) -> dict[str
         "robot_count": max(len(scene["robots"]) for scene in frames.scenes),
         "facts": _facts(recording, frames),
         "numbers": _numbers(recording, frames),
-        "events": events[:MOMENTS_MAX].tolist(),
+        "events": [(*row[:3], _cut(row[3])) for row in events[:MOMENTS_MAX].tolist()],
         "more_events": max(len(events) - MOMENTS_MAX, 0),
         "kinds": sorted(set(events["kind"].tolist())),
         "moments": [[round(time_s, 3), kind] for time_s, kind in events[["time_s", "kind"]][:MARKS_MAX].tolist()],
@@ -208,4 +211,8 @@ def _wire(wire: Table) -> list[tuple[float, bool, str] | None]:
 
 
 def _printable(data: bytes) -> str:
-    return data.decode("latin-1").encode("unicode_escape").decode()
+    return _cut(data.decode("latin-1").encode("unicode_escape").decode())
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= LINE_CHARACTERS_MAX else f"{text[:LINE_CHARACTERS_MAX]}…"

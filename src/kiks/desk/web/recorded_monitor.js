@@ -9,7 +9,7 @@ import { placeOfNumber } from "./robot_drawing.js";
 const LEFT_OUT = new Set(["Clock", "Line"]);
 
 export class RecordedMonitor {
-  /** `root` is an empty element, `facts` an empty list. */
+  /** `root` is an empty element of the player, `facts` an empty list in it. */
   constructor(root, facts) {
     const robot = make("canvas"), around = make("div", "kiks-monitor-robot", robot), near = [], light = [];
     this._chips = CURVES.proximity.names.map((name, sensor) => {
@@ -47,7 +47,10 @@ export class RecordedMonitor {
       this._legend, this._camera);
     root.classList.add("kiks-monitor");
     root.append(this._absent, this._known);
-    const parts = { root, robot, curves, camera: () => camera, wheels: () => wheels, numbers: () => this._numbers };
+    // It draws while any part of the player is on the screen, for `facts` stand elsewhere in it.
+    const parts = {
+      root: root.parentElement, robot, curves, camera: () => camera, wheels: () => wheels, numbers: () => this._numbers,
+    };
     this.monitor = new Monitor(parts, "", (event, detail) => this._hear(event, detail));
     this._show("proximity");
   }
