@@ -20,6 +20,7 @@ from tests.at_length import share
 from tools.campaigns.recordings import Parts, sound, sound_parts, use
 
 import kiks
+from kiks.engine.state import ROBOT
 from kiks.errors import KiksError, ParameterError
 from kiks.recording import motion
 from kiks.recording.check import check_recording
@@ -292,6 +293,26 @@ def test_records_may_lack_fields(file: Path) -> None:
     replace(parts, attachments=attachments).save(file)
     recording = kiks.Recording(file)
     assert len(recording.table("poses"))
+
+
+def test_a_run_of_other_fields_is_checked_by_those_that_both_have(file: Path) -> None:
+    parts = sound_parts()
+    layout = json.loads(parts.attachments["layout.json"])
+    layout["robot"]["fields"] = [field for field in layout["robot"]["fields"] if field["name"] != "led"]
+    older = replace(parts, attachments={**parts.attachments, "layout.json": json.dumps(layout).encode()})
+    older.save(file)
+    checked = check_recording(kiks.Recording(file).log)
+    assert checked.differs_ns is None
+    assert checked.equal_count > 1
+    last_ns = max(entry.time_ns for rows, _ in parts.blocks for entry in rows if entry.kind == Kind.CHECK)
+    place = ROBOT.fields["forwards_mm"][1]
+
+    def changed(entry: Entry) -> Entry:
+        head, line, records = entry.data.partition(b"\n")
+        return entry._replace(data=head + line + records[:place] + bytes(8) + records[place + 8 :])
+
+    older.with_entry(lambda entry: entry.kind == Kind.CHECK and entry.time_ns == last_ns, changed).save(file)
+    assert check_recording(kiks.Recording(file).log).differs_ns == last_ns
 
 
 @pytest.mark.parametrize("kind", ["<i3", "|99", "<f99999999999", "|u2", "O", "<i16"])

@@ -19,9 +19,9 @@ import kiks
 from kiks.engine.state import BODY, ROBOT
 from kiks.recording.check import check_recording
 from kiks.recording.entries import Columns, Entry, block_of
+from kiks.recording.log import HASH_LENGTH
 from kiks.recording.mcap_file import McapFile, McapReader
 from kiks.recording.recorder import LOG, MOTION
-from kiks.recording.replay import HASH_LENGTH
 from kiks.recording.tables import TABLES
 from kiks.sim.run_log import Kind
 

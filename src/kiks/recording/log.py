@@ -42,6 +42,7 @@ class RecordedLog:
 
     Attributes:
         reader: Reads the file.
+        layout: The layout of the records in it.
 
     Raises:
         ParameterError: If it is missing, damaged or no recording of KiKS.
@@ -56,7 +57,7 @@ class RecordedLog:
                 f"{reader.what} must be a recording of KiKS, but it is another MCAP file, or the run was killed at its "
                 "very beginning. `--record FILE` makes one."
             )
-        self._layout = Layout.from_bytes(reader.attachments["layout.json"], reader.what)
+        self.layout = Layout.from_bytes(reader.attachments["layout.json"], reader.what)
 
     @property
     def begin_ns(self) -> int:
@@ -83,7 +84,7 @@ class RecordedLog:
         """Yield those records of a block."""
         for topic, _, data in self.reader.messages(self.reader.chunks[block]):
             if topic == MOTION.name:
-                yield from decode_motion(data, self._layout, self.reader.what)
+                yield from decode_motion(data, self.layout, self.reader.what)
 
     def entries(self) -> Iterator[Entry]:
         """Yield all entries of the log."""
@@ -147,7 +148,7 @@ class RecordedLog:
         """Return the setup and the state of an entry."""
         setup = self.setup(entry.number)
         data = entry.data[HASH_LENGTH:] if entry.kind == Kind.CHECK else entry.data
-        saved = SavedState.from_bytes(data, setup, self._layout, f"{self.reader.what}: state")
+        saved = SavedState.from_bytes(data, setup, self.layout, f"{self.reader.what}: state")
         if saved.now_ns != entry.time_ns:
             raise self.damaged(f"a state of {s_from_ns(saved.now_ns):.3f} s is at {s_from_ns(entry.time_ns):.3f} s")
         return setup, saved

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from kiks.model.checks import CLOCK_END_NS
 from kiks.recording.entries import Entry
-from kiks.recording.log import HASH_LENGTH, RecordedLog, Row
+from kiks.recording.log import RecordedLog, Row
 from kiks.recording.recorder import CHECK_NS
 from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.run_log import Kind
@@ -50,7 +50,7 @@ class Replay:
     Args:
         log: The log of a recording.
         time_ns: Where it begins [ns].
-        on_check: Called after each checkpoint has been reached, with its time [ns] and the hash that was recorded.
+        on_check: Called with each checkpoint that has been reached.
 
     Attributes:
         sim: The simulation.
@@ -64,7 +64,7 @@ class Replay:
         self,
         log: RecordedLog,
         time_ns: int = 0,
-        on_check: Callable[[int, str], None] = lambda time_ns, state_hash: None,
+        on_check: Callable[[Entry], None] = lambda checkpoint: None,
     ) -> None:
         self._log = log
         self._on_check = on_check
@@ -191,7 +191,7 @@ class Replay:
                 sim.sync()
                 for each in sim.wires:
                     each.line.forget()  # unread replies would fill the line
-                self._on_check(entry.time_ns, entry.data[:HASH_LENGTH].decode("ascii", "replace"))
+                self._on_check(entry)
             case Kind.STATE:
                 self._setup, saved = self._log.state_of(entry)
                 self._setup.bring(sim, saved.poses)

@@ -17,7 +17,9 @@ from typing import Any
 import numpy as np
 
 from kiks.desk.server.frames import arena_picture, describe_scene, describe_shapes, pack_frame, scene_key
-from kiks.recording.log import RecordedLog
+from kiks.recording.check import is_same
+from kiks.recording.entries import Entry
+from kiks.recording.log import HASH_LENGTH, RecordedLog
 from kiks.recording.replay import Replay
 from kiks.sim.simulation import Simulation
 from kiks.units import TICK_NS, s_from_ns
@@ -89,10 +91,10 @@ class RunFrames:
             self._is_other = False
             self._replay = Replay(self._log, time_ns, self._compare)
 
-    def _compare(self, time_ns: int, state_hash: str) -> None:
-        self.state_hash = state_hash
+    def _compare(self, checkpoint: Entry) -> None:
+        self.state_hash = checkpoint.data[:HASH_LENGTH].decode("ascii", "replace")
         self.checkpoint_count += 1
-        if self._replay.sim.state_hash() == state_hash:
+        if is_same(self._log, checkpoint, self._replay.sim):
             self.equal_count += 1
         else:
             self._is_other = True
