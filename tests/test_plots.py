@@ -73,7 +73,7 @@ def test_panels_are_the_rows_of_the_figure(recording: Recording) -> None:
     for name, legend in (("paths", "odometry"), ("readings", "7"), ("speeds", "asked for"), ("time", "thinking")):
         assert legend in panels[name].decode(), name
     assert panels == panels_of(recording)
-    with pytest.raises(ParameterError, match="robot must be from 1 to 1"):
+    with pytest.raises(ParameterError, match=r"robot must be .*from 1 to 1"):
         panels_of(recording, robot=2)
 
 
@@ -99,7 +99,7 @@ def test_the_same_recording_gives_the_same_picture(ending: str, recording: Recor
 
 
 def test_mistakes_get_a_clear_error(recording: Recording, tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match="robot must be from 1 to 1"):
+    with pytest.raises(ParameterError, match=r"robot must be .*from 1 to 1"):
         save_plot([recording], tmp_path / "plot.png", robot=2)
     with pytest.raises(ParameterError, match=r"ends in .png, .svg, .pdf"):
         save_plot([recording], tmp_path / "plot.gif")
