@@ -116,7 +116,7 @@ def page(
     from rich.console import Console
     from rich.progress import Progress
 
-    from kiks.desk.hand_in.page_file import save_page
+    from kiks.desk.run_page.page_file import save_page
     from kiks.recording.recording import Recording
 
     recording = Recording(file)

@@ -14,9 +14,9 @@ from pathlib import Path
 import jinja2
 from markupsafe import Markup
 
-from kiks.desk.hand_in.bundle import bundle
-from kiks.desk.hand_in.contents import clock_text, contents_of
-from kiks.desk.hand_in.run_frames import PERIOD_NS, RunFrames
+from kiks.desk.run_page.bundle import bundle
+from kiks.desk.run_page.contents import clock_text, contents_of
+from kiks.desk.run_page.run_frames import PERIOD_NS, RunFrames
 from kiks.model.atomic_files import replace_file
 from kiks.plots import panels_of
 from kiks.recording.recording import Recording

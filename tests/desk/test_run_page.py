@@ -15,9 +15,9 @@ pytest.importorskip("matplotlib", reason="the page has figures")
 pytest.importorskip("nicegui", reason="the desk needs NiceGUI")
 
 from kiks import Arena, Khepera, ParameterError, Recording, Simulation
-from kiks.desk.hand_in.bundle import bundle
-from kiks.desk.hand_in.page_file import WEB, save_page
-from kiks.desk.hand_in.run_frames import RunFrames
+from kiks.desk.run_page.bundle import bundle
+from kiks.desk.run_page.page_file import WEB, save_page
+from kiks.desk.run_page.run_frames import RunFrames
 from kiks.recording.entries import Entry
 from kiks.recording.recorder import RunRecorder
 from kiks.recording.replay import Replay
@@ -179,7 +179,7 @@ def test_there_is_a_scene_for_each_change(rich: Path) -> None:
 
 
 def test_a_long_run_has_a_longer_period(short: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("kiks.desk.hand_in.run_frames.FRAME_BYTES_MAX", 50_000)
+    monkeypatch.setattr("kiks.desk.run_page.run_frames.FRAME_BYTES_MAX", 50_000)
     run = RunFrames(Recording(short).log)
     assert run.period_ns == 80_000_000
     assert sum(map(len, run.frames)) < 50_000

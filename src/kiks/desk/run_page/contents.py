@@ -12,7 +12,7 @@ from pygments import highlight
 from pygments.formatters import HtmlFormatter
 from pygments.lexers import PythonLexer, TextLexer
 
-from kiks.desk.hand_in.run_frames import RunFrames
+from kiks.desk.run_page.run_frames import RunFrames
 from kiks.errors import counted
 from kiks.recording.analysis import all_time_shares
 from kiks.recording.recording import Recording
