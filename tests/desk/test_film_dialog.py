@@ -64,8 +64,6 @@ def test_a_part_of_the_run_is_filmed_and_downloaded(visitor: Visitor, tmp_path: 
 
 def test_mistakes_are_told(visitor: Visitor, tmp_path: Path) -> None:
     visitor.pause()
-    open_dialog(visitor)
-    visitor.told("this run is not recorded. Add --record run.mcap")
     with visitor.sim.record(tmp_path / "run.mcap"):
         pass_time(visitor, 2.0)
         open_dialog(visitor)
@@ -96,3 +94,21 @@ def test_a_closed_dialog_gives_the_film_up(visitor: Visitor, tmp_path: Path) -> 
         expect(visitor.at("film-make")).to_be_disabled()
         visitor.at("film-close").click()
         visitor.told("The dialog must stay open until the film is made")
+
+
+def test_the_past_is_filmed_without_a_recording_of_ones_own(visitor: Visitor, tmp_path: Path) -> None:
+    visitor.pause()
+    pass_time(visitor, 5.0)
+    begin_s, now_s = visitor.desk.looking.span.begin_ns / 1e9, visitor.sim.time_s
+    visitor.at("back-long").click()
+    visitor.until(lambda: visitor.desk.past is not None)
+    open_dialog(visitor)
+    expect(visitor.at("film-make")).to_be_visible()
+    start_s, end_s = (float(visitor.at(f"film-{name}").input_value()) for name in ("start", "end"))
+    assert start_s == pytest.approx(begin_s, abs=0.01)
+    assert end_s == pytest.approx(now_s, abs=0.01)
+    visitor.at("film-start").fill(f"{end_s - 2:g}")
+    with visitor.page.expect_download() as download:
+        visitor.at("film-make").click()
+    download.value.save_as(tmp_path / "film.mp4")
+    assert len(pictures(tmp_path / "film.mp4")) == pytest.approx(2 * FPS + 1, abs=1)

@@ -287,6 +287,8 @@ WRONG_REFS = ["[]", "5", "'xxxx'", "[-7 -7 -7 -7]", "[-1 -1]", "[-1.5 -1.5 -1.5 
 
 WRONG = [
     *(f"{name}({ref})" for name in ONLY_REF for ref in WRONG_REFS),
+    "kiks_record(5)",
+    "kiks_record('run.mp4')",
     "kiks_recordmovie(5)",
     "kiks_recordmovie({})",
     "kiks_recordmovie(['ab'; 'cd'])",

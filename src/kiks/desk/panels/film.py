@@ -13,9 +13,7 @@ from kiks.desk.server.desk import Desk
 from kiks.errors import ParameterError
 from kiks.films.film import FPS, save_film
 from kiks.films.video_file import ENDINGS
-from kiks.recording.recorder import RunRecorder
 from kiks.recording.recording import Recording
-from kiks.sim.simulation import Simulation
 from kiks.units import s_from_ns
 
 LAST_S = 10.0
@@ -58,9 +56,13 @@ class FilmDialog:
 
     @told
     async def open(self) -> None:
-        """Show it, with the last seconds of the run chosen."""
-        begin_s, end_s = await self._desk.do(lambda sim: _flushed(sim)[1:])
-        self._start.value, self._end.value = round(max(begin_s, end_s - LAST_S), 3), round(end_s, 3)
+        """Show it, with the last seconds before the shown time chosen."""
+        log = Recording(await self._desk.looking.file()).log
+        begin_s, now_s = s_from_ns(log.begin_ns), self._desk.sim.time_s
+        # At the beginning of a recording the next seconds are more than the last ones.
+        start_s = max(begin_s, now_s - LAST_S)
+        end_s = min(max(now_s, start_s + LAST_S), s_from_ns(log.end_ns))
+        self._start.value, self._end.value = round(start_s, 3), round(end_s, 3)
         robots = {number: f"robot {name}, in the middle" for number, name in enumerate(self._desk.names(), 1)}
         self._follow.set_options({0: "the whole arena", **robots}, value=0)
         self._dialog.open()
@@ -75,7 +77,7 @@ class FilmDialog:
                 f"A film must be at most {LENGTH_MAX_S:g} s long, but it would be {(end_s - start_s) / speed:g} s. "
                 "Choose less of the run, or more times real time."
             )
-        file, _, _ = await self._desk.do(_flushed)
+        file = await self._desk.looking.file()
         name = f"kiks-film{self._kind.value}"
         self._done, self._is_given_up = 0.0, False
         self._make_button.disable()
@@ -113,20 +115,6 @@ class FilmDialog:
 
     def _give_up(self) -> None:
         self._is_given_up = not self._dialog.value
-
-
-def _flushed(sim: Simulation) -> tuple[Path, float, float]:
-    """Return the file of a world's recording up to now, and when it begins and ends [s].
-
-    Raises:
-        ParameterError: If it is not recorded.
-    """
-    recorder = sim.loop.recorder
-    if not isinstance(recorder, RunRecorder):
-        raise ParameterError("A film needs a recording, but this run is not recorded. Add --record run.mcap.")
-    recorder.flush()
-    log = Recording(recorder.path).log
-    return recorder.path, s_from_ns(log.begin_ns), s_from_ns(log.end_ns)
 
 
 def _number(label: str, name: str, value: float | None = None) -> ui.number:

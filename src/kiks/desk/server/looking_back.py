@@ -12,7 +12,7 @@ from pathlib import Path
 from kiks.desk.server.desk_world import DeskWorld, Speedometer
 from kiks.desk.server.player import Player, Span
 from kiks.desk.server.timeline import Mark, Run, Timeline, next_mark
-from kiks.errors import KiksError, LinkError
+from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.sim.simulation import Simulation
 from kiks.units import ns_from_s
 
@@ -121,6 +121,19 @@ class LookingBack:
         """How the run that is shown began, if its programs can run again."""
         past = self.past
         return None if past is None else self._timeline.run_at(past.sim.now_ns)
+
+    async def file(self) -> Path:
+        """Return the file of the recording of the time that is shown, with all that has happened up to now.
+
+        Raises:
+            KiksError: If there is none, or it is damaged.
+        """
+        await self.tend()
+        present = self._present()
+        await present.do(lambda _: self._timeline.flush())
+        if not self._timeline.parts:
+            raise ParameterError("the world must be recorded, but its past could not be kept. Is the disk full?")
+        return self._timeline.part_at((self.past or present).sim.now_ns).file
 
     async def tend(self) -> None:
         """Keep the recording going, and read what has happened; called about once a second."""
