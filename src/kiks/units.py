@@ -53,3 +53,15 @@ def character_ns(baud: int) -> int:
         1145833
     """
     return BITS_PER_CHARACTER * NS_PER_S // baud
+
+
+def clock_text(time_s: float) -> str:
+    """Return a time [s] as the desk's clock shows it: minutes, seconds and complete hundredths.
+
+    Example:
+        >>> clock_text(83.456)
+        '1:23.45'
+    """
+    # Rounding errors may put a time just below a hundredth.
+    hundredths = int(time_s * 100 + 1e-6)
+    return f"{hundredths // 6000}:{hundredths // 100 % 60:02d}.{hundredths % 100:02d}"

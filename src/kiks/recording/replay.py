@@ -14,6 +14,7 @@ from kiks.model.checks import CLOCK_END_NS
 from kiks.recording.entries import Entry
 from kiks.recording.log import RecordedLog, Row
 from kiks.recording.recorder import CHECK_NS
+from kiks.sim.port import BAUD_MAX, BAUD_MIN
 from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.run_log import Kind
 from kiks.sim.saved_state import Layout, SavedState, Setup, restore_state, state_bytes
@@ -182,7 +183,7 @@ class Replay:
             case Kind.HANG_UP:
                 wire.hang_up()
             case Kind.SET_BAUD:
-                if not 75 <= entry.number <= 4_000_000:
+                if not BAUD_MIN <= entry.number <= BAUD_MAX:
                     raise self._log.damaged(f"it sets a line to {entry.number} bit/s")
                 wire.set_baud(entry.number)
             case Kind.DROP:

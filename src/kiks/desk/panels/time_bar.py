@@ -11,7 +11,7 @@ from nicegui.events import KeyEventArguments
 
 from kiks.desk.panels.widgets import icon_button, told
 from kiks.desk.server.desk import Desk
-from kiks.units import s_from_ns
+from kiks.units import clock_text
 
 _WEB = Path(__file__).parents[1] / "web"
 
@@ -191,8 +191,8 @@ class TimeBar:
         """Say what going on does, and ask how."""
         desk = self._desk
         await desk.pause()
-        self._title.text = f"Go on from {_clock(desk.sim.now_ns)}"
-        end = _clock(desk.present.sim.now_ns)
+        self._title.text = f"Go on from {clock_text(desk.sim.time_s)}"
+        end = clock_text(desk.present.sim.time_s)
         self._intro.text = f"{INTRO} The run that has come to {end} ends." if desk.looking.has_present else INTRO
         reason, run = desk.why_not_again(), desk.looking.run
         self._again.set_enabled(not reason)
@@ -215,17 +215,6 @@ class TimeBar:
         self._dialog.close()
         await self._desk.run_again_to_here()
         self.refresh()
-
-
-def _clock(time_ns: int) -> str:
-    """Return a time as the clock shows it.
-
-    Example:
-        >>> _clock(72_345_000_000)
-        '1:12.34'
-    """
-    minutes, seconds = divmod(int(s_from_ns(time_ns) * 100 + 1e-6), 6000)
-    return f"{minutes}:{seconds // 100:02d}.{seconds % 100:02d}"
 
 
 def _long_button(text: str, icon: str, name: str, act: Callable[[], Awaitable[None]]) -> ui.button:

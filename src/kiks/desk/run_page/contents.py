@@ -18,7 +18,7 @@ from kiks.recording.analysis import all_time_shares
 from kiks.recording.recording import Recording
 from kiks.recording.tables import Table
 from kiks.sim.wire_log import TimeShares
-from kiks.units import s_from_ns
+from kiks.units import clock_text, s_from_ns
 from kiks.version import __version__
 
 MOMENTS_MAX = 1000
@@ -104,17 +104,6 @@ def contents_of(recording: Recording, frames: RunFrames, robot: int) -> dict[str
         "check": shlex.join(["kiks", "replay", "--check", file]),
         "watch": shlex.join(["kiks", "replay", file]),
     }
-
-
-def clock_text(time_s: float) -> str:
-    """Return a time as the desk's clock shows it.
-
-    Example:
-        >>> clock_text(83.456)
-        '1:23.45'
-    """
-    hundredths = int(time_s * 100 + 1e-6)
-    return f"{hundredths // 6000}:{hundredths // 100 % 60:02d}.{hundredths % 100:02d}"
 
 
 def _arena(recording: Recording) -> str:

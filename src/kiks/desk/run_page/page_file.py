@@ -15,12 +15,12 @@ import jinja2
 from markupsafe import Markup
 
 from kiks.desk.run_page.bundle import bundle
-from kiks.desk.run_page.contents import clock_text, contents_of
+from kiks.desk.run_page.contents import contents_of
 from kiks.desk.run_page.run_frames import PERIOD_NS, RunFrames
 from kiks.model.atomic_files import replace_file
 from kiks.plots import panels_of
 from kiks.recording.recording import Recording
-from kiks.units import s_from_ns
+from kiks.units import clock_text, s_from_ns
 from kiks.version import __version__
 
 WEB = Path(__file__).parents[1] / "web"

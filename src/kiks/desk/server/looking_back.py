@@ -31,7 +31,7 @@ class LookingBack:
 
     Attributes:
         past: What is shown of the past; None while the present is shown.
-        has_present: Whether there is a present; False while a recording is shown that nobody has gone on from.
+        has_present: Whether a world goes on besides the past; False while the desk shows only a file.
         marks: What has happened, as far as it was read.
     """
 
@@ -109,7 +109,7 @@ class LookingBack:
         with suppress(NotYet):
             self._present().gate.ask(self._timeline.close).result(CLOSE_S)
 
-    # ---- what there is ----
+    # ---- the span and the marks ----
 
     @property
     def span(self) -> Span | None:

@@ -1,6 +1,7 @@
 /* The time bar's slider: the past of the world from its beginning to now, with marks where something happened.
 
-   The server says in messages "bar" what there is; frames say where the world stands. A drag sends "seek". */
+   The messages "bar" of the server carry the span and the marks; frames carry the time of the shown world. A drag sends
+   "seek". */
 
 import { clockText, pageFeed } from "kiks-desk";
 
