@@ -2,8 +2,10 @@ function [result, link] = simulator_link(what, varargin)
 % simulator_link  The connection to the simulator's process: two pipes in Octave, TCP in MATLAB.
 %
 %   link = simulator_link('open', options)              starts the process, or joins one
-%   [answer, link] = simulator_link('ask', link, line)  for a connection: sends a line, returns the next answer; ''
-%                                                       if the process is gone
+%   simulator_link('send', link, line)                  sends a line
+%   [answer, link] = simulator_link('answer', link, begin)
+%                                                       waits for the next frame and returns it without the blanks at
+%                                                       its end; '' if the process is gone. begin: what was read of it
 %   link = simulator_link('catch up', link)             cancels the request that Ctrl-C has interrupted, and skips
 %                                                       its answer
 %   simulator_link('close', link)                       closes it; the process ends with its last connection
@@ -19,8 +21,10 @@ switch what
         else
             result = open_connection(varargin{1});
         end
-    case 'ask'
-        [result, link] = ask(varargin{:});
+    case 'send'
+        send(varargin{:});
+    case 'answer'
+        [result, link] = next_frame(varargin{:});
     case 'catch up'
         result = caught_up(varargin{1});
     case 'close'
@@ -39,24 +43,18 @@ end
 command = kiks_command();
 % The argument `true`, which Octave's help does not mention, makes reads wait for data.
 [to, from, process] = popen2(command{1}, [command(2:end) {'session'} options], true);
-link = struct('is_pipe', true, 'to', to, 'from', from, 'process', process, 'is_joined', ~isempty(options));
+link = struct('is_pipe', true, 'is_polled', nproc() > 1, 'to', to, 'from', from, 'process', process, ...
+    'is_joined', ~isempty(options));
 unfinished = link;
 % The first answer is the greeting or an error; frames that announce it may precede it.
-first = '~';
-while strcmp(first, '~')
-    first = fread(from, [1 96], '*char');
-    if numel(first) == 96
-        length_ = str2double(first(1:8));
-        if length_ > 88
-            first = [first, fread(from, [1 length_ - 88], '*char')];
-        end
-        first = first(9:length_ + 8);
+while true
+    first = next_frame(link, '');
+    if numel(first) < 9 || first(9) ~= '~'
+        break
     end
-    if strcmp(first, '~')
-        fputs(to, char(10));
-        fflush(to);
-    end
+    send(link, char(10));
 end
+first = first(9:end);
 if isempty(door_of(first))
     hang_up(link);
     unfinished = [];
@@ -77,10 +75,10 @@ if isempty(number)
     refuse(first, command);
 end
 name = sprintf('127.0.0.1:%d', number);
-link = struct('is_pipe', false, 'to', [], 'from', [], 'port', robot_port('open', name, 9600), 'rest', '');
+link = struct('is_pipe', false, 'is_polled', false, 'to', [], 'from', [], 'port', robot_port('open', name, 9600), 'rest', '');
 robot_port('write', link.port, [token 10]);
 % Every connection begins with the greeting.
-[~, link] = ask(link, '');
+[~, link] = next_frame(link, '');
 end
 
 function first = started(command)
@@ -136,31 +134,79 @@ function line = words_line(words)
 line = strjoin(cellfun(@(word) ['"' word '"'], words, 'UniformOutput', false), ' ');
 end
 
-function [answer, link] = ask(link, line)
+function send(link, line)
+if link.is_pipe
+    fputs(link.to, line);
+    fflush(link.to);
+    return
+end
+try
+    robot_port('write', link.port, line);
+catch failure
+    ignore_lost(failure);  % waiting for the answer detects the end of the process
+end
+end
+
+function [answer, link] = next_frame(link, answer)
+if link.is_pipe
+    let_reads_wait(link, true);
+    for ending = [96 0]
+        if ending == 0
+            ending = frame_length(answer);
+        end
+        if numel(answer) < ending
+            answer = [answer, fread(link.from, [1 ending - numel(answer)], '*char')];
+        end
+        if numel(answer) < ending
+            answer = '';
+            return
+        end
+    end
+    answer = answer(1:frame_length(answer));
+    let_reads_wait(link, ~link.is_polled);
+    return
+end
 answer = '';
 silence = tic();
 try
-    robot_port('write', link.port, line);
-    while true
+    while isempty(answer)
         [answer, link.rest] = first_frame(link.rest);
-        if ~isempty(answer)
-            return
-        end
-        news = robot_port('read', link.port, 0.5);
-        link.rest = [link.rest news];
-        if ~isempty(news)
-            silence = tic();
-        elseif toc(silence) > 60
-            % Even during a slow answer, four frames a second arrive.
-            return
+        if isempty(answer)
+            news = robot_port('read', link.port, 0.5);
+            link.rest = [link.rest news];
+            if ~isempty(news)
+                silence = tic();
+            elseif toc(silence) > 60
+                % Even during a slow answer, four frames a second arrive.
+                return
+            end
         end
     end
 catch failure
     link.rest = '';
     answer = '';
-    if ~strcmp(failure.identifier, 'kiks:link')
-        rethrow(failure);
-    end
+    ignore_lost(failure);
+end
+end
+
+function length_ = frame_length(frame)
+% Without the blanks that fill it up.
+length_ = str2double(frame(1:8)) + 8;
+end
+
+function let_reads_wait(link, is_waiting)
+% Whether a read of the pipe waits for data, or returns at once.
+fclear(link.from);
+if is_waiting
+    fcntl(link.from, F_SETFL(), 0);
+else
+    fcntl(link.from, F_SETFL(), O_NONBLOCK());
+end
+end
+
+function ignore_lost(failure)
+if ~strcmp(failure.identifier, 'kiks:link')
+    rethrow(failure);
 end
 end
 
@@ -173,8 +219,8 @@ sign = char(32 + number);
 ending = char([2 sign]);
 line = char([24 sign 10]);
 if link.is_pipe
-    fputs(link.to, line);
-    fflush(link.to);
+    let_reads_wait(link, true);
+    send(link, line);
     count = 96;
     last = '';
     news = 'x';
@@ -201,10 +247,7 @@ try
     end
     link.rest = link.rest(strfind(link.rest, ending) + 2:end);
 catch failure
-    % The next request detects the end of the process.
-    if ~strcmp(failure.identifier, 'kiks:link')
-        rethrow(failure);
-    end
+    ignore_lost(failure);  % the next request detects the end of the process
 end
 end
 
@@ -214,7 +257,7 @@ if numel(rest) >= 96
     length_ = str2double(rest(1:8));
     whole = max(length_ + 8, 96);
     if numel(rest) >= whole
-        text = rest(9:length_ + 8);
+        text = rest(1:length_ + 8);
         rest = rest(whole + 1:end);
     end
 end
@@ -230,6 +273,7 @@ if ~link.is_pipe
     robot_port('close', link.port);
     return
 end
+let_reads_wait(link, true);
 % Send an explicit end, as other processes that Octave has started may keep the pipe open.
 try
     fputs(link.to, char([4 10]));
