@@ -1,7 +1,7 @@
 """What the constants and the robot definition files of KiKS 2.2.0 change of a robot.
 
-They belong to models of sensors that this KiKS does not have. So they change what was measured on real robots as much as
-they changed those models (kiks-behaviour.md 2.2 and 3). With the values of KiKS 2.2.0, nothing changes.
+They belong to models of sensors that this KiKS does not have. So they change what was measured on real robots as much
+as they changed those models (kiks-behaviour.md 2.2 and 3). With the values of KiKS 2.2.0, nothing changes.
 """
 
 from __future__ import annotations
@@ -135,8 +135,8 @@ def _shape(figures: tuple[float, ...], spec: RobotSpec) -> tuple[dict[str, Any],
     """Return what the figures of a robot definition file change of body, proximity, ambient and reflection.
 
     Sensors are as far within the rim as on the robot that was measured. They see at s times the distance what its
-    sensors see, where s is the ratio of the ranges: in the light (cos(i) / (t + behind))^3 of a ray, t and `behind` grow
-    by s, and with them the light that is given for one length, `LIGHT_MM`.
+    sensors see, where s is the ratio of the ranges: in the light (cos(i) / (t + behind))^3 of a ray, t and `behind`
+    grow by s, and with them the light that is given for one length, `LIGHT_MM`.
     """
     diameter_mm, wheel_base_mm, range_mm = figures[:3]
     places, directions = figures[3 : 3 + SENSOR_COUNT], figures[3 + SENSOR_COUNT :]

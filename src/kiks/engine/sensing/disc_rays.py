@@ -9,9 +9,9 @@ of its own, and from the tracks it gets the discs that it sees: four numbers for
 and shade. A shade above 0 is the brightness of a plain disc. One below 0 is that of a striped robot: it holds the
 number of stripes and the heading (`shade_of`), so plain discs cost nothing more.
 
-Stripes: n black and n white ones stand around a robot, the middle of a black one ahead. So the point at the angle a from
-ahead is black where cos(n a) > 0. With z = cos(a) + i sin(a), that is the real part of z^n: multiplications alone, in
-lanes as well.
+Stripes: n black and n white ones stand around a robot, the middle of a black one ahead. So the point at the angle a
+from ahead is black where cos(n a) > 0. With z = cos(a) + i sin(a), that is the real part of z^n: multiplications alone,
+in lanes as well.
 """
 
 from __future__ import annotations
