@@ -29,7 +29,7 @@ requests = {
     ['set robot ' escaped(robot(p.KIKS_ROBOT))]
     ['set response ' escaped(lower(p.KIKS_RESPONSE))]
     sprintf('set noise %d', p.KIKS_NOISE)
-    ['set turrets ' escaped(lower(p.KIKS_TURRETS))]
+    ['set turrets ' escaped(strjoin(built_in_turrets(p.KIKS_TURRETS), ' '))]
     ['set ball ' number_text(greys{1})]
     ['set cylinder ' number_text(greys{2})]
     ['set brightness ' number_text(greys{3})]
@@ -81,6 +81,17 @@ if strcmpi(ending, '.toml')
 else
     name = strrep(lower(name), ' ', '_');
 end
+end
+
+function names = built_in_turrets(text)
+% A turret of the user's own takes the place of the built-in one with its number.
+names = strsplit(strtrim(lower(text)), ' ');
+number_of = struct('gripper', 1, 'k213', 2, 'radio', 4, 'battle', 99);
+is_replaced = cellfun(@(name) isfield(number_of, name) && any(number_of.(name) == own_turrets('numbers')), names);
+for k = find(is_replaced)
+    say_once(names{k}, sprintf('A turret of the folder turrets has the number of %s and takes its place.', names{k}));
+end
+names = names(~is_replaced);
 end
 
 function seconds = latency_s(p)

@@ -101,6 +101,12 @@ while true
         is_behind = false;
         answered = tic();
         error('kiks:simulator', '%s', unescaped(answer(21:end)));
+    elseif answer(1) == '?'
+        % An order for a turret of this program. Its function may send requests of its own.
+        is_behind = false;
+        line = [own_turrets('call', answer(21:end)) line_feed];
+        is_behind = true;
+        continue
     end
     % The answer is not ready; confirm that this program still waits.
     line = line_feed;
