@@ -6,8 +6,13 @@ together. Then the order goes over the robot's line, and the robot answers with 
 
 from __future__ import annotations
 
+import re
+
 from kiks.errors import ParameterError, shown
 from kiks.firmware.turret import Turret
+
+_ORDER = re.compile(r"T, *([0-9]{1,9}) *,[^\r\n]+[\r\n]", re.ASCII)
+_NUMBERS = [str(number) for number in range(1, 100)]
 
 
 class TurretOrder(Exception):  # noqa: N818 (it is a question to the program, not an error)
@@ -38,18 +43,19 @@ def turrets_of(words: str) -> dict[int, str]:
     """
     given = words.split()
     pairs = list(zip(given[::2], given[1::2], strict=False))
-    if len(given) % 2 or not all(number.isascii() and number.isdigit() and 1 <= int(number) <= 99 for number, _ in pairs):
+    if len(given) % 2 or not all(
+        number.isascii() and number.isdigit() and 1 <= int(number) <= 99 for number, _ in pairs
+    ):
         raise ParameterError(f"turrets must be numbers from 1 to 99, each with a name, but they were {shown(words)}.")
     return {int(number): name for number, name in pairs}
 
 
-def turret_of(order: str) -> int | None:
-    """Return the number of the turret that an order is for; None for another command.
+def turret_of(text: str) -> int | None:
+    r"""Return the number of the turret that a line is an order for; None for anything else.
 
     Example:
-        >>> turret_of("T,24,C"), turret_of("N"), turret_of("T,x,C")
-        (24, None, None)
+        >>> turret_of("T,24,C\n"), turret_of("T,24,C"), turret_of("N\n"), turret_of("T,24,C\nN\n")
+        (24, None, None, None)
     """
-    letter, number, *rest = [*order.split(","), ""][:3]
-    is_order = letter == "T" and rest and number.strip().isascii() and number.strip().isdigit() and len(number) < 10
-    return int(number) if is_order else None
+    found = _ORDER.fullmatch(text)
+    return None if found is None else int(found[1])

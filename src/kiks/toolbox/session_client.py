@@ -202,9 +202,8 @@ class SessionClient:
             TurretOrder: If the program must work out the reply; then nothing was sent.
         """
         opened = self.opened(number)
-        order = text[:-1]
-        if self.turrets and turret_of(order) in self.turrets and text[-1] in "\r\n" and not opened.unfinished:
-            raise TurretOrder(number, order)
+        if self.turrets and turret_of(text) in self.turrets and not opened.unfinished:
+            raise TurretOrder(number, text[:-1])
         return self._exchange(opened, text)
 
     def send_order(self, number: int, order: str, reply: str) -> str:
