@@ -28,7 +28,8 @@ KIKS_THINKING = 'live';
 % current folder, else measured once, for two seconds. Then KIKS_THINKING is live with the factor that follows.
 KIKS_EMULATED_CPU = '';
 
-% 'Khepera', 'Khepera_II', or the name of a robot's file .toml.
+% 'Khepera', 'Khepera_II', the name of a robot's file .toml, or of a robot definition file .m of KiKS 2.2.0. Such a file is
+% looked for in the current folder and on the path, there also in folders named robots, and may be named without .m.
 KIKS_ROBOT = 'Khepera';
 
 % The model of its proximity sensors: '' the robot's own, 'reflection', 'thesis', 'fast', 'standin' or 'curve'.
@@ -57,7 +58,8 @@ KIKS_WINDOW = [];
 % The brightness of things as sensors see them, 1 black to 255 white. [] suits the response: white balls, wooden
 % cylinders and the robot's own brightness with the responses of real robots; the values of KiKS 2.2.0 (ball 25,
 % cylinder 70, robot 120) with 'thesis', 'fast' and 'standin', which use its rule of colours. A sensor that measures
-% reflected light hardly sees a ball of 25.
+% reflected light hardly sees a ball of 25. A KIKS_COLOR_ROBOT of -X stands for X black and X white stripes around
+% each robot.
 KIKS_COLOR_BALL = [];
 KIKS_COLOR_CYLINDER = [];
 KIKS_COLOR_ROBOT = [];
@@ -68,7 +70,16 @@ KIKS_ARENA_DEFAULT_COLOR = 255;
 % The number of lines that kiks_status keeps.
 KIKS_LOG_HISTORY = 1000;
 
-% Without effect: responses and noise are measured ones (KIKS_RESPONSE, KIKS_NOISE).
+% Constants of the sensors' models of KiKS 2.2.0. Here sensors and their noise are as measured on real robots, as long as
+% these constants have the values below. Other values change what was measured as much as they changed those models:
+%
+%   KIKS_SIM_PROX_NOISE     random part of each proximity reading [%]: the measured one is multiplied by it
+%   KIKS_SIM_PROX_EMAX      error of small readings, a share: the measured one grows in proportion
+%   KIKS_SIM_PROX_EMIN      error of readings of 1000: likewise
+%   KIKS_SIM_PROX_EEXP      the larger, the less frequent large errors are; with 1, all are equally frequent
+%   KIKS_SIM_LIGHT_FEXP     the larger, the wider is the field of view of the light sensors
+%   KIKS_K213_NOISE         random part of each pixel of the camera [%]
+%   KIKS_K213_NONORMALIZE   with a value other than [], the camera's shutter is fixed: a dark scene gives a dark picture
 KIKS_SIM_PROX_EMAX = 0.25;
 KIKS_SIM_PROX_EMIN = 0.10;
 KIKS_SIM_PROX_EEXP = 3;

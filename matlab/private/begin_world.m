@@ -14,7 +14,8 @@ if nargin > 2
 end
 % Report errors of the arena before a process starts and opens a window.
 world = world_request(plain_text(arena), colormask, preferences);
-settings = setting_requests(preferences);
+turrets = own_turrets('find');
+settings = [setting_requests(preferences), {turrets}];
 is_new = ~is_active();
 cellfun(@simulator, settings, 'UniformOutput', false);
 if is_new

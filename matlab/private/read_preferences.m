@@ -57,9 +57,6 @@ if isequal(value, default)
     return
 end
 switch name
-    case {'KIKS_SIM_PROX_EMAX', 'KIKS_SIM_PROX_EMIN', 'KIKS_SIM_PROX_EEXP', 'KIKS_SIM_PROX_NOISE', ...
-            'KIKS_SIM_LIGHT_FEXP', 'KIKS_K213_NOISE', 'KIKS_K213_NONORMALIZE'}
-        reason = 'sensors and their noise are as measured on a real robot. KIKS_NOISE = 0 turns noise off';
     case {'KIKS_SIM_PROX_STEP', 'KIKS_K213_STEP', 'KIKS_MMPERPIXEL'}
         reason = 'the simulator''s rays and movements are exact';
     case 'KIKS_TRACE_MAX'
@@ -99,21 +96,30 @@ check(isempty(p.KIKS_WINDOW) || isequal(p.KIKS_WINDOW, 0) || isequal(p.KIKS_WIND
     p.KIKS_WINDOW, '0, 1 or []', '0');
 check(grey(p.KIKS_COLOR_BALL), 'KIKS_COLOR_BALL', p.KIKS_COLOR_BALL, 'a grey from 1 to 255, or []', '255');
 check(grey(p.KIKS_COLOR_CYLINDER), 'KIKS_COLOR_CYLINDER', p.KIKS_COLOR_CYLINDER, 'a grey from 1 to 255, or []', '190');
-if isnumeric(p.KIKS_COLOR_ROBOT) && isscalar(p.KIKS_COLOR_ROBOT) && p.KIKS_COLOR_ROBOT < 0
-    say_once('KIKS_COLOR_ROBOT', ...
-        'kiks_preferences: KIKS_COLOR_ROBOT below 0 has no effect: robots are drawn without stripes.');
-    preferences.KIKS_COLOR_ROBOT = [];
-else
-    check(grey(p.KIKS_COLOR_ROBOT), 'KIKS_COLOR_ROBOT', p.KIKS_COLOR_ROBOT, 'a grey from 1 to 255, or []', '120');
-end
+check(grey(p.KIKS_COLOR_ROBOT) || whole(p.KIKS_COLOR_ROBOT, -100, -1), 'KIKS_COLOR_ROBOT', p.KIKS_COLOR_ROBOT, ...
+    'a grey from 1 to 255, a number of stripes from -1 to -100, or []', '120');
 check(whole(p.KIKS_ARENA_DEFAULT_COLOR, 1, 255), 'KIKS_ARENA_DEFAULT_COLOR', p.KIKS_ARENA_DEFAULT_COLOR, ...
     'a grey from 1 to 255', '255');
+check(within(p.KIKS_SIM_PROX_NOISE, 100), 'KIKS_SIM_PROX_NOISE', p.KIKS_SIM_PROX_NOISE, 'a share [%] from 0 to 100', '1');
+check(within(p.KIKS_SIM_PROX_EMAX, 1), 'KIKS_SIM_PROX_EMAX', p.KIKS_SIM_PROX_EMAX, 'a share from 0 to 1', '0.25');
+check(within(p.KIKS_SIM_PROX_EMIN, 1), 'KIKS_SIM_PROX_EMIN', p.KIKS_SIM_PROX_EMIN, 'a share from 0 to 1', '0.10');
+check(is_exponent(p.KIKS_SIM_PROX_EEXP), 'KIKS_SIM_PROX_EEXP', p.KIKS_SIM_PROX_EEXP, 'a number above 0', '3');
+check(is_exponent(p.KIKS_SIM_LIGHT_FEXP), 'KIKS_SIM_LIGHT_FEXP', p.KIKS_SIM_LIGHT_FEXP, 'a number above 0', '5');
+check(within(p.KIKS_K213_NOISE, 100), 'KIKS_K213_NOISE', p.KIKS_K213_NOISE, 'a share [%] from 0 to 100', '10');
 check(whole(p.KIKS_LOG_HISTORY, 1, 10^6), 'KIKS_LOG_HISTORY', p.KIKS_LOG_HISTORY, ...
     'a whole number from 1 to 10^6', '1000');
 end
 
 function yes = is_positive(value)
 yes = isnumeric(value) && isscalar(value) && isfinite(value) && value > 0;
+end
+
+function yes = is_exponent(value)
+yes = isnumeric(value) && isscalar(value) && value > 0;
+end
+
+function yes = within(value, high)
+yes = isnumeric(value) && isscalar(value) && value >= 0 && value <= high;
 end
 
 function check(holds, name, value, what, example)

@@ -4,6 +4,19 @@ function requests = setting_requests(preferences)
 %   An empty value stands for the simulator's default.
 
 p = preferences;
+figures = robot_figures(p.KIKS_ROBOT);
+if ~isempty(figures)
+    p.KIKS_ROBOT = 'Khepera';  % with these figures
+    if any(strcmpi(p.KIKS_RESPONSE, {'thesis', 'fast'}))
+        say_once('KIKS_RESPONSE', sprintf(['KIKS_RESPONSE = ''%s'' has places, directions and a range of its own for ' ...
+            'the sensors: those of the robot''s file have no effect.'], p.KIKS_RESPONSE));
+    end
+end
+stripes = 0;
+if any(p.KIKS_COLOR_ROBOT < 0)
+    stripes = -p.KIKS_COLOR_ROBOT;
+    p.KIKS_COLOR_ROBOT = [];
+end
 greys = {p.KIKS_COLOR_BALL, p.KIKS_COLOR_CYLINDER, p.KIKS_COLOR_ROBOT};
 if any(strcmpi(p.KIKS_RESPONSE, {'thesis', 'fast', 'standin'}))
     of_the_old = {25, 70, 120};
@@ -16,7 +29,7 @@ requests = {
     ['set robot ' escaped(robot(p.KIKS_ROBOT))]
     ['set response ' escaped(lower(p.KIKS_RESPONSE))]
     sprintf('set noise %d', p.KIKS_NOISE)
-    ['set turrets ' escaped(lower(p.KIKS_TURRETS))]
+    ['set turrets ' escaped(strjoin(built_in_turrets(p.KIKS_TURRETS), ' '))]
     ['set ball ' number_text(greys{1})]
     ['set cylinder ' number_text(greys{2})]
     ['set brightness ' number_text(greys{3})]
@@ -24,6 +37,15 @@ requests = {
     ['set robots ' number_text(p.KIKS_ROBOTS)]
     sprintf('set programs %d', p.KIKS_PROGRAMS)
     sprintf('set latency_s %.17g', latency_s(p))
+    ['set figures ' strtrim(sprintf('%.17g ', figures))]
+    sprintf('set stripes %d', stripes)
+    sprintf('set noise_percent %.17g', p.KIKS_SIM_PROX_NOISE)
+    sprintf('set error_small %.17g', p.KIKS_SIM_PROX_EMAX)
+    sprintf('set error_large %.17g', p.KIKS_SIM_PROX_EMIN)
+    sprintf('set error_exponent %.17g', min(p.KIKS_SIM_PROX_EEXP, 10^6))
+    sprintf('set light_exponent %.17g', min(p.KIKS_SIM_LIGHT_FEXP, 10^6))
+    sprintf('set camera_noise_percent %.17g', p.KIKS_K213_NOISE)
+    sprintf('set fixed_shutter %d', ~isempty(p.KIKS_K213_NONORMALIZE))
     }';
 end
 
@@ -59,6 +81,17 @@ if strcmpi(ending, '.toml')
 else
     name = strrep(lower(name), ' ', '_');
 end
+end
+
+function names = built_in_turrets(text)
+% A turret of the user's own takes the place of the built-in one with its number.
+names = strsplit(strtrim(lower(text)), ' ');
+number_of = struct('gripper', 1, 'k213', 2, 'radio', 4, 'battle', 99);
+is_replaced = cellfun(@(name) isfield(number_of, name) && any(number_of.(name) == own_turrets('numbers')), names);
+for k = find(is_replaced)
+    say_once(names{k}, sprintf('A turret of the folder turrets has the number of %s and takes its place.', names{k}));
+end
+names = names(~is_replaced);
 end
 
 function seconds = latency_s(p)

@@ -100,6 +100,10 @@ while true
             error('kiks:simulator', '%s', unescaped(answer(29:end)));
         end
         payload = answer(29:end);
+        if answer(9) == '?'
+            % An order for a turret of this program. Its function may send requests of its own.
+            payload = simulator(own_turrets('call', payload));
+        end
         return
     end
     % The answer is not ready; confirm that this program still waits.

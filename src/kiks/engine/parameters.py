@@ -49,6 +49,7 @@ PARAMETERS = np.dtype(
     [
         ("radius_mm", "f8"),
         ("brightness", "i8"),  # of the body, as others see it
+        ("stripe_count", "i8"),  # black stripes around the body, and as many white ones; 0 for its one brightness
         ("wheel_base_mm", "f8"),
         ("pulse_mm", "f8"),
         ("wall_friction", "f8"),
@@ -104,6 +105,8 @@ PARAMETERS = np.dtype(
         ("lamp_step_mm", "f8"),
         ("lamp_point_count", "i8"),
         ("lamp_counts", "f8", (LAMP_POINT_LIMIT,)),
+        ("camera_noise_share", "f8"),
+        ("adapts_exposure", "i8"),
     ],
     align=True,
 )
@@ -114,7 +117,7 @@ def pack(spec: RobotSpec) -> NDArray[np.void]:
     packed = np.zeros(1, PARAMETERS)
     robot: Any = packed[0]
     body, motor, proximity = spec.body, spec.motor, spec.proximity
-    robot["radius_mm"], robot["brightness"] = body.radius_mm, body.brightness
+    robot["radius_mm"], robot["brightness"], robot["stripe_count"] = body.radius_mm, body.brightness, body.stripe_count
     robot["is_noisy"] = spec.is_noisy
     for name in ("wheel_base_mm", "pulse_mm", "wall_friction", "slip_ratio_min", "slip_ratio_max"):
         robot[name] = getattr(body, name)
@@ -136,6 +139,8 @@ def pack(spec: RobotSpec) -> NDArray[np.void]:
     robot["mount_x_mm"], robot["mount_y_mm"] = _places_mm(proximity.mount_angle_deg, proximity.mount_radius_mm)
     _pack_response(robot, spec)
     _pack_ambient(robot, spec)
+    robot["camera_noise_share"] = spec.camera.noise_share
+    robot["adapts_exposure"] = spec.camera.adapts_exposure
     return packed
 
 

@@ -65,6 +65,8 @@ class Firmware(Robot):
             if letter in self._commands:
                 act, count = self._commands[letter]
                 if letter == b"T":
+                    if self.dictated is not None and line == self.dictated[0]:
+                        return self.dictated[1] + b"\r\n"
                     values = act(self, *self._message(words[1:]))
                 else:
                     # Commands without parameters ignore what follows the comma; for the others the count must fit.

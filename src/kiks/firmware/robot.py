@@ -25,6 +25,7 @@ class Robot:
     Attributes:
         fitted: All turrets.
         turrets: Those that answer orders, by their numbers.
+        dictated: An order for a turret, and the robot's reply to it, if the program that sends it says that, too.
         baud: Speed of the line now [bit/s]; the tool `serial` changes it.
         selected_baud: Speed that the mode selector asks for [bit/s]: the robot reads it at a reset.
     """
@@ -45,6 +46,7 @@ class Robot:
         self.sense_ambient = sense_ambient
         self.fitted: list[Turret] = []
         self.turrets: dict[int, Turret] = {}
+        self.dictated: tuple[bytes, bytes] | None = None
         self.now_ns = 0
         self.selected_baud = spec.firmware.baud
         self.demo_wakes_ns: int | None = None

@@ -81,6 +81,14 @@ def _check_thinking(thinking: str) -> str:
     return thinking
 
 
+_Plain = Switch | Whole | Number | Text
+Change = Annotated[
+    _Plain | Annotated[tuple[_Plain, ...], Field(max_length=1000)],
+    Rule("a number, a text, true, false, or a list of them"),
+]
+"""A value in a robot's file."""
+
+
 @record
 class ProjectRobot:
     """A robot of a project.
@@ -92,9 +100,14 @@ class ProjectRobot:
         program: A Python file in the project's folder, which drives it.
         arguments: The program's arguments.
         brightness: Its brightness for other robots' sensors, 1 black to 255 white; that of its file if None.
+        changes: What is different from its file: the keys of each section and their values.
 
     Raises:
         ParameterError: If a name is unknown, a path leaves the folder, or the brightness is out of range.
+
+    Example:
+        >>> ProjectRobot(changes={"body": {"diameter_mm": 70.0}}).kind
+        'khepera'
     """
 
     kind: Annotated[Text, AfterValidator(_check_kind)] = "khepera"
@@ -103,6 +116,7 @@ class ProjectRobot:
     program: Annotated[Text, AfterValidator(_check_program)] | None = None
     arguments: Annotated[tuple[Text, ...], Field(max_length=100)] = ()
     brightness: Brightness | None = None
+    changes: dict[str, dict[str, Change]] = Field(default_factory=dict)
 
 
 Robots = Annotated[
@@ -235,7 +249,7 @@ class Project:
         for robot in self.robots:
             lines += ["", "[[robot]]"]
             values = ((each.name, getattr(robot, each.name)) for each in fields(robot))
-            lines += [f"{name} = {_toml(value)}" for name, value in values if value not in (None, "", ())]
+            lines += [f"{name} = {_toml(value)}" for name, value in values if value not in (None, "", (), {})]
         lines += place_lines(self.arena)
         lines += ["", "[walls]"]
         if (box := box_keys_of(self.arena)) is not None:
@@ -287,9 +301,15 @@ class ProjectFile:
     walls: ProjectWalls = ProjectWalls()
 
 
+def _key(name: str) -> str:
+    return name if name.isascii() and name.isidentifier() else quoted(name)
+
+
 def _toml(value: Any) -> str:
     if isinstance(value, tuple | list):
         return f"[{', '.join(map(_toml, value))}]"
+    if isinstance(value, dict):
+        return f"{{ {', '.join(f'{_key(name)} = {_toml(each)}' for name, each in value.items())} }}"
     if isinstance(value, bool):
         return "true" if value else "false"
     return quoted(value) if isinstance(value, str) else repr(value)

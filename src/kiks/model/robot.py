@@ -24,6 +24,7 @@ from kiks.model.robot_parts import (
     Baud,
     Body,
     Brightness,
+    Camera,
     Curve,
     FirmwareSpec,
     Motor,
@@ -45,6 +46,7 @@ __all__ = [
     "Baud",
     "Body",
     "Brightness",
+    "Camera",
     "Curve",
     "FirmwareSpec",
     "Motor",
@@ -75,6 +77,7 @@ class RobotSpec:
     proximity: Proximity
     ambient: Ambient
     firmware: FirmwareSpec
+    camera: Camera = field(default_factory=Camera)
     quirks: Quirks = field(default_factory=Quirks)
     curve: Curve | None = None
     reflection: Reflection | None = None

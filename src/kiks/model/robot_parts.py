@@ -28,6 +28,9 @@ AMBIENT_MODELS = ("flux", "thesis")
 LAMP_POINT_LIMIT = 64
 """Most points of the curve of light against distance."""
 
+STRIPE_LIMIT = 100
+"""Most stripes of either colour around a body."""
+
 Response = Annotated[str, OneOf(RESPONSES)]
 Angle = Annotated[Number, Field(ge=-360, le=360)]
 Counts = Annotated[Number, Field(ge=-1023, le=65535)]
@@ -42,7 +45,8 @@ _ONE_EACH = Field(min_length=SENSOR_COUNT, max_length=SENSOR_COUNT, description=
 class Body:
     """Shape and contact. `slip_ratio_min` and `_max` bound a blocked wheel's speed, as a share of its command.
 
-    `brightness` is its brightness for other robots' sensors: 1 black to 255 white.
+    `brightness` is its brightness for other robots' sensors: 1 black to 255 white. With a `stripe_count` above 0 that
+    many black and as many white stripes stand around the body instead, the middle of a black one ahead.
     """
 
     diameter_mm: Annotated[Number, Field(ge=10, le=500)]
@@ -52,6 +56,7 @@ class Body:
     wall_friction: Annotated[Number, Field(ge=0, le=2)]
     slip_ratio_min: Share
     slip_ratio_max: Share
+    stripe_count: Annotated[Whole, Field(ge=0, le=STRIPE_LIMIT)] = 0
 
     def __post_init__(self) -> None:
         # Wheels may stick out a little; calibration also tries unrealistic robots.
@@ -189,6 +194,18 @@ class Ambient:
         must(rises(counts) and counts[-1] <= self.dark_counts, self, "lamp_counts", "a list that rises to dark_counts")
         is_between = counts[0] < self.background_counts <= self.dark_counts
         must(is_between, self, "background_counts", "above lamp_counts, up to dark_counts")
+
+
+@record
+class Camera:
+    """How the linear camera K213 takes its pictures, where a robot carries one.
+
+    `noise_share` is the share of each pixel that is random. With `adapts_exposure` the brightest pixel becomes white;
+    without, the shutter is fixed, and a dark scene gives a dark picture.
+    """
+
+    noise_share: Share = 0.1
+    adapts_exposure: Switch = True
 
 
 @record

@@ -69,10 +69,16 @@ def spec_of(robot: ProjectRobot, project: Project, folder: Path) -> RobotSpec:
         folder: Where the project lies.
 
     Raises:
-        ParameterError: If the robot's file is none, or leads out of the folder.
+        ParameterError: If the robot's file is none, or leads out of the folder, or one of its changes is wrong.
     """
     path = inside(folder, robot.kind, "kind") if robot.kind.lower().endswith(".toml") else robot.kind
-    return _as_set(RobotSpec.load(path, response=project.response), robot, project)
+    spec = RobotSpec.load(path, response=project.response)
+    if robot.changes:
+        tables = robot.changes.items()
+        spec = spec.with_changes(
+            **{f"{section}__{key}": value for section, values in tables for key, value in values.items()}
+        )
+    return _as_set(spec, robot, project)
 
 
 def _as_set(spec: RobotSpec, robot: ProjectRobot, project: Project) -> RobotSpec:

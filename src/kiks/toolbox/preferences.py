@@ -11,33 +11,21 @@ from pydantic import BeforeValidator, Field
 from kiks.model.arena import Arena
 from kiks.model.data_file import Number, OneOf, Rule, Switch, Text, Whole, check, record
 from kiks.model.project import TURRETS, Project, ProjectRobot, Seed, ThinkingPolicy
-from kiks.model.robot import Brightness, Response
-
-
-def _number(given: object) -> object:
-    """Convert a text to an int or float; return anything else unchanged."""
-    try:
-        number = float(given) if isinstance(given, str) else given
-    except ValueError:
-        return given
-    return int(number) if isinstance(number, float) and number.is_integer() else number
-
-
-def _switch(given: object) -> object:
-    return {"0": False, "1": True}.get(given, given) if isinstance(given, str) else given
+from kiks.model.robot import Brightness, Response, RobotSpec
+from kiks.toolbox.old_constants import NUMBER as _NUMBER
+from kiks.toolbox.old_constants import SWITCH, OldConstants
 
 
 def _words(given: object) -> object:
     return given.split() if isinstance(given, str) else given
 
 
-_NUMBER = BeforeValidator(_number)
 Count = Annotated[Whole, Field(ge=1, le=1000)]
 
 
 @record
-class Settings:
-    """The preferences that the simulator needs.
+class Settings(OldConstants):
+    """The preferences that the simulator needs, besides the constants of KiKS 2.2.0 that change robots.
 
     Attributes:
         seed: Seed of all random numbers.
@@ -60,7 +48,7 @@ class Settings:
     robot: Text = "khepera"
     robots: Annotated[Count, _NUMBER] | None = None
     response: Response | None = None
-    noise: Annotated[Switch, BeforeValidator(_switch), Rule("0 or 1")] = True
+    noise: Annotated[Switch, SWITCH, Rule("0 or 1")] = True
     turrets: Annotated[
         tuple[Annotated[str, OneOf(TURRETS)], ...], Field(max_length=len(TURRETS)), BeforeValidator(_words)
     ] = ("k213", "radio", "battle")
@@ -97,7 +85,12 @@ class Settings:
         """
         # A world needs a robot, even if the arena has no start.
         count = max(len(arena.starts) if self.robots is None else self.robots, 1)
-        robot = ProjectRobot(kind=Path(self.robot).name, turrets=self.turrets, brightness=self.brightness)
+        robot = ProjectRobot(
+            kind=Path(self.robot).name,
+            turrets=self.turrets,
+            brightness=self.brightness,
+            changes=self.changes(RobotSpec.load(self.robot)),
+        )
         return Project(
             arena,
             robots=(robot,) * count,

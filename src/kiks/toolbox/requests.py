@@ -11,6 +11,7 @@ from kiks.model.arena import Arena
 from kiks.model.arena_file import save_arena
 from kiks.model.kad import save_kad
 from kiks.toolbox.matlab_arenas import arena_of
+from kiks.toolbox.own_turrets import TurretOrder, turrets_of
 from kiks.toolbox.session_client import SessionClient
 from kiks.toolbox.wire_format import escape, matrices_of, matrix_text, number_text, numbers_of, numbers_text, unescape
 from kiks.toolbox.world_requests import (
@@ -69,6 +70,9 @@ def answer(client: SessionClient, line: str) -> str:
                 f"{len(result)}. Ask for less: a path begins anew when the port is opened anew."
             )
         return f"+{client.clock()}{result}"
+    except TurretOrder as asked:
+        number, order = asked.args
+        return f"?{client.clock()}{number} {escape(order)}"
     except KiksError as error:
         why = str(error)
     except OSError as error:
@@ -204,6 +208,18 @@ def _ask(client: SessionClient, words: str) -> str:
     return escape(client.send(port_of(number), text + "\n"))
 
 
+def _turrets(client: SessionClient, words: str) -> str:
+    client.turrets = turrets_of(words)
+    return ""
+
+
+def _order(client: SessionClient, words: str) -> str:
+    """Send an order for a turret of the program's own, with its reply in a second line."""
+    number, _, text = words.partition(" ")
+    order, _, reply = unescape(text).partition("\n")
+    return escape(client.send_order(port_of(number), order, reply))
+
+
 def _time(client: SessionClient, words: str) -> str:
     time_s = client.time_s(port_of(words))
     return "" if time_s is None else number_text(time_s)
@@ -242,6 +258,8 @@ REQUESTS: dict[str, Act] = {
     "close": _close,
     "send": _send,
     "ask": _ask,
+    "turrets": _turrets,
+    "order": _order,
     "listen": lambda client, words: escape(client.listen(port_of(words))),
     "time": _time,
     "pass": _pass,

@@ -16,6 +16,7 @@ from kiks.ports.local_link import AwaitedAnswer, LocalConnection, PendingAnswer,
 from kiks.ports.messages import Kind
 from kiks.sim.port import VirtualPort
 from kiks.sim.simulation import Simulation
+from kiks.toolbox.own_turrets import OwnTurret, TurretOrder, turret_of
 from kiks.toolbox.session import Session
 from kiks.toolbox.session_film import SessionFilm
 from kiks.units import s_from_ns
@@ -76,6 +77,7 @@ class SessionClient:
         openings: The last opening of each port in this world.
         asked: Number of the port that the present request concerns; 0 for none.
         film: The film that it makes of the world; None for none.
+        turrets: The names of the turrets that are functions of the program, by their numbers.
     """
 
     def __init__(self, session: Session, number: int, pending: PendingAnswer | None = None) -> None:
@@ -87,6 +89,7 @@ class SessionClient:
         self.ports: dict[int, OpenPort] = {}
         self.openings: dict[int, OpenPort] = {}
         self.film: SessionFilm | None = None
+        self.turrets: dict[int, str] = {}
         self._sim: Simulation | None = None
         self._connection: LocalConnection | None = None
         session.clients.append(self)
@@ -128,6 +131,9 @@ class SessionClient:
     def _open(self, number: int, baud: int, connection: LocalConnection, sim: Simulation) -> OpenPort:
         known = self.openings.get(number)
         robot = self.session.take_robot(self, self._usual_robot(number)) if known is None else known.robot
+        for turret, name in self.turrets.items():
+            if turret not in sim.wires[robot - 1].firmware.turrets:
+                sim.fit(robot, OwnTurret(turret, name))
         port = VirtualPort(SharedLine(connection, sim, robot), self._program)
         port.baudrate = baud
         port.claim(f"{self.name}, port {-number}")
@@ -190,8 +196,27 @@ class SessionClient:
     # ---- the line ----
 
     def send(self, number: int, text: str) -> str:
-        """Send characters and return the first reply without its line end; an empty text without a terminator."""
+        """Send characters and return the first reply without its line end; an empty text without a terminator.
+
+        Raises:
+            TurretOrder: If the program must work out the reply; then nothing was sent.
+        """
         opened = self.opened(number)
+        if self.turrets and turret_of(text) in self.turrets and not opened.unfinished:
+            raise TurretOrder(number, text[:-1])
+        return self._exchange(opened, text)
+
+    def send_order(self, number: int, order: str, reply: str) -> str:
+        """Send an order for a turret and let the robot reply what the program has worked out; return the reply."""
+        opened = self.opened(number)
+        firmware = self.session.world.wires[opened.robot - 1].firmware
+        firmware.dictated = (order.encode("latin-1", errors="replace"), reply.encode("latin-1", errors="replace"))
+        try:
+            return self._exchange(opened, order + "\n")
+        finally:
+            firmware.dictated = None
+
+    def _exchange(self, opened: OpenPort, text: str) -> str:
         port, data = opened.port, text.encode("latin-1", errors="replace")
         if not opened.is_clean:
             port.reset_input_buffer()

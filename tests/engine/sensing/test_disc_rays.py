@@ -14,6 +14,7 @@ from tests.engine.same_walls import with_things
 from tests.engine.sensing.followed_rays import meet_discs_alone, meet_discs_of
 
 from kiks.engine.simd.lanes import LANES
+from kiks.firmware.turret import Turret
 from kiks.model.arena import Arena
 from kiks.model.arena_objects import Ball, Cylinder, Lamp, Pose
 from kiks.model.robot import RobotSpec
@@ -26,6 +27,16 @@ EXACT = RobotSpec.load("khepera").with_changes(
     proximity__noise_small=0.0, proximity__noise_large=0.0, proximity__jitter_counts=(0.0, 0.0)
 )
 """A Khepera without noise."""
+
+
+class Aim(Turret):
+    """Tells what is in a direction."""
+
+    number, name = 24, "Aim"
+
+    def met(self, angle_rad: float = 0.0):
+        met = self.site.ray(angle_rad)
+        return met.distance_mm, met.brightness, met.robot
 
 
 def meet_by_quadratic(discs, x, y, angle, reach):
@@ -225,3 +236,39 @@ def test_robots_balls_and_cylinders_hide_lamps(what):
             met[nearest < radius] += 1
     assert met[True] >= 20
     assert met[False] >= 20
+
+
+def striped_world(turn_rad: float, **body) -> Simulation:
+    """A robot with a camera, and another one before it, whose body has these constants."""
+    kinds = [EXACT, EXACT.with_changes(**{f"body__{key}": value for key, value in body.items()})]
+    sim = Simulation(Arena.box(600, 400), robot=kinds)
+    sim.place(2, 500, 300, 0.0)
+    sim.place(1, 200, 200, 0.0)
+    sim.place(2, 265, 200, math.pi + turn_rad)
+    sim.fit(1, "k213")
+    return sim
+
+
+@pytest.mark.parametrize(("turn_rad", "brightness"), [(0.0, 1), (math.pi, 255), (7 * math.pi, 255), (-8 * math.pi, 1)])
+def test_a_robot_of_one_black_and_one_white_half_looks_like_the_half_that_is_seen(turn_rad, brightness):
+    striped, plain = striped_world(turn_rad, stripe_count=1), striped_world(turn_rad, brightness=brightness)
+    assert striped.proximity(1) == plain.proximity(1)
+    assert striped.image(1) == plain.image(1)
+    assert striped.fit(1, Aim()).met() == plain.fit(1, Aim()).met()
+
+
+@pytest.mark.parametrize("count", [3, 8, 25])
+def test_stripes_are_where_the_angle_on_the_rim_says(count):
+    """Rays from all around, one by one."""
+    turn_rad = 0.3
+    sim = striped_world(turn_rad, stripe_count=count)
+    aim = sim.fit(1, Aim())
+    for x_mm in (200.0, 190.0):
+        sim.place(1, x_mm, 200, 0.0)
+        for angle in np.linspace(-0.35, 0.35, 71):
+            distance_mm, brightness, robot = aim.met(float(angle))
+            if robot == 2:
+                hit = x_mm + distance_mm * math.cos(angle) - 265, distance_mm * math.sin(angle)
+                rim_rad = math.atan2(hit[1], hit[0]) - math.pi - turn_rad
+                if abs(math.cos(count * rim_rad)) > 1e-6:
+                    assert brightness == (1 if math.cos(count * rim_rad) > 0 else 255)

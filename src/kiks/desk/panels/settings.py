@@ -181,9 +181,14 @@ class _RobotRow:
             ui.button(icon="close", on_click=lambda: remove(self)).props('flat round dense size=sm aria-label="Remove"')
 
     def robot(self) -> ProjectRobot:
-        """Return the robot as edited."""
+        """Return the robot as edited; what was changed of one kind does not suit another."""
+        kind = self._kind.value
         return replace(
-            self._given, name=self._name.value or "", kind=self._kind.value, turrets=tuple(self._turrets.value)
+            self._given,
+            name=self._name.value or "",
+            kind=kind,
+            turrets=tuple(self._turrets.value),
+            changes=self._given.changes if kind == self._given.kind else {},
         )
 
 

@@ -9,6 +9,8 @@ const LED_RADIUS_MM = 1.9;
 /** A robot smaller than this on the screen is drawn without its small parts [pixels]. */
 const SMALL_PX = 7;
 const STRIP_PX = [64, 9];
+/** How wide stripes around the body are drawn [mm]. */
+const STRIPES_MM = 3;
 
 /** The parts of a robot that never change, as paths in its own frame. */
 export class RobotLook {
@@ -16,6 +18,8 @@ export class RobotLook {
     const radius_mm = robot.radius_mm, base = robot.wheel_base_mm / 2;
     this.radius_mm = radius_mm;
     this.body = disc(0, 0, radius_mm);
+    this.rim = disc(0, 0, radius_mm - STRIPES_MM / 2);
+    this.stripes = robot.stripe_count ? whiteStripes(robot.stripe_count, radius_mm - STRIPES_MM / 2) : null;
     this.wheels = new Path2D();
     this.treads = new Path2D();
     for (const side of [-1, 1]) {
@@ -52,6 +56,17 @@ function disc(x, y, radius) {
   return path;
 }
 
+/** The white ones of the stripes around a body: the middle of a black one is ahead. */
+function whiteStripes(count, radius) {
+  const path = new Path2D(), half = Math.PI / (2 * count);
+  for (let k = 0; k < count; k++) {
+    const middle = ((2 * k + 1) * Math.PI) / count;
+    path.moveTo(radius * Math.cos(middle - half), radius * Math.sin(middle - half));
+    path.arc(0, 0, radius, middle - half, middle + half);
+  }
+  return path;
+}
+
 function shapePath({ points, radius_mm }) {
   if (points.length === 1) return disc(points[0][0], points[0][1], radius_mm || 1);
   const path = new Path2D();
@@ -81,6 +96,13 @@ export function paintRobot(context, look, robot, pose, index, scale, hasGripper,
   context.strokeStyle = robotColour(index, isDark);
   context.lineWidth = isSmall ? 4 : 2.2;
   context.stroke(look.body);
+  if (look.stripes) {
+    context.lineWidth = STRIPES_MM;
+    context.strokeStyle = "#000000";
+    context.stroke(look.rim);
+    context.strokeStyle = "#ffffff";
+    context.stroke(look.stripes);
+  }
   context.fillStyle = "#17191c";
   context.fill(look.wheels);
   if (!isSmall) {

@@ -6,7 +6,8 @@ manual) and thesis 3.4 ("Linear vision extension module").
 Method: 64 rays from +18 to -18 degrees, the leftmost pixel first, from the robot's centre; the view begins 50 mm from
 it. A ray ends at the first surface, whose brightness 1..255 becomes a grey of 50..245. Then, in this order: the lens
 blurs distant surfaces, the exposure adapts to the scene, the converter adds noise, the picture darkens towards its
-edges, motion smears it, and the line adds noise.
+edges, motion smears it, and the line adds noise. How much, and whether the exposure adapts, is a matter of the robot's
+file (`kiks.model.robot.Camera`).
 
 Blur: each pixel becomes the mean over an interval of the row, with a width of its own [pixels].
 
@@ -53,7 +54,6 @@ _DEFOCUS_PIXELS = 7.0  # to each side, at infinite distance
 _BLACK, _WHITE = 50.0, 245.0  # greys of the blackest and the whitest wall
 _DARKEN = 10.0  # subtracted by the exposure in a scene without black
 _NOISE = 10.0  # of the converter, to each side
-_LINE_NOISE = 0.1  # share of the final grey that is random
 
 _EXPOSURE_TICKS = 5.0  # 50 ms, the shortest reading period
 _SHAKE_PIXELS_PER_MM, _SHAKE_PIXELS = 1.5, 6.0  # per path during the exposure, and at most
@@ -163,6 +163,7 @@ def take_image_in(scene: Any, world: Any, robot: Any, tick_count: Any, time_ns: 
         The reading of the light detector, larger for a darker scene.
     """
     state = scene.robots[world, robot]
+    parameters = scene.kinds[state.kind]
     x, y, heading = pose_at(state, tick_count, time_ns)
     x_before, y_before, heading_before = pose_at(state, tick_count, time_ns - TICK_NS)
     sine, cosine = sin_cos(heading)
@@ -190,7 +191,8 @@ def take_image_in(scene: Any, world: Any, robot: Any, tick_count: Any, time_ns: 
     brightest = out.max()
     light = (255.0 - brightest) * 7.0 + 175.0 + 50.0 * flicker + (brightest - out.mean())
 
-    expose(out)
+    if parameters.adapts_exposure:
+        expose(out)
     for p in range(PIXEL_COUNT):
         out[p] += _NOISE * (2.0 * chance[p] - 1.0)
     darken_edges(out, chance[PIXEL_COUNT:])
@@ -204,13 +206,13 @@ def take_image_in(scene: Any, world: Any, robot: Any, tick_count: Any, time_ns: 
             half_width[p] = 0.5 + 0.5 * (shake + shift)
         smear(out, half_width)
     # At rest, too, each pixel takes a quarter from either neighbour.
-    before = out[0]
+    before, line_noise = out[0], parameters.camera_noise_share
     for p in range(PIXEL_COUNT):
         here = out[p]
         out[p] = 0.25 * before + 0.5 * here + 0.25 * out[min(p + 1, PIXEL_COUNT - 1)]
         before = here
     for p in range(PIXEL_COUNT):
-        out[p] = (1.0 - _LINE_NOISE) * out[p] + _LINE_NOISE * 255.0 * chance[2 * PIXEL_COUNT + p]
+        out[p] = (1.0 - line_noise) * out[p] + line_noise * 255.0 * chance[2 * PIXEL_COUNT + p]
         if is_noisy:
             out[p] = min(max(0.0, np.floor(out[p] + 0.5)), 255.0)
     return np.int64(np.floor(light + 0.5))

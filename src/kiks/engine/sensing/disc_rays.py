@@ -6,17 +6,24 @@ and the disc's normal has the cosine w/r.
 
 A reading first lists the tracks of nearby discs: their places at the last tick boundaries. Each sensor has an instant
 of its own, and from the tracks it gets the discs that it sees: four numbers for each, column, row and radius [cells],
-and brightness.
+and shade. A shade above 0 is the brightness of a plain disc. One below 0 is that of a striped robot: it holds the
+number of stripes and the heading (`shade_of`), so plain discs cost nothing more.
+
+Stripes: n black and n white ones stand around a robot, the middle of a black one ahead. So the point at the angle a
+from ahead is black where cos(n a) > 0. With z = cos(a) + i sin(a), that is the real part of z^n: multiplications alone,
+in lanes as well.
 """
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
 from kiks.engine.compiling import allocating, inlined, kernel
 from kiks.engine.grid import count_discs, is_on_floor
+from kiks.engine.numbers import sin_cos
 from kiks.engine.simd.lanes import LANES, root, store, wide
 from kiks.engine.simd.masks import anywhere, choose, holds
 from kiks.engine.simd.stack_arrays import stack_floats
@@ -35,14 +42,18 @@ ALL_SEEN_SIZE = 3072
 """Numbers for those that eight sensors see: the first `SEEN_SIZE` are of the first sensor."""
 
 PER_TRACK = 2 * (TRAIL_LENGTH + 1) + 3
-"""Numbers of a track: x and y [mm] now and at the past tick boundaries, radius [mm], brightness, and the disc."""
+"""Numbers of a track: x and y [mm] now and at the past tick boundaries, radius [mm], shade, and the disc."""
 
 TRACKS_SIZE = 1056
 """Numbers for `SEEN_LIMIT` tracks."""
 
 _ANYWHERE_MM = 1e6
 
-_RADIUS, _BRIGHTNESS, _DISC = (2 * (TRAIL_LENGTH + 1) + k for k in range(3))
+_BLACK_STRIPE, _WHITE_STRIPE = 1.0, 255.0
+_TURN_RAD = 2.0 * math.pi
+_CODE_RAD = 8.0  # more than a turn
+
+_RADIUS, _SHADE, _DISC = (2 * (TRAIL_LENGTH + 1) + k for k in range(3))
 
 
 @kernel
@@ -67,16 +78,43 @@ def follow(scene: Any, world: Any, found: Any, count: Any, x: Any, y: Any, reach
         disc, place = found[k], PER_TRACK * track_count
         if disc < robots.shape[1]:
             robot = robots[world, disc]
-            radius, brightness = kinds[robot.kind].radius_mm, np.float64(kinds[robot.kind].brightness)
+            radius, shade = kinds[robot.kind].radius_mm, shade_of(kinds[robot.kind], robot)
             moved_mm = note_track(robot, place, tracks)
         else:
             body = bodies[world, disc - robots.shape[1]]
-            radius, brightness = body.radius_mm, np.float64(body.brightness)
+            radius, shade = body.radius_mm, np.float64(body.brightness)
             moved_mm = note_track(body, place, tracks)
-        tracks[place + _RADIUS], tracks[place + _BRIGHTNESS], tracks[place + _DISC] = radius, brightness, disc
+        tracks[place + _RADIUS], tracks[place + _SHADE], tracks[place + _DISC] = radius, shade, disc
         dx, dy, far = tracks[place] - x, tracks[place + 1] - y, reach_mm + radius + moved_mm
         track_count += dx * dx + dy * dy < far * far
     return track_count
+
+
+@inlined
+def shade_of(parameters: Any, robot: Any) -> Any:
+    """Return the shade of a robot. Stripes are those of its present heading, at most 20 ms after a sensor's instant."""
+    if parameters.stripe_count == 0:
+        return np.float64(parameters.brightness)
+    turn = robot.heading_rad - _TURN_RAD * np.floor(robot.heading_rad / _TURN_RAD)
+    return -(_CODE_RAD * parameters.stripe_count + turn)
+
+
+@kernel
+def stripe_at(shade: Any, ahead: Any, aside: Any) -> Any:
+    """Return the brightness of a striped robot at a place of its rim, or at eight of them, in lanes.
+
+    Args:
+        shade: Its shade.
+        ahead: The place in the direction of x, from its centre [radii].
+        aside: The place in the direction of y.
+    """
+    count = np.int64(-shade / _CODE_RAD)
+    sine, cosine = sin_cos(-shade - _CODE_RAD * count)
+    ahead, aside = ahead * cosine + aside * sine, aside * cosine - ahead * sine
+    real, imaginary = ahead, aside
+    for _ in range(count - 1):
+        real, imaginary = real * ahead - imaginary * aside, real * aside + imaginary * ahead
+    return choose(real > 0.0, _BLACK_STRIPE, _WHITE_STRIPE)
 
 
 @kernel
@@ -135,7 +173,7 @@ def note_disc(walls: Any, tracks: Any, k: Any, x: Any, y: Any, place: Any, seen:
     per_cell = 1.0 / walls.cell_mm
     seen[place], seen[place + 1] = x * per_cell + walls.pad, y * per_cell + walls.pad
     seen[place + 2] = tracks[PER_TRACK * k + _RADIUS] * per_cell
-    seen[place + 3] = tracks[PER_TRACK * k + _BRIGHTNESS]
+    seen[place + 3] = tracks[PER_TRACK * k + _SHADE]
 
 
 @kernel
@@ -215,7 +253,13 @@ def meet_discs(
         begin, cosine_in, is_met = enter_disc(seen, k, column, row, cosine, sine)
         is_first = is_met & (begin < length)
         squarely = choose(is_first, cosine_in, squarely)
-        shade = choose(is_first, seen[PER_DISC * k + 3], shade)
+        its_shade = seen[PER_DISC * k + 3]
+        shade = choose(is_first, its_shade, shade)
+        if its_shade < 0.0:
+            per_radius = 1.0 / seen[PER_DISC * k + 2]
+            ahead = (column + begin * cosine - seen[PER_DISC * k]) * per_radius
+            aside = (row + begin * sine - seen[PER_DISC * k + 1]) * per_radius
+            shade = choose(is_first, stripe_at(its_shade, ahead, aside), shade)
         length = choose(is_first, begin, length)
     return length, squarely, shade
 

@@ -1,0 +1,109 @@
+function figures = robot_figures(name)
+% robot_figures  Read a robot definition file of KiKS 2.2.0, a script or a function that sets five constants.
+%
+%   figures = robot_figures(name) is a row of 19 numbers: the diameter of the body, the distance between the wheels, the
+%   range of the proximity sensors [mm], the places of the eight sensors on the rim and their directions [degrees from
+%   ahead, left positive]. name is my_robot.m, or my_robot if there is such a file. It is looked for in the current
+%   folder and on the path, there also in folders named robots.
+%
+%   figures is [] if name means another kind of robot.
+
+figures = [];
+[folder, base, ending] = fileparts(strrep(name, ' ', '_'));
+is_ours = isempty(folder) && any(strcmpi(base, {'khepera', 'khepera_ii'}));
+if ~any(strcmpi(ending, {'', '.m'})) || (isempty(ending) && is_ours)
+    return
+end
+file = found_file(folder, [base '.m']);
+if isempty(file)
+    if ~isempty(ending)
+        error('kiks:argument', ['KIKS_ROBOT must be a file that exists, but %s is neither in %s nor on the path, nor ' ...
+            'in a folder robots there. Look for slips in its name, or give it with its folder.'], shown(name), pwd());
+    end
+    return
+end
+names = {'KIKS_ROBOT_DIAMETER', 'KIKS_ROBOT_DISTANCE_BETWEEN_WHEELS', 'KIKS_PROXIMITY_SENSORS_RANGE', ...
+    'KIKS_PROXIMITY_POSITIONS', 'KIKS_PROXIMITY_DIRECTIONS'};
+text = fileread(file);
+values = constants_of(file, text, names);
+say_unknown([base '.m'], text, names);
+rule = @(k, low, high, what) check_figures([base '.m'], names{k}, values{k}, low, high, what);
+rule(1, 10, 500, 'a diameter [mm] from 10 to 500');
+rule(2, 1, values{1}, sprintf('a distance [mm] from 1 to the robot''s diameter, %g', values{1}));
+rule(3, 10, 500, 'a range [mm] from 10 to 500');
+for k = 4:5
+    rule(k, -360, 360, 'eight angles [degrees] from -360 to 360, one for each sensor');
+end
+figures = [values{1:3}, values{4}(:)', values{5}(:)'];
+end
+
+function file = found_file(folder, name)
+if isempty(folder)
+    folders = [{pwd()}, strsplit(path(), pathsep())];
+else
+    folders = {absolute_path(folder)};
+end
+for k = 1:numel(folders)
+    files = {fullfile(folders{k}, name), fullfile(folders{k}, 'robots', name)};
+    is_there = cellfun(@(each) exist(each, 'file') == 2, files);
+    if any(is_there)
+        file = absolute_path(files{find(is_there, 1)});
+        return
+    end
+end
+file = '';
+end
+
+function values = constants_of(file, text, names)
+% The constants are global in a function, and may be in a script. None is left over from another file.
+for k = 1:numel(names)
+    eval(['global ' names{k} '; ' names{k} ' = [];']);
+end
+[folder, base] = fileparts(file);
+here = pwd();
+try
+    if isempty(regexp(text, '^(\s*[%#][^\n]*\n)*\s*function\s', 'once'))
+        run_script(text, names);
+    else
+        cd(folder);
+        clear(base);  % what was read of it before may be out of date
+        feval(base);
+        cd(here);
+    end
+catch failure
+    cd(here);
+    error('kiks:argument', 'KIKS_ROBOT''s file %s.m must run, but it did not: %s. Mend it, or take another robot.', ...
+        base, regexprep(one_line(failure.message), '\.$', ''));
+end
+values = cell(1, numel(names));
+for k = 1:numel(names)
+    values{k} = eval(names{k});
+end
+end
+
+function run_script(kiks_text, kiks_names)
+% In a workspace of its own, as it may set any variable.
+eval(sprintf('global %s;', sprintf('%s ', kiks_names{:})));
+eval(kiks_text);
+end
+
+function say_unknown(file, text, names)
+set_ones = regexp(text, '^\s*(KIKS_\w+)\s*(\([^\n]*\)\s*)?=[^=]', 'tokens', 'lineanchors');
+for k = 1:numel(set_ones)
+    name = set_ones{k}{1};
+    if ~any(strcmp(name, names))
+        say_once([file name], sprintf('%s: %s has no effect on a robot of this KiKS.', file, name));
+    end
+end
+end
+
+function check_figures(file, name, value, low, high, what)
+count = 1 + 7 * ~isempty(strfind(name, 'POSITIONS')) + 7 * ~isempty(strfind(name, 'DIRECTIONS'));
+if isempty(value)
+    error('kiks:argument', '%s must set %s, %s, but it does not. Add it.', file, name, what);
+end
+is_right = isnumeric(value) && isreal(value) && numel(value) == count && all(value(:) >= low) && all(value(:) <= high);
+if ~is_right
+    error('kiks:argument', '%s in %s must be %s, but it was %s. Correct it.', name, file, what, shown(value));
+end
+end

@@ -1,0 +1,141 @@
+"""Robot definition files of KiKS 2.2.0, its constants of noise, light and camera, and striped robots, in Octave."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.matlab.octave import needs_octave, run
+
+from kiks.model.project import Project
+from kiks.model.robot import RobotSpec
+from kiks.sim.from_project import spec_of
+
+pytestmark = [needs_octave, pytest.mark.slow]
+
+PLACES, DIRECTIONS = [68, 43, 13, -13, -43, -68, -158, 158], [90, 45, 10, -10, -45, -90, -180, 180]
+
+SCRIPT = """\
+% A robot.
+KIKS_ROBOT_DIAMETER = 58;
+KIKS_ROBOT_DISTANCE_BETWEEN_WHEELS = 53;
+KIKS_PROXIMITY_SENSORS_RANGE = 50;
+KIKS_PROXIMITY_POSITIONS = {places};
+KIKS_PROXIMITY_DIRECTIONS = {directions};
+"""
+
+NAMES = """\
+global KIKS_ROBOT_DIAMETER KIKS_ROBOT_DISTANCE_BETWEEN_WHEELS KIKS_PROXIMITY_SENSORS_RANGE
+global KIKS_PROXIMITY_POSITIONS KIKS_PROXIMITY_DIRECTIONS
+"""
+
+
+def write(file: Path, *, turn_deg: int = 0, function: str = "", after: str = "") -> None:
+    file.parent.mkdir(exist_ok=True)
+    text = SCRIPT.format(places=[a + turn_deg for a in PLACES], directions=[a + turn_deg for a in DIRECTIONS])
+    file.write_text((f"function {function}\n{NAMES}" if function else "") + text + after, encoding="utf-8")
+
+
+READINGS = """
+global KIKS_ROBOT KIKS_NOISE
+KIKS_NOISE = 0;
+function values = reading(robot, heading)
+    global KIKS_ROBOT
+    KIKS_ROBOT = robot;
+    arena = zeros(400, 400);
+    arena(200, 200) = -heading;
+    arena(100:300, 240:250) = 1;
+    kiks_arena(arena)
+    ref = kiks_kopen;
+    kiks_pause(0.1)
+    values = kProximity(ref);
+    kiks_kclose(ref);
+end
+name = 'a variable of mine';
+say('usual', reading('mine.m', 360))
+say('short', reading('mine', 360))
+say('other', reading('quarter', 360))
+say('turned', reading('mine', 90))
+kiks_save('saved.kiks')
+say('name', name)
+say('built_in', reading('Khepera', 360))
+"""
+
+
+def test_scripts_and_functions_describe_robots(tmp_path: Path) -> None:
+    write(tmp_path / "mine.m", after="name = 1;\nKIKS_SPDC = 8.2;\n")
+    write(tmp_path / "robots" / "quarter.m", turn_deg=90, function="quarter")
+    octave = run(READINGS, tmp_path)
+    said = octave.said
+    assert max(said["usual"]) > 300
+    assert np.array_equal(said["short"], said["usual"])
+    # What is read with all sensors turned is what the same robot reads that is turned itself.
+    assert np.array_equal(said["other"], said["turned"])
+    assert not np.array_equal(said["other"], said["usual"])
+    assert not np.array_equal(said["built_in"], said["usual"])
+    assert said["name"] == "a variable of mine"
+    assert octave.line("mine.m: ") == "KIKS_SPDC has no effect on a robot of this KiKS."
+    project = Project.load(tmp_path / "saved.kiks")
+    spec = spec_of(project.robots[0], project, tmp_path)
+    assert (spec.body.diameter_mm, spec.body.pulse_mm) == (58, 0.082)
+    assert spec.proximity.mount_angle_deg == tuple(PLACES)
+    assert spec.proximity.range_mm == RobotSpec.load("khepera").proximity.range_mm
+
+
+WRONG = {
+    "KIKS_ROBOT_DIAMETER = 50;": "KIKS_ROBOT_DISTANCE_BETWEEN_WHEELS in mine.m must be a distance .* 50, but it was 53",
+    "KIKS_ROBOT_DIAMETER = 5;": "KIKS_ROBOT_DIAMETER in mine.m must be a diameter .* from 10 to 500, but it was 5",
+    "KIKS_PROXIMITY_SENSORS_RANGE = NaN;": "KIKS_PROXIMITY_SENSORS_RANGE in mine.m must be a range .* but it was NaN",
+    "KIKS_PROXIMITY_SENSORS_RANGE = 'far';": "KIKS_PROXIMITY_SENSORS_RANGE in mine.m must be .* was 'far'",
+    "KIKS_PROXIMITY_POSITIONS = [1 2 3];": "KIKS_PROXIMITY_POSITIONS in mine.m must be eight angles .* was .1 2 3.",
+    "KIKS_PROXIMITY_DIRECTIONS(3) = Inf;": "KIKS_PROXIMITY_DIRECTIONS in mine.m must be eight angles",
+    "KIKS_PROXIMITY_POSITIONS = [];": "mine.m must set KIKS_PROXIMITY_POS",
+    "error('not today')": "mine.m must run, but it did not: not today. ",
+}
+
+
+def test_a_wrong_file_is_an_error_that_names_it(tmp_path: Path) -> None:
+    program = "global KIKS_ROBOT\nKIKS_ROBOT = 'mine';\n"
+    for number, line in enumerate(WRONG):
+        program += f"write_it({number})\nsay('wrong_{number}', caught(@() kiks()))\n"
+        write(tmp_path / f"wrong_{number}.txt", after=line + "\n")
+    program += "KIKS_ROBOT = 'absent.m'; say('absent', caught(@() kiks()))\n"
+    program = "function write_it(k)\n  copyfile(sprintf('wrong_%d.txt', k), 'mine.m');\nend\n" + program
+    said = run(program, tmp_path).said
+    for number, expected in enumerate(WRONG.values()):
+        identifier, _, message = said[f"wrong_{number}"].partition("|")
+        assert identifier == "kiks:argument"
+        assert re.search(expected, message), message
+    assert "'absent.m' is neither in" in said["absent"]
+
+
+CONSTANTS = """
+global KIKS_SIM_PROX_NOISE KIKS_SIM_PROX_EEXP KIKS_SIM_LIGHT_FEXP KIKS_K213_NOISE KIKS_K213_NONORMALIZE KIKS_COLOR_ROBOT
+kiks
+say('usual', kiks('--state'))
+kiks_save('usual.kiks')
+KIKS_SIM_PROX_NOISE = 2; KIKS_SIM_PROX_EEXP = Inf; KIKS_SIM_LIGHT_FEXP = 1; KIKS_K213_NOISE = 0;
+KIKS_K213_NONORMALIZE = 1; KIKS_COLOR_ROBOT = -16;
+kiks_arena
+kiks_save('changed.kiks')
+KIKS_K213_NOISE = 101;
+say('noise', caught(@() kiks_arena()))
+KIKS_K213_NOISE = 10; KIKS_COLOR_ROBOT = -101;
+say('stripes', caught(@() kiks_arena()))
+"""
+
+
+def test_constants_of_the_old_simulator_change_robots(tmp_path: Path) -> None:
+    octave = run(CONSTANTS, tmp_path)
+    assert Project.load(tmp_path / "usual.kiks").robots[0].changes == {}
+    changes = Project.load(tmp_path / "changed.kiks").robots[0].changes
+    assert changes["body"] == {"stripe_count": 16}
+    assert changes["camera"] == {"noise_share": 0.0, "adapts_exposure": False}
+    assert changes["proximity"]["noise_exponent"] == 20
+    assert changes["proximity"]["jitter_counts"][-1] == 2 * 9.7
+    assert changes["ambient"]["angle_exponent"] > 4
+    assert "KIKS_K213_NOISE must be a share [%] from 0 to 100, but it was 101." in octave.said["noise"]
+    assert "a number of stripes from -1 to -100, or [], but it was -101." in octave.said["stripes"]
+    assert not [line for line in octave.lines if "effect" in line]
