@@ -103,4 +103,7 @@ if ~isnumeric(number) || ~isscalar(number) || ~isfinite(number) || number < 0 ||
 end
 simulator('--join', number);
 kiks_status('Joined the session. kiks_quit leaves it.', 1);
+if ~isempty(simulator('desk'))
+    poll_desk('begin');
+end
 end

@@ -142,6 +142,12 @@ class LocalConnection(Connection):
         self._now_ns = self._told_ns = self._participant.acts_from_ns = time_ns
         self._needs_time = False
 
+    def halt(self) -> None:
+        """Leave the world at once, for a person who has stopped the program: its robots stop and are free."""
+        with self._world:
+            self._participant.is_stopped = True
+            self._participant.disconnect()
+
     def rest(self) -> None:
         """Let the world run without this program until `wake`; earlier requests are still done."""
         self._is_resting = True

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,7 @@ from kiks.sim.port import VirtualPort
 from kiks.sim.simulation import Simulation
 from kiks.toolbox.session import Session
 from kiks.toolbox.session_film import SessionFilm
+from kiks.toolbox.wire_format import escape
 from kiks.units import s_from_ns
 
 ANSWER_S = 10.0
@@ -76,6 +78,8 @@ class SessionClient:
         openings: The last opening of each port in this world.
         asked: Number of the port that the present request concerns; 0 for none.
         film: The film that it makes of the world; None for none.
+        is_halted: Whether Halt was pressed on the desk, and the program does not know yet.
+        typed: Commands for the program to evaluate that people have typed on the desk, the oldest first.
     """
 
     def __init__(self, session: Session, number: int, pending: PendingAnswer | None = None) -> None:
@@ -87,6 +91,8 @@ class SessionClient:
         self.ports: dict[int, OpenPort] = {}
         self.openings: dict[int, OpenPort] = {}
         self.film: SessionFilm | None = None
+        self.is_halted = False
+        self.typed: deque[str] = deque()
         self._sim: Simulation | None = None
         self._connection: LocalConnection | None = None
         session.clients.append(self)
@@ -186,6 +192,29 @@ class SessionClient:
             )
         self.asked = number
         return opened
+
+    # ---- what people ask for on the desk ----
+
+    def halt(self) -> None:
+        """Stop the program: the request under way, or else the next one, fails; from any thread."""
+        self.is_halted = True
+        self._pending.is_cancelled = True
+        self.cancel()
+
+    def next_command(self) -> str:
+        """Return the answer that makes the program evaluate the next typed command; empty without one."""
+        return f"!{escape(self.typed.popleft())}" if self.typed else ""
+
+    def take_halt(self) -> bool:
+        """Return whether the program was halted since the last call; then its ports are closed and its robots stop."""
+        if not self.is_halted:
+            return False
+        self.is_halted = False
+        if self._connection is not None:
+            self._connection.halt()
+            self._connection = None
+        self.ports.clear()
+        return True
 
     # ---- the line ----
 

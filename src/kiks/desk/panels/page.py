@@ -10,6 +10,7 @@ from nicegui import ui
 from kiks.desk.panels.arena_view import ArenaView, Pick, Stroke
 from kiks.desk.panels.editor import EditorPanel
 from kiks.desk.panels.monitor import MonitorPanel
+from kiks.desk.panels.octave import OctavePanel
 from kiks.desk.panels.programs import ProgramsPanel
 from kiks.desk.panels.settings import SettingsPanel
 from kiks.desk.panels.time_bar import TimeBar
@@ -84,13 +85,15 @@ class Page:
         self._monitor: MonitorPanel | None = None
         self._editor: EditorPanel | None = None
         self._sleepers: dict[str, WirePanel | ProgramsPanel] = {}
-        tabs = (
+        tabs: list[tuple[str, str, Callable[[], object]]] = [
             ("robot", "Robot", lambda: self._build_monitor(feed)),
             ("wire", "Wire", lambda: self._build_sleeper("wire", WirePanel)),
             ("arena", "Arena", self._build_editor),
             ("programs", "Programs", lambda: self._build_sleeper("programs", ProgramsPanel)),
             ("settings", "Settings", lambda: SettingsPanel(desk)),
-        )
+        ]
+        if desk.outside.interpreters():
+            tabs.insert(-1, ("octave", "Octave", lambda: OctavePanel(desk)))
         with (
             ui.tabs().props("dense no-caps align=justify active-color=accent").classes("w-full desk-tabs") as self._tabs
         ):

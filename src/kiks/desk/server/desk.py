@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import threading
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +15,7 @@ from kiks.clock.gate import Gate
 from kiks.desk.server.comparison import Comparison, Instant
 from kiks.desk.server.desk_world import DeskWorld, Speedometer
 from kiks.desk.server.looking_back import LookingBack
+from kiks.desk.server.outside_programs import OutsidePrograms, PlainPrograms
 from kiks.desk.server.player import Player
 from kiks.desk.server.scripts import EXAMPLES
 from kiks.desk.server.timeline import Run
@@ -30,6 +32,9 @@ from kiks.sim.turret_host import name_of
 
 NEWS_LIMIT = 200
 """Number of messages to people that are kept."""
+
+LOG_LIMIT = 1000
+"""Number of lines of the log that are kept."""
 
 Done = TypeVar("Done")
 
@@ -60,7 +65,9 @@ class Desk:
         programs: The programs in the present world.
         is_seen: Set when a page has shown it for the first time.
         scene: Counts up whenever a thing appears, disappears or changes its looks.
+        outside: The programs in the world that this desk has not started.
         news: Messages to people, the newest last.
+        log: These and what programs of Octave and MATLAB tell, each line with the time of day, the newest last.
     """
 
     def __init__(
@@ -81,6 +88,8 @@ class Desk:
         self.may_run_programs = may_run_programs
         self.scene = 0
         self.news: RingBuffer[str] = RingBuffer(NEWS_LIMIT)
+        self.log: RingBuffer[str] = RingBuffer(LOG_LIMIT)
+        self.outside: OutsidePrograms = PlainPrograms()
         self.is_seen = threading.Event()
         self.looking = LookingBack(lambda: self.present, self.say)
         self._has_begun = not is_held
@@ -199,7 +208,13 @@ class Desk:
 
     def say(self, text: str) -> None:
         """Show a message in all browsers; from any thread."""
-        self.news.add([text])
+        self.news.append(text)
+        self.note(text)
+
+    def note(self, text: str) -> None:
+        """Write into the log; from any thread."""
+        now = time.strftime("%H:%M:%S")
+        self.log.add(f"{now} {line}" for line in text.split("\n"))
 
     async def do(self, act: Callable[[Simulation], Done]) -> Done:
         """Run a function with the locked world between two events, and return or raise its outcome.
@@ -336,6 +351,23 @@ class Desk:
         """
         world = self.shown
         await world.do(lambda _: world.set_speed(speed))
+
+    async def halt(self) -> None:
+        """Stop all programs and all robots.
+
+        Raises:
+            ParameterError: If the past is shown.
+        """
+        self.check_present()
+        for handle in list(self.programs.handles):
+            self.programs.stop(handle)
+        self.outside.halt()
+
+        def stop(sim: Simulation) -> None:
+            for wire in sim.wires:
+                wire.stop(sim.now_ns)
+
+        await self.do(stop)
 
     # ---- branches ----
 
