@@ -120,6 +120,7 @@ class Session:
                     owns_world=True,
                     may_run_programs=True,
                     new_programs=self._new_programs,
+                    has_old_coordinates=True,
                 )
                 self.desk.outside = self
                 if self._has_window:

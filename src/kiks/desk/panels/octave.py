@@ -33,7 +33,7 @@ class OctavePanel:
             self._rows = (
                 ui.log(max_lines=LOG_LIMIT)
                 .classes("w-full text-caption")
-                .style("height: 55vh")
+                .style("height: 55vh; white-space: pre-wrap")
                 .props('data-testid="log" aria-label="Log of the session"')
             )
             programs = desk.outside.interpreters()

@@ -57,6 +57,7 @@ class Desk:
         commands: Programs that start with the world, the first for robot 1 and so on; they are always permitted.
         new_programs: Factory of a world's program host; the default takes the project's settings.
         is_held: Whether programs wait for `begin`; else they start at once.
+        has_old_coordinates: Whether people see the coordinates of KiKS 2.2.0.
 
     Attributes:
         present: The world that goes on.
@@ -82,10 +83,12 @@ class Desk:
         commands: Sequence[Command | None] = (),
         new_programs: NewPrograms | None = None,
         is_held: bool = False,
+        has_old_coordinates: bool = False,
     ) -> None:
         self.folder = (Path.cwd() if folder is None else folder).resolve()
         self.owns_world = owns_world
         self.may_run_programs = may_run_programs
+        self.has_old_coordinates = has_old_coordinates
         self.scene = 0
         self.news: RingBuffer[str] = RingBuffer(NEWS_LIMIT)
         self.log: RingBuffer[str] = RingBuffer(LOG_LIMIT)
@@ -205,6 +208,11 @@ class Desk:
     def tell(self) -> None:
         """Make all browsers load the scene again: a thing has appeared, disappeared or changed its looks."""
         self.scene += 1
+
+    def show_old_coordinates(self, are_old: bool) -> None:
+        """Show the coordinates and the numbers of sensors of KiKS 2.2.0, or those of this KiKS."""
+        self.has_old_coordinates = are_old
+        self.tell()
 
     def say(self, text: str) -> None:
         """Show a message in all browsers; from any thread."""

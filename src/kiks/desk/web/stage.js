@@ -1,6 +1,7 @@
 /* The stage: both views of the arena in one element, with pointer and keyboard, drawn for each picture of the screen.
    It does not depend on Vue; arena_view.js is its component. */
 
+import { shownPlace } from "./coordinates.js";
 import { pageFeed } from "./feed.js";
 import { Hand } from "./hand.js";
 import { KEYS_HELP, pressKey } from "./keys.js";
@@ -305,6 +306,7 @@ export class Stage {
       return;
     }
     const { x_mm, y_mm } = placeOf(this.feed.frame, thing.what, thing.index);
-    this.live.textContent = `${nameOf(this.feed.scene, thing)} selected, at ${Math.round(x_mm)}, ${Math.round(y_mm)} mm`;
+    const [x, y] = shownPlace(this.feed.scene, x_mm, y_mm).map(Math.round);
+    this.live.textContent = `${nameOf(this.feed.scene, thing)} selected, at ${x}, ${y} mm`;
   }
 }
