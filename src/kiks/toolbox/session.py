@@ -121,6 +121,7 @@ class Session:
                     may_run_programs=True,
                     new_programs=self._new_programs,
                     has_old_coordinates=True,
+                    project_of=lambda arena: self.settings.project_of(arena),
                 )
                 self.desk.outside = self
                 if self._has_window:
@@ -242,7 +243,7 @@ class Session:
     def mark(self) -> None:
         """Take a checkpoint."""
         if self.desk is not None:
-            asyncio.run(self.desk.mark())
+            asyncio.run(self.desk.mark_present())
 
     def reset(self) -> None:
         """Restore the checkpoint.
@@ -250,7 +251,7 @@ class Session:
         Raises:
             LinkError: If there is no world.
         """
-        asyncio.run(self._present_desk().reset())
+        asyncio.run(self._present_desk().reset_present())
 
     def present_project(self) -> Project:
         """Return the project with the present poses.
@@ -258,7 +259,8 @@ class Session:
         Raises:
             LinkError: If there is no world.
         """
-        return asyncio.run(self._present_desk().present_project())
+        desk = self._present_desk()
+        return asyncio.run(desk.present_project(desk.present))
 
     # ---- the thread that moves the world ----
 

@@ -16,6 +16,7 @@ from kiks.desk.panels.settings import SettingsPanel
 from kiks.desk.panels.time_bar import TimeBar
 from kiks.desk.panels.time_controls import TimePanel
 from kiks.desk.panels.view import ViewPanel
+from kiks.desk.panels.widgets import told
 from kiks.desk.panels.wire import WirePanel
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.live_editing import Editing
@@ -69,7 +70,7 @@ class Page:
         with ui.splitter(value=64, limits=(30, 100)).classes("desk-body") as halves:
             with halves.before, ui.column().classes("desk-stage"):
                 with ui.element("div").classes("desk-arena"):
-                    self._view = ArenaView(feed, on_pick=self._pick, on_draw=self._draw)
+                    self._view = ArenaView(feed, on_pick=self._pick, on_draw=self._draw, on_remove=self._remove)
                     ui.label(HINT if desk.past is None else PAST_HINT).classes("desk-hint")
                 TimeBar(desk, feed)
             with halves.after, ui.column().classes("w-full gap-0 no-wrap"):
@@ -141,6 +142,11 @@ class Page:
         """Pass a stroke to the editor."""
         if self._editor is not None:
             await self._editor.draw(stroke)
+
+    @told
+    async def _remove(self, x_mm: float, y_mm: float) -> None:
+        """Remove the selected thing."""
+        await self._editing.remove(x_mm, y_mm)
 
     def _tell_news(self) -> None:
         first, news = self._desk.news.since(self._told)

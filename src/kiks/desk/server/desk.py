@@ -20,6 +20,7 @@ from kiks.desk.server.player import Player
 from kiks.desk.server.scripts import EXAMPLES
 from kiks.desk.server.timeline import Run
 from kiks.errors import KiksError, LinkError, ParameterError
+from kiks.model.arena import Arena
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, robot_names
 from kiks.ports.program_process import Command, Permission, commands_of
@@ -58,6 +59,7 @@ class Desk:
         new_programs: Factory of a world's program host; the default takes the project's settings.
         is_held: Whether programs wait for `begin`; else they start at once.
         has_old_coordinates: Whether people see the coordinates of KiKS 2.2.0.
+        project_of: Makes the project of an arena that people open.
 
     Attributes:
         present: The world that goes on.
@@ -84,11 +86,13 @@ class Desk:
         new_programs: NewPrograms | None = None,
         is_held: bool = False,
         has_old_coordinates: bool = False,
+        project_of: Callable[[Arena], Project] = Project.of_arena,
     ) -> None:
         self.folder = (Path.cwd() if folder is None else folder).resolve()
         self.owns_world = owns_world
         self.may_run_programs = may_run_programs
         self.has_old_coordinates = has_old_coordinates
+        self.project_of = project_of
         self.scene = 0
         self.news: RingBuffer[str] = RingBuffer(NEWS_LIMIT)
         self.log: RingBuffer[str] = RingBuffer(LOG_LIMIT)
@@ -315,14 +319,14 @@ class Desk:
         while self._retired:
             self._retired.pop().close()
 
-    async def present_project(self) -> Project:
-        """Return the project with the present poses.
+    async def present_project(self, world: DeskWorld | None = None) -> Project:
+        """Return the project with the poses in a world: the one that is shown if left out.
 
         Raises:
             ArenaError: If there is no room for a thing that a gripper holds up.
         """
-        sim, project = self.sim, self.project
-        return replace(await self.do(lambda _: project_of(sim, project)), speed=self.present.gate.speed)
+        world, project = world or self.shown, self.project
+        return replace(await world.do(lambda sim: project_of(sim, project)), speed=self.present.gate.speed)
 
     # ---- time ----
 
@@ -441,7 +445,12 @@ class Desk:
         Raises:
             ParameterError: If the past is shown.
         """
-        self._mark = await self.change(lambda sim: sim.checkpoint())
+        self.check_present()
+        await self.mark_present()
+
+    async def mark_present(self) -> None:
+        """Do that even if the past is shown."""
+        self._mark = await self.present.do(lambda sim: sim.checkpoint())
 
     async def reset(self) -> None:
         """Restore the last checkpoint, or the initial state; time and programs go on.
@@ -449,12 +458,17 @@ class Desk:
         Raises:
             ParameterError: If the past is shown.
         """
+        self.check_present()
+        await self.reset_present()
+
+    async def reset_present(self) -> None:
+        """Do that even if the past is shown."""
 
         def restore(sim: Simulation) -> None:
             self.present.drop_all()
             sim.reset(self._mark)
 
-        await self.change(restore)
+        await self.present.do(restore)
 
     # ---- hands ----
 

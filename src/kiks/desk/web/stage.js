@@ -37,6 +37,10 @@ export class Stage {
     this._tell = {
       pick: (pick) => tell("pick", pick),
       draw: (stroke) => tell("draw", stroke),
+      remove: ({ what, index }) => {
+        const { x_mm, y_mm } = placeOf(this.feed.frame, what, index);
+        tell("remove", { x_mm, y_mm });
+      },
       view: () => this.topView.keepView(),
       fit: () => this.fit(),
     };
