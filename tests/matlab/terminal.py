@@ -30,9 +30,10 @@ class Terminal:
     Args:
         folder: Where it runs, and where its sessions are found.
         environment: Variables of the environment besides those that there are.
+        edits_lines: Whether Octave edits the lines that are typed, as it does for people.
     """
 
-    def __init__(self, folder: Path, environment: dict[str, str] | None = None) -> None:
+    def __init__(self, folder: Path, environment: dict[str, str] | None = None, *, edits_lines: bool = False) -> None:
         assert OCTAVE is not None
         self.doors = folder / "doors"
         self.doors.mkdir(mode=0o700)
@@ -42,7 +43,8 @@ class Terminal:
         self.number, self._end = pty.fork()
         if self.number == 0:
             os.chdir(folder)
-            os.execve(OCTAVE, [OCTAVE, "--no-gui", "-qf", "--no-line-editing", "--no-history"], own)
+            plain = [] if edits_lines else ["--no-line-editing"]
+            os.execve(OCTAVE, [OCTAVE, "--no-gui", "-qf", *plain, "--no-history"], own)
         self._text = ""
         self._questions = 0
         self.type(BEGIN)

@@ -31,15 +31,15 @@ SLICE_NS = NS_PER_S
 
 
 class PendingAnswer(Protocol):
-    """State of the answer that a program waits for.
+    """State of the answer that a program waits for."""
 
-    Attributes:
-        is_cancelled: Whether the program has stopped waiting.
-        is_held: Whether the program has yet to confirm that it waits; until then its pause must not go on.
-    """
+    @property
+    def is_cancelled(self) -> bool:
+        """Whether the program has stopped waiting."""
 
-    is_cancelled: bool
-    is_held: bool
+    @property
+    def is_held(self) -> bool:
+        """Whether the program has yet to confirm that it waits; until then its pause must not go on."""
 
 
 @dataclass
@@ -113,9 +113,11 @@ class LocalConnection(Connection):
 
     def _check_at_gate(self) -> None:
         gate = self._programs.sim.gate
-        if threading.get_ident() == self._thread or not self._pending.is_cancelled:
+        is_own = threading.get_ident() == self._thread
+        if is_own or not self._pending.is_cancelled:
             assert gate is not None
             gate.leave(self._check_at_gate)
+        if is_own:
             self._check_pending()
 
     def _check_pending(self) -> None:

@@ -119,7 +119,7 @@ class SessionClient:
             self._sim = sim
         if self._connection is None:
             assert session.desk is not None
-            self._connection = LocalConnection(session.desk.programs, self.name, self.number, self._pending)
+            self._connection = LocalConnection(session.desk.programs, self.name, self.number, self)
         if not self.ports:
             self._connection.wake()
             # A new clock, so that the time without an open port does not count as thinking.
@@ -198,8 +198,17 @@ class SessionClient:
     def halt(self) -> None:
         """Stop the program: the request under way, or else the next one, fails; from any thread."""
         self.is_halted = True
-        self._pending.is_cancelled = True
         self.cancel()
+
+    @property
+    def is_cancelled(self) -> bool:
+        """Whether nothing waits for the answer under way."""
+        return self.is_halted or self._pending.is_cancelled
+
+    @property
+    def is_held(self) -> bool:
+        """Whether the program has yet to confirm that it waits; until then its pause must not go on."""
+        return self._pending.is_held
 
     def next_command(self) -> str:
         """Return the answer that makes the program evaluate the next typed command; empty without one."""
@@ -282,7 +291,7 @@ class SessionClient:
         return 0 if film is None else film.save(lambda done, count: self._check_pending())
 
     def _check_pending(self) -> None:
-        if self._pending.is_cancelled:
+        if self.is_cancelled:
             raise LinkError("the film must be waited for, but the program was interrupted: it is lost.")
 
     # ---- time ----
