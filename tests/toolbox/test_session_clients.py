@@ -776,6 +776,7 @@ def test_a_program_is_not_disturbed_by_people_who_look_back(session: Session, tm
     ask("checkpoint")
     ask("pause 3")
     here = ask("pose 1")
+    ask("close 1")
     asyncio.run(session.desk.looking.look_at(0))
     ask(f"save {tmp_path / 'now.kiks'}")
     ask("reset")
