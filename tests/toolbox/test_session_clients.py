@@ -733,12 +733,11 @@ def test_an_idle_program_is_halted_without_an_error(session: Session) -> None:
 
 def test_a_typed_command_comes_before_the_answer(session: Session) -> None:
     ask = begun(session)
-    assert ask.client.next_command() == ""
     session.evaluate(1, "x = 'a\\b'\ny = 2")
     session.evaluate(1, "z = 3")
     assert ask.client.next_command() == r"!x = 'a\\b'\ny = 2"
     assert ask.client.next_command() == "!z = 3"
-    assert ask.client.next_command() == ""
+    assert not ask.client.typed
     ask("typed z = 3\\n")
     assert session.desk is not None
     lines = [line[9:] for line in session.desk.log.since(0)[1]]

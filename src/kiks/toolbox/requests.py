@@ -67,15 +67,16 @@ def answer(client: SessionClient, line: str) -> str:
             raise ParameterError(
                 f"a request must have at most {WORDS_MAX} characters, but this one, {shown(name)}, has {len(words)}."
             )
-        if act is not _poll:
-            _check_halt(client)
+        if client.is_halted and act is not _poll:
+            raise HaltError(HALTED)
         result = act(client, words)
         if len(result) > ANSWER_MAX:
             raise ParameterError(
                 f"an answer must have at most {ANSWER_MAX} characters, but this one, to {shown(name)}, has "
                 f"{len(result)}. Ask for less: a path begins anew when the port is opened anew."
             )
-        _check_halt(client)
+        if client.is_halted:
+            raise HaltError(HALTED)
         return f"+{client.clock()}{result}"
     except KiksError as error:
         why = HALTED if client.take_halt() else str(error)
@@ -89,11 +90,6 @@ def answer(client: SessionClient, line: str) -> str:
     if len(why) > REASON_MAX:
         why = f"{why[: REASON_MAX // 2]} ... {why[-REASON_MAX // 4 :]}"
     return f"-{client.clock()}{escape(why)}"
-
-
-def _check_halt(client: SessionClient) -> None:
-    if client.take_halt():
-        raise HaltError(HALTED)
 
 
 # ---- the desk ----

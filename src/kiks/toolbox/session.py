@@ -122,6 +122,7 @@ class Session:
                     new_programs=self._new_programs,
                     has_old_coordinates=True,
                     project_of=lambda arena: self.settings.project_of(arena),
+                    log_limit=self.settings.log_lines,
                 )
                 self.desk.outside = self
                 if self._has_window:

@@ -211,8 +211,8 @@ class SessionClient:
         return self._pending.is_held
 
     def next_command(self) -> str:
-        """Return the answer that makes the program evaluate the next typed command; empty without one."""
-        return f"!{escape(self.typed.popleft())}" if self.typed else ""
+        """Return the answer that makes the program evaluate the next typed command; there is one."""
+        return f"!{escape(self.typed.popleft())}"
 
     def take_halt(self) -> bool:
         """Return whether the program was halted since the last call; then its ports are closed and its robots stop."""

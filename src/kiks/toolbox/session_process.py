@@ -106,7 +106,7 @@ class SessionProcess:
                     self._announce()
                     for line in exchange.lines():
                         # A program evaluates a typed command first, and then sends its request again.
-                        exchange.reply(client.next_command() or answer(client, line))
+                        exchange.reply(client.next_command() if client.typed else answer(client, line))
         finally:
             self._heartbeat.acts.remove(exchange.beat)
             with self._lock:

@@ -6,7 +6,10 @@ from nicegui import ui
 
 from kiks.desk.panels.console import History
 from kiks.desk.panels.widgets import icon_button, told
-from kiks.desk.server.desk import LOG_LIMIT, Desk
+from kiks.desk.server.desk import Desk
+
+ROWS_MAX = 10_000
+"""Maximum number of lines of the log in the page."""
 
 REFRESH_S = 0.25
 """Refresh period of the log and of the list of programs [s]."""
@@ -28,12 +31,13 @@ class OctavePanel:
         self._desk = desk
         self._history = History()
         self._next_line = 0
+        ui.add_css(".kiks-log * { white-space: pre-wrap; overflow-wrap: anywhere }")
         with ui.column().classes("w-full q-pa-sm gap-2"):
             ui.label("Log").classes("text-subtitle2")
             self._rows = (
-                ui.log(max_lines=LOG_LIMIT)
-                .classes("w-full text-caption")
-                .style("height: 55vh; white-space: pre-wrap")
+                ui.log(max_lines=ROWS_MAX)
+                .classes("w-full text-caption kiks-log")
+                .style("height: 55vh")
                 .props('data-testid="log" aria-label="Log of the session"')
             )
             programs = desk.outside.interpreters()

@@ -35,7 +35,7 @@ NEWS_LIMIT = 200
 """Number of messages to people that are kept."""
 
 LOG_LIMIT = 1000
-"""Number of lines of the log that are kept."""
+"""Number of lines of the log that are kept, unless a program asks for another."""
 
 Done = TypeVar("Done")
 
@@ -60,6 +60,7 @@ class Desk:
         is_held: Whether programs wait for `begin`; else they start at once.
         has_old_coordinates: Whether people see the coordinates of KiKS 2.2.0.
         project_of: Makes the project of an arena that people open.
+        log_limit: Number of lines of the log that are kept.
 
     Attributes:
         present: The world that goes on.
@@ -87,6 +88,7 @@ class Desk:
         is_held: bool = False,
         has_old_coordinates: bool = False,
         project_of: Callable[[Arena], Project] = Project.of_arena,
+        log_limit: int = LOG_LIMIT,
     ) -> None:
         self.folder = (Path.cwd() if folder is None else folder).resolve()
         self.owns_world = owns_world
@@ -95,7 +97,7 @@ class Desk:
         self.project_of = project_of
         self.scene = 0
         self.news: RingBuffer[str] = RingBuffer(NEWS_LIMIT)
-        self.log: RingBuffer[str] = RingBuffer(LOG_LIMIT)
+        self.log: RingBuffer[str] = RingBuffer(log_limit)
         self.outside: OutsidePrograms = PlainPrograms()
         self.is_seen = threading.Event()
         self.looking = LookingBack(lambda: self.present, self.say)
