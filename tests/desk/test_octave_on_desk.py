@@ -90,6 +90,7 @@ def test_what_is_typed_on_the_desk_is_evaluated_in_octave(terminal: Terminal, ne
     page = begin(terminal, new_page)
     page.get_by_test_id("tab-octave").click()
     expect(page.get_by_test_id("log")).to_contain_text("The world is shown at")
+    expect(page.get_by_test_id("log")).not_to_contain_text("token")
     before = terminal.ask("hex2dec(kiks('--state')(1:8))")
     # At the prompt, in the middle of a line that a person types.
     os.write(terminal.end, b"y = x +")

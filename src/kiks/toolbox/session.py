@@ -184,9 +184,9 @@ class Session:
         client.typed.append(command)
 
     def log(self, text: str) -> None:
-        """Write into the log of the desk."""
+        """Write into the log of the desk, without the token of its address: a page shows that nowhere."""
         if self.desk is not None:
-            self.desk.note(text)
+            self.desk.note(text.replace(self.url, self.url.partition("?")[0]) if self.url else text)
 
     def trace(self) -> None:
         """Record the paths of all robots in this world from now on."""
