@@ -119,7 +119,8 @@ while true
         is_behind = false;
         evaluate_typed(unescaped(answer(2:end)), strcmp(request, 'poll'));
         if isempty(link)
-            error('kiks:session', 'The simulator must run to answer, but a command typed on the desk has ended it.');
+            error('kiks:session', ['The simulator must run to answer, but a command typed on the desk has ended it. ' ...
+                'Start another one with kiks(ARENA).']);
         end
         line = [request line_feed];
         is_behind = true;

@@ -88,6 +88,8 @@ def test_halt_reaches_a_program_that_speaks_tcp(tmp_path: Path, new_page: NewPag
 
 def test_what_is_typed_on_the_desk_is_evaluated_in_octave(terminal: Terminal, new_page: NewPage) -> None:
     page = begin(terminal, new_page)
+    terminal.type("kiks_print('half way')")
+    expect(page.locator(".desk-hint")).to_contain_text("half way")
     page.get_by_test_id("tab-octave").click()
     expect(page.get_by_test_id("log")).to_contain_text("The world is shown at")
     expect(page.get_by_test_id("log")).not_to_contain_text("token")

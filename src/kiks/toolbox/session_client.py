@@ -291,7 +291,7 @@ class SessionClient:
         return 0 if film is None else film.save(lambda done, count: self._check_pending())
 
     def _check_pending(self) -> None:
-        if self.is_cancelled:
+        if self._pending.is_cancelled:
             raise LinkError("the film must be waited for, but the program was interrupted: it is lost.")
 
     # ---- time ----

@@ -57,7 +57,7 @@ class Page:
     def __init__(self, desk: Desk, editing: Editing, number: int) -> None:
         self._desk = desk
         self._editing = editing
-        self._told = desk.news.count
+        self._told, self._logged = desk.news.count, desk.log.count
         feed = f"/desk/{number}/feed"
         ui.colors(primary=PRIMARY, accent=ACCENT, positive=POSITIVE)
         ui.add_head_html(MEMORY)
@@ -71,7 +71,7 @@ class Page:
             with halves.before, ui.column().classes("desk-stage"):
                 with ui.element("div").classes("desk-arena"):
                     self._view = ArenaView(feed, on_pick=self._pick, on_draw=self._draw, on_remove=self._remove)
-                    ui.label(HINT if desk.past is None else PAST_HINT).classes("desk-hint")
+                    self._hint = ui.label(HINT if desk.past is None else PAST_HINT).classes("desk-hint")
                 TimeBar(desk, feed)
             with halves.after, ui.column().classes("w-full gap-0 no-wrap"):
                 self._build_tabs(feed)
@@ -153,3 +153,7 @@ class Page:
         self._told = first + len(news)
         for text in news:
             ui.notify(text, multi_line=True, close_button="OK", timeout=8000)
+        _, lines = self._desk.log.since(max(self._logged, self._desk.log.count - 1))
+        if lines and self._desk.outside.interpreters():
+            # The last line of the log stands there, as in the window of KiKS 2.2.0.
+            self._hint.set_text(lines[-1])
