@@ -520,7 +520,7 @@ def test_random_requests_get_an_answer(
             # What is wrong with a file says the reader of files.
             assert len(words) <= 80 or words[:81] not in told or name in ("read", "record", "save")
     assert ask("active") == "1"
-    for setting in ("seed", "robot", "robots", "response", "turrets", "thinking", "programs", "latency_s"):
+    for setting in ("seed", "robot", "robots", "response", "turrets", "thinking", "programs", "latency_s", "log_lines"):
         ask(f"set {setting} ")
     ask("world default")
     ask("open 1 9600")
