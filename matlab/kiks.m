@@ -104,4 +104,7 @@ end
 simulator('--join', number);
 simulator(own_turrets('find'));
 kiks_status('Joined the session. kiks_quit leaves it.', 1);
+if ~isempty(simulator('desk'))
+    poll_desk('begin');
+end
 end

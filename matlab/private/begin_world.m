@@ -30,6 +30,7 @@ if is_new
     address = simulator('desk');
     if ~isempty(address)
         kiks_status(['The world is shown at ' address], 1);
+        poll_desk('begin');
     end
 end
 end

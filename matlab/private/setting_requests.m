@@ -46,6 +46,7 @@ requests = {
     sprintf('set light_exponent %.17g', min(p.KIKS_SIM_LIGHT_FEXP, 10^6))
     sprintf('set camera_noise_percent %.17g', p.KIKS_K213_NOISE)
     sprintf('set fixed_shutter %d', ~isempty(p.KIKS_K213_NONORMALIZE))
+    sprintf('set log_lines %d', p.KIKS_LOG_HISTORY)
     }';
 end
 

@@ -9,6 +9,7 @@ function payload = simulator(request, argument)
 %   simulator('--is-running', [])      true if this Octave or MATLAB has one
 %   simulator('--clock', port)     time of a port [s] from the last answer; [] if that was another port's, or
 %                                  thinking is measured and it was more than a few milliseconds ago
+%   simulator('--poll', [])            evaluates what people have typed on the desk
 %
 %   Four frames a second announce a slow answer; between two of them Octave handles Ctrl-C. What
 %   Ctrl-C left unread is skipped before the next request.
@@ -24,6 +25,14 @@ if nargin > 1
                 if told(1) == argument || (told(1) == -argument && toc(answered) < 0.005)
                     payload = told(2);
                 end
+            end
+        case '--poll'
+            % While the program is at its prompt: what it knows of the time stays. In MATLAB a timer may come in the
+            % middle of a request.
+            if ~isempty(link) && (link.is_pipe || ~is_behind)
+                kept = {answer, answered};
+                simulator('poll');
+                [answer, answered] = kept{:};
             end
         case '--is-running'
             payload = ~isempty(link);
@@ -96,13 +105,26 @@ while true
         is_behind = false;
         is_ready = link.is_polled;
         answered = tic();
-        if answer(9) == '-'
-            error('kiks:simulator', '%s', unescaped(answer(29:end)));
+        if answer(9) == '!'
+            % A person has typed a command on the desk: it is evaluated first, and then the request is sent again.
+            evaluate_typed(unescaped(answer(10:end)), strcmp(request, 'poll'));
+            if isempty(link)
+                error('kiks:session', ['The simulator must run to answer, but a command typed on the desk has ended ' ...
+                    'it. Start another one with kiks(ARENA).']);
+            end
+            payload = simulator(request);
+            return
         end
         payload = answer(29:end);
         if answer(9) == '?'
             % An order for a turret of this program. Its function may send requests of its own.
             payload = simulator(own_turrets('call', payload));
+        elseif answer(9) == '-'
+            text = unescaped(payload);
+            if strncmp(text, 'Simulation halted', 17)
+                open_ports('remove', 0);
+            end
+            error('kiks:simulator', '%s', text);
         end
         return
     end

@@ -23,6 +23,10 @@ class LinkError(KiksError, OSError):
     """A port is unknown, busy or closed, or the robot's answer is not the one expected."""
 
 
+class HaltError(LinkError):
+    """A person has halted the program on the desk."""
+
+
 class WorkError(KiksError, RuntimeError):
     """An evaluation cannot be had: the work raises, or its workers are lost again and again."""
 

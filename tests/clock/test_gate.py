@@ -13,7 +13,7 @@ import pytest
 import kiks
 from kiks.clock.gate import LAG_NS, SLICE_NS, Gate
 from kiks.clock.pace import Pace
-from kiks.errors import ParameterError
+from kiks.errors import HaltError, ParameterError
 from kiks.model.arena import Pose
 from kiks.sim.drag import Drags
 
@@ -264,3 +264,27 @@ def test_other_robots_may_push_a_dragged_robot() -> None:
         drags.turn("a", step / 10)
         sim.run(0.05)
     assert abs(sim.pose(1)[1] - 38) < 60
+
+
+def test_halt_ends_the_wait_of_the_program_once() -> None:
+    """The program waits in a world that stands still, which nothing else would end."""
+    sim = kiks.Simulation()
+    sim.gate = gate = Gate(sim.lock)
+    gate.pause(sim.now_ns)
+    told: list[str] = []
+
+    def pause() -> None:
+        try:
+            sim.run(10)
+        except HaltError as error:
+            told.append(str(error))
+
+    thread = threading.Thread(target=pause)
+    thread.start()
+    gate.halt()
+    thread.join(GUARD_S)
+    assert told == ["Halt was pressed on the desk: the program and the robots are stopped."]
+    gate.set_speed(None, sim.now_ns)
+    gate.go_on()
+    sim.run(1)
+    assert sim.time_s == 1

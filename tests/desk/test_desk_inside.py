@@ -107,7 +107,47 @@ def test_mistake_in_a_program_is_shown_by_its_line(visitor: Visitor) -> None:
     visitor.picture("mistake_in_a_program")
 
 
+# ---- above the arena ----
+
+
+def test_halt_stops_programs_and_robots(visitor: Visitor) -> None:
+    visitor.tab("wire")
+    visitor.choose("wire-robot", "robot 2")
+    visitor.at("console").fill("D,4,4")
+    visitor.at("console").press("Enter")
+    visitor.tab("programs")
+    visitor.choose("script", "example: avoid")
+    expect(visitor.page.locator(".cm-content")).to_contain_text("Braitenberg")
+    visitor.at("run-program").click()
+    visitor.until(lambda: setpoints(visitor) != [0, 0] and setpoints(visitor, 2) == [4, 4])
+    visitor.at("halt").click()
+    visitor.told("All programs and all robots are stopped.")
+    expect(visitor.at("programs")).to_contain_text("avoid.py on robot 1: stopped")
+    visitor.until(lambda: setpoints(visitor) == setpoints(visitor, 2) == [0, 0])
+
+
+def test_places_and_sensors_in_the_coordinates_of_kiks_2(visitor: Visitor) -> None:
+    """From the upper left corner of 600 x 400 mm; x and y count from 1 in the middle of the first millimetre."""
+    expect(visitor.at("facts")).to_contain_text("x 150.0, y 200.0 mm")
+    visitor.tab("settings")
+    visitor.at("old-coordinates").click()
+    visitor.tab("robot")
+    expect(visitor.at("facts")).to_contain_text("x 150.5, y 200.5 mm")
+    visitor.page.mouse.click(*visitor.on_page(450, 300))
+    expect(visitor.at("facts")).to_contain_text("x 450.5, y 100.5 mm")
+    expect(visitor.page.locator(".kiks-chip-name").last).to_have_text("8")
+    visitor.at("proximity-0").click()
+    expect(visitor.at("explanation-text")).to_contain_text("Sensor 1 (left 90) of robot 2")
+
+
 # ---- Arena ----
+
+
+def test_delete_removes_what_is_selected(visitor: Visitor) -> None:
+    visitor.page.mouse.click(*visitor.on_page(300, 100))
+    visitor.page.keyboard.press("Delete")
+    visitor.until(lambda: len(visitor.sim.bodies()) == 1)
+    assert visitor.sim.robot_count == 2
 
 
 def test_wall_is_drawn_saved_and_opened_again(visitor: Visitor) -> None:

@@ -30,19 +30,25 @@ class Terminal:
     Args:
         folder: Where it runs, and where its sessions are found.
         environment: Variables of the environment besides those that there are.
+        edits_lines: Whether Octave edits the lines that are typed, as it does for people.
+
+    Attributes:
+        number: Of Octave's process.
+        end: Descriptor of this end of the terminal.
     """
 
-    def __init__(self, folder: Path, environment: dict[str, str] | None = None) -> None:
+    def __init__(self, folder: Path, environment: dict[str, str] | None = None, *, edits_lines: bool = False) -> None:
         assert OCTAVE is not None
         self.doors = folder / "doors"
         self.doors.mkdir(mode=0o700)
         hidden = ("DISPLAY", "WAYLAND_DISPLAY", "KIKS_COMMAND", "KIKS_TRANSPORT")
         own = {name: value for name, value in os.environ.items() if name not in hidden}
         own |= {"KIKS_WINDOW": "0", "XDG_RUNTIME_DIR": str(self.doors), **(environment or {})}
-        self.number, self._end = pty.fork()
+        self.number, self.end = pty.fork()
         if self.number == 0:
             os.chdir(folder)
-            os.execve(OCTAVE, [OCTAVE, "--no-gui", "-qf", "--no-line-editing", "--no-history"], own)
+            plain = [] if edits_lines else ["--no-line-editing"]
+            os.execve(OCTAVE, [OCTAVE, "--no-gui", "-qf", *plain, "--no-history"], own)
         self._text = ""
         self._questions = 0
         self.type(BEGIN)
@@ -54,17 +60,17 @@ class Terminal:
     def __exit__(self, *_: object) -> None:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self.number, signal.SIGKILL)
-        os.close(self._end)
+        os.close(self.end)
         with contextlib.suppress(ChildProcessError):
             os.waitpid(self.number, 0)
 
     def type(self, line: str) -> None:
         """Type a line."""
-        os.write(self._end, f"{line}\n".encode())
+        os.write(self.end, f"{line}\n".encode())
 
     def press_ctrl_c(self) -> None:
         """Press Ctrl-C: the foreground processes of the terminal get SIGINT."""
-        os.write(self._end, CTRL_C)
+        os.write(self.end, CTRL_C)
 
     def wait_for(self, pattern: str, seconds: float = GUARD_S) -> str:
         """Wait for a printed text and return it; earlier output is dropped."""
@@ -100,9 +106,9 @@ class Terminal:
         return [int(child) for child in children if state(int(child)) != "Z"]
 
     def _hear(self, seconds: float) -> None:
-        if select.select([self._end], [], [], seconds)[0]:
+        if select.select([self.end], [], [], seconds)[0]:
             try:
-                self._text += os.read(self._end, 1 << 16).decode(errors="replace")
+                self._text += os.read(self.end, 1 << 16).decode(errors="replace")
             except OSError as error:
                 raise AssertionError(f"Octave has ended:\n{self._text}") from error
 

@@ -167,6 +167,21 @@ def test_client_of_a_robot_in_use_is_rejected(caplog: pytest.LogCaptureFixture) 
     assert sim.wires[0].holder == "a program in this process"
 
 
+def test_dropped_clients_are_disconnected_and_others_may_come() -> None:
+    tcp = TcpEndpoint(0)
+    with served([tcp]) as run:
+        client = socket.create_connection(("127.0.0.1", tcp.port), timeout=GUARD_S)
+        client.sendall(b"E\n")
+        assert client.recv(1) == b"e"
+        run.server.drop_clients()
+        while client.recv(100):
+            pass
+        client.close()
+        with socket.create_connection(("127.0.0.1", tcp.port), timeout=GUARD_S) as another:
+            another.sendall(b"E\n")
+            assert another.recv(1) == b"e"
+
+
 def test_lag_is_logged_once(caplog: pytest.LogCaptureFixture) -> None:
     wall = WallClock()
     pace = Pace(4.0, wall_ns=wall)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 import threading
 import time
 import tracemalloc
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib import resources
 from pathlib import Path
@@ -14,6 +15,7 @@ import numpy as np
 import pytest
 from tests.served import GUARD_S
 
+from kiks.errors import ParameterError
 from kiks.model.arena import Arena
 from kiks.ports.local_link import AwaitedAnswer
 from kiks.sim.simulation import Simulation
@@ -518,7 +520,7 @@ def test_random_requests_get_an_answer(
             # What is wrong with a file says the reader of files.
             assert len(words) <= 80 or words[:81] not in told or name in ("read", "record", "save")
     assert ask("active") == "1"
-    for setting in ("seed", "robot", "robots", "response", "turrets", "thinking", "programs", "latency_s"):
+    for setting in ("seed", "robot", "robots", "response", "turrets", "thinking", "programs", "latency_s", "log_lines"):
         ask(f"set {setting} ")
     ask("world default")
     ask("open 1 9600")
@@ -633,3 +635,152 @@ def test_an_interrupted_film_is_given_up(tmp_path: Path) -> None:
         pending.is_cancelled = True
         assert "the film must be waited for, but the program was interrupted" in ask.refused("film_save")
         assert not list(tmp_path.iterdir())
+
+
+# ---- what people do on the desk ----
+
+
+def halt(session: Session) -> None:
+    """Press Halt: in another thread than that of a program."""
+    assert session.desk is not None
+    desk = session.desk
+    presses = threading.Thread(target=lambda: asyncio.run(desk.halt()))
+    presses.start()
+    presses.join(GUARD_S)
+
+
+def wait_until(fact: Callable[[], bool]) -> None:
+    end_s = time.monotonic() + GUARD_S
+    while not fact():
+        assert time.monotonic() < end_s
+
+
+def set_points(session: Session) -> list[list[int]]:
+    points: list[list[int]] = session.world.world.state.robots["speed_setpoint"][0].tolist()
+    return points
+
+
+@pytest.mark.parametrize("is_paused", [False, True])
+def test_halt_ends_a_long_pause_and_stops_the_robot(session: Session, is_paused: bool) -> None:
+    """Also in a world that stands still, where the pause would never end."""
+    ask = begun(session)
+    assert session.desk is not None
+    desk, told, drives = session.desk, list[str](), threading.Event()
+
+    def drive() -> None:
+        ask("open 1 9600")
+        ask("ask 1 D,9,7")
+        asyncio.run(desk.pause() if is_paused else desk.set_speed(1.0))
+        drives.set()
+        told.append(ask.told("pause 100000"))
+
+    thread = threading.Thread(target=drive)
+    thread.start()
+    assert drives.wait(GUARD_S)
+    while not told:
+        halt(session)
+        thread.join(0.1)
+    assert told[0][0] == "-"
+    assert told[0][HEAD:].startswith("Simulation halted: Halt was pressed on the desk.")
+    asyncio.run(desk.go_on())
+    asyncio.run(desk.set_speed(None))
+    ask.told("time 1")
+    assert "must be open" in ask.refused("ask 1 N")
+    ask("open 1 9600")
+    ask("pause 0.5")
+    assert ask("ask 1 E") == "e,0,0"
+    assert set_points(session) == [[0, 0]]
+
+
+def test_halt_stops_every_program_at_its_next_request(session: Session) -> None:
+    codes = np.zeros((500, 500))
+    codes[249, 129], codes[249, 369] = -360, -90
+    first = begun(session, world=f"matrix {matrix_text(codes)}")
+    second = Asker(session, 2)
+    told: list[str] = []
+
+    def loop(ask: Asker) -> None:
+        ask("open 1 9600")
+        while (answer := ask.told("ask 1 D,5,5"))[0] == "+":
+            pass
+        told.append(answer[HEAD:])
+        told.append(ask.refused("ask 1 D,9,9"))
+
+    threads = [threading.Thread(target=loop, args=(ask,)) for ask in (first, second)]
+    for thread in threads:
+        thread.start()
+    wait_until(lambda: set_points(session) == [[5, 5], [5, 5]])
+    halt(session)
+    for thread in threads:
+        thread.join(GUARD_S)
+    assert sum(text.startswith("Simulation halted") for text in told) == 2
+    assert sum("port -1 must be open" in text for text in told) == 2
+    wait_until(lambda: set_points(session) == [[0, 0], [0, 0]])
+    first("open 1 9600")
+
+
+def test_an_idle_program_is_halted_without_an_error(session: Session) -> None:
+    ask = begun(session)
+    ask("open 1 9600")
+    ask("ask 1 D,5,5")
+    halt(session)
+    assert ask("poll") == ""
+    assert ask("time 1") == ""
+    ask("open 1 9600")
+    ask("pause 0.5")
+    assert ask("ask 1 E") == "e,0,0"
+
+
+def test_a_typed_command_comes_before_the_answer(session: Session) -> None:
+    ask = begun(session)
+    session.evaluate(1, "x = 'a\\b'\ny = 2")
+    session.evaluate(1, "z = 3")
+    assert ask.client.next_command() == r"!x = 'a\\b'\ny = 2"
+    assert ask.client.next_command() == "!z = 3"
+    assert not ask.client.typed
+    ask("typed z = 3\\n")
+    assert session.desk is not None
+    lines = [line[9:] for line in session.desk.log.since(0)[1]]
+    assert lines == [r">> x = 'a\b'", "y = 2", ">> z = 3", "z = 3", ""]
+    for number, command, rule in ((2, "x", "must be for a program that takes part"), (1, "", "1 to 10000 characters")):
+        with pytest.raises(ParameterError, match=rule):
+            session.evaluate(number, command)
+
+
+def test_polls_let_no_time_pass(session: Session) -> None:
+    ask = begun(session, "thinking live")
+    ask("open 1 9600")
+    ask("ask 1 N")
+    before_ns = session.world.now_ns
+    with session.world.lock:
+        for _ in range(100):
+            ask("poll")
+        assert session.world.now_ns == before_ns
+
+
+def test_an_arena_of_the_desk_gets_the_settings_of_the_session(session: Session) -> None:
+    begun(session, "turrets gripper", "seed 9")
+    assert session.desk is not None
+    project = session.desk.project_of(Arena.box(300, 300))
+    assert (project.seed, project.robots[0].turrets, session.desk.has_old_coordinates) == (9, ("gripper",), True)
+
+
+def test_a_program_is_not_disturbed_by_people_who_look_back(session: Session, tmp_path: Path) -> None:
+    """It takes and restores checkpoints of the present, and saves the present world."""
+    ask = begun(session)
+    assert session.desk is not None
+    session.desk.keep_past()
+    ask("open 1 9600")
+    ask("ask 1 D,5,5")
+    ask("checkpoint")
+    ask("pause 3")
+    here = ask("pose 1")
+    ask("close 1")
+    asyncio.run(session.desk.looking.look_at(0))
+    ask(f"save {tmp_path / 'now.kiks'}")
+    ask("reset")
+    assert session.desk.past is not None
+    asyncio.run(session.desk.looking.back_to_now())
+    assert ask("pose 1") != here
+    ask(f"world file {tmp_path / 'now.kiks'}")
+    assert ask.numbers("pose 1")[:2] == pytest.approx([float(word) for word in here.split()][:2], abs=0.1)

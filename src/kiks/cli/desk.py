@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from collections.abc import Callable
 from dataclasses import replace
@@ -14,7 +15,7 @@ from kiks.cli.engine_start import ready_engine
 from kiks.cli.options import is_project, parse_turret, parse_words, show_log, with_robots
 from kiks.cli.record import RecordFile, recorded
 from kiks.ending import end_as_with_ctrl_c
-from kiks.errors import ParameterError
+from kiks.errors import HaltError, ParameterError
 
 if TYPE_CHECKING:
     from kiks.desk.server.desk import Desk
@@ -156,6 +157,7 @@ def open_desk(
         goes_on: Whether time passes by itself after that.
         programs_ended: Called with the world, locked, when its programs have ended.
     """
+    from kiks.desk.server.outside_programs import PlainPrograms
     from kiks.desk.server.show import Driver, Shown
 
     shown = Shown(desk, host=host, port=port)
@@ -169,7 +171,10 @@ def open_desk(
             _wait_for(desk.is_seen)
         desk.begin()
         if work is not None:
-            work()
+            desk.outside = PlainPrograms(desk.gate.halt)
+            with contextlib.suppress(HaltError):
+                work()
+            desk.outside = PlainPrograms()
         if goes_on:
             Driver(desk, programs_ended).run()
         _wait_for(threading.Event())

@@ -18,6 +18,7 @@ from typing import Any, TypeVar
 
 from kiks.clock.pace import Pace
 from kiks.clock.patience import Patience
+from kiks.errors import HaltError
 from kiks.units import NS_PER_S, TICK_NS
 
 SLICE_NS = NS_PER_S // 50
@@ -73,7 +74,7 @@ class Gate:
         self._held_ns = 0
         self._requests: deque[tuple[Callable[[], Any], Future[Any]]] = deque()
         self._keepers: list[Callable[[], None]] = []
-        self._is_closed = False
+        self._is_closed = self._is_halting = False
         self.pace = Pace(speed, wall_ns=wall_ns)
         self._update_is_up()
 
@@ -142,6 +143,11 @@ class Gate:
             self._keepers.remove(keeper)
         self._update_is_up()
 
+    def halt(self) -> None:
+        """Raise an error in the thread that lets time pass, or else in the first one that does."""
+        self._is_halting = True
+        self._update_is_up()
+
     def close(self) -> None:
         """Let time pass freely from now on, and do the requests."""
         self._is_closed = True
@@ -167,10 +173,17 @@ class Gate:
         """Wait until time may pass; return the time up to which it may [ns]: `until_ns`, or less, and then ask again.
 
         The caller holds the lock; waiting releases it.
+
+        Raises:
+            HaltError: If `halt` was called.
         """
         with self._changed:
             while True:
                 self._do_requests()
+                if self._is_halting:
+                    self._is_halting = False
+                    self._update_is_up()
+                    raise HaltError("Halt was pressed on the desk: the program and the robots are stopped.")
                 if self._is_closed or now_ns >= until_ns:
                     return until_ns
                 pace = self.pace
@@ -194,7 +207,7 @@ class Gate:
 
     def _update_is_up(self) -> None:
         self.is_up = not self._is_closed and bool(
-            self._requests or self._keepers or self.pace.is_held or self.pace.speed is not None
+            self._requests or self._keepers or self._is_halting or self.pace.is_held or self.pace.speed is not None
         )
 
     def _wait(self, seconds: float) -> None:

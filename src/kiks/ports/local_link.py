@@ -31,15 +31,15 @@ SLICE_NS = NS_PER_S
 
 
 class PendingAnswer(Protocol):
-    """State of the answer that a program waits for.
+    """State of the answer that a program waits for."""
 
-    Attributes:
-        is_cancelled: Whether the program has stopped waiting.
-        is_held: Whether the program has yet to confirm that it waits; until then its pause must not go on.
-    """
+    @property
+    def is_cancelled(self) -> bool:
+        """Whether the program has stopped waiting."""
 
-    is_cancelled: bool
-    is_held: bool
+    @property
+    def is_held(self) -> bool:
+        """Whether the program has yet to confirm that it waits; until then its pause must not go on."""
 
 
 @dataclass
@@ -113,9 +113,11 @@ class LocalConnection(Connection):
 
     def _check_at_gate(self) -> None:
         gate = self._programs.sim.gate
-        if threading.get_ident() == self._thread or not self._pending.is_cancelled:
+        is_own = threading.get_ident() == self._thread
+        if is_own or not self._pending.is_cancelled:
             assert gate is not None
             gate.leave(self._check_at_gate)
+        if is_own:
             self._check_pending()
 
     def _check_pending(self) -> None:
@@ -141,6 +143,12 @@ class LocalConnection(Connection):
         """Set the program's time to that of the world [ns], after the program has moved the world itself."""
         self._now_ns = self._told_ns = self._participant.acts_from_ns = time_ns
         self._needs_time = False
+
+    def halt(self) -> None:
+        """Leave the world at once, for a person who has stopped the program: its robots stop and are free."""
+        with self._world:
+            self._participant.is_stopped = True
+            self._participant.disconnect()
 
     def rest(self) -> None:
         """Let the world run without this program until `wake`; earlier requests are still done."""

@@ -15,6 +15,10 @@ from kiks.ports.program_scheduler import Participant, ProgramScheduler
 from kiks.sim.local_line import claim
 from kiks.sim.read_completion import NEVER_NS, end_of_read, end_of_wait, is_complete, never_ends
 from kiks.sim.simulation import Simulation
+from kiks.units import NS_PER_S
+
+STOPPING_NS = NS_PER_S // 2
+"""Time that a robot's wheels have to come to rest when its program was stopped [ns]."""
 
 _log = logging.getLogger("kiks.run")
 
@@ -275,9 +279,12 @@ class ProgramParticipant(Participant):
             wires[robot - 1].hang_up()
         self._robots.clear()
         if self.is_stopped:
-            for robot in {self.robot, *self._used}:
+            now_ns = self._world.now_ns
+            for robot in {self.robot, *self._used} - {0}:
                 if wires[robot - 1].holder is None:
-                    wires[robot - 1].halt(self._world.now_ns)
+                    wires[robot - 1].halt(now_ns)
+            # Without another program nothing else would let the time pass that the wheels take to stop.
+            self._scheduler.note_seen(now_ns + STOPPING_NS)
 
     def _answer(self, now_ns: int, *, robot: int = 0, number: int = 0, is_good: bool = True, data: bytes = b"") -> None:
         """Answer a request, so the program goes on."""

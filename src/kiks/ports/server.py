@@ -105,6 +105,11 @@ class Server:
                 for key, events in ready:
                     key.data(events)
 
+    def drop_clients(self) -> None:
+        """Disconnect all clients soon; from any thread. Their robots drive on."""
+        for link in self._links.values():
+            link.is_dropped = link.channel is not None
+
     def close(self) -> None:
         """Disconnect all clients, close all endpoints and remove their files."""
         with self.sim.lock:

@@ -193,6 +193,11 @@ class Wire:
             self.think(self.thinks_since_ns, now_ns)
         self.thinks_since_ns = None
 
+    def stop(self, now_ns: int) -> None:
+        """Stop the wheels while a program may be using the line, for a person; the program gets no reply to that."""
+        # The first terminator ends a command of which the program has sent a part.
+        self.send(b"\n" + STOP, now_ns, ignore_reply)
+
     def halt(self, now_ns: int) -> None:
         """Stop the wheels and free the line, for a program that a user has stopped."""
         self.hang_up()

@@ -41,6 +41,7 @@ class Settings(OldConstants):
         brightness: Brightness of robots; None for that of their file.
         programs: Number of programs that start together; with 1, each starts as it joins.
         latency_s: Extra time of each exchange [s], as measured by a calibration.
+        log_lines: Number of lines of the log that the desk keeps, from the first world on.
     """
 
     seed: Annotated[Seed, _NUMBER] = 0
@@ -58,6 +59,7 @@ class Settings(OldConstants):
     brightness: Annotated[Brightness, _NUMBER] | None = None
     programs: Annotated[Count, _NUMBER] = 1
     latency_s: Annotated[Number, Field(ge=0, le=10), _NUMBER] = 0.0
+    log_lines: Annotated[Whole, Field(ge=1, le=1_000_000), _NUMBER] = 1000
 
     def changed(self, name: str, value: str) -> Settings:
         """Return a copy with one changed value; an empty text stands for the default.

@@ -6,7 +6,7 @@ import logging
 from collections.abc import Callable
 from pathlib import Path
 
-from kiks.errors import KiksError, ParameterError, shown
+from kiks.errors import HaltError, KiksError, ParameterError, shown
 from kiks.model.arena import Arena
 from kiks.model.arena_file import save_arena
 from kiks.model.kad import save_kad
@@ -43,6 +43,11 @@ PATH_MAX = 4000
 PAUSE_MAX_S = 1e6
 """Longest pause [s]: eleven days."""
 
+HALTED = (
+    "Simulation halted: Halt was pressed on the desk. The robots stop, and the ports are closed. kiks_kopen opens them "
+    "again."
+)
+
 _log = logging.getLogger("kiks.toolbox")
 
 Act = Callable[[SessionClient, str], str]
@@ -63,18 +68,22 @@ def answer(client: SessionClient, line: str) -> str:
             raise ParameterError(
                 f"a request must have at most {WORDS_MAX} characters, but this one, {shown(name)}, has {len(words)}."
             )
+        if client.is_halted and act is not _poll:
+            raise HaltError(HALTED)
         result = act(client, words)
         if len(result) > ANSWER_MAX:
             raise ParameterError(
                 f"an answer must have at most {ANSWER_MAX} characters, but this one, to {shown(name)}, has "
                 f"{len(result)}. Ask for less: a path begins anew when the port is opened anew."
             )
+        if client.is_halted:
+            raise HaltError(HALTED)
         return f"+{client.clock()}{result}"
     except TurretOrder as asked:
         number, order = asked.args
         return f"?{client.clock()}{number} {escape(order)}"
     except KiksError as error:
-        why = str(error)
+        why = HALTED if client.take_halt() else str(error)
     except OSError as error:
         why = f"{shown(name)} must be able to use its file, but is not: {shown(error.strerror)}. Give another."
     except MemoryError:
@@ -85,6 +94,21 @@ def answer(client: SessionClient, line: str) -> str:
     if len(why) > REASON_MAX:
         why = f"{why[: REASON_MAX // 2]} ... {why[-REASON_MAX // 4 :]}"
     return f"-{client.clock()}{escape(why)}"
+
+
+# ---- the desk ----
+
+
+def _poll(client: SessionClient, words: str) -> str:
+    """Do nothing but let an idle program, at its prompt, take what people have typed; it has nothing to be halted."""
+    client.take_halt()
+    return ""
+
+
+def _typed(client: SessionClient, words: str) -> str:
+    """Show what a typed command has printed."""
+    client.session.log(unescape(words))
+    return ""
 
 
 # ---- worlds ----
@@ -144,8 +168,7 @@ def _save(client: SessionClient, words: str) -> str:
 
 
 def _print(client: SessionClient, words: str) -> str:
-    if client.session.desk is not None:
-        client.session.desk.say(unescape(words))
+    client.session.log(unescape(words))
     return ""
 
 
@@ -244,6 +267,8 @@ REQUESTS: dict[str, Act] = {
     "world": _world,
     "active": lambda client, words: str(int(client.session.desk is not None)),
     "desk": lambda client, words: client.session.url,
+    "poll": _poll,
+    "typed": _typed,
     "save": _save,
     "read": lambda client, words: matrix_text(Arena.load(_path(words)).brightness[::-1]),
     "print": _print,

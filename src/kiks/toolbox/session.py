@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import threading
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from kiks.clock.gate import Gate
-from kiks.errors import LinkError
+from kiks.errors import LinkError, ParameterError
 from kiks.model.arena import Arena
 from kiks.model.project import Project
 from kiks.ports.program_process import Command
@@ -35,8 +36,19 @@ PATH_PERIOD_S = 0.04
 """Time between two points of a path [s]: KiKS moved its robot 25 times a second (kiks-behaviour.md 7.1)."""
 
 
-class ThinkingClient(Protocol):
-    """A client whose thinking time can pass as it happens."""
+COMMAND_MAX = 10_000
+"""Longest command for Octave or MATLAB [characters]."""
+
+
+class Client(Protocol):
+    """A client as the session sees it."""
+
+    number: int
+    name: str
+    typed: deque[str]
+
+    def halt(self) -> None:
+        """Stop the program."""
 
     def live(self, time_ns: int) -> bool:
         """Let time pass [ns] while the program thinks; return whether it did."""
@@ -60,7 +72,7 @@ class Session:
     def __init__(self, *, ready: Callable[[], None] = lambda: None, has_window: bool = False) -> None:
         self.settings = Settings()
         self.desk: Desk | None = None
-        self.clients: list[ThinkingClient] = []
+        self.clients: list[Client] = []
         self.owners: dict[int, object] = {}
         self.lock = threading.RLock()
         self._ready = ready
@@ -108,7 +120,11 @@ class Session:
                     owns_world=True,
                     may_run_programs=True,
                     new_programs=self._new_programs,
+                    has_old_coordinates=True,
+                    project_of=lambda arena: self.settings.project_of(arena),
+                    log_limit=self.settings.log_lines,
                 )
+                self.desk.outside = self
                 if self._has_window:
                     self._show()
             else:
@@ -136,6 +152,41 @@ class Session:
             self.begin(Project.load(path), Path(path).parent)
         else:
             self.begin_arena(Arena.load(path))
+
+    # ---- what people do on the desk ----
+
+    def halt(self) -> None:
+        """Halt all programs of Octave and MATLAB."""
+        for client in self.clients[:]:
+            client.halt()
+
+    def interpreters(self) -> dict[int, str]:
+        """Return the names of these programs, each of which evaluates commands, by their numbers."""
+        return {client.number: client.name for client in self.clients[:]}
+
+    def evaluate(self, number: int, command: str) -> None:
+        """Let one of them evaluate a command at its next request, or at its prompt.
+
+        Raises:
+            ParameterError: If it is not there, or the command is empty or too long.
+        """
+        client = next((each for each in self.clients[:] if each.number == number), None)
+        if client is None:
+            raise ParameterError(
+                f"a command must be for a program that takes part, but program {number} has left. Choose another one."
+            )
+        if not 0 < len(command) <= COMMAND_MAX:
+            raise ParameterError(
+                f"a command must have 1 to {COMMAND_MAX} characters, but it has {len(command)}. Write a function and "
+                "call it."
+            )
+        self.log(f">> {command}")
+        client.typed.append(command)
+
+    def log(self, text: str) -> None:
+        """Write into the log of the desk, without the token of its address: a page shows that nowhere."""
+        if self.desk is not None:
+            self.desk.note(text.replace(self.url, self.url.partition("?")[0]) if self.url else text)
 
     def trace(self) -> None:
         """Record the paths of all robots in this world from now on."""
@@ -193,7 +244,7 @@ class Session:
     def mark(self) -> None:
         """Take a checkpoint."""
         if self.desk is not None:
-            asyncio.run(self.desk.mark())
+            asyncio.run(self.desk.mark_present())
 
     def reset(self) -> None:
         """Restore the checkpoint.
@@ -201,7 +252,7 @@ class Session:
         Raises:
             LinkError: If there is no world.
         """
-        asyncio.run(self._present_desk().reset())
+        asyncio.run(self._present_desk().reset_present())
 
     def present_project(self) -> Project:
         """Return the project with the present poses.
@@ -209,7 +260,8 @@ class Session:
         Raises:
             LinkError: If there is no world.
         """
-        return asyncio.run(self._present_desk().present_project())
+        desk = self._present_desk()
+        return asyncio.run(desk.present_project(desk.present))
 
     # ---- the thread that moves the world ----
 

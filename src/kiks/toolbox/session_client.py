@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +20,7 @@ from kiks.sim.simulation import Simulation
 from kiks.toolbox.own_turrets import OwnTurret, TurretOrder, turret_of
 from kiks.toolbox.session import Session
 from kiks.toolbox.session_film import SessionFilm
+from kiks.toolbox.wire_format import escape
 from kiks.units import s_from_ns
 
 ANSWER_S = 10.0
@@ -78,6 +80,8 @@ class SessionClient:
         asked: Number of the port that the present request concerns; 0 for none.
         film: The film that it makes of the world; None for none.
         turrets: The names of the turrets that are functions of the program, by their numbers.
+        is_halted: Whether Halt was pressed on the desk, and the program does not know yet.
+        typed: Commands for the program to evaluate that people have typed on the desk, the oldest first.
     """
 
     def __init__(self, session: Session, number: int, pending: PendingAnswer | None = None) -> None:
@@ -90,6 +94,8 @@ class SessionClient:
         self.openings: dict[int, OpenPort] = {}
         self.film: SessionFilm | None = None
         self.turrets: dict[int, str] = {}
+        self.is_halted = False
+        self.typed: deque[str] = deque()
         self._sim: Simulation | None = None
         self._connection: LocalConnection | None = None
         session.clients.append(self)
@@ -116,7 +122,7 @@ class SessionClient:
             self._sim = sim
         if self._connection is None:
             assert session.desk is not None
-            self._connection = LocalConnection(session.desk.programs, self.name, self.number, self._pending)
+            self._connection = LocalConnection(session.desk.programs, self.name, self.number, self)
         if not self.ports:
             self._connection.wake()
             # A new clock, so that the time without an open port does not count as thinking.
@@ -192,6 +198,38 @@ class SessionClient:
             )
         self.asked = number
         return opened
+
+    # ---- what people ask for on the desk ----
+
+    def halt(self) -> None:
+        """Stop the program: the request under way, or else the next one, fails; from any thread."""
+        self.is_halted = True
+        self.cancel()
+
+    @property
+    def is_cancelled(self) -> bool:
+        """Whether nothing waits for the answer under way."""
+        return self.is_halted or self._pending.is_cancelled
+
+    @property
+    def is_held(self) -> bool:
+        """Whether the program has yet to confirm that it waits; until then its pause must not go on."""
+        return self._pending.is_held
+
+    def next_command(self) -> str:
+        """Return the answer that makes the program evaluate the next typed command; there is one."""
+        return f"!{escape(self.typed.popleft())}"
+
+    def take_halt(self) -> bool:
+        """Return whether the program was halted since the last call; then its ports are closed and its robots stop."""
+        if not self.is_halted:
+            return False
+        self.is_halted = False
+        if self._connection is not None:
+            self._connection.halt()
+            self._connection = None
+        self.ports.clear()
+        return True
 
     # ---- the line ----
 

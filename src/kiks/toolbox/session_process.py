@@ -105,7 +105,8 @@ class SessionProcess:
                 if exchange.greet(self.address.line()):
                     self._announce()
                     for line in exchange.lines():
-                        exchange.reply(answer(client, line))
+                        # A program evaluates a typed command first, and then sends its request again.
+                        exchange.reply(client.next_command() if client.typed else answer(client, line))
         finally:
             self._heartbeat.acts.remove(exchange.beat)
             with self._lock:

@@ -99,6 +99,7 @@ class ArenaView(
         view: The first view.
         on_pick: Called with each click that is not a drag.
         on_draw: Called with each stroke of a tool.
+        on_remove: Called with the place of a thing that a person removes [mm].
 
     Raises:
         ParameterError: If there is no such view.
@@ -111,6 +112,7 @@ class ArenaView(
         view: View = "top",
         on_pick: Callable[[Pick], Any] | None = None,
         on_draw: Callable[[Stroke], Any] | None = None,
+        on_remove: Callable[[float, float], Any] | None = None,
     ) -> None:
         super().__init__()
         ui.add_css(_WEB / "arena_view.css")
@@ -124,6 +126,8 @@ class ArenaView(
             self.on("pick", lambda event: on_pick(_pick(event)))
         if on_draw is not None:
             self.on("draw", lambda event: on_draw(_stroke(event)))
+        if on_remove is not None:
+            self.on("remove", lambda event: on_remove(float(event.args["x_mm"]), float(event.args["y_mm"])))
 
     def set_view(self, view: View) -> None:
         """Show the arena from above ('top'), in 3-D ('solid') or 'both'.

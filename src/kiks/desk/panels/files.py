@@ -91,12 +91,17 @@ class FilesPanel:
         name = self._choice.value
         if not name:
             raise ParameterError("A file must be chosen first. Save one, or open an example.")
-        await self._begin(await asyncio.to_thread(self._folder.open, name))
+        await self._open_file(name, await asyncio.to_thread(self._folder.open, name))
         self._name.value = str(PurePosixPath(name).with_suffix(".kiks"))
 
     @told
     async def _open_example(self) -> None:
         await self._begin(EXAMPLES[str(self._example.value)]())
+
+    async def _open_file(self, name: str, read: Project) -> None:
+        """Begin the world of a file: a project, or an arena, to which the desk adds what is not in the file."""
+        is_project = PurePosixPath(name).suffix.lower() == ".kiks"
+        await self._begin(read if is_project else self._desk.project_of(read.arena))
 
     async def _begin(self, project: Project) -> None:
         await self._desk.replace(project)
@@ -135,7 +140,7 @@ class FilesPanel:
             arena = Arena.from_array(raster, mm_per_pixel=mm_per_pixel, name=PurePosixPath(name).stem[:100])
             await self._editing.begin(arena)
         else:
-            await self._begin(await asyncio.to_thread(decode, name, data))
+            await self._open_file(name, await asyncio.to_thread(decode, name, data))
 
 
 async def _agrees(question: str) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 from nicegui import ui
@@ -169,6 +170,8 @@ class MonitorPanel:
             return explain(number, reading.sensor)
 
         why = await self._desk.do(explained)
+        if self._desk.has_old_coordinates:
+            why = replace(why, sensor=why.sensor + 1)
         if reading != self._reading:
             self._reading = reading
             self._view.set_chosen(reading)

@@ -10,11 +10,13 @@ from nicegui import ui
 from kiks.desk.panels.arena_view import ArenaView, Pick, Stroke
 from kiks.desk.panels.editor import EditorPanel
 from kiks.desk.panels.monitor import MonitorPanel
+from kiks.desk.panels.octave import OctavePanel
 from kiks.desk.panels.programs import ProgramsPanel
 from kiks.desk.panels.settings import SettingsPanel
 from kiks.desk.panels.time_bar import TimeBar
 from kiks.desk.panels.time_controls import TimePanel
 from kiks.desk.panels.view import ViewPanel
+from kiks.desk.panels.widgets import told
 from kiks.desk.panels.wire import WirePanel
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.live_editing import Editing
@@ -55,7 +57,7 @@ class Page:
     def __init__(self, desk: Desk, editing: Editing, number: int) -> None:
         self._desk = desk
         self._editing = editing
-        self._told = desk.news.count
+        self._told, self._logged = desk.news.count, desk.log.count
         feed = f"/desk/{number}/feed"
         ui.colors(primary=PRIMARY, accent=ACCENT, positive=POSITIVE)
         ui.add_head_html(MEMORY)
@@ -68,8 +70,8 @@ class Page:
         with ui.splitter(value=64, limits=(30, 100)).classes("desk-body") as halves:
             with halves.before, ui.column().classes("desk-stage"):
                 with ui.element("div").classes("desk-arena"):
-                    self._view = ArenaView(feed, on_pick=self._pick, on_draw=self._draw)
-                    ui.label(HINT if desk.past is None else PAST_HINT).classes("desk-hint")
+                    self._view = ArenaView(feed, on_pick=self._pick, on_draw=self._draw, on_remove=self._remove)
+                    self._hint = ui.label(HINT if desk.past is None else PAST_HINT).classes("desk-hint")
                 TimeBar(desk, feed)
             with halves.after, ui.column().classes("w-full gap-0 no-wrap"):
                 self._build_tabs(feed)
@@ -84,13 +86,15 @@ class Page:
         self._monitor: MonitorPanel | None = None
         self._editor: EditorPanel | None = None
         self._sleepers: dict[str, WirePanel | ProgramsPanel] = {}
-        tabs = (
+        tabs: list[tuple[str, str, Callable[[], object]]] = [
             ("robot", "Robot", lambda: self._build_monitor(feed)),
             ("wire", "Wire", lambda: self._build_sleeper("wire", WirePanel)),
             ("arena", "Arena", self._build_editor),
             ("programs", "Programs", lambda: self._build_sleeper("programs", ProgramsPanel)),
             ("settings", "Settings", lambda: SettingsPanel(desk)),
-        )
+        ]
+        if desk.outside.interpreters():
+            tabs.insert(-1, ("octave", "Octave", lambda: OctavePanel(desk)))
         with (
             ui.tabs().props("dense no-caps align=justify active-color=accent").classes("w-full desk-tabs") as self._tabs
         ):
@@ -139,8 +143,17 @@ class Page:
         if self._editor is not None:
             await self._editor.draw(stroke)
 
+    @told
+    async def _remove(self, x_mm: float, y_mm: float) -> None:
+        """Remove the selected thing."""
+        await self._editing.remove(x_mm, y_mm)
+
     def _tell_news(self) -> None:
         first, news = self._desk.news.since(self._told)
         self._told = first + len(news)
         for text in news:
             ui.notify(text, multi_line=True, close_button="OK", timeout=8000)
+        _, lines = self._desk.log.since(max(self._logged, self._desk.log.count - 1))
+        if lines and self._desk.outside.interpreters():
+            # The last line of the log stands there, as in the window of KiKS 2.2.0.
+            self._hint.set_text(lines[-1])

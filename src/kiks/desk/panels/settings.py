@@ -36,8 +36,8 @@ MATLAB_KIKS_SETTINGS = """
 **The settings of the Matlab KiKS.**
 *Time mode* and *CPU*: thinking `live` with a factor, above. *Time acceleration*: the speed above the arena.
 *Movement limit* and *interpolation limit*: not needed, motion is exact at any speed. *Fast sensors*: sensor
-model `fast`. *Grid*, *redraw* and *visualization*: the layers button above the arena. *KiKSnet*: several robots in one
-world, each with its own program, and `kiks serve` for programs in any language.
+model `fast`. *Grid*, *redraw* (clear trails) and *visualization*: the layers button above the arena. *KiKSnet*:
+several robots in one world, each with its own program, and `kiks serve` for programs in any language.
 """
 
 
@@ -52,6 +52,9 @@ class SettingsPanel:
         self._desk = desk
         self._rows: list[_RobotRow] = []
         with ui.column().classes("w-full q-pa-md gap-3"):
+            old = ui.switch("Coordinates of KiKS 2.2.0", value=desk.has_old_coordinates)
+            old.props("data-testid=old-coordinates").on_value_change(lambda: desk.show_old_coordinates(bool(old.value)))
+            old.tooltip("x is a column and y a row of the arena's matrix, so y points down; sensors are 1 to 8")
             self._build_settings()
             ui.label("Robots").classes("text-subtitle1")
             self._table = ui.column().classes("w-full gap-1")

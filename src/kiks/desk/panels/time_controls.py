@@ -72,6 +72,7 @@ class TimePanel:
         icon_button("skip_next", "Step", "step", self._step, look=BAR).tooltip(
             "Run for one step, then pause (key: .). The key , goes back by one step"
         )
+        icon_button("dangerous", "Halt", "halt", self._halt, look=BAR).tooltip("Halt: stop all programs and all robots")
         self._step_s = _select(STEPS, 0.01, "Size of a step", "step-size", "5rem")
         self._speed = _select(SPEEDS, self._shown_speed(), "Speed of time", "speed", "8.5rem")
         self._speed.on_value_change(self._set_speed)
@@ -105,6 +106,11 @@ class TimePanel:
     async def _toggle(self) -> None:
         await (self._desk.go_on() if self._desk.is_paused else self._desk.pause())
         self._refresh()
+
+    @told
+    async def _halt(self) -> None:
+        await self._desk.halt()
+        ui.notify("All programs and all robots are stopped.")
 
     @told
     async def _step(self) -> None:

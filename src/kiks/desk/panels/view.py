@@ -32,7 +32,7 @@ HELP = """
 
 * Space: run and pause. `.`: one step.
 * On the arena (press Tab to reach it): `n` selects the next thing, arrows move it by 10 mm (with Shift 1 mm),
-  `q` and `e` turn it by 5 degrees, Escape deselects it; `+` `-` `0`: zoom in, zoom out, show all.
+  `q` and `e` turn it by 5 degrees, Delete removes it, Escape deselects it; `+` `-` `0`: zoom in, zoom out, show all.
 * In the program editor: Ctrl-Enter runs; Tab indents, and leaves the editor after Escape.
 """
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import threading
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -14,10 +15,12 @@ from kiks.clock.gate import Gate
 from kiks.desk.server.comparison import Comparison, Instant
 from kiks.desk.server.desk_world import DeskWorld, Speedometer
 from kiks.desk.server.looking_back import LookingBack
+from kiks.desk.server.outside_programs import OutsidePrograms, PlainPrograms
 from kiks.desk.server.player import Player
 from kiks.desk.server.scripts import EXAMPLES
 from kiks.desk.server.timeline import Run
 from kiks.errors import KiksError, LinkError, ParameterError
+from kiks.model.arena import Arena
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, robot_names
 from kiks.ports.program_process import Command, Permission, commands_of
@@ -30,6 +33,9 @@ from kiks.sim.turret_host import name_of
 
 NEWS_LIMIT = 200
 """Number of messages to people that are kept."""
+
+LOG_LIMIT = 1000
+"""Number of lines of the log that are kept, unless a program asks for another."""
 
 Done = TypeVar("Done")
 
@@ -52,6 +58,9 @@ class Desk:
         commands: Programs that start with the world, the first for robot 1 and so on; they are always permitted.
         new_programs: Factory of a world's program host; the default takes the project's settings.
         is_held: Whether programs wait for `begin`; else they start at once.
+        has_old_coordinates: Whether people see the coordinates of KiKS 2.2.0.
+        project_of: Makes the project of an arena that people open.
+        log_limit: Number of lines of the log that are kept.
 
     Attributes:
         present: The world that goes on.
@@ -60,7 +69,9 @@ class Desk:
         programs: The programs in the present world.
         is_seen: Set when a page has shown it for the first time.
         scene: Counts up whenever a thing appears, disappears or changes its looks.
+        outside: The programs in the world that this desk has not started.
         news: Messages to people, the newest last.
+        log: These and what programs of Octave and MATLAB tell, each line with the time of day, the newest last.
     """
 
     def __init__(
@@ -75,12 +86,19 @@ class Desk:
         commands: Sequence[Command | None] = (),
         new_programs: NewPrograms | None = None,
         is_held: bool = False,
+        has_old_coordinates: bool = False,
+        project_of: Callable[[Arena], Project] = Project.of_arena,
+        log_limit: int = LOG_LIMIT,
     ) -> None:
         self.folder = (Path.cwd() if folder is None else folder).resolve()
         self.owns_world = owns_world
         self.may_run_programs = may_run_programs
+        self.has_old_coordinates = has_old_coordinates
+        self.project_of = project_of
         self.scene = 0
         self.news: RingBuffer[str] = RingBuffer(NEWS_LIMIT)
+        self.log: RingBuffer[str] = RingBuffer(log_limit)
+        self.outside: OutsidePrograms = PlainPrograms()
         self.is_seen = threading.Event()
         self.looking = LookingBack(lambda: self.present, self.say)
         self._has_begun = not is_held
@@ -197,9 +215,20 @@ class Desk:
         """Make all browsers load the scene again: a thing has appeared, disappeared or changed its looks."""
         self.scene += 1
 
+    def show_old_coordinates(self, are_old: bool) -> None:
+        """Show the coordinates and the numbers of sensors of KiKS 2.2.0, or those of this KiKS."""
+        self.has_old_coordinates = are_old
+        self.tell()
+
     def say(self, text: str) -> None:
         """Show a message in all browsers; from any thread."""
-        self.news.add([text])
+        self.news.append(text)
+        self.note(text)
+
+    def note(self, text: str) -> None:
+        """Write into the log; from any thread."""
+        now = time.strftime("%H:%M:%S")
+        self.log.add(f"{now} {line}" for line in text.split("\n"))
 
     async def do(self, act: Callable[[Simulation], Done]) -> Done:
         """Run a function with the locked world between two events, and return or raise its outcome.
@@ -292,14 +321,14 @@ class Desk:
         while self._retired:
             self._retired.pop().close()
 
-    async def present_project(self) -> Project:
-        """Return the project with the present poses.
+    async def present_project(self, world: DeskWorld | None = None) -> Project:
+        """Return the project with the poses in a world: the one that is shown if left out.
 
         Raises:
             ArenaError: If there is no room for a thing that a gripper holds up.
         """
-        sim, project = self.sim, self.project
-        return replace(await self.do(lambda _: project_of(sim, project)), speed=self.present.gate.speed)
+        world, project = world or self.shown, self.project
+        return replace(await world.do(lambda sim: project_of(sim, project)), speed=self.present.gate.speed)
 
     # ---- time ----
 
@@ -336,6 +365,23 @@ class Desk:
         """
         world = self.shown
         await world.do(lambda _: world.set_speed(speed))
+
+    async def halt(self) -> None:
+        """Stop all programs and all robots.
+
+        Raises:
+            ParameterError: If the past is shown.
+        """
+        self.check_present()
+        for handle in list(self.programs.handles):
+            self.programs.stop(handle)
+        self.outside.halt()
+
+        def stop(sim: Simulation) -> None:
+            for wire in sim.wires:
+                wire.stop(sim.now_ns)
+
+        await self.do(stop)
 
     # ---- branches ----
 
@@ -401,7 +447,12 @@ class Desk:
         Raises:
             ParameterError: If the past is shown.
         """
-        self._mark = await self.change(lambda sim: sim.checkpoint())
+        self.check_present()
+        await self.mark_present()
+
+    async def mark_present(self) -> None:
+        """Do that even if the past is shown."""
+        self._mark = await self.present.do(lambda sim: sim.checkpoint())
 
     async def reset(self) -> None:
         """Restore the last checkpoint, or the initial state; time and programs go on.
@@ -409,12 +460,17 @@ class Desk:
         Raises:
             ParameterError: If the past is shown.
         """
+        self.check_present()
+        await self.reset_present()
+
+    async def reset_present(self) -> None:
+        """Do that even if the past is shown."""
 
         def restore(sim: Simulation) -> None:
             self.present.drop_all()
             sim.reset(self._mark)
 
-        await self.change(restore)
+        await self.present.do(restore)
 
     # ---- hands ----
 

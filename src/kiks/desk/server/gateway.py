@@ -152,6 +152,7 @@ class Gateway:
         if (seen := (desk.scene, *scene_key(sim))) != self._seen:
             self._seen = seen
             self._scene = describe_scene(sim, self._scene.get("scene", 0) + 1, desk.names())
+            self._scene["has_old_coordinates"] = desk.has_old_coordinates
             self._scene["arena"]["picture"] = f"/desk/{self._number}/arena/{self._scene['scene']}.png"
             if self._picture[0] is not sim.arena:
                 self._picture = sim.arena, arena_picture(sim.arena)

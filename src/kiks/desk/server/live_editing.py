@@ -251,8 +251,8 @@ def _thing_at(sketch: Sketch, x_mm: float, y_mm: float) -> int:
     number = min(sketch.things, key=lambda number: gap_mm(sketch.things[number]), default=0)
     if number == 0 or gap_mm(sketch.things[number]) > 0:
         raise ParameterError(
-            f"A thing must be at the place of a click, but nothing is at ({x_mm:.0f}, {y_mm:.0f}) mm. Click a robot, "
-            "a ball, a cylinder or a lamp."
+            "A thing must be at the place of a click, but nothing is there. Click a robot, a ball, a cylinder or "
+            "a lamp."
         )
     return number
 

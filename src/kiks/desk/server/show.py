@@ -13,6 +13,7 @@ from typing import Any
 
 from kiks.desk.server.desk import Desk, NewsHandler
 from kiks.desk.server.frames import pack_frame
+from kiks.desk.server.outside_programs import PlainPrograms
 from kiks.desk.server.server import SERVER
 from kiks.engine.code_cache import is_compiled
 from kiks.engine.compiling import LAST
@@ -171,9 +172,12 @@ def show(
         LinkError: If the desk cannot listen there.
         ParameterError: If the speed is out of range, or the server already listens at another port.
     """
-    shown = Shown(Desk(sim, speed=speed, may_run_programs=is_alive), port=port)
+    desk = Desk(sim, speed=speed, may_run_programs=is_alive)
+    shown = Shown(desk, port=port)
     if is_alive:
         shown.drive()
+    else:
+        desk.outside = PlainPrograms(desk.gate.halt)
     shown.present(browser=browser)
     return shown
 

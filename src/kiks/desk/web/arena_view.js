@@ -23,7 +23,7 @@ export default {
     /** null follows the page. */
     dark: { type: Boolean, default: null },
   },
-  emits: ["pick", "draw"],
+  emits: ["pick", "draw", "remove"],
   computed: {
     label: () => `Arena from above. ${KEYS_HELP}`,
   },

@@ -1,6 +1,7 @@
 /* The data of a robot as rows of a list: [name, value]. */
 
 import { clockText } from "./clock.js";
+import { shownPlace } from "./coordinates.js";
 
 const DEGREES = 180 / Math.PI;
 const ARM_DOWN = 215, ARM_UPRIGHT = 127;
@@ -8,9 +9,10 @@ const ARM_DOWN = 215, ARM_UPRIGHT = 127;
 /** Return the rows of a robot in a frame. */
 export function factsOf(scene, frame, index) {
   const robot = frame.robot(index), known = scene.robots[index];
+  const [x, y] = shownPlace(scene, robot.x_mm, robot.y_mm);
   const rows = [
     ["Clock", clockText(frame.time_s)],
-    ["Place", `x ${robot.x_mm.toFixed(1)}, y ${robot.y_mm.toFixed(1)} mm`],
+    ["Place", `x ${x.toFixed(1)}, y ${y.toFixed(1)} mm`],
     ["Heading", `${turned(robot.heading_rad * DEGREES).toFixed(1)}°`],
     ["Encoders", `left ${robot.encoders[0]}, right ${robot.encoders[1]}`],
     ["Forwards", `${robot.forwards_mm.toFixed(0)} mm`],

@@ -31,7 +31,7 @@ export class Floor {
   }
 
   /** Draw everything; `context` takes CSS pixels. */
-  paint(context, viewport, { isGrid, isLight, isEdged = true }, colours) {
+  paint(context, viewport, { isGrid, isLight, isEdged = true, isFromTop = false }, colours) {
     context.fillStyle = colours.outside;
     context.fillRect(0, 0, viewport.width_px, viewport.height_px);
     if (!this.raster) return;
@@ -44,7 +44,7 @@ export class Floor {
       context.imageSmoothingEnabled = true;
       context.drawImage(this._light, left, top, width, height);
     }
-    if (isGrid) this._grid(context, viewport, left, top, right, bottom, colours);
+    if (isGrid) this._grid(context, viewport, { left, top, right, bottom }, isFromTop, colours);
     context.imageSmoothingEnabled = viewport.scale * this.raster.mm_per_cell < 4;
     context.imageSmoothingQuality = "medium";
     context.drawImage(this._walls, left, top, width, height);
@@ -54,7 +54,9 @@ export class Floor {
     context.strokeRect(left - 1, top - 1, width + 2, height + 2);
   }
 
-  _grid(context, viewport, left, top, right, bottom, colours) {
+  /** Draw lines at multiples of 10 and 100 mm from the left edge, and from the lower or the upper one. */
+  _grid(context, viewport, { left, top, right, bottom }, isFromTop, colours) {
+    const from = isFromTop ? top : bottom;
     const draw = (step_mm, colour) => {
       const step = step_mm * viewport.scale;
       context.beginPath();
@@ -63,8 +65,8 @@ export class Floor {
         context.moveTo(Math.round(x) + 0.5, Math.max(top, 0));
         context.lineTo(Math.round(x) + 0.5, Math.min(bottom, viewport.height_px));
       }
-      const first_y = bottom - step * Math.max(1, Math.ceil((bottom - viewport.height_px) / step));
-      for (let y = first_y; y > Math.max(top, 0); y -= step) {
+      const lowest = Math.min(bottom - 1, viewport.height_px), last_y = Math.max(top, 0);
+      for (let y = from + step * Math.floor((lowest - from) / step); y > last_y; y -= step) {
         context.moveTo(Math.max(left, 0), Math.round(y) + 0.5);
         context.lineTo(Math.min(right, viewport.width_px), Math.round(y) + 0.5);
       }

@@ -1,5 +1,5 @@
-/* The keyboard: Tab or n selects the next thing, arrows move it (or the view), q and e turn it, + and -
-   zoom. */
+/* The keyboard: Tab or n selects the next thing, arrows move it (or the view), q and e turn it, Delete removes it, + and
+   - zoom. */
 
 import { allThings, isSame } from "./things.js";
 
@@ -12,7 +12,8 @@ const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowD
 const TURNS = { q: 1, "<": 1, e: -1, ">": -1 };
 
 export const KEYS_HELP =
-  "Tab selects the next thing, arrow keys move it by 10 mm (with Shift 1 mm), q and e turn it, Escape deselects; " +
+  "Tab selects the next thing, arrow keys move it by 10 mm (with Shift 1 mm), q and e turn it, Delete removes it, Escape " +
+  "deselects; " +
   "plus and minus zoom, 0 shows everything.";
 
 /** Handle a key; return whether it was a shortcut. `tell` is that of the pointer. */
@@ -31,6 +32,10 @@ export function pressKey(event, feed, hand, drawing, viewport, tell) {
     if (hand.selected) return hand.step(right * step_mm, up * step_mm, 0);
     viewport.panBy(-right * PAN_PX, up * PAN_PX);
     tell.view();
+    return true;
+  }
+  if (key === "Delete") {
+    if (hand.selected && !hand.holding) tell.remove(hand.selected);
     return true;
   }
   if (key in TURNS) return hand.step(0, 0, TURNS[key] * TURN_RAD);

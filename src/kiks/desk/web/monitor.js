@@ -3,6 +3,7 @@
 
 import { READING_COLOURS, readingBucket } from "./colours.js";
 import { paintCameraStrip } from "./camera_strip.js";
+import { shownSensor } from "./coordinates.js";
 import { paintCurves } from "./curves.js";
 import { factsOf } from "./facts.js";
 import { pageFeed } from "./feed.js";
@@ -85,6 +86,7 @@ export class Monitor {
     const known = this.feed.scene?.robots[this.index];
     this._look = known ? new RobotLook(known) : null;
     this._tell("known", known ?? null);
+    this._tell("firstSensor", shownSensor(this.feed.scene, 0));
     this._facts_ms = 0;
     if (this.feed.frame) this._take(this.feed.frame);
   }

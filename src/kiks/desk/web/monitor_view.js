@@ -12,12 +12,12 @@ export default {
         <div class="kiks-monitor-robot" role="group" aria-label="Sensors around the robot: click one for an explanation">
           <canvas ref="robot" aria-hidden="true"></canvas>
           <div v-for="(name, k) in names" :key="k" class="kiks-chip" :style="chipStyle(k)">
-            <span class="kiks-chip-name" aria-hidden="true">{{ k }}</span>
+            <span class="kiks-chip-name" aria-hidden="true">{{ number(k) }}</span>
             <button ref="near" type="button" :class="{chosen: isChosen(k, 'proximity')}" :data-testid="'proximity-' + k"
-              :title="'Sensor ' + k + ', ' + name + ': proximity. Click for an explanation'"
+              :title="'Sensor ' + number(k) + ', ' + name + ': proximity. Click for an explanation'"
               :aria-pressed="isChosen(k, 'proximity')" @click="ask(k, 'proximity')">0</button>
             <button ref="light" type="button" class="kiks-chip-light" :class="{chosen: isChosen(k, 'ambient')}"
-              :data-testid="'ambient-' + k" :title="'Sensor ' + k + ', ' + name + ': light, less is brighter. Click for an explanation'"
+              :data-testid="'ambient-' + k" :title="'Sensor ' + number(k) + ', ' + name + ': light, less is brighter. Click for an explanation'"
               :aria-pressed="isChosen(k, 'ambient')" @click="ask(k, 'ambient')">0</button>
           </div>
         </div>
@@ -42,7 +42,7 @@ export default {
         </div>
         <canvas ref="curves" class="kiks-curves" role="img" :aria-label="curves[kind].label + ' over the last seconds'"></canvas>
         <div class="kiks-legend" role="group" aria-label="Lines to show">
-          <button v-for="(name, k) in curves[kind].names" :key="kind + name" type="button" :aria-pressed="!hidden.includes(k)"
+          <button v-for="(name, k) in lines" :key="kind + name" type="button" :aria-pressed="!hidden.includes(k)"
             :class="{off: hidden.includes(k)}" :title="legendHint(k)" @click="toggle(k)">
             <i :style="{borderTopColor: colour(k), borderTopStyle: dashed(k) ? 'dashed' : 'solid'}"></i>{{ name }}
           </button>
@@ -64,10 +64,11 @@ export default {
     chosen: { type: Object, default: null },
   },
   emits: ["explain", "seen"],
-  data: () => ({ known: null, facts: [], hasCamera: false, kind: "proximity", hidden: [], isDark: false }),
+  data: () => ({ known: null, facts: [], hasCamera: false, firstSensor: 0, kind: "proximity", hidden: [], isDark: false }),
   computed: {
     names: () => SENSOR_NAMES,
     curves: () => CURVES,
+    lines() { return CURVES[this.kind].names.map((name, line) => (this.kind === "speeds" ? name : `${this.number(line)}`)); },
   },
   watch: {
     robot(index) { this.monitor.setRobot(index); },
@@ -93,6 +94,7 @@ export default {
   methods: {
     hear(event, detail) {
       if (event === "known") this.known = detail;
+      else if (event === "firstSensor") this.firstSensor = detail;
       else if (event === "seen") this.$emit("seen", detail);
       else {
         this.facts = detail.rows;
@@ -101,6 +103,7 @@ export default {
       }
     },
     ask(sensor, which) { this.$emit("explain", { sensor, which }); },
+    number(sensor) { return sensor + this.firstSensor; },
     isChosen(sensor, which) { return this.chosen?.sensor === sensor && this.chosen?.which === which; },
     chipStyle(sensor) {
       const [across, down] = placeOfNumber(sensor);
@@ -119,7 +122,7 @@ export default {
     dashed(line) { return isDashed(this.kind, line); },
     legendHint(line) {
       const what = this.kind === "speeds" ? ["Left wheel, measured", "Right wheel, measured", "Left wheel, commanded", "Right wheel, commanded"][line]
-        : `Sensor ${line}, ${SENSOR_NAMES[line]}`;
+        : `Sensor ${this.number(line)}, ${SENSOR_NAMES[line]}`;
       return `${what}: show or hide its line`;
     },
   },

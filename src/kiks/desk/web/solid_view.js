@@ -187,10 +187,11 @@ export class SolidView {
     if (!this._floor.raster) return;
     const lamps = this.show.light ? Array.from({ length: frame.lamp_count }, (_, index) => frame.lamp(index)) : [];
     const isLit = this._floor.setLamps(lamps, this._isDark);
-    const key = `${this.show.grid} ${this.show.light} ${this._isDark}`;
+    const isFromTop = Boolean(this.feed.scene.has_old_coordinates);
+    const key = `${this.show.grid} ${this.show.light} ${this._isDark} ${isFromTop}`;
     if (!isLit && key === this._floor_key) return;
     this._floor_key = key;
-    const show = { isGrid: this.show.grid, isLight: this.show.light, isEdged: false };
+    const show = { isGrid: this.show.grid, isLight: this.show.light, isEdged: false, isFromTop };
     this._floor.paint(this._paper.getContext("2d", { alpha: false }), this._flat, show, this._colours);
     this._map.needsUpdate = true;
   }

@@ -1,6 +1,7 @@
 /* The stage: both views of the arena in one element, with pointer and keyboard, drawn for each picture of the screen.
    It does not depend on Vue; arena_view.js is its component. */
 
+import { shownPlace } from "./coordinates.js";
 import { pageFeed } from "./feed.js";
 import { Hand } from "./hand.js";
 import { KEYS_HELP, pressKey } from "./keys.js";
@@ -36,6 +37,10 @@ export class Stage {
     this._tell = {
       pick: (pick) => tell("pick", pick),
       draw: (stroke) => tell("draw", stroke),
+      remove: ({ what, index }) => {
+        const { x_mm, y_mm } = placeOf(this.feed.frame, what, index);
+        tell("remove", { x_mm, y_mm });
+      },
       view: () => this.topView.keepView(),
       fit: () => this.fit(),
     };
@@ -305,6 +310,7 @@ export class Stage {
       return;
     }
     const { x_mm, y_mm } = placeOf(this.feed.frame, thing.what, thing.index);
-    this.live.textContent = `${nameOf(this.feed.scene, thing)} selected, at ${Math.round(x_mm)}, ${Math.round(y_mm)} mm`;
+    const [x, y] = shownPlace(this.feed.scene, x_mm, y_mm).map(Math.round);
+    this.live.textContent = `${nameOf(this.feed.scene, thing)} selected, at ${x}, ${y} mm`;
   }
 }

@@ -1,6 +1,8 @@
 /* Drawing on the arena: rectangle, line, freehand and point, snapped to a grid and kept within the arena. What is
    drawn is only shown here, as a preview; the editor does it. */
 
+import { shownPlace } from "./coordinates.js";
+
 const LEAST_STEP_MM = 0.5;
 
 export class Drawing {
@@ -54,7 +56,8 @@ export class Drawing {
   get preview() {
     if (!this.isActive || !this.points.length) return null;
     const { kind, brush_mm = 1, label } = this.tool, [x, y] = this.points.at(-1), text = label ? [label] : [];
-    text.push(`x ${tell(x)}, y ${tell(y)} mm`);
+    const [shown_x, shown_y] = this.feed.scene ? shownPlace(this.feed.scene, x, y) : [x, y];
+    text.push(`x ${tell(shown_x)}, y ${tell(shown_y)} mm`);
     if (this.isDrawing && kind !== "freehand" && kind !== "point") {
       const wide = Math.abs(x - this.points[0][0]), high = Math.abs(y - this.points[0][1]);
       text.push(kind === "line" ? `length ${tell(Math.hypot(wide, high))} mm` : `${tell(wide)} × ${tell(high)} mm`);

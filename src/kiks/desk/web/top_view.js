@@ -91,18 +91,19 @@ export class TopView {
     context.setTransform(this._ratio, 0, 0, this._ratio, 0, 0);
     if (frame && scene) this._drawMoving(context, frame, scene, poses, marks);
     if (scene) paintMarks(context, viewport, this.feed, marks, this.colours);
-    if (this.show.ruler) this._drawRulers(context);
+    if (scene && this.show.ruler) this._drawRulers(context);
   }
 
   _drawStill(frame) {
     const { viewport, show } = this;
     const lamps = frame ? Array.from({ length: frame.lamp_count }, (_, index) => frame.lamp(index)) : [];
     if (this._floor.setLamps(show.light ? lamps : [], this._isDark)) this._still_key = "";
-    const key = `${viewport.changes} ${show.grid} ${show.light} ${show.trails} ${this.trails.changes} ${this._ratio}`;
+    const isFromTop = Boolean(this.feed.scene?.has_old_coordinates), trails = this.trails.changes;
+    const key = `${viewport.changes} ${show.grid} ${show.light} ${show.trails} ${trails} ${this._ratio} ${isFromTop}`;
     const context = this._still.getContext("2d", { alpha: false });
     context.setTransform(this._ratio, 0, 0, this._ratio, 0, 0);
     if (key !== this._still_key) {
-      this._floor.paint(context, viewport, { isGrid: show.grid, isLight: show.light }, this.colours);
+      this._floor.paint(context, viewport, { isGrid: show.grid, isLight: show.light, isFromTop }, this.colours);
       this._drawn = [];
       this._still_key = key;
     }
@@ -111,12 +112,13 @@ export class TopView {
   }
 
   _drawRulers(context) {
-    const key = `${this.viewport.changes} ${this._isDark} ${this._ratio}`;
+    const { scene } = this.feed.scene;
+    const key = `${this.viewport.changes} ${this._isDark} ${this._ratio} ${scene}`;
     if (key !== this._rulers_key) {
       const rulers = this._rulers.getContext("2d");
       rulers.setTransform(this._ratio, 0, 0, this._ratio, 0, 0);
       rulers.clearRect(0, 0, this.viewport.width_px, this.viewport.height_px);
-      paintRulers(rulers, this.viewport, this.colours);
+      paintRulers(rulers, this.viewport, this.feed.scene, this.colours);
       this._rulers_key = key;
     }
     const { width, height } = this.canvas, thick = Math.round(RULER_PX * this._ratio);

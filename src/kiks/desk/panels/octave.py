@@ -1,0 +1,84 @@
+"""The Octave panel: the log of the session, and a line of commands for Octave or MATLAB to evaluate."""
+
+from __future__ import annotations
+
+from nicegui import ui
+
+from kiks.desk.panels.console import History
+from kiks.desk.panels.widgets import icon_button, told
+from kiks.desk.server.desk import Desk
+
+ROWS_MAX = 10_000
+"""Maximum number of lines of the log in the page."""
+
+REFRESH_S = 0.25
+"""Refresh period of the log and of the list of programs [s]."""
+
+EXPLANATION = (
+    "A command runs in that program, in its base workspace, with all the rights of the user who started it: as soon as "
+    "the program uses its robot again, or at once at Octave's prompt. Its output appears here and in that program."
+)
+
+
+class OctavePanel:
+    """The log and the command line of the programs of Octave and MATLAB.
+
+    Args:
+        desk: The desk.
+    """
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+        self._history = History()
+        self._next_line = 0
+        ui.add_css(".kiks-log * { white-space: pre-wrap; overflow-wrap: anywhere }")
+        with ui.column().classes("w-full q-pa-sm gap-2"):
+            ui.label("Log").classes("text-subtitle2")
+            self._rows = (
+                ui.log(max_lines=ROWS_MAX)
+                .classes("w-full text-caption kiks-log")
+                .style("height: 55vh")
+                .props('data-testid="log" aria-label="Log of the session"')
+            )
+            programs = desk.outside.interpreters()
+            self._choice = ui.select(programs, value=min(programs), label="Commands for").classes("w-full")
+            self._choice.props('dense options-dense data-testid="interpreter"')
+            with ui.row().classes("w-full items-end no-wrap gap-2"):
+                self._line = (
+                    ui.input("Command for Octave or MATLAB", placeholder="kSetSpeed(ref, 5, 5)")
+                    .classes("col")
+                    .props('dense autocomplete=off autocapitalize=off spellcheck=false data-testid="octave-line"')
+                    .on("keydown.enter", self._send)
+                    .on("keydown.up.prevent", self._back)
+                    .on("keydown.down.prevent", self._forth)
+                    .tooltip("A command of the language; the arrow keys recall earlier ones")
+                )
+                icon_button("send", "Evaluate", "octave-send", self._send).tooltip("Evaluate the command")
+            ui.label(EXPLANATION).classes("text-caption")
+        ui.timer(REFRESH_S, self._refresh)
+        self._refresh()
+
+    def _refresh(self) -> None:
+        first, lines = self._desk.log.since(self._next_line)
+        self._next_line = first + len(lines)
+        for line in lines:
+            self._rows.push(line)
+        programs = self._desk.outside.interpreters()
+        if programs and programs != self._choice.options:
+            kept = self._choice.value if self._choice.value in programs else min(programs)
+            self._choice.set_options(programs, value=kept)
+        self._choice.set_visibility(len(programs) > 1)
+
+    @told
+    async def _send(self) -> None:
+        command = (self._line.value or "").strip()
+        self._desk.outside.evaluate(self._choice.value, command)
+        self._history.add(command)
+        self._line.value = ""
+        self._refresh()
+
+    def _back(self) -> None:
+        self._line.value = self._history.back(self._line.value or "")
+
+    def _forth(self) -> None:
+        self._line.value = self._history.forth()

@@ -1,0 +1,136 @@
+"""The desk of a session in a real browser, with a real Octave at a terminal."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("nicegui", reason="the desk needs NiceGUI")
+pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
+
+from playwright.sync_api import Page, expect
+from tests.desk.visitor import FIRST_PICTURE, SCREENSHOTS
+from tests.desk.visits import NewPage
+from tests.matlab.octave import need_tcp, needs_octave
+from tests.matlab.terminal import Terminal
+
+pytestmark = [needs_octave, pytest.mark.slow]
+
+SPEEDS = "() => import('kiks-desk').then(({ pageFeed }) => pageFeed().frame.robot(0).speeds.map(Math.abs))"
+STANDS = f"async () => (await ({SPEEDS})()).every((speed) => speed === 0)"
+DRIVES = f"async () => (await ({SPEEDS})()).some((speed) => speed > 1)"
+
+
+def terminal_in(folder: Path, **environment: str) -> Terminal:
+    own = {"KIKS_COMMAND": f"{sys.executable} -m kiks", "KIKS_WINDOW": "1", **environment}
+    return Terminal(folder, own, edits_lines=True)
+
+
+@pytest.fixture
+def terminal(tmp_path: Path) -> Iterator[Terminal]:
+    with terminal_in(tmp_path) as each:
+        yield each
+
+
+def begin(terminal: Terminal, new_page: NewPage) -> Page:
+    """Start a session with an open port, and open its desk."""
+    terminal.type("kiks")
+    url = terminal.wait_for(r"shown at http\S+").split()[-1]
+    page = new_page()
+    page.goto(url)
+    page.wait_for_function(FIRST_PICTURE)
+    terminal.type("ref = kiks_kopen;")
+    return page
+
+
+def evaluate(page: Page, command: str) -> None:
+    page.get_by_test_id("octave-line").fill(command)
+    page.get_by_test_id("octave-line").press("Enter")
+
+
+def drive_and_halt(terminal: Terminal, page: Page, loop: str) -> None:
+    """Halt a program that drives, and check that it is told, that the robot stands, and that the port opens again."""
+    terminal.type(f"kSetSpeed(ref, 5, 5), {loop}")
+    page.wait_for_function(DRIVES)
+    page.get_by_test_id("halt").click()
+    terminal.wait_for("error: Simulation halted: Halt was pressed on the desk")
+    page.wait_for_function(STANDS)
+    assert terminal.ask("isempty(kiks_ktime(-1))") == "1"
+    terminal.type("ref = kiks_kopen;")
+    assert terminal.ask("numel(kProximity(ref))") == "8"
+
+
+def test_halt_stops_a_program_of_octave(terminal: Terminal, new_page: NewPage) -> None:
+    page = begin(terminal, new_page)
+    for loop in ("while true, kProximity(ref); end", "kiks_pause(1e5)", "while kiks_ktime(-1) < 1e5, end"):
+        drive_and_halt(terminal, page, loop)
+    # At the prompt there is no program to be told.
+    terminal.type("kSetSpeed(ref, 5, 5)")
+    page.wait_for_function(DRIVES)
+    page.get_by_test_id("halt").click()
+    page.wait_for_function(STANDS)
+    assert terminal.ask("7") == "7"
+    assert not terminal.has_printed("halted")
+
+
+def test_halt_reaches_a_program_that_speaks_tcp(tmp_path: Path, new_page: NewPage) -> None:
+    """As MATLAB does."""
+    need_tcp()
+    with terminal_in(tmp_path, KIKS_TRANSPORT="tcp") as terminal:
+        page = begin(terminal, new_page)
+        drive_and_halt(terminal, page, "kiks_pause(1e5)")
+
+
+def test_what_is_typed_on_the_desk_is_evaluated_in_octave(terminal: Terminal, new_page: NewPage) -> None:
+    page = begin(terminal, new_page)
+    terminal.type("kiks_print('half way')")
+    expect(page.locator(".desk-hint")).to_contain_text("half way")
+    page.get_by_test_id("tab-octave").click()
+    expect(page.get_by_test_id("log")).to_contain_text("The world is shown at")
+    expect(page.get_by_test_id("log")).not_to_contain_text("token")
+    before = terminal.ask("hex2dec(kiks('--state')(1:8))")
+    # At the prompt, in the middle of a line that a person types.
+    os.write(terminal.end, b"y = x +")
+    evaluate(page, "x = 6 * 7")
+    expect(page.get_by_test_id("log")).to_contain_text("x = 42")
+    terminal.wait_for("x = 42")
+    terminal.type(" 1")
+    assert terminal.ask("y") == "43"
+    assert terminal.ask("hex2dec(kiks('--state')(1:8))") == before, "polls let no time pass"
+    # In a program, with functions of KiKS and with errors.
+    terminal.type("while true, kProximity(ref); end")
+    evaluate(page, "kSetSpeed(ref, 3, 4); z = kGetSpeed(ref);")
+    page.wait_for_function(DRIVES)
+    evaluate(page, "error('no %d', 1), end")
+    expect(page.get_by_test_id("log")).to_contain_text("parse error")
+    evaluate(page, "error('no %d', 2)")
+    expect(page.get_by_test_id("log")).to_contain_text("error: no 2")
+    SCREENSHOTS.mkdir(exist_ok=True)
+    page.screenshot(path=SCREENSHOTS / "octave.png", animations="disabled")
+    terminal.press_ctrl_c()
+    assert terminal.ask("numel(z)") == "2"
+    assert terminal.ask("numel(kProximity(ref))") == "8"
+    # It may even end the session: here when the page is closed, which would miss the desk.
+    terminal.type("fread(stdin, 1);")
+    evaluate(page, "kiks_quit")
+    expect(page.get_by_test_id("log")).to_contain_text(">> kiks_quit")
+    page.close()
+    terminal.type("")
+    terminal.wait_for("The KiKS session has ended")
+    assert terminal.ask("7") == "7"
+    assert terminal.sessions() == []
+
+
+def test_places_and_sensors_are_those_of_octave(terminal: Terminal, new_page: NewPage) -> None:
+    page = begin(terminal, new_page)
+    terminal.type("here = kiks_siminfo_robotpos;")
+    x, y = float(terminal.ask("here(1)")), float(terminal.ask("here(2)"))
+    expect(page.get_by_test_id("facts")).to_contain_text(f"x {x:.1f}, y {y:.1f} mm")
+    expect(page.locator(".kiks-chip-name").first).to_have_text("1")
+    page.get_by_test_id("proximity-7").click()
+    expect(page.get_by_test_id("explanation-text")).to_contain_text(re.compile(r"^Sensor 8 \(back left\)"))
