@@ -102,5 +102,6 @@ if ~isnumeric(number) || ~isscalar(number) || ~isfinite(number) || number < 0 ||
         'Leave it out for the newest session.'], shown(number));
 end
 simulator('--join', number);
+pulse_mm('forget');
 kiks_status('Joined the session. kiks_quit leaves it.', 1);
 end

@@ -45,6 +45,8 @@ if ~is_active()
 end
 simulator(sprintf('open %d %.10g', -settings(1), settings(2)));
 open_ports('add', -settings(1));
+% Another program may have begun another world.
+pulse_mm('forget');
 ref = settings([1 1 1 1]);
 kiks_ksend(['B' char(10)], ref);
 try

@@ -12,6 +12,7 @@ function kiks_quit(silent)
 %   See also kiks, kiks_kclose.
 
 open_ports('remove', 0);
+pulse_mm('forget');
 if simulator('--is-running', [])
     movie('stop', 0);
     movie('save', 0);

@@ -25,6 +25,7 @@ simulator(world);
 movie('save', 0);
 % The ports belonged to the old world.
 open_ports('remove', 0);
+pulse_mm('forget');
 if is_new
     address = simulator('desk');
     if ~isempty(address)

@@ -14,6 +14,7 @@ requests = {
     sprintf('set seed %.0f', p.KIKS_SEED)
     ['set thinking ' escaped(thinking(p))]
     ['set robot ' escaped(robot(p.KIKS_ROBOT))]
+    ['set pulse_mm ' sprintf('%.17g', pulse_mm('next'))]
     ['set response ' escaped(lower(p.KIKS_RESPONSE))]
     sprintf('set noise %d', p.KIKS_NOISE)
     ['set turrets ' escaped(lower(p.KIKS_TURRETS))]

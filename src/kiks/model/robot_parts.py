@@ -33,6 +33,7 @@ Angle = Annotated[Number, Field(ge=-360, le=360)]
 Counts = Annotated[Number, Field(ge=-1023, le=65535)]
 Share = Annotated[Number, Field(ge=0, le=1)]
 Brightness = Annotated[Whole, Field(ge=1, le=255, description="1 is black, 255 white.")]
+PulseMm = Annotated[Number, Field(ge=0.001, le=1)]
 Baud = Annotated[Whole, Field(ge=75, le=4_000_000, description="A Khepera's usual is 9600.")]
 Gains = Annotated[tuple[Annotated[Whole, Field(ge=0, le=32767)], ...], Field(min_length=3, max_length=3)]
 _ONE_EACH = Field(min_length=SENSOR_COUNT, max_length=SENSOR_COUNT, description="One for each sensor.")
@@ -48,7 +49,7 @@ class Body:
     diameter_mm: Annotated[Number, Field(ge=10, le=500)]
     brightness: Brightness
     wheel_base_mm: Annotated[Number, Field(gt=0, le=500)]
-    pulse_mm: Annotated[Number, Field(ge=0.001, le=1)]
+    pulse_mm: PulseMm
     wall_friction: Annotated[Number, Field(ge=0, le=2)]
     slip_ratio_min: Share
     slip_ratio_max: Share

@@ -72,7 +72,11 @@ def spec_of(robot: ProjectRobot, project: Project, folder: Path) -> RobotSpec:
         ParameterError: If the robot's file is none, or leads out of the folder.
     """
     path = inside(folder, robot.kind, "kind") if robot.kind.lower().endswith(".toml") else robot.kind
-    return _as_set(RobotSpec.load(path, response=project.response), robot, project)
+    spec = RobotSpec.load(path, response=project.response)
+    if robot.pulse_mm is not None:
+        # Of this kind alone: a robot that takes its place has pulses of its own.
+        spec = spec.with_changes(body__pulse_mm=robot.pulse_mm)
+    return _as_set(spec, robot, project)
 
 
 def _as_set(spec: RobotSpec, robot: ProjectRobot, project: Project) -> RobotSpec:

@@ -15,7 +15,7 @@ from kiks.sim.free_space import ATTEMPTS
 from kiks.sim.simulation import Simulation
 from kiks.toolbox.matlab_arenas import place_mm, user_place
 from kiks.toolbox.session_client import SessionClient
-from kiks.toolbox.wire_format import matrix_text, numbers_of, numbers_text
+from kiks.toolbox.wire_format import matrix_text, number_text, numbers_of, numbers_text
 
 STREAM_SPAWN = 6
 """Random stream of random places and headings."""
@@ -51,6 +51,14 @@ def ask_pose(client: SessionClient, words: str) -> str:
         return numbers_text((*user_place(sim.arena, x_mm, y_mm), heading_rad))
 
     return client.do(pose)
+
+
+def ask_pulse(client: SessionClient, words: str) -> str:
+    """Return the way of a wheel for a pulse [mm] of port -1's robot, else of robot 1; an empty text without a robot."""
+    session = client.session
+    if session.desk is None or not session.world.robot_count:
+        return ""
+    return number_text(session.world.specs[(client.robot(1) or 1) - 1].body.pulse_mm)
 
 
 def ask_path(client: SessionClient, words: str) -> str:
