@@ -6,7 +6,7 @@ function requests = setting_requests(preferences)
 p = preferences;
 greys = {p.KIKS_COLOR_BALL, p.KIKS_COLOR_CYLINDER, p.KIKS_COLOR_ROBOT};
 if any(strcmpi(p.KIKS_RESPONSE, {'thesis', 'fast', 'standin'}))
-    of_the_old = {25, 70, 120};
+    of_the_old = struct2cell(greys_of_kiks_2())';
     is_open = cellfun(@isempty, greys);
     greys(is_open) = of_the_old(is_open);
 end
@@ -14,7 +14,7 @@ requests = {
     sprintf('set seed %.0f', p.KIKS_SEED)
     ['set thinking ' escaped(thinking(p))]
     ['set robot ' escaped(robot(p.KIKS_ROBOT))]
-    ['set pulse_mm ' sprintf('%.17g', pulse_mm('next'))]
+    ['set pulse_mm ' sprintf('%.17g', pulse_of_kind(p.KIKS_ROBOT))]
     ['set response ' escaped(lower(p.KIKS_RESPONSE))]
     sprintf('set noise %d', p.KIKS_NOISE)
     ['set turrets ' escaped(lower(p.KIKS_TURRETS))]
