@@ -21,6 +21,9 @@ function [values, is_function] = values_of_copy(text, folder)
 % The file runs as a copy under a name of its own, as Octave caches which file a name stands for, and a function can be
 % called only by its file's name.
 persistent count
+if any(text == 0)
+    error('kiks:argument', 'it is no text: it has characters of number 0');
+end
 count = sum(count) + 1;
 name = sprintf('kiks_preferences_%d', count);
 home = tempname();

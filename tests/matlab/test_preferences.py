@@ -1,4 +1,4 @@
-"""kiks_preferences.m in the user's folder: scripts, the functions of KiKS 2.2.0, and pulses that follow from the robot."""
+"""kiks_preferences.m in the user's folder, a script or a function of KiKS 2.2.0; pulses that follow from the robot."""
 
 from __future__ import annotations
 
