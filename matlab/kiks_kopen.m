@@ -19,7 +19,7 @@ function ref = kiks_kopen(port, varargin)
 %
 %   See also kiks_kclose, kiks_ksend, kiks_ktime, kiks.
 
-allow_numbers_in_text();
+accept_old_style();
 settings = [-1 9600 1];
 if nargin > 0 && ischar(plain_text(port))
     ref = kopen(port, varargin{:});

@@ -32,7 +32,8 @@ KIKS_EMULATED_CPU = '';
 % 'Khepera', 'Khepera_II', or the name of a robot's file .toml.
 KIKS_ROBOT = 'Khepera';
 
-% The model of its proximity sensors: '' the robot's own, 'reflection', 'thesis', 'fast', 'standin' or 'curve'.
+% The model of its proximity sensors: '' the robot's own ('reflection' of a Khepera, 'curve' of a Khepera II); 'thesis',
+% 'fast' and 'standin' are of both.
 KIKS_RESPONSE = '';
 
 % 1: sensors are noisy; 0: they are not.

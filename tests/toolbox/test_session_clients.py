@@ -206,10 +206,44 @@ def test_a_late_reply_answers_nothing_else(session: Session) -> None:
     ask("open 1 9600")
     assert ask(r"send 1 N\nH\n").startswith("n,")
     assert ask("ask 1 H").startswith("h,")
-    assert ask("send 1 H") == "", "no terminator, no answer"
-    assert ask(r"send 1 \n").startswith("h,"), "now it is there"
+    assert ask("send 1 H").startswith("h,"), "each call is a command of its own, even without a terminator"
+    assert ask("send 1 D,5,5") == "d"
     assert ask(r"send 1 \n") == "", "empty lines are not answered"
     assert ask("ask 1 E").startswith("e,")
+
+
+@pytest.mark.parametrize(
+    ("command", "counters"),
+    [
+        ("G,5.5,-5.5", "h,6,-6"),
+        ("G,.4,2.", "h,0,2"),
+        ("G, 1.25e2 ,-0.1", "h,125,0"),
+        ("G,+7.0,8", "h,7,8"),
+        ("G,1.5.5,3", None),
+        ("G,x.5,3", None),
+        ("G,1e400.5,3", None),
+        ("G," + "9" * 99 + ".5,3", None),
+    ],
+)
+def test_fractions_are_rounded(session: Session, command: str, counters: str | None) -> None:
+    ask = begun(session)
+    ask("open 1 9600")
+    assert ask(f"ask 1 {command}") == ("z,Protocol error" if counters is None else "g")
+    assert ask("ask 1 H") == ("h,0,0" if counters is None else counters)
+
+
+def test_the_pace_stays_after_the_ports_are_closed(session: Session) -> None:
+    ask = begun(session)
+    assert ask.numbers("pace") == [100, 100]
+    ask("open 1 9600")
+    ask("pause 1000")
+    assert min(ask.numbers("pace")) > 100
+    before = ask("state")
+    ask("close 1")
+    last = ask.numbers("pace")
+    assert last[0] > 100
+    assert ask.numbers("pace") == last
+    assert ask("state") == before, "to be asked takes no time"
 
 
 def test_replies_of_several_lines_are_read_completely(session: Session) -> None:

@@ -228,6 +228,7 @@ REQUESTS: dict[str, Act] = {
     "set": _set,
     "world": _world,
     "active": lambda client, words: str(int(client.session.desk is not None)),
+    "clients": lambda client, words: str(len(client.session.clients)),
     "desk": lambda client, words: client.session.url,
     "save": _save,
     "read": lambda client, words: matrix_text(Arena.load(_path(words)).brightness[::-1]),
