@@ -406,6 +406,20 @@ def test_objects_are_listed_lights_first_and_can_be_moved(session: Session) -> N
     assert "row must be one of the 3" in ask.refused("set_object 4 1 1 1 1")
 
 
+def test_objects_are_deleted_by_their_rows(session: Session) -> None:
+    ask = begun(session, world=f"matrix {matrix_text(np.zeros((500, 600)))}")
+    for spawned in ("2 100 400", "1 50 60", "3 200 400", "1 80 90", "2 300 400"):
+        ask(f"spawn {spawned}")
+    assert "row must be one of the 5" in ask.refused("delete 1 6")
+    ask("delete 4 1 4")
+    objects = matrices_of(ask("objects"))[0]
+    assert objects[:, :3].tolist() == [[1, 80, 90], [2, 100, 400], [2, 300, 400]]
+    ask("reset")
+    assert matrices_of(ask("objects"))[0].tolist() == objects.tolist()
+    ask("delete")
+    assert matrices_of(ask("objects"))[0].tolist() == objects.tolist()
+
+
 def test_objects_spawned_without_a_place_get_one(session: Session) -> None:
     ask = begun(session, world=f"matrix {matrix_text(np.zeros((500, 600)))}")
     for _ in range(5):

@@ -14,6 +14,7 @@ from kiks.toolbox.matlab_arenas import arena_of
 from kiks.toolbox.session_client import SessionClient
 from kiks.toolbox.wire_format import escape, matrices_of, matrix_text, number_text, numbers_of, numbers_text, unescape
 from kiks.toolbox.world_requests import (
+    ask_delete,
     ask_distances,
     ask_objects,
     ask_path,
@@ -257,5 +258,6 @@ REQUESTS: dict[str, Act] = {
     "objects": ask_objects,
     "set_object": ask_set_object,
     "spawn": ask_spawn,
+    "delete": ask_delete,
 }
 """Handlers of requests by name."""

@@ -25,7 +25,9 @@ from kiks.units import s_from_ns
 ANSWER_S = 10.0
 """Timeout of a reply [s of simulated time]: a camera picture at 300 baud takes that."""
 
-SILENCE_ADVICE = "It takes part again when it sends a command. Close its port with kiks_kclose(ref) while it has nothing to do."
+SILENCE_ADVICE = (
+    "When it sends a command, it takes part again. kiks_kclose(ref) closes its port while it has nothing to do."
+)
 
 SILENCE_S = 0.1
 """Silence after which all replies have arrived [s of simulated time]."""
