@@ -10,11 +10,18 @@ if any(strcmpi(p.KIKS_RESPONSE, {'thesis', 'fast', 'standin'}))
     is_open = cellfun(@isempty, greys);
     greys(is_open) = of_the_old(is_open);
 end
+pulse = pulse_of_kind(p.KIKS_ROBOT);
+dead_band = '';
+if ~isempty(pulse)
+    % Robots of KiKS 2.2.0 drove exactly as far as they were told. Motors with a dead band stop up to 2 pulses off.
+    dead_band = '0';
+end
 requests = {
     sprintf('set seed %.0f', p.KIKS_SEED)
     ['set thinking ' escaped(thinking(p))]
     ['set robot ' escaped(robot(p.KIKS_ROBOT))]
-    ['set pulse_mm ' sprintf('%.17g', pulse_of_kind(p.KIKS_ROBOT))]
+    ['set pulse_mm ' sprintf('%.17g', pulse)]
+    ['set dead_band_pwm ' dead_band]
     ['set response ' escaped(lower(p.KIKS_RESPONSE))]
     sprintf('set noise %d', p.KIKS_NOISE)
     ['set turrets ' escaped(lower(p.KIKS_TURRETS))]

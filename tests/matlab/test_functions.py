@@ -220,6 +220,11 @@ say('outside', caught(@() kiks_spawn(3, [1000 20])))
 say('set_object', [kiks_siminfo_setobject(3, 105, 200, 50, pi / 2) kiks_siminfo_setobject(3, [], 201) ...
     kiks_siminfo_setobject(3, -50, 200) kiks_siminfo_setobject(1, 70, 80)])
 say('objects_set', kiks_siminfo_objects())
+before = rows(kiks_siminfo_objects());
+kiks_delete_object([1 before])
+say('deleted', before - rows(kiks_siminfo_objects()))
+say('demos', strjoin(kiks_demo()', ' '))
+kiks_demo
 say('set_robot', [kiks_siminfo_setrobot(150, 100, 1) kiks_siminfo_setrobot(5, 5, 1) kiks_siminfo_setrobot(1)])
 say('pose_set', kiks_siminfo_robotpos())
 kiks_checkpoint
@@ -419,6 +424,9 @@ def test_functions_of_worlds(tmp_path: Path) -> None:
     assert (said["speed"] > 0).all()
     assert said["distances_back"][0, 1] > 15
     assert said["pose_reset"] == pytest.approx(said["pose_set"], abs=1e-6)
+    assert said["deleted"] == 2
+    assert said["demos"] == "avoid battle camera clean dance follow football maze mv80mm siminfo"
+    assert "  6  follow    follow the wall on the left." in done.lines
     assert "a line" in done.lines
     assert "loud" in done.lines
     assert "quiet" not in done.lines

@@ -40,7 +40,7 @@ from kiks.model.data_file import (
     record,
 )
 from kiks.model.raster_text import box_keys_of, raster_of_text, raster_text
-from kiks.model.robot import Baud, Brightness, PulseMm, Response, robot_names
+from kiks.model.robot import Baud, Brightness, DeadBandPwm, PulseMm, Response, robot_names
 from kiks.model.thinking_policy import split_thinking
 
 FILE_BYTES_MAX = 96 << 20
@@ -93,9 +93,10 @@ class ProjectRobot:
         arguments: The program's arguments.
         brightness: Its brightness for other robots' sensors, 1 black to 255 white; that of its file if None.
         pulse_mm: Way of a wheel for a pulse of its encoder [mm]; that of its file if None.
+        dead_band_pwm: Power below which its motors do not turn, 255 is full; that of its file if None.
 
     Raises:
-        ParameterError: If a name is unknown, a path leaves the folder, or the brightness or the pulse is out of range.
+        ParameterError: If a name is unknown, a path leaves the folder, or another value is out of range.
     """
 
     kind: Annotated[Text, AfterValidator(_check_kind)] = "khepera"
@@ -105,6 +106,7 @@ class ProjectRobot:
     arguments: Annotated[tuple[Text, ...], Field(max_length=100)] = ()
     brightness: Brightness | None = None
     pulse_mm: PulseMm | None = None
+    dead_band_pwm: DeadBandPwm | None = None
 
 
 Robots = Annotated[

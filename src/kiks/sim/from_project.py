@@ -73,9 +73,9 @@ def spec_of(robot: ProjectRobot, project: Project, folder: Path) -> RobotSpec:
     """
     path = inside(folder, robot.kind, "kind") if robot.kind.lower().endswith(".toml") else robot.kind
     spec = RobotSpec.load(path, response=project.response)
-    if robot.pulse_mm is not None:
-        # Of this kind alone: a robot that takes its place has pulses of its own.
-        spec = spec.with_changes(body__pulse_mm=robot.pulse_mm)
+    # Wheels and motors are of this kind: a robot that takes its place has its own.
+    drive = {"body__pulse_mm": robot.pulse_mm, "motor__dead_band_pwm": robot.dead_band_pwm}
+    spec = spec.with_changes(**{name: value for name, value in drive.items() if value is not None})
     return _as_set(spec, robot, project)
 
 

@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field
 from kiks.model.arena import Arena
 from kiks.model.data_file import Number, OneOf, Rule, Switch, Text, Whole, check, record
 from kiks.model.project import TURRETS, Project, ProjectRobot, Seed, ThinkingPolicy
-from kiks.model.robot import Brightness, PulseMm, Response
+from kiks.model.robot import Brightness, DeadBandPwm, PulseMm, Response
 
 
 def _number(given: object) -> object:
@@ -44,6 +44,7 @@ class Settings:
         thinking: Policy for the program's thinking time.
         robot: Kind of all robots.
         pulse_mm: Way of a wheel for a pulse of the encoder [mm]; None for that of the robot's file.
+        dead_band_pwm: Power below which motors do not turn, 255 is full; None for that of the robot's file.
         robots: Number of robots; None for the number of starts.
         response: Model of the proximity sensors; None for that of the robot's file.
         noise: Whether sensors are noisy.
@@ -60,6 +61,7 @@ class Settings:
     thinking: ThinkingPolicy = "live"
     robot: Text = "khepera"
     pulse_mm: Annotated[PulseMm, _NUMBER] | None = None
+    dead_band_pwm: Annotated[DeadBandPwm, _NUMBER] | None = None
     robots: Annotated[Count, _NUMBER] | None = None
     response: Response | None = None
     noise: Annotated[Switch, BeforeValidator(_switch), Rule("0 or 1")] = True
@@ -100,7 +102,11 @@ class Settings:
         # A world needs a robot, even if the arena has no start.
         count = max(len(arena.starts) if self.robots is None else self.robots, 1)
         robot = ProjectRobot(
-            kind=Path(self.robot).name, turrets=self.turrets, brightness=self.brightness, pulse_mm=self.pulse_mm
+            kind=Path(self.robot).name,
+            turrets=self.turrets,
+            brightness=self.brightness,
+            pulse_mm=self.pulse_mm,
+            dead_band_pwm=self.dead_band_pwm,
         )
         return Project(
             arena,
