@@ -14,8 +14,8 @@ if nargin < 1 || ~isnumeric(rows) || ~all(rows(:) >= 1 & rows(:) < Inf & rows(:)
     if nargin < 1
         rows = [];
     end
-    error('kiks:argument', ['The rows must be those of things in kiks_siminfo_objects, from 1 on, but they were %s. ' ...
-        'Call kiks_delete_object(1).'], shown(rows));
+    error('kiks:argument', ['The rows must be those of things in kiks_siminfo_objects, from 1 on, but they were ' ...
+        '%s. Call kiks_delete_object(1).'], shown(rows));
 end
 need_session('kiks_delete_object');
 simulator(['delete' sprintf(' %d', rows)]);

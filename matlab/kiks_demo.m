@@ -28,8 +28,8 @@ demo = plain_text(demo);
 if isnumeric(demo) && isscalar(demo) && any(demo == 1:numel(names))
     demo = names{demo};
 elseif ~ischar(demo) || ~any(strcmp(demo, names))
-    error('kiks:argument', 'The demo must be a number from 1 to %d or one of%s, but it was %s. Call kiks_demo(''follow'').', ...
-        numel(names), sprintf(' %s', names{:}), shown(demo));
+    error('kiks:argument', ['The demo must be a number from 1 to %d or one of%s, but it was %s. ' ...
+        'Call kiks_demo(''follow'').'], numel(names), sprintf(' %s', names{:}), shown(demo));
 end
 addpath(folder);
 feval(demo, varargin{:});
