@@ -21,8 +21,9 @@ function answer = kiks(arena, colormask)
 %   Each start pose gets a robot. Old programs of the thesis's coding (2 ball, 3 light): KIKS_ARENA_CODING in
 %   kiks_preferences.
 %
-%   arena as a file: .kad, a picture (.tif .png .bmp .pgm .pbm .ppm), an arena file .toml or a project .kiks. What is
-%   not in the current folder is looked for on the path.
+%   arena as a file: .kad, a picture (.tif .png .bmp .pgm .pbm .ppm), an arena file .toml or a project .kiks, with or
+%   without its ending. What is not in the current folder is looked for beside the running program, on the path, and
+%   among the arenas that come with KiKS: kiks('maze').
 %
 %   colormask: a matrix of arena's size, the brightness of walls, 1 black to 255 white; where it is left out, walls have
 %   KIKS_ARENA_DEFAULT_COLOR. It is ignored with files, which have greys of their own.
@@ -103,6 +104,7 @@ if ~isnumeric(number) || ~isscalar(number) || ~isfinite(number) || number < 0 ||
 end
 simulator('--join', number);
 simulator(own_turrets('find'));
+pulse_mm('forget');
 kiks_status('Joined the session. kiks_quit leaves it.', 1);
 if ~isempty(simulator('desk'))
     poll_desk('begin');

@@ -1,4 +1,4 @@
-function kiks_calibrate(port, baud)
+function kiks_calibrate(port, baud, ~)
 % kiks_calibrate  Measure this computer, and the line to a real robot.
 %
 %   kiks_calibrate measures the computer speed index, see kiks_speedtest.
@@ -8,6 +8,8 @@ function kiks_calibrate(port, baud)
 %   encoders, read encoders, stop) go to the real robot and then to a simulated one. The difference for one command,
 %   times baud, is K, in seconds * baud: the mean of the second to the ninth of the ten, sorted. V is the ninth less
 %   the second. The present session ends.
+%
+%   A third argument has no effect: KiKS 2.2.0 took one.
 %
 %   Both are written into kiks_data.mat in the current folder, as KIKS_COMPUTER_SPEED, KIKS_KSEND_CONSTANT (K),
 %   KIKS_CALIBRATE_BAUD and KIKS_KSEND_VARIATION (V). Without a real robot an earlier file's values for the line stay.

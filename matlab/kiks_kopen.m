@@ -19,7 +19,7 @@ function ref = kiks_kopen(port, varargin)
 %
 %   See also kiks_kclose, kiks_ksend, kiks_ktime, kiks.
 
-allow_numbers_in_text();
+accept_old_style();
 settings = [-1 9600 1];
 if nargin > 0 && ischar(plain_text(port))
     ref = kopen(port, varargin{:});
@@ -45,6 +45,8 @@ if ~is_active()
 end
 simulator(sprintf('open %d %.10g', -settings(1), settings(2)));
 open_ports('add', -settings(1));
+% Another program may have begun another world.
+pulse_mm('forget');
 ref = settings([1 1 1 1]);
 kiks_ksend(['B' char(10)], ref);
 try

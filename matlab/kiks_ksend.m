@@ -2,7 +2,11 @@ function reply = kiks_ksend(cmd, ref, timeout)
 % kiks_ksend  Send a command and return the robot's reply.
 %
 %   reply = kiks_ksend(cmd, ref) sends the text cmd, which ends in a line feed (10) or carriage return (13), and returns
-%   the reply without its line end. It is empty if cmd has no such end. With an empty cmd only time passes.
+%   the reply without its line end. With an empty cmd only time passes.
+%
+%   As in KiKS 2.2.0, a simulated robot takes a cmd without such an end as a whole command, and rounds numbers with a
+%   decimal point. A real robot waits for the end, and answers z,Protocol error to D,5.5,5.
+%
 %   kiks_ksend(cmd, ref, timeout) waits for a real robot for timeout seconds; a simulated one needs none.
 %
 %   An error if the port is not open, if ref has fewer than 4 elements, or if cmd is no text.

@@ -1,8 +1,9 @@
 % kiks_preferences  Constants of the simulation, for the user to change.
 %
 %   This file is a script that sets constants. Copy it into the folder of your programs and change it there: the copy
-%   in the current folder wins, and may hold only the lines that differ. A program can also set a constant as a global
-%   variable, which wins over both:
+%   in the current folder wins, and may hold only the lines that differ. A kiks_preferences.m of KiKS 2.2.0, a function,
+%   is read as well. A constant that is [] has the value of this file. A program can also set a constant as a global
+%   variable, which wins over all:
 %
 %     global KIKS_SEED, KIKS_SEED = 7; kiks
 %
@@ -32,7 +33,8 @@ KIKS_EMULATED_CPU = '';
 % looked for in the current folder and on the path, there also in folders named robots, and may be named without .m.
 KIKS_ROBOT = 'Khepera';
 
-% The model of its proximity sensors: '' the robot's own, 'reflection', 'thesis', 'fast', 'standin' or 'curve'.
+% The model of its proximity sensors: '' the robot's own ('reflection' of a Khepera, 'curve' of a Khepera II); 'thesis',
+% 'fast' and 'standin' are of both.
 KIKS_RESPONSE = '';
 
 % 1: sensors are noisy; 0: they are not.
@@ -93,6 +95,15 @@ KIKS_SIM_PROX_STEP = 5;
 KIKS_K213_STEP = 10;
 KIKS_MMPERPIXEL = 2;
 
+% Without effect: balls, cylinders and the range of sensors have the sizes of real ones.
+KIKS_OBJECT_BALL_RADIUS = [];
+KIKS_ROUNDOBJECT_RADIUS = [];
+KIKS_SIM_PROX_DIST = [];
+
+% Without effect: KiKS 2.2.0 used these for itself.
+KIKS_K213_2DMODE = [];
+KIKS_SETTINGS_DIR = '';
+
 % Without effect: paths are kept completely.
 KIKS_TRACE_MAX = 8^5;
 
@@ -100,5 +111,5 @@ KIKS_TRACE_MAX = 8^5;
 KIKS_MOVIENAME = '';
 
 % Without effect: films are H.264, in a quality of their own.
-KIKS_MOVIECOMPRESSION = 'Indeo5';
-KIKS_MOVIEQUALITY = 50;
+KIKS_MOVIE_COMPRESSION = 'Indeo5';
+KIKS_MOVIE_QUALITY = 50;

@@ -13,13 +13,31 @@ function kiks_quit(silent)
 
 open_ports('remove', 0);
 poll_desk('end');
+pulse_mm('forget');
 if simulator('--is-running', [])
     movie('stop', 0);
     movie('save', 0);
+    goes_on = is_shared();
     simulator('--end', []);
     if nargin < 1 || isempty(silent) || ~any(silent)
-        disp('The KiKS session has ended.');
+        if goes_on
+            disp('This program has left the KiKS session. The session goes on for the other programs.');
+        else
+            disp('The KiKS session has ended.');
+        end
     end
 end
 clear kiks_status
+end
+
+function shared = is_shared()
+shared = false;
+try
+    shared = str2double(simulator('clients')) > 1;
+catch failure
+    % A process that has ended is no reason not to leave.
+    if ~strcmp(failure.identifier, 'kiks:session')
+        rethrow(failure);
+    end
+end
 end

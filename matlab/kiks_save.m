@@ -7,7 +7,7 @@ function kiks_save(file)
 %     .toml   arena file with a picture beside it
 %     .kiks   project: the arena and all settings
 %
-%   An existing file of that name is replaced.
+%   An existing file of that name is replaced. kiks_save lets you choose a name in a dialog, if there is a display.
 %
 %   Example:
 %     kiks, kiks_save('mine.kad'), kiks_quit
@@ -15,7 +15,12 @@ function kiks_save(file)
 %   See also kiks_load.
 
 if nargin < 1
-    error('kiks:argument', 'kiks_save needs the name of a file. Call kiks_save(''arena.kad'').');
+    need_session('kiks_save');
+    file = asked_file(@uiputfile, 'Save the world', ...
+        ['kiks_save needs the name of a file. Call kiks_save(''arena.kad''). ' arenas_there()]);
+    if isempty(file)
+        return
+    end
 end
 file = plain_text(file);
 [~, ~, ending] = fileparts_of(file);

@@ -28,7 +28,7 @@ function ref = kopen(port, baud, timeout)
 %
 %   See also kclose, ksend, kcmd, kiks_kopen.
 
-allow_numbers_in_text();
+accept_old_style();
 if nargin < 1
     error('kiks:argument', 'kopen needs a port. Give kopen([0 9600 1]) or kopen(''/dev/ttyUSB0'', 9600, 1).');
 end

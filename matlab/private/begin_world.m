@@ -4,7 +4,7 @@ function begin_world(arena, colormask, changes)
 %   begin_world(arena, colormask) takes the arguments of kiks and the values of kiks_preferences.
 %   begin_world(arena, colormask, changes) takes values of the struct changes instead of those preferences.
 
-allow_numbers_in_text();
+accept_old_style();
 preferences = prepare_process();
 if nargin > 2
     names = fieldnames(changes);
@@ -26,6 +26,7 @@ simulator(world);
 movie('save', 0);
 % The ports belonged to the old world.
 open_ports('remove', 0);
+pulse_mm('forget');
 if is_new
     address = simulator('desk');
     if ~isempty(address)

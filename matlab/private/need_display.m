@@ -3,12 +3,7 @@ function need_display(name, instead)
 %
 %   need_display(name, instead) names the function that draws and the alternative without a window.
 
-if is_octave()
-    has_display = have_window_system();
-else
-    has_display = feature('ShowFigureWindows');
-end
-if ~has_display
+if ~has_display()
     error('kiks:display', '%s must open a window, but there is no display here. %s', name, instead);
 end
 end

@@ -3,7 +3,10 @@ function preferences = read_preferences()
 %
 %   preferences = read_preferences() is a struct with a field for each constant, checked.
 
-defaults = constants_of(fileparts(fileparts(mfilename('fullpath'))));
+persistent defaults
+if isempty(defaults)
+    defaults = constants_of(fileparts(fileparts(mfilename('fullpath'))));
+end
 preferences = defaults;
 changes = struct();
 if exist(fullfile(pwd(), 'kiks_preferences.m'), 'file') == 2
@@ -16,7 +19,9 @@ if exist(fullfile(pwd(), 'kiks_preferences.m'), 'file') == 2
 end
 names = fieldnames(changes);
 for k = 1:numel(names)
-    if isfield(preferences, names{k})
+    if isempty(changes.(names{k}))
+        continue  % the default
+    elseif isfield(preferences, names{k})
         preferences.(names{k}) = changes.(names{k});
     else
         say_once(names{k}, sprintf('kiks_preferences: KiKS knows no %s. See help kiks_preferences.', ...
@@ -35,22 +40,6 @@ end
 preferences = checked(preferences);
 end
 
-function values = constants_of(folder)
-% The script runs in its own workspace, as the user's script may declare its constants global. It is not called by its
-% name, as Octave caches which file that is, nor by run, which changes the current folder.
-eval(fileread(fullfile(folder, 'kiks_preferences.m')));
-names = who('KIKS_*');
-values = struct();
-for k = 1:numel(names)
-    values.(names{k}) = eval(names{k});
-end
-end
-
-function value = global_value(name)
-eval(['global ' name]);
-value = eval(name);
-end
-
 function say_idle(name, value, default)
 % Say why a changed constant has no effect.
 if isequal(value, default)
@@ -61,7 +50,11 @@ switch name
         reason = 'the simulator''s rays and movements are exact';
     case 'KIKS_TRACE_MAX'
         reason = 'paths are kept whole';
-    case {'KIKS_MOVIECOMPRESSION', 'KIKS_MOVIEQUALITY'}
+    case {'KIKS_OBJECT_BALL_RADIUS', 'KIKS_ROUNDOBJECT_RADIUS', 'KIKS_SIM_PROX_DIST'}
+        reason = 'balls, cylinders and the range of sensors have the sizes of real ones';
+    case {'KIKS_K213_2DMODE', 'KIKS_SETTINGS_DIR'}
+        reason = 'KiKS 2.2.0 used it for itself';
+    case {'KIKS_MOVIE_COMPRESSION', 'KIKS_MOVIE_QUALITY'}
         reason = 'films are H.264, in a quality of their own';
     otherwise
         return

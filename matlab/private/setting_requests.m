@@ -19,14 +19,22 @@ if any(p.KIKS_COLOR_ROBOT < 0)
 end
 greys = {p.KIKS_COLOR_BALL, p.KIKS_COLOR_CYLINDER, p.KIKS_COLOR_ROBOT};
 if any(strcmpi(p.KIKS_RESPONSE, {'thesis', 'fast', 'standin'}))
-    of_the_old = {25, 70, 120};
+    of_the_old = struct2cell(greys_of_kiks_2())';
     is_open = cellfun(@isempty, greys);
     greys(is_open) = of_the_old(is_open);
+end
+pulse = pulse_of_kind(p.KIKS_ROBOT);
+dead_band = '';
+if ~isempty(pulse)
+    % Robots of KiKS 2.2.0 drove exactly as far as they were told. Motors with a dead band stop up to 2 pulses off.
+    dead_band = '0';
 end
 requests = {
     sprintf('set seed %.0f', p.KIKS_SEED)
     ['set thinking ' escaped(thinking(p))]
     ['set robot ' escaped(robot(p.KIKS_ROBOT))]
+    ['set pulse_mm ' sprintf('%.17g', pulse)]
+    ['set dead_band_pwm ' dead_band]
     ['set response ' escaped(lower(p.KIKS_RESPONSE))]
     sprintf('set noise %d', p.KIKS_NOISE)
     ['set turrets ' escaped(strjoin(built_in_turrets(p.KIKS_TURRETS), ' '))]

@@ -32,7 +32,7 @@ say('beside', kProximity(ref))
 say('followed', kiks_siminfo_robotpos())
 kiks_kclose(ref)
 kiks_arena
-mv80mm
+kiks_demo(9)
 say('went', kiks_siminfo_robotdist())
 siminfo(-1, 9600, 20)
 say('ball', kiks_siminfo_objects())

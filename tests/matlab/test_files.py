@@ -103,6 +103,40 @@ def test_files_of_octave_and_python_are_the_same(tmp_path: Path) -> None:
     assert np.array_equal(Arena.load(tmp_path / "packed.kad").brightness[::-1], picture)
 
 
+NAMES = """
+addpath('path')
+kiks('robot_wars')
+say('current', size(kiks_tif2arena('robot_wars')))
+robot_wars = 'robot_wars.tif';
+delete(robot_wars)
+kiks_arena('robot_wars')
+kiks_save('on_path.kiks')
+kiks_load('pillars')
+say('pillars', size(kiks_siminfo_objects()))
+kiks_load('on_path')
+run(fullfile('program', 'beside.m'))
+say('no_name', caught(@() kiks_load()))
+say('no_name_to_save', caught(@() kiks_save()))
+kiks_quit(1)
+"""
+
+
+def test_arenas_are_found_by_their_names(tmp_path: Path) -> None:
+    for width, folder in ((200, "."), (210, "path"), (220, "program")):
+        (tmp_path / folder).mkdir(exist_ok=True)
+        Image.fromarray(np.zeros((150, width), np.uint8)).save(tmp_path / folder / "robot_wars.tif")
+    (tmp_path / "program" / "robot_wars.tif").rename(tmp_path / "program" / "ring.tif")
+    (tmp_path / "program" / "beside.m").write_text(f"cd('{tmp_path}')\nkiks_arena('ring')\nkiks_save('ring.kiks')\n")
+    said = run(NAMES, tmp_path).said
+    assert said["current"].tolist() == [[150, 200]]
+    assert Project.load(tmp_path / "on_path.kiks").arena.width_mm == 210
+    assert Project.load(tmp_path / "ring.kiks").arena.width_mm == 220
+    assert said["pillars"].tolist() == [[2, 5]], "one that comes with KiKS, with two lamps"
+    there = "Arenas in the current folder: on_path, ring. Those of KiKS: default, maze, office, pillars, pitch, track."
+    assert said["no_name"].endswith(f"Call kiks_load('maze'). {there}")
+    assert said["no_name_to_save"].endswith(f"Call kiks_save('arena.kad'). {there}")
+
+
 GREYS = """
 global KIKS_ARENA_CODING KIKS_NOISE KIKS_ARENA_DEFAULT_COLOR
 KIKS_NOISE = 0;

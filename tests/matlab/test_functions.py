@@ -17,10 +17,10 @@ NAMES = re.findall(
     """
     kiks kiks_arena kiks_tif2arena kiks_kad2arena kiks_generate_maze kiks_arena_new_create kiks_quit kiks_setup
     kiks_checkpoint kiks_reset kiks_record kiks_recordmovie kiks_print kiks_status kiks_speedtest kiks_calibrate
-    kiks_mm2p kiks_p2mm kiks_kiksnet kiks_preferences kiks_load kiks_save
+    kiks_mm2p kiks_p2mm kiks_demo kiks_kiksnet kiks_preferences kiks_load kiks_save
     kiks_kopen kiks_ksend kiks_kclose kiks_ktime kiks_pause
     kiks_siminfo_robotpos kiks_siminfo_robotpath kiks_siminfo_robotdist kiks_siminfo_objects kiks_siminfo_setobject
-    kiks_siminfo_setrobot kiks_siminfo_speed kiks_spawn
+    kiks_siminfo_setrobot kiks_siminfo_speed kiks_spawn kiks_delete_object
     kcmd kProximity kAmbient kSetSpeed kGetSpeed kSetEncoders kGetEncoders kMoveTo kGetStatus kStatus kStop kSetProfile
     kLED kBios kGetAnalog kSetPWM kSetSpeedPID kSetPositionPID kReadByte kWriteByte kFlush kList kTeam kTurret
     kTurretBios kLinVis kLinLight kSetArm kSetGripper kRadio_status kRadio_read kRadio_send kBattle_sensors kBattle_fire
@@ -107,6 +107,41 @@ say('kclose', kiks_ktime(-1))
 kiks_kclose([])
 """
 
+# Calls that KiKS 2.2.0 accepted, besides those in which it and this toolbox agree.
+OLD_CALLS = {
+    "kiks_reset(1)": None,
+    "kiks_reset()": 1,
+    "kiks_checkpoint()": 1,
+    "kiks_calibrate(-1, 9600, 1)": None,
+    "kiks_arena([], [], [])": None,
+    "kiks_quit([])": None,
+}
+
+
+def test_calls_of_old_programs_are_accepted(tmp_path: Path) -> None:
+    lines = ["kiks"]
+    for number, (call, result) in enumerate(OLD_CALLS.items()):
+        lines.append(f"{call};" if result is None else f"r = {call};\nsay('r{number}', r)")
+    said = run("\n".join(lines), tmp_path).said
+    for number, (call, result) in enumerate(OLD_CALLS.items()):
+        assert result is None or said[f"r{number}"] == result, call
+
+
+OLD_STYLE = """
+ref = kiks_kopen;
+counts = [0 0];
+if kProximity(ref) | kAmbient(ref), counts(1) = 1; end
+while counts(2) < 3 & kAmbient(ref), counts(2) = counts(2) + 1; end
+kiks_ksend(['N' 10], ref);
+kiks_quit
+"""
+
+
+def test_old_style_is_accepted_without_a_warning(tmp_path: Path) -> None:
+    assert run(OLD_STYLE, tmp_path).lines[-1] == "The KiKS session has ended."
+    assert "warning" not in run(OLD_STYLE, tmp_path).text
+
+
 TURRETS = """
 global KIKS_ROBOTS KIKS_TURRETS
 KIKS_ROBOTS = 2;
@@ -185,6 +220,11 @@ say('outside', caught(@() kiks_spawn(3, [1000 20])))
 say('set_object', [kiks_siminfo_setobject(3, 105, 200, 50, pi / 2) kiks_siminfo_setobject(3, [], 201) ...
     kiks_siminfo_setobject(3, -50, 200) kiks_siminfo_setobject(1, 70, 80)])
 say('objects_set', kiks_siminfo_objects())
+before = rows(kiks_siminfo_objects());
+kiks_delete_object([1 before])
+say('deleted', before - rows(kiks_siminfo_objects()))
+say('demos', strjoin(kiks_demo()', ' '))
+kiks_demo
 say('set_robot', [kiks_siminfo_setrobot(150, 100, 1) kiks_siminfo_setrobot(5, 5, 1) kiks_siminfo_setrobot(1)])
 say('pose_set', kiks_siminfo_robotpos())
 kiks_checkpoint
@@ -292,8 +332,9 @@ def test_functions_of_the_robot_itself(tmp_path: Path) -> None:
     assert said["wrong"].startswith("z,")
     assert said["unknown"]
     assert said["ksend"] == said["ksend_cr"] == said["after_flush"]
-    assert said["without_end"] == said["only_time"] == ""
-    assert re.fullmatch(r"n(,\d+){8}|.*Command not found.*|z,.*", said["after_without_end"])
+    assert said["only_time"] == ""
+    assert re.fullmatch(r"h(,-?\d+){2}", said["without_end"])
+    assert re.fullmatch(r"n(,\d+){8}", said["after_without_end"])
     assert said["times"].shape == (1, 4)
     assert len(set(said["times"][0])) == 1
     assert said["times"][0, 0] <= said["time"] < said["times"][0, 0] + 0.1
@@ -383,6 +424,9 @@ def test_functions_of_worlds(tmp_path: Path) -> None:
     assert (said["speed"] > 0).all()
     assert said["distances_back"][0, 1] > 15
     assert said["pose_reset"] == pytest.approx(said["pose_set"], abs=1e-6)
+    assert said["deleted"] == 2
+    assert said["demos"] == "avoid battle camera clean dance follow football maze mv80mm siminfo"
+    assert "  6  follow    follow the wall on the left." in done.lines
     assert "a line" in done.lines
     assert "loud" in done.lines
     assert "quiet" not in done.lines

@@ -94,8 +94,8 @@ def test_a_film_ends_with_its_world_and_with_its_program(tmp_path: Path) -> None
 
 
 def test_a_preference_names_the_film_of_each_run(tmp_path: Path) -> None:
-    (tmp_path / "kiks_preferences.m").write_text("KIKS_MOVIENAME = 'each';\nKIKS_MOVIEQUALITY = 90;\n")
+    (tmp_path / "kiks_preferences.m").write_text("KIKS_MOVIENAME = 'each';\nKIKS_MOVIE_QUALITY = 90;\n")
     octave = run("for i = 1:2, ref = kiks_kopen; kiks_pause(i), kiks_kclose(ref), end", tmp_path)
     assert len(pictures(tmp_path / "each.mp4")) == pytest.approx(2 * PICTURES_PER_S, abs=2)
     assert len([line for line in octave.lines if line.startswith("kiks_recordmovie: ")]) == 2
-    assert any("KIKS_MOVIEQUALITY has no effect: films are H.264" in line for line in octave.lines)
+    assert any("KIKS_MOVIE_QUALITY has no effect: films are H.264" in line for line in octave.lines)

@@ -348,5 +348,6 @@ def test_pictures_are_arenas_and_sessions_follow_each_other(tmp_path: Path) -> N
     assert said["quit"].size == 0
     assert said["file"].shape == said["matrix"].shape == (1, 3)
     assert said["after_quit"].startswith("kiks:session|A port must be open for that, but none is.")
-    assert re.match(r"kiks:argument\|The name of an arena's file must end in one of .*'robot_wars'", said["no_ending"])
+    assert said["no_ending"].startswith("kiks:argument|The arena's file must exist, but 'robot_wars' with one of the ")
+    assert said["no_ending"].endswith("folder: corridors. Those of KiKS: default, maze, office, pillars, pitch, track.")
     assert said["inputs"].shape == (20, 16)

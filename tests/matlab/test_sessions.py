@@ -31,7 +31,7 @@ for i = 1:2000
 end
 say('wrong', strjoin(wrong, ';'))
 say('count', 5 * i)
-% Several lines at once, lines without an end and empty ones: what comes later answers nothing else.
+% Several lines at once, lines without an end and empty ones: each call is answered for itself.
 for i = 1:20
     kiks_ksend(['N' 10 'H' 10], ref);
     kiks_ksend('E', ref);
@@ -47,7 +47,6 @@ def test_ten_thousand_replies_answer_their_own_commands(tmp_path: Path) -> None:
     said = run(EXCHANGES, tmp_path).said
     assert said["wrong"] == ""
     assert said["count"] == 10_000
-    # `E` and what follows it are one line.
     assert [said[f"after_{i}"] for i in range(1, 21)] == ["d"] * 20
 
 
@@ -194,6 +193,20 @@ say('again', caught(@() kiks('--join', {number} + 1)))
     assert first.said["here"][0, 0] == pytest.approx(150 + 32, abs=4)
     assert second.said["left"].size == 0
     assert re.match(r"kiks:session\|.*session \d+ must run before it is joined", second.said["again"])
+
+
+@pytest.mark.parametrize("transport", ["pipes", "tcp"])
+def test_leaving_a_session_says_whether_it_goes_on(transport: str, tmp_path: Path) -> None:
+    first_program = "kiks\nsay('session', session_number())\nfread(stdin, 1);\nkiks_quit\n"
+    with Octave(first_program, tmp_path) as first:
+        number = int(first.wait_for("session"))
+        second_program = f"kiks('--join', {number})\nkiks_quit\n"
+        with Octave(second_program, tmp_path, transport_variables(transport), shares=first) as second:
+            second.finish()
+        first.tell()
+        first.finish()
+    assert second.lines[-1] == "This program has left the KiKS session. The session goes on for the other programs."
+    assert first.lines[-1] == "The KiKS session has ended."
 
 
 # ---- repeatable runs ----
@@ -375,6 +388,12 @@ WRONG = [
     "kiks_pause([1 2])",
     "kiks_print(5)",
     "kiks_status({})",
+    "kiks_demo(0)",
+    "kiks_demo('tennis')",
+    "kiks_delete_object()",
+    "kiks_delete_object(0)",
+    "kiks_delete_object(99)",
+    "kiks_delete_object('a')",
     "kiks_spawn()",
     "kiks_spawn(7)",
     "kiks_spawn('a')",

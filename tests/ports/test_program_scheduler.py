@@ -188,3 +188,35 @@ def test_any_order_gives_the_same_run(programs: Sequence[Steps], orders: Sequenc
     times_ns = [entry[1] for entry in first]
     assert times_ns == sorted(times_ns)
     assert sum(entry[0] == "command" for entry in first) == sum(len(steps) for steps in programs)
+
+
+def test_a_program_that_is_silent_again_is_reported_once(caplog: pytest.LogCaptureFixture) -> None:
+    world: Any = FakeWorld()
+    wall_ns = [0]
+    scheduler = ProgramScheduler(
+        world,
+        expected=2,
+        missing=lambda: "",
+        log=logging.getLogger("kiks.test"),
+        new_patience=partial(Patience, wall_ns=lambda: wall_ns[0]),
+    )
+    busy, mute = (FakeProgram(rank, [(10, 10)] * 20, world, scheduler) for rank in (1, 2))
+    mute.advice = "Close its port."
+    for fake in (busy, mute):
+        scheduler.join(fake)
+    for _ in range(3):
+        mute.is_waited_for = True  # as the connection of a program does when that sends something again
+        mute.send()
+        for _ in range(2):
+            busy.send()
+            while scheduler.advance() == 0.0:
+                pass
+            wall_ns[0] += 3_000_000_000
+            while scheduler.advance() == 0.0:
+                pass
+        assert not mute.is_waited_for
+        assert busy.can_send
+    assert [record.getMessage() for record in caplog.records] == [
+        "program 2 must act while others wait, but it did nothing for 3.0 s: from now on the world does not wait for "
+        "it, and the run is not repeatable. Close its port."
+    ]

@@ -208,10 +208,44 @@ def test_a_late_reply_answers_nothing_else(session: Session) -> None:
     ask("open 1 9600")
     assert ask(r"send 1 N\nH\n").startswith("n,")
     assert ask("ask 1 H").startswith("h,")
-    assert ask("send 1 H") == "", "no terminator, no answer"
-    assert ask(r"send 1 \n").startswith("h,"), "now it is there"
+    assert ask("send 1 H").startswith("h,"), "each call is a command of its own, even without a terminator"
+    assert ask("send 1 D,5,5") == "d"
     assert ask(r"send 1 \n") == "", "empty lines are not answered"
     assert ask("ask 1 E").startswith("e,")
+
+
+@pytest.mark.parametrize(
+    ("command", "counters"),
+    [
+        ("G,5.5,-5.5", "h,6,-6"),
+        ("G,.4,2.", "h,0,2"),
+        ("G, 1.25e2 ,-0.1", "h,125,0"),
+        ("G,+7.0,8", "h,7,8"),
+        ("G,1.5.5,3", None),
+        ("G,x.5,3", None),
+        ("G,1e400.5,3", None),
+        ("G," + "9" * 99 + ".5,3", None),
+    ],
+)
+def test_fractions_are_rounded(session: Session, command: str, counters: str | None) -> None:
+    ask = begun(session)
+    ask("open 1 9600")
+    assert ask(f"ask 1 {command}") == ("z,Protocol error" if counters is None else "g")
+    assert ask("ask 1 H") == ("h,0,0" if counters is None else counters)
+
+
+def test_the_pace_stays_after_the_ports_are_closed(session: Session) -> None:
+    ask = begun(session)
+    assert ask.numbers("pace") == [100, 100]
+    ask("open 1 9600")
+    ask("pause 1000")
+    assert min(ask.numbers("pace")) > 100
+    before = ask("state")
+    ask("close 1")
+    last = ask.numbers("pace")
+    assert last[0] > 100
+    assert ask.numbers("pace") == last
+    assert ask("state") == before, "to be asked takes no time"
 
 
 def test_replies_of_several_lines_are_read_completely(session: Session) -> None:
@@ -372,6 +406,20 @@ def test_objects_are_listed_lights_first_and_can_be_moved(session: Session) -> N
     assert ask("set_object 1 70 80 0 0") == "1"
     assert matrices_of(ask("objects"))[0][0, 1:3].tolist() == [70, 80]
     assert "row must be one of the 3" in ask.refused("set_object 4 1 1 1 1")
+
+
+def test_objects_are_deleted_by_their_rows(session: Session) -> None:
+    ask = begun(session, world=f"matrix {matrix_text(np.zeros((500, 600)))}")
+    for spawned in ("2 100 400", "1 50 60", "3 200 400", "1 80 90", "2 300 400"):
+        ask(f"spawn {spawned}")
+    assert "row must be one of the 5" in ask.refused("delete 1 6")
+    ask("delete 4 1 4")
+    objects = matrices_of(ask("objects"))[0]
+    assert objects[:, :3].tolist() == [[1, 80, 90], [2, 100, 400], [2, 300, 400]]
+    ask("reset")
+    assert matrices_of(ask("objects"))[0].tolist() == objects.tolist()
+    ask("delete")
+    assert matrices_of(ask("objects"))[0].tolist() == objects.tolist()
 
 
 def test_objects_spawned_without_a_place_get_one(session: Session) -> None:

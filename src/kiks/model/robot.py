@@ -112,10 +112,10 @@ class RobotSpec:
 
     def __post_init__(self) -> None:
         response = self.proximity.response
-        is_known = response not in ("curve", "reflection") or getattr(self, response) is not None
-        if not is_known:
+        if response not in self._responses():
             raise ParameterError(
-                f"proximity.response {shown(response)} needs a section [{response}], but there is none."
+                f"proximity.response must be one of this robot's, {self._responses()}, but it was {shown(response)}, "
+                f"which needs a section [{response}]."
             )
         for number, radius_mm in enumerate(self.proximity.mount_radius_mm):
             if radius_mm > self.body.radius_mm:
@@ -127,6 +127,10 @@ class RobotSpec:
                 "motor.free_speed_pulses must be at most 20 mm a tick (2 m/s), but it was "
                 f"{self.motor.free_speed_pulses:g}."
             )
+
+    def _responses(self) -> list[str]:
+        """Return the responses that the robot has: two need numbers of their own."""
+        return [name for name in RESPONSES if getattr(self, name, name) is not None]
 
     @property
     def is_noisy(self) -> bool:

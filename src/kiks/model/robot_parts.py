@@ -36,6 +36,8 @@ Angle = Annotated[Number, Field(ge=-360, le=360)]
 Counts = Annotated[Number, Field(ge=-1023, le=65535)]
 Share = Annotated[Number, Field(ge=0, le=1)]
 Brightness = Annotated[Whole, Field(ge=1, le=255, description="1 is black, 255 white.")]
+PulseMm = Annotated[Number, Field(ge=0.001, le=1)]
+DeadBandPwm = Annotated[Number, Field(ge=0, lt=255)]
 Baud = Annotated[Whole, Field(ge=75, le=4_000_000, description="A Khepera's usual is 9600.")]
 Gains = Annotated[tuple[Annotated[Whole, Field(ge=0, le=32767)], ...], Field(min_length=3, max_length=3)]
 _ONE_EACH = Field(min_length=SENSOR_COUNT, max_length=SENSOR_COUNT, description="One for each sensor.")
@@ -52,7 +54,7 @@ class Body:
     diameter_mm: Annotated[Number, Field(ge=10, le=500)]
     brightness: Brightness
     wheel_base_mm: Annotated[Number, Field(gt=0, le=500)]
-    pulse_mm: Annotated[Number, Field(ge=0.001, le=1)]
+    pulse_mm: PulseMm
     wall_friction: Annotated[Number, Field(ge=0, le=2)]
     slip_ratio_min: Share
     slip_ratio_max: Share
@@ -75,7 +77,7 @@ class Motor:
 
     free_speed_pulses: Annotated[Number, Field(ge=1, le=1000)]
     time_constant_ms: Annotated[Number, Field(ge=0.1, le=1000)]
-    dead_band_pwm: Annotated[Number, Field(ge=0, lt=255)]
+    dead_band_pwm: DeadBandPwm
     left_gain: Annotated[Number, Field(ge=0.5, le=1.5)]
     right_gain: Annotated[Number, Field(ge=0.5, le=1.5)]
     gain_scale: Annotated[Whole, Field(ge=1, le=1 << 20)]

@@ -58,18 +58,20 @@ class LocalConnection(Connection):
         name: Name of the program, for a person.
         rank: Order among programs that act at the same instant.
         pending: State of the answer that the program waits for.
+        advice: What its user can do if it is silent while others wait, as a sentence.
 
     Raises:
         KiksError: If the world has ended.
     """
 
-    def __init__(self, programs: Programs, name: str, rank: int, pending: PendingAnswer) -> None:
+    def __init__(self, programs: Programs, name: str, rank: int, pending: PendingAnswer, advice: str) -> None:
         super().__init__(is_late=True)
         self._pending = pending
         self._thread = threading.get_ident()
         self._programs = programs
         self._world = programs.sim.lock
         self._participant = programs.admit(name, rank)
+        self._participant.advice = advice
         self._is_resting = False
 
     def _transmit(self, request: Request) -> None:

@@ -69,11 +69,13 @@ class Participant(ABC):
         is_here: Whether it has joined the run.
         is_waited_for: Whether the world waits for it while it thinks.
         has_left: Whether it has gone and all its requests are done.
-        has_been_reported: Whether the log has said that the world waits for it.
+        has_been_reported: Whether the log has said that it is silent.
         patience: Measures the real time for which it delays others; set by `ProgramScheduler.join`.
+        advice: What its user can do if it is silent, as a sentence.
     """
 
     patience: Patience
+    advice = "--patience gives it more time, --when-silent wait all it wants."
 
     def __init__(self, name: str, rank: int) -> None:
         self.name = name
@@ -352,11 +354,15 @@ class ProgramScheduler:
             participant.drop()
             return
         participant.is_waited_for = False
+        if participant.has_been_reported:
+            return
+        participant.has_been_reported = True
         self._log.warning(
             "%s must act while others wait, but it did nothing for %.1f s: from now on the world does not wait for it, "
-            "and the run is not repeatable. --patience gives it more time, --when-silent wait all it wants.",
+            "and the run is not repeatable. %s",
             participant.name,
             waited_s,
+            participant.advice,
         )
 
 

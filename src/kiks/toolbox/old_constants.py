@@ -14,10 +14,7 @@ from pydantic import BeforeValidator, Field
 from kiks.engine.parameters import LIGHT_MM
 from kiks.model.data_file import Number, Rule, Switch, Whole, record
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
-from kiks.model.robot_parts import STRIPE_LIMIT
-
-PULSE_MM = 0.082
-"""Path of a wheel in a pulse [mm]."""
+from kiks.model.robot_parts import STRIPE_LIMIT, DeadBandPwm, PulseMm
 
 RANGE_MM = 50.0
 """Range of the Khepera's proximity sensors [mm]."""
@@ -61,6 +58,8 @@ class OldConstants:
         figures: What a robot definition file says: diameter of the body, distance between the wheels, range of the
             proximity sensors [mm]; places of the eight sensors on the rim and their directions [deg, left positive].
             None for a robot without such a file.
+        pulse_mm: Way of a wheel for a pulse of its encoder [mm]; None for that of the robot's file.
+        dead_band_pwm: Power below which motors do not turn, 255 is full; None for that of the robot's file.
         stripes: Number of black and of white stripes around each robot; 0 for none.
         noise_percent: Random share of each proximity reading [%].
         error_small: Largest share by which a small reading errs.
@@ -72,6 +71,8 @@ class OldConstants:
     """
 
     figures: Annotated[Figures, BeforeValidator(_numbers)] | None = None
+    pulse_mm: Annotated[PulseMm, NUMBER] | None = None
+    dead_band_pwm: Annotated[DeadBandPwm, NUMBER] | None = None
     stripes: Annotated[Whole, Field(ge=0, le=STRIPE_LIMIT), NUMBER] = 0
     noise_percent: Percent = NOISE_PERCENT
     error_small: Annotated[Number, Field(ge=0, le=1), NUMBER] = ERROR_SMALL
@@ -92,12 +93,17 @@ class OldConstants:
             {'proximity': {'noise_small': 0.5, 'noise_exponent': 7}}
         """
         body: dict[str, Any] = {}
+        motor: dict[str, Any] = {}
         proximity: dict[str, Any] = {}
         ambient: dict[str, Any] = {}
         camera: dict[str, Any] = {}
         reflection: dict[str, Any] = {}
         if self.figures is not None:
             body, proximity, ambient, reflection = _shape(self.figures, spec)
+        if self.pulse_mm is not None:
+            body["pulse_mm"] = self.pulse_mm
+        if self.dead_band_pwm is not None:
+            motor["dead_band_pwm"] = self.dead_band_pwm
         if self.stripes:
             body["stripe_count"] = self.stripes
         chance = spec.proximity
@@ -123,6 +129,7 @@ class OldConstants:
             camera["adapts_exposure"] = False
         sections = {
             "body": body,
+            "motor": motor,
             "proximity": proximity,
             "ambient": ambient,
             "camera": camera,
@@ -142,7 +149,7 @@ def _shape(figures: tuple[float, ...], spec: RobotSpec) -> tuple[dict[str, Any],
     places, directions = figures[3 : 3 + SENSOR_COUNT], figures[3 + SENSOR_COUNT :]
     inset_mm = spec.body.radius_mm - max(spec.proximity.mount_radius_mm)
     scale = range_mm / RANGE_MM
-    body = {"diameter_mm": diameter_mm, "wheel_base_mm": wheel_base_mm, "pulse_mm": PULSE_MM}
+    body = {"diameter_mm": diameter_mm, "wheel_base_mm": wheel_base_mm}
     proximity = {
         "mount_angle_deg": places,
         "mount_radius_mm": (diameter_mm / 2 - inset_mm,) * SENSOR_COUNT,

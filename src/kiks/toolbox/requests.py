@@ -15,10 +15,12 @@ from kiks.toolbox.own_turrets import TurretOrder, turrets_of
 from kiks.toolbox.session_client import SessionClient
 from kiks.toolbox.wire_format import escape, matrices_of, matrix_text, number_text, numbers_of, numbers_text, unescape
 from kiks.toolbox.world_requests import (
+    ask_delete,
     ask_distances,
     ask_objects,
     ask_path,
     ask_pose,
+    ask_pulse,
     ask_set_object,
     ask_set_robot,
     ask_spawn,
@@ -266,6 +268,7 @@ REQUESTS: dict[str, Act] = {
     "set": _set,
     "world": _world,
     "active": lambda client, words: str(int(client.session.desk is not None)),
+    "clients": lambda client, words: str(len(client.session.clients)),
     "desk": lambda client, words: client.session.url,
     "poll": _poll,
     "typed": _typed,
@@ -290,6 +293,7 @@ REQUESTS: dict[str, Act] = {
     "pass": _pass,
     "pause": _pause,
     "pace": lambda client, words: numbers_text(100.0 * speed for speed in client.pace()),
+    "pulse": ask_pulse,
     "pose": ask_pose,
     "path": ask_path,
     "distances": ask_distances,
@@ -297,5 +301,6 @@ REQUESTS: dict[str, Act] = {
     "objects": ask_objects,
     "set_object": ask_set_object,
     "spawn": ask_spawn,
+    "delete": ask_delete,
 }
 """Handlers of requests by name."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+import math
+import re
 import time
 from collections import deque
 from collections.abc import Callable
@@ -26,8 +28,15 @@ from kiks.units import s_from_ns
 ANSWER_S = 10.0
 """Timeout of a reply [s of simulated time]: a camera picture at 300 baud takes that."""
 
+SILENCE_ADVICE = (
+    "When it sends a command, it takes part again. kiks_kclose(ref) closes its port while it has nothing to do."
+)
+
 SILENCE_S = 0.1
 """Silence after which all replies have arrived [s of simulated time]."""
+
+_FRACTION = re.compile(r"(?<=,) *[+-]?(?:\d{1,15}\.\d*|\.\d+)(?:[eE][+-]?\d{1,2})? *(?=[,\r\n]|$)", re.ASCII)
+"""A number of a command with a decimal point."""
 
 _log = logging.getLogger("kiks.toolbox")
 
@@ -45,10 +54,9 @@ class OpenPort:
         opened_wall_s: Real time of its opening [s].
         way_mm: Distances that the robot had driven by then, forwards and backwards [mm].
         start_mm: Place of the robot at that time [mm].
-        last_ns: Simulated time of the last call of `SessionClient.pace` [ns].
+        last_ns: Simulated time of the last call of `pace` [ns].
         last_wall_s: Real time of that call [s].
         is_clean: Whether all expected replies have been read.
-        unfinished: The characters sent since the last terminator.
     """
 
     port: VirtualPort
@@ -60,7 +68,14 @@ class OpenPort:
     last_ns: int
     last_wall_s: float
     is_clean: bool = True
-    unfinished: bytes = b""
+
+    def pace(self, now_ns: int) -> tuple[float, float]:
+        """Return the speed of simulated time up to an instant [ns], since the opening and since the last call."""
+        now_s = time.monotonic()
+        average = s_from_ns(now_ns - self.opened_ns) / max(now_s - self.opened_wall_s, 1e-9)
+        momentary = s_from_ns(now_ns - self.last_ns) / max(now_s - self.last_wall_s, 1e-9)
+        self.last_ns, self.last_wall_s = now_ns, now_s
+        return average, momentary
 
 
 class SessionClient:
@@ -98,6 +113,7 @@ class SessionClient:
         self.typed: deque[str] = deque()
         self._sim: Simulation | None = None
         self._connection: LocalConnection | None = None
+        self._pace = 1.0, 1.0
         session.clients.append(self)
 
     # ---- ports ----
@@ -122,7 +138,7 @@ class SessionClient:
             self._sim = sim
         if self._connection is None:
             assert session.desk is not None
-            self._connection = LocalConnection(session.desk.programs, self.name, self.number, self)
+            self._connection = LocalConnection(session.desk.programs, self.name, self.number, self, SILENCE_ADVICE)
         if not self.ports:
             self._connection.wake()
             # A new clock, so that the time without an open port does not count as thinking.
@@ -159,7 +175,10 @@ class SessionClient:
         for each in list(self.ports) if number == 0 else [number]:
             if each in self.ports:
                 self._meet()
-                self.ports.pop(each).port.close()
+                assert self._connection is not None
+                opened = self.ports.pop(each)
+                self._pace = opened.pace(self._connection.now_ns)
+                opened.port.close()
         self._rest_if_idle()
 
     def leave(self) -> None:
@@ -234,14 +253,21 @@ class SessionClient:
     # ---- the line ----
 
     def send(self, number: int, text: str) -> str:
-        """Send characters and return the first reply without its line end; an empty text without a terminator.
+        """Send characters and return the first reply without its line end.
+
+        As in KiKS 2.2.0, each call is a command of its own, even without a terminator, and numbers may have fractions,
+        which are rounded.
 
         Raises:
             TurretOrder: If the program must work out the reply; then nothing was sent.
         """
         opened = self.opened(number)
-        if self.turrets and turret_of(text) in self.turrets and not opened.unfinished:
+        if not text.endswith(("\n", "\r")):
+            text += "\n"
+        if self.turrets and turret_of(text) in self.turrets:
             raise TurretOrder(number, text[:-1])
+        if "." in text:
+            text = _FRACTION.sub(_rounded, text)
         return self._exchange(opened, text)
 
     def send_order(self, number: int, order: str, reply: str) -> str:
@@ -264,7 +290,7 @@ class SessionClient:
             port.sleep(latency_s)
         port.write(data)
         # The robot does not answer empty lines.
-        *commands, opened.unfinished = (opened.unfinished + data).replace(b"\r", b"\n").split(b"\n")
+        commands = data.replace(b"\r", b"\n").split(b"\n")
         replies = [port.read_until(b"\n") for command in commands if command]
         opened.is_clean = all(reply.endswith(b"\n") for reply in replies)
         return replies[0].rstrip(b"\r\n").decode("ascii", errors="replace") if replies else ""
@@ -355,15 +381,14 @@ class SessionClient:
         return connection is not None and connection.live(time_ns)
 
     def pace(self) -> tuple[float, float]:
-        """Return the speed of simulated time since a port was opened and since the last call; 1 is real time."""
-        if not self.ports:
-            return 1.0, 1.0
-        opened = self.opened(next(iter(self.ports)))
-        now_ns, now_s = opened.port.ask_ns(), time.monotonic()
-        average = s_from_ns(now_ns - opened.opened_ns) / max(now_s - opened.opened_wall_s, 1e-9)
-        momentary = s_from_ns(now_ns - opened.last_ns) / max(now_s - opened.last_wall_s, 1e-9)
-        opened.last_ns, opened.last_wall_s = now_ns, now_s
-        return average, momentary
+        """Return the speed of simulated time since a port was opened and since the last call; 1 is real time.
+
+        After the ports were closed these are the last figures.
+        """
+        if self.ports:
+            opened = self.opened(next(iter(self.ports)))
+            self._pace = opened.pace(opened.port.ask_ns())
+        return self._pace
 
     # ---- the world ----
 
@@ -416,3 +441,10 @@ class SessionClient:
         if self._connection is not None:
             self._connection.close()
             self._connection = None
+
+
+def _rounded(number: re.Match[str]) -> str:
+    """Return a number as a whole one, rounded like `round` of Octave and MATLAB."""
+    value = float(number[0])
+    whole = int(math.copysign(math.floor(abs(value) + 0.5), value))
+    return str(whole)

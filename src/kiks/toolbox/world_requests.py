@@ -15,7 +15,7 @@ from kiks.sim.free_space import ATTEMPTS
 from kiks.sim.simulation import Simulation
 from kiks.toolbox.matlab_arenas import place_mm, user_place
 from kiks.toolbox.session_client import SessionClient
-from kiks.toolbox.wire_format import matrix_text, numbers_of, numbers_text
+from kiks.toolbox.wire_format import matrix_text, number_text, numbers_of, numbers_text
 
 STREAM_SPAWN = 6
 """Random stream of random places and headings."""
@@ -51,6 +51,14 @@ def ask_pose(client: SessionClient, words: str) -> str:
         return numbers_text((*user_place(sim.arena, x_mm, y_mm), heading_rad))
 
     return client.do(pose)
+
+
+def ask_pulse(client: SessionClient, words: str) -> str:
+    """Return the way of a wheel for a pulse [mm] of port -1's robot, else of robot 1; an empty text without a robot."""
+    session = client.session
+    if session.desk is None or not session.world.robot_count:
+        return ""
+    return number_text(session.world.specs[(client.robot(1) or 1) - 1].body.pulse_mm)
 
 
 def ask_path(client: SessionClient, words: str) -> str:
@@ -138,11 +146,7 @@ def ask_set_object(client: SessionClient, words: str) -> str:
 
     def set_object(sim: Simulation) -> str:
         lamps, bodies = sim.lamps, sim.bodies()
-        if number not in range(1, len(lamps) + len(bodies) + 1):
-            raise ParameterError(
-                f"row must be one of the {len(lamps) + len(bodies)} that kiks_siminfo_objects lists, but it was "
-                f"{number:g}."
-            )
+        _check_row(number, len(lamps) + len(bodies))
         row = int(number) - 1
         if row < len(lamps):
             x_mm, y_mm = _kept(place_mm(sim.arena, x, y), lamps[row, :2].tolist())
@@ -208,10 +212,40 @@ def ask_spawn(client: SessionClient, words: str) -> str:
         raise ParameterError("there must be room for one more object, but none was found. Take something away.")
 
     client.do(spawn)
+    _tell(client)
+    return ""
+
+
+def ask_delete(client: SessionClient, words: str) -> str:
+    """Remove the objects of some rows."""
+    numbers = numbers_of(words.split(), len(words.split()), "rows")
+
+    def delete(sim: Simulation) -> None:
+        lamp_count, bodies = len(sim.lamps), sim.bodies()
+        for number in numbers:
+            _check_row(number, lamp_count + len(bodies))
+        # From below, so that the rows above stay where they are.
+        for row in sorted({int(number) for number in numbers}, reverse=True):
+            if row > lamp_count:
+                sim.remove_body(int(bodies[row - lamp_count - 1]["number"]))
+            else:
+                sim.remove_lamp(row)
+
+    client.do(delete)
+    _tell(client)
+    return ""
+
+
+def _tell(client: SessionClient) -> None:
+    """Tell browsers which objects there are now, and take a checkpoint with them."""
     if client.session.desk is not None:
         client.session.desk.tell()
     client.session.mark()
-    return ""
+
+
+def _check_row(number: float, count: int) -> None:
+    if number not in range(1, count + 1):
+        raise ParameterError(f"row must be one of the {count} that kiks_siminfo_objects lists, but it was {number:g}.")
 
 
 def _kept(wanted: tuple[float, float], present: Any) -> tuple[float, float]:

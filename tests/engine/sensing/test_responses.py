@@ -96,7 +96,7 @@ def test_an_unknown_response_is_named() -> None:
     names = "'reflection', 'thesis', 'fast', 'standin', 'curve'"
     with pytest.raises(ParameterError, match=rf"proximity.response must be one of {names}, but"):
         kiks.Simulation(response="thesys")
-    with pytest.raises(ParameterError, match=r"'curve' needs a section \[curve\]"):
+    with pytest.raises(ParameterError, match=r"'curve', which needs a section \[curve\]"):
         kiks.Simulation(response="curve")
 
 

@@ -1,0 +1,123 @@
+"""kiks_preferences.m in the user's folder, a script or a function of KiKS 2.2.0; pulses that follow from the robot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from tests.matlab.octave import needs_octave, run
+
+from kiks.model.project import Project
+from kiks.model.robot import RobotSpec, save_robot
+
+pytestmark = [needs_octave, pytest.mark.slow]
+
+FORMS = {
+    "script": "KIKS_ROBOTS = {robots}; KIKS_ARENA_DEFAULT_COLOR = [];",
+    "script of globals": "global KIKS_ROBOTS\nKIKS_ROBOTS = {robots};",
+    "function of 2.2.0": """\
+% Preferences.
+%{{
+function no = this(one)
+%}}
+function kiks_preferences
+global KIKS_ROBOTS KIKS_MOVIE_QUALITY KIKS_MOVIE_COMPRESSION KIKS_SIM_PROX_DIST KIKS_OBJECT_BALL_RADIUS
+global KIKS_COLOR_ROBOT KIKS_COLOR_BALL KIKS_COLOR_CYLINDER
+KIKS_COLOR_ROBOT = 120; KIKS_COLOR_BALL = 25; KIKS_COLOR_CYLINDER = 70;
+KIKS_ROBOTS={robots};      % a comment
+KIKS_MOVIE_COMPRESSION='Indeo5';
+KIKS_MOVIE_QUALITY=50;
+""",
+    "function of another name": """\
+function settings()
+    global KIKS_ROBOTS
+    KIKS_ROBOTS = helper({robots});
+end
+
+function count = helper(count)
+end
+""",
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_all_forms_are_read_and_read_anew(form: str, tmp_path: Path) -> None:
+    file = tmp_path / "kiks_preferences.m"
+    changed = FORMS[form].format(robots=3).replace("\n", "\\n").replace("'", "''").replace("%", "%%")
+    file.write_text(FORMS[form].format(robots=2), encoding="utf-8")
+    done = run(
+        f"""
+global KIKS_COLOR_CYLINDER
+KIKS_COLOR_CYLINDER = 200;
+kiks(zeros(400))
+kiks_save('first.kiks')
+kiks_spawn(2)
+kiks_spawn(3)
+kiks_save('things.toml')
+file = fopen('kiks_preferences.m', 'w');
+fprintf(file, '{changed}');
+fclose(file);
+kiks_arena(zeros(400))
+kiks_save('second.kiks')
+global KIKS_ROBOTS
+say('left', isempty(KIKS_ROBOTS))
+say('kept', KIKS_COLOR_CYLINDER)
+KIKS_ROBOTS = 4;
+kiks_arena(zeros(400))
+kiks_save('third.kiks')
+say('own', KIKS_ROBOTS)
+kiks_quit(1)
+""",
+        tmp_path,
+    )
+    assert [len(Project.load(tmp_path / f"{name}.kiks").robots) for name in ("first", "second", "third")] == [2, 3, 4]
+    assert done.said["left"] == 1, "the file's globals end with its reading"
+    assert done.said["kept"] == 200, "a program's own stay"
+    assert done.said["own"] == 4
+    things = Project.load(tmp_path / "things.toml").arena
+    assert [each.brightness for each in (*things.balls, *things.cylinders)] == [255, 200]
+    assert Project.load(tmp_path / "first.kiks").robots[0].brightness is None, "2.2.0's grey was chosen by nobody"
+    assert "warning" not in done.text
+    assert "kiks_preferences:" not in done.text
+
+
+def test_a_function_that_fails_is_named(tmp_path: Path) -> None:
+    (tmp_path / "kiks_preferences.m").write_text("function kiks_preferences\nnothing_like_that(1);\n", encoding="utf-8")
+    said = run("before = path();\nsay('why', caught(@() kiks()))\nsay('same', strcmp(before, path()))", tmp_path).said
+    assert said["why"].startswith(f"kiks:argument|kiks_preferences.m in {tmp_path} must run, but it did not: ")
+    assert "'nothing_like_that' undefined" in said["why"]
+    assert said["same"] == 1, "its copy has left the path"
+
+
+PULSES = """
+say('before', kiks_mm2p(82))
+kiks
+say('in_session', [kiks_mm2p(82) kiks_p2mm(1000)])
+ref = kiks_kopen;
+kSetSpeed(ref, 10, 10);
+kiks_pause(0.5)
+start = kiks_siminfo_robotpos();
+t = kiks_ktime(-1);
+kiks_pause(1)
+say('speed', norm(kiks_siminfo_robotpos()(1:2) - start(1:2)) / (kiks_ktime(-1) - t))
+kiks_save('mine.kiks')
+KIKS_ROBOT = 'mine.toml';
+say('still', kiks_mm2p(100))
+kiks_arena
+say('of_the_file', kiks_mm2p(100))
+kiks_load('mine.kiks')
+say('of_the_project', kiks_mm2p(82))
+kiks_quit(1)
+say('next', kiks_mm2p(100))
+"""
+
+
+def test_pulses_are_those_of_the_robot(tmp_path: Path) -> None:
+    save_robot(RobotSpec.load("khepera").with_changes(body__pulse_mm=0.1), tmp_path / "mine.toml")
+    said = run("global KIKS_ROBOT\n" + PULSES, tmp_path).said
+    assert said["before"] == pytest.approx(1000)
+    assert said["in_session"][0] == pytest.approx([1000, 82])
+    assert said["speed"] == pytest.approx(82, abs=0.5)
+    assert said["still"] == pytest.approx(100 / 0.082)
+    assert said["of_the_file"] == said["next"] == pytest.approx(1000)
+    assert said["of_the_project"] == pytest.approx(1000), "a saved project drives the same"
