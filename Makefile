@@ -48,6 +48,8 @@ system:
 lint: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/mh_lint --brief matlab
+	$(BIN)/mh_style --brief matlab
 
 types: setup
 	$(BIN)/mypy

@@ -13,12 +13,12 @@ function kiks_quit(silent)
 
 open_ports('remove', 0);
 if simulator('--is-running', [])
-    movie('stop', 0);
-    movie('save', 0);
+    film('stop', 0);
+    film('save', 0);
     simulator('--end', []);
     if nargin < 1 || isempty(silent) || ~any(silent)
         disp('The KiKS session has ended.');
     end
 end
-clear kiks_status
+clear kiks_status;
 end

@@ -62,8 +62,6 @@ switch name
         reason = 'sensors and their noise are as measured on a real robot. KIKS_NOISE = 0 turns noise off';
     case {'KIKS_SIM_PROX_STEP', 'KIKS_K213_STEP', 'KIKS_MMPERPIXEL'}
         reason = 'the simulator''s rays and movements are exact';
-    case 'KIKS_TRACE_MAX'
-        reason = 'paths are kept whole';
     case {'KIKS_MOVIECOMPRESSION', 'KIKS_MOVIEQUALITY'}
         reason = 'films are H.264, in a quality of their own';
     otherwise
@@ -108,6 +106,7 @@ else
 end
 check(whole(p.KIKS_ARENA_DEFAULT_COLOR, 1, 255), 'KIKS_ARENA_DEFAULT_COLOR', p.KIKS_ARENA_DEFAULT_COLOR, ...
     'a grey from 1 to 255', '255');
+check(whole(p.KIKS_TRACE_MAX, 2, 10^6), 'KIKS_TRACE_MAX', p.KIKS_TRACE_MAX, 'a whole number from 2 to 10^6', '8^5');
 check(whole(p.KIKS_LOG_HISTORY, 1, 10^6), 'KIKS_LOG_HISTORY', p.KIKS_LOG_HISTORY, ...
     'a whole number from 1 to 10^6', '1000');
 end

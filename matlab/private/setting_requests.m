@@ -24,6 +24,7 @@ requests = {
     ['set robots ' number_text(p.KIKS_ROBOTS)]
     sprintf('set programs %d', p.KIKS_PROGRAMS)
     sprintf('set latency_s %.17g', latency_s(p))
+    sprintf('set path_points %d', p.KIKS_TRACE_MAX)
     }';
 end
 

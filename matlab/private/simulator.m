@@ -31,7 +31,7 @@ if nargin > 1
             if ~isempty(link)
                 error('kiks:session', 'A session must be left before another is joined. Call kiks_quit first.');
             end
-            mlock
+            mlock;
             is_pipe = [];
             link = simulator_link('open', {'--join', sprintf('%d', argument)});
             simulator('version');  % a process without a request would end after a timeout
@@ -52,7 +52,7 @@ if isempty(link)
     if any(strcmp(strtok(request), {'ask', 'send', 'listen', 'pass', 'pause'}))
         error('kiks:session', 'A port must be open for that, but none is. Open it with ref = kiks_kopen([-1 9600 1]).');
     end
-    mlock  % `clear all` in a user's program would lose the process
+    mlock;  % `clear all` in a user's program would lose the process
     if ~isempty(ending)
         simulator_link('close', ending);  % Ctrl-C has interrupted an earlier close
         ending = [];

@@ -201,6 +201,26 @@ def test_distances_and_paths_begin_when_the_port_is_opened(session: Session) -> 
         ask("close 1")
 
 
+def test_a_long_path_keeps_its_ends_in_few_points(session: Session) -> None:
+    ask = Asker(session)
+    ask("set path_points 40")
+    ask("world default")
+    ask("open 1 9600")
+    start = ask.numbers("pose 1")
+    ask("ask 1 D,5,5")
+    ask("pause 3")
+    path = matrices_of(ask("path 1"))[0]
+    assert 20 <= path.shape[1] <= 40, "3 s have 75 points; every second one is left"
+    assert path[:, 0] == pytest.approx(start[:2], abs=0.1)
+    assert path[:, -1] == pytest.approx(ask.numbers("pose 1")[:2], abs=5)
+    ask("close 1")
+    assert matrices_of(ask("path 1"))[0].shape == path.shape, "a closed port has a path"
+    # A new port begins with all points again.
+    ask("open 1 9600")
+    ask("pause 1")
+    assert 23 <= matrices_of(ask("path 1"))[0].shape[1] <= 27
+
+
 def test_a_late_reply_answers_nothing_else(session: Session) -> None:
     ask = begun(session)
     ask("open 1 9600")

@@ -33,6 +33,7 @@ def _words(given: object) -> object:
 
 _NUMBER = BeforeValidator(_number)
 Count = Annotated[Whole, Field(ge=1, le=1000)]
+Points = Annotated[Whole, Field(ge=2, le=10**6)]
 
 
 @record
@@ -53,6 +54,7 @@ class Settings:
         brightness: Brightness of robots; None for that of their file.
         programs: Number of programs that start together; with 1, each starts as it joins.
         latency_s: Extra time of each exchange [s], as measured by a calibration.
+        path_points: Most points of a path; a longer path has points at larger distances.
     """
 
     seed: Annotated[Seed, _NUMBER] = 0
@@ -70,6 +72,7 @@ class Settings:
     brightness: Annotated[Brightness, _NUMBER] | None = None
     programs: Annotated[Count, _NUMBER] = 1
     latency_s: Annotated[Number, Field(ge=0, le=10), _NUMBER] = 0.0
+    path_points: Annotated[Points, _NUMBER] = 8**5
 
     def changed(self, name: str, value: str) -> Settings:
         """Return a copy with one changed value; an empty text stands for the default.

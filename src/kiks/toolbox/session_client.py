@@ -128,11 +128,11 @@ class SessionClient:
     def _open(self, number: int, baud: int, connection: LocalConnection, sim: Simulation) -> OpenPort:
         known = self.openings.get(number)
         robot = self.session.take_robot(self, self._usual_robot(number)) if known is None else known.robot
+        self.session.trace(for_new_port=True)
         port = VirtualPort(SharedLine(connection, sim, robot), self._program)
         port.baudrate = baud
         port.claim(f"{self.name}, port {-number}")
         port.timeout = ANSWER_S
-        self.session.trace()
         self._meet()
         with sim.lock:
             x_mm, y_mm, _ = sim.pose(robot)
