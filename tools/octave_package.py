@@ -1,7 +1,7 @@
 """Build the Octave package: python tools/octave_package.py FOLDER makes FOLDER/kiks-VERSION.tar.gz for `pkg install`.
 
-Everything in it comes from elsewhere: the functions from matlab/, the page from docs/matlab.md, and so do the categories
-that `pkg describe -verbose kiks` lists; the licence and the version are those of KiKS.
+Everything in it comes from elsewhere: the functions from matlab/, and the page from docs/matlab.md, whose table gives
+the categories that `pkg describe -verbose kiks` lists. Licence and version are those of KiKS.
 """
 
 from __future__ import annotations
@@ -57,9 +57,8 @@ def index() -> str:
     """Return the list of functions by categories, as docs/matlab.md has it, and the demos."""
     page = PAGE.read_text(encoding="utf-8")
     table = page[page.index("## Functions") :].split("\n\n")[1]
-    categories = {
-        name: re.findall(r"`(k\w+)`", row) for name, row in re.findall(r"^\| (\w.*?) \| (.*)\|$", table, re.M)
-    }
+    rows = re.findall(r"^\| (\w.*?) \| (.*)\|$", table, re.MULTILINE)
+    categories = {name: re.findall(r"`(k\w+)`", row) for name, row in rows}
     categories["demos"] = sorted(path.stem for path in (TOOLBOX / "demos").glob("*.m"))
     lines = ["kiks >> KiKS, a simulator of Khepera robots"]
     for name, functions in categories.items():
