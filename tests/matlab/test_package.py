@@ -1,4 +1,4 @@
-"""The package for Octave that `make octave-package` builds: it is installed in a new home, and programs run from there."""
+"""The package for Octave that `make octave-package` builds is installed in a new home, and programs run from there."""
 
 from __future__ import annotations
 

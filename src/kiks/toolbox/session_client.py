@@ -13,7 +13,6 @@ from kiks.clock.program_clock import ProgramClock
 from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.model.arena import Arena
 from kiks.ports.local_link import AwaitedAnswer, LocalConnection, PendingAnswer, SharedLine
-from kiks.ports.messages import Kind
 from kiks.sim.port import VirtualPort
 from kiks.sim.simulation import Simulation
 from kiks.toolbox.session import Session
@@ -334,13 +333,8 @@ class SessionClient:
 
     def _meet(self) -> None:
         """Advance the world to the program's time."""
-        connection, sim = self._connection, self._sim
-        assert connection is not None
-        assert sim is not None
-        now_ns = connection.ask(Kind.MEET).now_ns
-        # All other programs act later.
-        with sim.lock:
-            sim.advance_to(now_ns)
+        assert self._connection is not None
+        self._connection.meet()
 
     def _rest_if_idle(self) -> None:
         """Let the world run without this program while it has no open port."""
