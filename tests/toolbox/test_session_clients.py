@@ -313,6 +313,39 @@ def test_requests_to_a_paused_world_can_be_cancelled(session: Session, request_:
     assert told[1][HEAD:].startswith("n,") or request_ == "close 1", told
 
 
+def test_an_interrupted_pause_in_a_shared_world_has_not_run_ahead_of_it(session: Session) -> None:
+    other = begun(session)
+    other("open 1 9600")
+    other("close 1")
+    awaited = AwaitedAnswer()
+    told: list[str] = []
+    is_paused = threading.Event()
+    ask = Asker(session, 2)
+    ask.client.leave()
+
+    def drive() -> None:
+        ask.client = SessionClient(session, 2, awaited)
+        ask("open 1 9600")
+        assert session.desk is not None
+        session.desk.gate.pause(session.world.now_ns)
+        is_paused.set()
+        told.append(ask.told("pause 1e6"))
+        awaited.is_cancelled = False
+        session.desk.gate.go_on()
+        told.append(ask("time 1"))
+
+    thread = threading.Thread(target=drive)
+    thread.start()
+    assert is_paused.wait(GUARD_S)
+    awaited.is_cancelled = True
+    while not told:
+        ask.client.cancel()
+        thread.join(GUARD_S / 1000)
+    thread.join(GUARD_S)
+    assert "the program was interrupted" in told[0]
+    assert float(told[1]) < 5
+
+
 def test_waiting_for_other_programs_can_be_cancelled(session: Session) -> None:
     awaited = AwaitedAnswer()
     ask = begun(session, "programs 2")
