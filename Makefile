@@ -10,7 +10,7 @@ PYTEST = $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 # The tests start hundreds of Python processes: Python keeps the bytecode of the modules, whatever the environment says.
 export PYTHONDONTWRITEBYTECODE =
 
-.PHONY: demo test quick nightly checked setup system lint types docs benchmarks wheel clean
+.PHONY: demo test quick nightly checked setup system lint types docs benchmarks wheel octave-package clean
 
 demo: setup
 	$(BIN)/kiks demo follow --arena examples/arenas/office.toml --seconds 300 --picture kiks-demo.png
@@ -48,6 +48,8 @@ system:
 lint: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/mh_lint --brief matlab
+	$(BIN)/mh_style --brief matlab
 
 types: setup
 	$(BIN)/mypy
@@ -62,6 +64,10 @@ benchmarks: setup
 wheel: setup
 	$(BIN)/python tools/compile_kernels.py build/kernels
 	KIKS_KERNELS=build/kernels $(BIN)/python -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
+
+# A package for Octave in `dist`: pkg install dist/kiks-*.tar.gz, then pkg load kiks.
+octave-package: setup
+	$(BIN)/python tools/octave_package.py dist
 
 clean:
 	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

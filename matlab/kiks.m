@@ -65,7 +65,7 @@ if ischar(arena) && strncmp(arena, '--', 2)
             answer = simulator('state');
             if nargout == 0
                 disp(answer);
-                clear answer
+                clear answer;
             end
         case '--help'
             help('kiks');

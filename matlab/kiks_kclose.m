@@ -25,8 +25,8 @@ if nargin > 0 && ~isempty(ref)
 end
 open_ports('remove', number);
 if simulator('--is-running', [])
-    movie('stop', number);
+    film('stop', number);
     simulator(sprintf('close %d', number));
-    movie('save', number);
+    film('save', number);
 end
 end

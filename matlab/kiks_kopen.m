@@ -9,7 +9,7 @@ function ref = kiks_kopen(port, varargin)
 %   timeout   how long to wait for a real robot [s], 1 if it is left out; a simulated one needs none
 %
 %   kiks_kopen without an argument opens [-1 9600 1]. A port with a name, kiks_kopen('/dev/ttyUSB0', 9600, 1), is real:
-%   see kopen. ref is [-n -n -n -n] for the simulated port -n.
+%   see kopen. ref is [-n -n -n -n] for the simulated port -n, and kiks_kopen(ref) opens that port again at 9600 baud.
 %
 %   If there is no session, one starts with the default arena. Time and distances of the port begin at 0; encoders stay
 %   as they are. An error if the port is open: kiks_kclose([]) closes it.
@@ -30,6 +30,9 @@ elseif nargin > 0 && ~isempty(port)
             'was %s. Call kiks_kopen([-1 9600 1]).'], shown(port));
     end
     count = min(numel(port), 3);
+    if numel(port) == 4 && port(1) < 0 && all(port == port(1))
+        count = 1;  % a reference
+    end
     settings(1:count) = port(1:count);
 end
 if settings(2) <= 0 || settings(3) < 0
@@ -50,7 +53,7 @@ pulse_mm('forget');
 ref = settings([1 1 1 1]);
 kiks_ksend(['B' char(10)], ref);
 try
-    movie('begin', -settings(1));
+    film('begin', -settings(1));
 catch failure
     kiks_kclose(ref);
     rethrow(failure);

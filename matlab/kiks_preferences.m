@@ -51,7 +51,8 @@ KIKS_ROBOTS = [];
 % joins.
 KIKS_PROGRAMS = 1;
 
-% The meaning of elements 2, 3 and 4 of an arena matrix: 'kiks' (light, ball, cylinder) or 'thesis' (ball, light, cylinder).
+% The meaning of elements 2, 3 and 4 of an arena matrix: 'kiks' (light, ball, cylinder) or 'thesis' (ball, light,
+% cylinder).
 KIKS_ARENA_CODING = 'kiks';
 
 % Whether a window shows the world: [] if there is a display, 0 never, 1 always. It is read when a session starts.
@@ -104,7 +105,8 @@ KIKS_SIM_PROX_DIST = [];
 KIKS_K213_2DMODE = [];
 KIKS_SETTINGS_DIR = '';
 
-% Without effect: paths are kept completely.
+% The most points of a path (kiks_siminfo_robotpath). At first there are 25 a second. When there are more than this,
+% every second point is dropped, and from then on half as many come.
 KIKS_TRACE_MAX = 8^5;
 
 % The film that the next kiks_kopen begins and kiks_kclose ends (see kiks_recordmovie); '' for none.

@@ -15,8 +15,8 @@ open_ports('remove', 0);
 poll_desk('end');
 pulse_mm('forget');
 if simulator('--is-running', [])
-    movie('stop', 0);
-    movie('save', 0);
+    film('stop', 0);
+    film('save', 0);
     goes_on = is_shared();
     simulator('--end', []);
     if nargin < 1 || isempty(silent) || ~any(silent)
@@ -27,7 +27,7 @@ if simulator('--is-running', [])
         end
     end
 end
-clear kiks_status
+clear kiks_status;
 end
 
 function shared = is_shared()

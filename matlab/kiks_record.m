@@ -2,8 +2,8 @@ function kiks_record(file)
 % kiks_record  Record the world into a file.
 %
 %   kiks_record(file) records all that happens in the present world from now on: what programs send and robots answer,
-%   how robots move, and what people change. The name must end in .mcap; an existing file is replaced. The recording ends
-%   with the world, with the session, and when another one begins. The world is the same with and without it.
+%   how robots move, and what people change. The name must end in .mcap; an existing file is replaced. The recording
+%   ends with the world, with the session, and when another one begins. The world is the same with and without it.
 %
 %   kiks_record('') ends it. Outside of Octave, `kiks replay run.mcap` shows the run again, and `kiks plot`, `kiks film`
 %   and `kiks page` make figures, a film and a page of it.

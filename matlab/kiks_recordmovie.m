@@ -1,9 +1,9 @@
 function kiks_recordmovie(name)
 % kiks_recordmovie  Make a film of the world.
 %
-%   kiks_recordmovie(name) films the world from the next kiks_kopen of a simulated port on, until kiks_kclose closes that
-%   port. The film shows the world from above, and beside it what the robot of the port reads. It is an MP4 (H.264), in
-%   real time; a name that ends in .gif or .webp gives that instead. An existing file is replaced.
+%   kiks_recordmovie(name) films the world from the next kiks_kopen of a simulated port on, until kiks_kclose closes
+%   that port. The film shows the world from above, and beside it what the robot of the port reads. It is an MP4
+%   (H.264), in real time; a name that ends in .gif or .webp gives that instead. An existing file is replaced.
 %
 %   kiks_recordmovie('') takes that back. A program may also set the global variable KIKS_MOVIENAME to the name, or
 %   kiks_preferences may, to film each time.

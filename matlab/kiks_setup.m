@@ -1,8 +1,8 @@
 function kiks_setup()
 % kiks_setup  Put the toolbox on the path.
 %
-%   kiks_setup adds the toolbox's folder and that of the demos to the path of this session. To keep it, call savepath after
-%   it, or write addpath('FOLDER') with the toolbox's folder into .octaverc or startup.m. KiKS needs nothing else.
+%   kiks_setup adds the toolbox's folder and that of the demos to the path of this session. To keep it, call savepath
+%   after it, or write addpath('FOLDER') with the toolbox's folder into .octaverc or startup.m. KiKS needs nothing else.
 %
 %   A calibration is optional: to give the simulator the latency of a real robot's line, measure it with
 %   kiks_calibrate.

@@ -2,7 +2,8 @@ function path_xy = kiks_siminfo_robotpath(port)
 % kiks_siminfo_robotpath  Return the path of a simulated robot.
 %
 %   path_xy = kiks_siminfo_robotpath() is 2xN: row 1 x, row 2 y [mm] of this program's robot since its kiks_kopen. It is
-%   2x0 before a session.
+%   2x0 before a session. There are 25 points a second, but at most KIKS_TRACE_MAX (32768): when there are more,
+%   every second one is dropped, and half as many come from then on.
 %
 %   kiks_siminfo_robotpath(port) is for port -1, -2, ...; port may be a reference.
 %

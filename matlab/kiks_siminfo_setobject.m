@@ -1,9 +1,9 @@
 function ok = kiks_siminfo_setobject(row, x, y, spd, ang)
 % kiks_siminfo_setobject  Move a light, ball or cylinder, or make it roll.
 %
-%   ok = kiks_siminfo_setobject(row, x, y, spd, ang) moves the thing in that row of kiks_siminfo_objects to x, y [mm] and
-%   gives it the speed spd [mm/s] in the direction ang [rad]. [] or a missing argument keeps a value. ok is 1; it is 0
-%   if the place is not free: then it stays where it is but gets speed and angle. It is 0 before a session.
+%   ok = kiks_siminfo_setobject(row, x, y, spd, ang) moves the thing in that row of kiks_siminfo_objects to x, y [mm]
+%   and gives it the speed spd [mm/s] in the direction ang [rad]. [] or a missing argument keeps a value. ok is 1; it
+%   is 0 if the place is not free: then it stays where it is but gets speed and angle. It is 0 before a session.
 %
 %   Example:
 %     kiks, kiks_spawn(2), kiks_siminfo_setobject(1, [], [], 100, pi / 2), kiks_siminfo_objects, kiks_quit

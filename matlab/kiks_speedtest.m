@@ -3,8 +3,9 @@ function index = kiks_speedtest(n)
 %
 %   index = kiks_speedtest(n) does a fixed piece of work n times (4) and returns the processor seconds of the fastest:
 %   the smaller, the faster. The work is a mixture of small matrices and a loop, as in programs for robots. A present
-%   computer has 0.1 to 0.5; on the scale of KiKS 2.2.0, which is used here, a PC of 2001 has about 4 (1 GHz Pentium III:
-%   4.39). How well the scales agree is an estimate, so factors between indexes are good to a factor of two.
+%   computer has 0.1 to 0.5; on the scale of KiKS 2.2.0, which is used here, a PC of 2001 has about 4 (1 GHz
+%   Pentium III: 4.39). How well the scales agree is an estimate, so factors between indexes are good to a factor of
+%   two.
 %
 %   KIKS_EMULATED_CPU in kiks_preferences uses it: then a program thinks as slowly as on that computer.
 %

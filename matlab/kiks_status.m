@@ -47,6 +47,6 @@ fprintf('%s\n', str);
 if is_octave()
     fflush(stdout);
 else
-    drawnow
+    drawnow;
 end
 end

@@ -6,8 +6,8 @@ function reply = ksend(cmd, ref, timeout)
 %   ksend(cmd, ref, timeout) waits for another time [s].
 %
 %   A reply that comes later is dropped: it never answers another command. An empty cmd sends nothing. A cmd without an
-%   end is sent, and the reply is ''. A simulated ref is passed on to kiks_ksend. It is an error if the port is not open or
-%   the connection is lost.
+%   end is sent, and the reply is ''. A simulated ref is passed on to kiks_ksend. It is an error if the port is not open
+%   or the connection is lost.
 %
 %   Example:
 %     ref = kopen('/dev/ttyUSB0', 9600, 1);

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from tests.at_length import nightly, share
+from tests.matlab.octave import needs_octave
 
 pytestmark = pytest.mark.slow
 
@@ -111,3 +112,10 @@ def test_another_process_takes_the_place_of_a_killed_one(scene: str) -> None:
 @pytest.mark.parametrize("group", ["serve", pytest.param("session", marks=nightly)])
 def test_robots_answer_while_many_clients_connect(group: str) -> None:
     check("--only", f"crowd.{group}", "--cases", "1", "--seed", "15")
+
+
+@needs_octave
+@pytest.mark.timeout(470)  # a campaign in processes of its own
+@pytest.mark.parametrize("kind", ["joined_window", pytest.param("start", marks=nightly)])
+def test_ctrl_c_in_octave_leaves_right_answers_and_no_process(kind: str) -> None:
+    check("--only", f"octave.{kind}", "--cases", "1", "--seed", "16")

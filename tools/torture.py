@@ -33,7 +33,7 @@ from tools.campaigns.runner import (
     verdicts,
 )
 
-GROUPS = ("files", "calls", "messages", "wire", "faults", "crowd", "soak", "planted")
+GROUPS = ("files", "calls", "messages", "wire", "faults", "octave", "crowd", "soak", "planted")
 """Groups of campaigns: modules of `tools.campaigns`."""
 
 PEAK_MAX_MB = 2000
@@ -65,6 +65,7 @@ def figures(results: list[Result]) -> dict[str, float]:
         "torture.files_lost": counts["lost"],
         "torture.peak_mb": round(max((r.peak_mb for r in results if r.name.startswith("files.")), default=0.0), 1),
         "torture.soak_growth_mb": round(max((r.figures.get("growth_mb", 0.0) for r in results), default=0.0), 2),
+        "torture.prompt_s": round(max((r.figures.get("prompt_s", 0.0) for r in results), default=0.0), 2),
     }
     return found | {f"torture.tried.{result.name}": result.tried for result in results}
 

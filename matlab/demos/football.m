@@ -94,7 +94,7 @@ end
 % Not into the walls: the goal is the only way out.
 aim = complex(min(max(real(aim), 95), real(goal) + 30), -min(max(-imag(aim), 35), 365));
 turn = angle((aim - place) * exp(-1i * heading));
-ahead = most * max(0, cos(turn)) ^ 2;
+ahead = most * max(0, cos(turn))^2;
 spin = max(-8, min(8, 8 * turn));
 speeds = ahead + [-1; 1] * spin;
 end

@@ -19,11 +19,11 @@ settings = [setting_requests(preferences), {turrets}];
 is_new = ~is_active();
 cellfun(@simulator, settings, 'UniformOutput', false);
 if is_new
-    movie('forget', 0);
+    film('forget', 0);
 end
-movie('stop', 0);
+film('stop', 0);
 simulator(world);
-movie('save', 0);
+film('save', 0);
 % The ports belonged to the old world.
 open_ports('remove', 0);
 pulse_mm('forget');

@@ -7,7 +7,7 @@ function numbers = open_ports(what, number)
 
 persistent known
 if isempty(known)
-    mlock  % `clear all` in a user's program leaves ports open
+    mlock;  % `clear all` in a user's program leaves ports open
     known = zeros(1, 0);
 end
 switch what

@@ -48,8 +48,6 @@ end
 switch name
     case {'KIKS_SIM_PROX_STEP', 'KIKS_K213_STEP', 'KIKS_MMPERPIXEL'}
         reason = 'the simulator''s rays and movements are exact';
-    case 'KIKS_TRACE_MAX'
-        reason = 'paths are kept whole';
     case {'KIKS_OBJECT_BALL_RADIUS', 'KIKS_ROUNDOBJECT_RADIUS', 'KIKS_SIM_PROX_DIST'}
         reason = 'balls, cylinders and the range of sensors have the sizes of real ones';
     case {'KIKS_K213_2DMODE', 'KIKS_SETTINGS_DIR'}
@@ -99,6 +97,7 @@ check(within(p.KIKS_SIM_PROX_EMIN, 1), 'KIKS_SIM_PROX_EMIN', p.KIKS_SIM_PROX_EMI
 check(is_exponent(p.KIKS_SIM_PROX_EEXP), 'KIKS_SIM_PROX_EEXP', p.KIKS_SIM_PROX_EEXP, 'a number above 0', '3');
 check(is_exponent(p.KIKS_SIM_LIGHT_FEXP), 'KIKS_SIM_LIGHT_FEXP', p.KIKS_SIM_LIGHT_FEXP, 'a number above 0', '5');
 check(within(p.KIKS_K213_NOISE, 100), 'KIKS_K213_NOISE', p.KIKS_K213_NOISE, 'a share [%] from 0 to 100', '10');
+check(whole(p.KIKS_TRACE_MAX, 2, 10^6), 'KIKS_TRACE_MAX', p.KIKS_TRACE_MAX, 'a whole number from 2 to 10^6', '8^5');
 check(whole(p.KIKS_LOG_HISTORY, 1, 10^6), 'KIKS_LOG_HISTORY', p.KIKS_LOG_HISTORY, ...
     'a whole number from 1 to 10^6', '1000');
 end

@@ -15,7 +15,7 @@ function result = robot_link(what, number, varargin)
 
 persistent numbers links openings
 if isempty(numbers)
-    mlock  % `clear all` in a user's program would lose the open ports
+    mlock;  % `clear all` in a user's program would lose the open ports
     numbers = zeros(1, 0);
     links = {};
 end

@@ -3,11 +3,11 @@ function result = robot_port(what, port, varargin)
 %
 %   port = robot_port('open', name, baud)       name is 'host:port', with or without socket://, or a serial port
 %   robot_port('write', port, text)
-%   text = robot_port('read', port, seconds)    the characters that have arrived; waits for the first one at most that long
+%   text = robot_port('read', port, seconds)    what has arrived; waits for the first character at most that long
 %   robot_port('close', port)
 %
-%   A port that cannot be opened, or is lost, raises the error kiks:link. In Octave the package instrument-control does the
-%   work. Without it a serial port is read and written as a file, after stty; setting the environment variable
+%   A port that cannot be opened, or is lost, raises the error kiks:link. In Octave the package instrument-control does
+%   the work. Without it a serial port is read and written as a file, after stty; setting the environment variable
 %   KIKS_SERIAL to 'file' chooses that way.
 
 result = '';

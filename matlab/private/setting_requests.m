@@ -55,6 +55,7 @@ requests = {
     sprintf('set camera_noise_percent %.17g', p.KIKS_K213_NOISE)
     sprintf('set fixed_shutter %d', ~isempty(p.KIKS_K213_NONORMALIZE))
     sprintf('set log_lines %d', p.KIKS_LOG_HISTORY)
+    sprintf('set path_points %d', p.KIKS_TRACE_MAX)
     }';
 end
 

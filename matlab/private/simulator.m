@@ -40,7 +40,7 @@ if nargin > 1
             if ~isempty(link)
                 error('kiks:session', 'A session must be left before another is joined. Call kiks_quit first.');
             end
-            mlock
+            mlock;
             is_behind = false;
             link = simulator_link('open', {'--join', sprintf('%d', argument)});
             simulator('version');  % a process without a request would end after a timeout
@@ -84,7 +84,7 @@ if is_ready
     end
 else
     if isempty(link)
-        mlock  % `clear all` in a user's program would lose the process
+        mlock;  % `clear all` in a user's program would lose the process
         link = new_link(request, ending);
         ending = [];
     elseif is_behind

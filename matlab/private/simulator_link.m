@@ -123,8 +123,9 @@ end
 
 function refuse(first, command)
 if ~ischar(first) || isempty(strtrim(first))
-    error('kiks:session', ['The command kiks must start, but %s did not. Install KiKS (pip install . in a checkout), or set ' ...
-        'the environment variable KIKS_COMMAND to where the command is.'], command{1});
+    error('kiks:session', ['The command kiks must start, but %s did not. Install KiKS (pip install . in a ' ...
+        'checkout), or tell where the command is: setenv(''KIKS_COMMAND'', ''/home/me/KiKS/.venv/bin/kiks'').'], ...
+        command{1});
 end
 error('kiks:session', '%s', strtrim(first));
 end

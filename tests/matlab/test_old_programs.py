@@ -78,6 +78,11 @@ clear all
 kiks_kclose([]);
 ref = kiks_kopen([-1, 9600, 1]);
 say('after_clear', kProximity(ref))
+% "Reset the connection", with the reference itself.
+kiks_kclose(ref); kiks_kopen(ref);
+picture = kLinVis(ref);
+kiks_kclose(ref); kiks_kopen(ref);
+say('pictures', [picture kLinVis(ref)])
 % The lines that follow in many programs: replies taken to pieces.
 reply = kiks_ksend(['H' 10], ref);
 [value, count, errmsg] = sscanf(reply, 'h,%d,%d');
@@ -100,6 +105,7 @@ def test_loops_end_by_the_clock_and_compare_vectors(tmp_path: Path) -> None:
     assert said["waited"].shape == (1, 4)
     assert 2 <= said["waited"][0, 0] < 2.1
     assert said["after_clear"].shape == (8, 1)
+    assert said["pictures"].shape == (64, 2)
     assert said["pieces"].tolist() == [[2, 2, 1]]
     assert said["letter"] == 1
 

@@ -14,7 +14,7 @@ from kiks.model.project import Project
 from kiks.model.robot import RobotSpec
 from kiks.sim.from_project import simulation_of
 from kiks.sim.simulation import Simulation
-from kiks.toolbox.old_constants import PULSE_MM, OldConstants
+from kiks.toolbox.old_constants import OldConstants
 from kiks.toolbox.preferences import Settings
 
 KHEPERA = RobotSpec.load("khepera")
@@ -57,7 +57,7 @@ def counts(sim: Simulation, readings: int = 200) -> Any:
 
 def test_a_file_that_describes_the_khepera_makes_a_khepera() -> None:
     spec = world(figures=figures()).specs[0]
-    assert spec == KHEPERA.with_changes(body__pulse_mm=PULSE_MM, ambient__direction_deg=DIRECTIONS)
+    assert spec == KHEPERA.with_changes(ambient__direction_deg=DIRECTIONS)
 
 
 @pytest.mark.parametrize("turn_deg", [30, 180, -90])

@@ -203,6 +203,26 @@ def test_distances_and_paths_begin_when_the_port_is_opened(session: Session) -> 
         ask("close 1")
 
 
+def test_a_long_path_keeps_its_ends_in_few_points(session: Session) -> None:
+    ask = Asker(session)
+    ask("set path_points 40")
+    ask("world default")
+    ask("open 1 9600")
+    start = ask.numbers("pose 1")
+    ask("ask 1 D,5,5")
+    ask("pause 3")
+    path = matrices_of(ask("path 1"))[0]
+    assert 20 <= path.shape[1] <= 40, "3 s have 75 points; every second one is left"
+    assert path[:, 0] == pytest.approx(start[:2], abs=0.1)
+    assert path[:, -1] == pytest.approx(ask.numbers("pose 1")[:2], abs=5)
+    ask("close 1")
+    assert matrices_of(ask("path 1"))[0].shape == path.shape, "a closed port has a path"
+    # A new port begins with all points again.
+    ask("open 1 9600")
+    ask("pause 1")
+    assert 23 <= matrices_of(ask("path 1"))[0].shape[1] <= 27
+
+
 def test_a_late_reply_answers_nothing_else(session: Session) -> None:
     ask = begun(session)
     ask("open 1 9600")
@@ -327,6 +347,39 @@ def test_requests_to_a_paused_world_can_be_cancelled(session: Session, request_:
     assert not thread.is_alive()
     assert told[0][0] == "+" or "the program was interrupted" in told[0]
     assert told[1][HEAD:].startswith("n,") or request_ == "close 1", told
+
+
+def test_an_interrupted_pause_in_a_shared_world_has_not_run_ahead_of_it(session: Session) -> None:
+    other = begun(session)
+    other("open 1 9600")
+    other("close 1")
+    awaited = AwaitedAnswer()
+    told: list[str] = []
+    is_paused = threading.Event()
+    ask = Asker(session, 2)
+    ask.client.leave()
+
+    def drive() -> None:
+        ask.client = SessionClient(session, 2, awaited)
+        ask("open 1 9600")
+        assert session.desk is not None
+        session.desk.gate.pause(session.world.now_ns)
+        is_paused.set()
+        told.append(ask.told("pause 1e6"))
+        awaited.is_cancelled = False
+        session.desk.gate.go_on()
+        told.append(ask("time 1"))
+
+    thread = threading.Thread(target=drive)
+    thread.start()
+    assert is_paused.wait(GUARD_S)
+    awaited.is_cancelled = True
+    while not told:
+        ask.client.cancel()
+        thread.join(GUARD_S / 1000)
+    thread.join(GUARD_S)
+    assert "the program was interrupted" in told[0]
+    assert float(told[1]) < 5
 
 
 def test_waiting_for_other_programs_can_be_cancelled(session: Session) -> None:

@@ -70,12 +70,13 @@ class Figure(Exception):  # noqa: N818  (no error: how a case hands over what it
 
     Args:
         name: What it is called in the results.
-        value: How much.
+        value: How much; of several cases, the largest counts.
+        tried: How much the case has tried.
     """
 
-    def __init__(self, name: str, value: float) -> None:
+    def __init__(self, name: str, value: float, tried: int = 1) -> None:
         super().__init__(f"{name} = {value:g}")
-        self.name, self.value = name, value
+        self.name, self.value, self.tried = name, value, tried
 
 
 @dataclass(frozen=True)
@@ -240,7 +241,7 @@ def _live(play: Play, campaign: Campaign, cases: range, seed: int, row: Any, err
                     row[TRIED] += 1
                     lines.write(json.dumps([broken.verdict, broken.where, str(broken), case]) + "\n")
                 except Figure as figure:
-                    row[TRIED] += 1
+                    row[TRIED] += figure.tried
                     lines.write(json.dumps(["figure", figure.name, figure.value, case]) + "\n")
                 row[PLAYED] += 1
                 peak_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -14,7 +14,7 @@ from kiks.cli.engine_start import ready_engine
 from kiks.cli.options import show_log
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import KiksError
-from kiks.toolbox.framing import Exchange, Heartbeat
+from kiks.toolbox.framing import BUSY, Exchange, Heartbeat, write_all
 
 
 def session(
@@ -43,6 +43,9 @@ def session(
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_SETMASK, ())
     show_log(is_quiet=True)
+    if where is None and listen is None:
+        # Octave waits for the greeting, and handles Ctrl-C when a frame has arrived: the first one comes at once.
+        write_all(sink, BUSY)
     exchange = Exchange(0, sink, close=lambda: _close(0, sink), parent=os.getppid())
     try:
         if where is not None:

@@ -29,6 +29,9 @@ POLL_S = 0.05
 SLICE_NS = NS_PER_S
 """Simulated time that passes in one piece while a program pauses [ns]."""
 
+WATCHED_SLICE_NS = NS_PER_S // 10
+"""The same if the program shares a watched world: a pause that is interrupted has run ahead of the world so far."""
+
 
 class PendingAnswer(Protocol):
     """State of the answer that a program waits for."""
@@ -141,6 +144,13 @@ class LocalConnection(Connection):
             sim.sync()
             return True
 
+    def meet(self) -> None:
+        """Advance the world to the program's time, when it is the program's turn."""
+        now_ns = self.ask(Kind.MEET).now_ns
+        # All other programs act later.
+        with self._world:
+            self._programs.sim.advance_to(now_ns)
+
     def set_time(self, time_ns: int) -> None:
         """Set the program's time to that of the world [ns], after the program has moved the world itself."""
         self._now_ns = self._told_ns = self._participant.acts_from_ns = time_ns
@@ -201,12 +211,14 @@ class SharedLine(RemoteLine):
     def pass_to(self, time_ns: int) -> None:
         """Let time pass up to a time [ns]."""
         now_ns = self.now_ns
-        while now_ns + SLICE_NS < time_ns:
-            now_ns += SLICE_NS
+        while now_ns + (slice_ns := self._slice_ns()) < time_ns:
+            now_ns += slice_ns
             self._act(self._local_line.pass_to, super().pass_to, now_ns)
-            if self._connection.is_alone:
-                # Simulate each slice here, not all of them when the state is read.
-                self._sim.sync()
+            if not self._connection.is_alone:
+                # Wait for the world: the program's own time needs no wait.
+                self._connection.meet()
+            # Simulate each slice here, not all of them when the state is read.
+            self._sim.sync()
             self._connection.yield_world()
         self._act(self._local_line.pass_to, super().pass_to, time_ns)
 
@@ -221,6 +233,11 @@ class SharedLine(RemoteLine):
             LinkError: If it could wait for ever.
         """
         return self._act(self._local_line.read, super().read, size, terminator, timeout_ns, poll_ns)
+
+    def _slice_ns(self) -> int:
+        gate = self._sim.gate
+        is_watched = gate is not None and gate.speed is not None
+        return WATCHED_SLICE_NS if is_watched and not self._connection.is_alone else SLICE_NS
 
     def _act(self, alone: Callable[[*Given], Result], shared: Callable[[*Given], Result], *args: *Given) -> Result:
         """Call the method of the line that serves this program now."""

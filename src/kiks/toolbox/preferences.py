@@ -21,6 +21,7 @@ def _words(given: object) -> object:
 
 
 Count = Annotated[Whole, Field(ge=1, le=1000)]
+Points = Annotated[Whole, Field(ge=2, le=10**6)]
 
 
 @record
@@ -42,6 +43,7 @@ class Settings(OldConstants):
         programs: Number of programs that start together; with 1, each starts as it joins.
         latency_s: Extra time of each exchange [s], as measured by a calibration.
         log_lines: Number of lines of the log that the desk keeps, from the first world on.
+        path_points: Most points of a path; a longer path has points at larger distances.
     """
 
     seed: Annotated[Seed, _NUMBER] = 0
@@ -60,6 +62,7 @@ class Settings(OldConstants):
     programs: Annotated[Count, _NUMBER] = 1
     latency_s: Annotated[Number, Field(ge=0, le=10), _NUMBER] = 0.0
     log_lines: Annotated[Whole, Field(ge=1, le=1_000_000), _NUMBER] = 1000
+    path_points: Annotated[Points, _NUMBER] = 8**5
 
     def changed(self, name: str, value: str) -> Settings:
         """Return a copy with one changed value; an empty text stands for the default.

@@ -80,6 +80,7 @@ class Session:
         self._shown: Shown | None = None
         self._has_world = threading.Event()
         self._traced: Simulation | None = None
+        self._coarse_ns = 0
         self._recorder: RunRecorder | None = None
 
     @property
@@ -188,11 +189,19 @@ class Session:
         if self.desk is not None:
             self.desk.note(text.replace(self.url, self.url.partition("?")[0]) if self.url else text)
 
-    def trace(self) -> None:
-        """Record the paths of all robots in this world from now on."""
-        if self._traced is not self.world:
-            self._traced = self.world
-            self._traced.record_paths(PATH_PERIOD_S)
+    def trace(self, *, for_new_port: bool = False) -> None:
+        """Record the paths of all robots in this world from now on.
+
+        Args:
+            for_new_port: Whether a port is about to be opened. If it is the only one, and the paths are so long that
+                points were dropped, they begin anew.
+        """
+        sim = self.world
+        is_only = for_new_port and all(wire.holder is None for wire in sim.wires)
+        if self._traced is not sim or (is_only and sim.now_ns > self._coarse_ns):
+            self._traced = sim
+            self._coarse_ns = sim.now_ns + int(self.settings.path_points * PATH_PERIOD_S * NS_PER_S)
+            sim.record_paths(PATH_PERIOD_S, points_max=self.settings.path_points)
 
     def record(self, path: Path | None) -> None:
         """Record this world from now on, until it ends or the next call; with None, record no more.

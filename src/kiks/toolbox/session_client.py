@@ -16,7 +16,6 @@ from kiks.clock.program_clock import ProgramClock
 from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.model.arena import Arena
 from kiks.ports.local_link import AwaitedAnswer, LocalConnection, PendingAnswer, SharedLine
-from kiks.ports.messages import Kind
 from kiks.sim.port import VirtualPort
 from kiks.sim.simulation import Simulation
 from kiks.toolbox.own_turrets import OwnTurret, TurretOrder, turret_of
@@ -156,11 +155,11 @@ class SessionClient:
         for turret, name in self.turrets.items():
             if turret not in sim.wires[robot - 1].firmware.turrets:
                 sim.fit(robot, OwnTurret(turret, name))
+        self.session.trace(for_new_port=True)
         port = VirtualPort(SharedLine(connection, sim, robot), self._program)
         port.baudrate = baud
         port.claim(f"{self.name}, port {-number}")
         port.timeout = ANSWER_S
-        self.session.trace()
         self._meet()
         with sim.lock:
             x_mm, y_mm, _ = sim.pose(robot)
@@ -422,13 +421,8 @@ class SessionClient:
 
     def _meet(self) -> None:
         """Advance the world to the program's time."""
-        connection, sim = self._connection, self._sim
-        assert connection is not None
-        assert sim is not None
-        now_ns = connection.ask(Kind.MEET).now_ns
-        # All other programs act later.
-        with sim.lock:
-            sim.advance_to(now_ns)
+        assert self._connection is not None
+        self._connection.meet()
 
     def _rest_if_idle(self) -> None:
         """Let the world run without this program while it has no open port."""

@@ -1,10 +1,10 @@
-function movie(what, number)
-% movie  The film that kiks_recordmovie has asked for.
+function film(what, number)
+% film  The film that kiks_recordmovie has asked for.
 %
-%   movie('begin', number)   films from now on if KIKS_MOVIENAME names a film and none is made; number: port's
-%   movie('stop', number)    ends the film that began with this port, 0: with any, at this time
-%   movie('save', number)    makes its file, and forgets its name
-%   movie('forget', number)  the simulator's process has ended, and its film with it
+%   film('begin', number)   films from now on if KIKS_MOVIENAME names a film and none is made; number: port's
+%   film('stop', number)    ends the film that began with this port, 0: with any, at this time
+%   film('save', number)    makes its file, and forgets its name
+%   film('forget', number)  the simulator's process has ended, and its film with it
 %
 %   After a film has been stopped, time may pass in the world until it is saved.
 

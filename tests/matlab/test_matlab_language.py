@@ -1,0 +1,149 @@
+"""The toolbox is valid MATLAB, as far as can be told without MATLAB: MISS_HIT parses it, and each function is MATLAB's.
+
+`mh_lint` and `mh_style` check grammar and style (`make lint`). Here stands what they do not look at: whether the
+functions that are called exist in MATLAB.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from miss_hit_core.config import Config
+from miss_hit_core.errors import Message_Handler
+from miss_hit_core.m_ast import (
+    AST_Visitor,
+    For_Loop_Statement,
+    Function_Call,
+    Function_Definition,
+    Function_Signature,
+    Global_Statement,
+    Identifier,
+    Lambda_Function,
+    Node,
+    Persistent_Statement,
+    Selection,
+    Simple_Assignment_Statement,
+    String_Literal,
+    Try_Statement,
+)
+from miss_hit_core.m_language import MATLAB_2020b_Language
+from miss_hit_core.m_language_builtins import BUILTIN_FUNCTIONS, HIGH_IMPACT_BUILTIN_FUNCTIONS
+from miss_hit_core.m_lexer import MATLAB_Lexer
+from miss_hit_core.m_parser import MATLAB_Parser
+from tests.matlab.octave import DEMOS, TOOLBOX
+
+FILES = sorted(TOOLBOX.rglob("*.m"))
+
+WRITTEN_IN_MATLAB = """
+    addpath angle axis bar datestr fileparts fileread fullfile gca help hold ind2sub inpolygon ispc isunix linspace
+    mat2str mean meshgrid now onCleanup path pathsep pwd read serialport setdiff str2double strcat strjoin strsplit
+    strtok tcpclient tempname title union unique write xlabel ylabel
+"""
+"""Functions of MATLAB R2020b that the toolbox calls and MISS_HIT does not list: it knows only those that are built in.
+Look a function up in MATLAB's documentation before you add it."""
+
+OCTAVE_ONLY = {
+    "canonicalize_file_name": {"robot_port"},
+    "fclear": {"robot_port"},
+    "fflush": {"kiks_status", "robot_port", "simulator", "simulator_link"},
+    "fputs": {"simulator", "simulator_link"},
+    "have_window_system": {"need_display"},
+    "pkg": {"robot_port"},
+    "popen2": {"simulator_link"},
+    "stdout": {"kiks_status"},
+    "waitpid": {"simulator_link"},
+}
+"""Functions that only Octave has, and the files that call them, in branches that only Octave takes."""
+
+MATLAB_ONLY = {"feature": {"need_display"}}
+"""The same for MATLAB."""
+
+
+class Names(AST_Visitor):
+    """Collects the names of a file.
+
+    Attributes:
+        used: All names except those of fields.
+        variables: The names of variables.
+        functions: The functions that are defined in the file.
+        slips: What MATLAB takes for a command (`x += 1`), a shell escape (`!x`) or a string (`"x"`).
+    """
+
+    def __init__(self) -> None:
+        self.used: set[str] = set()
+        self.variables: set[str] = set()
+        self.functions: set[str] = set()
+        self.slips: set[str] = set()
+
+    def visit(self, node: Node, n_parent: Node, relation: str) -> None:
+        """Look at a node."""
+        match node:
+            case Identifier():
+                if not (isinstance(n_parent, Selection) and relation == "Field"):
+                    self.used.add(str(node))
+            case Function_Call() if node.variant != "normal" and str(node.n_name) != "clear":
+                self.slips.add(str(node))
+            case String_Literal():
+                self.slips.add(str(node))
+            case Function_Definition():
+                self.functions.add(str(node.n_sig.n_name))
+            case Function_Signature():
+                self._declare(*node.l_inputs, *node.l_outputs)
+            case Simple_Assignment_Statement():
+                self._declare(node.n_lhs)
+            case For_Loop_Statement():
+                self._declare(node.n_ident)
+            case Global_Statement() | Persistent_Statement():
+                self._declare(*node.l_names)
+            case Lambda_Function():
+                self._declare(*node.l_parameters)
+            case Try_Statement() if node.n_ident is not None:
+                self._declare(node.n_ident)
+            case _ if hasattr(node, "l_lhs"):  # [a, b] = f()
+                self._declare(*node.l_lhs)
+
+    def _declare(self, *targets: Node) -> None:
+        for target in targets:
+            # a.b(3).c = 1 makes a variable a.
+            while not isinstance(target, Identifier):
+                target = getattr(target, "n_prefix", None) or target.n_ident
+            self.variables.add(str(target))
+
+
+def names_of(file: Path) -> Names:
+    """Parse a file as MATLAB R2020b."""
+    messages = Message_Handler("debug")
+    messages.register_file(str(file))
+    lexer = MATLAB_Lexer(MATLAB_2020b_Language(), messages, file.read_text(encoding="utf-8"), str(file))
+    tree = MATLAB_Parser(messages, lexer, Config()).parse_file()
+    names = Names()
+    tree.visit(None, names, "Root")
+    return names
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.relative_to(TOOLBOX)))
+def test_every_function_is_one_of_matlab_or_of_the_toolbox(file: Path) -> None:
+    folders = {TOOLBOX, DEMOS, file.parent, file.parent / "private"}
+    ours = {each.stem for folder in folders for each in folder.glob("*.m")}
+    names = names_of(file)
+    known = BUILTIN_FUNCTIONS | HIGH_IMPACT_BUILTIN_FUNCTIONS | set(WRITTEN_IN_MATLAB.split()) | {"end"}
+    named_here = ours | names.functions | names.variables
+    here_alone = {name for name, files in (OCTAVE_ONLY | MATLAB_ONLY).items() if file.stem in files}
+    assert names.used - known - named_here - here_alone == set()
+    assert names.slips == set()
+
+
+def test_the_lists_name_only_what_is_called() -> None:
+    used = {file.stem: names_of(file).used for file in FILES}
+    assert set().union(*used.values()) >= set(WRITTEN_IN_MATLAB.split())
+    for name, files in (OCTAVE_ONLY | MATLAB_ONLY).items():
+        assert {file for file in files if name in used[file]} == files
+
+
+def test_functions_that_matlab_lacks_are_noticed(tmp_path: Path) -> None:
+    file = tmp_path / "wrong.m"
+    file.write_text("function wrong()\nx.y = 3;\nprintf('%d', x.y, columns(x));\nend\n")
+    assert names_of(file).used - names_of(file).variables - {"wrong"} == {"printf", "columns"}
+    file.write_text('function wrong()\nx = "a";\nx += 1;\nif x != 3, x = 1; end\nend\n')
+    assert len(names_of(file).slips) == 3
