@@ -29,8 +29,8 @@ KIKS_THINKING = 'live';
 % current folder, else measured once, for two seconds. Then KIKS_THINKING is live with the factor that follows.
 KIKS_EMULATED_CPU = '';
 
-% 'Khepera', 'Khepera_II', the name of a robot's file .toml, or of a robot definition file .m of KiKS 2.2.0. Such a file is
-% looked for in the current folder and on the path, there also in folders named robots, and may be named without .m.
+% 'Khepera', 'Khepera_II', the name of a robot's file .toml, or of a robot definition file .m of KiKS 2.2.0. KiKS looks
+% for such a file in the current folder and on the path, there also in folders named robots. '.m' may be left out.
 KIKS_ROBOT = 'Khepera';
 
 % The model of its proximity sensors: '' the robot's own ('reflection' of a Khepera, 'curve' of a Khepera II); 'thesis',
@@ -73,8 +73,8 @@ KIKS_ARENA_DEFAULT_COLOR = 255;
 % The number of lines that kiks_status keeps.
 KIKS_LOG_HISTORY = 1000;
 
-% Constants of the sensors' models of KiKS 2.2.0. Here sensors and their noise are as measured on real robots, as long as
-% these constants have the values below. Other values change what was measured as much as they changed those models:
+% Constants of the sensors' models of KiKS 2.2.0. Here sensors and their noise are as measured on real robots, as long
+% as these constants have the values below. Other values change what was measured as much as they changed those models:
 %
 %   KIKS_SIM_PROX_NOISE     random part of each proximity reading [%]: the measured one is multiplied by it
 %   KIKS_SIM_PROX_EMAX      error of small readings, a share: the measured one grows in proportion

@@ -51,8 +51,8 @@ for k = 1:numel(files)
     end
     is_number = isnumeric(number) && isscalar(number) && any(number == 1:99);
     if ~is_number || any([turrets.number] == number)
-        say_once(name, sprintf(['turrets/%s must return a number of its own from 1 to 99 when it is called without an ' ...
-            'argument, but that was %s. It is left out.'], files{k}, shown(number)));
+        say_once(name, sprintf(['turrets/%s must return a number of its own from 1 to 99 when it is called without ' ...
+            'an argument, but that was %s. It is left out.'], files{k}, shown(number)));
         continue
     end
     turrets(end + 1) = struct('number', double(number), 'name', name); %#ok<AGROW>

@@ -20,7 +20,7 @@ if nargin < 1
     end
     return
 end
-mlock  % `clear all` in a user's program would lose the hook
+mlock;  % `clear all` in a user's program would lose the hook
 if ~isempty(hook)
     if is_octave()
         remove_input_event_hook(hook);

@@ -91,7 +91,8 @@ check(grey(p.KIKS_COLOR_ROBOT) || whole(p.KIKS_COLOR_ROBOT, -100, -1), 'KIKS_COL
     'a grey from 1 to 255, a number of stripes from -1 to -100, or []', '120');
 check(whole(p.KIKS_ARENA_DEFAULT_COLOR, 1, 255), 'KIKS_ARENA_DEFAULT_COLOR', p.KIKS_ARENA_DEFAULT_COLOR, ...
     'a grey from 1 to 255', '255');
-check(within(p.KIKS_SIM_PROX_NOISE, 100), 'KIKS_SIM_PROX_NOISE', p.KIKS_SIM_PROX_NOISE, 'a share [%] from 0 to 100', '1');
+check(within(p.KIKS_SIM_PROX_NOISE, 100), 'KIKS_SIM_PROX_NOISE', p.KIKS_SIM_PROX_NOISE, ...
+    'a share [%] from 0 to 100', '1');
 check(within(p.KIKS_SIM_PROX_EMAX, 1), 'KIKS_SIM_PROX_EMAX', p.KIKS_SIM_PROX_EMAX, 'a share from 0 to 1', '0.25');
 check(within(p.KIKS_SIM_PROX_EMIN, 1), 'KIKS_SIM_PROX_EMIN', p.KIKS_SIM_PROX_EMIN, 'a share from 0 to 1', '0.10');
 check(is_exponent(p.KIKS_SIM_PROX_EEXP), 'KIKS_SIM_PROX_EEXP', p.KIKS_SIM_PROX_EEXP, 'a number above 0', '3');

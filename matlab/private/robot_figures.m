@@ -17,8 +17,9 @@ end
 file = found_file(folder, [base '.m']);
 if isempty(file)
     if ~isempty(ending)
-        error('kiks:argument', ['KIKS_ROBOT must be a file that exists, but %s is neither in %s nor on the path, nor ' ...
-            'in a folder robots there. Look for slips in its name, or give it with its folder.'], shown(name), pwd());
+        error('kiks:argument', ['KIKS_ROBOT must be a file that exists, but %s is neither in %s nor on the path, ' ...
+            'nor in a folder robots there. Look for slips in its name, or give it with its folder.'], ...
+            shown(name), pwd());
     end
     return
 end

@@ -8,8 +8,8 @@ figures = robot_figures(p.KIKS_ROBOT);
 if ~isempty(figures)
     p.KIKS_ROBOT = 'Khepera';  % with these figures
     if any(strcmpi(p.KIKS_RESPONSE, {'thesis', 'fast'}))
-        say_once('KIKS_RESPONSE', sprintf(['KIKS_RESPONSE = ''%s'' has places, directions and a range of its own for ' ...
-            'the sensors: those of the robot''s file have no effect.'], p.KIKS_RESPONSE));
+        say_once('KIKS_RESPONSE', sprintf(['KIKS_RESPONSE = ''%s'' has places, directions and a range of its own ' ...
+            'for the sensors: those of the robot''s file have no effect.'], p.KIKS_RESPONSE));
     end
 end
 stripes = 0;

@@ -109,8 +109,8 @@ while true
             % A person has typed a command on the desk: it is evaluated first, and then the request is sent again.
             evaluate_typed(unescaped(answer(10:end)), strcmp(request, 'poll'));
             if isempty(link)
-                error('kiks:session', ['The simulator must run to answer, but a command typed on the desk has ended ' ...
-                    'it. Start another one with kiks(ARENA).']);
+                error('kiks:session', ['The simulator must run to answer, but a command typed on the desk has ' ...
+                    'ended it. Start another one with kiks(ARENA).']);
             end
             payload = simulator(request);
             return

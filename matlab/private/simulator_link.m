@@ -75,7 +75,8 @@ if isempty(number)
     refuse(first, command);
 end
 name = sprintf('127.0.0.1:%d', number);
-link = struct('is_pipe', false, 'is_polled', false, 'to', [], 'from', [], 'port', robot_port('open', name, 9600), 'rest', '');
+link = struct('is_pipe', false, 'is_polled', false, 'to', [], 'from', [], ...
+    'port', robot_port('open', name, 9600), 'rest', '');
 robot_port('write', link.port, [token 10]);
 % Every connection begins with the greeting.
 [~, link] = next_frame(link, '');
