@@ -129,9 +129,10 @@ say('stripes', caught(@() kiks_arena()))
 
 def test_constants_of_the_old_simulator_change_robots(tmp_path: Path) -> None:
     octave = run(CONSTANTS, tmp_path)
-    assert Project.load(tmp_path / "usual.kiks").robots[0].changes == {}
+    wheels = {"body": {"pulse_mm": 0.082}, "motor": {"dead_band_pwm": 0.0}}
+    assert Project.load(tmp_path / "usual.kiks").robots[0].changes == wheels
     changes = Project.load(tmp_path / "changed.kiks").robots[0].changes
-    assert changes["body"] == {"stripe_count": 16}
+    assert changes["body"] == {"pulse_mm": 0.082, "stripe_count": 16}
     assert changes["camera"] == {"noise_share": 0.0, "adapts_exposure": False}
     assert changes["proximity"]["noise_exponent"] == 20
     assert changes["proximity"]["jitter_counts"][-1] == 2 * 9.7
