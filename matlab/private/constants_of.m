@@ -1,31 +1,20 @@
-function values = constants_of(folder)
-% constants_of  The constants that kiks_preferences.m in a folder sets, in a struct.
+function [values, is_function] = constants_of(file)
+% constants_of  The constants KIKS_... that a file .m sets, in a struct, and whether it is a function.
 %
 %   The file may be a script, or, as in KiKS 2.2.0, a function that sets global variables. What is global before is so
 %   again afterwards: else the file's values would count as a program's own, and outlast a change of the file.
+%
+%   The file runs as a copy under a name of its own, as Octave caches which file a name stands for, and a function can
+%   be called only by its file's name.
 
-[values, is_function] = values_of_copy(fileread(fullfile(folder, 'kiks_preferences.m')), folder);
-if is_function
-    % The file of KiKS 2.2.0 sets each constant. Greys that are still as they came with it were chosen by nobody.
-    shipped = greys_of_kiks_2();
-    names = fieldnames(shipped);
-    for k = 1:numel(names)
-        if isfield(values, names{k}) && isequal(values.(names{k}), shipped.(names{k}))
-            values = rmfield(values, names{k});
-        end
-    end
-end
-end
-
-function [values, is_function] = values_of_copy(text, folder)
-% The file runs as a copy under a name of its own, as Octave caches which file a name stands for, and a function can be
-% called only by its file's name.
 persistent count
+[folder, base] = fileparts(file);
+text = fileread(file);
 if any(text == 0)
     error('kiks:argument', 'it is no text: it has characters of number 0');
 end
 count = sum(count) + 1;
-name = sprintf('kiks_preferences_%d', count);
+name = sprintf('kiks_constants_%d', count);
 home = tempname();
 [is_made, why] = mkdir(home);
 if ~is_made || ~isempty(why)
@@ -38,9 +27,9 @@ for k = 1:numel(globals)
     before{k} = global_value(globals{k}, []);
 end
 cleaning = onCleanup(@() clean_up(home, copy, globals, before)); %#ok<NASGU>
-file = fopen(copy, 'w');
-fwrite(file, text);
-fclose(file);
+opened = fopen(copy, 'w');
+fwrite(opened, text);
+fclose(opened);
 addpath(home);
 % Octave warns of a function that is named otherwise than its file.
 shown_before = warning('query', 'Octave:function-name-clash');
@@ -49,7 +38,7 @@ showing = onCleanup(@() warning(shown_before.state, shown_before.identifier)); %
 try
     values = values_of_run(name);
 catch failure
-    error('kiks:argument', '%s', strrep(strrep(failure.message, home, folder), name, 'kiks_preferences'));
+    error('kiks:argument', '%s', strrep(strrep(one_line(failure.message), home, folder), name, base));
 end
 is_function = isempty(fieldnames(values));
 for k = 1:numel(globals)

@@ -5,16 +5,21 @@ function preferences = read_preferences()
 
 persistent defaults
 if isempty(defaults)
-    defaults = constants_of(fileparts(fileparts(mfilename('fullpath'))));
+    toolbox = fileparts(fileparts(mfilename('fullpath')));
+    defaults = constants_of(fullfile(toolbox, 'kiks_preferences.m'));
 end
 preferences = defaults;
 changes = struct();
-if exist(fullfile(pwd(), 'kiks_preferences.m'), 'file') == 2
+file = fullfile(pwd(), 'kiks_preferences.m');
+if exist(file, 'file') == 2
     try
-        changes = constants_of(pwd());
+        [changes, is_function] = constants_of(file);
     catch failure
         error('kiks:argument', 'kiks_preferences.m in %s must run, but it did not: %s. Mend it or delete it.', ...
-            pwd(), regexprep(one_line(failure.message), '\.$', ''));
+            pwd(), regexprep(failure.message, '\.$', ''));
+    end
+    if is_function
+        changes = without_shipped_greys(changes);
     end
 end
 names = fieldnames(changes);
@@ -38,6 +43,17 @@ for k = 1:numel(names)
     say_idle(names{k}, preferences.(names{k}), defaults.(names{k}));
 end
 preferences = checked(preferences);
+end
+
+function changes = without_shipped_greys(changes)
+% The file of KiKS 2.2.0, a function, sets each constant. The user has not chosen greys that are still as shipped.
+shipped = greys_of_kiks_2();
+names = fieldnames(shipped);
+for k = 1:numel(names)
+    if isfield(changes, names{k}) && isequal(changes.(names{k}), shipped.(names{k}))
+        changes = rmfield(changes, names{k});
+    end
+end
 end
 
 function say_idle(name, value, default)

@@ -25,9 +25,17 @@ if isempty(file)
 end
 names = {'KIKS_ROBOT_DIAMETER', 'KIKS_ROBOT_DISTANCE_BETWEEN_WHEELS', 'KIKS_PROXIMITY_SENSORS_RANGE', ...
     'KIKS_PROXIMITY_POSITIONS', 'KIKS_PROXIMITY_DIRECTIONS'};
-text = fileread(file);
-values = constants_of(file, text, names);
-say_unknown([base '.m'], text, names);
+try
+    set_ones = constants_of(file);
+catch failure
+    error('kiks:argument', 'KIKS_ROBOT''s file %s.m must run, but it did not: %s. Mend it, or take another robot.', ...
+        base, regexprep(failure.message, '\.$', ''));
+end
+say_unknown([base '.m'], setdiff(fieldnames(set_ones), names));
+values = cell(1, numel(names));
+for k = find(isfield(set_ones, names))
+    values{k} = set_ones.(names{k});
+end
 rule = @(k, low, high, what) check_figures([base '.m'], names{k}, values{k}, low, high, what);
 rule(1, 10, 500, 'a diameter [mm] from 10 to 500');
 rule(2, 1, values{1}, sprintf('a distance [mm] from 1 to the robot''s diameter, %g', values{1}));
@@ -55,46 +63,9 @@ end
 file = '';
 end
 
-function values = constants_of(file, text, names)
-% The constants are global in a function, and may be in a script. None is left over from another file.
-for k = 1:numel(names)
-    eval(['global ' names{k} '; ' names{k} ' = [];']);
-end
-[folder, base] = fileparts(file);
-here = pwd();
-try
-    if isempty(regexp(text, '^(\s*[%#][^\n]*\n)*\s*function\s', 'once'))
-        run_script(text, names);
-    else
-        cd(folder);
-        clear(base);  % what was read of it before may be out of date
-        feval(base);
-        cd(here);
-    end
-catch failure
-    cd(here);
-    error('kiks:argument', 'KIKS_ROBOT''s file %s.m must run, but it did not: %s. Mend it, or take another robot.', ...
-        base, regexprep(one_line(failure.message), '\.$', ''));
-end
-values = cell(1, numel(names));
-for k = 1:numel(names)
-    values{k} = eval(names{k});
-end
-end
-
-function run_script(kiks_text, kiks_names)
-% In a workspace of its own, as it may set any variable.
-eval(sprintf('global %s;', sprintf('%s ', kiks_names{:})));
-eval(kiks_text);
-end
-
-function say_unknown(file, text, names)
-set_ones = regexp(text, '^\s*(KIKS_\w+)\s*(\([^\n]*\)\s*)?=[^=]', 'tokens', 'lineanchors');
-for k = 1:numel(set_ones)
-    name = set_ones{k}{1};
-    if ~any(strcmp(name, names))
-        say_once([file name], sprintf('%s: %s has no effect on a robot of this KiKS.', file, name));
-    end
+function say_unknown(file, unknown)
+for k = 1:numel(unknown)
+    say_once([file unknown{k}], sprintf('%s: %s has no effect on a robot of this KiKS.', file, unknown{k}));
 end
 end
 

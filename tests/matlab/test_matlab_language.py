@@ -37,26 +37,32 @@ FILES = sorted(TOOLBOX.rglob("*.m"))
 
 WRITTEN_IN_MATLAB = """
     addpath angle axis bar datestr fileparts fileread fullfile gca help hold ind2sub inpolygon ispc isunix linspace
-    mat2str mean meshgrid now onCleanup path pathsep pwd read serialport setdiff str2double strcat strjoin strsplit
-    strtok tcpclient tempname title union unique write xlabel ylabel
+    mat2str mean meshgrid now onCleanup path pathsep pwd read rmfield rmpath serialport setdiff start stop
+    str2double strcat strjoin strsplit strtok tcpclient tempname timer title union unique write xlabel ylabel
 """
 """Functions of MATLAB R2020b that the toolbox calls and MISS_HIT does not list: it knows only those that are built in.
 Look a function up in MATLAB's documentation before you add it."""
 
 OCTAVE_ONLY = {
+    "F_SETFL": {"simulator_link"},
+    "O_NONBLOCK": {"simulator_link"},
+    "add_input_event_hook": {"poll_desk"},
     "canonicalize_file_name": {"robot_port"},
-    "fclear": {"robot_port"},
-    "fflush": {"kiks_status", "robot_port", "simulator", "simulator_link"},
+    "fclear": {"robot_port", "simulator", "simulator_link"},
+    "fcntl": {"simulator_link"},
+    "fflush": {"evaluate_typed", "kiks_status", "robot_port", "simulator", "simulator_link"},
     "fputs": {"simulator", "simulator_link"},
-    "have_window_system": {"need_display"},
+    "have_window_system": {"has_display"},
+    "nproc": {"simulator_link"},
     "pkg": {"robot_port"},
     "popen2": {"simulator_link"},
-    "stdout": {"kiks_status"},
+    "remove_input_event_hook": {"poll_desk"},
+    "stdout": {"evaluate_typed", "kiks_status"},
     "waitpid": {"simulator_link"},
 }
 """Functions that only Octave has, and the files that call them, in branches that only Octave takes."""
 
-MATLAB_ONLY = {"feature": {"need_display"}}
+MATLAB_ONLY = {"feature": {"has_display"}}
 """The same for MATLAB."""
 
 
