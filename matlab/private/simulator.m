@@ -66,7 +66,7 @@ if is_ready
     fputs(to, [request line_feed]);
     fflush(to);
     answer = fread(from, [1 96], '*char');
-    polls = 100;
+    polls = 20;
     while isempty(answer) && polls > 0
         fclear(from);
         answer = fread(from, [1 96], '*char');
