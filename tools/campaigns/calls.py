@@ -365,7 +365,7 @@ def _project(rng: random.Random) -> Subject:
         "arena": _box(), "robots": (ProjectRobot(),), "seed": 1, "thinking": "none", "baud": 9600,
         "response": "thesis", "noise": True,
         "speed": 1.0, "kind": "khepera", "turrets": ("k213",), "name": "a", "program": "a.py", "arguments": ("a",),
-        "brightness": 99,
+        "brightness": 99, "changes": {"body": {"diameter_mm": 60.0}},
     }  # fmt: skip
 
     def project(**settings: Any) -> None:
