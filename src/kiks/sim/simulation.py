@@ -179,8 +179,12 @@ class Simulation:
 
     @property
     def spec(self) -> RobotSpec:
-        """The kind of robot 1."""
-        return self.world.specs[0]
+        """The kind of robot 1.
+
+        Raises:
+            ParameterError: If there is no robot.
+        """
+        return self.world.specs[self.index_of(1)]
 
     @property
     def robot_count(self) -> int:
