@@ -122,7 +122,9 @@ def load_world(file: str | None) -> tuple[Project, Path]:
 
 
 def with_robots(project: Project, count: int | None, least: int) -> Project:
-    """Return a project with the number of robots that the command line names; new robots are of the kind of the last, or Kheperas.
+    """Return a project with the number of robots that the command line names.
+
+    New robots are of the kind of the last, or Kheperas.
 
     Args:
         project: The project.

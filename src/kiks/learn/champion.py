@@ -20,7 +20,7 @@ from kiks.model.arena_file import quoted
 from kiks.model.atomic_files import inside, path_of, replace_files
 from kiks.model.checks import check_count
 from kiks.model.data_file import Number, Rule, Text, Whole, as_list, check, parse_toml, read_file, record
-from kiks.model.project import Project
+from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, robot_names, robot_toml, specs_of
 from kiks.sim.from_project import simulation_of
 from kiks.sim.simulation import Simulation

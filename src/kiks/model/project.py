@@ -119,9 +119,7 @@ class ProjectRobot:
     changes: dict[str, dict[str, Change]] = Field(default_factory=dict)
 
 
-Robots = Annotated[
-    tuple[ProjectRobot, ...], Field(max_length=THINGS_MAX, description="Head each with [[robot]].")
-]
+Robots = Annotated[tuple[ProjectRobot, ...], Field(max_length=THINGS_MAX, description="Head each with [[robot]].")]
 Seed = Annotated[Whole, Field(ge=0, le=2**63 - 1)]
 ThinkingPolicy = Annotated[Text, AfterValidator(_check_thinking)]
 Speed = Annotated[Number, Field(ge=1e-3, le=1e3, description="1 is real time.")]

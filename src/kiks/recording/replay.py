@@ -19,8 +19,7 @@ from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.run_log import Kind
 from kiks.sim.saved_state import Layout, SavedState, Setup, restore_state, state_bytes
 from kiks.sim.simulation import Simulation
-from kiks.sim.wire import Wire
-from kiks.sim.wire import ignore_reply
+from kiks.sim.wire import Wire, ignore_reply
 from kiks.units import NS_PER_S, s_from_ns
 
 KEPT_NS = NS_PER_S // 10

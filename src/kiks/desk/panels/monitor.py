@@ -86,7 +86,12 @@ class MonitorPanel:
         self._is_seen = False
         with ui.column().classes("w-full gap-2 q-pa-sm"):
             self._choice = (
-                ui.select(names := self._names(), value=0 if names else None, label="Robot", on_change=lambda event: self._choose(event.value))
+                ui.select(
+                    self._names(),
+                    value=0 if desk.sim.robot_count else None,
+                    label="Robot",
+                    on_change=lambda event: self._choose(event.value),
+                )
                 .classes("w-full")
                 .props('dense outlined data-testid="monitor-robot"')
                 .mark("monitor-robot")
