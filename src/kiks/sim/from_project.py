@@ -131,8 +131,11 @@ def project_of(sim: Simulation, project: Project) -> Project:
             cylinders.append(Cylinder(*place))
     hung = [Lamp(round(x_mm, 3), round(y_mm, 3), power_w, is_on != 0) for x_mm, y_mm, power_w, is_on in lamps.tolist()]
     # Without robots, the arena's starts wait for those to come.
-    places = {"starts": tuple(starts) or arena.starts, "lamps": tuple(hung)}
-    return replace(project, arena=replace(arena, **places, balls=tuple(balls), cylinders=tuple(cylinders)))
+    kept = tuple(starts) or arena.starts
+    return replace(
+        project,
+        arena=replace(arena, starts=kept, lamps=tuple(hung), balls=tuple(balls), cylinders=tuple(cylinders)),
+    )
 
 
 def rounded_pose(x_mm: float, y_mm: float, heading_rad: float) -> Pose:
