@@ -5,8 +5,8 @@ function kiks_arena(arena, colormask, nokhep)
 %   session if there is none. For arena and colormask see kiks; without them the default arena comes. Ports have to be
 %   opened again. Preferences are read anew.
 %
-%   A third argument that is not empty made a world without a robot in KiKS 2.2.0. Here a world has at least one, and a
-%   line says so.
+%   kiks_arena(arena, colormask, 1), or with any third argument that is not empty, makes a world without a robot. The
+%   first kiks_kopen or kiks_siminfo_setrobot brings one.
 %
 %   Example:
 %     kiks_arena(kiks_generate_maze(5, 5)); kiks_siminfo_robotpos, kiks_quit
@@ -19,9 +19,9 @@ end
 if nargin < 2
     colormask = [];
 end
+changes = struct();
 if nargin > 2 && ~isempty(nokhep)
-    say_once('kiks_arena', ['kiks_arena: a world has at least one robot, so the third argument has no effect. ' ...
-        'kiks_siminfo_setrobot moves the robot out of the way.']);
+    changes.KIKS_ROBOTS = 0;
 end
-begin_world(arena, colormask);
+begin_world(arena, colormask, changes);
 end

@@ -3,7 +3,7 @@ function ok = kiks_siminfo_setrobot(x, y, radians, port)
 %
 %   ok = kiks_siminfo_setrobot(x, y, radians) moves this program's robot to x, y [mm] with the heading radians, a random
 %   one if it is left out or []. ok is 1; it is 0, and nothing changes, if the place is not free, if x or y is missing,
-%   or before a session. An open port stays open.
+%   or before a session. An open port stays open. In a world without a robot (kiks_arena), one comes before it is moved.
 %
 %   kiks_siminfo_setrobot(x, y, radians, port) is for port -1, -2, ...; port may be a reference.
 %

@@ -158,7 +158,7 @@ def _draw_paths(axes: Any, recording: Recording, poses: Table, wheels: Table) ->
         colour = f"C{(number - 1) % 10}"
         axes.plot(path["x_mm"], path["y_mm"], color=colour, linewidth=1.2, label=f"robot {number}")
         axes.plot(path["x_mm"][:1], path["y_mm"][:1], "o", color=colour, markersize=4)
-        if len(recording.robots) == 1:
+        if len(recording.robots) == len(setup.specs) == 1:
             body = setup.specs[0].body
             pulses = np.column_stack([counts["left_pulses"], counts["right_pulses"]])
             start = np.array([path[name][0] for name in ("x_mm", "y_mm", "heading_rad")])

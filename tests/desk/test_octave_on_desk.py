@@ -134,3 +134,20 @@ def test_places_and_sensors_are_those_of_octave(terminal: Terminal, new_page: Ne
     expect(page.locator(".kiks-chip-name").first).to_have_text("1")
     page.get_by_test_id("proximity-7").click()
     expect(page.get_by_test_id("explanation-text")).to_contain_text(re.compile(r"^Sensor 8 \(back left\)"))
+
+
+def test_desk_shows_a_world_without_a_robot_and_then_the_robot(terminal: Terminal, new_page: NewPage) -> None:
+    terminal.type("kiks_arena([], [], 1)")
+    url = terminal.wait_for(r"shown at http\S+").split()[-1]
+    page = new_page()
+    page.goto(url)
+    page.wait_for_function("() => window.kiksDesk?.stats().frames_drawn > 3")
+    for tab in ("wire", "programs", "settings", "robot"):
+        page.get_by_test_id(f"tab-{tab}").click()
+    terminal.type("kiks_spawn(2)")
+    terminal.type("ref = kiks_kopen; kSetSpeed(ref, 2, 2)")
+    page.wait_for_function(FIRST_PICTURE)
+    expect(page.get_by_test_id("monitor-robot")).to_have_value("Robot 1")
+    page.wait_for_function(DRIVES)
+    page.get_by_test_id("tab-wire").click()
+    expect(page.get_by_test_id("wire-robot")).to_have_value("robot 1")

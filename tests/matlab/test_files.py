@@ -292,3 +292,57 @@ def test_a_hostile_preference_file_is_refused_in_a_line(tmp_path: Path) -> None:
         assert "must" in why
         assert why.isprintable(), text[:80]
         assert len(why) < 400, text[:80]
+
+
+WITHOUT_ROBOT = """
+global KIKS_SEED
+KIKS_SEED = 3;
+arena = zeros(400, 500);
+arena(300, 400) = -90;
+kiks_arena(arena, [], 1)
+kiks_spawn(2, [100 100]), kiks_spawn(3, [300 100]), kiks_spawn(1, [200 200])
+say('pose', size(kiks_siminfo_robotpos))
+say('path', size(kiks_siminfo_robotpath))
+say('dist', kiks_siminfo_robotdist)
+say('time', size(kiks_ktime))
+say('moved', kiks_siminfo_setobject(2, 150, 120))
+kiks_reset
+say('objects', kiks_siminfo_objects())
+kiks_save('empty.kiks')
+ref = kiks_kopen;
+say('start', kiks_siminfo_robotpos())
+kSetSpeed(ref, 10, 10);
+kiks_pause(1)
+say('driven', kiks_siminfo_robotdist())
+say('counts', numel(kProximity(ref)))
+kiks_load('empty.kiks')
+say('loaded', size(kiks_siminfo_robotpos))
+say('again', kiks_siminfo_objects())
+say('taken', kiks_siminfo_setrobot(1, 1, 0))
+say('set', kiks_siminfo_setrobot(350, 250, 0))
+say('there', kiks_siminfo_robotpos())
+kiks_arena(arena)
+say('normal', kiks_siminfo_robotpos())
+kiks_arena('empty.kiks', [], 1)
+say('twice', size(kiks_siminfo_robotpos))
+kiks_quit
+"""
+
+
+def test_world_without_a_robot_gets_one_when_it_is_needed(tmp_path):
+    said = run(WITHOUT_ROBOT, tmp_path).said
+    sizes = [said[name].ravel().tolist() for name in ("pose", "loaded", "twice", "time")]
+    assert sizes == [[0, 0]] * 4
+    assert said["path"].ravel().tolist() == [2, 0]
+    assert said["dist"].ravel().tolist() == [0, 0, 0]
+    assert said["moved"] == 1
+    assert said["objects"][:, :3].tolist() == [[1, 200, 200], [2, 100, 100], [3, 300, 100]]
+    assert said["again"].tolist() == said["objects"].tolist()
+    assert said["start"][0, :2].tolist() == said["normal"][0, :2].tolist() == [400, 300]
+    assert said["driven"].ravel()[0] > 50
+    assert said["counts"] == 8
+    assert (said["taken"], said["set"]) == (0, 1)
+    assert said["there"].ravel().tolist() == [350, 250, 0]
+    project = Project.load(tmp_path / "empty.kiks")
+    assert project.robots == ()
+    assert len(project.arena.starts) == 1

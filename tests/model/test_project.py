@@ -159,7 +159,7 @@ BASE = "kiks = 1\n[walls]\nsize_mm = [300, 300]\n"
         (BASE + "[[robot]]\nprogram = '/bin/a.py'\n", "program"),
         (BASE + "[[robot]]\nprogram = 7\n", "program"),
         (BASE + "[[robot]]\narguments = [7]\n", r"robot 1: arguments\[0\] must be a text"),
-        (BASE + "[[robot]]\n" * (THINGS_MAX + 1), "robot must be a list of 1 to 1000 tables"),
+        (BASE + "[[robot]]\n" * (THINGS_MAX + 1), "robot must be a list of 0 to 1000 tables"),
         (BASE + "[[lamp]]\nat_mm = [5, 5]\n" * (THINGS_MAX + 1), "lamp must be a list of 0 to 1000 tables"),
         (BASE + "[[ball]]\nat_mm = [5, 5]\n", "ball 1"),
         (BASE + "png = 'aaaa'\n", "either"),

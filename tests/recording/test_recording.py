@@ -403,3 +403,30 @@ def test_a_full_disk_ends_the_recording_and_not_the_run() -> None:
         link.unlink()
     assert sim.state_hash() == alone.state_hash()
     assert sim.loop.recorder is None
+
+
+def test_a_world_without_a_robot_is_made_again_with_the_robot_that_comes(tmp_path):
+    def act(sim):
+        ball = sim.add_ball(100, 100)
+        sim.move_body(ball, 100, 100, speed_mm_s=200.0)
+        sim.run(1.2)
+        assert sim.add_robot() == 1
+        drive(sim, 1.5)
+
+    sim = Simulation(Arena.box(500, 500), robots=0)
+    recording = recorded(sim, tmp_path / "run.mcap", act)
+    check_again(recording, sim.state_hash())
+    assert recording.world_at(1.0).robot_count == 0
+    assert recording.project_at(1.0).robots == ()
+    assert len(recording.project_at(2.0).robots) == 1
+    poses = recording.table("poses")
+    assert set(poses["robot"]) == {1}
+    assert poses["time_s"].min() >= 1.2 - 1e-9
+
+
+def test_what_needs_a_robot_says_so_where_none_came(tmp_path):
+    recording = recorded(Simulation(robots=0), tmp_path / "run.mcap", lambda sim: sim.run(1.0))
+    assert check_recording(recording.log).differs_ns is None
+    assert len(recording.table("poses")) == 0
+    with pytest.raises(ParameterError, match="must have a robot for this, but its world has none"):
+        recording.plot()

@@ -326,3 +326,40 @@ def test_no_robot_comes_where_there_is_no_room():
     assert sim.robot_count == 1
     with pytest.raises(ParameterError, match="robot must be one of"):
         sim.add_robot("kheperra")
+
+
+def test_balls_roll_without_a_robot_as_with_a_robot_far_away():
+    lonely, with_robot = Simulation(Arena.box(500, 500), robots=0), Simulation(Arena.box(500, 500))
+    with_robot.place(1, 450, 450, 0)
+    for sim in (lonely, with_robot):
+        first, second = sim.add_ball(100, 100), sim.add_ball(250, 110)
+        sim.run(0.1)
+        sim.move_body(first, 100, 100, speed_mm_s=300.0)
+        sim.run(1.5)
+    assert lonely.bodies().tobytes() == with_robot.bodies().tobytes()
+    assert lonely.bodies()["x_mm"][1] > 251, "one ball pushes the other"
+    lonely.remove_body(second)
+    lonely.move_body(first, 100, 100, speed_mm_s=200.0)
+    lonely.run(0.5)
+    assert round(float(lonely.bodies()["x_mm"][0]), 1) == 197.5, "a ball rolls alone, too"
+
+
+def test_a_world_without_a_robot_gets_one():
+    sim = Simulation(Arena.box(500, 500), robots=0)
+    assert sim.poses().shape == sim.distances_mm().shape == (0, 3)
+    assert sim.next_event_ns() is None
+    sim.record_paths()
+    saved = sim.checkpoint()
+    sim.add_cylinder(100, 100)
+    sim.run(1.0)
+    sim.reset(saved)
+    assert len(sim.bodies()) == 0
+    for ask in (lambda: sim.spec, lambda: sim.port(1), lambda: sim.place(1, 100, 100, 0)):
+        with pytest.raises(ParameterError, match="This simulation has no robot"):
+            ask()
+    assert sim.add_robot() == 1
+    sim.place(1, 250, 250, 0)
+    sim.port(1).write(b"D,10,10\n")
+    sim.run(1.0)
+    assert sim.pose(1)[0] > 300
+    assert sim.paths().shape[0] == 1

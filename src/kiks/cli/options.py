@@ -122,7 +122,9 @@ def load_world(file: str | None) -> tuple[Project, Path]:
 
 
 def with_robots(project: Project, count: int | None, least: int) -> Project:
-    """Return a project with the number of robots that the command line names; new robots are of the kind of the last.
+    """Return a project with the number of robots that the command line names.
+
+    New robots are of the kind of the last, or Kheperas.
 
     Args:
         project: The project.
@@ -133,7 +135,8 @@ def with_robots(project: Project, count: int | None, least: int) -> Project:
 
     robots = project.robots
     count = max(len(robots) if count is None else count, least)
-    more = (ProjectRobot(kind=robots[-1].kind),) * (count - len(robots))
+    kind = robots[-1].kind if robots else "khepera"
+    more = (ProjectRobot(kind=kind),) * (count - len(robots))
     return replace(project, robots=robots[:count] + more)
 
 

@@ -95,7 +95,7 @@ Bunch: Any = namedtuple(
 * kinds: the constants of the robots, records of `EIGHT_KINDS`;
 * seeds: the seed of each lane's world, int64 [lane];
 * room: scratch memory for collisions (`Room`);
-* has_company: whether worlds hold more than one thing that moves;
+* has_company: whether worlds hold anything that moves besides a lone robot;
 * has_grippers: whether any robot has a gripper.
 """
 
@@ -132,11 +132,12 @@ def take(scene: Any, worlds: Any, ticks: Any, lanes: Any, room: Any) -> Any:
         lanes: Memory for the robots (`make_lanes`).
         room: Scratch memory for collisions in these worlds (`make_room`).
     """
-    robot_count, disc_count = count_discs(scene)
-    has_grippers, eight, lane = False, -1, LANES - 1
+    robot_count = scene.robots.shape[1]
+    # Only worlds with company have room for pairs.
+    has_company, has_grippers, eight, lane = scene.grid.pairs.shape[1] > 0, False, -1, LANES - 1
     for k in range(worlds.shape[0]):
         wake_all(scene, room, k)
-        if disc_count > 1 and has_changed(scene, worlds[k]):
+        if has_company and has_changed(scene, worlds[k]):
             enter_all(scene, worlds[k])
         for number in range(robot_count):
             robot = scene.robots[worlds[k], number]
@@ -159,18 +160,18 @@ def take(scene: Any, worlds: Any, ticks: Any, lanes: Any, room: Any) -> Any:
     # There may be memory for more worlds than these.
     used = eight + 1
     its = lanes.robots[:used], lanes.before[:used], lanes.kinds[:used], lanes.seeds[: LANES * used], room
-    return Bunch(worlds, ticks, *its, disc_count > 1, has_grippers)
+    return Bunch(worlds, ticks, *its, has_company, has_grippers)
 
 
 @kernel
 def give_back(scene: Any, bunch: Any) -> Any:
     """Write the robots back to the scene."""
-    robot_count, disc_count = count_discs(scene)
+    robot_count = scene.robots.shape[1]
     for place in range(bunch.worlds.shape[0] * robot_count):
         k, number = whose(scene, place)
         store_lane(bunch.robots[place // LANES], place % LANES, scene.robots[bunch.worlds[k], number])
     for k in range(bunch.worlds.shape[0]):
-        if disc_count > 1:
+        if bunch.has_company:
             note_places(scene, bunch.worlds[k])
 
 

@@ -98,7 +98,9 @@ class Scene:
         world_count, robot_count = state.robots.shape
         disc_count = robot_count + state.bodies.shape[1]
         size_mm = max(arena.height_mm for arena in arenas), max(arena.width_mm for arena in arenas)
-        rows, columns = squares_of(*size_mm) if disc_count > 1 else (1, 1)
+        # A lone robot meets nothing, and its motors move it; a lone ball rolls as one of many does.
+        has_company = disc_count > min(robot_count, 1)
+        rows, columns = squares_of(*size_mm) if has_company else (1, 1)
         self.record = np.zeros(1, SCENE)
         self._arrays: dict[str, NDArray[Any]] = {}
         self._keep(
@@ -108,14 +110,14 @@ class Scene:
             begins=np.zeros((world_count, rows, columns + 1), np.int32),
             entries=np.zeros((world_count, disc_count), np.int32),
             spots=np.zeros((world_count, disc_count, 3)),
-            pairs=np.zeros((world_count, PAIRS_PER_DISC * disc_count if disc_count > 1 else 0, 2), np.int32),
+            pairs=np.zeros((world_count, PAIRS_PER_DISC * disc_count if has_company else 0, 2), np.int32),
             places=np.zeros((world_count, disc_count, 2)),
             crowds=np.zeros(world_count, CROWD),
             networks=networks,
             lamps=lamps,
             seeds=np.asarray(seeds, np.int64),
         )
-        self.record["widest_mm"] = max(kinds["radius_mm"].max(), state.bodies["radius_mm"].max(initial=0.0))
+        self.record["widest_mm"] = max(kinds["radius_mm"].max(initial=0.0), state.bodies["radius_mm"].max(initial=0.0))
         self._take_walls(arenas[0])
         enter_all_worlds(self.record)
 

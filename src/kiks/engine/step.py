@@ -62,7 +62,8 @@ def advance_bunch(scene: Any, bunch: Any, until: Any) -> Any:
         until: The tick that each of its worlds is to reach, int64; a world that has reached it does no tick.
     """
     set_end(scene, bunch, until)
-    while turn_wheels(bunch):
+    # A world without a robot is alone in its bunch.
+    while turn_wheels(bunch) or (bunch.robots.shape[0] == 0 and bunch.ticks[0] < until[0]):
         for k in range(until.shape[0]):
             if bunch.ticks[k] < until[k] and (bunch.has_company or bunch.has_grippers):
                 meet_others(scene, bunch, k)

@@ -100,7 +100,8 @@ def save_film(
     if view not in tuple(VIEWS):
         raise ParameterError(f"view must be one of {', '.join(map(repr, VIEWS))}, but it was {shown(view)}.")
     follow, zoom = checked_follow(recording, follow, zoom)
-    robot = recording.check_robot((follow or 1) if robot is None else robot)
+    # Without robots, nothing is read.
+    robot = follow or 1 if robot is None else recording.check_robot(robot)
     times_ns = _times_ns(recording, start_s, end_s, speed / fps)
 
     def pictures(times_ns: Sequence[int]) -> Iterator[Pixels]:

@@ -20,7 +20,7 @@ from kiks.model.arena_file import quoted
 from kiks.model.atomic_files import inside, path_of, replace_files
 from kiks.model.checks import check_count
 from kiks.model.data_file import Number, Rule, Text, Whole, as_list, check, parse_toml, read_file, record
-from kiks.model.project import Project
+from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, robot_names, robot_toml, specs_of
 from kiks.sim.from_project import simulation_of
 from kiks.sim.simulation import Simulation
@@ -149,8 +149,9 @@ class Champion:
             ArenaError: If the arena has no free place for a robot.
         """
         project = self.world if arena is None and self.world is not None else Project(arena or Arena.default())
-        count = len(project.robots) if robots is None else check_count("robots", robots, 1, 1000)
-        named = (*project.robots, *project.robots[-1:] * count)[:count]
+        there = project.robots or (ProjectRobot(),)
+        count = len(there) if robots is None else check_count("robots", robots, 1, 1000)
+        named = (*there, *there[-1:] * count)[:count]
         project = replace(project, robots=named, seed=project.seed if seed is None else seed)
         think_s = self.timing.think_s
         sim = simulation_of(project, kinds=[self.robot], thinking=f"fixed:{think_s * 1e3:g}" if think_s else "none")

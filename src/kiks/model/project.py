@@ -119,9 +119,7 @@ class ProjectRobot:
     changes: dict[str, dict[str, Change]] = Field(default_factory=dict)
 
 
-Robots = Annotated[
-    tuple[ProjectRobot, ...], Field(min_length=1, max_length=THINGS_MAX, description="Head each with [[robot]].")
-]
+Robots = Annotated[tuple[ProjectRobot, ...], Field(max_length=THINGS_MAX, description="Head each with [[robot]].")]
 Seed = Annotated[Whole, Field(ge=0, le=2**63 - 1)]
 ThinkingPolicy = Annotated[Text, AfterValidator(_check_thinking)]
 Speed = Annotated[Number, Field(ge=1e-3, le=1e3, description="1 is real time.")]
@@ -133,7 +131,7 @@ class Project:
 
     Args:
         arena: Walls, what stands in it, and where robots start, the first start for the first robot.
-        robots: The robots.
+        robots: The robots; () for a world without a robot.
         seed: Seed of all random numbers.
         thinking: Thinking time of programs: 'none', 'fixed:MS', 'live', 'live:FACTOR' (another computer's), or
             'replay:FILE' with a file in the project's folder.
@@ -246,6 +244,8 @@ class Project:
             if value is not None:
                 lines.append(f"{name} = {_toml(value)}")
         lines.append(f"name = {quoted(self.arena.name)}")
+        if not self.robots:
+            lines.append("robot = []")
         for robot in self.robots:
             lines += ["", "[[robot]]"]
             values = ((each.name, getattr(robot, each.name)) for each in fields(robot))

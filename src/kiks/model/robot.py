@@ -189,7 +189,7 @@ def specs_of(
 
     Args:
         robot: The kind of all, or a list with that of each: names that `RobotSpec.load` knows, files, or specs.
-        robots: How many there are; as many as kinds are named if None.
+        robots: How many there are, 0 for none; as many as kinds are named if None.
         response: What makes counts of their proximity sensors' rays; what their files say if None.
 
     Raises:
@@ -197,9 +197,10 @@ def specs_of(
     """
     named = [robot] if isinstance(robot, str | RobotSpec) else list(robot)
     count = len(named) if robots is None else robots
-    if not isinstance(count, int) or not 1 <= count <= 1000:
+    least = 1 if robots is None else 0
+    if not isinstance(count, int) or not least <= count <= 1000:
         raise ParameterError(
-            f"robots must be a whole number from 1 to 1000, but it was {shown(count)}. Say how many you need."
+            f"robots must be a whole number from {least} to 1000, but it was {shown(count)}. Say how many you need."
         )
     if len(named) not in (1, count):
         raise ParameterError(

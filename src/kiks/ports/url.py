@@ -47,6 +47,11 @@ def find_port(url: str) -> SimPort:
         sim = REGISTRY.newest() or Simulation()
     robot = int(number)
     if not 1 <= robot <= sim.robot_count:
+        if not sim.robot_count:
+            raise LinkError(
+                f"a port must belong to an existing robot, but {shown(url)} names robot {robot} and the simulation has "
+                "none. Add one with add_robot()."
+            )
         known = "robot 1 only" if sim.robot_count == 1 else f"robots 1 to {sim.robot_count}"
         raise LinkError(
             f"a port must belong to an existing robot, but {shown(url)} names robot {robot} and the simulation has "

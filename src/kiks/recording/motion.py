@@ -109,7 +109,7 @@ def decode(block: bytes, layout: Layout, what: str) -> Iterator[Motion]:
         middle = begin + looks * 8
         end = middle + looks * robots * robot_bytes
         offset = end + looks * bodies * layout.body.itemsize
-        is_whole = looks and robots and 0 < robot_bytes <= layout.robot.itemsize and offset <= len(block)
+        is_whole = looks and 0 < robot_bytes <= layout.robot.itemsize and offset <= len(block)
         # Records may be larger in this version than in the file.
         is_small = looks * (robots * KEPT_BYTES + bodies * BODY.itemsize) <= MOTION_BYTES_MAX
         ticks = np.frombuffer(block, "<i8", looks if is_whole else 0, begin if is_whole else 0)

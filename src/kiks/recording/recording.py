@@ -121,6 +121,8 @@ class Recording:
         Raises:
             ParameterError: If it has no such robot.
         """
+        if not self.robots:
+            raise ParameterError(f"{self._reader.what} must have a robot for this, but its world has none.")
         return check_count(name, robot, 1, len(self.robots), advice)
 
     @property

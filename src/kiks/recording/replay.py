@@ -19,7 +19,7 @@ from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.run_log import Kind
 from kiks.sim.saved_state import Layout, SavedState, Setup, restore_state, state_bytes
 from kiks.sim.simulation import Simulation
-from kiks.sim.wire import ignore_reply
+from kiks.sim.wire import Wire, ignore_reply
 from kiks.units import NS_PER_S, s_from_ns
 
 KEPT_NS = NS_PER_S // 10
@@ -174,7 +174,22 @@ class Replay:
 
     def _apply(self, entry: Entry) -> None:
         sim = self.sim
-        wire = sim.wires[entry.robot] if entry.robot < len(sim.wires) else sim.wires[0]
+        match entry.kind:
+            case Kind.SEND | Kind.TYPE | Kind.HANG_UP | Kind.SET_BAUD | Kind.DROP:
+                if entry.robot >= len(sim.wires):
+                    raise self._log.damaged(f"it uses the line of robot {entry.robot + 1}, which is not there")
+                self._apply_to(sim.wires[entry.robot], entry)
+            case Kind.CHECK:
+                sim.sync()
+                for each in sim.wires:
+                    each.line.forget()  # unread replies would fill the line
+                self._on_check(entry)
+            case Kind.STATE:
+                self._setup, saved = self._log.state_of(entry)
+                self._setup.bring(sim, saved.poses)
+                restore_state(sim, saved)
+
+    def _apply_to(self, wire: Wire, entry: Entry) -> None:
         match entry.kind:
             case Kind.SEND:
                 wire.send(entry.data, self._sent_ns(entry))
@@ -188,12 +203,3 @@ class Replay:
                 wire.set_baud(entry.number)
             case Kind.DROP:
                 wire.drop_after(entry.number, entry.other)
-            case Kind.CHECK:
-                sim.sync()
-                for each in sim.wires:
-                    each.line.forget()  # unread replies would fill the line
-                self._on_check(entry)
-            case Kind.STATE:
-                self._setup, saved = self._log.state_of(entry)
-                self._setup.bring(sim, saved.poses)
-                restore_state(sim, saved)

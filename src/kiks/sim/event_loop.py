@@ -25,13 +25,16 @@ class EventQueue:
         """Add the next event of a wire, at a time [ns]."""
         heappush(self._entries, (time_ns, index))
 
-    def first(self, wires: list[Wire]) -> Wire:
-        """Return the wire with the earliest event; at the same instant, the one with the lower number."""
+    def first(self, wires: list[Wire]) -> tuple[int, int] | None:
+        """Return the time [ns] of the earliest event and the index of its wire; None if there is no event.
+
+        At the same instant, the wire with the lower number comes first.
+        """
         entries = self._entries
         # A wire that has acted, or acts sooner than it was added for, leaves an outdated entry behind.
         while entries and wires[entries[0][1]].next_ns != entries[0][0]:
             heappop(entries)
-        return wires[entries[0][1] if entries else 0]
+        return entries[0] if entries else None
 
 
 class Supervisor(Protocol):
@@ -140,16 +143,18 @@ class EventLoop:
 
     def _do_events_to(self, time_ns: int) -> None:
         world, events, wires = self.world, self._events, self.wires
-        wire = events.first(wires)
-        while wire.next_ns is not None and wire.next_ns <= time_ns:
-            if wire.next_ns > world.now_ns:
-                world.now_ns = wire.next_ns
+        event = events.first(wires)
+        while event is not None and event[0] <= time_ns:
+            due_ns, index = event
+            if due_ns > world.now_ns:
+                world.now_ns = due_ns
             self._sync()
-            wire.act(world.now_ns)
-            wire = events.first(wires)
+            wires[index].act(world.now_ns)
+            event = events.first(wires)
         if time_ns > world.now_ns:
             world.now_ns = time_ns
 
     def next_event_ns(self) -> int | None:
         """Return when a robot acts next [ns]; None while all of them wait for characters."""
-        return self._events.first(self.wires).next_ns
+        event = self._events.first(self.wires)
+        return None if event is None else event[0]

@@ -51,7 +51,7 @@ def simulation_of(
     else:
         specs = [spec_of(robot, project, home) for robot in project.robots]
     thinking = thinking_of(project, home) if thinking is None else thinking
-    sim = Simulation(project.arena, seed=project.seed, thinking=thinking, robot=specs)
+    sim = Simulation(project.arena, seed=project.seed, thinking=thinking, robots=len(specs), robot=specs)
     for number, (robot, wire) in enumerate(zip(project.robots, sim.wires, strict=True), start=1):
         for turret in robot.turrets:
             sim.fit(number, turret)
@@ -130,9 +130,11 @@ def project_of(sim: Simulation, project: Project) -> Project:
         else:
             cylinders.append(Cylinder(*place))
     hung = [Lamp(round(x_mm, 3), round(y_mm, 3), power_w, is_on != 0) for x_mm, y_mm, power_w, is_on in lamps.tolist()]
+    # Without robots, the arena's starts wait for those to come.
+    kept = tuple(starts) or arena.starts
     return replace(
         project,
-        arena=replace(arena, starts=tuple(starts), lamps=tuple(hung), balls=tuple(balls), cylinders=tuple(cylinders)),
+        arena=replace(arena, starts=kept, lamps=tuple(hung), balls=tuple(balls), cylinders=tuple(cylinders)),
     )
 
 

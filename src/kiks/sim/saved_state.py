@@ -68,7 +68,7 @@ class _SetupFile:
     seed: Annotated[Whole, Field(ge=0, le=2**63 - 1)]
     arena: str
     kinds: Annotated[tuple[str, ...], Field(max_length=1000)]
-    robots: Annotated[tuple[Annotated[Whole, Field(ge=0)], ...], Field(min_length=1, max_length=1000)]
+    robots: Annotated[tuple[Annotated[Whole, Field(ge=0)], ...], Field(max_length=1000)]
     turrets: tuple[tuple[Text | TurretOfUser, ...], ...]
 
 
@@ -124,7 +124,7 @@ class Setup:
         file = check(_SetupFile, parse_json(data, what), what)
         arena = Project.from_bytes(file.arena.encode(), what=what).arena
         kinds = [check(RobotSpec, parse_toml(text.encode(), what), what) for text in file.kinds]
-        if not (max(file.robots) < len(kinds) and len(file.turrets) == len(file.robots)):
+        if not (max(file.robots, default=-1) < len(kinds) and len(file.turrets) == len(file.robots)):
             raise ParameterError(
                 f"{what} must name a kind and turrets for each robot, but it does not. Is the file damaged?"
             )
@@ -192,7 +192,7 @@ class _Head:
 
     now_ns: Annotated[Whole, Field(ge=0, le=CLOCK_END_NS)]
     tick_count: Count
-    robots: Annotated[Whole, Field(ge=1, le=1000)]
+    robots: Annotated[Whole, Field(ge=0, le=1000)]
     bodies: Annotated[Whole, Field(ge=0, le=100_000)]
     lamps: Annotated[Whole, Field(ge=0, le=100_000)]
     body_count: Count

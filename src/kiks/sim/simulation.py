@@ -48,7 +48,7 @@ class Simulation:
 
     Args:
         arena: Where the robots drive; the classic 500 x 650 mm box if left out.
-        robots: How many there are; as many as kinds are named if left out.
+        robots: How many there are, 0 for none before `add_robot`; as many as kinds are named if left out.
         seed: Seed of all random numbers; the same seed gives the same run, to the bit.
         thinking: What the program's own computing costs: 'none', 'fixed:MS', 'live', 'live:FACTOR' or 'replay:FILE'.
         robot: Kind of all robots: a name that `RobotSpec.load` knows, a file, or a `RobotSpec`; or a list of such, one
@@ -91,7 +91,7 @@ class Simulation:
         if arena is not None:
             _check_arena(arena)
         check_kinds(robot, response)
-        robots = None if robots is None else check_count("robots", robots, 1, 1000, "Say how many you need.")
+        robots = None if robots is None else check_count("robots", robots, 0, 1000, "Say how many you need.")
         seed = check_count("seed", seed, 0, 2**63 - 1, "Any small number will do.")
         self._begin(
             World(Arena.default() if arena is None else arena, specs_of(robot, robots, response), seed), thinking
@@ -179,8 +179,12 @@ class Simulation:
 
     @property
     def spec(self) -> RobotSpec:
-        """The kind of robot 1."""
-        return self.world.specs[0]
+        """The kind of robot 1.
+
+        Raises:
+            ParameterError: If there is no robot.
+        """
+        return self.world.specs[self.index_of(1)]
 
     @property
     def robot_count(self) -> int:

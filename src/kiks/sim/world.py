@@ -197,7 +197,7 @@ class World:
             ParameterError: If there is no such robot.
         """
         if not isinstance(robot, int | np.integer) or not 1 <= robot <= self.robot_count:
-            numbers = "robot 1" if self.robot_count == 1 else f"robots 1 to {self.robot_count}"
+            numbers = {0: "no robot", 1: "robot 1"}.get(self.robot_count, f"robots 1 to {self.robot_count}")
             raise ParameterError(
                 f"robot must be the number of an existing robot, but it was {shown(robot)}. This simulation "
                 f"has {numbers}."
@@ -211,7 +211,7 @@ class World:
 
     def poses(self) -> NDArray[np.float64]:
         """Return where all robots are at this instant, float64 [robot, 3]: x_mm, y_mm, heading_rad."""
-        return np.array([self.pose(index) for index in range(self.robot_count)])
+        return np.array([self.pose(index) for index in range(self.robot_count)]).reshape(-1, 3)
 
     def place_robot(self, index: int, x_mm: float, y_mm: float, heading_rad: float) -> None:
         """Put a robot down at a free place.

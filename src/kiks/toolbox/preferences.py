@@ -32,7 +32,7 @@ class Settings(OldConstants):
         seed: Seed of all random numbers.
         thinking: Policy for the program's thinking time.
         robot: Kind of all robots.
-        robots: Number of robots; None for the number of starts.
+        robots: Number of robots, 0 for none; None for the number of starts, or 1 without a start.
         response: Model of the proximity sensors; None for that of the robot's file.
         noise: Whether sensors are noisy.
         turrets: Turrets of each robot.
@@ -49,7 +49,7 @@ class Settings(OldConstants):
     seed: Annotated[Seed, _NUMBER] = 0
     thinking: ThinkingPolicy = "live"
     robot: Text = "khepera"
-    robots: Annotated[Count, _NUMBER] | None = None
+    robots: Annotated[Annotated[Whole, Field(ge=0, le=1000)], _NUMBER] | None = None
     response: Response | None = None
     noise: Annotated[Switch, SWITCH, Rule("0 or 1")] = True
     turrets: Annotated[
@@ -82,23 +82,30 @@ class Settings(OldConstants):
         """The folder of the robot's file."""
         return Path(self.robot).parent
 
+    @property
+    def project_robot(self) -> ProjectRobot:
+        """Each robot of a world; the path of its file is relative to `folder`.
+
+        Raises:
+            ParameterError: If a value is out of range.
+        """
+        return ProjectRobot(
+            kind=Path(self.robot).name,
+            turrets=self.turrets,
+            brightness=self.brightness,
+            changes=self.changes(RobotSpec.load(self.robot)),
+        )
+
     def project_of(self, arena: Arena) -> Project:
         """Return the project of an arena with these settings; its paths are relative to `folder`.
 
         Raises:
             ParameterError: If a value is out of range.
         """
-        # A world needs a robot, even if the arena has no start.
-        count = max(len(arena.starts) if self.robots is None else self.robots, 1)
-        robot = ProjectRobot(
-            kind=Path(self.robot).name,
-            turrets=self.turrets,
-            brightness=self.brightness,
-            changes=self.changes(RobotSpec.load(self.robot)),
-        )
+        count = max(len(arena.starts), 1) if self.robots is None else self.robots
         return Project(
             arena,
-            robots=(robot,) * count,
+            robots=(self.project_robot,) * count,
             seed=self.seed,
             thinking=self.thinking,
             response=self.response,

@@ -146,11 +146,14 @@ class Session:
     def begin_file(self, path: str) -> None:
         """Begin the world of a file: a project with its own settings, or an arena with the present ones.
 
+        The present settings may ask for a world without a robot in either case.
+
         Raises:
             ArenaError: If the file is neither.
         """
         if path.lower().endswith(".kiks"):
-            self.begin(Project.load(path), Path(path).parent)
+            project = Project.load(path)
+            self.begin(replace(project, robots=()) if self.settings.robots == 0 else project, Path(path).parent)
         else:
             self.begin_arena(Arena.load(path))
 
@@ -235,8 +238,11 @@ class Session:
                 if is_there and self.owners.get(robot, owner) is owner and sim.wires[robot - 1].holder is None:
                     self.owners[robot] = owner
                     return robot
-            plan = desk.project.robots[-1]
-            added = sim.add_robot(spec_of(plan, desk.project, desk.folder))
+            if desk.project.robots:
+                plan, folder = desk.project.robots[-1], desk.folder
+            else:
+                plan, folder = self.settings.project_robot, self.settings.folder
+            added = sim.add_robot(spec_of(plan, desk.project, folder))
             for turret in plan.turrets:
                 sim.fit(added, turret)
             desk.project = replace(desk.project, robots=(*desk.project.robots, replace(plan, name="", program=None)))

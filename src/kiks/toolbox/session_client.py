@@ -151,7 +151,7 @@ class SessionClient:
 
     def _open(self, number: int, baud: int, connection: LocalConnection, sim: Simulation) -> OpenPort:
         known = self.openings.get(number)
-        robot = self.session.take_robot(self, self._usual_robot(number)) if known is None else known.robot
+        robot = self.take_robot(number) if known is None else known.robot
         for turret, name in self.turrets.items():
             if turret not in sim.wires[robot - 1].firmware.turrets:
                 sim.fit(robot, OwnTurret(turret, name))
@@ -412,6 +412,14 @@ class SessionClient:
         robot = self._usual_robot(number)
         is_there = 1 <= robot <= self.session.world.robot_count
         return robot if is_there and self.session.owners.get(robot, self) is self else None
+
+    def take_robot(self, number: int) -> int:
+        """Take a robot for a port that has none yet, a new one if all are taken; return its number.
+
+        Raises:
+            KiksError: If there is no room for another robot.
+        """
+        return self.session.take_robot(self, self._usual_robot(number))
 
     # ---- inside ----
 

@@ -72,7 +72,7 @@ def ask_path(client: SessionClient, words: str) -> str:
             return "2 0"
         paths = sim.paths()
         # A robot that came after the recording began has no path yet.
-        points: Any = paths[robot - 1] if robot <= len(paths) else paths[0, :0]
+        points: Any = paths[robot - 1] if robot <= len(paths) else np.empty((0, 4))
         if opened is not None:
             points = points[points[:, 0] >= opened.opened_ns * 1e-9 - 1e-9]
         points = points[~np.isnan(points[:, 1])]
@@ -104,14 +104,14 @@ def ask_distances(client: SessionClient, words: str) -> str:
 
 
 def ask_set_robot(client: SessionClient, words: str) -> str:
-    """Move a port's robot to a place; return 1, or 0 if the place is not free."""
+    """Move a port's robot to a place, the first robot of a world without one; return 1, or 0 if it is not free."""
     word, _, rest = words.partition(" ")
     number = port_of(word)
     x, y, angle = numbers_of(rest.split(), 3, "x, y and angle")
     _check_angle(angle)
 
     def set_robot(sim: Simulation) -> str:
-        robot = client.robot(number)
+        robot = client.robot(number) if sim.robot_count else client.take_robot(number)
         if robot is None:
             raise ParameterError(f"port {-number} must have a robot, but it has none. Open it with kiks_kopen.")
         turn = uniform(sim.seed, 0, 0, STREAM_SPAWN, sim.now_ns, 0)

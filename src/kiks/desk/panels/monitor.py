@@ -86,7 +86,12 @@ class MonitorPanel:
         self._is_seen = False
         with ui.column().classes("w-full gap-2 q-pa-sm"):
             self._choice = (
-                ui.select(self._names(), value=0, label="Robot", on_change=lambda event: self._choose(event.value))
+                ui.select(
+                    self._names(),
+                    value=0 if desk.sim.robot_count else None,
+                    label="Robot",
+                    on_change=lambda event: self._choose(event.value),
+                )
                 .classes("w-full")
                 .props('dense outlined data-testid="monitor-robot"')
                 .mark("monitor-robot")
@@ -136,8 +141,8 @@ class MonitorPanel:
     def _names(self) -> dict[int, str]:
         return {index: f"Robot {name}" for index, name in enumerate(self._desk.names())}
 
-    def _choose(self, index: int) -> None:
-        self._index = index
+    def _choose(self, chosen: int | None) -> None:
+        self._index = index = chosen or 0
         self._view.set_robot(index)
         self._forget()
 
@@ -155,7 +160,7 @@ class MonitorPanel:
         if not self._is_seen:
             return
         if self._choice.options != (names := self._names()):
-            self._choice.set_options(names, value=min(self._index, len(names) - 1))
+            self._choice.set_options(names, value=min(self._index, len(names) - 1) if names else None)
         number = self._index + 1
         self._turrets.set_text(await self._desk.do(lambda sim: _describe_turrets(sim, number)))
         if self._keeps.value and self._reading is not None:

@@ -98,7 +98,7 @@ class ProgramsPanel:
         if desk.may_run_programs:
             robots = {robot: f"robot {robot}" for robot in range(1, desk.sim.robot_count + 1)}
             if self._robot.options != robots:
-                self._robot.set_options(robots, value=min(self._robot.value or 1, len(robots)))
+                self._robot.set_options(robots, value=min(self._robot.value or 1, len(robots)) or None)
         self._add_output()
 
     def _draw_list(self, handles: list[Handle]) -> None:

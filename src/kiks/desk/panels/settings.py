@@ -11,7 +11,7 @@ from kiks.desk.panels.widgets import told
 from kiks.desk.server.desk import Desk
 from kiks.errors import ParameterError
 from kiks.model.project import TURRETS, ProjectRobot
-from kiks.model.robot import robot_names
+from kiks.model.robot import RobotSpec, robot_names
 from kiks.model.thinking_policy import split_thinking
 
 POLICIES = {
@@ -111,7 +111,8 @@ class SettingsPanel:
         self._amount.value = amount if not isinstance(amount, str) else 1.0
         self._file.value = amount if isinstance(amount, str) else ""
         self._name_amount()
-        baud = project.baud or self._desk.sim.specs[0].firmware.baud
+        specs = self._desk.sim.specs
+        baud = project.baud or (specs[0] if specs else RobotSpec.load("khepera")).firmware.baud
         self._baud.set_options(sorted({*BAUDS, baud}), value=baud)
         self._model.value = project.response or ""
         self._noise.value = project.noise

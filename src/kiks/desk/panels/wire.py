@@ -53,7 +53,6 @@ class WirePanel:
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
-        self._sim: object = None
         self._watched: Wire | None = None
         self._log: WireLog | None = None
         self._next_piece = 0
@@ -139,12 +138,12 @@ class WirePanel:
     def refresh(self) -> None:
         """Show new traffic."""
         sim = self._desk.sim
-        if sim is not self._sim:
-            self._sim = sim
-            self._robot.set_options(
-                {robot: f"robot {robot}" for robot in range(1, sim.robot_count + 1)},
-                value=min(self._robot.value or 1, sim.robot_count),
-            )
+        robots = {robot: f"robot {robot}" for robot in range(1, sim.robot_count + 1)}
+        if self._robot.options != robots:
+            self._robot.set_options(robots, value=min(self._robot.value or 1, len(robots)) or None)
+        if not sim.wires:
+            self._let_go()
+            return
         wire = sim.wires[(self._robot.value or 1) - 1]
         if wire is not self._watched:
             self._let_go()
