@@ -316,7 +316,10 @@ kiks_quit
 kiks_quit
 say('quit', kiks_ktime(-1))
 say('after_quit', caught(@() kProximity(ref)))
-say('no_ending', caught(@() kiks('robot_wars')))
+say('ending', caught(@() kiks('robot_wars.tif')))
+kiks('robot_wars')
+say('default', kiks_siminfo_robotpos())
+kiks_quit
 kiks_kiksnet('knockknock');
 
 kiks('corridors.tif');
@@ -354,6 +357,46 @@ def test_pictures_are_arenas_and_sessions_follow_each_other(tmp_path: Path) -> N
     assert said["quit"].size == 0
     assert said["file"].shape == said["matrix"].shape == (1, 3)
     assert said["after_quit"].startswith("kiks:session|A port must be open for that, but none is.")
-    assert said["no_ending"].startswith("kiks:argument|The arena's file must exist, but 'robot_wars' with one of the ")
-    assert said["no_ending"].endswith("folder: corridors. Those of KiKS: default, maze, office, pillars, pitch, track.")
+    assert said["ending"].startswith("kiks:argument|The arena's file must exist, but 'robot_wars.tif' is neither in ")
+    assert said["default"][0, :2] == pytest.approx([250.5, 325.5])
+    there = r"corridors\. Those of KiKS: .*, track\. The default arena is taken instead\."
+    assert re.search(rf"warning: The arena's file must exist, but 'robot_wars' with one of the .*: {there}", done.text)
     assert said["inputs"].shape == (20, 16)
+
+
+# ---- functions spelled with other capitals, which neither kMatlab nor MATLAB on Windows distinguished ----
+
+SPELLINGS = """
+clear all
+ref = kiks_kopen([-1 9600 1]);
+before = KGetEncoders(ref);
+ksetspeed(ref, 3, -3)
+while KGetEncoders(ref)(1) < before(1) + 200
+end
+kSetspeed(ref, 0, 0);
+Kproximity(ref)
+kstatus(ref)
+[major, protocol] = kbios(ref);
+say('versions', [major protocol])
+say('turned', kiks_siminfo_robotpos())
+say('own', kgetspeed(ref))
+say('wrong', caught(@() ksetspeed(ref)))
+kiks_kclose(ref);
+clear all
+ref = kiks_kopen([-1 9600 1]);
+say('after_clear', kgetencoders(ref))
+kiks_kclose(ref);
+"""
+
+
+def test_capitals_of_functions_do_not_matter(tmp_path: Path) -> None:
+    (tmp_path / "kgetspeed.m").write_text("function speed = kgetspeed(ref)\nspeed = 'a function of the program';\n")
+    done = run(SPELLINGS, tmp_path)
+    said = done.said
+    text = "\n".join(line for line in done.lines if line)
+    assert re.match(r"ans = 0\nans =\n( +\d+\n){8}left  wheel: speed mode, error", text)
+    assert said["versions"].tolist() == [[5.02, 5.01]]
+    assert said["turned"][0, 2] < np.pi / 2 - 0.5
+    assert said["own"] == "a function of the program"
+    assert said["wrong"].startswith("kiks:argument|kSetSpeed needs the speeds of both wheels.")
+    assert said["after_clear"][0, 0] >= 200
