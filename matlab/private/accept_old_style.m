@@ -33,7 +33,6 @@ if exist(other) %#ok<EXIST>
     return
 end
 % Without an output asked for, the reply is still printed as ans.
-least = min(abs(nargout(name)), 1);
-eval(sprintf('function varargout = %s(varargin)\n[varargout{1:max(nargout, %d)}] = %s(varargin{:});\nend', ...
-    other, least, name));
+eval(sprintf(['function varargout = %s(varargin)\n' ...
+    '[varargout{1:max(nargout, min(abs(nargout(''%s'')), 1))}] = %s(varargin{:});\nend'], other, name, name));
 end
