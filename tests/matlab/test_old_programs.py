@@ -88,6 +88,9 @@ reply = kiks_ksend(['H' 10], ref);
 [value, count, errmsg] = sscanf(reply, 'h,%d,%d');
 say('pieces', [numel(value) count isempty(errmsg)])
 say('letter', strcmp(reply(1), 'h'))
+% The first of many lines is read only; kMatlab's own kcmd, copied beside a program, does so.
+kiks_ksend(['list' 10], ref);
+say('after_list', kGetEncoders(ref))
 kiks_kclose(ref);
 """
 
@@ -108,6 +111,7 @@ def test_loops_end_by_the_clock_and_compare_vectors(tmp_path: Path) -> None:
     assert said["pictures"].shape == (64, 2)
     assert said["pieces"].tolist() == [[2, 2, 1]]
     assert said["letter"] == 1
+    assert said["after_list"].shape == (2, 1)
 
 
 # ---- scripts that print what they get, with commands of text and the number 10 ----
