@@ -404,3 +404,19 @@ def test_capitals_of_functions_do_not_matter(tmp_path: Path) -> None:
     assert said["own"] == "a function of the program"
     assert said["wrong"].startswith("kiks:argument|kSetSpeed needs the speeds of both wheels.")
     assert said["after_clear"][0, 0] >= 200
+
+
+# ---- files of Windows: Latin letters in comments, lines that end in CR LF ----
+
+
+def test_files_may_be_those_of_windows(tmp_path: Path) -> None:
+    preferences = (
+        "function kiks_preferences\r\n% f\xfcr alle\r\nglobal KIKS_NOISE\r\nKIKS_NOISE = 0; % ohne Rauschen \xe4\r\n"
+    )
+    (tmp_path / "kiks_preferences.m").write_bytes(preferences.encode("cp1252"))
+    (tmp_path / "drive.m").write_bytes(
+        "% Gr\xf6\xdfe\r\nref = kiks_kopen;\r\nsay('x', kProximity(ref))\r\n".encode("cp1252")
+    )
+    done = run("drive\nkiks_print('done')\n", tmp_path)
+    assert (done.said["x"] == done.said["x"][0]).all(), "without noise, in the middle of the arena"
+    assert "constants_of" not in done.text, "nothing but what Octave says of any such file"
