@@ -23,7 +23,8 @@ function answer = kiks(arena, colormask)
 %
 %   arena as a file: .kad, a picture (.tif .png .bmp .pgm .pbm .ppm), an arena file .toml or a project .kiks, with or
 %   without its ending. What is not in the current folder is looked for beside the running program, on the path, and
-%   among the arenas that come with KiKS: kiks('maze').
+%   among the arenas that come with KiKS: kiks('maze'). If nothing has a name without ending, there is a warning and the
+%   default arena.
 %
 %   colormask: a matrix of arena's size, the brightness of walls, 1 black to 255 white; where it is left out, walls have
 %   KIKS_ARENA_DEFAULT_COLOR. It is ignored with files, which have greys of their own.

@@ -23,5 +23,5 @@ file = plain_text(file);
 if ~ischar(file) || isempty(file)
     error('kiks:argument', '%s', need);
 end
-begin_world(file, []);
+begin_world(arena_file(file), []);
 end

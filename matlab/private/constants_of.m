@@ -21,6 +21,7 @@ if ~is_made || ~isempty(why)
     error('a folder %s for its copy cannot be made: %s', home, why);
 end
 copy = fullfile(home, [name '.m']);
+text = in_utf8(text);
 globals = unique(regexp(text, '\<KIKS_\w+', 'match'));
 before = cell(size(globals));
 for k = 1:numel(globals)
@@ -69,4 +70,13 @@ if exist(copy, 'file')
     delete(copy);
 end
 rmdir(home);
+end
+
+function text = in_utf8(text)
+% Octave takes only that. What is in another encoding is from Windows, in Western Europe.
+try
+    regexp(text, ' ', 'once');
+catch
+    text = native2unicode(uint8(text), 'windows-1252');
+end
 end

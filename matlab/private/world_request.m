@@ -4,7 +4,7 @@ function request = world_request(arena, colormask, preferences)
 if isempty(arena)
     request = 'world default';
 elseif ischar(arena)
-    request = ['world file ' escaped(arena_file(arena))];
+    request = file_request(arena);
 else
     codes = checked_codes(arena);
     if any(size(codes) < 100)
@@ -20,6 +20,20 @@ else
     if ~isempty(colormask)
         request = [request ' ' matrix_text(wall_greys(codes, colormask))];
     end
+end
+end
+
+function request = file_request(name)
+try
+    request = ['world file ' escaped(arena_file(name))];
+catch failure
+    [~, ~, ending] = fileparts(name);
+    if ~isempty(ending)
+        rethrow(failure);
+    end
+    % Programs for KiKS 2.2.0, which did not know names without ending, count on going on.
+    warn('kiks:argument', '%s The default arena is taken instead.', failure.message);
+    request = 'world default';
 end
 end
 

@@ -99,7 +99,7 @@ say('send_closed', caught(@() kiks_ksend(['N' 10], ref)))
 ref = kopen([-1 9600 1]);
 say('kopen', ref)
 say('ksend_real', ksend(['N' 10], ref))
-ksends(['D,5,5' 10], ref)
+say('ksends', ksends(['D,5,5' 10], ref))
 kiks_pause(0.3)
 say('after_ksends', kGetSpeed(ref))
 kclose(ref)
@@ -345,6 +345,7 @@ def test_functions_of_the_robot_itself(tmp_path: Path) -> None:
     assert said["closed"].size == said["kclose"].size == 0
     assert said["send_closed"].startswith("kiks:simulator|port -1 must be open, but it is not.")
     assert re.fullmatch(r"n(,\d+){8}", said["ksend_real"])
+    assert said["ksends"] == "d"
     assert said["after_ksends"] == pytest.approx(np.full((2, 1), 5), abs=1)
 
 

@@ -88,6 +88,9 @@ reply = kiks_ksend(['H' 10], ref);
 [value, count, errmsg] = sscanf(reply, 'h,%d,%d');
 say('pieces', [numel(value) count isempty(errmsg)])
 say('letter', strcmp(reply(1), 'h'))
+% The first of many lines is read only; kMatlab's own kcmd, copied beside a program, does so.
+kiks_ksend(['list' 10], ref);
+say('after_list', kGetEncoders(ref))
 kiks_kclose(ref);
 """
 
@@ -108,6 +111,7 @@ def test_loops_end_by_the_clock_and_compare_vectors(tmp_path: Path) -> None:
     assert said["pictures"].shape == (64, 2)
     assert said["pieces"].tolist() == [[2, 2, 1]]
     assert said["letter"] == 1
+    assert said["after_list"].shape == (2, 1)
 
 
 # ---- scripts that print what they get, with commands of text and the number 10 ----
@@ -316,7 +320,10 @@ kiks_quit
 kiks_quit
 say('quit', kiks_ktime(-1))
 say('after_quit', caught(@() kProximity(ref)))
-say('no_ending', caught(@() kiks('robot_wars')))
+say('ending', caught(@() kiks('robot_wars.tif')))
+kiks('robot_wars')
+say('default', kiks_siminfo_robotpos())
+kiks_quit
 kiks_kiksnet('knockknock');
 
 kiks('corridors.tif');
@@ -354,6 +361,62 @@ def test_pictures_are_arenas_and_sessions_follow_each_other(tmp_path: Path) -> N
     assert said["quit"].size == 0
     assert said["file"].shape == said["matrix"].shape == (1, 3)
     assert said["after_quit"].startswith("kiks:session|A port must be open for that, but none is.")
-    assert said["no_ending"].startswith("kiks:argument|The arena's file must exist, but 'robot_wars' with one of the ")
-    assert said["no_ending"].endswith("folder: corridors. Those of KiKS: default, maze, office, pillars, pitch, track.")
+    assert said["ending"].startswith("kiks:argument|The arena's file must exist, but 'robot_wars.tif' is neither in ")
+    assert said["default"][0, :2] == pytest.approx([250.5, 325.5])
+    there = r"corridors\. Those of KiKS: .*, track\. The default arena is taken instead\."
+    assert re.search(rf"warning: The arena's file must exist, but 'robot_wars' with one of the .*: {there}", done.text)
     assert said["inputs"].shape == (20, 16)
+
+
+# ---- functions spelled with other capitals, which neither kMatlab nor MATLAB on Windows distinguished ----
+
+SPELLINGS = """
+clear all
+ref = kiks_kopen([-1 9600 1]);
+before = KGetEncoders(ref);
+ksetspeed(ref, 3, -3)
+while KGetEncoders(ref)(1) < before(1) + 200
+end
+kSetspeed(ref, 0, 0);
+Kproximity(ref)
+kstatus(ref)
+[major, protocol] = kbios(ref);
+say('versions', [major protocol])
+say('turned', kiks_siminfo_robotpos())
+say('own', kgetspeed(ref))
+say('wrong', caught(@() ksetspeed(ref)))
+kiks_kclose(ref);
+clear all
+ref = kiks_kopen([-1 9600 1]);
+say('after_clear', kgetencoders(ref))
+kiks_kclose(ref);
+"""
+
+
+def test_capitals_of_functions_do_not_matter(tmp_path: Path) -> None:
+    (tmp_path / "kgetspeed.m").write_text("function speed = kgetspeed(ref)\nspeed = 'a function of the program';\n")
+    done = run(SPELLINGS, tmp_path)
+    said = done.said
+    text = "\n".join(line for line in done.lines if line)
+    assert re.match(r"ans = 0\nans =\n( +\d+\n){8}left  wheel: speed mode, error", text)
+    assert said["versions"].tolist() == [[5.02, 5.01]]
+    assert said["turned"][0, 2] < np.pi / 2 - 0.5
+    assert said["own"] == "a function of the program"
+    assert said["wrong"].startswith("kiks:argument|kSetSpeed needs the speeds of both wheels.")
+    assert said["after_clear"][0, 0] >= 200
+
+
+# ---- files of Windows: Latin letters in comments, lines that end in CR LF ----
+
+
+def test_files_may_be_those_of_windows(tmp_path: Path) -> None:
+    preferences = (
+        "function kiks_preferences\r\n% f\xfcr alle\r\nglobal KIKS_NOISE\r\nKIKS_NOISE = 0; % ohne Rauschen \xe4\r\n"
+    )
+    (tmp_path / "kiks_preferences.m").write_bytes(preferences.encode("cp1252"))
+    (tmp_path / "drive.m").write_bytes(
+        "% Gr\xf6\xdfe\r\nref = kiks_kopen;\r\nsay('x', kProximity(ref))\r\n".encode("cp1252")
+    )
+    done = run("drive\nkiks_print('done')\n", tmp_path)
+    assert (done.said["x"] == done.said["x"][0]).all(), "without noise, in the middle of the arena"
+    assert "constants_of" not in done.text, "nothing but what Octave says of any such file"

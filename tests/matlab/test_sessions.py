@@ -420,7 +420,7 @@ WRONG = [
     "kiks_save(5)",
     "kiks_save('x.png')",
     "kiks_save('/nowhere/x.kad')",
-    "kiks_arena('x')",
+    "kiks_arena('x.tif')",
     "kiks_arena(zeros(200, 200, 2))",
     "kiks_arena(0.5 * ones(200))",
     "kiks_arena(zeros(200), ones(3))",

@@ -56,6 +56,7 @@ class OpenPort:
         last_ns: Simulated time of the last call of `pace` [ns].
         last_wall_s: Real time of that call [s].
         is_clean: Whether all expected replies have been read.
+        is_talking: Whether further lines of a tool's reply may come.
     """
 
     port: VirtualPort
@@ -67,6 +68,7 @@ class OpenPort:
     last_ns: int
     last_wall_s: float
     is_clean: bool = True
+    is_talking: bool = False
 
     def pace(self, now_ns: int) -> tuple[float, float]:
         """Return the speed of simulated time up to an instant [ns], since the opening and since the last call."""
@@ -281,6 +283,9 @@ class SessionClient:
 
     def _exchange(self, opened: OpenPort, text: str) -> str:
         port, data = opened.port, text.encode("latin-1", errors="replace")
+        if opened.is_talking:
+            # The caller wanted the first line of them only.
+            self._hear_out(opened)
         if not opened.is_clean:
             port.reset_input_buffer()
             opened.is_clean = True
@@ -292,19 +297,24 @@ class SessionClient:
         commands = data.replace(b"\r", b"\n").split(b"\n")
         replies = [port.read_until(b"\n") for command in commands if command]
         opened.is_clean = all(reply.endswith(b"\n") for reply in replies)
+        # Commands of one letter answer with one line, tools such as list with several.
+        opened.is_talking = any(command[:1].islower() for command in commands)
         return replies[0].rstrip(b"\r\n").decode("ascii", errors="replace") if replies else ""
 
     def listen(self, number: int) -> str:
         """Return all characters that arrive until the line is silent."""
-        port = self.opened(number).port
+        return self._hear_out(self.opened(number)).decode("ascii", errors="replace")
+
+    def _hear_out(self, opened: OpenPort) -> bytes:
         heard = b""
-        port.timeout = SILENCE_S
+        opened.port.timeout = SILENCE_S
         try:
-            while line := port.read_until(b"\n"):
+            while line := opened.port.read_until(b"\n"):
                 heard += line
         finally:
-            port.timeout = ANSWER_S
-        return heard.decode("ascii", errors="replace")
+            opened.port.timeout = ANSWER_S
+        opened.is_talking = False
+        return heard
 
     # ---- the film ----
 
