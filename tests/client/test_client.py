@@ -126,9 +126,9 @@ def test_polling_the_time_lets_it_pass(sim: kiks.Simulation) -> None:
     assert 3.0 <= sim.time_s < 3.2
 
 
-@pytest.mark.parametrize("robots", [0, 1001, 1.5, "2"])
+@pytest.mark.parametrize("robots", [-1, 1001, 1.5, "2"])
 def test_number_of_robots_is_checked(robots: object) -> None:
-    with pytest.raises(kiks.ParameterError, match="robots must be a whole number from 1 to 1000, but it was"):
+    with pytest.raises(kiks.ParameterError, match="robots must be a whole number from 0 to 1000, but it was"):
         kiks.Simulation(robots=robots)  # type: ignore[arg-type]
 
 
