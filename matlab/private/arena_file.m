@@ -10,21 +10,13 @@ candidates = {file};
 if ~any(strcmpi(ending, endings))
     candidates = strcat(file, endings);
 end
-folders = {pwd()};
+folders = {''};
 if isempty(folder)
     folders = [folders, program_folders(), strsplit(path(), pathsep()), {arena_folder()}];
 end
-for k = 1:numel(folders)
-    for j = 1:numel(candidates)
-        path_name = candidates{j};
-        if k > 1
-            path_name = fullfile(folders{k}, path_name);
-        end
-        path_name = absolute_path(path_name);
-        if exist(path_name, 'file') == 2
-            return
-        end
-    end
+path_name = first_file(folders, candidates);
+if ~isempty(path_name)
+    return
 end
 if numel(candidates) > 1
     tried = sprintf('%s with one of the endings%s', shown(file), sprintf(' %s', endings{:}));

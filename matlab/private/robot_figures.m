@@ -14,7 +14,11 @@ is_ours = isempty(folder) && any(strcmpi(base, {'khepera', 'khepera_ii'}));
 if ~any(strcmpi(ending, {'', '.m'})) || (isempty(ending) && is_ours)
     return
 end
-file = found_file(folder, [base '.m']);
+folders = {folder};
+if isempty(folder)
+    folders = [folders, strsplit(path(), pathsep())];
+end
+file = first_file(folders, {[base '.m'], fullfile('robots', [base '.m'])});
 if isempty(file)
     if ~isempty(ending)
         error('kiks:argument', ['KIKS_ROBOT must be a file that exists, but %s is neither in %s nor on the path, ' ...
@@ -44,23 +48,6 @@ for k = 4:5
     rule(k, -360, 360, 'eight angles [degrees] from -360 to 360, one for each sensor');
 end
 figures = [values{1:3}, values{4}(:)', values{5}(:)'];
-end
-
-function file = found_file(folder, name)
-if isempty(folder)
-    folders = [{pwd()}, strsplit(path(), pathsep())];
-else
-    folders = {absolute_path(folder)};
-end
-for k = 1:numel(folders)
-    files = {fullfile(folders{k}, name), fullfile(folders{k}, 'robots', name)};
-    is_there = cellfun(@(each) exist(each, 'file') == 2, files);
-    if any(is_there)
-        file = absolute_path(files{find(is_there, 1)});
-        return
-    end
-end
-file = '';
 end
 
 function say_unknown(file, unknown)
