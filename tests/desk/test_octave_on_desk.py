@@ -49,8 +49,8 @@ def begin(terminal: Terminal, new_page: NewPage) -> Page:
 
 
 def evaluate(page: Page, command: str) -> None:
-    page.get_by_test_id("octave-line").fill(command)
-    page.get_by_test_id("octave-line").press("Enter")
+    page.get_by_test_id("octave").fill(command)
+    page.get_by_test_id("octave").press("Enter")
 
 
 def drive_and_halt(terminal: Terminal, page: Page, loop: str) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from nicegui import ui
 
-from kiks.desk.panels.widgets import icon_button, told
+from kiks.desk.panels.command_line import CommandLine
 from kiks.desk.server.desk import Desk
 from kiks.firmware.commands import COMMANDS
 from kiks.firmware.commands import Command as RobotCommand
@@ -15,45 +15,8 @@ from kiks.sim.console import Typed, type_lines
 ROWS = 100
 """Maximum number of lines in the page."""
 
-HISTORY_LIMIT = 100
-"""Number of commands kept for the arrow keys."""
-
 SUGGESTIONS = 6
 """Maximum number of suggested commands."""
-
-
-class History:
-    """The commands typed before, for the arrow keys.
-
-    Example:
-        >>> history = History()
-        >>> history.add("N"); history.add("D,1,1")
-        >>> history.back("x"), history.back("x"), history.back("x"), history.forth(), history.forth()
-        ('D,1,1', 'N', 'N', 'D,1,1', 'x')
-    """
-
-    def __init__(self) -> None:
-        self._lines: list[str] = []
-        self._place = 0
-        self._unsent = ""
-
-    def add(self, line: str) -> None:
-        """Add a line that was sent."""
-        if self._lines[-1:] != [line]:
-            self._lines = [*self._lines, line][-HISTORY_LIMIT:]
-        self._place = len(self._lines)
-
-    def back(self, now: str) -> str:
-        """Return the previous line; `now` is the unsent line, which `forth` returns at the end."""
-        if self._place == len(self._lines):
-            self._unsent = now
-        self._place = max(self._place - 1, 0)
-        return self._lines[self._place] if self._lines else now
-
-    def forth(self) -> str:
-        """Return the next line, or the unsent line at the end."""
-        self._place = min(self._place + 1, len(self._lines))
-        return self._lines[self._place] if self._place < len(self._lines) else self._unsent
 
 
 class ConsolePanel:
@@ -67,7 +30,6 @@ class ConsolePanel:
     def __init__(self, desk: Desk, robot: Callable[[], int]) -> None:
         self._desk = desk
         self._of_robot = robot
-        self._history = History()
         self._waiting: list[Typed] = []
         ui.label("Commands to the robot").classes("text-subtitle2")
         self._rows = (
@@ -77,18 +39,16 @@ class ConsolePanel:
             .props('data-testid="console-log" aria-label="What you typed, and the replies"')
             .mark("console-log")
         )
-        with ui.row().classes("w-full items-end no-wrap gap-2"):
-            self._line = (
-                ui.input("Command", placeholder="D,5,5", on_change=self._suggest)
-                .classes("col")
-                .props('dense autocomplete=off autocapitalize=off spellcheck=false data-testid="console"')
-                .mark("console")
-                .on("keydown.enter", self._send)
-                .on("keydown.up.prevent", self._back)
-                .on("keydown.down.prevent", self._forth)
-                .tooltip("A command for the robot, such as D,5,5 to drive; the arrow keys recall earlier ones")
-            )
-            icon_button("send", "Send", "console-send", self._send).tooltip("Send the command on the robot's line")
+        self._line = CommandLine(
+            self._send,
+            label="Command",
+            example="D,5,5",
+            tip="A command for the robot, such as D,5,5 to drive",
+            verb="Send",
+            verb_tip="Send the command on the robot's line",
+            name="console",
+            on_change=self._suggest,
+        )
         self._hints = ui.column().classes("w-full gap-0").mark("hints").props('data-testid="hints"')
         self._suggest()
 
@@ -99,29 +59,20 @@ class ConsolePanel:
             for line in (typed.reply or "(no reply)").split("\n"):
                 self._rows.push(f"{typed.reply_s or 0:8.3f} ← {line}", classes="wire-row wire-received")
 
-    @told
-    async def _send(self) -> None:
-        desk, text, robot = self._desk, (self._line.value or "").strip(), self._of_robot()
+    async def _send(self, text: str) -> None:
+        desk, robot = self._desk, self._of_robot()
         sent = await desk.change(lambda sim: type_lines(sim, robot, text))
-        self._history.add(text)
-        self._line.value = ""
         self._waiting += sent
         for typed in sent:
             self._rows.push(f"{typed.time_s:8.3f} → {typed.text}", classes="wire-row wire-sent")
         if desk.is_paused:
             ui.notify("Time is paused. Press space to run it; then the robot answers.")
 
-    def _back(self) -> None:
-        self._line.value = self._history.back(self._line.value or "")
-
-    def _forth(self) -> None:
-        self._line.value = self._history.forth()
-
     def _suggest(self) -> None:
         """Show the commands that match the input."""
         self._hints.clear()
         with self._hints:
-            for command in suggested(self._line.value or "")[:SUGGESTIONS]:
+            for command in suggested(self._line.text)[:SUGGESTIONS]:
                 with (
                     ui.button(on_click=lambda command=command: self._take(command))
                     .props("flat dense no-caps align=left")
@@ -131,8 +82,7 @@ class ConsolePanel:
 
     def _take(self, command: RobotCommand) -> None:
         """Put a command into the input line for completion."""
-        self._line.value = command.letter + ("," if command.parameters else "")
-        self._line.run_method("focus")
+        self._line.complete(command.letter + ("," if command.parameters else ""))
 
 
 def suggested(text: str) -> list[RobotCommand]:

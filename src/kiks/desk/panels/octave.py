@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from nicegui import ui
 
-from kiks.desk.panels.console import History
-from kiks.desk.panels.widgets import icon_button, told
+from kiks.desk.panels.command_line import CommandLine
 from kiks.desk.server.desk import Desk
 
 ROWS_MAX = 10_000
@@ -29,7 +28,6 @@ class OctavePanel:
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
-        self._history = History()
         self._next_line = 0
         ui.add_css(".kiks-log * { white-space: pre-wrap; overflow-wrap: anywhere }")
         with ui.column().classes("w-full q-pa-sm gap-2"):
@@ -43,17 +41,15 @@ class OctavePanel:
             programs = desk.outside.interpreters()
             self._choice = ui.select(programs, value=min(programs), label="Commands for").classes("w-full")
             self._choice.props('dense options-dense data-testid="interpreter"')
-            with ui.row().classes("w-full items-end no-wrap gap-2"):
-                self._line = (
-                    ui.input("Command for Octave or MATLAB", placeholder="kSetSpeed(ref, 5, 5)")
-                    .classes("col")
-                    .props('dense autocomplete=off autocapitalize=off spellcheck=false data-testid="octave-line"')
-                    .on("keydown.enter", self._send)
-                    .on("keydown.up.prevent", self._back)
-                    .on("keydown.down.prevent", self._forth)
-                    .tooltip("A command of the language; the arrow keys recall earlier ones")
-                )
-                icon_button("send", "Evaluate", "octave-send", self._send).tooltip("Evaluate the command")
+            self._line = CommandLine(
+                self._send,
+                label="Command for Octave or MATLAB",
+                example="kSetSpeed(ref, 5, 5)",
+                tip="A command of the language",
+                verb="Evaluate",
+                verb_tip="Evaluate the command",
+                name="octave",
+            )
             ui.label(EXPLANATION).classes("text-caption")
         ui.timer(REFRESH_S, self._refresh)
         self._refresh()
@@ -69,16 +65,6 @@ class OctavePanel:
             self._choice.set_options(programs, value=kept)
         self._choice.set_visibility(len(programs) > 1)
 
-    @told
-    async def _send(self) -> None:
-        command = (self._line.value or "").strip()
+    async def _send(self, command: str) -> None:
         self._desk.outside.evaluate(self._choice.value, command)
-        self._history.add(command)
-        self._line.value = ""
         self._refresh()
-
-    def _back(self) -> None:
-        self._line.value = self._history.back(self._line.value or "")
-
-    def _forth(self) -> None:
-        self._line.value = self._history.forth()

@@ -1,0 +1,112 @@
+"""An input line for commands, which recalls earlier ones, and a button that sends."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+from nicegui import ui
+
+from kiks.desk.panels.widgets import icon_button, told
+
+HISTORY_LIMIT = 100
+"""Number of commands kept for the arrow keys."""
+
+
+class History:
+    """The commands typed before, for the arrow keys.
+
+    Example:
+        >>> history = History()
+        >>> history.add("N"); history.add("D,1,1")
+        >>> history.back("x"), history.back("x"), history.back("x"), history.forth(), history.forth()
+        ('D,1,1', 'N', 'N', 'D,1,1', 'x')
+    """
+
+    def __init__(self) -> None:
+        self._lines: list[str] = []
+        self._place = 0
+        self._unsent = ""
+
+    def add(self, line: str) -> None:
+        """Add a line that was sent."""
+        if self._lines[-1:] != [line]:
+            self._lines = [*self._lines, line][-HISTORY_LIMIT:]
+        self._place = len(self._lines)
+
+    def back(self, now: str) -> str:
+        """Return the previous line; `now` is the unsent line, which `forth` returns at the end."""
+        if self._place == len(self._lines):
+            self._unsent = now
+        self._place = max(self._place - 1, 0)
+        return self._lines[self._place] if self._lines else now
+
+    def forth(self) -> str:
+        """Return the next line, or the unsent line at the end."""
+        self._place = min(self._place + 1, len(self._lines))
+        return self._lines[self._place] if self._place < len(self._lines) else self._unsent
+
+
+class CommandLine:
+    """An input line and a button that sends. A line whose command fails stays, to be corrected.
+
+    Args:
+        send: Called with each line, without blanks around it.
+        label: Label of the input.
+        example: A command, shown while the input is empty.
+        tip: What a command does, for a person who hovers over the input.
+        verb: Name of the button.
+        verb_tip: What it does.
+        name: Test id of the input; that of the button ends in `-send`.
+        on_change: Called when the text has changed.
+    """
+
+    def __init__(
+        self,
+        send: Callable[[str], Awaitable[None]],
+        *,
+        label: str,
+        example: str,
+        tip: str,
+        verb: str,
+        verb_tip: str,
+        name: str,
+        on_change: Callable[[], Any] = lambda: None,
+    ) -> None:
+        self._take = send
+        self._history = History()
+        with ui.row().classes("w-full items-end no-wrap gap-2"):
+            self._input = (
+                ui.input(label, placeholder=example, on_change=lambda: on_change())
+                .classes("col")
+                .props(f'dense autocomplete=off autocapitalize=off spellcheck=false data-testid="{name}"')
+                .mark(name)
+                .on("keydown.enter", self._send)
+                .on("keydown.up.prevent", self._back)
+                .on("keydown.down.prevent", self._forth)
+                .tooltip(f"{tip}; the arrow keys recall earlier ones")
+            )
+            icon_button("send", verb, f"{name}-send", self._send).tooltip(verb_tip)
+
+    @property
+    def text(self) -> str:
+        """The text of the input."""
+        return self._input.value or ""
+
+    def complete(self, text: str) -> None:
+        """Put a text into the input for completion."""
+        self._input.value = text
+        self._input.run_method("focus")
+
+    @told
+    async def _send(self) -> None:
+        text = self.text.strip()
+        await self._take(text)
+        self._history.add(text)
+        self._input.value = ""
+
+    def _back(self) -> None:
+        self._input.value = self._history.back(self.text)
+
+    def _forth(self) -> None:
+        self._input.value = self._history.forth()
