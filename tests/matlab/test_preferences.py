@@ -76,7 +76,9 @@ kiks_quit(1)
     assert done.said["own"] == 4
     things = Project.load(tmp_path / "things.toml").arena
     assert [each.brightness for each in (*things.balls, *things.cylinders)] == [255, 200]
-    assert Project.load(tmp_path / "first.kiks").robots[0].brightness is None, "2.2.0's grey was chosen by nobody"
+    assert Project.load(tmp_path / "first.kiks").robots[0].brightness is None, (
+        "the user did not choose the grey of 2.2.0"
+    )
     assert "warning" not in done.text
     assert "kiks_preferences:" not in done.text
 

@@ -12,7 +12,6 @@ from kiks.errors import ParameterError, shown
 from kiks.firmware.turret import Turret
 
 _ORDER = re.compile(r"T, *([0-9]{1,9}) *,[^\r\n]+[\r\n]", re.ASCII)
-_NUMBERS = [str(number) for number in range(1, 100)]
 
 
 class TurretOrder(Exception):  # noqa: N818 (it is a question to the program, not an error)

@@ -1,9 +1,9 @@
 r"""Text format of requests and answers; `framing.py` transports them.
 
 A request is a name and words. The answer is `+` or `-`, the number of the port and its time in 19 characters, and the
-result or an error message; or `?` and an order for a turret that the program itself must carry out. Texts have the
-escape sequences `\n`, `\r` and `\\`. Matrices are run lengths in column-major order, as MATLAB stores them: most of an
-arena is floor.
+result or an error message; or `?` and an order for a turret that the program itself must carry out; or `!` and a typed
+command, without a time. Texts have the escape sequences `\n`, `\r` and `\\`. Matrices are run lengths in column-major
+order, as MATLAB stores them: most of an arena is floor.
 """
 
 from __future__ import annotations
