@@ -14,12 +14,28 @@ if isempty(known) && simulator('--is-running', [])
 end
 mm = known;
 if isempty(mm)
+    robot = next_robot();
+    mm = pulse_of_kind(robot);
+    if isempty(mm)
+        mm = pulse_of_file(robot);
+    end
+end
+end
+
+function robot = next_robot()
+% The robot of the next world. Reading all preferences takes milliseconds, and programs convert in loops.
+persistent read_robot read_from
+file = [];
+if exist(fullfile(pwd(), 'kiks_preferences.m'), 'file') == 2
+    file = dir('kiks_preferences.m');
+end
+from = {pwd(), file, global_value('KIKS_ROBOT')};
+if isempty(read_robot) || ~isequal(from, read_from)
     preferences = read_preferences();
-    mm = pulse_of_kind(preferences.KIKS_ROBOT);
+    read_robot = preferences.KIKS_ROBOT;
+    read_from = from;
 end
-if isempty(mm)
-    mm = pulse_of_file(preferences.KIKS_ROBOT);
-end
+robot = read_robot;
 end
 
 function mm = pulse_of_file(file)
