@@ -75,6 +75,30 @@ def test_typed_command_drives_the_robot_and_appears_on_the_wire(visitor: Visitor
     visitor.until(lambda: setpoints(visitor) == [0, 0])
 
 
+AT_ONCE = """([input, ...texts]) => {
+    for (const text of texts) {
+        input.value = text;
+        input.dispatchEvent(new Event("input"));
+        input.dispatchEvent(new KeyboardEvent("keydown", { key: "Enter", bubbles: true }));
+    }
+    input.value = "D,7,";
+    input.dispatchEvent(new Event("input"));
+}"""
+"""Types commands, and half of another one, before the page has been answered."""
+
+
+def test_commands_typed_faster_than_the_page_is_answered_all_arrive(visitor: Visitor) -> None:
+    visitor.tab("wire")
+    texts = [f"C,{k},{k}" for k in range(5)] + ["D,7,8"]
+    visitor.page.evaluate(AT_ONCE, [visitor.at("console").element_handle(), *texts])
+    visitor.until(lambda: setpoints(visitor) == [7, 8])
+    for text in texts:
+        expect(visitor.at("console-log")).to_contain_text(f"→ {text}")
+    expect(visitor.at("console")).to_have_value("D,7,")
+    visitor.at("console").press("ArrowUp")
+    expect(visitor.at("console")).to_have_value("D,7,8")
+
+
 # ---- Programs ----
 
 

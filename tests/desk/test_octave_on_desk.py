@@ -144,6 +144,8 @@ def test_desk_shows_a_world_without_a_robot_and_then_the_robot(terminal: Termina
     page.wait_for_function("() => window.kiksDesk?.stats().frames_drawn > 3")
     for tab in ("wire", "programs", "settings", "robot"):
         page.get_by_test_id(f"tab-{tab}").click()
+        # The page ignores a click on the tab that it shows until the server has answered the click before it.
+        expect(page.get_by_test_id(f"tab-{tab}")).to_have_attribute("aria-selected", "true")
     terminal.type("kiks_spawn(2)")
     terminal.type("ref = kiks_kopen; kSetSpeed(ref, 2, 2)")
     page.wait_for_function(FIRST_PICTURE)

@@ -10,6 +10,8 @@ import pytest
 from tests.matlab.octave import DEMOS, TOOLBOX, needs_octave, run
 from tools.octave_package import build, contents
 
+from kiks.engine.code_cache import cache_folders
+
 PROGRAM = """
 rmpath('{toolbox}')
 say('before', exist('kiks', 'file'))
@@ -36,7 +38,10 @@ def test_an_installed_package_runs_a_demo_from_any_folder(tmp_path: Path) -> Non
     home = tmp_path / "a home"
     home.mkdir()
     program = PROGRAM.format(toolbox=TOOLBOX, home=home, package=build(tmp_path / "dist"))
-    done = run(program, tmp_path, {"HOME": str(home), "KIKS_COMMAND": f"{sys.executable} -m kiks"})
+    # In the new home, KiKS would compile its engine again.
+    compiled = str(next(cache_folders()).parents[1])
+    environment = {"HOME": str(home), "NUMBA_CACHE_DIR": compiled, "KIKS_COMMAND": f"{sys.executable} -m kiks"}
+    done = run(program, tmp_path, environment)
     said = done.said
     assert said["before"] == said["after"] == 0
     assert said["where"].startswith(str(home))

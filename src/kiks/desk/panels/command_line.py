@@ -5,12 +5,21 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable
 from typing import Any
 
-from nicegui import ui
+from nicegui import events, ui
 
 from kiks.desk.panels.widgets import icon_button, told
+from kiks.errors import KiksError
 
 HISTORY_LIMIT = 100
 """Number of commands kept for the arrow keys."""
+
+TAKE = """(event) => {
+    const input = event.target, text = input.value;
+    // The browser empties the input at once, for a person may type the next command before an answer comes.
+    input.value = "";
+    input.dispatchEvent(new Event("input"));
+    setTimeout(() => emit(text));  // after the change of the input
+}"""
 
 
 class History:
@@ -29,7 +38,7 @@ class History:
         self._unsent = ""
 
     def add(self, line: str) -> None:
-        """Add a line that was sent."""
+        """Add a line that a person sends."""
         if self._lines[-1:] != [line]:
             self._lines = [*self._lines, line][-HISTORY_LIMIT:]
         self._place = len(self._lines)
@@ -48,7 +57,7 @@ class History:
 
 
 class CommandLine:
-    """An input line and a button that sends. A line whose command fails stays, to be corrected.
+    """An input line and a button that sends. A line whose command fails comes back, to be corrected.
 
     Args:
         send: Called with each line, without blanks around it.
@@ -73,7 +82,7 @@ class CommandLine:
         name: str,
         on_change: Callable[[], Any] = lambda: None,
     ) -> None:
-        self._take = send
+        self._send = send
         self._history = History()
         with ui.row().classes("w-full items-end no-wrap gap-2"):
             self._input = (
@@ -81,12 +90,12 @@ class CommandLine:
                 .classes("col")
                 .props(f'dense autocomplete=off autocapitalize=off spellcheck=false data-testid="{name}"')
                 .mark(name)
-                .on("keydown.enter", self._send)
+                .on("keydown.enter", self._take_enter, js_handler=TAKE)
                 .on("keydown.up.prevent", self._back)
                 .on("keydown.down.prevent", self._forth)
                 .tooltip(f"{tip}; the arrow keys recall earlier ones")
             )
-            icon_button("send", verb, f"{name}-send", self._send).tooltip(verb_tip)
+            icon_button("send", verb, f"{name}-send", self._take_click).tooltip(verb_tip)
 
     @property
     def text(self) -> str:
@@ -98,12 +107,22 @@ class CommandLine:
         self._input.value = text
         self._input.run_method("focus")
 
-    @told
-    async def _send(self) -> None:
-        text = self.text.strip()
+    async def _take_enter(self, event: events.GenericEventArguments) -> None:
+        await self._take(str(event.args))
+
+    async def _take_click(self) -> None:
+        text, self._input.value = self.text, ""
         await self._take(text)
+
+    @told
+    async def _take(self, text: str) -> None:
+        text = text.strip()
         self._history.add(text)
-        self._input.value = ""
+        try:
+            await self._send(text)
+        except KiksError:
+            self._input.value = self.text or text
+            raise
 
     def _back(self) -> None:
         self._input.value = self._history.back(self.text)
