@@ -29,21 +29,20 @@ def open_dialog(visitor: Visitor) -> None:
     visitor.at("film").click()
 
 
-def pass_time(visitor: Visitor, seconds: float) -> None:
-    """Let time pass in the paused world."""
-    end_ns = visitor.sim.now_ns + round(seconds * 1e9)
+def pass_time(visitor: Visitor, seconds: int) -> None:
+    """Let whole seconds pass in the paused world."""
     visitor.choose("step-size", "1 s")
-    while visitor.sim.now_ns < end_ns:
-        now_ns = visitor.sim.now_ns
+    for _ in range(seconds):
+        end_ns = visitor.sim.now_ns + 1_000_000_000
         visitor.at("step").click()
-        visitor.until(lambda now_ns=now_ns: visitor.sim.now_ns > now_ns)
+        visitor.until(lambda end_ns=end_ns: visitor.sim.now_ns == end_ns)
 
 
 def test_a_part_of_the_run_is_filmed_and_downloaded(visitor: Visitor, tmp_path: Path) -> None:
     visitor.pause()
     with visitor.sim.record(tmp_path / "run.mcap"):
         begin_s = visitor.sim.time_s
-        pass_time(visitor, 12.0)
+        pass_time(visitor, 12)
         open_dialog(visitor)
         expect(visitor.at("film-make")).to_be_visible()
         start_s, end_s = (float(visitor.at(f"film-{name}").input_value()) for name in ("start", "end"))
@@ -65,7 +64,7 @@ def test_a_part_of_the_run_is_filmed_and_downloaded(visitor: Visitor, tmp_path: 
 def test_mistakes_are_told(visitor: Visitor, tmp_path: Path) -> None:
     visitor.pause()
     with visitor.sim.record(tmp_path / "run.mcap"):
-        pass_time(visitor, 2.0)
+        pass_time(visitor, 2)
         open_dialog(visitor)
         expect(visitor.at("film-make")).to_be_visible()
         end_s = visitor.at("film-end").input_value()
@@ -87,7 +86,7 @@ def test_mistakes_are_told(visitor: Visitor, tmp_path: Path) -> None:
 def test_a_closed_dialog_gives_the_film_up(visitor: Visitor, tmp_path: Path) -> None:
     visitor.pause()
     with visitor.sim.record(tmp_path / "run.mcap"):
-        pass_time(visitor, 6.0)
+        pass_time(visitor, 6)
         open_dialog(visitor)
         visitor.at("film-speed").fill("0.02")
         visitor.at("film-make").click()
@@ -98,10 +97,9 @@ def test_a_closed_dialog_gives_the_film_up(visitor: Visitor, tmp_path: Path) -> 
 
 def test_the_past_is_filmed_without_a_recording_of_ones_own(visitor: Visitor, tmp_path: Path) -> None:
     visitor.pause()
-    pass_time(visitor, 5.0)
+    pass_time(visitor, 5)
     visitor.at("back-long").click()
     visitor.until(lambda: visitor.desk.past is not None)
-    # The last step may have gone on until here.
     begin_s, now_s = visitor.desk.looking.span.begin_ns / 1e9, visitor.desk.present.sim.time_s
     open_dialog(visitor)
     expect(visitor.at("film-make")).to_be_visible()
