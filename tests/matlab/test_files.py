@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from scipy.io import loadmat
-from scipy.ndimage import label
+from scipy.ndimage import distance_transform_edt, label
 from tests.matlab.octave import needs_octave, run
 
 from kiks.model.arena import Arena
@@ -241,6 +241,10 @@ say('again', kiks_generate_maze(5, 5))
 kiks_arena(kiks_generate_maze(5, 5))
 say('pose', kiks_siminfo_robotpos())
 say('lamp', kiks_siminfo_objects())
+narrow = kiks_generate_maze(4, 3, 67, 40);
+say('narrow', narrow)
+kiks_arena(narrow)
+say('narrow_pose', kiks_siminfo_robotpos())
 kiks_quit(1)
 """
 
@@ -276,6 +280,11 @@ def test_mazes_have_their_size_and_every_cell_can_be_reached(tmp_path: Path) -> 
     assert said["demo_1"].shape == (640, 880)
     assert said["pose"][0] == pytest.approx([55, 60, 0], abs=1e-9)
     assert said["lamp"][0, :3].tolist() == [1, 830, 580]
+    # A robot gets from the entrance to all cells of the narrowest maze.
+    room = distance_transform_edt(said["narrow"] != 1) >= 28
+    assert label(room)[1] == 1
+    assert all(room[row * 107 :, (column + 1) * 107 - 40 :][:67, :67].any() for row in range(3) for column in range(4))
+    assert said["narrow_pose"][0] == pytest.approx([38, 38, 0], abs=1e-9)
 
 
 HOSTILE = (
