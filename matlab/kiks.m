@@ -6,19 +6,22 @@ function answer = kiks(arena, colormask)
 %   kiks(arena, colormask)   with a matrix and the greys of its walls
 %
 %   A session is a world and the process that simulates it. If one is active, kiks says so and changes nothing:
-%   kiks_arena changes the world, kiks_quit ends the session.
+%   kiks_arena changes the world, kiks_quit ends the session. After clear all, kiks begins a new world, unless other
+%   programs take part in the session, and kiks_kopen opens a port that was left open: a program that begins with
+%   clear all can be run again.
 %
 %   arena as a matrix: one element is 1 mm x 1 mm, rows are y (down), columns are x (to the right); at least
 %   100 x 100, else there is a warning and the default arena. Its elements:
 %
 %      < 0   start pose of a robot; the absolute value is its heading [degrees, 0 right, 90 up], -360 for 0
 %        0   floor
-%        1   wall                (so is what is larger than 4)
+%        1   wall                (so is what is larger than 4; so are fractions: 0.5 is a wall half as bright as white)
 %        2   light
 %        3   ball
 %        4   cylinder
 %
-%   Each start pose gets a robot. Old programs of the thesis's coding (2 ball, 3 light): KIKS_ARENA_CODING in
+%   Each start pose gets a robot. A robot, ball or cylinder without room at its place gets the nearest place with room,
+%   and a warning says so. Old programs of the thesis's coding (2 ball, 3 light): KIKS_ARENA_CODING in
 %   kiks_preferences.
 %
 %   arena as a file: .kad, a picture (.tif .png .bmp .pgm .pbm .ppm), an arena file .toml or a project .kiks, with or
@@ -76,7 +79,7 @@ if ischar(arena) && strncmp(arena, '--', 2)
             error('kiks:argument', ['The option must be --join, --version, --state or --help, but it was %s. ' ...
                 'Give an arena, or nothing for the default one.'], arena);
     end
-elseif is_active()
+elseif is_active() && (~isempty(global_value('KIKS_SESSIONACTIVE')) || is_shared())
     kiks_status(['A session is active, so kiks changed nothing. kiks_arena(ARENA) changes the world, ' ...
         'kiks_quit ends the session.'], 1);
 else
@@ -106,6 +109,7 @@ end
 simulator('--join', number);
 simulator(own_turrets('find'));
 pulse_mm('forget');
+global_value('KIKS_SESSIONACTIVE', 1);
 kiks_status('Joined the session. kiks_quit leaves it.', 1);
 if ~isempty(simulator('desk'))
     poll_desk('begin');

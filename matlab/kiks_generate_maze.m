@@ -10,7 +10,7 @@ function arena = kiks_generate_maze(xs, ys, path_width, wall_width)
 %   Exactly one way leads from each place to each other, and each such maze is as likely as any other. rand draws it:
 %   rand('twister', 7) before it gives the same maze again.
 %
-%   xs and ys are 1 to 100, wall_width is 1 to 1000, path_width at least 2*wall_width + 77: a robot fits everywhere.
+%   xs and ys are 1 to 100, wall_width is 1 to 1000, path_width at least 67, so that a Khepera fits everywhere.
 %
 %   Example:
 %     arena = kiks_generate_maze(5, 5); size(arena)
@@ -33,7 +33,7 @@ end
 check_whole('xs', xs, 1, 100, 'It counts the cells side by side.');
 check_whole('ys', ys, 1, 100, 'It counts the cells one above the other.');
 check_whole('wall_width', wall_width, 1, 1000, 'It is in mm.');
-check_whole('path_width', path_width, 2 * wall_width + 77, 10000, 'A Khepera has to fit beside the outer wall.');
+check_whole('path_width', path_width, 67, 10000, 'A Khepera has to fit beside the outer wall.');
 pitch = path_width + wall_width;
 height = ys * pitch - wall_width;
 width = (xs + 2) * path_width + (xs - 1) * wall_width;
@@ -52,7 +52,8 @@ for k = 1:size(passages, 1)
 end
 arena([1:10 end - 10:end], :) = 1;
 arena(:, [1:10 end - 10:end]) = 1;
-arena(round(path_width / 2), round((wall_width + path_width) / 2) - wall_width) = -360;
+% In the middle of the entrance, or as near to it as the outer wall allows.
+arena(max(round(path_width / 2), 38), max(round((wall_width + path_width) / 2) - wall_width, 38)) = -360;
 arena((ys - 1) * pitch + round(path_width / 2), (xs + 1) * pitch + round(path_width / 2) - wall_width) = light_code();
 end
 

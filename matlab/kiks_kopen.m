@@ -12,7 +12,7 @@ function ref = kiks_kopen(port, varargin)
 %   see kopen. ref is [-n -n -n -n] for the simulated port -n, and kiks_kopen(ref) opens that port again at 9600 baud.
 %
 %   If there is no session, one starts with the default arena. Time and distances of the port begin at 0; encoders stay
-%   as they are. An error if the port is open: kiks_kclose([]) closes it.
+%   as they are. An error if the port is open: kiks_kclose([]) closes it. After clear all, an open port is closed first.
 %
 %   Example:
 %     ref = kiks_kopen([-1 9600 1]); kProximity(ref), kiks_kclose(ref)
@@ -45,7 +45,10 @@ if settings(1) >= 0
 end
 if ~is_active()
     begin_world([], []);
+elseif isempty(global_value('KIKS_SESSIONACTIVE')) && any(open_ports('list') == -settings(1))
+    kiks_kclose(settings([1 1 1 1]));  % left open by a program that has forgotten it with `clear all`
 end
+global_value('KIKS_SESSIONACTIVE', 1);
 simulator(sprintf('open %d %.10g', -settings(1), settings(2)));
 open_ports('add', -settings(1));
 % Another program may have begun another world.

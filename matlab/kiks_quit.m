@@ -14,6 +14,7 @@ function kiks_quit(silent)
 open_ports('remove', 0);
 poll_desk('end');
 pulse_mm('forget');
+global_value('KIKS_SESSIONACTIVE', []);
 if simulator('--is-running', [])
     film('stop', 0);
     film('save', 0);
@@ -28,16 +29,4 @@ if simulator('--is-running', [])
     end
 end
 clear kiks_status;
-end
-
-function shared = is_shared()
-shared = false;
-try
-    shared = str2double(simulator('clients')) > 1;
-catch failure
-    % A process that has ended is no reason not to leave.
-    if ~strcmp(failure.identifier, 'kiks:session')
-        rethrow(failure);
-    end
-end
 end

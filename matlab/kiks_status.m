@@ -1,7 +1,8 @@
 function lines = kiks_status(str, dual, replace)
 % kiks_status  Write into the log, or read it.
 %
-%   kiks_status(str) adds text to the log, with the time of day before it. The simulator's window shows it, too.
+%   kiks_status(str) adds text to the log, with the time of day before each line of it; empty lines are left out. The
+%   simulator's window shows it, too.
 %   kiks_status(str, dual) shows it on the console as well if dual is not 0.
 %   kiks_status(str, dual, replace) puts it in the place of the last line if replace is not 0.
 %
@@ -25,17 +26,19 @@ if nargin > 0
         error('kiks:argument', 'The text must be a row of characters, but it was %s. Use num2str or sprintf.', ...
             shown(str));
     end
-    if nargin > 1 && ~isempty(dual) && any(dual)
-        show(str);
-    end
     if nargin > 2 && ~isempty(replace) && any(replace)
         history = history(1:end - 1);
     end
-    history = [history; {[datestr(now(), 'HH:MM:SS') ' ' str]}];
-    history = history(max(1, end - line_limit + 1):end);
-    if is_active()
-        simulator(['print ' escaped(str)]);
+    for line_ = regexp(str, '[^\n]+', 'match')
+        if nargin > 1 && ~isempty(dual) && any(dual)
+            show(line_{1});
+        end
+        history = [history; {[datestr(now(), 'HH:MM:SS') ' ' line_{1}]}]; %#ok<AGROW>
+        if is_active()
+            simulator(['print ' escaped(line_{1})]);
+        end
     end
+    history = history(max(1, end - line_limit + 1):end);
 end
 if nargout > 0
     lines = history;

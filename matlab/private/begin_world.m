@@ -22,11 +22,14 @@ if is_new
     film('forget', 0);
 end
 film('stop', 0);
-simulator(world);
+for move = regexp(unescaped(simulator(world)), '[^\n]+', 'match')
+    warn('kiks:arena', '%s', move{1});
+end
 film('save', 0);
 % The ports belonged to the old world.
 open_ports('remove', 0);
 pulse_mm('forget');
+global_value('KIKS_SESSIONACTIVE', 1);
 if is_new
     address = simulator('desk');
     if ~isempty(address)

@@ -6,7 +6,7 @@ if isempty(arena)
 elseif ischar(arena)
     request = file_request(arena);
 else
-    codes = checked_codes(arena);
+    [codes, greys] = checked_codes(arena);
     if any(size(codes) < 100)
         warn('kiks:argument', ['An arena must be at least 100 x 100 mm, but this matrix is %d x %d. ' ...
             'The default arena is taken instead.'], size(codes, 1), size(codes, 2));
@@ -18,7 +18,10 @@ else
     end
     request = ['world matrix ' matrix_text(codes)];
     if ~isempty(colormask)
-        request = [request ' ' matrix_text(wall_greys(codes, colormask))];
+        greys = wall_greys(codes, colormask);
+    end
+    if ~isempty(greys)
+        request = [request ' ' matrix_text(greys)];
     end
 end
 end
@@ -37,19 +40,26 @@ catch failure
 end
 end
 
-function codes = checked_codes(arena)
+function [codes, greys] = checked_codes(arena)
+% Codes of the elements, and what they say about the greys of walls, 0 for the default; [] if they say nothing.
 if ~(isnumeric(arena) || islogical(arena)) || ndims(arena) ~= 2 || ~isreal(arena)
     error('kiks:argument', ['The arena must be a matrix of element codes or the name of a file, but it was %s. ' ...
         'See help kiks.'], shown(arena));
 end
 codes = full(double(arena));
-wrong = find(~isfinite(codes) | (codes > 0 & codes ~= fix(codes)), 1);
+wrong = find(~isfinite(codes), 1);
 if ~isempty(wrong)
     [row, column] = ind2sub(size(codes), wrong);
-    error('kiks:argument', ['An arena''s elements must be headings below 0 or the codes 0 to 4, but that in ' ...
-        'row %d, column %d was %g. Give walls as 1, and their greys in a second matrix.'], row, column, codes(wrong));
+    error('kiks:argument', ['An arena''s elements must be headings below 0, the codes 0 to 4 or shares of white, ' ...
+        'but that in row %d, column %d was %g. Give walls as 1.'], row, column, codes(wrong));
 end
-codes(codes > 4) = 1;
+greys = [];
+% Of pictures that were divided by 255, KiKS 2.2.0 made walls of these greys.
+shares = codes > 0 & codes ~= fix(codes);
+if any(shares(:))
+    greys = max(round(255 * min(codes, 1)), 1) .* shares;
+end
+codes(codes > 4 | shares) = 1;
 end
 
 function codes = swapped(codes)

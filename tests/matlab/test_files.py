@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from scipy.io import loadmat
-from scipy.ndimage import label
+from scipy.ndimage import distance_transform_edt, label
 from tests.matlab.octave import needs_octave, run
 
 from kiks.model.arena import Arena
@@ -160,6 +160,10 @@ end
 kiks_arena(arena, zeros(size(arena)))
 ref = kiks_kopen;
 say('zero', max(kProximity(ref)))
+% Elements that are shares of white: a picture divided by 255.
+kiks_arena(arena .* (arena < 0) + 120 / 255 * (arena == 1))
+ref = kiks_kopen;
+say('share', max(kProximity(ref)))
 say('logical', caught(@() kiks_arena(arena, ones(2))))
 
 codes = zeros(200);
@@ -186,6 +190,13 @@ say('second', kiks_siminfo_robotpos(-2))
 kiks_arena(zeros(99, 200))
 say('replaced', kiks_siminfo_robotpos())
 say('wrong', caught(@() kiks_arena(NaN(200))))
+% What has no room at its place goes to the nearest with room.
+codes = zeros(300);
+codes(10, 150) = -90;
+codes(295, 100) = 3;
+kiks_arena(codes)
+say('moved', kiks_siminfo_robotpos())
+say('moved_ball', kiks_siminfo_objects())
 """
 
 
@@ -197,6 +208,7 @@ def test_greys_are_seen_and_codes_follow_the_preference(tmp_path: Path) -> None:
     assert said["default"] == said["white"]
     assert said["default_grey"] == said["grey"]
     assert said["zero"] == said["black"]
+    assert said["share"] == said["grey"]
     assert said["logical"].startswith("kiks:argument|The colormask must be a matrix as large as the arena")
     assert said["kiks"][:, :3].tolist() == [[1, 60, 50], [2, 150, 100], [3, 60, 150]]
     assert said["thesis"][:, :3].tolist() == [[1, 150, 100], [2, 60, 50], [3, 60, 150]]
@@ -207,6 +219,13 @@ def test_greys_are_seen_and_codes_follow_the_preference(tmp_path: Path) -> None:
     assert "warning: An arena must be at least 100 x 100 mm" in done.text
     assert said["replaced"][0, :2] == pytest.approx([250.5, 325.5])
     assert said["wrong"].startswith("kiks:argument|An arena's elements must be")
+    assert said["moved"][0] == pytest.approx([150, 28, np.pi / 2])
+    assert said["moved_ball"][0, :3] == pytest.approx([2, 100, 268])
+    moves = [line for line in done.lines if "has no room" in line]
+    assert moves == [
+        "warning: A robot has no room at x = 150, y = 10 and is placed at x = 150, y = 28.",
+        "warning: A ball has no room at x = 100, y = 295 and is placed at x = 100, y = 268.",
+    ]
 
 
 MAZES = """
@@ -222,6 +241,10 @@ say('again', kiks_generate_maze(5, 5))
 kiks_arena(kiks_generate_maze(5, 5))
 say('pose', kiks_siminfo_robotpos())
 say('lamp', kiks_siminfo_objects())
+narrow = kiks_generate_maze(4, 3, 67, 40);
+say('narrow', narrow)
+kiks_arena(narrow)
+say('narrow_pose', kiks_siminfo_robotpos())
 kiks_quit(1)
 """
 
@@ -257,6 +280,11 @@ def test_mazes_have_their_size_and_every_cell_can_be_reached(tmp_path: Path) -> 
     assert said["demo_1"].shape == (640, 880)
     assert said["pose"][0] == pytest.approx([55, 60, 0], abs=1e-9)
     assert said["lamp"][0, :3].tolist() == [1, 830, 580]
+    # A robot gets from the entrance to all cells of the narrowest maze.
+    room = distance_transform_edt(said["narrow"] != 1) >= 28
+    assert label(room)[1] == 1
+    assert all(room[row * 107 :, (column + 1) * 107 - 40 :][:67, :67].any() for row in range(3) for column in range(4))
+    assert said["narrow_pose"][0] == pytest.approx([38, 38, 0], abs=1e-9)
 
 
 HOSTILE = (

@@ -242,6 +242,8 @@ say('distances_back', kiks_siminfo_robotdist())
 kiks_reset
 say('pose_reset', kiks_siminfo_robotpos())
 kiks_print('a line')
+kiks_print([10 'two' 10 10 'lines' 10])
+kiks_print('')
 kiks_status('quiet')
 kiks_status('loud', 1)
 kiks_status('instead', 0, 1)
@@ -428,10 +430,12 @@ def test_functions_of_worlds(tmp_path: Path) -> None:
     assert said["deleted"] == 2
     assert said["demos"] == "avoid battle camera clean dance follow football maze mv80mm siminfo"
     assert "  6  follow    follow the wall on the left." in done.lines
-    assert "a line" in done.lines
+    at = done.lines.index("a line")
+    assert done.lines[at : at + 4] == ["a line", "two", "lines", "loud"]
     assert "loud" in done.lines
     assert "quiet" not in done.lines
     log = said["log"].split(";")
+    assert [line[9:] for line in log[-5:-2]] == ["a line", "two", "lines"]
     assert re.fullmatch(r"\d\d:\d\d:\d\d quiet", log[-2])
     assert log[-1].endswith(" instead")
     assert said["pulses"][0] == pytest.approx([80 / 0.082, 1])

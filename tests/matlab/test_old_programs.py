@@ -406,6 +406,53 @@ def test_capitals_of_functions_do_not_matter(tmp_path: Path) -> None:
     assert said["after_clear"][0, 0] >= 200
 
 
+# ---- programs that are run again and again, and never close their port ----
+
+AGAIN = """
+clear all; close all
+arena = zeros(300, 300);
+arena(200, 150) = -90;
+kiks(arena)
+port = -1; period = 0.05;
+ref = kiks_kopen([port 9600 1]);
+kSetSpeed(ref, 5, 5);
+for i = 1:5
+    t = kiks_ktime(port);
+    light(:, i) = kAmbient(ref);
+    prox(:, i) = kProximity(ref);
+    % Both take 62 ms.
+    kiks_pause(period - (kiks_ktime(port) - t))
+end
+time = kiks_ktime(port);
+place = kiks_siminfo_robotpos;
+"""
+
+
+def test_programs_that_clear_all_begin_anew(tmp_path: Path) -> None:
+    (tmp_path / "again.m").write_text(AGAIN)
+    (tmp_path / "kiks_preferences.m").write_text("KIKS_THINKING = 'none';\n")
+    program = """
+again
+say('first', [place time])
+again
+say('second', [place time])
+say('open', caught(@() kiks_kopen([-1 9600 1])))
+kiks(zeros(400, 400))
+clear all
+ref = kiks_kopen([-1 9600 1]);
+say('same_world', kiks_siminfo_robotpos())
+kiks_quit(1)
+"""
+    done = run(program, tmp_path)
+    said = done.said
+    assert said["first"].tolist() == said["second"].tolist()
+    assert 200 - said["first"][0, 1] > 5
+    assert 0.3 < said["first"][0, 3] < 0.5, "pauses below 0 take no time"
+    assert said["open"].startswith("kiks:simulator|port -1 must be closed before it is opened")
+    assert sum("A session is active" in line for line in done.lines) == 1, "that of the prompt, without clear all"
+    assert said["same_world"][0] == pytest.approx(said["second"][0, :3], abs=2), "while the port opened, it drove on"
+
+
 # ---- files of Windows: Latin letters in comments, lines that end in CR LF ----
 
 

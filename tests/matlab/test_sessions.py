@@ -160,6 +160,9 @@ kiks_quit
     second_program = """
 kiks('--join', {number})
 say('taken', caught(@() kiks('--join', {number})))
+% A program that forgets all does not take the world away from others.
+clear all
+kiks(zeros(200, 200));
 ref = kiks_kopen([-1 9600 1]);
 say('begins', kiks_siminfo_robotpos())
 say('opened', 1)
@@ -382,7 +385,7 @@ WRONG = [
     "kiks_ktime(NaN)",
     "kiks_ktime(-1.5)",
     "kiks_pause()",
-    "kiks_pause(-1)",
+    "kiks_pause(NaN)",
     "kiks_pause(Inf)",
     "kiks_pause('a')",
     "kiks_pause([1 2])",

@@ -10,9 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from kiks.errors import KiksError, ParameterError
+import kiks
+from kiks.errors import ArenaError, KiksError, ParameterError
 from kiks.toolbox.framing import FRAME_MIN, frame
-from kiks.toolbox.matlab_arenas import arena_of, place_mm, user_place
+from kiks.toolbox.matlab_arenas import MOVED_MAX, arena_of, place_mm, settled, user_place
 from kiks.toolbox.preferences import Settings
 from kiks.toolbox.wire_format import escape, matrices_of, matrix_text, numbers_of, unescape
 
@@ -93,6 +94,40 @@ def test_a_colour_mask_sets_the_brightness_of_walls() -> None:
     assert brightness[5, 50] == 61
     assert brightness[5, 150] == 200
     assert brightness[100, 100] == 0, "a grey where there is no wall is none"
+
+
+def test_what_has_room_stays_where_it_is() -> None:
+    codes = np.zeros((300, 400))
+    codes[99, 99], codes[99, 199], codes[199, 199], codes[0, 0] = -90, 3, 4, 2
+    arena = arena_of(codes)
+    settled_arena, moves = settled(arena, 27.5)
+    assert moves == []
+    parts = ("starts", "balls", "cylinders", "lamps")
+    assert all(getattr(settled_arena, part) == getattr(arena, part) for part in parts)
+
+
+def test_what_has_no_room_goes_to_the_nearest_free_place() -> None:
+    codes = np.zeros((300, 400))
+    codes[:100] = 1
+    codes[119, 199], codes[151, 199], codes[199, 29] = -90, 4, 3
+    arena, moves = settled(arena_of(codes), 27.5)
+    sim = kiks.Simulation(arena)
+    x, y = user_place(arena, *sim.pose(1)[:2])
+    assert (x, y) == (200, 128)
+    assert arena.starts[0].heading_rad == pytest.approx(math.pi / 2)
+    cylinder, ball = (user_place(arena, *body[0][:2]) for body in (arena.cylinders, arena.balls))
+    assert math.dist(cylinder, (x, y)) == pytest.approx(27.5 + 16, abs=1.5)
+    assert ball == (33, 200)
+    assert [move.split(" has")[0] for move in moves] == ["A robot", "A ball", "A cylinder"]
+
+
+def test_a_disc_drawn_of_balls_stays_an_error() -> None:
+    codes = np.zeros((2000, 2000))
+    codes[999, 999 : 999 + MOVED_MAX + 2] = 3
+    arena = arena_of(codes)
+    assert settled(arena, 27.5) == (arena, [])
+    with pytest.raises(ArenaError, match=r"the place of a ball must be free.* ball 1 is "):
+        kiks.Simulation(arena)
 
 
 def test_an_unknown_element_is_named() -> None:

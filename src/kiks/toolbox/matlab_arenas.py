@@ -9,19 +9,26 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kiks.errors import ParameterError
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
+from kiks.model.free_disc import free_place
+from kiks.sim.free_space import PRESSED_MM
 
 WALL, LIGHT, BALL, CYLINDER = 1, 2, 3, 4
 """Codes of positive elements; negative ones are starts of robots, with the heading in degrees."""
 
 OBJECTS_MAX = 10_000
 """Maximum number of robots, lights, balls and cylinders in an arena."""
+
+MOVED_MAX = 10
+"""Maximum number of things that get another place: with more, the matrix is drawn wrongly, such as a ball as a disc."""
+
+Thing = TypeVar("Thing", Pose, Ball, Cylinder)
 
 
 def place_mm(arena: Arena, x: float, y: float) -> tuple[float, float]:
@@ -108,6 +115,54 @@ def arena_of(
         balls=tuple(Ball(*place, **_grey(ball)) for place in places(codes == BALL)),
         cylinders=tuple(Cylinder(*place, **_grey(cylinder)) for place in places(codes == CYLINDER)),
     )
+
+
+def settled(arena: Arena, robot_radius_mm: float) -> tuple[Arena, list[str]]:
+    """Move robots, balls and cylinders without room to the nearest free places, as programs count on going on.
+
+    KiKS 2.2.0 took random ones (kiks-behaviour.md 3.6).
+
+    Args:
+        arena: The arena of a matrix.
+        robot_radius_mm: Radius of the robots [mm].
+
+    Returns:
+        The arena, and a sentence for each thing that was moved, in the user's coordinates. If there are more than
+        `MOVED_MAX` of these, the arena as it was.
+
+    Raises:
+        ArenaError: If there is no free place for one.
+
+    Example:
+        >>> codes = np.zeros((200, 300)); codes[9, 99] = -90
+        >>> settled(arena_of(codes), 27.5)[1]
+        ['A robot has no room at x = 100, y = 10 and is placed at x = 100, y = 28.']
+    """
+    discs: list[tuple[float, float, float]] = []
+    moves: list[str] = []
+
+    def placed(thing: Thing, what: str, radius_mm: float) -> Thing:
+        x_mm, y_mm = thing.x_mm, thing.y_mm
+        room_mm = arena.clearance_at_mm(x_mm, y_mm)
+        for x, y, radius in discs:
+            room_mm = min(room_mm, math.hypot(x_mm - x, y_mm - y) - radius)
+        if room_mm < radius_mm - PRESSED_MM and len(moves) <= MOVED_MAX:
+            x_mm, y_mm = free_place(arena, discs, radius_mm, (x_mm, y_mm), f"a {what}")
+            old, new = (
+                "x = {:g}, y = {:g}".format(*user_place(arena, *place))
+                for place in ((thing.x_mm, thing.y_mm), (x_mm, y_mm))
+            )
+            moves.append(f"A {what} has no room at {old} and is placed at {new}.")
+        discs.append((x_mm, y_mm, radius_mm))
+        return thing._replace(x_mm=x_mm, y_mm=y_mm)
+
+    settled_arena = replace(
+        arena,
+        starts=tuple(placed(start, "robot", robot_radius_mm) for start in arena.starts),
+        balls=tuple(placed(ball, "ball", ball.radius_mm) for ball in arena.balls),
+        cylinders=tuple(placed(cylinder, "cylinder", cylinder.radius_mm) for cylinder in arena.cylinders),
+    )
+    return (arena, []) if len(moves) > MOVED_MAX else (settled_arena, moves)
 
 
 def _grey(brightness: int | None) -> dict[str, Any]:

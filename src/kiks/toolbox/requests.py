@@ -10,7 +10,8 @@ from kiks.errors import HaltError, KiksError, ParameterError, shown
 from kiks.model.arena import Arena
 from kiks.model.arena_file import save_arena
 from kiks.model.kad import save_kad
-from kiks.toolbox.matlab_arenas import arena_of
+from kiks.sim.from_project import spec_of
+from kiks.toolbox.matlab_arenas import arena_of, settled
 from kiks.toolbox.own_turrets import TurretOrder, turrets_of
 from kiks.toolbox.session_client import SessionClient
 from kiks.toolbox.wire_format import escape, matrices_of, matrix_text, number_text, numbers_of, numbers_text, unescape
@@ -133,25 +134,30 @@ def _set(client: SessionClient, words: str) -> str:
 
 
 def _world(client: SessionClient, words: str) -> str:
+    """Begin a world; return a line for each thing that was moved to a free place."""
     session = client.session
     kind, _, rest = words.partition(" ")
+    moves: list[str] = []
     if kind == "default":
         session.begin_arena(Arena.default())
     elif kind == "file":
         session.begin_file(_path(rest))
     elif kind == "matrix":
-        session.begin_arena(_arena(client, rest))
+        arena, moves = _arena(client, rest)
+        session.begin_arena(arena)
     else:
         raise ParameterError(f"a world must be default, file or matrix, but it was {shown(kind)}.")
     # They belonged to the old world, and this client asked for a new one: no error.
     client.close(0)
-    return ""
+    return escape("\n".join(moves))
 
 
-def _arena(client: SessionClient, text: str) -> Arena:
+def _arena(client: SessionClient, text: str) -> tuple[Arena, list[str]]:
     codes, *greys = matrices_of(text)
     settings = client.session.settings
-    return arena_of(codes, *greys, wall=settings.wall, ball=settings.ball, cylinder=settings.cylinder)
+    arena = arena_of(codes, *greys, wall=settings.wall, ball=settings.ball, cylinder=settings.cylinder)
+    robot = spec_of(settings.project_robot, settings.project_of(arena), settings.folder)
+    return settled(arena, robot.body.radius_mm)
 
 
 def _save(client: SessionClient, words: str) -> str:
