@@ -55,11 +55,12 @@ def test_both_views_draw(visit: Callable[..., Visit], dark: str) -> None:
     here = visit(f"view=both&dark={dark}")
     here.wait("() => kiksDesk.isSolid() && kiksDesk.stats().solid_frames > 3")
     assert ("kiks-dark" in here.page.locator("[data-testid=arena]").get_attribute("class")) == (dark == "true")
+    # Before robots drive, which would come here.
+    shades = {here.colour(115 + 90 * k, 195)[0] // 8 for k in range(5)} | {here.colour(300, 300)[0] // 8}
+    assert len(shades) == 6, "walls of five brightnesses and the floor look different"
     here.ask("drive")
     drawn = here.page.evaluate("kiksDesk.stats().frames_drawn")
     here.wait("(drawn) => kiksDesk.stats().frames_drawn > drawn + 10", drawn)
-    shades = {here.colour(115 + 90 * k, 195)[0] // 8 for k in range(5)} | {here.colour(300, 300)[0] // 8}
-    assert len(shades) == 6, "walls of five brightnesses and the floor look different"
     assert here.page.evaluate("kiksDesk.stats().bytes") > 1000
 
 

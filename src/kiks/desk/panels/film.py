@@ -72,9 +72,10 @@ class FilmDialog:
         start_s, end_s, speed = self._start.value, self._end.value, self._speed.value
         if None in (start_s, end_s, speed):
             raise ParameterError("A film needs a beginning, an end and a speed. Write all three numbers.")
-        if speed > 0 and (end_s - start_s) / speed > LENGTH_MAX_S:
+        # Differences of decimal numbers are off by rounding.
+        if speed > 0 and (length_s := round((end_s - start_s) / speed, 6)) > LENGTH_MAX_S:
             raise ParameterError(
-                f"A film must be at most {LENGTH_MAX_S:g} s long, but it would be {(end_s - start_s) / speed:g} s. "
+                f"A film must be at most {LENGTH_MAX_S:g} s long, but it would be {length_s:g} s. "
                 "Choose less of the run, or more times real time."
             )
         file = await self._desk.looking.file()
