@@ -256,20 +256,17 @@ class RunRecorder:
             now_ns, robot, line = self._lines.popleft()
             self.note((TEXT, now_ns, robot, 0, 0, line.encode("utf-8", "replace")))
             self._messages.append((foxglove.TEXT, now_ns, foxglove.text(f"robot {robot + 1}", line, now_ns)))
-        looks, self._motion.looks = self._motion.looks, []
+        looks = self._motion.take()
         messages, self._messages = self._messages, []
         entries = block_of(self._entries)
         self._entries.clear()
-        blocks = [(LOG, self._chunk_ns, entries), (MOTION, self._chunk_ns, motion.encode(looks, _LAYOUT))]
+        blocks = [(LOG, self._chunk_ns, entries), (MOTION, self._chunk_ns, motion.encode(looks))]
         self._chunk_ns = self._world.now_ns
         self._file.write(blocks + messages + foxglove.poses(looks))
         self._waiting_bytes = 0
         self._chunk_at_s = time.monotonic() + CHUNK_S
         if self._file.has_failed or self._file.is_disk_full:
             self._end_by_itself()
-
-
-_LAYOUT = Layout()
 
 
 class _OwnTurretRecorder:
