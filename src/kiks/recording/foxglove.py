@@ -182,7 +182,7 @@ def poses(looks: Sequence[Looks]) -> list[tuple[Topic, int, bytes]]:
     """Return messages with poses."""
     messages: dict[int, list[str]] = {}
     due_tick = 0
-    for each, look, tick_count in ((each, look, tick) for each in looks for look, tick in enumerate(each.ticks)):
+    for each, (look, tick_count) in ((some, look) for some in looks for look in enumerate(some.ticks)):
         if tick_count < due_tick:
             continue
         due_tick = tick_count + PERIOD_TICKS

@@ -22,6 +22,7 @@ from kiks.units import TICK_NS
 KEPT_BYTES = next(field[1] for name, field in (ROBOT.fields or {}).items() if name == "bus")
 """Bytes of a robot's record that are kept: those before the field of that name."""
 
+
 class Looks:
     """Looks at a world while nothing came or went, in order, until they are written.
 
