@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import shutil
 import threading
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager
@@ -19,7 +20,7 @@ from kiks.desk.server.timeline import Mark, next_mark
 from kiks.errors import LinkError, ParameterError
 from kiks.model.project import Project
 from kiks.ports.program_process import Command
-from kiks.recording.mcap_file import McapReader
+from kiks.recording.mcap_file import McapReader, Room
 from kiks.sim.from_project import simulation_of
 from kiks.units import NS_PER_S
 
@@ -82,6 +83,10 @@ def make_sim() -> Simulation:
 
 def state_of(desk: Desk) -> tuple[int, str]:
     return run(desk.do(lambda sim: (sim.now_ns, sim.state_hash())))
+
+
+def told(desk: Desk) -> list[str]:
+    return desk.news.since(0)[1]
 
 
 # ---- the present and the past ----
@@ -243,12 +248,17 @@ def test_a_recording_of_the_user_takes_the_place_of_the_desks_own(tmp_path: Path
 
 
 def test_a_long_past_is_kept_in_parts_and_the_oldest_goes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("kiks.desk.server.timeline.PART_BYTES_MAX", 1)
+    few_bytes(monkeypatch, 80_000)
     sim, hashes = make_sim(), {}
     with desk_of(sim) as desk:
-        for _ in range(6):
+        for _ in range(8):
             drive(sim, 1.0, hashes)
             run(desk.looking.tend())
+            assert sum(part.own_bytes for part in desk.looking._timeline.parts) <= 80_000
+        assert len(desk.looking._timeline.parts) > 1
+        (message,) = told(desk)
+        assert "The time bar now begins at" in message
+        assert "--record FILE" in message
         span = desk.looking.span
         assert span is not None
         assert span.begin_ns > NS_PER_S
@@ -267,6 +277,95 @@ def test_a_long_past_is_kept_in_parts_and_the_oldest_goes(monkeypatch: pytest.Mo
         for time_ns in [each for each in hashes if each >= span.begin_ns][::11]:
             run(desk.looking.look_at(time_ns))
             assert state_of(desk) == (time_ns, hashes[time_ns])
+
+
+def few_bytes(monkeypatch: pytest.MonkeyPatch, bytes_max: int) -> None:
+    """Let temporary recordings have few bytes, and write each checkpoint at once."""
+    monkeypatch.setattr("kiks.recording.recorder.CHUNK_S", 0.0)
+    monkeypatch.setattr("kiks.desk.server.timeline.BYTES_MIN", 1000)
+    monkeypatch.setattr("kiks.desk.server.timeline.BYTES_MAX", bytes_max)
+
+
+def test_the_past_takes_half_of_what_others_leave_of_the_disk(monkeypatch: pytest.MonkeyPatch) -> None:
+    few_bytes(monkeypatch, 10**9)
+    reserve_bytes, others_leave = 10**6, 160_000
+    sim, alone = make_sim(), make_sim()
+    with desk_of(sim) as desk:
+        parts = lambda: desk.looking._timeline.parts  # noqa: E731
+
+        def room(_folder: Path) -> Room:
+            return Room(reserve_bytes + others_leave - sum(part.own_bytes for part in parts()), reserve_bytes)
+
+        monkeypatch.setattr("kiks.desk.server.timeline.room_of", room)
+        for _ in range(6):
+            drive(sim, 1.0)
+            run(desk.looking.tend())
+            assert sum(part.own_bytes for part in parts()) <= others_leave / 2
+        (message,) = told(desk)
+        assert "The time bar now begins at" in message
+        # Another program fills the disk: the latest recording stays, and the world goes on.
+        others_leave, now_ns = 0, sim.now_ns
+        run(desk.looking.tend())
+        (_, message) = told(desk)
+        assert message.startswith("The past can be kept no longer")
+        assert "Free some space and start the world over" in message
+        assert sim.loop.recorder is None
+        assert len(parts()) == 1
+        drive(sim, 1.0)
+        run(desk.looking.tend())
+        assert len(told(desk)) == 2
+        for _ in range(7):
+            drive(alone, 1.0)
+        run(desk.looking.look_at(10**15))
+        assert desk.sim.now_ns == now_ns
+        run(desk.looking.back_to_now())
+        assert sim.state_hash() == alone.state_hash()
+
+
+def test_a_past_whose_files_are_gone_is_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As programs that clean up temporary files may leave it."""
+    few_bytes(monkeypatch, 10_000)
+    sim = make_sim()
+    with desk_of(sim) as desk:
+        drive(sim, 2.0)
+        shutil.rmtree(desk.looking._timeline.parts[0].file.parent)
+        run(desk.looking.tend())
+        (message,) = told(desk)
+        assert message.startswith("The past can be kept no longer")
+        drive(sim, 1.0)
+        run(desk.looking.tend())
+        assert len(told(desk)) == 1
+        assert sim.loop.recorder is None
+
+
+def test_a_desk_without_space_says_so_and_records_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("kiks.desk.server.timeline.room_of", lambda _folder: Room(140 << 20, 128 << 20))
+    sim = make_sim()
+    with desk_of(sim) as desk:
+        (message,) = told(desk)
+        assert "must have 144 MiB free, but it has 140 MiB" in message
+        assert desk.looking.span is None
+        assert sim.loop.recorder is None
+
+
+def test_when_the_file_of_the_user_is_full_the_desk_records_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("kiks.recording.recorder.CHUNK_S", 0.0)
+    sim, hashes = make_sim(), {}
+    with desk_of(sim) as desk:
+        recorder = sim.record(tmp_path / "run.mcap")
+        drive(sim, 1.5, hashes)
+        run(desk.looking.tend())
+        with monkeypatch.context() as full:
+            full.setattr("kiks.recording.mcap_file.room_of", lambda _folder: Room(0, 1))
+            drive(sim, 1.5, hashes)
+        run(desk.looking.tend())
+        drive(sim, 1.0, hashes)
+        for time_ns in [each for each in hashes if each < 2 * NS_PER_S or each > 3.2 * NS_PER_S][::9]:
+            run(desk.looking.look_at(time_ns))
+            assert state_of(desk) == (time_ns, hashes[time_ns])
+        with pytest.raises(ParameterError, match="has ended at 2"):
+            recorder.close()
+    assert Recording(tmp_path / "run.mcap").is_whole
 
 
 # ---- a recording ----
@@ -408,10 +507,6 @@ def with_programs(folder: Path) -> Iterator[Desk]:
     driver.stop()
     thread.join(GUARD_S)
     desk.close()
-
-
-def told(desk: Desk) -> list[str]:
-    return desk.news.since(0)[1]
 
 
 @pytest.mark.slow

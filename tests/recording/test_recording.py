@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import resource
 import threading
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import jsonschema
@@ -24,6 +26,7 @@ from kiks.recording import foxglove
 from kiks.recording.check import Checked, check_recording
 from kiks.recording.events import EventReader
 from kiks.recording.log import RecordedLog
+from kiks.recording.mcap_file import room_of
 from kiks.recording.replay import Replay
 from kiks.sim.console import type_lines
 from kiks.sim.drag import Drags
@@ -387,22 +390,91 @@ def test_mistakes_get_a_clear_error(tmp_path: Path) -> None:
         Recording(tmp_path / "text.mcap")
 
 
-def test_a_full_disk_ends_the_recording_and_not_the_run() -> None:
+def test_a_full_disk_ends_the_recording_and_not_the_run(tmp_path: Path) -> None:
     if not Path("/dev/full").exists():
         pytest.skip("there is no /dev/full here")
     sim, alone = Simulation(seed=1), Simulation(seed=1)
-    link = Path("/tmp") / f"kiks-full-{id(sim)}.mcap"
+    link = tmp_path / "run.mcap"
     link.symlink_to("/dev/full")
-    try:
-        recorder = sim.record(link)
-        drive(sim, 2.0)
-        drive(alone, 2.0)
-        with pytest.raises(ParameterError, match="No space left"):
-            recorder.close()
-    finally:
-        link.unlink()
+    recorder = sim.record(link)
+    drive(sim, 2.0)
+    drive(alone, 2.0)
+    with pytest.raises(ParameterError, match="No space left"):
+        recorder.close()
+    recorder.close()
     assert sim.state_hash() == alone.state_hash()
     assert sim.loop.recorder is None
+
+
+def test_a_file_that_can_grow_no_more_is_read_up_to_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The system refuses the middle of a chunk, as a full disk does."""
+    monkeypatch.setattr("kiks.recording.recorder.CHUNK_S", 0.0)
+    sim, alone = Simulation(seed=1), Simulation(seed=1)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    recorder = sim.record(tmp_path / "run.mcap")
+    drive(sim, 1.0)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, ((tmp_path / "run.mcap").stat().st_size + 20_000, before[1]))
+        drive(sim, 5.0)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    (line,) = caplog.messages
+    assert "File too large" in line
+    assert sim.loop.recorder is None
+    drive(sim, 1.0)
+    with pytest.raises(ParameterError, match="File too large"):
+        recorder.close()
+    for seconds in (1.0, 5.0, 1.0):
+        drive(alone, seconds)
+    assert sim.state_hash() == alone.state_hash()
+    recording = Recording(tmp_path / "run.mcap")
+    assert not recording.is_whole
+    assert recording.duration_s >= 2.0
+    assert check_recording(recording.log).differs_ns is None
+
+
+def test_a_recording_leaves_a_reserve_of_its_disk_free(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    file, reserve_bytes, size = tmp_path / "run.mcap", 128 << 20, 40_000
+
+    def disk_usage(folder: Path) -> SimpleNamespace:
+        assert folder == tmp_path
+        used = sum(each.stat().st_size for each in folder.iterdir())
+        return SimpleNamespace(total=1 << 40, used=used, free=reserve_bytes + size - used)
+
+    monkeypatch.setattr("kiks.recording.recorder.CHUNK_S", 0.0)
+    monkeypatch.setattr("shutil.disk_usage", disk_usage)
+    sim, alone = Simulation(seed=1), Simulation(seed=1)
+    recorder = sim.record(file)
+    drive(sim, 9.0)
+    (line,) = caplog.messages
+    assert "some of its disk free" in line
+    recorder.mark("too late")
+    recorder.say(0, "too late")
+    with pytest.raises(ParameterError, match=r"has ended at \d\.0 s, and is whole up to there"):
+        recorder.close()
+    drive(alone, 9.0)
+    assert sim.state_hash() == alone.state_hash()
+    recording = Recording(file)
+    assert recording.is_whole
+    assert 1.0 < recording.duration_s < 9.0
+    assert size <= file.stat().st_size < size + 30_000
+    assert check_recording(recording.log).differs_ns is None
+    assert "too late" not in recording.table("events")["text"]
+    # There is no room for another one, which leaves an earlier file as it is.
+    with pytest.raises(ParameterError, match=r"must leave 128 MiB of its disk free, but that of .* has 12[78] MiB"):
+        sim.record(file)
+    assert Recording(file).is_whole
+
+
+def test_of_a_small_disk_the_reserve_is_a_share(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("shutil.disk_usage", lambda _folder: SimpleNamespace(total=10**8, used=0, free=10**7))
+    assert room_of(tmp_path) == (10**7, 5 * 10**6)
+    with Simulation(seed=1).record(tmp_path / "run.mcap"):
+        pass
 
 
 def test_a_world_without_a_robot_is_made_again_with_the_robot_that_comes(tmp_path):

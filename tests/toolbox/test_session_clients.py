@@ -18,6 +18,8 @@ from tests.served import GUARD_S
 from kiks.errors import ParameterError
 from kiks.model.arena import Arena
 from kiks.ports.local_link import AwaitedAnswer
+from kiks.recording.mcap_file import Room
+from kiks.recording.recording import Recording
 from kiks.sim.simulation import Simulation
 from kiks.toolbox.requests import REQUESTS, answer
 from kiks.toolbox.session import Session
@@ -885,3 +887,22 @@ def test_a_program_is_not_disturbed_by_people_who_look_back(session: Session, tm
     assert ask("pose 1") != here
     ask(f"world file {tmp_path / 'now.kiks'}")
     assert ask.numbers("pose 1")[:2] == pytest.approx([float(word) for word in here.split()][:2], abs=0.1)
+
+
+def test_a_recording_on_a_full_disk_ends_alone(
+    session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("kiks.recording.recorder.CHUNK_S", 0.0)
+    ask = begun(session)
+    ask("open 1 9600")
+    for name in ("run", "other"):
+        ask(f"record {tmp_path / name}.mcap")
+        with monkeypatch.context() as full:
+            full.setattr("kiks.recording.mcap_file.room_of", lambda _folder: Room(0, 1))
+            ask("pause 2")
+        assert "almost full" in caplog.messages[-1]
+        assert ask("ask 1 B").startswith("b,")
+        if name == "run":
+            assert "almost full" in ask.refused("record")
+    ask("world default")
+    assert Recording(tmp_path / "run.mcap").is_whole

@@ -6,8 +6,6 @@ Entries are written in columns: many entries make one block, for a message per e
 from __future__ import annotations
 
 import struct
-import sys
-from array import array
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -49,12 +47,10 @@ def block_of(values: Sequence[Any]) -> bytes:
         b'N'
     """
     *columns, data = (values[place::_COLUMN_COUNT] for place in range(_COLUMN_COUNT))
-    # `array` takes numbers three times as fast as numpy does.
-    arrays = [array("q", column) for column in (*columns, map(len, data))]
-    if sys.byteorder == "big":
-        for each in arrays:
-            each.byteswap()
-    return b"".join((_COUNT.pack(len(data)), *arrays, *data))
+    # A struct takes numbers faster than `array` and numpy do.
+    numbers = struct.Struct(f"<{len(data)}q")
+    packed = (numbers.pack(*column) for column in (*columns, map(len, data)))
+    return b"".join((_COUNT.pack(len(data)), *packed, *data))
 
 
 ROBOTS_MAX = 1000

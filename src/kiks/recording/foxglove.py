@@ -18,7 +18,7 @@ from kiks.engine.state import BODY
 from kiks.model.arena import Arena
 from kiks.model.robot import RobotSpec
 from kiks.recording.mcap_file import Topic
-from kiks.recording.motion import KEPT_BYTES, Look
+from kiks.recording.motion import KEPT_BYTES, Looks
 from kiks.units import NS_PER_S, TICK_NS
 
 PERIOD_TICKS = 50
@@ -178,27 +178,29 @@ def _disc(name: str, radius_m: float, grey: float, time_ns: int) -> dict[str, An
     }
 
 
-def poses(looks: Sequence[Look]) -> list[tuple[Topic, int, bytes]]:
+def poses(looks: Sequence[Looks]) -> list[tuple[Topic, int, bytes]]:
     """Return messages with poses."""
     messages: dict[int, list[str]] = {}
     due_tick = 0
-    for tick_count, robot_bytes, body_bytes in looks:
+    for each, (look, tick_count) in ((some, look) for some in looks for look in enumerate(some.ticks)):
         if tick_count < due_tick:
             continue
         due_tick = tick_count + PERIOD_TICKS
         transforms = messages.setdefault(tick_count - tick_count % MESSAGE_TICKS, [])
         time_ns = tick_count * TICK_NS
         stamp = f'{{"timestamp":{{"sec":{time_ns // NS_PER_S},"nsec":{time_ns % NS_PER_S}}},"parent_frame_id":"arena",'
-        for number in range(1, len(robot_bytes) // KEPT_BYTES + 1):
-            x_mm, y_mm, heading_rad = _POSE_BYTES.unpack_from(robot_bytes, (number - 1) * KEPT_BYTES)
+        for number in range(1, each.robot_count + 1):
+            place = (look * each.robot_count + number - 1) * KEPT_BYTES
+            x_mm, y_mm, heading_rad = _POSE_BYTES.unpack_from(each.robots, place)
             half_rad = heading_rad / 2
             transforms.append(
                 f'{stamp}"child_frame_id":"robot {number}",'
                 f'"translation":{{"x":{x_mm / 1000:.5f},"y":{y_mm / 1000:.5f},"z":0}},'
                 f'"rotation":{{"x":0,"y":0,"z":{math.sin(half_rad):.5f},"w":{math.cos(half_rad):.5f}}}}}'
             )
-        if body_bytes:
-            bodies: Any = np.frombuffer(body_bytes, BODY)
+        if each.body_count:
+            place = look * each.body_count * BODY.itemsize
+            bodies: Any = np.frombuffer(each.bodies, BODY, each.body_count, place)
             rows = zip(bodies["number"].tolist(), bodies["x_mm"].tolist(), bodies["y_mm"].tolist(), strict=True)
             transforms += [
                 f'{stamp}"child_frame_id":"body {number}",'

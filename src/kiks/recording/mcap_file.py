@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import os
+import shutil
 import struct
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -39,6 +40,36 @@ _CRC = struct.Struct("<I")
 RECORD_BYTES_MAX = 64 << 20
 """Most bytes of a record that is read, and of a chunk when it is expanded."""
 
+RESERVE_BYTES, RESERVE_SHARE = 128 << 20, 0.05
+"""What recordings leave free of a disk [bytes], or of a small disk this share."""
+
+
+class Room(NamedTuple):
+    """The free space of a disk.
+
+    Attributes:
+        free_bytes: What is free.
+        reserve_bytes: How much of it recordings leave to other programs.
+    """
+
+    free_bytes: int
+    reserve_bytes: int
+
+    @property
+    def is_too_small(self) -> bool:
+        """Whether only the reserve is left."""
+        return self.free_bytes < self.reserve_bytes
+
+
+def room_of(folder: Path) -> Room:
+    """Return the free space of the disk on which a folder lies.
+
+    Raises:
+        OSError: If there is no such folder.
+    """
+    disk = shutil.disk_usage(folder)
+    return Room(disk.free, min(RESERVE_BYTES, int(disk.total * RESERVE_SHARE)))
+
 
 class Topic(NamedTuple):
     """A channel of a recording.
@@ -67,7 +98,7 @@ class McapFile:
         topics: The channels.
 
     Raises:
-        ParameterError: If its name does not end in .mcap, or it cannot be written.
+        ParameterError: If its name does not end in .mcap, it cannot be written, or its disk has only the reserve left.
     """
 
     def __init__(self, path: str | Path, topics: Iterable[Topic]) -> None:
@@ -75,7 +106,13 @@ class McapFile:
         if self._path.suffix.lower() != ENDING:
             raise ParameterError(f"A recording's file must end in '{ENDING}', but it was {str(self._path)!r}.")
         self._error: OSError | None = None
+        self._folder = Path(os.path.realpath(self._path)).parent
         try:
+            if (room := room_of(self._folder)).is_too_small:
+                raise ParameterError(
+                    f"a recording must leave {room.reserve_bytes >> 20} MiB of its disk free, but that of "
+                    f"{str(self._path)!r} has {room.free_bytes >> 20} MiB. Free some space, or choose another place."
+                )
             self._stream: BinaryIO = self._path.open("wb")
         except OSError as error:
             raise self._unwritable(error) from None
@@ -89,9 +126,12 @@ class McapFile:
         return self._error is not None
 
     @property
-    def byte_count(self) -> int:
-        """Number of bytes up to the last chunk."""
-        return self._stream.tell()
+    def is_disk_full(self) -> bool:
+        """Whether only the reserve of its disk is left."""
+        try:
+            return room_of(self._folder).is_too_small
+        except OSError:  # the folder has another name now
+            return False
 
     def attach(self, name: str, data: bytes, media_type: str, time_ns: int = 0) -> None:
         """Write a file within the file."""

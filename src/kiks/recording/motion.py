@@ -22,34 +22,71 @@ from kiks.units import TICK_NS
 KEPT_BYTES = next(field[1] for name, field in (ROBOT.fields or {}).items() if name == "bus")
 """Bytes of a robot's record that are kept: those before the field of that name."""
 
-Look = tuple[int, bytes, bytes]
-"""The number of ticks done, the first parts of robots' records, and the records of bodies."""
+
+class Looks:
+    """Looks at a world while nothing came or went, in order, until they are written.
+
+    The records of all looks lie in one array of bytes: objects of their own would cost more than what is in them.
+
+    Args:
+        robot_count: Number of robots.
+        body_count: Number of bodies.
+
+    Attributes:
+        robot_count: As above.
+        body_count: As above.
+        ticks: Number of ticks done at each look.
+        robots: The first parts of robots' records.
+        bodies: The records of bodies.
+    """
+
+    def __init__(self, robot_count: int, body_count: int) -> None:
+        self.robot_count, self.body_count = robot_count, body_count
+        self.ticks: list[int] = []
+        self.robots = bytearray()
+        self.bodies = bytearray()
 
 
 class MotionWatcher:
-    """Keeps looks until they are written, as a `kiks.sim.paths.Watcher`.
+    """Keeps looks until they are taken, as a `kiks.sim.paths.Watcher`.
 
     A program lets the ticks be done in pieces. It looks where such a piece ends, so that it needs no more of them.
 
     Attributes:
         from_tick: See `kiks.sim.paths.Watcher`.
         due_tick: The same.
-        looks: What was seen and is not written yet.
     """
 
     def __init__(self, state: State) -> None:
-        self.looks: list[Look] = []
-        self._robots: NDArray[np.void] | None = None
+        self._done: list[Looks] = []
+        self._begin(state.robots, state.bodies)
         self.look(state)
+
+    def _begin(self, robots: NDArray[np.void], bodies: NDArray[np.void]) -> None:
+        """Begin looks at the arrays of a state."""
+        self._robots, self._bodies = robots, bodies
+        self._kept = robots.view(np.uint8).reshape(-1, ROBOT.itemsize)[:, :KEPT_BYTES]
+        self._looks = looks = Looks(robots.size, bodies.size)
+        self._add_tick, self._add_robots = looks.ticks.append, looks.robots.extend
 
     def look(self, state: State) -> None:
         """Keep the records."""
-        if state.robots is not self._robots:
-            self._robots = state.robots
-            self._kept = state.robots.view(np.uint8).reshape(-1, ROBOT.itemsize)[:, :KEPT_BYTES]
+        if state.robots is not self._robots or state.bodies is not self._bodies:
+            self._done.append(self._looks)
+            self._begin(state.robots, state.bodies)
         tick = state.tick_count
         self.from_tick, self.due_tick = tick + TRAIL_LENGTH, tick + TRAIL_LENGTH + 1
-        self.looks.append((tick, self._kept.tobytes(), state.bodies.tobytes() if state.bodies.size else b""))
+        self._add_tick(tick)
+        self._add_robots(self._kept.tobytes())
+        if self._looks.body_count:
+            self._looks.bodies += self._bodies.tobytes()
+
+    def take(self) -> list[Looks]:
+        """Return the looks since the last call."""
+        looks = [each for each in (*self._done, self._looks) if each.ticks]
+        self._done = []
+        self._begin(self._robots, self._bodies)
+        return looks
 
 
 class Motion(NamedTuple):
@@ -75,19 +112,13 @@ MOTION_BYTES_MAX = 256 << 20
 _HEAD = struct.Struct("<IIII")  # looks, robots, bytes of a robot, bodies
 
 
-def encode(looks: Sequence[Look], layout: Layout) -> bytes:
+def encode(looks: Sequence[Looks]) -> bytes:
     """Return a block of looks."""
-    parts: list[bytes] = []
-    begin = 0
-    for end in range(1, len(looks) + 1):
-        _, robots, bodies = looks[begin]
-        if end == len(looks) or len(looks[end][1]) != len(robots) or len(looks[end][2]) != len(bodies):
-            ticks, of_robots, of_bodies = zip(*looks[begin:end], strict=True)
-            body_count = len(bodies) // layout.body.itemsize
-            parts.append(_HEAD.pack(end - begin, len(robots) // KEPT_BYTES, KEPT_BYTES, body_count))
-            parts.append(np.array(ticks, "<i8").tobytes())
-            parts += of_robots + of_bodies
-            begin = end
+    parts: list[bytes | bytearray] = []
+    for each in looks:
+        count = len(each.ticks)
+        parts.append(_HEAD.pack(count, each.robot_count, KEPT_BYTES, each.body_count))
+        parts += struct.pack(f"<{count}q", *each.ticks), each.robots, each.bodies
     return b"".join(parts)
 
 

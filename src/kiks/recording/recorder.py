@@ -6,6 +6,7 @@ run is the same with it, to the bit.
 
 from __future__ import annotations
 
+import logging
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -19,11 +20,14 @@ from kiks.recording import foxglove, motion
 from kiks.recording.entries import block_of
 from kiks.recording.mcap_file import McapFile, Topic
 from kiks.recording.motion import MotionWatcher
+from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.run_log import ACT, CHECK, MARK, STATE, TEXT, Clock, NotedEntry
 from kiks.sim.saved_state import Layout, Setup, TurretOfUser, state_bytes
 from kiks.sim.simulation import Simulation
-from kiks.units import NS_PER_S
+from kiks.units import NS_PER_S, s_from_ns
 from kiks.version import __version__
+
+_log = logging.getLogger("kiks.recording")
 
 LOG = Topic("/kiks/log", "kiks")
 MOTION = Topic("/kiks/motion", "kiks")
@@ -51,6 +55,9 @@ WAITING_BYTES_MAX = 16 << 20
 class RunRecorder:
     """Records a simulation from now on, as a `kiks.sim.event_loop.Recorder`; `close`, or the end of `with`, ends it.
 
+    It ends by itself, with a warning, when only the reserve of the disk is left or the file cannot be written. The run
+    goes on, and the recording can be read up to there.
+
     Args:
         sim: The simulation.
         path: The file, which ends in .mcap.
@@ -66,7 +73,8 @@ class RunRecorder:
         change_count: Of the world, when its changes were noted last.
 
     Raises:
-        ParameterError: If the file cannot be written, or the simulation is being recorded already.
+        ParameterError: If the file cannot be written, its disk has only the reserve left, or the simulation is being
+            recorded already.
     """
 
     def __init__(
@@ -87,6 +95,7 @@ class RunRecorder:
         self.gives_way: bool = gives_way
         self._sim, self._world, self._loop = sim, sim.world, sim.loop
         self._file = McapFile(path, (LOG, MOTION, *foxglove.TOPICS))
+        self._error: ParameterError | None = None
         self.clock: Clock = self._world
         # In one list: to keep a tuple for each entry would make Python's garbage collection slow.
         self._entries: list[int | bytes] = []
@@ -126,31 +135,48 @@ class RunRecorder:
         """End the recording with the present state.
 
         Raises:
-            ParameterError: If it could not be written.
+            ParameterError: If it has ended by itself; once.
         """
         with self._sim.lock, postponing_endings():
-            if self._loop.recorder is not self:
-                return
             self.flush()
-            self._loop.recorder = None
-            for wire in self._sim.wires:
-                wire.recorder = None
-            self._world.unwatch(self._motion)
+            if self._is_on:
+                self._end()
+            error, self._error = self._error, None
+        if error is not None:
+            raise error
+
+    @property
+    def _is_on(self) -> bool:
+        return self._loop.recorder is self
+
+    def _end(self) -> None:
+        """Let the run go on without it, and end the file."""
+        self._loop.recorder = None
+        self.next_ns = NEVER_NS
+        for wire in self._sim.wires:
+            wire.recorder = None
+        self._world.unwatch(self._motion)
+        try:
             self._file.close()
+        except ParameterError as error:
+            self._error = error
 
-    @property
-    def has_failed(self) -> bool:
-        """Whether something could not be written; then nothing more is."""
-        return self._file.has_failed
-
-    @property
-    def byte_count(self) -> int:
-        """Number of bytes in the file so far."""
-        return self._file.byte_count
+    def _end_by_itself(self) -> None:
+        self._end()
+        if self._error is None:
+            self._error = ParameterError(
+                f"a recording must leave some of its disk free, but that of {str(self.path)!r} is almost full: the "
+                f"recording has ended at {s_from_ns(self._world.now_ns):.1f} s, and is whole up to there. Free some "
+                "space, or choose another place."
+            )
+        if not self.gives_way:
+            _log.warning("%s", self._error)
 
     def flush(self) -> None:
         """Write all that has happened up to now, with the present state, so that a reader of the file finds it."""
         with self._sim.lock, postponing_endings():
+            if not self._is_on:
+                return
             self.note_changes()
             self._note_check()
             self._motion.look(self._world.state)
@@ -200,6 +226,8 @@ class RunRecorder:
     def mark(self, note: str) -> None:
         """Set a bookmark at this time."""
         with self._sim.lock:
+            if not self._is_on:
+                return
             now_ns = self._world.now_ns
             self.note((MARK, now_ns, 0, 0, 0, note.encode()))
             self._messages.append((foxglove.TEXT, now_ns, foxglove.text("bookmark", note, now_ns)))
@@ -228,18 +256,17 @@ class RunRecorder:
             now_ns, robot, line = self._lines.popleft()
             self.note((TEXT, now_ns, robot, 0, 0, line.encode("utf-8", "replace")))
             self._messages.append((foxglove.TEXT, now_ns, foxglove.text(f"robot {robot + 1}", line, now_ns)))
-        looks, self._motion.looks = self._motion.looks, []
+        looks = self._motion.take()
         messages, self._messages = self._messages, []
         entries = block_of(self._entries)
         self._entries.clear()
-        blocks = [(LOG, self._chunk_ns, entries), (MOTION, self._chunk_ns, motion.encode(looks, _LAYOUT))]
+        blocks = [(LOG, self._chunk_ns, entries), (MOTION, self._chunk_ns, motion.encode(looks))]
         self._chunk_ns = self._world.now_ns
         self._file.write(blocks + messages + foxglove.poses(looks))
         self._waiting_bytes = 0
         self._chunk_at_s = time.monotonic() + CHUNK_S
-
-
-_LAYOUT = Layout()
+        if self._file.has_failed or self._file.is_disk_full:
+            self._end_by_itself()
 
 
 class _OwnTurretRecorder:

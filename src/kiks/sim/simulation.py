@@ -668,7 +668,7 @@ class Simulation:
             A `kiks.recording.recorder.RunRecorder`, with `mark(note)` for bookmarks.
 
         Raises:
-            ParameterError: If the file cannot be written, or the simulation is recorded already.
+            ParameterError: If the file cannot be written, its disk is almost full, or the run is recorded already.
         """
         return record_simulation(self, file)
 

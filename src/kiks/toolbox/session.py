@@ -6,6 +6,7 @@ import asyncio
 import threading
 from collections import deque
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
@@ -129,7 +130,7 @@ class Session:
                 if self._has_window:
                     self._show()
             else:
-                self.record(None)
+                self._end_recording()
                 self.desk.folder = folder.resolve()
                 asyncio.run(self.desk.replace(project))
             self.owners.clear()
@@ -210,7 +211,8 @@ class Session:
         """Record this world from now on, until it ends or the next call; with None, record no more.
 
         Raises:
-            ParameterError: If the file cannot be written, or a film is being made of the world.
+            ParameterError: If the file cannot be written, a film is being made of the world, or the recording before
+                has ended by itself.
         """
         with self.lock:
             recorder, self._recorder = self._recorder, None
@@ -218,6 +220,10 @@ class Session:
                 recorder.close()
             if path is not None:
                 self._recorder = RunRecorder(self.world, path)
+
+    def _end_recording(self) -> None:
+        with suppress(ParameterError):  # it has ended by itself, with a warning
+            self.record(None)
 
     def take_robot(self, owner: object, wanted: int) -> int:
         """Assign a robot to a client: the wanted, a free or a new one; return its number.
@@ -302,7 +308,7 @@ class Session:
 
     def close(self) -> None:
         """End the world and all programs in it."""
-        self.record(None)
+        self._end_recording()
         if self._shown is not None:
             self._shown.close()
         elif self.desk is not None:

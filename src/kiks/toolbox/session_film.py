@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from kiks.films.film import check_film, save_film
 from kiks.model.atomic_files import check_writable
 from kiks.recording.recorder import RunRecorder
 from kiks.recording.recording import Recording
+from kiks.recording.temporary_folder import TemporaryFolder
 from kiks.sim.simulation import Simulation
 
 
@@ -29,12 +29,12 @@ class SessionFilm:
         check_film(path)
         check_writable(path, "a film")
         self._path, self._robot = path, robot
-        self._folder = TemporaryDirectory(prefix="kiks-film-")
-        self._recording = Path(self._folder.name, "run.mcap")
+        self._folder = TemporaryFolder()
+        self._recording = self._folder.path / "run.mcap"
         try:
             self._recorder = RunRecorder(sim, self._recording)
         except BaseException:
-            self._folder.cleanup()
+            self._folder.delete()
             raise
 
     def stop(self) -> None:
@@ -50,6 +50,8 @@ class SessionFilm:
         Raises:
             ParameterError: If the film cannot be written, or no time has passed.
         """
-        with self._folder:
+        try:
             self.stop()
             return save_film(Recording(self._recording), self._path, robot=self._robot, on_picture=on_picture)
+        finally:
+            self._folder.delete()

@@ -6,7 +6,6 @@ the past, the recordings up to there stay, and another one follows them.
 
 from __future__ import annotations
 
-import tempfile
 import threading
 from collections.abc import Sequence
 from contextlib import suppress
@@ -14,21 +13,26 @@ from pathlib import Path
 from typing import NamedTuple
 
 from kiks.desk.server.player import Span
-from kiks.errors import KiksError
+from kiks.errors import KiksError, ParameterError
 from kiks.model.project import Project
 from kiks.ports.program_process import Command
 from kiks.recording.events import Event, EventReader
 from kiks.recording.log import RecordedLog
+from kiks.recording.mcap_file import room_of
 from kiks.recording.recorder import RunRecorder
 from kiks.recording.replay import Replay
+from kiks.recording.temporary_folder import TemporaryFolder
 from kiks.sim.simulation import Simulation
 from kiks.units import ns_from_s, s_from_ns
 
-PART_BYTES_MAX = 256 << 20
-"""Most bytes of a temporary recording; then another one begins."""
+BYTES_MIN, BYTES_MAX = 8 << 20, 1 << 30
+"""Least and most bytes of all temporary recordings of a desk; when there are more, the oldest recording is deleted."""
 
-PART_COUNT_MAX = 4
-"""Most recordings that are kept; the oldest one goes first."""
+FREE_SHARE = 0.5
+"""Most that they take of the space that other files leave."""
+
+PART_COUNT = 4
+"""In how many recordings they are divided."""
 
 MERGED_S = 0.3
 """Time within which events of a kind and robot are one to people [s]: a drag is a hundred changes."""
@@ -100,6 +104,7 @@ class Part:
         end_ns: When it ends [ns]; None while it grows.
         run: As above.
         recorder: As above.
+        own_recorder: The same if the desk has begun it, into a temporary file; else None.
         marks: What has happened in it, as far as it was read.
 
     Raises:
@@ -111,6 +116,7 @@ class Part:
         self.begin_ns = self.log.begin_ns
         self.end_ns: int | None = self.log.end_ns if recorder is None else None
         self.run, self.recorder = run, recorder
+        self.own_recorder = recorder if recorder is not None and recorder.gives_way else None
         self.marks: list[Mark] = []
         self.file = file
         # One of its own, for it is read in another thread.
@@ -118,19 +124,29 @@ class Part:
         self._events = EventReader(self._events_log)
         self._latest: dict[tuple[str, int], tuple[float, int]] = {}
 
+    @property
+    def own_bytes(self) -> int:
+        """Number of bytes of its file if that is temporary."""
+        with suppress(FileNotFoundError):
+            return 0 if self.own_recorder is None else self.file.stat().st_size
+        return 0
+
     def finish(self, end_ns: int) -> None:
-        """Let it end at a time [ns], and end its recording if that is temporary."""
-        self.end_ns = end_ns
-        if self.recorder is not None and self.recorder.gives_way:
+        """Let it end at a time [ns], or where its recording has ended before, and end that if it is temporary."""
+        if self.own_recorder is not None:
             with suppress(KiksError):  # a full disk, which is told where it is noticed
-                self.recorder.close()
-        self.log.find_more()
+                self.own_recorder.close()
+        self.end_ns = end_ns
+        with suppress(KiksError):  # a file that is gone, which people are told when they look there
+            self.log.find_more()
+            self.end_ns = min(end_ns, self.log.end_ns)
 
     def delete(self) -> None:
         """End it, and delete its file if that is temporary."""
-        if self.recorder is not None and self.recorder.gives_way:
-            with suppress(KiksError, OSError):
-                self.recorder.close()
+        if self.own_recorder is not None:
+            with suppress(KiksError):
+                self.own_recorder.close()
+            with suppress(OSError):
                 self.file.unlink(missing_ok=True)
 
     def read(self) -> None:
@@ -166,9 +182,9 @@ class Timeline:
 
     def __init__(self) -> None:
         self.parts: tuple[Part, ...] = ()
-        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        self._folder: TemporaryFolder | None = None
         self._count = 0
-        self._has_failed = False
+        self._has_failed = self._has_dropped = False
         self._reading = threading.Lock()
 
     # ---- recording; with the lock of the present world ----
@@ -194,7 +210,7 @@ class Timeline:
         before, self.parts = self.parts, ()
         for part in before:
             part.delete()
-        self._has_failed = False
+        self._has_failed = self._has_dropped = False
         self._record(sim, run)
 
     def branch(self, sim: Simulation) -> None:
@@ -217,25 +233,64 @@ class Timeline:
         """Keep the recording of the present world going; return a message for people if there is one."""
         if self._has_failed or not self.parts:
             return ""
-        last, recorder = self.parts[-1], sim.loop.recorder
-        if recorder is last.recorder and last.recorder is not None:
-            if last.recorder.has_failed:
-                self._has_failed = True
-                last.finish(last.log.end_ns)
-                return "The past can be kept no longer: its file cannot be written. Is the disk full?"
-            if not last.recorder.gives_way or last.recorder.byte_count < PART_BYTES_MAX:
-                return ""
-        # Another recording has begun or ended, or this one is long enough.
-        last.finish(sim.now_ns)
+        last = self.parts[-1]
         try:
-            self._record(sim, last.run)
+            if sim.loop.recorder is not last.recorder:
+                # Another recording has begun, or this one has ended; if by itself, this tells why.
+                if last.own_recorder is not None:
+                    last.own_recorder.close()
+                self._record_next(sim)
+            if self.parts[-1].own_recorder is None:
+                return ""
+            bytes_max = self._bytes_max()
+            if self.parts[-1].own_bytes >= bytes_max // PART_COUNT:
+                self._record_next(sim)
+            return self._drop_oldest(bytes_max)
         except (KiksError, OSError) as error:
             self._has_failed = True
+            self.parts[-1].finish(sim.now_ns)
+            self._drop_oldest(0)
             return f"The past can be kept no longer: {error}"
-        while len(self.parts) > PART_COUNT_MAX:
+
+    def _record_next(self, sim: Simulation) -> None:
+        last = self.parts[-1]
+        last.finish(sim.now_ns)
+        self._record(sim, last.run)
+
+    def _bytes_max(self) -> int:
+        """Return how many bytes all temporary recordings may have now.
+
+        Raises:
+            ParameterError: If the disk has too little space for any.
+            OSError: If the folder or a file is gone.
+        """
+        if self._folder is None:
+            self._folder = TemporaryFolder()
+        room = room_of(self._folder.path)
+        others_leave_bytes = room.free_bytes - room.reserve_bytes + sum(part.own_bytes for part in self.parts)
+        bytes_max = min(BYTES_MAX, int(others_leave_bytes * FREE_SHARE))
+        if bytes_max < BYTES_MIN:
+            needed_bytes = room.reserve_bytes + int(BYTES_MIN / FREE_SHARE)
+            raise ParameterError(
+                f"the disk of the temporary folder must have {needed_bytes >> 20} MiB free, but it has "
+                f"{room.free_bytes >> 20} MiB. Free some space and start the world over, or start KiKS with TMPDIR set "
+                "to a folder on another disk."
+            )
+        return bytes_max
+
+    def _drop_oldest(self, bytes_max: int) -> str:
+        """Delete the oldest recordings until all have few bytes enough; return a message the first time."""
+        count = len(self.parts)
+        while len(self.parts) > 1 and sum(part.own_bytes for part in self.parts) > bytes_max:
             self.parts[0].delete()
             self.parts = self.parts[1:]
-        return ""
+        if count == len(self.parts) or self._has_dropped:
+            return ""
+        self._has_dropped = True
+        return (
+            f"The time bar now begins at {s_from_ns(self.parts[0].begin_ns):.0f} s: temporary recordings have at most "
+            f"{bytes_max >> 20} MiB, and the oldest was deleted. To keep a whole run, start KiKS with --record FILE."
+        )
 
     def flush(self) -> None:
         """Write all that has happened up to now, and find it.
@@ -250,10 +305,10 @@ class Timeline:
     def _record(self, sim: Simulation, run: Run | None) -> None:
         recorder = sim.loop.recorder
         if not isinstance(recorder, RunRecorder):
-            if self._folder is None:
-                self._folder = tempfile.TemporaryDirectory(prefix="kiks-past-", ignore_cleanup_errors=True)
+            self._bytes_max()
+            assert self._folder is not None
             self._count += 1
-            recorder = RunRecorder(sim, Path(self._folder.name, f"{self._count}.mcap"), gives_way=True)
+            recorder = RunRecorder(sim, self._folder.path / f"{self._count}.mcap", gives_way=True)
         self.parts = (*self.parts, Part(recorder.path, run, recorder))
 
     def close(self) -> None:
@@ -262,7 +317,7 @@ class Timeline:
             part.delete()
         self.parts = ()
         if self._folder is not None:
-            self._folder.cleanup()
+            self._folder.delete()
             self._folder = None
 
     # ---- reading ----
