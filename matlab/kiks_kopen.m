@@ -43,8 +43,10 @@ if settings(1) >= 0
     ref = kopen(settings);
     return
 end
-if ~is_active()
-    begin_world([], []);
+if is_active()
+    preferences = read_preferences();
+else
+    preferences = begin_world([], []);
 end
 simulator(sprintf('open %d %.10g', -settings(1), settings(2)));
 open_ports('add', -settings(1));
@@ -53,7 +55,7 @@ pulse_mm('forget');
 ref = settings([1 1 1 1]);
 kiks_ksend(['B' char(10)], ref);
 try
-    film('begin', -settings(1));
+    film('begin', -settings(1), preferences.KIKS_MOVIENAME);
 catch failure
     kiks_kclose(ref);
     rethrow(failure);

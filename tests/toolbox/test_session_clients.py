@@ -781,7 +781,7 @@ def test_halt_ends_a_long_pause_and_stops_the_robot(session: Session, is_paused:
     while not told:
         halt(session)
         thread.join(0.1)
-    assert told[0][0] == "-"
+    assert told[0][0] == "."
     assert told[0][HEAD:].startswith("Simulation halted: Halt was pressed on the desk.")
     asyncio.run(desk.go_on())
     asyncio.run(desk.set_speed(None))
@@ -804,7 +804,7 @@ def test_halt_stops_every_program_at_its_next_request(session: Session) -> None:
         ask("open 1 9600")
         while (answer := ask.told("ask 1 D,5,5"))[0] == "+":
             pass
-        told.append(answer[HEAD:])
+        told.append(answer[0])
         told.append(ask.refused("ask 1 D,9,9"))
 
     threads = [threading.Thread(target=loop, args=(ask,)) for ask in (first, second)]
@@ -814,7 +814,7 @@ def test_halt_stops_every_program_at_its_next_request(session: Session) -> None:
     halt(session)
     for thread in threads:
         thread.join(GUARD_S)
-    assert sum(text.startswith("Simulation halted") for text in told) == 2
+    assert told.count(".") == 2
     assert sum("port -1 must be open" in text for text in told) == 2
     wait_until(lambda: set_points(session) == [[0, 0], [0, 0]])
     first("open 1 9600")
