@@ -313,11 +313,9 @@ class Sketch:
         """Take a thing away.
 
         Raises:
-            ParameterError: If there is no such thing, or it is the only robot.
+            ParameterError: If there is no such thing.
         """
         thing = self._thing(number)
-        if isinstance(thing, SketchRobot) and len(self.kinds) == 1:
-            raise ParameterError("There must be at least one robot, but this is the only one. Add another one first.")
         self._push(ThingPatch(number, thing))
         del self.things[number]
 
