@@ -848,6 +848,26 @@ def test_a_typed_command_comes_before_the_answer(session: Session) -> None:
             session.evaluate(number, command)
 
 
+def test_a_program_replaces_only_its_own_last_line(session: Session) -> None:
+    ask = begun(session)
+    other = Asker(session, 2)
+    assert session.desk is not None
+    log = session.desk.log
+
+    def lines() -> list[str]:
+        return [line[9:] for line in log.since(0)[1]]
+
+    ask("print_over 0 of 9")
+    ask("print 1 of 9")
+    ask("print_over 2 of 9")
+    ask("print_over 3 of 9")
+    assert lines() == ["0 of 9", "3 of 9"]
+    other("print hello")
+    ask("print_over 4 of 9")
+    ask("print_over 5 of 9")
+    assert lines()[-3:] == ["3 of 9", "hello", "5 of 9"]
+
+
 def test_polls_let_no_time_pass(session: Session) -> None:
     ask = begun(session, "thinking live")
     ask("open 1 9600")

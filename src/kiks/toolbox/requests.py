@@ -175,7 +175,13 @@ def _save(client: SessionClient, words: str) -> str:
 
 
 def _print(client: SessionClient, words: str) -> str:
-    client.session.log(unescape(words))
+    client.last_line = client.session.log(unescape(words))
+    return ""
+
+
+def _print_over(client: SessionClient, words: str) -> str:
+    """Replace what this program has printed last, unless the log has got other lines since."""
+    client.last_line = client.session.log(unescape(words), over=client.last_line)
     return ""
 
 
@@ -280,6 +286,7 @@ REQUESTS: dict[str, Act] = {
     "save": _save,
     "read": lambda client, words: matrix_text(Arena.load(_path(words)).brightness[::-1]),
     "print": _print,
+    "print_over": _print_over,
     "checkpoint": _checkpoint,
     "reset": _reset,
     "record": _record,
