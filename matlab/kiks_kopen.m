@@ -43,10 +43,13 @@ if settings(1) >= 0
     ref = kopen(settings);
     return
 end
-if ~is_active()
-    begin_world([], []);
-elseif isempty(global_value('KIKS_SESSIONACTIVE')) && any(open_ports('list') == -settings(1))
-    kiks_kclose(settings([1 1 1 1]));  % left open by a program that has forgotten it with `clear all`
+if is_active()
+    preferences = read_preferences();
+    if isempty(global_value('KIKS_SESSIONACTIVE')) && any(open_ports('list') == -settings(1))
+        kiks_kclose(settings([1 1 1 1]));  % left open by a program that has forgotten it with `clear all`
+    end
+else
+    preferences = begin_world([], []);
 end
 global_value('KIKS_SESSIONACTIVE', 1);
 simulator(sprintf('open %d %.10g', -settings(1), settings(2)));
@@ -56,7 +59,7 @@ pulse_mm('forget');
 ref = settings([1 1 1 1]);
 kiks_ksend(['B' char(10)], ref);
 try
-    film('begin', -settings(1));
+    film('begin', -settings(1), preferences.KIKS_MOVIENAME);
 catch failure
     kiks_kclose(ref);
     rethrow(failure);

@@ -14,7 +14,8 @@ function kiks_load(file)
 
 need = 'kiks_load needs the name of a file, as text. Call kiks_load(''maze'').';
 if nargin < 1
-    file = asked_file(@uigetfile, 'Load an arena', [need ' ' arenas_there()]);
+    kinds = {strjoin(strcat('*', arena_endings()), ';'), 'Arenas and projects'};
+    file = asked_file(@uigetfile, kinds, 'Load an arena', [need ' ' arenas_there()]);
     if isempty(file)
         return
     end

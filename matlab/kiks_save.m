@@ -7,7 +7,8 @@ function kiks_save(file)
 %     .toml   arena file with a picture beside it
 %     .kiks   project: the arena and all settings
 %
-%   An existing file of that name is replaced. kiks_save lets you choose a name in a dialog, if there is a display.
+%   An existing file of that name is replaced. kiks_save lets you choose a name and a kind of file in a dialog, if there
+%   is a display.
 %
 %   Example:
 %     kiks, kiks_save('mine.kad'), kiks_quit
@@ -16,7 +17,10 @@ function kiks_save(file)
 
 if nargin < 1
     need_session('kiks_save');
-    file = asked_file(@uiputfile, 'Save the world', ...
+    kinds = {'*.kiks', 'Projects: the arena and all settings'
+        '*.toml', 'Arenas'
+        '*.kad', 'Arenas of KiKS 2.2.0'};
+    file = asked_file(@uiputfile, kinds, 'Save the world', ...
         ['kiks_save needs the name of a file. Call kiks_save(''arena.kad''). ' arenas_there()]);
     if isempty(file)
         return

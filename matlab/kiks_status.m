@@ -4,7 +4,8 @@ function lines = kiks_status(str, dual, replace)
 %   kiks_status(str) adds text to the log, with the time of day before each line of it; empty lines are left out. The
 %   simulator's window shows it, too.
 %   kiks_status(str, dual) shows it on the console as well if dual is not 0.
-%   kiks_status(str, dual, replace) puts it in the place of the last line if replace is not 0.
+%   kiks_status(str, dual, replace) puts it in the place of the last line if replace is not 0. In the simulator's window
+%   it does so if that line is this program's.
 %
 %   lines = kiks_status() returns the log as a column of cells, the oldest line first: the last 1000
 %   (KIKS_LOG_HISTORY in kiks_preferences). kiks_quit empties it.
@@ -26,8 +27,10 @@ if nargin > 0
         error('kiks:argument', 'The text must be a row of characters, but it was %s. Use num2str or sprintf.', ...
             shown(str));
     end
+    request = 'print ';
     if nargin > 2 && ~isempty(replace) && any(replace)
         history = history(1:end - 1);
+        request = 'print_over ';
     end
     for line_ = regexp(str, '[^\n]+', 'match')
         if nargin > 1 && ~isempty(dual) && any(dual)
@@ -35,8 +38,9 @@ if nargin > 0
         end
         history = [history; {[datestr(now(), 'HH:MM:SS') ' ' line_{1}]}]; %#ok<AGROW>
         if is_active()
-            simulator(['print ' escaped(line_{1})]);
+            simulator([request escaped(line_{1})]);
         end
+        request = 'print ';
     end
     history = history(max(1, end - line_limit + 1):end);
 end

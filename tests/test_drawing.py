@@ -47,6 +47,22 @@ def test_everything_is_where_it_is() -> None:
     assert one != other
 
 
+def test_stripes_stand_around_a_robot() -> None:
+    robot = kiks.RobotSpec.load("khepera").with_changes(body__stripe_count=2)
+    sim = kiks.Simulation(kiks.Arena.box(300, 300), robot=robot)
+    sim.place(1, 150, 150, math.pi / 2)
+    image, rim_mm = draw_simulation(sim), robot.body.radius_mm - 1.5
+    black, white = (
+        {
+            pixel(image, 150 - rim_mm * math.sin(angle), 150 + rim_mm * math.cos(angle))
+            for angle in (first, first + math.pi)
+        }
+        for first in (0.6, math.pi / 2 + 0.6)
+    )
+    assert max(map(max, black)) < 30
+    assert min(map(min, white)) > 230
+
+
 def test_a_trace_shows_where_everything_was() -> None:
     sim = world()
     trace = Trace(sim)

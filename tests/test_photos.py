@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +12,10 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from kiks import Arena, ParameterError, Recording, Simulation
+from kiks import Arena, ParameterError, Recording, RobotSpec, Simulation
+from kiks.films.film import save_film
 from kiks.films.photo import save_photo
+from kiks.model.arena import Pose
 
 pytestmark = pytest.mark.slow
 
@@ -56,6 +60,23 @@ def test_the_followed_robot_is_in_the_middle(recording: Recording, tmp_path: Pat
     assert len(rows) > 300
     assert columns.mean() == pytest.approx(80, abs=6)
     assert rows.mean() == pytest.approx(64, abs=10)
+
+
+def test_robots_have_stripes_and_names_as_in_films(tmp_path: Path) -> None:
+    arena = replace(Arena.box(400, 300), starts=(Pose(100, 150, -math.pi / 2), Pose(300, 150, math.pi / 2)))
+    sim = Simulation(arena, robot=RobotSpec.load("khepera").with_changes(body__stripe_count=1), robots=2)
+    with sim.record(tmp_path / "run.mcap"):
+        sim.run(0.1)
+    recording = Recording(tmp_path / "run.mcap")
+    black, white = (taken(recording, tmp_path, follow=number) for number in (1, 2))
+    assert black[86:89, 75:85].max() < 40, "the front of one, towards the camera"
+    assert white[86:89, 75:85].min() > 120, "the back of the other"
+    save_film(recording, tmp_path / "film.webp", size=(160, 120), view="3d", is_plain=True, follow=1)
+    with Image.open(tmp_path / "film.webp") as film:
+        name = np.asarray(film.convert("RGB")).astype(float)[50:64, 66:94, 0]
+    seen = black[50:64, 66:94, 0]
+    alike, mirrored = (np.corrcoef(each.ravel(), name.ravel())[0, 1] for each in (seen, seen[:, ::-1]))
+    assert alike > max(mirrored + 0.2, 0.7)
 
 
 def test_mistakes_get_a_clear_error(recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,7 +11,7 @@ from PIL import Image
 
 import kiks
 from kiks import Arena, Khepera, ParameterError, Recording
-from kiks.plots import PANELS, ROWS, figure_of, panels_of, save_plot
+from kiks.plots import NO_ROBOT, PANELS, ROWS, figure_of, panels_of, save_plot
 from kiks.recording.analysis import odometry, time_shares
 from kiks.sim.simulation import Simulation
 
@@ -89,6 +89,18 @@ def test_panels_are_the_rows_of_the_figure(recording: Recording) -> None:
     assert panels == panels_of(recording)
     with pytest.raises(ParameterError, match="robot must be a whole number from 1 to 1"):
         panels_of(recording, robot=2)
+
+
+def test_a_run_without_a_robot_has_the_arena_and_says_so(recording: Recording, tmp_path: Path) -> None:
+    sim = Simulation(Arena.box(300, 260), robots=0)
+    with sim.record(tmp_path / "none.mcap"):
+        sim.run(1.0)
+    none = Recording(tmp_path / "none.mcap")
+    assert list(panels_of(none)) == ["paths"]
+    figure = figure_of([none, recording])
+    said = [[text.get_text() for text in axes.texts] for axes in figure.axes[: 2 * len(ROWS) : 2]]
+    assert said == [[]] + [[NO_ROBOT]] * (len(ROWS) - 1)
+    save_plot([none], tmp_path / "none.png")
 
 
 def test_a_figure_has_a_column_for_each_recording(recording: Recording) -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +12,10 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image, ImageSequence
 
-from kiks import Arena, Khepera, ParameterError, Recording, Simulation
+from kiks import Arena, Khepera, ParameterError, Recording, RobotSpec, Simulation
 from kiks.films.film import save_film
 from kiks.films.solid_stage import CELLS_MAX, wall_boxes
+from kiks.model.arena import Pose
 from kiks.sheet import robot_colour
 
 Pixels = NDArray[np.uint8]
@@ -69,6 +72,23 @@ def test_the_followed_robot_stays_in_the_middle(recording: Recording, tmp_path: 
         column, row = place_of(picture, robot_colour(0, 2))
         assert column == pytest.approx(160, abs=12)
         assert row == pytest.approx(120, abs=25)
+
+
+@pytest.fixture(scope="module")
+def striped(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    """One robot whose front is black shows it to the camera, one its white back."""
+    arena = replace(Arena.box(400, 300), starts=(Pose(100, 150, -math.pi / 2), Pose(300, 150, math.pi / 2)))
+    sim = Simulation(arena, robot=RobotSpec.load("khepera").with_changes(body__stripe_count=1), robots=2)
+    file = tmp_path_factory.mktemp("striped") / "run.mcap"
+    with sim.record(file):
+        sim.run(0.1)
+    return Recording(file)
+
+
+def test_stripes_stand_around_robots(striped: Recording, tmp_path: Path) -> None:
+    for number, is_seen in ((1, lambda side: side.max() < 20), (2, lambda side: side.min() > 120)):
+        side = filmed(striped, tmp_path, follow=number)[0][172:178, 150:170]
+        assert is_seen(side), number
 
 
 @pytest.mark.parametrize("name", ["maze", "track", "office", "default"])

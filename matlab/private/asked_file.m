@@ -1,14 +1,16 @@
-function file = asked_file(ask, title, need)
+function file = asked_file(ask, kinds, title, need)
 % asked_file  Let the user choose a file in a dialog; '' if there is no choice made.
 %
-%   file = asked_file(ask, title, need) calls ask, @uigetfile or @uiputfile. Where no dialog can be opened, it stops
-%   with the message need.
+%   file = asked_file(ask, kinds, title, need) calls ask, @uigetfile or @uiputfile. A name that is typed without an
+%   ending gets that of the chosen kind of file. Where no dialog can be opened, it stops with the message need.
+%
+%   kinds    what the dialog offers: rows of patterns, such as '*.png;*.tif', and their names
 
 if ~has_display()
     error('kiks:argument', '%s', need);
 end
 try
-    [name, folder] = ask({'*.kad;*.tif;*.png;*.toml;*.kiks', 'Arenas'}, title);
+    [name, folder] = ask(kinds, title);
 catch
     error('kiks:argument', '%s', need);
 end

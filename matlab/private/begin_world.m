@@ -1,7 +1,8 @@
-function begin_world(arena, colormask, changes)
+function preferences = begin_world(arena, colormask, changes)
 % begin_world  Begin a new world; start the simulator's process if there is none.
 %
-%   begin_world(arena, colormask) takes the arguments of kiks and the values of kiks_preferences.
+%   preferences = begin_world(arena, colormask) takes the arguments of kiks and the values of kiks_preferences, and
+%   returns these values.
 %   begin_world(arena, colormask, changes) takes values of the struct changes instead of those preferences.
 
 accept_old_style();

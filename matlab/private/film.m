@@ -1,23 +1,20 @@
-function film(what, number)
+function film(what, number, name)
 % film  The film that kiks_recordmovie has asked for.
 %
-%   film('begin', number)   films from now on if KIKS_MOVIENAME names a film and none is made; number: port's
-%   film('stop', number)    ends the film that began with this port, 0: with any, at this time
-%   film('save', number)    makes its file, and forgets its name
-%   film('forget', number)  the simulator's process has ended, and its film with it
+%   film('begin', number, name)  films from now on if there is a name and no film is made; number: port's
+%   film('stop', number)         ends the film that began with this port, 0: with any, at this time
+%   film('save', number)         makes its file, and forgets its name
+%   film('forget', number)       the simulator's process has ended, and its film with it
 %
 %   After a film has been stopped, time may pass in the world until it is saved.
 
 persistent port file
 switch what
     case 'begin'
-        if isempty(port)
-            preferences = read_preferences();
-            if ~isempty(preferences.KIKS_MOVIENAME)
-                file = movie_file(preferences.KIKS_MOVIENAME);
-                simulator(sprintf('film %d %s', number, escaped(file)));
-                port = number;
-            end
+        if isempty(port) && ~isempty(name)
+            file = movie_file(name);
+            simulator(sprintf('film %d %s', number, escaped(file)));
+            port = number;
         end
     case 'stop'
         if is_meant(port, number)

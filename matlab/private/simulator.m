@@ -119,12 +119,11 @@ while true
         if answer(9) == '?'
             % An order for a turret of this program. Its function may send requests of its own.
             payload = simulator(own_turrets('call', payload));
-        elseif answer(9) == '-'
-            text = unescaped(payload);
-            if strncmp(text, 'Simulation halted', 17)
-                open_ports('remove', 0);
+        elseif answer(9) ~= '+'
+            if answer(9) == '.'
+                open_ports('remove', 0);  % Halt was pressed on the desk, which closes them
             end
-            error('kiks:simulator', '%s', text);
+            error('kiks:simulator', '%s', unescaped(payload));
         end
         return
     end

@@ -16,6 +16,7 @@ from kiks.errors import ParameterError
 from kiks.model.arena import Arena, Ball
 from kiks.model.atomic_files import check_writable, replace_file
 from kiks.model.robot import RobotSpec
+from kiks.model.robot_parts import Body
 from kiks.sheet import FINER, Colour, Place, Sheet, path_colour, path_mm, robot_colour, tint, wall_picture
 from kiks.sim.simulation import Simulation
 
@@ -64,8 +65,8 @@ def draw_simulation(sim: Simulation, trace: Trace | None = None) -> Image:
         >>> draw_simulation(sim).size
         (600, 400)
     """
-    radii_mm = [spec.body.radius_mm for spec in sim.specs]
-    return draw_world(sim.arena, sim.lamps, sim.bodies(), sim.poses(), radii_mm, trace)
+    robots = [spec.body for spec in sim.specs]
+    return draw_world(sim.arena, sim.lamps, sim.bodies(), sim.poses(), robots, trace)
 
 
 def draw_world(
@@ -73,7 +74,7 @@ def draw_world(
     lamps: NDArray[np.float64],
     bodies: NDArray[np.void],
     poses: NDArray[np.float64],
-    radii_mm: Sequence[float],
+    robots: Sequence[Body],
     trace: Trace | None = None,
     *,
     longest_side: int = _LONGEST_SIDE,
@@ -85,14 +86,14 @@ def draw_world(
         lamps: x_mm, y_mm, power_w, and 1 for on or 0 for off, float64 [lamp, 4].
         bodies: Records of `kiks.engine.state.BODY`, shape [body].
         poses: Of the robots: x_mm, y_mm, heading_rad, float64 [robot, 3].
-        radii_mm: Of the robots [mm].
+        robots: The robots' shapes.
         trace: The way there: paths are drawn, and faintly what stood where at the beginning.
         longest_side: Most pixels of a side.
     """
     from PIL import Image
 
     sheet = _sheet_of(arena, longest_side)
-    _draw(sheet, lamps, bodies, poses, radii_mm, trace)
+    _draw(sheet, lamps, bodies, poses, robots, trace)
     width, height = sheet.image.size
     return sheet.image.resize((width // FINER, height // FINER), Image.Resampling.LANCZOS)
 
@@ -104,7 +105,7 @@ def draw_arena(arena: Arena) -> Image:
         record["x_mm"], record["y_mm"], record["radius_mm"] = body.x_mm, body.y_mm, body.radius_mm
         record["brightness"], record["what"] = body.brightness, BALL if isinstance(body, Ball) else CYLINDER
     lamps, starts = np.array(arena.lamps, np.float64).reshape(-1, 4), np.array(arena.starts, np.float64).reshape(-1, 3)
-    return draw_world(arena, lamps, bodies, starts, [RobotSpec.load("khepera").body.radius_mm] * len(starts))
+    return draw_world(arena, lamps, bodies, starts, [RobotSpec.load("khepera").body] * len(starts))
 
 
 def simulation_for_notebook(sim: Simulation) -> tuple[bytes, dict[str, int]]:
@@ -141,7 +142,7 @@ def save_simulation(sim: Simulation, path: str | Path, trace: Trace | None = Non
         save_picture(draw_simulation(sim, trace), path)
         return
     sheet = _sheet_of(sim.arena, _LONGEST_SIDE, of_lines := _SvgPen())
-    _draw(sheet, sim.lamps, sim.bodies(), sim.poses(), [spec.body.radius_mm for spec in sim.specs], trace)
+    _draw(sheet, sim.lamps, sim.bodies(), sim.poses(), [spec.body for spec in sim.specs], trace)
     replace_file(path, _svg(sheet.image, of_lines.elements, finer=FINER), "a picture")
 
 
@@ -150,7 +151,7 @@ def _draw(
     lamps: NDArray[np.float64],
     bodies: NDArray[np.void],
     poses: NDArray[np.float64],
-    radii_mm: Sequence[float],
+    robots: Sequence[Body],
     trace: Trace | None,
 ) -> None:
     """Draw what stands in an arena on a sheet."""
@@ -158,9 +159,9 @@ def _draw(
         sheet.lamp((x_mm, y_mm), power_w, is_on=bool(is_on))
     if trace is not None:
         places_of = trace.bodies()
-        for index, (radius_mm, path) in enumerate(zip(radii_mm, trace.paths(), strict=True)):
+        for index, (robot, path) in enumerate(zip(robots, trace.paths(), strict=True)):
             sheet.path(path, _colours(index, len(poses), len(path)), path_mm(len(poses)))
-            sheet.ring(path[0][:2], radius_mm, (*robot_colour(index, len(poses)), 90))
+            sheet.ring(path[0][:2], robot.radius_mm, (*robot_colour(index, len(poses)), 90))
         for body in bodies:
             places = places_of[int(body["number"])]
             sheet.line(places, (*tint(body), 200), 2.4)
@@ -168,7 +169,7 @@ def _draw(
     for body in bodies:
         sheet.body(body)
     for index, pose in enumerate(poses.tolist()):
-        sheet.robot(pose, radii_mm[index], robot_colour(index, len(poses)), str(index + 1))
+        sheet.robot(pose, robots[index], robot_colour(index, len(poses)), str(index + 1))
 
 
 def save_picture(image: Image, path: str | Path) -> None:

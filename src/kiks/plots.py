@@ -23,6 +23,8 @@ from kiks.recording.tables import Table
 from kiks.sim.simulation import Simulation
 from kiks.units import s_from_ns
 
+NO_ROBOT = "There was no robot in this run"
+
 TYPES = (".png", ".svg", ".pdf")
 
 COLUMN_INCHES, DOTS_PER_INCH = 5.6, 160
@@ -46,10 +48,11 @@ def save_plot(recordings: Sequence[Recording], path: str | Path, *, robot: int =
     Args:
         recordings: The recordings.
         path: The picture's file, .png, .svg or .pdf.
-        robot: Number of the robot whose readings, speeds and time are drawn.
+        robot: Number of the robot whose readings, speeds and time are drawn; a run without a robot has paths alone.
 
     Raises:
-        ParameterError: If Matplotlib is not installed, the file cannot be written, or there is no such robot.
+        ParameterError: If Matplotlib is not installed, the file cannot be written, or a run with robots has no such
+            robot.
     """
     kind = Path(path).suffix.lower()
     if kind not in TYPES:
@@ -61,9 +64,8 @@ def panels_of(recording: Recording, *, robot: int = 1) -> dict[str, bytes]:
     """Return what `save_plot` draws of one recording as single pictures, by the names of `PANELS`, in SVG.
 
     Raises:
-        ParameterError: If Matplotlib is not installed, or the recording has no such robot.
+        ParameterError: If Matplotlib is not installed, or a run with robots has no such robot.
     """
-    recording.check_robot(robot)
     pictures = {}
     arena = recording.setup.arena
     arena_inches = min(max(0.75 * COLUMN_INCHES * arena.height_mm / arena.width_mm + 0.6, 2.0), COLUMN_INCHES)
@@ -98,19 +100,18 @@ def figure_of(recordings: Sequence[Recording], *, robot: int = 1) -> Any:
     """Return the figure of `save_plot`, a `matplotlib.figure.Figure`.
 
     Raises:
-        ParameterError: If Matplotlib is not installed, or a recording has no such robot.
+        ParameterError: If Matplotlib is not installed, or a recording with robots has no such robot.
     """
-    for recording in recordings:
-        recording.check_robot(robot)
+    drawings = [_drawings(recording, robot) for recording in recordings]
     figure = library("matplotlib.figure", "plot").Figure(
         figsize=(COLUMN_INCHES * len(recordings), 2.6 * sum(ROWS)), layout="constrained"
     )
     figure.get_layout_engine().set(h_pad=0.12)  # room for the legends between the rows
     axes = figure.subplots(len(ROWS), len(recordings), squeeze=False, height_ratios=ROWS)
-    for column, recording in zip(axes.T, recordings, strict=True):
+    for column, recording, draw in zip(axes.T, recordings, drawings, strict=True):
         column[0].set_title(recording.title, fontsize="medium")
-        for axes_of_row, draw in zip(column, _drawings(recording, robot).values(), strict=True):
-            draw(axes_of_row)
+        for axes_of_row, name in zip(column, PANELS, strict=True):
+            draw.get(name, _draw_nothing)(axes_of_row)
     return figure
 
 
@@ -130,15 +131,32 @@ def figure_of_run(sim: Simulation, *, robot: int = 1) -> Any:
 
 
 def _drawings(recording: Recording, robot: int) -> dict[str, Callable[[Any], None]]:
-    """Return functions that draw the rows on axes, by the names of `PANELS`."""
+    """Return functions that draw the rows on axes, by the names of `PANELS`: of a run without a robot, paths alone.
+
+    Raises:
+        ParameterError: If a run with robots has no such robot.
+    """
     poses, wheels = recording.table("poses"), recording.table("wheels")
-    return {
-        "paths": lambda axes: _draw_paths(axes, recording, poses, wheels),
+    paths = {"paths": lambda axes: _draw_paths(axes, recording, poses, wheels)}
+    if not recording.robots:
+        return paths
+    recording.check_robot(robot)
+    return paths | {
         "places": lambda axes: _draw_heat(axes, recording.setup.arena, poses),
         "readings": lambda axes: _draw_readings(axes, recording.table("readings", robot)),
         "speeds": lambda axes: _draw_speeds(axes, wheels[wheels["robot"] == robot]),
         "time": lambda axes: _draw_time(axes, recording, robot),
     }
+
+
+def _draw_nothing(axes: Any) -> None:
+    axes.set_axis_off()
+    _write_in(axes, NO_ROBOT)
+
+
+def _write_in(axes: Any, text: str) -> None:
+    """Write in the middle of axes why they are empty."""
+    axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", color="gray")
 
 
 def _draw_arena(axes: Any, arena: Arena) -> None:
@@ -176,7 +194,7 @@ def _draw_paths(axes: Any, recording: Recording, poses: Table, wheels: Table) ->
         )
     axes.set_xlim(0, setup.arena.width_mm)
     axes.set_ylim(0, setup.arena.height_mm)
-    if len(recording.robots) <= 6:
+    if 1 <= len(recording.robots) <= 6:
         legend = axes.legend(fontsize="x-small", loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
         legend.set_in_layout(False)
 
@@ -205,7 +223,7 @@ def _draw_readings(axes: Any, table: Table) -> None:
     if len(table):
         _legend_above(axes, 8)
     else:
-        axes.text(0.5, 0.5, "no command N", transform=axes.transAxes, ha="center", va="center", color="gray")
+        _write_in(axes, "no command N")
 
 
 def _draw_speeds(axes: Any, table: Table) -> None:

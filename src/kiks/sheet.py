@@ -13,6 +13,7 @@ import numpy as np
 
 from kiks.engine.state import BALL
 from kiks.model.arena import PAD, Arena
+from kiks.model.robot_parts import Body
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -27,7 +28,13 @@ FINER = 2
 LAMP_MM = 18.0
 """How far a lamp reaches without its light [mm]."""
 
-FLOOR, INK, WHITE = (246, 243, 236), (30, 34, 40), (255, 255, 255)
+STRIPES_MM = 3.0
+"""How wide stripes around a robot are seen from above [mm]."""
+
+ROUND_RAD = 0.05
+"""Largest angle between two corners of a drawn arc [rad]."""
+
+FLOOR, INK, BLACK, WHITE = (246, 243, 236), (30, 34, 40), (0, 0, 0), (255, 255, 255)
 
 _ONE_ROBOT = (38, 84, 60)
 _PATH_BEGIN, _PATH_END = (66, 135, 245), (220, 60, 60)
@@ -167,9 +174,10 @@ class Sheet:
         else:
             self.disc(place, 0.62 * radius_mm, None, outline=(*WHITE, 110), width=self.pixels(1.2))
 
-    def robot(self, pose: Sequence[float], radius_mm: float, colour: Colour, name: str) -> None:
-        """Draw a robot from above: two wheels, a nose that shows its heading, and its number."""
+    def robot(self, pose: Sequence[float], body: Body, colour: Colour, name: str) -> None:
+        """Draw a robot from above: stripes, two wheels, a nose that shows its heading, and its number."""
         x_mm, y_mm, heading = pose
+        radius_mm = body.radius_mm
         ahead, aside = (math.cos(heading), math.sin(heading)), (-math.sin(heading), math.cos(heading))
 
         def at(forwards: float, sideways: float) -> Place:
@@ -179,6 +187,13 @@ class Sheet:
             return self.point((x, y_mm + along_mm * ahead[1] + across_mm * aside[1]))
 
         self.disc((x_mm, y_mm), radius_mm, colour, outline=INK, width=self.pixels(1.0))
+        if body.stripe_count:
+            self.disc((x_mm, y_mm), radius_mm, BLACK)
+            for begin, end in body.white_stripes_rad:
+                angles_rad = np.linspace(begin, end, 2 + int((end - begin) / ROUND_RAD)).tolist()
+                rim = [at(math.cos(angle), math.sin(angle)) for angle in angles_rad]
+                self.pen.polygon([at(0.0, 0.0), *rim], fill=WHITE)
+            self.disc((x_mm, y_mm), radius_mm - STRIPES_MM, colour)
         for side in (-1, 1):
             wheel = [at(0.35, 0.92 * side), at(0.35, 0.72 * side), at(-0.35, 0.72 * side), at(-0.35, 0.92 * side)]
             self.pen.polygon(wheel, fill=INK)

@@ -245,6 +245,28 @@ def test_applying_settings_restarts_the_world(visitor: Visitor) -> None:
     visitor.picture("another_world")
 
 
+def test_all_robots_may_be_removed(visitor: Visitor) -> None:
+    old = visitor.sim
+    visitor.tab("settings")
+    buttons = visitor.page.get_by_role("button", name="Remove", exact=True).and_(visitor.page.locator(".q-btn--round"))
+    for left in (1, 0):
+        buttons.first.click()
+        expect(buttons).to_have_count(left)
+    visitor.at("apply").click()
+    visitor.told("Restarted with these settings.")
+    assert visitor.sim is not old
+    assert visitor.sim.robot_count == 0
+    visitor.page.wait_for_function("() => kiksDesk.scene().robots.length === 0")
+    for tab in ("robot", "wire", "programs"):
+        visitor.at(f"tab-{tab}").click()
+        expect(visitor.at(f"tab-{tab}")).to_have_attribute("aria-selected", "true")
+    visitor.picture("no_robot")
+    visitor.tab("settings")
+    visitor.at("add-robot").click()
+    visitor.at("apply").click()
+    visitor.page.wait_for_function("() => kiksDesk.scene().robots.length === 1 && kiksDesk.pose(0)")
+
+
 def test_wrong_setting_gets_a_clear_message(visitor: Visitor) -> None:
     old = visitor.sim
     visitor.tab("settings")

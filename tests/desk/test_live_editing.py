@@ -128,7 +128,6 @@ def test_refused_edits_change_nothing(desk):
         await refused(editing.draw(lambda sketch: sketch.rectangle(90, 90, 110, 110)), "robot 1")
         await refused(editing.place(Ball(100, 100)), "robot 1")
         await refused(editing.remove(250, 20), "nothing")
-        await refused(editing.remove(100, 100), "only one")
         await refused(editing.place(SketchRobot(250, 200, 0.0, "kepera")), "Did you mean")
 
     asyncio.run(do())
@@ -229,6 +228,23 @@ def test_adding_a_robot_restarts_the_world(desk):
         assert counts(desk) == (1, 2, 1)
         assert not desk.sim.arena.brightness[100, 200]
         assert not editing.can_undo
+
+    asyncio.run(do())
+
+
+def test_the_last_robot_may_go_and_come_back(desk):
+
+    async def do() -> None:
+        editing = Editing(desk)
+        await editing.remove(100, 100)
+        assert counts(desk) == (0, 2, 1)
+        assert desk.project.robots == ()
+        await editing.draw(lambda sketch: sketch.rectangle(90, 90, 110, 110))
+        await editing.undo()
+        await editing.undo()
+        assert desk.names() == ["Ada"]
+        assert desk.sim.pose(1)[:2] == (100, 100)
+        assert len(desk.sim.wires[0].firmware.fitted) == 1
 
     asyncio.run(do())
 

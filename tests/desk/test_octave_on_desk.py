@@ -126,6 +126,18 @@ def test_what_is_typed_on_the_desk_is_evaluated_in_octave(terminal: Terminal, ne
     assert terminal.sessions() == []
 
 
+def test_a_line_of_the_log_is_replaced(terminal: Terminal, new_page: NewPage) -> None:
+    page = begin(terminal, new_page)
+    page.get_by_test_id("tab-octave").click()
+    log = page.get_by_test_id("log")
+    terminal.type("kiks_status('first'), kiks_status('1 of 9')")
+    expect(log).to_contain_text("1 of 9")
+    terminal.type("kiks_status('2 of 9', 0, 1), kiks_status('9 of 9', 0, 1), kiks_status('last')")
+    expect(log).to_contain_text("last")
+    expect(log).to_have_text(re.compile(r"first[\s\d:]+ 9 of 9[\s\d:]+ last\s*$"))
+    expect(page.locator(".desk-hint")).to_contain_text("last")
+
+
 def test_places_and_sensors_are_those_of_octave(terminal: Terminal, new_page: NewPage) -> None:
     page = begin(terminal, new_page)
     terminal.type("here = kiks_siminfo_robotpos;")

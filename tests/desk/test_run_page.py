@@ -224,6 +224,24 @@ def test_a_run_without_time_becomes_a_page(tmp_path: Path) -> None:
     assert "0.000 s of simulated time" in Tags(page_of(tmp_path / "none.mcap", tmp_path)).text
 
 
+@pytest.fixture
+def lonely(tmp_path: Path) -> Path:
+    """A recording of a ball in a world without a robot."""
+    sim = Simulation(Arena.box(300, 300), seed=1, robots=0)
+    with sim.record(tmp_path / "lonely.mcap"):
+        sim.move_body(sim.add_ball(100, 100), 100, 100, speed_mm_s=100.0)
+        sim.run(2.0)
+    return tmp_path / "lonely.mcap"
+
+
+def test_a_run_without_a_robot_says_so(lonely: Path) -> None:
+    found = Tags(page_of(lonely, lonely.parent))
+    assert found.text.count("There was no robot in this run.") == 1
+    assert "no robot" in found.text
+    assert [attrs["class"] for tag, attrs in found.tags if tag == "figure"] == ["paths"]
+    assert "The wire" not in found.text
+
+
 def test_mistakes_are_told(short: Path, tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match=r"robot must be .*from 1 to 1"):
         page_of(short, tmp_path, robot=2)
@@ -379,6 +397,20 @@ def test_a_narrow_page_and_one_without_time_fit(tmp_path: Path, rich: Path, visi
             "() => document.getElementById('facts').textContent.includes(kiksPage.feed.frame.robot(0).x_mm.toFixed(1))"
             " && kiksPage.player._shown_s === kiksPage.feed.end_s"
         )
+
+
+@pytest.mark.slow
+def test_the_player_shows_a_world_without_a_robot(lonely: Path, visit: Callable[..., Page]) -> None:
+    from tests.desk.visitor import SCREENSHOTS
+
+    SCREENSHOTS.mkdir(exist_ok=True)
+    page = visit(page_of(lonely, lonely.parent))
+    assert "There was no robot in this run." in page.locator("#monitor").inner_text()
+    assert not page.locator("#robot").is_visible()
+    assert not page.locator("#follow").is_visible()
+    page.evaluate("kiksPage.player.seek(kiksPage.feed.end_s)")
+    page.wait_for_function("() => kiksPage.player._shown_s === kiksPage.feed.end_s")
+    page.screenshot(path=SCREENSHOTS / "page_without_a_robot.png", full_page=True)
 
 
 @pytest.mark.slow

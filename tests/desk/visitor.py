@@ -37,7 +37,7 @@ Fact = TypeVar("Fact")
 
 
 def make_project() -> Project:
-    """Return two robots, a ball, a cylinder and a lamp in a room of 600 by 400 mm."""
+    """Return two robots, of which the second has stripes, a ball, a cylinder and a lamp in a room of 600 by 400 mm."""
     plain = Arena.box(600, 400)
     arena = Arena(
         plain.brightness,
@@ -48,7 +48,8 @@ def make_project() -> Project:
         balls=(Ball(300, 100),),
         cylinders=(Cylinder(450, 100),),
     )
-    return Project(arena, robots=(ProjectRobot(turrets=("k213",)), ProjectRobot(turrets=("gripper",))), seed=3)
+    striped = ProjectRobot(turrets=("gripper",), changes={"body": {"stripe_count": 8}})
+    return Project(arena, robots=(ProjectRobot(turrets=("k213",)), striped), seed=3)
 
 
 def open_desk(folder: Path, project: Project | None = None, commands: Sequence[Command | None] = ()) -> Shown:

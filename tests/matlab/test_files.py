@@ -374,3 +374,40 @@ def test_world_without_a_robot_gets_one_when_it_is_needed(tmp_path):
     project = Project.load(tmp_path / "empty.kiks")
     assert project.robots == ()
     assert len(project.arena.starts) == 1
+
+
+DIALOG = """
+function [name, folder] = {name}(kinds, title)
+    global choice
+    say('{name}', [strjoin(kinds(:, 1)', ' ') '|' title])
+    [name, folder] = choice{{:}};
+end
+"""
+
+DIALOGS = """
+global choice
+kiks(zeros(300))
+choice = {'other.kad', fullfile(pwd(), 'there')};
+mkdir('there')
+kiks_save
+kiks_arena(zeros(200))
+kiks_load
+kiks_save('loaded.kiks')
+choice = {0, 0};
+kiks_load
+kiks_save
+kiks_save('same.kiks')
+"""
+
+
+def test_dialogs_ask_for_files(tmp_path):
+    """The dialogs' own functions are replaced here."""
+    for name in ("uigetfile", "uiputfile"):
+        (tmp_path / f"{name}.m").write_text(DIALOG.format(name=name))
+    (tmp_path / "have_window_system.m").write_text("function yes = have_window_system()\nyes = true;\nend\n")
+    said = run(DIALOGS, tmp_path).said
+    assert said["uigetfile"] == "*.toml;*.kiks;*.kad;*.tif;*.tiff;*.png;*.bmp;*.pgm;*.pbm;*.ppm|Load an arena"
+    assert said["uiputfile"] == "*.kiks *.toml *.kad|Save the world"
+    assert (tmp_path / "there" / "other.kad").exists()
+    assert Project.load(tmp_path / "loaded.kiks").arena.width_mm == 300
+    assert Project.load(tmp_path / "same.kiks").arena.width_mm == 300, "no choice changes nothing"

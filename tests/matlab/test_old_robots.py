@@ -140,3 +140,10 @@ def test_constants_of_the_old_simulator_change_robots(tmp_path: Path) -> None:
     assert "KIKS_K213_NOISE must be a share [%] from 0 to 100, but it was 101." in octave.said["noise"]
     assert "a number of stripes from -1 to -100, or [], but it was -101." in octave.said["stripes"]
     assert not [line for line in octave.lines if "effect" in line]
+
+
+def test_a_response_with_sensors_of_its_own_says_so(tmp_path: Path) -> None:
+    write(tmp_path / "mine.m")
+    octave = run("global KIKS_ROBOT KIKS_RESPONSE\nKIKS_ROBOT = 'mine'; KIKS_RESPONSE = 'thesis'; kiks, kiks", tmp_path)
+    told = "has places, directions and a range of its own for the sensors: those of the robot's file have no effect."
+    assert [line for line in octave.lines if "KIKS_RESPONSE" in line] == [f"KIKS_RESPONSE = 'thesis' {told}"]

@@ -83,6 +83,28 @@ kiks_quit(1)
     assert "kiks_preferences:" not in done.text
 
 
+READINGS = """\
+file = fopen('readings', 'a');
+fprintf(file, 'x');
+fclose(file);
+"""
+
+
+def test_the_opening_of_a_port_reads_them_once(tmp_path: Path) -> None:
+    """With and without a session."""
+    (tmp_path / "kiks_preferences.m").write_text(READINGS, encoding="utf-8")
+    said = run(
+        """
+kiks_kopen([-1 9600 1]);
+say('with_the_world', numel(fileread('readings')))
+kiks_kopen([-2 9600 1]);
+say('in_a_session', numel(fileread('readings')))
+""",
+        tmp_path,
+    ).said
+    assert said == {"with_the_world": 1, "in_a_session": 2}
+
+
 def test_a_function_that_fails_is_named(tmp_path: Path) -> None:
     (tmp_path / "kiks_preferences.m").write_text("function kiks_preferences\nnothing_like_that(1);\n", encoding="utf-8")
     said = run("before = path();\nsay('why', caught(@() kiks()))\nsay('same', strcmp(before, path()))", tmp_path).said

@@ -12,9 +12,11 @@ from hypothesis import strategies as st
 from kiks.cli.options import load_arena
 from kiks.errors import ArenaError, KiksError, ParameterError
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
+from kiks.model.arena_objects import THINGS_MAX
 from kiks.model.atomic_files import check_relative, inside
+from kiks.model.checks import ROBOTS_MAX
 from kiks.model.kad import save_kad
-from kiks.model.project import THINGS_MAX, TURRETS, Project, ProjectRobot
+from kiks.model.project import TURRETS, Project, ProjectRobot
 from kiks.model.raster_text import box_keys_of
 from kiks.model.robot import RESPONSES, RobotSpec
 from kiks.sim.from_project import project_of, simulation_of
@@ -159,7 +161,7 @@ BASE = "kiks = 1\n[walls]\nsize_mm = [300, 300]\n"
         (BASE + "[[robot]]\nprogram = '/bin/a.py'\n", "program"),
         (BASE + "[[robot]]\nprogram = 7\n", "program"),
         (BASE + "[[robot]]\narguments = [7]\n", r"robot 1: arguments\[0\] must be a text"),
-        (BASE + "[[robot]]\n" * (THINGS_MAX + 1), "robot must be a list of 0 to 1000 tables"),
+        (BASE + "[[robot]]\n" * (ROBOTS_MAX + 1), "robot must be a list of 0 to 1000 tables"),
         (BASE + "[[lamp]]\nat_mm = [5, 5]\n" * (THINGS_MAX + 1), "lamp must be a list of 0 to 1000 tables"),
         (BASE + "[[ball]]\nat_mm = [5, 5]\n", "ball 1"),
         (BASE + "png = 'aaaa'\n", "either"),

@@ -243,7 +243,6 @@ def test_the_room_is_that_of_the_arena():
         (lambda s: s.add(Lamp(500, 10)), ArenaError, "inside the arena"),
         (lambda s: s.change(1, SketchRobot(5, 5)), ArenaError, "wall"),
         (lambda s: s.change(9, SketchRobot(5, 5)), ParameterError, "There are"),
-        (lambda s: s.remove(1), ParameterError, "at least one robot"),
         (lambda s: s.line([], width_mm=3), ParameterError, "points_mm"),
         (lambda s: s.line([(0, 0)] * (POINTS_MAX + 1), width_mm=3), ParameterError, "points_mm"),
         (lambda s: s.line([(0, math.inf)], width_mm=3), ParameterError, "A point"),

@@ -496,9 +496,9 @@ def test_a_world_without_a_robot_is_made_again_with_the_robot_that_comes(tmp_pat
     assert poses["time_s"].min() >= 1.2 - 1e-9
 
 
-def test_what_needs_a_robot_says_so_where_none_came(tmp_path):
+def test_a_table_of_a_robot_needs_one(tmp_path):
     recording = recorded(Simulation(robots=0), tmp_path / "run.mcap", lambda sim: sim.run(1.0))
     assert check_recording(recording.log).differs_ns is None
     assert len(recording.table("poses")) == 0
     with pytest.raises(ParameterError, match="must have a robot for this, but its world has none"):
-        recording.plot()
+        recording.table("readings", 1)

@@ -16,7 +16,7 @@ from kiks.engine.state import State
 from kiks.errors import ParameterError, shown
 from kiks.model.arena import AnArena, Arena
 from kiks.model.array_checks import check_numbers
-from kiks.model.checks import HEADING_KEPT_RAD, check_count, wrapped
+from kiks.model.checks import HEADING_KEPT_RAD, ROBOTS_MAX, check_count, wrapped
 from kiks.model.data_file import OneOf
 from kiks.model.robot import RobotSpec
 from kiks.sim.simulation import Simulation, check_kinds
@@ -79,7 +79,7 @@ class InitialState:
         self.arenas = list(arena) if isinstance(arena, Iterable) else [arena]
         if not self.arenas or not all(isinstance(each, Arena) for each in self.arenas):
             raise ParameterError(f"arena must be a kiks.Arena or several, but it was {shown(arena)}.")
-        worlds, robots = check_count("worlds", worlds, 1, WORLDS_LIMIT), check_count("robots", robots, 1, 1000)
+        worlds, robots = check_count("worlds", worlds, 1, WORLDS_LIMIT), check_count("robots", robots, 1, ROBOTS_MAX)
         named = _kinds_of(robot, worlds, robots, response)
         self.specs = list(dict.fromkeys(spec for row in named for spec in row))
         numbers = {spec: number for number, spec in enumerate(self.specs)}

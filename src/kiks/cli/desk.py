@@ -16,6 +16,7 @@ from kiks.cli.options import is_project, parse_turret, parse_words, show_log, wi
 from kiks.cli.record import RecordFile, recorded
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import HaltError, ParameterError
+from kiks.model.checks import ROBOTS_MAX
 
 if TYPE_CHECKING:
     from kiks.desk.server.desk import Desk
@@ -37,7 +38,7 @@ def desk(
         str | None,
         typer.Option(help="Project (.kiks), arena file (.toml, .kad) or picture; the classic box if left out."),
     ] = None,
-    robots: Annotated[int | None, typer.Option(help="Robots in the arena.", min=1, max=1000)] = None,
+    robots: Annotated[int | None, typer.Option(help="Robots in the arena.", min=1, max=ROBOTS_MAX)] = None,
     robot: Annotated[
         list[str] | None,
         typer.Option("--robot", help="Kind of robot: khepera, khepera_ii, or a file; once for all, or once for each."),

@@ -13,6 +13,7 @@ import typer
 import kiks
 from kiks.errors import ParameterError, shown
 from kiks.model.atomic_files import check_writable, make_folder
+from kiks.model.checks import ROBOTS_MAX
 
 if TYPE_CHECKING:
     from kiks.learn.champion import Champion
@@ -26,7 +27,7 @@ ArenaFile = Annotated[
 ]
 Robots = Annotated[
     int | None,
-    typer.Option(help="Robots in the arena; as many as a project has, else 1, if left out.", min=1, max=1000),
+    typer.Option(help="Robots in the arena; as many as a project has, else 1, if left out.", min=1, max=ROBOTS_MAX),
 ]
 RobotKinds = Annotated[
     list[str] | None,

@@ -106,7 +106,7 @@ def recorded(
         if picture is not None:
             from kiks.drawing import Trace, save_simulation
 
-            trace = Trace(sim, points_max=max(POINTS_MAX // sim.robot_count, LEAST_POINTS_MAX))
+            trace = Trace(sim, points_max=max(POINTS_MAX // max(sim.robot_count, 1), LEAST_POINTS_MAX))
             at_the_end.callback(save_simulation, sim, picture, trace)
         if csv is not None:
             file = GrowingFile(csv, "--csv")

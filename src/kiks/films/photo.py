@@ -21,9 +21,11 @@ from kiks.films.solid_stage import (
     WALL_MM,
     camera_places,
     robot_top,
+    stripe_greys,
     wall_boxes,
 )
 from kiks.model.checks import check_count
+from kiks.model.robot_parts import Body
 from kiks.recording.moments import Moment, moments
 from kiks.recording.recording import Recording
 from kiks.sheet import FLOOR, INK, Colour, robot_colour, tint
@@ -117,7 +119,7 @@ class _Scene:
         for body in moment.bodies:
             self._add_body(body)
         for index, (pose, spec) in enumerate(zip(moment.poses.tolist(), moment.setup.specs, strict=False)):
-            self._add_robot(pose, spec.body.radius_mm, robot_colour(index, len(moment.poses)), str(index + 1))
+            self._add_robot(pose, spec.body, robot_colour(index, len(moment.poses)), str(index + 1))
 
     def aim(self, size: tuple[int, int], follow: int | None, zoom: float, samples: int) -> None:
         """Put the camera up."""
@@ -156,9 +158,16 @@ class _Scene:
         else:
             self._add_upright(place, radius_mm, low_mm, low_mm + CYLINDER_MM, tint(body))
 
-    def _add_robot(self, pose: list[float], radius_mm: float, colour: Colour, name: str) -> None:
+    def _add_robot(self, pose: list[float], body: Body, colour: Colour, name: str) -> None:
         x_mm, y_mm, heading_rad = pose
+        radius_mm = body.radius_mm
         self._add_upright((x_mm, y_mm), 0.97 * radius_mm, CHASSIS_MM, ROBOT_MM, colour)
+        if body.stripe_count:
+            stripes = self._bitmap(np.repeat(stripe_greys(body)[np.newaxis, :, np.newaxis], 3, axis=2))
+            paint = {"type": "diffuse", "reflectance": stripes | {"filter_type": "nearest"}}
+            place = self._place().translate((x_mm, y_mm, CHASSIS_MM)).rotate((0, 0, 1), math.degrees(heading_rad))
+            place = place.scale((0.98 * radius_mm, 0.98 * radius_mm, ROBOT_MM - CHASSIS_MM))
+            self._add("cylinder", to_world=place, bsdf={"type": "twosided", "paint": paint})
         aside = -math.sin(heading_rad), math.cos(heading_rad), 0.0
         wheel_mm, width_mm = ROBOT_MM / 4, 0.2 * radius_mm
         for side in (-1.0, 1.0):
@@ -169,7 +178,7 @@ class _Scene:
             self._add("cylinder", to_world=axle.scale((wheel_mm, wheel_mm, width_mm)), bsdf=_two_sided(INK))
             rim = axle.translate((0.0, 0.0, width_mm)).scale((wheel_mm, wheel_mm, 1.0))
             self._add("disk", to_world=rim, bsdf=_two_sided(INK))
-        top = robot_top(radius_mm, colour, name)
+        top = robot_top(body, colour, name)[::-1]  # row 0 of a bitmap is at the bottom
         place = self._place().translate((x_mm, y_mm, ROBOT_MM + 0.3)).rotate((0, 0, 1), math.degrees(heading_rad))
         paint = {"type": "diffuse", "reflectance": self._bitmap(top[..., :3])}
         mask = {"type": "mask", "opacity": self._bitmap(top[..., 3:]), "nested": {"type": "twosided", "paint": paint}}

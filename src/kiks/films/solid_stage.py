@@ -17,6 +17,7 @@ from kiks.engine.state import BALL
 from kiks.errors import library
 from kiks.films.stage import OUTSIDE, Canvas, Ground, Pixels
 from kiks.model.arena import Arena
+from kiks.model.robot_parts import Body
 from kiks.recording.moments import Moment
 from kiks.sheet import INK, Colour, robot_colour, tint
 
@@ -130,7 +131,7 @@ class SolidStage:
                 self._renderer.RemoveActor(actor)
             specs = moment.setup.specs
             self._robots = [
-                self._robot(spec.body.radius_mm, robot_colour(index, count), str(index + 1))
+                self._robot(spec.body, robot_colour(index, count), str(index + 1))
                 for index, spec in zip(range(count), specs, strict=False)
             ]
             for actor in self._robots:
@@ -139,12 +140,14 @@ class SolidStage:
             actor.SetPosition(x_mm, y_mm, 0.0)
             actor.SetOrientation(0.0, 0.0, math.degrees(heading_rad))
 
-    def _robot(self, radius_mm: float, colour: Colour, name: str) -> Any:
+    def _robot(self, shape: Body, colour: Colour, name: str) -> Any:
         """Return a robot at the origin that heads along x."""
-        vtk = self._vtk
+        vtk, radius_mm = self._vtk, shape.radius_mm
         robot = vtk.vtkAssembly()
         wheel_mm = 0.5 * ROBOT_MM
         body = self._upright(0.97 * radius_mm, ROBOT_MM - CHASSIS_MM, colour)
+        if shape.stripe_count:
+            self._paint_stripes(body, shape)
         body.SetPosition(0.0, 0.0, (CHASSIS_MM + ROBOT_MM) / 2)
         robot.AddPart(body)
         for side in (-1, 1):
@@ -156,12 +159,22 @@ class SolidStage:
             set_corner(corner[0] * radius_mm, corner[1] * radius_mm, ROBOT_MM + 0.5)
         texture = vtk.vtkTexture()
         texture.InterpolateOn()
-        texture.SetInputData(self._image(robot_top(radius_mm, colour, name)))
+        texture.SetInputData(self._image(robot_top(shape, colour, name)))
         part = self._actor(top)
         part.SetTexture(texture)
         part.GetProperty().LightingOff()
         robot.AddPart(part)
         return robot
+
+    def _paint_stripes(self, upright: Any, shape: Body) -> None:
+        """Paint the stripes of a robot on an upright cylinder."""
+        mapper, greys = upright.GetMapper(), stripe_greys(shape)
+        mapper.GetInputAlgorithm().SetResolution(len(greys))
+        mapper.Update()
+        # Its faces begin ahead; its two ends are the last ones.
+        colours = np.repeat(np.append(greys, [0, 0]).astype(np.uint8), 3).reshape(-1, 3)
+        mapper.GetInput().GetCellData().SetScalars(self._numpy.numpy_to_vtk(colours, deep=True))
+        mapper.SetScalarModeToUseCellData()
 
     def _place_bodies(self, moment: Moment) -> None:
         numbers = {int(body["number"]) for body in moment.bodies}
@@ -258,12 +271,23 @@ def camera_places(
     return (x_mm, y_mm, ROBOT_MM), (x_mm, y_mm - away_mm * cosine, ROBOT_MM + away_mm * sine)
 
 
-def robot_top(radius_mm: float, colour: Colour, name: str) -> Pixels:
+def stripe_greys(body: Body) -> NDArray[np.uint8]:
+    """Return the greys of equal parts around a striped body, counter-clockwise from ahead, uint8 [part]."""
+    each = 4 * body.stripe_count
+    count = each * -(-ROUND // each)
+    middles_rad = (np.arange(count) + 0.5) * (2 * math.pi / count)
+    begins_rad, ends_rad = np.array(body.white_stripes_rad).T[..., np.newaxis]
+    is_white = ((begins_rad < middles_rad) & (middles_rad < ends_rad)).any(axis=0)
+    return np.where(is_white, 255, 0).astype(np.uint8)
+
+
+def robot_top(body: Body, colour: Colour, name: str) -> Pixels:
     """Return how a robot that heads to the right looks from above, with a fourth part that says where it is."""
+    radius_mm = body.radius_mm
     scale = TOP_PIXELS / (2 * radius_mm)
     canvas = Canvas(np.zeros((TOP_PIXELS, TOP_PIXELS, 3), np.uint8), scale, -radius_mm, radius_mm)
     with canvas.patch([(0.0, 0.0)], radius_mm) as sheet:
-        sheet.robot((0.0, 0.0, 0.0), radius_mm, colour, name)
+        sheet.robot((0.0, 0.0, 0.0), body, colour, name)
     rows, columns = np.indices((TOP_PIXELS, TOP_PIXELS)) - (TOP_PIXELS - 1) / 2
     return np.dstack([canvas.pixels, np.uint8(255) * (np.hypot(rows, columns) < TOP_PIXELS / 2 - 1)])
 

@@ -203,7 +203,7 @@ class Stage:
                 sheet.body(body)
         for index, (pose, spec) in enumerate(zip(moment.poses.tolist(), moment.setup.specs, strict=False)):
             with view.patch([pose[:2]], spec.body.radius_mm) as sheet:
-                sheet.robot(pose, spec.body.radius_mm, robot_colour(index, len(moment.poses)), str(index + 1))
+                sheet.robot(pose, spec.body, robot_colour(index, len(moment.poses)), str(index + 1))
 
     def _view(self, moment: Moment, picture: Pixels) -> Canvas:
         """Return a canvas of the picture, with what the camera sees of the base."""

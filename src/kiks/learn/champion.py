@@ -18,7 +18,7 @@ from kiks.control.controllers import controller_of, recipe_for
 from kiks.model.arena import Arena
 from kiks.model.arena_file import quoted
 from kiks.model.atomic_files import inside, path_of, replace_files
-from kiks.model.checks import check_count
+from kiks.model.checks import ROBOTS_MAX, check_count
 from kiks.model.data_file import Number, Rule, Text, Whole, as_list, check, parse_toml, read_file, record
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, robot_names, robot_toml, specs_of
@@ -150,7 +150,7 @@ class Champion:
         """
         project = self.world if arena is None and self.world is not None else Project(arena or Arena.default())
         there = project.robots or (ProjectRobot(),)
-        count = len(there) if robots is None else check_count("robots", robots, 1, 1000)
+        count = len(there) if robots is None else check_count("robots", robots, 1, ROBOTS_MAX)
         named = (*there, *there[-1:] * count)[:count]
         project = replace(project, robots=named, seed=project.seed if seed is None else seed)
         think_s = self.timing.think_s

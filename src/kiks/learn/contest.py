@@ -26,8 +26,8 @@ from kiks.learn.candidate_worlds import (
     starts_of,
 )
 from kiks.learn.evaluation import Floats, Integers, check_candidates
-from kiks.learn.task import MEASURES_MAX, ROBOTS_MAX, SPREAD, WORLDS_MAX, Seconds
-from kiks.model.checks import check_number
+from kiks.learn.task import MEASURES_MAX, SPREAD, WORLDS_MAX, Seconds
+from kiks.model.checks import ROBOTS_MAX, check_number
 from kiks.model.data_file import Number, Rule, Text, Whole, read_file, record
 from kiks.model.robot import RobotSpec
 

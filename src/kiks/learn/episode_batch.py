@@ -72,7 +72,7 @@ class Episodes:
             measures=(spec.reward, path_mm, contacts, *goals),
         )
         self._goal_note = spec.reward.note_count + 2 if goals else None
-        self._radius_mm = self.batch.specs[0].body.radius_mm
+        self._body = self.batch.specs[0].body
         self._places = [self._free_places(arena) for arena in self.batch.arenas] if spec.starts == "random" else []
         self._sensors = np.zeros((worlds, robots, spec.sensor_count))
         self._most = np.concatenate([np.full(SENSES[name].size, SENSES[name].most) for name in spec.senses])
@@ -154,18 +154,16 @@ class Episodes:
     def picture(self, world: int) -> NDArray[np.uint8]:
         """Return a world from above, uint8 [row, column, 3]."""
         batch = self.batch
-        radii_mm = [self._radius_mm] * batch.robot_count
+        robots = [self._body] * batch.robot_count
         bodies: Any = batch.state.bodies[world]
         arena = batch.arenas[batch.arena_indices[world]]
-        drawn = draw_world(
-            arena, batch.lamps[world], bodies, batch.poses[world], radii_mm, longest_side=PICTURE_SIDE_PX
-        )
+        drawn = draw_world(arena, batch.lamps[world], bodies, batch.poses[world], robots, longest_side=PICTURE_SIDE_PX)
         return np.asarray(drawn)
 
     # ---- inside ----
 
     def _free_places(self, arena: Any) -> NDArray[np.float64]:
-        return random_starts(arena, PLACE_COUNT, seed=0, radius_mm=self._radius_mm, clear_mm=CLEAR_MM)
+        return random_starts(arena, PLACE_COUNT, seed=0, radius_mm=self._body.radius_mm, clear_mm=CLEAR_MM)
 
     def _draw_starts(self, world: int, rng: np.random.Generator) -> list[list[float]]:
         """Return start poses of a world's robots that do not overlap.
@@ -174,7 +172,7 @@ class Episodes:
             ParameterError: If the arena has not enough room.
         """
         places = self._places[self.batch.arena_indices[world]]
-        distance_min_mm = 2 * self._radius_mm + CLEAR_MM
+        distance_min_mm = 2 * self._body.radius_mm + CLEAR_MM
         taken: list[list[float]] = []
         for _ in range(100 * self.batch.robot_count):
             pose = places[rng.integers(len(places))].tolist()

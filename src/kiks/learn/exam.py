@@ -23,7 +23,7 @@ from kiks.learn.candidate_worlds import check_even, spread_starts
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats
 from kiks.model.arena import Arena
-from kiks.model.arena_file import THINGS_MAX
+from kiks.model.arena_objects import THINGS_MAX
 from kiks.model.checks import check_kind
 from kiks.model.data_file import Number, Text, Whole, record
 from kiks.model.family import family

@@ -30,7 +30,7 @@ from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats, Integers, check_candidates
 from kiks.learn.exam import Exam, world_of
 from kiks.model.arena import Pose
-from kiks.model.checks import check_count, check_number
+from kiks.model.checks import ROBOTS_MAX, check_count, check_number
 from kiks.model.data_file import Number, OneOf, Rule, Text, Whole, read_file, record
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, specs_of
@@ -42,8 +42,8 @@ SPREAD = 3.0
 """Standard deviation of each parameter at the beginning: three times the usual scale of controllers, so that some of
 the first candidates react sharply."""
 
-WORLDS_MAX, ROBOTS_MAX, MEASURES_MAX = 100_000, 1000, 100
-"""Largest number of worlds of a candidate, of robots in each world, and of measures."""
+WORLDS_MAX, MEASURES_MAX = 100_000, 100
+"""Largest number of worlds of a candidate, and of measures."""
 
 Seconds = Annotated[Number, Field(ge=1e-3, le=1e6)]
 

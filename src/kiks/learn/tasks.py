@@ -16,9 +16,10 @@ from kiks.control.controllers import controller_of
 from kiks.errors import KiksError, ParameterError, nearest, shown
 from kiks.learn.ready_contests import CONTESTS, football, pursuit
 from kiks.learn.ready_tasks import TASKS, avoid, disperse, follow, gather, light, maze
-from kiks.learn.task import ROBOTS_MAX, WORLDS_MAX, Seconds, Task
+from kiks.learn.task import WORLDS_MAX, Seconds, Task
 from kiks.model.arena import Arena
 from kiks.model.atomic_files import inside, path_of
+from kiks.model.checks import ROBOTS_MAX
 from kiks.model.data_file import OneOf, Rule, Text, Whole, check, parse_toml, read_file, record
 from kiks.model.robot import robot_names
 

@@ -15,15 +15,12 @@ from pydantic import Field
 
 from kiks.errors import ArenaError, KiksError, ParameterError
 from kiks.model.arena import Arena
-from kiks.model.arena_objects import Ball, Brightness, Cylinder, Friction, Lamp, Pose, Power, Radius
+from kiks.model.arena_objects import THINGS_MAX, Ball, Brightness, Cylinder, Friction, Lamp, Pose, Power, Radius
 from kiks.model.atomic_files import path_of, replace_files, within
 from kiks.model.box import PartMm, SideMm
 from kiks.model.data_file import Coordinate, Number, Point, Rule, Switch, Text, check, parse_toml, read_file, record
 from kiks.model.picture import read_picture
 from kiks.model.raster import MM_PER_PIXEL_MAX, MM_PER_PIXEL_MIN
-
-THINGS_MAX = 1000
-"""Most starts, lamps, balls and cylinders of a file, each."""
 
 Pitch = Annotated[
     Number,

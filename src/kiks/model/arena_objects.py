@@ -14,6 +14,9 @@ from kiks.errors import ArenaError, ParameterError, shown
 from kiks.model.data_file import Coordinate, Number, Switch, Whole, check
 from kiks.model.materials import brightness_of
 
+THINGS_MAX = 1000
+"""Most starts, lamps, balls and cylinders of a file, each."""
+
 Brightness = Annotated[
     Whole,
     BeforeValidator(brightness_of, json_schema_input_type=int | str),

@@ -11,6 +11,9 @@ from typing import TypeVar
 
 from kiks.errors import ParameterError, shown
 
+ROBOTS_MAX = 1000
+"""Most robots of a world."""
+
 SECONDS_MAX = 1e9
 """Longest time that may pass at once [s]: a clock of 64 bits counts nine of them in nanoseconds."""
 

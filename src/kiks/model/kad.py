@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from kiks.errors import ArenaError, KiksError, shown
 from kiks.model.arena import Arena
-from kiks.model.arena_objects import Ball, Cylinder, Lamp, Pose
+from kiks.model.arena_objects import THINGS_MAX, Ball, Cylinder, Lamp, Pose
 from kiks.model.array_checks import Numbers, check_array
 from kiks.model.atomic_files import path_of, replace_file
 from kiks.model.data_file import COORDINATE_MAX, read_file
@@ -32,9 +32,6 @@ WALLS_MAX = 2 + 10 * PIECES_MAX
 
 PAINTED_MAX = 16
 """Largest painted area of all pieces of a file together, in areas of the arena."""
-
-THINGS_MAX = 1000
-"""Most starts, lamps, balls and cylinders, of each."""
 
 _THINGS: dict[str, tuple[type[Any], int]] = {
     "starts": (Pose, 3),

@@ -14,7 +14,6 @@ from pydantic import AfterValidator, Field
 from kiks.errors import ArenaError, KiksError, ParameterError, nearest, shown
 from kiks.model.arena import AnArena, Arena
 from kiks.model.arena_file import (
-    THINGS_MAX,
     Balls,
     Cylinders,
     Lamps,
@@ -25,7 +24,9 @@ from kiks.model.arena_file import (
     places_of,
     quoted,
 )
+from kiks.model.arena_objects import THINGS_MAX
 from kiks.model.atomic_files import check_relative, path_of, replace_file
+from kiks.model.checks import ROBOTS_MAX
 from kiks.model.data_file import (
     Number,
     OneOf,
@@ -119,7 +120,7 @@ class ProjectRobot:
     changes: dict[str, dict[str, Change]] = Field(default_factory=dict)
 
 
-Robots = Annotated[tuple[ProjectRobot, ...], Field(max_length=THINGS_MAX, description="Head each with [[robot]].")]
+Robots = Annotated[tuple[ProjectRobot, ...], Field(max_length=ROBOTS_MAX, description="Head each with [[robot]].")]
 Seed = Annotated[Whole, Field(ge=0, le=2**63 - 1)]
 ThinkingPolicy = Annotated[Text, AfterValidator(_check_thinking)]
 Speed = Annotated[Number, Field(ge=1e-3, le=1e3, description="1 is real time.")]

@@ -12,6 +12,7 @@ from pydantic import Field
 from kiks.errors import ParameterError, nearest, shown
 from kiks.model.arena_file import quoted
 from kiks.model.atomic_files import path_of, replace_file
+from kiks.model.checks import ROBOTS_MAX, check_count
 from kiks.model.data_file import Text, check, parse_toml, read_file, record
 from kiks.model.robot_parts import (
     AMBIENT_MODELS,
@@ -196,12 +197,8 @@ def specs_of(
         ParameterError: If the numbers do not fit each other, or a name is unknown.
     """
     named = [robot] if isinstance(robot, str | RobotSpec) else list(robot)
-    count = len(named) if robots is None else robots
-    least = 1 if robots is None else 0
-    if not isinstance(count, int) or not least <= count <= 1000:
-        raise ParameterError(
-            f"robots must be a whole number from {least} to 1000, but it was {shown(count)}. Say how many you need."
-        )
+    count, least = (len(named), 1) if robots is None else (robots, 0)
+    count = check_count("robots", count, least, ROBOTS_MAX, "Say how many you need.")
     if len(named) not in (1, count):
         raise ParameterError(
             f"robot must name one kind for all or one for each of {count} robots, but it named {len(named)}. "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from typing import Annotated
 
@@ -69,6 +70,12 @@ class Body:
     def radius_mm(self) -> float:
         """Half the diameter [mm]."""
         return self.diameter_mm / 2
+
+    @property
+    def white_stripes_rad(self) -> tuple[tuple[float, float], ...]:
+        """Where each white stripe begins and ends, counter-clockwise from ahead [rad]; between them it is black."""
+        half = math.pi / max(2 * self.stripe_count, 1)
+        return tuple(((4 * k + 1) * half, (4 * k + 3) * half) for k in range(self.stripe_count))
 
 
 @record

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from kiks.errors import ArenaError, KiksError, ParameterError, shown
 from kiks.model.arena import Arena
-from kiks.model.arena_objects import Ball, Cylinder, Lamp, Pose, checked_places
+from kiks.model.arena_objects import THINGS_MAX, Ball, Cylinder, Lamp, Pose, checked_places
 from kiks.model.brush import Area, Point, rectangle_cells, stroke_cells
 from kiks.model.free_disc import OVERLAP_MM, free_place, room_mm
 from kiks.model.materials import brightness_of
@@ -37,9 +37,6 @@ WIDTH_MAX_MM = 1000.0
 
 POINTS_MAX = 10_000
 """Most points of one stroke."""
-
-THINGS_MAX = 1000
-"""Most robots, and most other things."""
 
 _FAR_MM = 1e5
 
@@ -313,11 +310,9 @@ class Sketch:
         """Take a thing away.
 
         Raises:
-            ParameterError: If there is no such thing, or it is the only robot.
+            ParameterError: If there is no such thing.
         """
         thing = self._thing(number)
-        if isinstance(thing, SketchRobot) and len(self.kinds) == 1:
-            raise ParameterError("There must be at least one robot, but this is the only one. Add another one first.")
         self._push(ThingPatch(number, thing))
         del self.things[number]
 

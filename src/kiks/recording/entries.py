@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.errors import ParameterError
-from kiks.model.checks import CLOCK_END_NS
+from kiks.model.checks import CLOCK_END_NS, ROBOTS_MAX
 
 
 class Entry(NamedTuple):
@@ -52,9 +52,6 @@ def block_of(values: Sequence[Any]) -> bytes:
     packed = (numbers.pack(*column) for column in (*columns, map(len, data)))
     return b"".join((_COUNT.pack(len(data)), *packed, *data))
 
-
-ROBOTS_MAX = 1000
-"""Most robots of a world."""
 
 _COLUMN_COUNT = 6
 _COUNT = struct.Struct("<I")

@@ -51,6 +51,11 @@ class RingBuffer(Generic[Item]):
             self._items.append(item)
             self._count += 1
 
+    def replace_last(self, item: Item) -> None:
+        """Put an entry in the place of the newest one; there must be one. Its number stays the same."""
+        with self._lock:
+            self._items[-1] = item
+
     def since(self, number: int) -> tuple[int, list[Item]]:
         """Return the entries from a number on, and the number of the first: larger if some were dropped."""
         with self._lock:

@@ -23,7 +23,7 @@ from kiks.firmware.radio import ATTEMPTS, DATA_LIMIT
 from kiks.firmware.receiver import LINE_LIMIT
 from kiks.firmware.turret import Turret
 from kiks.model.arena import Arena
-from kiks.model.checks import CLOCK_END_NS
+from kiks.model.checks import CLOCK_END_NS, ROBOTS_MAX
 from kiks.model.data_file import Switch, Text, Whole, check, parse_json, parse_toml, record
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import Baud, RobotSpec, robot_toml
@@ -67,8 +67,8 @@ class _SetupFile:
 
     seed: Annotated[Whole, Field(ge=0, le=2**63 - 1)]
     arena: str
-    kinds: Annotated[tuple[str, ...], Field(max_length=1000)]
-    robots: Annotated[tuple[Annotated[Whole, Field(ge=0)], ...], Field(max_length=1000)]
+    kinds: Annotated[tuple[str, ...], Field(max_length=ROBOTS_MAX)]
+    robots: Annotated[tuple[Annotated[Whole, Field(ge=0)], ...], Field(max_length=ROBOTS_MAX)]
     turrets: tuple[tuple[Text | TurretOfUser, ...], ...]
 
 
@@ -192,7 +192,7 @@ class _Head:
 
     now_ns: Annotated[Whole, Field(ge=0, le=CLOCK_END_NS)]
     tick_count: Count
-    robots: Annotated[Whole, Field(ge=0, le=1000)]
+    robots: Annotated[Whole, Field(ge=0, le=ROBOTS_MAX)]
     bodies: Annotated[Whole, Field(ge=0, le=100_000)]
     lamps: Annotated[Whole, Field(ge=0, le=100_000)]
     body_count: Count

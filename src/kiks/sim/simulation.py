@@ -91,7 +91,6 @@ class Simulation:
         if arena is not None:
             _check_arena(arena)
         check_kinds(robot, response)
-        robots = None if robots is None else check_count("robots", robots, 0, 1000, "Say how many you need.")
         seed = check_count("seed", seed, 0, 2**63 - 1, "Any small number will do.")
         self._begin(
             World(Arena.default() if arena is None else arena, specs_of(robot, robots, response), seed), thinking

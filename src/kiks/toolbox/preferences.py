@@ -9,6 +9,7 @@ from typing import Annotated
 from pydantic import BeforeValidator, Field
 
 from kiks.model.arena import Arena
+from kiks.model.checks import ROBOTS_MAX
 from kiks.model.data_file import Number, OneOf, Rule, Switch, Text, Whole, check, record
 from kiks.model.project import TURRETS, Project, ProjectRobot, Seed, ThinkingPolicy
 from kiks.model.robot import Brightness, Response, RobotSpec
@@ -20,7 +21,7 @@ def _words(given: object) -> object:
     return given.split() if isinstance(given, str) else given
 
 
-Count = Annotated[Whole, Field(ge=1, le=1000)]
+Count = Annotated[Whole, Field(ge=1, le=ROBOTS_MAX)]
 Points = Annotated[Whole, Field(ge=2, le=10**6)]
 
 
@@ -49,7 +50,7 @@ class Settings(OldConstants):
     seed: Annotated[Seed, _NUMBER] = 0
     thinking: ThinkingPolicy = "live"
     robot: Text = "khepera"
-    robots: Annotated[Annotated[Whole, Field(ge=0, le=1000)], _NUMBER] | None = None
+    robots: Annotated[Annotated[Whole, Field(ge=0, le=ROBOTS_MAX)], _NUMBER] | None = None
     response: Response | None = None
     noise: Annotated[Switch, SWITCH, Rule("0 or 1")] = True
     turrets: Annotated[

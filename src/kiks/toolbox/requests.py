@@ -46,7 +46,10 @@ PATH_MAX = 4000
 PAUSE_MAX_S = 1e6
 """Longest pause [s]: eleven days."""
 
-HALTED = (
+REFUSED, HALTED = "-", "."
+"""First character of an answer that is an error, and of one to a program that was halted: its ports are closed."""
+
+HALT_MESSAGE = (
     "Simulation halted: Halt was pressed on the desk. The robots stop, and the ports are closed. kiks_kopen opens them "
     "again."
 )
@@ -72,7 +75,7 @@ def answer(client: SessionClient, line: str) -> str:
                 f"a request must have at most {WORDS_MAX} characters, but this one, {shown(name)}, has {len(words)}."
             )
         if client.is_halted and act is not _poll:
-            raise HaltError(HALTED)
+            raise HaltError(HALT_MESSAGE)
         result = act(client, words)
         if len(result) > ANSWER_MAX:
             raise ParameterError(
@@ -80,13 +83,15 @@ def answer(client: SessionClient, line: str) -> str:
                 f"{len(result)}. Ask for less: a path begins anew when the port is opened anew."
             )
         if client.is_halted:
-            raise HaltError(HALTED)
+            raise HaltError(HALT_MESSAGE)
         return f"+{client.clock()}{result}"
     except TurretOrder as asked:
         number, order = asked.args
         return f"?{client.clock()}{number} {escape(order)}"
     except KiksError as error:
-        why = HALTED if client.take_halt() else str(error)
+        if client.take_halt():
+            return f"{HALTED}{client.clock()}{escape(HALT_MESSAGE)}"
+        why = str(error)
     except OSError as error:
         why = f"{shown(name)} must be able to use its file, but is not: {shown(error.strerror)}. Give another."
     except MemoryError:
@@ -96,7 +101,7 @@ def answer(client: SessionClient, line: str) -> str:
         why = f"KiKS itself has failed at {shown(name)}: {shown(error)}. Please tell its makers."
     if len(why) > REASON_MAX:
         why = f"{why[: REASON_MAX // 2]} ... {why[-REASON_MAX // 4 :]}"
-    return f"-{client.clock()}{escape(why)}"
+    return f"{REFUSED}{client.clock()}{escape(why)}"
 
 
 # ---- the desk ----
@@ -176,7 +181,13 @@ def _save(client: SessionClient, words: str) -> str:
 
 
 def _print(client: SessionClient, words: str) -> str:
-    client.session.log(unescape(words))
+    client.last_line = client.session.log(unescape(words))
+    return ""
+
+
+def _print_over(client: SessionClient, words: str) -> str:
+    """Replace what this program has printed last, unless the log has got other lines since."""
+    client.last_line = client.session.log(unescape(words), over=client.last_line)
     return ""
 
 
@@ -281,6 +292,7 @@ REQUESTS: dict[str, Act] = {
     "save": _save,
     "read": lambda client, words: matrix_text(Arena.load(_path(words)).brightness[::-1]),
     "print": _print,
+    "print_over": _print_over,
     "checkpoint": _checkpoint,
     "reset": _reset,
     "record": _record,

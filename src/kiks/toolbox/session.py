@@ -188,10 +188,21 @@ class Session:
         self.log(f">> {command}")
         client.typed.append(command)
 
-    def log(self, text: str) -> None:
-        """Write into the log of the desk, without the token of its address: a page shows that nowhere."""
-        if self.desk is not None:
-            self.desk.note(text.replace(self.url, self.url.partition("?")[0]) if self.url else text)
+    def log(self, text: str, over: int | None = None) -> int:
+        """Write into the log of the desk, without the token of its address: a page shows that nowhere.
+
+        Args:
+            text: The text.
+            over: Number of the line that it replaces if that is still the last one.
+
+        Returns:
+            Number of the last line, for `over`; 0 without a desk.
+        """
+        if self.desk is None:
+            return 0
+        text = text.replace(self.url, self.url.partition("?")[0]) if self.url else text
+        self.desk.note(text, replaces=over is not None and 0 < over == self.desk.log.count)
+        return self.desk.log.count
 
     def trace(self, *, for_new_port: bool = False) -> None:
         """Record the paths of all robots in this world from now on.

@@ -97,6 +97,7 @@ class SessionClient:
         film: The film that it makes of the world; None for none.
         turrets: The names of the turrets that are functions of the program, by their numbers.
         is_halted: Whether Halt was pressed on the desk, and the program does not know yet.
+        last_line: Number of the line of the desk's log that it has printed last; 0 for none.
         typed: Commands for the program to evaluate that people have typed on the desk, the oldest first.
     """
 
@@ -111,6 +112,7 @@ class SessionClient:
         self.film: SessionFilm | None = None
         self.turrets: dict[int, str] = {}
         self.is_halted = False
+        self.last_line = 0
         self.typed: deque[str] = deque()
         self._sim: Simulation | None = None
         self._connection: LocalConnection | None = None

@@ -272,3 +272,6 @@ def test_stripes_are_where_the_angle_on_the_rim_says(count):
                 rim_rad = math.atan2(hit[1], hit[0]) - math.pi - turn_rad
                 if abs(math.cos(count * rim_rad)) > 1e-6:
                     assert brightness == (1 if math.cos(count * rim_rad) > 0 else 255)
+                    stripes_rad = sim.specs[1].body.white_stripes_rad
+                    is_white = any(begin < rim_rad % (2 * math.pi) < end for begin, end in stripes_rad)
+                    assert is_white == (brightness == 255), "pictures have the stripes that sensors see"

@@ -29,6 +29,7 @@ class OctavePanel:
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
         self._next_line = 0
+        self._last_line = ""
         ui.add_css(".kiks-log * { white-space: pre-wrap; overflow-wrap: anywhere }")
         with ui.column().classes("w-full q-pa-sm gap-2"):
             ui.label("Log").classes("text-subtitle2")
@@ -55,10 +56,18 @@ class OctavePanel:
         self._refresh()
 
     def _refresh(self) -> None:
-        first, lines = self._desk.log.since(self._next_line)
-        self._next_line = first + len(lines)
+        # The last line is read again, as a program may have replaced it.
+        first, lines = self._desk.log.since(max(self._next_line - 1, 0))
+        if lines and first == self._next_line - 1:
+            if lines[0] == self._last_line:
+                lines = lines[1:]
+                first += 1
+            else:
+                [*self._rows][-1].delete()
         for line in lines:
             self._rows.push(line)
+            self._last_line = line
+        self._next_line = first + len(lines)
         programs = self._desk.outside.interpreters()
         if programs and programs != self._choice.options:
             kept = self._choice.value if self._choice.value in programs else min(programs)

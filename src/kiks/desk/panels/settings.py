@@ -129,10 +129,8 @@ class SettingsPanel:
             self._rows.append(_RobotRow(robot, len(self._rows) + 1, self._remove))
 
     def _remove(self, row: _RobotRow) -> None:
-        """Remove a robot, unless it is the only one."""
-        if len(self._rows) > 1:
-            self._rows.remove(row)
-            row.element.delete()
+        self._rows.remove(row)
+        row.element.delete()
 
     def _thinking(self) -> str:
         policy = self._policy.value

@@ -99,7 +99,7 @@ def contents_of(recording: Recording, frames: RunFrames, robot: int) -> dict[str
         "kinds": sorted(set(events["kind"].tolist())),
         "moments": [[round(time_s, 3), kind] for time_s, kind in events[["time_s", "kind"]][:MARKS_MAX].tolist()],
         "programs": programs,
-        "wire": _wire(recording.table("wire", robot)),
+        "wire": _wire(recording.table("wire", robot)) if recording.robots else [],
         "command": recording.about.get("command", ""),
         "check": shlex.join(["kiks", "replay", "--check", file]),
         "watch": shlex.join(["kiks", "replay", file]),
@@ -113,7 +113,7 @@ def _arena(recording: Recording) -> str:
 def _kinds(frames: RunFrames) -> str:
     """Return which robots there are in the end."""
     kinds = Counter(spec.name for spec in frames.last.specs)
-    return ", ".join(f"{count} x {kind}" if count > 1 else kind for kind, count in kinds.items())
+    return ", ".join(f"{count} x {kind}" if count > 1 else kind for kind, count in kinds.items()) or "no robot"
 
 
 def _facts(recording: Recording, frames: RunFrames) -> list[tuple[str, str]]:

@@ -18,7 +18,7 @@ from kiks.desk.run_page.bundle import bundle
 from kiks.desk.run_page.contents import contents_of
 from kiks.desk.run_page.run_frames import PERIOD_NS, RunFrames
 from kiks.model.atomic_files import replace_file
-from kiks.plots import panels_of
+from kiks.plots import NO_ROBOT, panels_of
 from kiks.recording.recording import Recording
 from kiks.units import clock_text, s_from_ns
 from kiks.version import __version__
@@ -51,7 +51,7 @@ def save_page(
         recording: The recording.
         path: The page's file.
         title: Its title; the programs' names if left out.
-        robot: Number of the robot whose readings, speeds, time and wire are shown.
+        robot: Number of the robot whose readings, speeds, time and wire are shown; a run without a robot has none.
         on_progress: Called now and then with the share that is done.
 
     Raises:
@@ -76,7 +76,9 @@ def save_page(
         figures=[
             (name, head, text.format(robot=robot), base64.b64encode(figures[name]).decode())
             for name, (head, text) in FIGURES.items()
+            if name in figures
         ],
+        no_robot=NO_ROBOT,
         frames=frames,
         packed=frames.pack(),
         is_coarse=frames.period_ns > PERIOD_NS,

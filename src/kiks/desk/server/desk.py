@@ -225,10 +225,13 @@ class Desk:
         self.news.append(text)
         self.note(text)
 
-    def note(self, text: str) -> None:
-        """Write into the log; from any thread."""
+    def note(self, text: str, *, replaces: bool = False) -> None:
+        """Write into the log, or put the text in the place of its last line; from any thread."""
         now = time.strftime("%H:%M:%S")
-        self.log.add(f"{now} {line}" for line in text.split("\n"))
+        lines = [f"{now} {line}" for line in text.split("\n")]
+        if replaces:
+            self.log.replace_last(lines.pop(0))
+        self.log.add(lines)
 
     async def do(self, act: Callable[[Simulation], Done]) -> Done:
         """Run a function with the locked world between two events, and return or raise its outcome.

@@ -212,7 +212,7 @@ def _describe_robot(sim: Simulation, index: int, name: str) -> dict[str, Any]:
         "kind": spec.name,
         "radius_mm": spec.body.radius_mm,
         "wheel_base_mm": spec.body.wheel_base_mm,
-        "stripe_count": spec.body.stripe_count,
+        "white_stripes_rad": np.round(spec.body.white_stripes_rad, 5).tolist(),
         "reach_mm": float(parameters["reach_mm"]),
         "sensors": [
             {

@@ -104,7 +104,7 @@ class Editing:
         """Remove the thing at a place.
 
         Raises:
-            ParameterError: If no thing is there, or it is the only robot.
+            ParameterError: If no thing is there.
         """
         await self.draw(lambda sketch: sketch.remove(_thing_at(sketch, x_mm, y_mm)))
 

@@ -40,7 +40,7 @@ export class RecordedMonitor {
     this._camera.append(camera);
     this._camera.hidden = true;
     this._facts = facts;
-    this._absent = make("p", "kiks-monitor-empty", "This robot is not there at this time.");
+    this._absent = make("p", "kiks-monitor-empty", root.dataset.absent);
     this._known = make("div", "", around,
       make("p", "kiks-monitor-hint", "Upper number: proximity, 0 to 1023. Lower one: light, less is brighter."),
       make("div", "kiks-wheels", ...bars), make("div", "kiks-curve-choice", ...this._choices, this._note), curves,

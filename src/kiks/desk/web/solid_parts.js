@@ -45,6 +45,14 @@ export function board(radius, height, colour, z, sides = 20) {
   return [[rim, colour, [0, 0, z]], [new THREE.CircleGeometry(radius, sides), colour, [0, 0, z + height / 2]]];
 }
 
+/** The side of an upright column, from one angle to another, at z = 0. */
+export function arc(radius, height, from, to) {
+  const sides = Math.ceil(8 * (to - from));
+  // Its angle 0 is at -y.
+  const side = new THREE.CylinderGeometry(radius, radius, height, sides, 1, true, from + Math.PI / 2, to - from);
+  return side.rotateX(Math.PI / 2);
+}
+
 /** A plate of any outline [[x, y], ...] from z = 0 up. */
 export function plate(points, height) {
   const outline = new THREE.Shape(points.map(([x, y]) => new THREE.Vector2(x, y)));

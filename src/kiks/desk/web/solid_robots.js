@@ -2,7 +2,7 @@
    All robots of a kind share one geometry, drawn for all of them at once. */
 
 import { THREE } from "nicegui-scene";
-import { board, box, column, empty, merge, plate } from "./solid_parts.js";
+import { arc, board, box, column, empty, merge, plate } from "./solid_parts.js";
 import { readingBucket, READING_COLOURS, robotHue } from "./colours.js";
 import { armAngle, jawsOf, PIVOT_MM } from "./gripper.js";
 
@@ -54,12 +54,13 @@ export class SolidRobots {
     return mesh;
   }
 
-  /** The parts of a single robot: turrets and a name. */
+  /** The parts of a single robot: turrets, stripes and a name. */
   _top(robot, index) {
     const top = new THREE.Group(), turrets = new THREE.Mesh(new THREE.BufferGeometry(), this._material);
     const name = nameSprite(robot.name, index);
     name.position.z = topOf(robot) + 30;
     top.add(turrets, name);
+    if (robot.white_stripes_rad.length) top.add(new THREE.Mesh(stripesOf(robot), this._material));
     top.userData = { turrets, name };
     this.group.add(top);
     return top;
@@ -153,6 +154,14 @@ function bodyGeometry(robot) {
     parts.push([hub, "#9aa1aa", [0, side * (wheel_y + 2.5), 8], [(-side * Math.PI) / 2, 0, 0]]);
   }
   return merge(parts);
+}
+
+/** The stripes around a body, between its boards and over their rims. */
+function stripesOf({ radius_mm, white_stripes_rad }) {
+  const low = LOWER_BOARD, high = UPPER_BOARD + BOARD, place = [0, 0, (low + high) / 2];
+  const around = (from, to, radius, colour) => [arc(radius, high - low, from, to), colour, place];
+  const white = white_stripes_rad.map(([from, to]) => around(from, to, radius_mm + 0.4, "#ffffff"));
+  return merge([around(0, 2 * Math.PI, radius_mm + 0.2, "#000000"), ...white]);
 }
 
 /** A white arrow on a board, which marks the robot's front. */

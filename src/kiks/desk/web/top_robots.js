@@ -19,7 +19,7 @@ export class RobotLook {
     this.radius_mm = radius_mm;
     this.body = disc(0, 0, radius_mm);
     this.rim = disc(0, 0, radius_mm - STRIPES_MM / 2);
-    this.stripes = robot.stripe_count ? whiteStripes(robot.stripe_count, radius_mm - STRIPES_MM / 2) : null;
+    this.stripes = robot.white_stripes_rad.length ? arcs(robot.white_stripes_rad, radius_mm - STRIPES_MM / 2) : null;
     this.wheels = new Path2D();
     this.treads = new Path2D();
     for (const side of [-1, 1]) {
@@ -56,13 +56,12 @@ function disc(x, y, radius) {
   return path;
 }
 
-/** The white ones of the stripes around a body: the middle of a black one is ahead. */
-function whiteStripes(count, radius) {
-  const path = new Path2D(), half = Math.PI / (2 * count);
-  for (let k = 0; k < count; k++) {
-    const middle = ((2 * k + 1) * Math.PI) / count;
-    path.moveTo(radius * Math.cos(middle - half), radius * Math.sin(middle - half));
-    path.arc(0, 0, radius, middle - half, middle + half);
+/** Parts of a circle, [from, to] in radians each. */
+function arcs(parts, radius) {
+  const path = new Path2D();
+  for (const [from, to] of parts) {
+    path.moveTo(radius * Math.cos(from), radius * Math.sin(from));
+    path.arc(0, 0, radius, from, to);
   }
   return path;
 }
