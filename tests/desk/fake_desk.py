@@ -95,6 +95,7 @@ class World:
             robots.append(
                 {
                     "name": str(k + 1), "kind": "Khepera", "radius_mm": 27.5, "wheel_base_mm": 53, "reach_mm": REACH_MM,
+                    "white_stripes_rad": [[0.8, 2.4], [3.9, 5.5]] if k == 1 else [],
                     "sensors": [sensor(degrees) for degrees in SENSOR_DEG], "has_gripper": k == 1,
                     "turrets": ["K213 vision"] if is_special else [], "shapes": shapes if k == 0 else [],
                 }
