@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.at_length import nightly
 from tests.matlab.octave import needs_octave, run
 
 pytestmark = [needs_octave, pytest.mark.slow]
@@ -51,7 +52,7 @@ kiks_kclose(ref)
 """
 
 
-@pytest.mark.parametrize("kind", ["Khepera", "Khepera_II"])
+@pytest.mark.parametrize("kind", ["Khepera", pytest.param("Khepera_II", marks=nightly)])
 def test_moves_and_turns_go_as_far_as_they_should(kind: str, tmp_path: Path) -> None:
     said = run(f"global KIKS_ROBOT\nKIKS_ROBOT = '{kind}';\n{MOVES}", tmp_path).said
     errors_mm = np.abs(said["moves"] - said["mm"])
