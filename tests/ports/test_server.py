@@ -104,6 +104,30 @@ def test_live_world_runs_without_a_client() -> None:
         run.wait_for(lambda: run.sim.now_ns == NS_PER_S)
 
 
+def test_ctrl_c_ends_the_server_between_two_rounds(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the middle of a disconnection, it would leave descriptors of which the selector knows a half."""
+    endpoint, rounds = TcpEndpoint(0), iter(range(1000))
+    server = Server(fresh(), {1: [endpoint]}, thinking="none")
+    epoll = server._selector._selector
+
+    class Interrupted:
+        def __getattr__(self, name: str) -> object:
+            return getattr(epoll, name)
+
+        def unregister(self, descriptor: int) -> None:
+            if descriptor == endpoint.fileno():
+                signal.raise_signal(signal.SIGINT)
+            epoll.unregister(descriptor)
+
+    monkeypatch.setattr(server._selector, "_selector", Interrupted())
+    with socket.create_connection(("127.0.0.1", endpoint.port)):
+        pass
+    with pytest.raises(KeyboardInterrupt):
+        server.serve(until=lambda: next(rounds) == 999)
+    assert server.sim.wires[0].holder is None
+    server.close()
+
+
 @pytest.mark.parametrize("length", [2, 1])
 def test_live_flooding_client_waits_for_the_line(tmp_path: Path, length: int) -> None:
     link, wall = str(tmp_path / "robot"), WallClock()

@@ -13,8 +13,9 @@ from kiks.clock.pace import Pace
 from kiks.clock.patience import Patience
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.clock.thinking import ThinkingFixed, parse_thinking
+from kiks.ending import postponing_endings
 from kiks.errors import ParameterError, shown
-from kiks.ports.endpoint import Endpoint
+from kiks.ports.endpoint import Channel, Endpoint
 from kiks.ports.live import Link, Live, TimePolicy
 from kiks.ports.lockstep import Lockstep
 from kiks.ports.program_scheduler import PATIENCE_S
@@ -110,6 +111,7 @@ class Server:
         for link in self._links.values():
             link.is_dropped = link.channel is not None
 
+    @postponing_endings()
     def close(self) -> None:
         """Disconnect all clients, close all endpoints and remove their files."""
         with self.sim.lock:
@@ -123,13 +125,14 @@ class Server:
             endpoint.close()
         self._endpoints.clear()
 
-    # ---- clients ----
+    # ---- clients; Ctrl-C in the middle of these would leave descriptors of which the selector knows a half ----
 
     def _listen(self, link: Link) -> None:
         """Wait for a client at all endpoints of a robot."""
         for endpoint in self._endpoints[link.robot]:
             self._selector.register(endpoint.fileno(), selectors.EVENT_READ, partial(self._accept, link, endpoint))
 
+    @postponing_endings()
     def _accept(self, link: Link, endpoint: Endpoint, _events: int) -> None:
         """Accept a client if the robot has none."""
         wire = link.wire
@@ -162,6 +165,7 @@ class Server:
         _log.info("robot %d has a client at %s", link.robot, endpoint.name)
         self._select_events(link)
 
+    @postponing_endings()
     def _disconnect(self, link: Link) -> None:
         """Disconnect a client. The next one waits until its commands have acted."""
         channel = link.channel
@@ -187,6 +191,7 @@ class Server:
         channel = link.channel
         return channel is not None and self._timing.forgets and self._timing.is_full(link) and channel.find_end()
 
+    @postponing_endings()
     def _free(self, link: Link) -> None:
         """Free the link for the next client."""
         link.clear()
@@ -233,8 +238,11 @@ class Server:
                 "characters ahead of its robot; what it sends now has to wait. Read a line after each command."
             )
         events = (0 if is_full else selectors.EVENT_READ) | (selectors.EVENT_WRITE if channel.has_unsent else 0)
-        if events == link.events:
-            return
+        if events != link.events:
+            self._select(link, channel, events)
+
+    @postponing_endings()
+    def _select(self, link: Link, channel: Channel, events: int) -> None:
         if not events:
             self._selector.unregister(channel.fileno())
         elif link.events:
