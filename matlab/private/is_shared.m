@@ -5,7 +5,7 @@ shared = false;
 try
     shared = str2double(simulator('clients')) > 1;
 catch failure
-    % A process that has ended is no reason not to leave.
+    % A process that has ended has no programs.
     if ~strcmp(failure.identifier, 'kiks:session')
         rethrow(failure);
     end

@@ -50,7 +50,7 @@ class Settings(OldConstants):
     seed: Annotated[Seed, _NUMBER] = 0
     thinking: ThinkingPolicy = "live"
     robot: Text = "khepera"
-    robots: Annotated[Annotated[Whole, Field(ge=0, le=ROBOTS_MAX)], _NUMBER] | None = None
+    robots: Annotated[Whole, Field(ge=0, le=ROBOTS_MAX), _NUMBER] | None = None
     response: Response | None = None
     noise: Annotated[Switch, SWITCH, Rule("0 or 1")] = True
     turrets: Annotated[

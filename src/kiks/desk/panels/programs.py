@@ -6,7 +6,7 @@ import asyncio
 
 from nicegui import ui
 
-from kiks.desk.panels.widgets import icon_button, told
+from kiks.desk.panels.widgets import icon_button, offer_robots, told
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.scripts import (
     NEW,
@@ -96,9 +96,7 @@ class ProgramsPanel:
             with self._list:
                 self._draw_list(handles)
         if desk.may_run_programs:
-            robots = {robot: f"robot {robot}" for robot in range(1, desk.sim.robot_count + 1)}
-            if self._robot.options != robots:
-                self._robot.set_options(robots, value=min(self._robot.value or 1, len(robots)) or None)
+            offer_robots(self._robot, desk.sim.robot_count)
         self._add_output()
 
     def _draw_list(self, handles: list[Handle]) -> None:

@@ -36,6 +36,13 @@ def icon_button(
     return ui.button(icon=icon, on_click=act).props(f'{look} aria-label="{label}" data-testid="{name}"').mark(name)
 
 
+def offer_robots(choice: ui.select, count: int) -> None:
+    """Let a list offer robots 1 to `count`, and keep the chosen one if it is among these."""
+    robots = {robot: f"robot {robot}" for robot in range(1, count + 1)}
+    if choice.options != robots:
+        choice.set_options(robots, value=min(choice.value or 1, count) or None)
+
+
 def text_button(text: str, icon: str, name: str, tip: str, act: Callable[..., Any]) -> ui.button:
     """Build a button with an icon, a text (possibly empty) and a tooltip."""
     button = ui.button(text, icon=icon, on_click=act).props('dense no-caps outline padding="4px 10px"')

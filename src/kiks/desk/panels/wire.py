@@ -5,7 +5,7 @@ from __future__ import annotations
 from nicegui import ui
 
 from kiks.desk.panels.console import ConsolePanel
-from kiks.desk.panels.widgets import icon_button
+from kiks.desk.panels.widgets import icon_button, offer_robots
 from kiks.desk.server.desk import Desk
 from kiks.sim.wire import Wire
 from kiks.sim.wire_log import Piece, TimeShares, WireLog
@@ -138,9 +138,7 @@ class WirePanel:
     def refresh(self) -> None:
         """Show new traffic."""
         sim = self._desk.sim
-        robots = {robot: f"robot {robot}" for robot in range(1, sim.robot_count + 1)}
-        if self._robot.options != robots:
-            self._robot.set_options(robots, value=min(self._robot.value or 1, len(robots)) or None)
+        offer_robots(self._robot, sim.robot_count)
         if not sim.wires:
             self._let_go()
             return

@@ -242,7 +242,7 @@ class Timeline:
                 self._record_next(sim)
             if self.parts[-1].own_recorder is None:
                 return ""
-            bytes_max = self._bytes_max()
+            bytes_max = self._bytes_max(self.parts[-1].file.parent)
             if self.parts[-1].own_bytes >= bytes_max // PART_COUNT:
                 self._record_next(sim)
             return self._drop_oldest(bytes_max)
@@ -257,16 +257,14 @@ class Timeline:
         last.finish(sim.now_ns)
         self._record(sim, last.run)
 
-    def _bytes_max(self) -> int:
-        """Return how many bytes all temporary recordings may have now.
+    def _bytes_max(self, folder: Path) -> int:
+        """Return how many bytes all temporary recordings, which lie in a folder, may have now.
 
         Raises:
             ParameterError: If the disk has too little space for any.
             OSError: If the folder or a file is gone.
         """
-        if self._folder is None:
-            self._folder = TemporaryFolder()
-        room = room_of(self._folder.path)
+        room = room_of(folder)
         others_leave_bytes = room.free_bytes - room.reserve_bytes + sum(part.own_bytes for part in self.parts)
         bytes_max = min(BYTES_MAX, int(others_leave_bytes * FREE_SHARE))
         if bytes_max < BYTES_MIN:
@@ -305,8 +303,9 @@ class Timeline:
     def _record(self, sim: Simulation, run: Run | None) -> None:
         recorder = sim.loop.recorder
         if not isinstance(recorder, RunRecorder):
-            self._bytes_max()
-            assert self._folder is not None
+            if self._folder is None:
+                self._folder = TemporaryFolder()
+            self._bytes_max(self._folder.path)  # an error if there is no room for it
             self._count += 1
             recorder = RunRecorder(sim, self._folder.path / f"{self._count}.mcap", gives_way=True)
         self.parts = (*self.parts, Part(recorder.path, run, recorder))
