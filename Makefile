@@ -1,8 +1,9 @@
 # make demo, make test: everything else is for people who develop KiKS (CONTRIBUTING.md).
 
-PYTHON ?= $(shell command -v python3.11 || command -v python3)
+PYTHON ?= $(or $(shell command -v python3.11 || command -v python3),python3)
 VENV   := .venv
 BIN    := $(VENV)/bin
+UV     := $(or $(shell command -v uv),$(BIN)/uv)
 # Many tests wait for processes that they start. Two workers for each processor keep all processors busy.
 WORKERS = $(shell $(BIN)/python -c 'import os; print(2 * os.cpu_count())')
 PYTEST = $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
@@ -10,9 +11,9 @@ PYTEST = $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 # The tests start hundreds of Python processes: Python keeps the bytecode of the modules, whatever the environment says.
 export PYTHONDONTWRITEBYTECODE =
 
-.PHONY: demo test quick nightly checked setup system lint types docs benchmarks wheel octave-package clean
+.PHONY: demo test test-all quick checked user setup system lint types docs benchmarks wheel octave-package clean
 
-demo: setup
+demo: user
 	$(BIN)/kiks demo follow --arena examples/arenas/office.toml --seconds 300 --picture kiks-demo.png
 
 # Each test has a time limit, which does not include compiling the engine.
@@ -20,27 +21,40 @@ test: setup system
 	$(BIN)/kiks warmup
 	$(PYTEST)
 
+# All tests with all their examples: `make test` tests each feature once (tests/at_length.py).
+test-all: setup system
+	$(BIN)/kiks warmup
+	KIKS_AT_LENGTH=1 $(PYTEST)
+
 quick: setup system
 	$(BIN)/kiks warmup
 	$(PYTEST) -m "not slow"
-
-# All tests with all their examples: `make test` runs a share of the longest (tests/at_length.py).
-nightly: setup system
-	$(BIN)/kiks warmup
-	KIKS_AT_LENGTH=1 $(PYTEST)
 
 # The tests of the kernels in code that checks every index. It takes some minutes, as it compiles everything again.
 checked: setup
 	NUMBA_BOUNDSCHECK=1 $(PYTEST) -m "not slow" tests/engine tests/batch
 
-setup: $(VENV)/.ready
+user: $(VENV)/.user
+setup: $(VENV)/.developer
 
-# The environment is made anew when the list of what it holds changes.
-$(VENV)/.ready: pyproject.toml tools/system-packages.sh
+# Both environments are brought up to date when the list of what they hold changes.
+$(VENV)/.user: pyproject.toml tools/system-packages.sh
 	@PYTHON="$(PYTHON)" sh tools/system-packages.sh
-	$(or $(PYTHON),python3) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@echo 'Installing KiKS into $(VENV) ...'
+	@$(PYTHON) -m venv $(VENV)
+	@command -v $(UV) >/dev/null || $(BIN)/python -m pip install -qq --disable-pip-version-check uv || true
+	@$(call install,.)
 	@touch $@
+
+$(VENV)/.developer: $(VENV)/.user
+	@echo 'Installing what the tests need ...'
+	@$(call install,.[dev])
+	@touch $@
+
+# uv takes a tenth of the time of pip. Where it cannot get the packages, for instance because only pip knows the mirror, pip installs them.
+WHEELS  = --only-binary :all: --no-binary kiks
+install = $(UV) pip install --quiet --python $(BIN)/python $(WHEELS) --editable '$(1)' || \
+	$(BIN)/python -m pip install -qq --disable-pip-version-check $(WHEELS) --editable '$(1)'
 
 system:
 	@PYTHON="$(PYTHON)" sh tools/system-packages.sh tests

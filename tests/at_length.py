@@ -1,4 +1,4 @@
-"""How much the tests do: `make nightly` runs all examples, the other targets a share of them."""
+"""How much the tests do: `make test` tests each feature once, `make test-all` and `.ci/run` everything."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import TypeVar
 import pytest
 
 AT_LENGTH = os.environ.get("KIKS_AT_LENGTH", "") not in ("", "0")
-"""`make nightly` sets this variable."""
+"""`make test-all` sets this variable."""
 
-nightly = pytest.mark.skipif(not AT_LENGTH, reason="make nightly runs it")
-"""Marks a test, or a case of one, that only `make nightly` runs."""
+at_length = pytest.mark.at_length
+"""Marks a test, or a case of one, that `make test` leaves out."""
 
 T = TypeVar("T")
 
 
 def share(normally: T, at_length: T) -> T:
-    """Return how much a test does: the first value in a normal run, the second in `make nightly`."""
+    """Return how much a test does: the first value in `make test`, the second in `make test-all`."""
     return at_length if AT_LENGTH else normally

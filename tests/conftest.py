@@ -1,24 +1,50 @@
-"""Setup for all tests: the engine is compiled once, before the workers of xdist start."""
+"""Setup for all tests: which of them run, the engine compiled before they start, and how a failed one runs alone."""
 
 from __future__ import annotations
 
+import shlex
 import signal
+import sys
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
-
-# The first example of a test may load the engine, and tests measure no time.
-settings.register_profile("kiks", deadline=None)
-settings.load_profile("kiks")
+from tests.at_length import AT_LENGTH
 
 # Programs to be run as processes, not modules to be imported.
 collect_ignore_glob = ["programs/*"]
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    # A test draws the same examples each time, unless a seed is given. The first one may load the engine: no deadline.
+    settings.register_profile("kiks", deadline=None, derandomize=config.option.hypothesis_seed is None)
+    settings.load_profile("kiks")
     # A shell that starts something in the background has it ignore Ctrl-C, and all that this starts: tests send it.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     if not hasattr(config, "workerinput") and not config.option.collectonly:
         from kiks.cli.engine_start import compile_everything
 
         compile_everything()
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if not AT_LENGTH:
+        left_out = [item for item in items if item.get_closest_marker("at_length")]
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if item not in set(left_out)]
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """Print for each test that failed the command that runs it alone."""
+    reports = [report for outcome in ("failed", "error") for report in terminalreporter.getreports(outcome)]
+    if not reports:
+        return
+    terminalreporter.section("to run a failed test alone")
+    seed = config.option.hypothesis_seed
+    options = [] if seed is None else [f"--hypothesis-seed={seed}"]
+    python = Path(sys.executable)
+    if python.is_relative_to(config.rootpath):
+        python = python.relative_to(config.rootpath)
+    for name in dict.fromkeys(report.nodeid for report in reports):
+        command = shlex.join([str(python), "-m", "pytest", *options, name])
+        terminalreporter.write_line(f"KIKS_AT_LENGTH=1 {command}" if AT_LENGTH else command)

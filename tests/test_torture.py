@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.at_length import nightly, share
+from tests.at_length import at_length, share
 from tests.matlab.octave import needs_octave
 
 pytestmark = pytest.mark.slow
@@ -103,19 +103,19 @@ def test_files_are_whole() -> None:
 
 
 @pytest.mark.timeout(470)  # a campaign in processes of its own
-@pytest.mark.parametrize("scene", ["server", pytest.param("desk", marks=nightly)])
+@pytest.mark.parametrize("scene", ["server", pytest.param("desk", marks=at_length)])
 def test_another_process_takes_the_place_of_a_killed_one(scene: str) -> None:
     check("--only", f"faults.kill_{scene}", "--cases", "1", "--seed", "14")
 
 
 @pytest.mark.timeout(470)  # a campaign in processes of its own
-@pytest.mark.parametrize("group", ["serve", pytest.param("session", marks=nightly)])
+@pytest.mark.parametrize("group", ["serve", pytest.param("session", marks=at_length)])
 def test_robots_answer_while_many_clients_connect(group: str) -> None:
     check("--only", f"crowd.{group}", "--cases", "1", "--seed", "15")
 
 
 @needs_octave
 @pytest.mark.timeout(470)  # a campaign in processes of its own
-@pytest.mark.parametrize("kind", ["joined_window", pytest.param("start", marks=nightly)])
+@pytest.mark.parametrize("kind", ["joined_window", pytest.param("start", marks=at_length)])
 def test_ctrl_c_in_octave_leaves_right_answers_and_no_process(kind: str) -> None:
     check("--only", f"octave.{kind}", "--cases", "1", "--seed", "16")

@@ -33,7 +33,7 @@ from tools.campaigns.runner import (
     verdicts,
 )
 
-GROUPS = ("files", "calls", "messages", "wire", "faults", "octave", "crowd", "soak", "planted")
+GROUPS = ("files", "calls", "messages", "wire", "faults", "octave", "crowd", "soak", "tests", "planted")
 """Groups of campaigns: modules of `tools.campaigns`."""
 
 PEAK_MAX_MB = 2000
@@ -44,13 +44,13 @@ GROWTH_MAX_MB = 5
 
 
 def chosen(only: list[str]) -> Iterator[Campaign]:
-    """Yield the campaigns whose name begins with one of some words; all but the planted ones if there are none."""
+    """Yield the campaigns whose name begins with one of some words; if there are none, all that need not be named."""
     for group in GROUPS:
         if only and not any(word.split(".")[0] == group for word in only):
             continue
         for campaign in importlib.import_module(f"tools.campaigns.{group}").campaigns():
             if any(campaign.name == word or campaign.name.startswith(f"{word}.") for word in only) or (
-                not only and not campaign.is_planted
+                not only and not campaign.is_named_only
             ):
                 yield campaign
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import typer
 from benchmarks.calibration_errors import half_distances_mm, hidden_robot
-from tests.at_length import nightly
+from tests.at_length import at_length
 from typer.testing import CliRunner
 
 import kiks
@@ -57,7 +57,7 @@ def measured(hidden: kiks.RobotSpec, base: kiks.RobotSpec = BASE, seed: int = 0,
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("base", "seed"), [pytest.param(BASE, 2, marks=nightly), (KHEPERA_II, 3)], ids=["khepera", "khepera_ii"]
+    ("base", "seed"), [pytest.param(BASE, 2, marks=at_length), (KHEPERA_II, 3)], ids=["khepera", "khepera_ii"]
 )
 def test_calibration_finds_hidden_parameters(base: kiks.RobotSpec, seed: int) -> None:
     hidden = hidden_robot(seed, base)
@@ -68,7 +68,7 @@ def test_calibration_finds_hidden_parameters(base: kiks.RobotSpec, seed: int) ->
     assert error[16:].max() < 0.005
 
 
-@nightly
+@at_length
 def test_calibrated_robot_reads_zero_as_often_as_its_kind() -> None:
     zero_share = idle(measured(BASE).spec)[1]
     assert zero_share == pytest.approx(idle(BASE)[1], abs=0.05)

@@ -14,7 +14,7 @@ from soccer_command import player
 from soccer_match import FullTime, Match, play, scorer
 from soccer_picture import draw_match
 from tests import forked
-from tests.at_length import nightly
+from tests.at_length import at_length
 from tests.busy import busy_computer
 from whereabouts import Whereabouts
 
@@ -44,13 +44,13 @@ def test_a_match_is_the_same_on_every_computer() -> None:
     assert hashes() == HASHES
 
 
-@nightly
+@at_length
 def test_a_match_is_the_same_on_a_busy_computer() -> None:
     with busy_computer(3):
         assert run(Match(20, 1)).state_hash() == HASHES["own"]
 
 
-@nightly
+@at_length
 def test_goals_fall_on_both_sides() -> None:
     scores = np.array([run(Match(300, seed)).report.score() for seed in (0, 1)])
     assert scores.sum(axis=1).min() >= 2

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numba
 import pytest
-from tests.at_length import nightly
+from tests.at_length import at_length
 from tests.engine.test_determinism import record_of_process, run_record
 
 from kiks.engine import code_cache
@@ -30,14 +30,14 @@ def said_by_process(**environment: str) -> str:
     return done.stdout
 
 
-@nightly
+@at_length
 @pytest.mark.timeout(470)  # it compiles the engine
 def test_no_index_leaves_its_array_and_no_bit_depends_on_the_build_in_a_world_of_two_robots() -> None:
     """`.ci/run` runs it, too: without LLVM's slowest optimisations, which take two thirds of the time."""
     assert record_of_process(**PLAIN_AND_CHECKED, NUMBA_OPT="1") == run_record()
 
 
-@nightly
+@at_length
 @pytest.mark.timeout(470)  # it compiles engine and batch, with the checks for the first time
 def test_no_index_leaves_its_array_and_no_bit_depends_on_the_build_in_any_world() -> None:
     """An index outside its array is an IndexError with the checks; without them the process may end."""

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 from llvmlite import binding
-from tests.at_length import nightly
+from tests.at_length import at_length
 
 from kiks.model.arena import Arena
 from kiks.model.arena_objects import Ball, Cylinder, Pose
@@ -87,7 +87,7 @@ def test_in_another_process(record: str) -> None:
 
 
 @pytest.mark.timeout(470)  # it compiles the engine for another processor
-@nightly
+@at_length
 @pytest.mark.skipif(not binding.get_host_cpu_features().get("avx512f"), reason="this computer's processor is like that")
 def test_for_another_processor(record: str) -> None:
     """For one with AVX2 and nothing wider; `test_bounds.py` takes one without wide vectors."""

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.at_length import nightly
+from tests.at_length import at_length
 from tests.matlab.octave import needs_octave, run
 
 pytestmark = [needs_octave, pytest.mark.slow]
@@ -52,7 +52,7 @@ kiks_kclose(ref)
 """
 
 
-@pytest.mark.parametrize("kind", ["Khepera", pytest.param("Khepera_II", marks=nightly)])
+@pytest.mark.parametrize("kind", ["Khepera", pytest.param("Khepera_II", marks=at_length)])
 def test_moves_and_turns_go_as_far_as_they_should(kind: str, tmp_path: Path) -> None:
     said = run(f"global KIKS_ROBOT\nKIKS_ROBOT = '{kind}';\n{MOVES}", tmp_path).said
     errors_mm = np.abs(said["moves"] - said["mm"])

@@ -54,5 +54,5 @@ def _third(act: Play) -> Callable[[], Play]:
 def campaigns() -> Iterator[Campaign]:
     """Yield them."""
     for act in (_raises, _dies, _eats, _tells, _loses, _refuses):
-        yield Campaign(f"planted{act.__name__.replace('_', '.')}", 12, _third(act), memory_mb=2000, is_planted=True)
-    yield Campaign("planted.hangs", 3, lambda: _hangs, limit_s=0.5, is_planted=True)
+        yield Campaign(f"planted{act.__name__.replace('_', '.')}", 12, _third(act), memory_mb=2000, is_named_only=True)
+    yield Campaign("planted.hangs", 3, lambda: _hangs, limit_s=0.5, is_named_only=True)

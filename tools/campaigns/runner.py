@@ -90,7 +90,8 @@ class Campaign:
         limit_s: Longest time of a case [s of the processor], and a quarter of the longest that it may wait; one that
             takes longer hangs.
         memory_mb: Most memory that the process of a case may have, all in all [MB]; any if None.
-        is_planted: Whether it is there to see that the runner notices.
+        is_named_only: Whether it runs only where `--only` names it.
+        jobs: Most of its cases that run at a time; as many as there are processes if None.
     """
 
     name: str
@@ -98,7 +99,8 @@ class Campaign:
     prepare: Callable[[], Play]
     limit_s: float = 30.0
     memory_mb: int | None = None
-    is_planted: bool = False
+    is_named_only: bool = False
+    jobs: int | None = None
 
 
 @dataclass
@@ -277,7 +279,7 @@ def run(campaign: Campaign, *, cases: range, seed: int, jobs: int) -> Result:
     begin_s = time.monotonic()
     play = campaign.prepare()
     result = Result(campaign.name)
-    jobs = min(jobs, len(cases))
+    jobs = min(jobs, len(cases), campaign.jobs or jobs)
     rows = np.frombuffer(mmap.mmap(-1, jobs * 64), np.int64).reshape(jobs, 8)
     with tempfile.TemporaryDirectory(prefix="kiks-torture-") as folder:
         report = Path(folder) / "report"

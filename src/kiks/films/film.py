@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kiks.errors import ParameterError, shown
+from kiks.errors import ParameterError, library, shown
 from kiks.films.panel import Panel
 from kiks.films.solid_stage import SolidStage
 from kiks.films.stage import Pixels, Stage
@@ -129,13 +129,14 @@ def check_film(path: str | Path) -> str:
     """Return the ending of a film's file.
 
     Raises:
-        ParameterError: If it is none of a film.
+        ParameterError: If it is none of a film, or the library that writes films is not installed.
     """
     ending = path_of(path, "a film's file").suffix.lower()
     if ending not in ENDINGS:
         raise ParameterError(
             f"a film must go to a file that ends in {', '.join(ENDINGS)}, but it was {shown(str(path))}."
         )
+    library("av", "film")
     return ending
 
 

@@ -216,8 +216,7 @@ class Programs:
         with self.sim.lock:
             self._check_open(command.program.name)
             self.sim.index_of(robot)
-            earlier = [handle for handle in self.handles if handle.robot == robot]
-            for handle in earlier:
+            for handle in [each for each in self.handles if each.robot == robot]:
                 if handle.is_running:
                     raise ParameterError(
                         f"robot {robot} must be free for another program, but {handle.name} has it. Stop that one "
@@ -230,7 +229,7 @@ class Programs:
                     self._names.disown(each.robot)
             self._names.own(robot)
             handle = self._add(command, robot)
-            self.handles = [each for each in self.handles if each not in earlier or not each.has_been_reported]
+            self._drop_replaced()
             self._was_touched = True
         self._wake()
         return handle
@@ -456,7 +455,13 @@ class Programs:
         ]
         for handle in ended:
             handle.has_been_reported = True
+        self._drop_replaced()
         return ended
+
+    def _drop_replaced(self) -> None:
+        """Drop programs whose end has been reported and whose robot has had another program since."""
+        last = {handle.robot: handle for handle in self.handles}
+        self.handles = [each for each in self.handles if last[each.robot] is each or not each.has_been_reported]
 
     def _report_end(self, handle: Handle) -> None:
         """Report how a program has ended."""

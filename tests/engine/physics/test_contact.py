@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.at_length import nightly
+from tests.at_length import at_length
 
 from kiks.engine.physics.motion import CONTACT_TICKS
 from kiks.model.arena import Arena
@@ -61,7 +61,7 @@ def test_no_penetration_and_no_energy_from_walls(make_world, make_random_arena, 
     check_laws(make_world, make_random_arena(number), draw, 300)
 
 
-@nightly
+@at_length
 @settings(derandomize=True, max_examples=250)
 @given(number=st.integers(0, 1_000_000), draw=st.integers(0, 2**32))
 def test_no_penetration_and_no_energy_from_walls_at_length(make_world, make_random_arena, number, draw):

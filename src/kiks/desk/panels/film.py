@@ -10,7 +10,7 @@ from nicegui import ui
 
 from kiks.desk.panels.widgets import told
 from kiks.desk.server.desk import Desk
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, library
 from kiks.films.film import FPS, save_film
 from kiks.films.video_file import ENDINGS
 from kiks.recording.recording import Recording
@@ -57,6 +57,7 @@ class FilmDialog:
     @told
     async def open(self) -> None:
         """Show it, with the last seconds before the shown time chosen."""
+        library("av", "film")
         log = Recording(await self._desk.looking.file()).log
         begin_s, now_s = s_from_ns(log.begin_ns), self._desk.sim.time_s
         # At the beginning of a recording the next seconds are more than the last ones.
