@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from typing import TypeVar
+from collections.abc import Iterable
+from typing import Any, TypeVar
 
 import pytest
 
@@ -19,3 +20,9 @@ T = TypeVar("T")
 def share(normally: T, at_length: T) -> T:
     """Return how much a test does: the first value in `make test`, the second in `make test-all`."""
     return at_length if AT_LENGTH else normally
+
+
+def cases(values: Iterable[Any], normally: int = 1) -> list[Any]:
+    """Return the values of a parametrized test: `make test` runs the first few, `make test-all` all of them."""
+    listed = [value if isinstance(value, tuple) else (value,) for value in values]
+    return [pytest.param(*each, marks=at_length if number >= normally else ()) for number, each in enumerate(listed)]

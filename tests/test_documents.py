@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from tests import forked
+from tests.at_length import cases
 
 from kiks.cli import app
 
@@ -26,9 +27,10 @@ def blocks(page: Path, language: str) -> list[str]:
 
 
 PROGRAMS = [(page.name, code) for page in PAGES for code in blocks(page, "python")]
+OF_README = sum(page == PAGES[0].name for page, _ in PROGRAMS)
 
 
-@pytest.mark.parametrize(("page", "code"), PROGRAMS, ids=lambda value: value[:20].replace("\n", " "))
+@pytest.mark.parametrize(("page", "code"), cases(PROGRAMS, OF_README), ids=lambda value: value[:20].replace("\n", " "))
 def test_programs_run(page: str, code: str) -> None:
     result = forked.run(code=code, cwd=ROOT)
     assert result.returncode == 0, f"{page}: {result.stderr}"

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from tests.at_length import cases
 
 ROOT = Path(__file__).parents[1]
 WANDER = str(ROOT / "tests" / "programs" / "wander.py")
@@ -62,7 +63,7 @@ def python(script: str, *words: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("place", PLACES)
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", cases(COMMANDS, 2))
 def test_a_command_ends_wherever_it_is_interrupted_while_it_loads(command: str, place: str, tmp_path: Path) -> None:
     words = [str(tmp_path / "out") if word == "OUT" else word for word in COMMANDS[command]]
     ending = (signal.SIGINT, signal.SIGTERM)[(PLACES.index(place) + len(command)) % 2]

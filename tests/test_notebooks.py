@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
+from tests.at_length import cases
 
 import kiks
 from kiks.batch.rollouts import FIRST, Rollouts
@@ -92,7 +93,9 @@ def test_a_notebook_shows_a_picture_or_a_table(run: Run, cell: str, kind: str, t
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("words", [["-c"], ["-m", "IPython", "--colors=NoColor", "-c"]], ids=["Python", "IPython"])
+@pytest.mark.parametrize(
+    "words", cases([["-c"], ["-m", "IPython", "--colors=NoColor", "-c"]]), ids=["Python", "IPython"]
+)
 def test_a_terminal_has_the_address_once(words: list[str]) -> None:
     if "IPython" in words:
         pytest.importorskip("IPython", reason="the terminal of IPython needs ipykernel")

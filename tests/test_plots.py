@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from tests.at_length import cases
+from tests.needed import need
 
 import kiks
 from kiks import Arena, Khepera, ParameterError, Recording
@@ -15,7 +17,7 @@ from kiks.plots import NO_ROBOT, PANELS, ROWS, figure_of, panels_of, save_plot
 from kiks.recording.analysis import odometry, time_shares
 from kiks.sim.simulation import Simulation
 
-pytest.importorskip("matplotlib")
+need("matplotlib")
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +117,7 @@ def test_a_figure_has_a_column_for_each_recording(recording: Recording) -> None:
     np.testing.assert_array_equal(readings[2].get_ydata(), recording.table("readings")["counts"][:, 2])
 
 
-@pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
+@pytest.mark.parametrize("ending", cases(["png", "svg", "pdf"]))
 def test_the_same_recording_gives_the_same_picture(ending: str, recording: Recording, tmp_path: Path) -> None:
     files = [tmp_path / f"{name}.{ending}" for name in ("one", "two")]
     for file in files:

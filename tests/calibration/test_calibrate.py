@@ -204,6 +204,7 @@ def test_error_for_an_obstacle_in_the_open() -> None:
     assert "the sensors must read little in the open, but sensor" in failure(Cornered(kiks.Simulation(), {}))
 
 
+@at_length
 @pytest.mark.slow
 def test_error_for_contradictory_measurements() -> None:
     words = failure(Misplaced(kiks.Simulation(), {15: 12}), (5, 15, 25))
@@ -253,6 +254,7 @@ def test_ctrl_c_in_the_middle_of_a_spin_stops_the_robot() -> None:
     assert stands_still(sim)
 
 
+@at_length
 @pytest.mark.slow
 def test_placements_may_repeat_a_measurement() -> None:
     class Fussy(SimPlacements):

@@ -11,6 +11,7 @@ from typing import get_args, get_type_hints
 
 import pytest
 from tests import forked
+from tests.at_length import cases
 
 from kiks.cli import app
 from kiks.errors import ParameterError
@@ -65,7 +66,7 @@ def test_the_process_of_a_program_needs_no_engine() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("behaviour", ["avoid", "follow"])
+@pytest.mark.parametrize("behaviour", cases(["follow", "avoid"]))
 def test_a_demo_is_the_same_in_two_processes(behaviour: str, tmp_path: Path) -> None:
     arguments = ("demo", behaviour, "--seconds", "30", "--arena", ARENA, "--seed", "4")
     first = forked.run(*arguments, "--picture", "run.png", cwd=tmp_path)

@@ -6,15 +6,14 @@ import re
 from pathlib import Path
 
 import pytest
+from tests.needed import need
 from typer.testing import CliRunner, Result
 
 from kiks import Recording
 from kiks.cli import app
 from kiks.errors import KiksError
 
-pytest.importorskip("cma")
-pytest.importorskip("pyarrow")
-pytest.importorskip("matplotlib")
+need("cma", "pyarrow", "matplotlib")
 
 TASK = """
 import kiks

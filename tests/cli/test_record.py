@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 import serial
 from tests import forked
+from tests.at_length import at_length, cases
 from tests.cli.test_cli import KIKS, state_of
 from tests.served import GUARD_S, PROGRAMS
 
@@ -33,7 +34,7 @@ for step in range(40):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("robots", [1, 2])
+@pytest.mark.parametrize("robots", cases([1, 2]))
 def test_programs_are_recorded_with_their_texts(robots: int, tmp_path: Path) -> None:
     (tmp_path / "round.py").write_text(ROUND)
     words = [word for _ in range(robots) for word in ("round.py", "COM1")]
@@ -67,6 +68,7 @@ def test_programs_are_recorded_with_their_texts(robots: int, tmp_path: Path) -> 
     assert [int(row["counts_7"]) for row in rows] == recording.table("readings", 1)["counts"][:, 7].tolist()
 
 
+@at_length
 @pytest.mark.slow
 def test_a_match_with_a_referee_is_made_again(tmp_path: Path) -> None:
     result = forked.run("demo", "soccer", "--seconds", "20", "--record", "match.mcap", cwd=tmp_path)
@@ -74,6 +76,7 @@ def test_a_match_with_a_referee_is_made_again(tmp_path: Path) -> None:
     assert AGAIN in forked.run("replay", "match.mcap", "--check", cwd=tmp_path).stdout
 
 
+@at_length
 @pytest.mark.slow
 def test_what_a_killed_server_has_recorded_is_made_again(tmp_path: Path) -> None:
     """A foreign client in real time; the server has no chance to end the file."""

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 from tests import forked
+from tests.at_length import cases
 from tests.cli.test_cli import KIKS, state_of
 from tests.served import GUARD_S, PROGRAMS, fresh
 
@@ -151,7 +152,7 @@ def test_mistakes_end_in_one_clear_line(words: tuple[str, ...], message: str, fo
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("count", [1, 2])
+@pytest.mark.parametrize("count", cases([2, 1]))
 def test_recording_changes_nothing(count: int, tmp_path: Path) -> None:
     programs = [DRIVE, "COM1", "40", "7", "6"] * count
     plain = forked.run("run", *programs)

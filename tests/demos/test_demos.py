@@ -24,7 +24,7 @@ from kiks.demos.swarm import Swarm
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[2]
-SEEDS = range(share(4, 10))
+SEEDS = range(share(2, 10))
 
 # The state after the first twenty seconds with seed 1. To renew: python tests/demos/test_demos.py
 HASHES = {

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.at_length import cases, share
+from tests.needed import need
 from typer.testing import CliRunner
 
 import kiks
@@ -17,8 +19,7 @@ from kiks.learn.algorithms import ALGORITHMS, Diverse
 
 pytestmark = pytest.mark.slow
 
-pytest.importorskip("ribs")
-pytest.importorskip("cma")
+need("ribs", "cma")
 pyarrow = pytest.importorskip("pyarrow")
 parquet = pytest.importorskip("pyarrow.parquet")
 
@@ -60,7 +61,7 @@ def test_each_algorithm_has_a_name_and_each_task_one_of_them() -> None:
     assert {make().algorithm for make in kiks.tasks.TASKS.values()} <= set(AlgorithmName)
 
 
-@pytest.mark.parametrize("algorithm", list(ALGORITHMS))
+@pytest.mark.parametrize("algorithm", cases(ALGORITHMS))
 def test_an_evolution_goes_on_to_the_bit_with_every_algorithm(algorithm: str, tmp_path: Path) -> None:
     np.random.seed(1)
     whole = run(algorithm, 6, tmp_path / "whole")
@@ -84,7 +85,7 @@ def test_algorithms_for_many_behaviours_need_axes_and_measures(algorithm: str) -
         evolution.tell(np.zeros(len(evolution.ask())))
 
 
-@pytest.mark.parametrize("algorithm", DIVERSE)
+@pytest.mark.parametrize("algorithm", cases(DIVERSE))
 def test_they_find_many_behaviours_where_one_gets_better(algorithm: str) -> None:
     # The behaviour is two of the parameters; a step towards larger ones is all that fitness rewards.
     evolution = kiks.Evolution(small(axes=(kiks.Axis("path_mm", -3, 3), kiks.Axis("straightness", -3, 3))), algorithm)
@@ -98,7 +99,7 @@ def test_they_find_many_behaviours_where_one_gets_better(algorithm: str) -> None
     assert archive_of(evolution).coverage > 0.3
 
 
-@pytest.mark.parametrize("algorithm", DIVERSE)
+@pytest.mark.parametrize("algorithm", cases(DIVERSE))
 def test_the_champion_is_the_elite_that_does_best_on_trial(algorithm: str) -> None:
     evolution = kiks.Evolution(small(), algorithm, seed=1, population=20)
     names = evolution.task.value_names
@@ -229,13 +230,13 @@ def test_damaged_footers_are_errors_of_one_line(tmp_path: Path) -> None:
     whole = file.read_bytes()
     end = len(whole) - 8
     messages = []
-    for place in range(end - int.from_bytes(whole[end : end + 4], "little"), end, 5):
+    for place in range(end - int.from_bytes(whole[end : end + 4], "little"), end, share(50, 5)):
         file.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
         try:
             kiks.Archive.load(tmp_path)
         except ParameterError as error:
             messages.append(str(error))
-    assert len(messages) > 100
+    assert len(messages) > share(10, 100)
     assert all(map(str.isprintable, messages))
 
 
@@ -262,7 +263,7 @@ def test_the_fitness_of_the_maze_puts_the_goal_before_thrift_and_thrift_before_n
     assert order[1] > order[2] + 1
 
 
-@pytest.mark.parametrize("algorithm", DIVERSE)
+@pytest.mark.parametrize("algorithm", cases(DIVERSE))
 def test_the_champion_of_the_maze_reaches_the_goal_though_others_are_cheaper(algorithm: str) -> None:
     task = kiks.tasks.maze()
     assert task.fitness is not None

@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.at_length import at_length
+from tests.needed import need
 
 import kiks
 from kiks import ParameterError
@@ -25,7 +27,7 @@ from kiks.model.arena import Pose
 
 pytestmark = pytest.mark.slow
 
-pytest.importorskip("cma")
+need("cma")
 parquet = pytest.importorskip("pyarrow.parquet")
 
 
@@ -238,6 +240,7 @@ coevolution.run(generations=10**6, executor="threads:1", each=report)
 """
 
 
+@at_length
 def test_a_killed_coevolution_loses_at_most_the_current_generation(tmp_path: Path) -> None:
     with subprocess.Popen([sys.executable, "-c", KILLED, str(tmp_path)], stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None

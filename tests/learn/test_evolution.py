@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.at_length import cases
+from tests.needed import need
 
 import kiks
 from kiks import ParameterError
@@ -19,8 +21,7 @@ from kiks.learn.candidate_worlds import cautious_mean
 
 pytestmark = pytest.mark.slow
 
-pytest.importorskip("cma")
-pytest.importorskip("ribs")
+need("cma", "ribs")
 parquet = pytest.importorskip("pyarrow.parquet")
 
 
@@ -42,7 +43,7 @@ def candidates_of(evolution: kiks.Evolution) -> bytes:
 # ---- seeds ----
 
 
-@pytest.mark.parametrize("algorithm", list(AlgorithmName))
+@pytest.mark.parametrize("algorithm", cases(AlgorithmName))
 def test_the_same_seed_gives_the_same_evolution(algorithm: str) -> None:
     np.random.seed(1)
     one = run(algorithm)

@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.at_length import at_length, cases
+from tests.needed import need
 
 import kiks
 from kiks import ParameterError
@@ -22,9 +24,7 @@ from kiks.learn.finals import FINALISTS, FINALS_SEED, SHARE, Contender, Finals, 
 from kiks.learn.generation_loop import seed_for
 from kiks.learn.results import result_of
 
-pytest.importorskip("cma")
-pytest.importorskip("ribs")
-pytest.importorskip("pyarrow")
+need("cma", "ribs", "pyarrow")
 
 
 def contenders(count: int) -> list[Contender]:
@@ -222,7 +222,7 @@ def test_threads_and_blocks_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("algorithm", list(AlgorithmName))
+@pytest.mark.parametrize("algorithm", cases(AlgorithmName))
 def test_a_continued_evolution_holds_finals_at_its_new_end(algorithm: str, tmp_path: Path) -> None:
     whole = run(algorithm, tmp_path / "whole")
     early = run(algorithm, tmp_path / "part", 4)
@@ -257,6 +257,7 @@ evolution.run(generations=6, executor="threads:1", each_round=kill)
 """
 
 
+@at_length
 @pytest.mark.slow
 def test_finals_in_which_the_process_was_killed_are_held_again(tmp_path: Path) -> None:
     ended = subprocess.run([sys.executable, "-c", KILLED, str(tmp_path / "killed")], check=False)
@@ -270,7 +271,7 @@ def test_finals_in_which_the_process_was_killed_are_held_again(tmp_path: Path) -
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("when", ["each", "each_round"])
+@pytest.mark.parametrize("when", cases(["each", "each_round"]))
 def test_an_interrupted_evolution_holds_no_finals(when: str, tmp_path: Path) -> None:
     def interrupt(state: Any) -> None:
         if when == "each_round" or len(state.generations) == 5:

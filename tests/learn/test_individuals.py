@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
+from tests.at_length import cases
 
 import kiks
 from kiks import ParameterError
@@ -62,7 +63,7 @@ TASKS = {
 }
 
 
-@pytest.mark.parametrize("name", list(TASKS))
+@pytest.mark.parametrize("name", cases(TASKS, 2))
 def test_a_demonstration_is_the_world_of_the_evaluation(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

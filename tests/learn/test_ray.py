@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.at_length import at_length
 from tests.learn import works
 from tests.learn.test_executors import expected
 
@@ -60,6 +61,7 @@ def test_values_are_the_same_and_only_the_chunk_of_a_lost_worker_is_repeated(clu
     assert not ray.is_initialized()
 
 
+@at_length
 def test_a_connection_of_the_program_is_used_and_stays_open(cluster, ray):
     candidates, seeds = works.candidates(40), works.seeds(40)
     ray.init(cluster.address)
@@ -85,6 +87,7 @@ def test_a_connection_of_the_program_is_used_and_stays_open(cluster, ray):
         ray.shutdown()
 
 
+@at_length
 def test_only_the_chunks_of_a_lost_node_are_repeated(cluster, tmp_path):
     candidates, seeds = works.candidates(100), works.seeds(100)
     # Each node gets one of the first two chunks: the chunk that starts first waits until the other is stuck.
@@ -109,6 +112,7 @@ def test_only_the_chunks_of_a_lost_node_are_repeated(cluster, tmp_path):
     os.close(gate)
 
 
+@at_length
 def test_a_local_cluster_listens_on_loopback_alone(ray, caplog):
     candidates, seeds = works.candidates(40), works.seeds(40)
     with executor_for("ray", works.Sums()) as executor:
@@ -147,6 +151,7 @@ def test_the_error_names_candidates_that_kill_their_workers(cluster):
         executor.evaluate(works.candidates(5, marked=3), works.seeds(5))
 
 
+@at_length
 def test_workers_that_die_in_prepare_are_an_error(cluster):
     with (
         executor_for(f"ray:{cluster.address}", works.DeadAtStart()) as executor,
@@ -183,6 +188,7 @@ def start_program(tmp_path: Path, work: str, rest: str) -> subprocess.Popen[str]
     )
 
 
+@at_length
 def test_ctrl_c_ends_all_workers(ray, tmp_path):
     running = start_program(tmp_path, "Stuck", "executor.evaluate(works.candidates(100, marked=0), works.seeds(100))")
     with (tmp_path / "pipe").open() as pipe:
@@ -195,6 +201,7 @@ def test_ctrl_c_ends_all_workers(ray, tmp_path):
     assert "KeyboardInterrupt" in errors
 
 
+@at_length
 def test_workers_end_with_a_program_that_is_killed(ray, tmp_path):
     rest = "executor.evaluate(works.candidates(1), works.seeds(1)); os.kill(os.getpid(), signal.SIGKILL)"
     running = start_program(tmp_path, "OpenPipe", rest)

@@ -8,7 +8,6 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
@@ -251,28 +250,26 @@ def matrix(sides: bytes, numbers: bytes, *, sides_type: int = 5, name: bytes = b
     return element(14, b"".join(element(kind, part) + bytes(-len(part) % 8) for kind, part in parts))
 
 
-@cache
-def hostile() -> dict[str, bytes]:
-    full = [4, 1, 8000, 8000, 1, 1, 1, 8000, 8000, 9]
-    star = np.random.default_rng(3).integers(1, 8000, (2, 30_000))
-    return {
-        "bomb": element(15, zlib.compress(bytes(8 * FILE_BYTES_MAX), 9)),
-        "huge": element(14, struct.pack("<IIII", 6, 8, 14, 0) + struct.pack("<IIii", 5, 8, 2**31 - 1, 2**31 - 1)),
-        "longer than the file": struct.pack("<II", 14, 2**32 - 1),
-        "many numbers": element(15, zlib.compress(matrix(struct.pack("<ii", 1, 46 << 20), bytes(46 << 20)), 9)),
-        "many starts": mat(walls=np.full((1, 2), 200), starts=np.zeros((2_000_000, 3)), compress=True)[128:],
-        "infinite sides": matrix(struct.pack("<dd", 1, np.inf), b"", sides_type=9),
-        "sides that are no numbers": matrix(struct.pack("<dd", 1, np.nan), b"", sides_type=9),
-        "negative sides": matrix(struct.pack("<ii", -1, -5), bytes(5)),
-        "painted over": mat(walls=np.array([8000, 8000, *full * 30], np.uint16))[128:],
-        "a star": mat(walls=np.array([8000, 8000, 30_000, *star.ravel(), 9], np.uint16))[128:],
-    }
+FULL = [4, 1, 8000, 8000, 1, 1, 1, 8000, 8000, 9]
+STAR = np.random.default_rng(3).integers(1, 8000, (2, 30_000))
+HOSTILE = {
+    "bomb": lambda: element(15, zlib.compress(bytes(8 * FILE_BYTES_MAX), 9)),
+    "huge": lambda: element(14, struct.pack("<IIII", 6, 8, 14, 0) + struct.pack("<IIii", 5, 8, 2**31 - 1, 2**31 - 1)),
+    "longer than the file": lambda: struct.pack("<II", 14, 2**32 - 1),
+    "many numbers": lambda: element(15, zlib.compress(matrix(struct.pack("<ii", 1, 46 << 20), bytes(46 << 20)), 9)),
+    "many starts": lambda: mat(walls=np.full((1, 2), 200), starts=np.zeros((2_000_000, 3)), compress=True)[128:],
+    "infinite sides": lambda: matrix(struct.pack("<dd", 1, np.inf), b"", sides_type=9),
+    "sides that are no numbers": lambda: matrix(struct.pack("<dd", 1, np.nan), b"", sides_type=9),
+    "negative sides": lambda: matrix(struct.pack("<ii", -1, -5), bytes(5)),
+    "painted over": lambda: mat(walls=np.array([8000, 8000, *FULL * 30], np.uint16))[128:],
+    "a star": lambda: mat(walls=np.array([8000, 8000, 30_000, *STAR.ravel(), 9], np.uint16))[128:],
+}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", hostile())
+@pytest.mark.parametrize("name", HOSTILE)
 def test_files_that_would_take_endless_memory_are_refused(name):
-    data = encode_kad(Arena.box(150, 120))[:128] + hostile()[name]
+    data = encode_kad(Arena.box(150, 120))[:128] + HOSTILE[name]()
     begin_s = time.process_time()
     with traced() as peak_bytes, pytest.raises(ArenaError) as caught:
         decode_kad(data)

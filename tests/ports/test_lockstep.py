@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.at_length import at_length, share
+from tests.at_length import at_length, cases, share
 from tests.busy import busy_computer
 from tests.ports.helpers import WallClock, warnings
 from tests.served import GUARD_S, PROGRAMS, Served, fresh, served
@@ -125,7 +125,7 @@ def test_two_programs_repeat(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("thinking", ["none", "fixed:2"])
+@pytest.mark.parametrize("thinking", cases(["fixed:2", "none"]))
 def test_order_in_real_time_does_not_matter(thinking: str) -> None:
     ends = set()
     for order in ((0, 1), (1, 0)):

@@ -7,6 +7,7 @@ import threading
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.at_length import share
 
 import kiks
 from kiks.clock.serial_timing import OUTPUT_LIMIT
@@ -137,7 +138,7 @@ def test_write_waits_while_the_line_is_full() -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=30, derandomize=True)
+@settings(max_examples=share(10, 30))
 @given(st.lists(st.integers(1, 7), min_size=1, max_size=20), st.integers(1, 5))
 def test_reading_in_any_pieces_gives_the_same_bytes_at_the_same_time(pieces: list[int], commands: int) -> None:
     whole, parts = kiks.Simulation().port(1), kiks.Simulation().port(1)

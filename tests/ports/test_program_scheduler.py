@@ -180,7 +180,7 @@ PROGRAMS = st.lists(st.lists(st.tuples(TIMES_NS, TIMES_NS), max_size=6), min_siz
 
 
 @pytest.mark.slow
-@settings(max_examples=share(300, 3000))
+@settings(max_examples=share(100, 3000))
 @given(programs=PROGRAMS, orders=st.lists(st.randoms(use_true_random=False), min_size=2, max_size=6))
 def test_any_order_gives_the_same_run(programs: Sequence[Steps], orders: Sequence[Any]) -> None:
     first, *others = (run(programs, order.randrange) for order in orders)

@@ -19,7 +19,7 @@ from pathlib import Path
 from subprocess import PIPE
 
 import pytest
-from tests.at_length import share
+from tests.at_length import at_length, share
 from tests.cli.test_cli import KIKS
 from tests.script.screen import display
 from tests.served import PROGRAMS
@@ -139,6 +139,7 @@ def run_together(
     return {name: (folder / name).read_text() for name in names}, end
 
 
+@at_length
 def test_programs_do_the_same_on_the_desk(
     alone: tuple[Runs, Runs], tmp_path: Path, environment: dict[str, str]
 ) -> None:
@@ -220,6 +221,7 @@ def run_all_real(names: Sequence[str], folder: Path, environment: Mapping[str, s
     return {name: job.result() for name, job in jobs.items()}
 
 
+@at_length
 def test_programs_do_the_same_in_real_time(
     alone: tuple[Runs, Runs], tmp_path: Path, environment: dict[str, str]
 ) -> None:
