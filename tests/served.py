@@ -12,12 +12,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from tests.guard import GUARD_S
+
 from kiks.model.arena import Arena
 from kiks.ports.endpoint import Endpoint
 from kiks.ports.server import Server
 from kiks.sim.simulation import Simulation
 
-GUARD_S = 20.0
 BOX = Arena.box(600, 600)
 PROGRAMS = Path(__file__).parent / "programs"
 

@@ -54,8 +54,8 @@ def test_links_lead_somewhere(page: Path) -> None:
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_commands_and_targets_exist(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
-    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), flags=re.MULTILINE))
-    assert set(re.findall(r"\bmake ([a-z]+)\b", "".join(blocks(page, "sh")))) <= targets
+    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), flags=re.MULTILINE))
+    assert set(re.findall(r"\bmake ([a-z-]+)\b", "".join(blocks(page, "sh")))) <= targets
     for command in re.findall(r"^kiks ([a-z]+)", "".join(blocks(page, "sh")), flags=re.MULTILINE):
         assert command in COMMANDS, f"{page.name}: kiks {command}"
     # Paths that a page names in code must exist.

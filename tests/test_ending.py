@@ -10,11 +10,10 @@ from pathlib import Path
 
 import pytest
 from tests.at_length import cases
+from tests.guard import GUARD_S
 
 ROOT = Path(__file__).parents[1]
 WANDER = str(ROOT / "tests" / "programs" / "wander.py")
-GUARD_S = 60
-"""How long a process may take before a test gives up on it; none waits that long."""
 
 # Runs a command and sends a signal when a module begins to be imported, or when LLVM calls back.
 AT_A_PLACE = """

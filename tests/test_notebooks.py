@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from PIL import Image
 from tests.at_length import cases
+from tests.guard import GUARD_S
 
 import kiks
 from kiks.batch.rollouts import FIRST, Rollouts
 
-GUARD_S = 60.0
 OF_DESK = "sim = kiks.Simulation(robots=2)\n"
 
 Run = Callable[[str], list[dict[str, Any]]]

@@ -110,12 +110,16 @@ def test_boxes_of_walls_cover_what_is_wall(name: str) -> None:
     assert (cells <= grown).all()
 
 
-def test_without_vtk_an_error_says_how_to_install_it(
-    recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("library", "extra"), [("av", "film"), ("vtk", "render")])
+def test_the_error_for_a_missing_library_names_its_extra(
+    library: str, extra: str, recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(sys.modules, "vtk", None)
-    with pytest.raises(ParameterError, match=r"This needs vtk, but it cannot be imported .*\[render\]"):
+    monkeypatch.setitem(sys.modules, library, None)
+    with pytest.raises(ParameterError, match=rf"This needs {library}, but it cannot be imported .*\[{extra}\]"):
         save_film(recording, tmp_path / "film.mp4", view="3d")
+
+
+def test_the_error_names_the_views(recording: Recording, tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="view must be one of 'top', '3d', but it was '4d'"):
         save_film(recording, tmp_path / "film.mp4", view="4d")
     assert not list(tmp_path.iterdir())

@@ -91,27 +91,23 @@ def test_a_few_hostile_bytes() -> None:
     check("--only", "wire", "--cases", "2", "--seed", "11")
 
 
-@pytest.mark.timeout(470)  # campaigns of many cases, in processes of their own
 def test_hostile_cases() -> None:
     check("--only", "files", "--only", "calls", "--only", "messages", "--cases", share("1", "4"), "--seed", "12")
 
 
 @at_length
-@pytest.mark.timeout(470)  # campaigns of many cases, in processes of their own
 def test_files_are_whole() -> None:
     scenes = (f"--only=faults.{scene}" for scene in ("kill_writer", "fill_disk", "no_descriptors"))
     check(*scenes, "--cases", "4", "--seed", "13")
 
 
 @at_length
-@pytest.mark.timeout(470)  # a campaign in processes of its own
 @pytest.mark.parametrize("scene", ["server", "desk"])
 def test_another_process_takes_the_place_of_a_killed_one(scene: str) -> None:
     check("--only", f"faults.kill_{scene}", "--cases", "1", "--seed", "14")
 
 
 @at_length
-@pytest.mark.timeout(470)  # a campaign in processes of its own
 @pytest.mark.parametrize("group", ["serve", "session"])
 def test_robots_answer_while_many_clients_connect(group: str) -> None:
     check("--only", f"crowd.{group}", "--cases", "1", "--seed", "15")
@@ -119,7 +115,6 @@ def test_robots_answer_while_many_clients_connect(group: str) -> None:
 
 @at_length
 @needs_octave
-@pytest.mark.timeout(470)  # a campaign in processes of its own
 @pytest.mark.parametrize("kind", ["joined_window", "start"])
 def test_ctrl_c_in_octave_leaves_right_answers_and_no_process(kind: str) -> None:
     check("--only", f"octave.{kind}", "--cases", "1", "--seed", "16")

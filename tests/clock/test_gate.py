@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 import pytest
+from tests.guard import GUARD_S
 
 import kiks
 from kiks.clock.gate import LAG_NS, SLICE_NS, Gate
@@ -16,8 +17,6 @@ from kiks.clock.pace import Pace
 from kiks.errors import HaltError, ParameterError
 from kiks.model.arena import Pose
 from kiks.sim.drag import Drags
-
-GUARD_S = 20.0
 
 
 class Wall:

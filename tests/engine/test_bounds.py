@@ -31,14 +31,12 @@ def said_by_process(**environment: str) -> str:
 
 
 @at_length
-@pytest.mark.timeout(470)  # it compiles the engine
 def test_no_index_leaves_its_array_and_no_bit_depends_on_the_build_in_a_world_of_two_robots() -> None:
     """`.ci/run` runs it, too: without LLVM's slowest optimisations, which take two thirds of the time."""
     assert record_of_process(**PLAIN_AND_CHECKED, NUMBA_OPT="1") == run_record()
 
 
 @at_length
-@pytest.mark.timeout(470)  # it compiles engine and batch, with the checks for the first time
 def test_no_index_leaves_its_array_and_no_bit_depends_on_the_build_in_any_world() -> None:
     """An index outside its array is an IndexError with the checks; without them the process may end."""
     assert said_by_process(**PLAIN_AND_CHECKED) == said_by_process()

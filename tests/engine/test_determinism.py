@@ -86,7 +86,6 @@ def test_in_another_process(record: str) -> None:
     assert record_of_process() == record
 
 
-@pytest.mark.timeout(470)  # it compiles the engine for another processor
 @at_length
 @pytest.mark.skipif(not binding.get_host_cpu_features().get("avx512f"), reason="this computer's processor is like that")
 def test_for_another_processor(record: str) -> None:

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.at_length import at_length
+from tests.guard import GUARD_S
 from tests.learn import works
 from tests.learn.test_executors import expected
 
@@ -22,7 +23,6 @@ from kiks.learn.executors import executor_for
 
 pytestmark = pytest.mark.slow
 
-TIMEOUT_S = 20.0
 ROOT = Path(__file__).parents[2]
 
 
@@ -126,7 +126,7 @@ def test_connecting_has_a_timeout(ray, monkeypatch):
     may_connect, is_shut_down = threading.Event(), threading.Event()
     with socket.create_server(("127.0.0.1", 0)) as silent:
         address = f"127.0.0.1:{silent.getsockname()[1]}"
-        monkeypatch.setattr(ray, "init", lambda *args, **options: may_connect.wait(TIMEOUT_S))
+        monkeypatch.setattr(ray, "init", lambda *args, **options: may_connect.wait(GUARD_S))
         monkeypatch.setattr(ray, "shutdown", is_shut_down.set)
         monkeypatch.setattr(ray_executor, "CONNECT_S", 0.01)
         with pytest.raises(ParameterError, match=r"was \(no answer within 0\.01 s\)\. Start one with"):
@@ -134,7 +134,7 @@ def test_connecting_has_a_timeout(ray, monkeypatch):
     assert not is_shut_down.is_set()
     # A connection that comes too late is closed.
     may_connect.set()
-    assert is_shut_down.wait(TIMEOUT_S)
+    assert is_shut_down.wait(GUARD_S)
 
 
 def test_an_address_without_a_server_is_an_error(ray):

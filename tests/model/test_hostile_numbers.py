@@ -229,7 +229,6 @@ def of_batch(batch: kiks.Batch, h: Any) -> dict[str, Callable[[], Any]]:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(470)  # the first one may compile the batch
 @pytest.mark.parametrize("hostile", HOSTILE, ids=NAMES)
 def test_a_batch_stays_sane(hostile: Any) -> None:
     batch = kiks.Batch(ARENA, 2, seed=1)
@@ -241,7 +240,6 @@ def test_a_batch_stays_sane(hostile: Any) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(470)  # the first one may compile the batch
 @pytest.mark.parametrize("hostile", HOSTILE, ids=NAMES)
 def test_environments_stay_sane(hostile: Any) -> None:
     from kiks.learn.gymnasium_envs import KheperaEnv, KheperaVectorEnv

@@ -24,7 +24,7 @@ from tests.cli.test_cli import KIKS
 from tests.script.screen import display
 from tests.served import PROGRAMS
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
+pytestmark = pytest.mark.slow
 
 CORPUS = {path.stem: str(path) for path in sorted((PROGRAMS / "corpus").glob("*.py"))}
 ON_TERMINAL, EACH_ALONE, INTO_FILE = (
