@@ -48,7 +48,7 @@ def installing(extra: str) -> str:
     """Return how the libraries of an extra are installed: KiKS itself is in no index yet.
 
     Args:
-        extra: The extra: 'film', 'learn', 'plot', 'ray' or 'render'.
+        extra: The extra: 'film', 'learn', 'ray' or 'render'.
 
     Example:
         >>> installing("learn")

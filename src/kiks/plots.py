@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from kiks.errors import ParameterError, library
+from kiks.errors import ParameterError
 from kiks.model.arena import Arena
 from kiks.model.atomic_files import replace_file
 from kiks.recording.analysis import odometry, time_shares
@@ -51,8 +50,7 @@ def save_plot(recordings: Sequence[Recording], path: str | Path, *, robot: int =
         robot: Number of the robot whose readings, speeds and time are drawn; a run without a robot has paths alone.
 
     Raises:
-        ParameterError: If Matplotlib is not installed, the file cannot be written, or a run with robots has no such
-            robot.
+        ParameterError: If the file cannot be written, or a run with robots has no such robot.
     """
     kind = Path(path).suffix.lower()
     if kind not in TYPES:
@@ -64,34 +62,37 @@ def panels_of(recording: Recording, *, robot: int = 1) -> dict[str, bytes]:
     """Return what `save_plot` draws of one recording as single pictures, by the names of `PANELS`, in SVG.
 
     Raises:
-        ParameterError: If Matplotlib is not installed, or a run with robots has no such robot.
+        ParameterError: If a run with robots has no such robot.
     """
+    from matplotlib.figure import Figure
+
     pictures = {}
     arena = recording.setup.arena
     arena_inches = min(max(0.75 * COLUMN_INCHES * arena.height_mm / arena.width_mm + 0.6, 2.0), COLUMN_INCHES)
     for name, draw in _drawings(recording, robot).items():
         size = (2 * COLUMN_INCHES, PANELS[name]) if PANELS[name] else (COLUMN_INCHES, arena_inches)
-        figure = library("matplotlib.figure", "plot").Figure(figsize=size, layout="constrained")
+        figure = Figure(figsize=size, layout="constrained")
         draw(figure.subplots())
         for axes in figure.axes:
-            if axes.get_legend() is not None:
-                axes.get_legend().set_in_layout(True)  # no other axes need the same width
+            legend = axes.get_legend()
+            if legend is not None:
+                legend.set_in_layout(True)  # no other axes need the same width
         pictures[name] = _file_of(figure, "svg")
     return pictures
 
 
-def recording_for_notebook(recording: Recording) -> tuple[bytes, dict[str, int]] | None:
-    """Return the figures of a recording as a PNG, and how wide a notebook shows it; nothing without Matplotlib."""
-    if find_spec("matplotlib") is None:
-        return None
+def recording_for_notebook(recording: Recording) -> tuple[bytes, dict[str, int]]:
+    """Return the figures of a recording as a PNG, and how wide a notebook shows it."""
     return _file_of(figure_of([recording]), "png"), {"width": round(COLUMN_INCHES * 96)}
 
 
 def _file_of(figure: Any, kind: str) -> bytes:
     """Return the file of a figure. Without dates and random names, the same recording gives the same file."""
+    from matplotlib import rc_context
+
     dated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
     buffer = io.BytesIO()
-    with library("matplotlib", "plot").rc_context({"svg.hashsalt": "kiks"}):
+    with rc_context({"svg.hashsalt": "kiks"}):
         figure.savefig(buffer, format=kind, dpi=DOTS_PER_INCH, metadata=dated)
     return buffer.getvalue()
 
@@ -100,13 +101,15 @@ def figure_of(recordings: Sequence[Recording], *, robot: int = 1) -> Any:
     """Return the figure of `save_plot`, a `matplotlib.figure.Figure`.
 
     Raises:
-        ParameterError: If Matplotlib is not installed, or a recording with robots has no such robot.
+        ParameterError: If a recording with robots has no such robot.
     """
+    from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
     drawings = [_drawings(recording, robot) for recording in recordings]
-    figure = library("matplotlib.figure", "plot").Figure(
-        figsize=(COLUMN_INCHES * len(recordings), 2.6 * sum(ROWS)), layout="constrained"
-    )
-    figure.get_layout_engine().set(h_pad=0.12)  # room for the legends between the rows
+    # Padding makes room for the legends between the rows.
+    layout = ConstrainedLayoutEngine(h_pad=0.12)
+    figure = Figure(figsize=(COLUMN_INCHES * len(recordings), 2.6 * sum(ROWS)), layout=layout)
     axes = figure.subplots(len(ROWS), len(recordings), squeeze=False, height_ratios=ROWS)
     for column, recording, draw in zip(axes.T, recordings, drawings, strict=True):
         column[0].set_title(recording.title, fontsize="medium")
@@ -119,7 +122,7 @@ def figure_of_run(sim: Simulation, *, robot: int = 1) -> Any:
     """Return the figure of a run that is being recorded; see `figure_of`.
 
     Raises:
-        ParameterError: If it is not, Matplotlib is not installed, or there is no such robot.
+        ParameterError: If it is not, or there is no such robot.
     """
     recorder = sim.loop.recorder
     if not isinstance(recorder, RunRecorder):

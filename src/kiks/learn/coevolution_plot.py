@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from kiks.errors import library
 from kiks.learn.coevolution import Coevolution, Tournament
 from kiks.model.atomic_files import replace_file
 
@@ -20,9 +19,11 @@ def save_fitness_plot(coevolution: Coevolution, path: str | Path) -> None:
     """Draw best, quartiles and median of each generation for both sides.
 
     Raises:
-        ParameterError: If Matplotlib is not installed, or the file cannot be written.
+        ParameterError: If the file cannot be written.
     """
-    figure = library("matplotlib.figure").Figure(figsize=(12.0, 4.4), layout="constrained")
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(12.0, 4.4), layout="constrained")
     numbers = np.arange(1, len(coevolution.generations) + 1)
     for side, axes in enumerate(figure.subplots(1, 2)):
         fitness = [each.values[:, side] for each in coevolution.generations]
@@ -42,9 +43,11 @@ def save_tournament_plot(tournament: Tournament, path: str | Path) -> None:
     """Draw the fitness of the first side in all pairs of champions as grey squares, and both sides' means.
 
     Raises:
-        ParameterError: If Matplotlib is not installed, or the file cannot be written.
+        ParameterError: If the file cannot be written.
     """
-    figure = library("matplotlib.figure").Figure(figsize=(12.0, 4.8), layout="constrained")
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(12.0, 4.8), layout="constrained")
     squares, curves = figure.subplots(1, 2)
     (first, second), generations = tournament.sides, tournament.generations
     half = 0.5 * (generations[-1] - generations[0]) / max(len(generations) - 1, 1) or 0.5

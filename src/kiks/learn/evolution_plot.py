@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from kiks.errors import library
 from kiks.learn.archive import Archive
 from kiks.learn.baselines import Baselines
 from kiks.learn.champion import Champion
@@ -35,11 +34,12 @@ def save_plot(evolution: Evolution, path: str | Path, baselines: Baselines | Non
         baselines: Its baselines, drawn as lines.
 
     Raises:
-        ParameterError: If Matplotlib is not installed, or the file cannot be written.
+        ParameterError: If the file cannot be written.
     """
-    figures = library("matplotlib.figure")
+    from matplotlib.figure import Figure
+
     archive = evolution.archive
-    figure = figures.Figure(figsize=(6.4 if archive is None else 12.0, 4.4), layout="constrained")
+    figure = Figure(figsize=(6.4 if archive is None else 12.0, 4.4), layout="constrained")
     axes = figure.subplots(1, 1 if archive is None else 2, squeeze=False)[0]
     _draw_fitness(axes[0], evolution, baselines)
     if archive is not None:
@@ -78,6 +78,8 @@ def draw_baselines(axes: Any, baselines: Baselines) -> None:
 
 def _draw_archive(figure: Any, axes: Any, archive: Archive, champion: Champion) -> None:
     """Draw the fitness in each cell; the fittest cell and the champion are marked."""
+    from matplotlib.patches import Rectangle
+
     heat, (across, *others) = archive.heat_map(), archive.axes
     while heat.ndim > 2:  # with more than two axes, show the best along the others
         heat = np.fmax.reduce(heat, axis=-1)
@@ -86,9 +88,9 @@ def _draw_archive(figure: Any, axes: Any, archive: Archive, champion: Champion) 
     picture = np.atleast_2d(heat.T)
     image = axes.imshow(picture, origin="lower", extent=extent, aspect="auto", interpolation="nearest", cmap="viridis")
     for elite in archive.best_first()[:1]:
-        corner = [axis.low + cell * _cell(axis) for axis, cell in zip((across, up), (*elite.cell, 0)[:2], strict=True)]
-        patches = library("matplotlib.patches")
-        square = patches.Rectangle(corner, _cell(across), _cell(up), fill=False, color="tab:red", label="fittest cell")
+        column, row = (*elite.cell, 0)[:2]
+        corner = across.low + column * _cell(across), up.low + row * _cell(up)
+        square = Rectangle(corner, _cell(across), _cell(up), fill=False, color="tab:red", label="fittest cell")
         axes.add_patch(square)
     place = [champion.measures.get(axis.measure, axis.low) for axis in archive.axes[:2]]
     if not others:

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from kiks.errors import library
 from kiks.learn.baselines import Baselines
 from kiks.learn.evolution_plot import draw_baselines
 from kiks.learn.exam import PASS_SHARE
@@ -30,12 +29,13 @@ def save_results_plot(groups: Mapping[str, Sequence[Result]], path: str | Path) 
         path: File of the picture.
 
     Raises:
-        ParameterError: If Matplotlib is not installed, or the file cannot be written.
+        ParameterError: If the file cannot be written.
     """
-    figures = library("matplotlib.figure")
+    from matplotlib.figure import Figure
+
     results = [each for group in groups.values() for each in group]
     has_exam = all(each.exam is not None for each in results)
-    figure = figures.Figure(figsize=(12.0 if has_exam else 6.4, 4.4), layout="constrained")
+    figure = Figure(figsize=(12.0 if has_exam else 6.4, 4.4), layout="constrained")
     axes = figure.subplots(1, 1 + has_exam, squeeze=False)[0]
     for (name, group), colour in zip(groups.items(), COLOURS, strict=False):
         _draw_curves(axes[0], name, group, colour)

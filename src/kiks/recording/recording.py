@@ -194,7 +194,7 @@ class Recording:
             A Matplotlib figure, which notebooks show.
 
         Raises:
-            ParameterError: If Matplotlib is not installed, or there is no such robot.
+            ParameterError: If there is no such robot.
         """
         return upwards.plot_recordings([self], robot=robot)
 

@@ -55,8 +55,7 @@ def save_page(
         on_progress: Called now and then with the share that is done.
 
     Raises:
-        KiksError: If Matplotlib is not installed, there is no such robot, the recording is damaged, or the file cannot
-            be written.
+        KiksError: If there is no such robot, the recording is damaged, or the file cannot be written.
     """
     figures = panels_of(recording, robot=robot)
     frames = RunFrames(recording.log, on_progress)
