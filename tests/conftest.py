@@ -25,6 +25,10 @@ def pytest_configure(config: pytest.Config) -> None:
         from kiks.cli.engine_start import compile_everything
 
         compile_everything()
+        if config.getoption("numprocesses", None):
+            from tests import forked
+
+            forked.address()  # started here, it is shared by all workers
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

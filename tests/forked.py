@@ -7,8 +7,11 @@ and of terminals begin a real process.
 from __future__ import annotations
 
 import atexit
+import contextlib
+import gc
 import json
 import os
+import select
 import signal
 import socket
 import subprocess
@@ -23,38 +26,42 @@ ROOT = Path(__file__).parents[1]
 LIMIT_S = 470.0
 """Time limit of a call."""
 
+ADDRESS = "KIKS_TESTS_FORKED"
+"""The variable of the environment that names the socket, so that all workers of the tests share one process."""
+
 _starting = threading.Lock()
-_server: Server | None = None
 
 
-class Server:
-    """The process that forks, and the way to ask it. One thread at a time may ask."""
+def address() -> str:
+    """Return the socket of the process that forks; start that process at the first call."""
+    with _starting:
+        if ADDRESS not in os.environ:
+            folder = tempfile.TemporaryDirectory(prefix="kiks-forked-")
+            os.environ[ADDRESS] = name = f"{folder.name}/socket"
+            with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listener:
+                listener.bind(name)
+                listener.listen(100)
+                command = [sys.executable, "-m", "tests.forked", str(listener.fileno())]
+                # Standard output is no terminal, so that Python buffers it as it does for a pipe.
+                pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.DEVNULL}
+                process = subprocess.Popen(command, cwd=ROOT, pass_fds=[listener.fileno()], **pipes)
+            atexit.register(folder.cleanup)
+            atexit.register(process.communicate)  # its input ends, and so does the process
+        return os.environ[ADDRESS]
 
-    def __init__(self) -> None:
-        self.lock = threading.Lock()
-        self.socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        with theirs:
-            command = [sys.executable, "-m", "tests.forked", str(theirs.fileno())]
-            # Standard output is no terminal, so that Python buffers it as it does for a pipe.
-            nowhere = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL}
-            self.process = subprocess.Popen(command, cwd=ROOT, pass_fds=[theirs.fileno()], **nowhere)
 
-    def call(self, request: Mapping[str, object], outputs: list[int]) -> int:
-        """Run a request with standard output and error in files; return the exit code, -N for signal N."""
-        with self.lock:
-            socket.send_fds(self.socket, [json.dumps(request).encode()], outputs)
-            self.socket.settimeout(LIMIT_S)
-            pid = int(self.socket.recv(100))
-            try:
-                return int(self.socket.recv(100))
-            except TimeoutError:
-                os.kill(pid, signal.SIGKILL)
-                raise
+def call(request: Mapping[str, object], descriptors: list[int]) -> int:
+    """Run a request with these for standard input, output and error; return the exit code, -N for signal N."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as connection:
+        connection.connect(address())
+        socket.send_fds(connection, [json.dumps(request).encode()], descriptors)
+        connection.settimeout(LIMIT_S)
+        return int(connection.recv(100))
 
-    def close(self) -> None:
-        """End the process."""
-        self.socket.close()
-        self.process.wait()
+
+def kiks_command() -> list[str]:
+    """Return a command that does what `kiks` does, in a fork; if it is killed, so is the fork."""
+    return [sys.executable, "-I", "-S", str(ROOT / "tests" / "programs" / "forked_kiks.py"), address()]
 
 
 def run(
@@ -71,15 +78,10 @@ def run(
     Raises:
         TimeoutError: If it does not end in time.
     """
-    global _server
-    with _starting:
-        if _server is None:
-            _server = Server()
-            atexit.register(_server.close)
     surroundings = {**os.environ, **(env or {})}
     request = {"words": words, "code": code, "cwd": str(cwd or Path.cwd()), "env": surroundings}
-    with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as errors:
-        exit_code = _server.call(request, [out.fileno(), errors.fileno()])
+    with open(os.devnull) as nothing, tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as errors:
+        exit_code = call(request, [nothing.fileno(), out.fileno(), errors.fileno()])
         out.seek(0)
         errors.seek(0)
         return subprocess.CompletedProcess(["kiks", *words], exit_code, out.read(), errors.read())
@@ -88,28 +90,45 @@ def run(
 # ---- in the process that forks ----
 
 
-def serve(requests: socket.socket) -> None:
-    """Fork for each request until the tests are over; return in each fork, too, when its program has ended."""
-    while True:
-        message, outputs, _, _ = socket.recv_fds(requests, 1 << 20, 2)
-        if not message:
+def serve(listener: socket.socket) -> None:
+    """Fork for each connection until the tests are over; return in each fork, too, when its program has ended."""
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+    while sys.stdin not in select.select([sys.stdin, listener], [], [])[0]:
+        connection, _ = listener.accept()
+        if os.fork() == 0:
+            listener.close()
+            signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+            attend(connection)
             return
-        pid = os.fork()
-        if pid == 0:
-            requests.close()
-            begin(json.loads(message), outputs)
-            return
-        for descriptor in outputs:
-            os.close(descriptor)
-        requests.send(b"%d" % pid)
-        requests.send(b"%d" % os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]))
+        connection.close()
 
 
-def begin(request: dict, outputs: list[int]) -> None:
+def attend(connection: socket.socket) -> None:
+    """Run a request in another fork; tell its exit code, or kill it when the other end closes the connection."""
+    message, descriptors, _, _ = socket.recv_fds(connection, 1 << 20, 3)
+    pid = os.fork()
+    if pid == 0:
+        connection.close()
+        begin(json.loads(message), descriptors)
+        return
+    for descriptor in descriptors:
+        os.close(descriptor)
+    end = os.pidfd_open(pid)
+    has_ended = end in select.select([end, connection], [], [])[0]
+    if not has_ended:
+        os.kill(pid, signal.SIGKILL)
+    exit_code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+    if has_ended:
+        with contextlib.suppress(OSError):  # the other end may have gone at the same moment
+            connection.send(b"%d" % exit_code)
+    os._exit(0)
+
+
+def begin(request: dict, descriptors: list[int]) -> None:
     """Run a request in this fork, as a process of its own would."""
-    for descriptor, output in zip((1, 2), outputs, strict=True):
-        os.dup2(output, descriptor)
-        os.close(output)
+    for descriptor, given in enumerate(descriptors):
+        os.dup2(given, descriptor)
+        os.close(given)
     os.chdir(request["cwd"])
     os.environ.clear()
     os.environ.update(request["env"])
@@ -126,8 +145,14 @@ def begin(request: dict, outputs: list[int]) -> None:
 
 
 if __name__ == "__main__":
+    import kiks.cli
+    import kiks.desk.server.show
+    import kiks.toolbox.session_process  # noqa: F401
     from kiks.cli.engine_start import compile_batch, compile_everything
 
     compile_everything()
     compile_batch()
+    # A fork need not look for garbage in what all of them share, which takes half a second at its end.
+    gc.collect()
+    gc.freeze()
     serve(socket.socket(fileno=int(sys.argv[1])))

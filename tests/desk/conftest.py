@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from tests.guard import GUARD_S
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page, Playwright
+    from playwright.sync_api import Browser, BrowserContext, Page, Playwright
     from tests.desk.visitor import Visitor
     from tests.desk.visits import NewPage
 
@@ -20,7 +21,7 @@ ARGUMENTS = [
     *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync"),
     *("--disable-background-networking", "--disable-component-update", "--enable-unsafe-swiftshader"),
 ]
-GUARD_MS = 20_000
+GUARD_MS = 1000 * GUARD_S
 
 
 @pytest.fixture(scope="module")
@@ -49,14 +50,27 @@ def browser_without_3d(playwright: Playwright) -> Iterator[Browser]:
     browser.close()
 
 
+@pytest.fixture(scope="module")
+def context(browser: Browser) -> BrowserContext:
+    """Of a module: its pages share a cache, and so read the desk's files once."""
+    return browser.new_context()
+
+
 @pytest.fixture
-def new_page(browser: Browser) -> Iterator[NewPage]:
-    """Open pages; at the end, no page may have had an error or printed one on its console."""
+def new_page(browser: Browser, context: BrowserContext) -> Iterator[NewPage]:
+    """Open pages; at the end, no page may have had an error or printed one on its console.
+
+    A page with options has a cache and cookies of its own.
+    """
     pages: list[Page] = []
     faults: list[str] = []
 
     def open_page(width: int = 1280, height: int = 800, *, by: Browser | None = None, **options: Any) -> Page:
-        page = (by or browser).new_page(viewport={"width": width, "height": height}, **options)
+        if by or options:
+            page = (by or browser).new_page(**options)
+        else:
+            page = context.new_page()
+        page.set_viewport_size({"width": width, "height": height})
         page.set_default_timeout(GUARD_MS)
         page.on("pageerror", lambda error: faults.append(str(error)))
         page.on("console", lambda said: faults.append(said.text) if said.type == "error" else None)
@@ -66,6 +80,7 @@ def new_page(browser: Browser) -> Iterator[NewPage]:
     yield open_page
     for page in pages:
         page.close()
+    context.clear_cookies()
     assert not faults
 
 

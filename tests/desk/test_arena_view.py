@@ -16,6 +16,7 @@ pytest.importorskip("nicegui", reason="the desk needs NiceGUI")
 pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
 
 from playwright.sync_api import Browser
+from tests.at_length import at_length, cases
 from tests.desk.visits import NewPage, Visit
 
 SENSOR_RAD = math.radians(66.4)
@@ -50,7 +51,7 @@ def last(said: list[dict[str, Any]], kind: str) -> dict[str, Any]:
     return [message for message in said if message["kind"] == kind][-1]
 
 
-@pytest.mark.parametrize("dark", ["true", "false"])
+@pytest.mark.parametrize("dark", cases(["true", "false"]))
 def test_both_views_draw(visit: Callable[..., Visit], dark: str) -> None:
     here = visit(f"view=both&dark={dark}")
     here.wait("() => kiksDesk.isSolid() && kiksDesk.stats().solid_frames > 3")
@@ -97,7 +98,7 @@ def test_a_robot_is_dragged(visit: Callable[..., Visit]) -> None:
     assert said[-1]["kind"] == "drop"
 
 
-@pytest.mark.parametrize("how", ["rim", "right button", "shift"])
+@pytest.mark.parametrize("how", cases(["rim", "right button", "shift"]))
 def test_a_robot_is_turned(visit: Callable[..., Visit], how: str) -> None:
     here = visit()
     x_mm, y_mm, heading_rad = here.pose(2)
@@ -112,7 +113,8 @@ def test_a_robot_is_turned(visit: Callable[..., Visit], how: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("what", "index", "place"), [("body", 0, (420, 320)), ("body", 1, (500, 320)), ("lamp", 1, (80, 300))]
+    ("what", "index", "place"),
+    cases([("body", 0, (420, 320)), ("lamp", 1, (80, 300)), ("body", 1, (500, 320))], 2),
 )
 def test_bodies_and_lamps_are_dragged(
     visit: Callable[..., Visit], what: str, index: int, place: tuple[float, float]
@@ -128,6 +130,7 @@ def test_bodies_and_lamps_are_dragged(
     here.heard("(said) => said.filter((message) => message.kind === 'drop').length === 2")
 
 
+@at_length
 def test_escape_moves_a_dragged_thing_back(visit: Callable[..., Visit]) -> None:
     here = visit()
     here.page.mouse.move(*here.on_page(420, 320))
@@ -165,6 +168,7 @@ def test_keys_select_move_and_turn(visit: Callable[..., Visit]) -> None:
     assert here.page.locator("[aria-live]").inner_text() == "Nothing selected"
 
 
+@at_length
 def test_tab_leaves_the_view_after_the_last_thing(visit: Callable[..., Visit]) -> None:
     here = visit()
     here.page.locator("[data-testid=arena-top]").focus()
@@ -215,6 +219,7 @@ def test_tools_draw_on_the_grid(visit: Callable[..., Visit], tool: str, points: 
         assert said["points"] == points
 
 
+@at_length
 def test_escape_ends_a_stroke_and_strokes_end_at_the_arena(visit: Callable[..., Visit]) -> None:
     here = visit("tool=line")
     here.page.mouse.move(*here.on_page(200, 500))
@@ -267,6 +272,7 @@ def test_fingers_drag_and_pinch(visit: Callable[..., Visit]) -> None:
     assert here.on_page(600, 520)[0] - here.on_page(500, 520)[0] == pytest.approx(2 * wide, rel=0.02)
 
 
+@at_length
 def test_select_from_python(visit: Callable[..., Visit]) -> None:
     here = visit()
     here.ask("select")
@@ -316,6 +322,7 @@ def test_a_new_scene_replaces_the_old_one(visit: Callable[..., Visit]) -> None:
     assert grown <= 2, "the graphics card keeps the one more robot's name and turrets, and nothing of the old scene"
 
 
+@at_length
 def test_things_are_dragged_in_three_dimensions_too(visit: Callable[..., Visit]) -> None:
     here = visit("view=solid")
     here.wait("() => kiksDesk.isSolid()")

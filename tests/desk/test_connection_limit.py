@@ -13,6 +13,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
+from tests.guard import GUARD_S
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
@@ -23,10 +24,8 @@ from kiks.desk.server.server import MESSAGE_LIMIT, SERVER
 from kiks.desk.server.show import Shown, show
 from kiks.desk.server.token import COOKIE
 
-GUARD_S = 20.0
 
-
-@pytest.fixture
+@pytest.fixture(scope="module")
 def shown() -> Iterator[Shown]:
     shown = show(kiks.Simulation(kiks.Arena.box(300, 300)), port=0, browser=False)
     yield shown

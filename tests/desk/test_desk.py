@@ -10,6 +10,7 @@ pytest.importorskip("nicegui", reason="the desk needs NiceGUI")
 pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
 
 from playwright.sync_api import Browser, expect
+from tests.at_length import at_length
 from tests.desk.visitor import Visitor
 from tests.desk.visits import NewPage
 
@@ -33,17 +34,26 @@ def centre_of_view(visitor: Visitor) -> tuple[float, float]:
 # ---- time ----
 
 
-def test_loads_and_time_passes(visitor: Visitor) -> None:
+def test_time_passes_at_the_chosen_speed(visitor: Visitor) -> None:
     assert visitor.page.title() == "KiKS"
     assert visitor.seen(1) == pytest.approx(visitor.sim.pose(1), abs=1e-3)
     begun_ns = visitor.sim.now_ns
     visitor.until(lambda: visitor.sim.now_ns > begun_ns + 200_000_000)
     expect(visitor.at("rate")).to_contain_text("1.0 x now")
     visitor.picture("first_picture")
+    visitor.choose("speed", "10 x")
+    visitor.until(lambda: visitor.desk.gate.speed == 10)
+    visitor.choose("speed", "full speed")
+    visitor.until(lambda: visitor.desk.gate.speed is None)
+    visitor.until(lambda: visitor.desk.meter.momentary > 10)
+    visitor.picture("as_fast_as_it_can")
+    visitor.choose("speed", "0.1 x")
+    visitor.until(lambda: visitor.desk.gate.speed == 0.1)
 
 
 def test_run_pause_and_step(visitor: Visitor) -> None:
     visitor.pause()
+    visitor.until(lambda: visitor.sim.now_ns == visitor.desk.gate.pace.now_ns())
     now_ns = visitor.sim.now_ns
     clock = visitor.at("clock")
     expect(clock).to_have_text(clock_text(now_ns))
@@ -61,6 +71,7 @@ def test_run_pause_and_step(visitor: Visitor) -> None:
     visitor.until(lambda: visitor.desk.gate.is_paused)
 
 
+@at_length
 def test_space_on_a_button_presses_only_that_button(visitor: Visitor) -> None:
     visitor.at("step").focus()
     visitor.page.keyboard.press("Space")
@@ -71,17 +82,6 @@ def test_space_on_a_button_presses_only_that_button(visitor: Visitor) -> None:
     visitor.until(lambda: visitor.sim.now_ns > now_ns)
     expect(visitor.at("clock")).to_have_text(clock_text(now_ns + 10_000_000))
     assert visitor.desk.gate.is_paused
-
-
-def test_speed_changes(visitor: Visitor) -> None:
-    visitor.choose("speed", "10 x")
-    visitor.until(lambda: visitor.desk.gate.speed == 10)
-    visitor.choose("speed", "full speed")
-    visitor.until(lambda: visitor.desk.gate.speed is None)
-    visitor.until(lambda: visitor.desk.meter.momentary > 10)
-    visitor.picture("as_fast_as_it_can")
-    visitor.choose("speed", "0.1 x")
-    visitor.until(lambda: visitor.desk.gate.speed == 0.1)
 
 
 def test_checkpoint_and_reset(visitor: Visitor) -> None:
@@ -118,6 +118,7 @@ def test_robot_is_dragged_and_slides_along_a_wall(visitor: Visitor) -> None:
     assert heading_rad == 0
 
 
+@at_length
 def test_robot_is_turned_by_its_rim(visitor: Visitor) -> None:
     visitor.pull((150 + 25.5, 200), (150, 260))
     assert visitor.until(lambda: visitor.sim.pose(1)[2] == pytest.approx(math.pi / 2, abs=0.02))
@@ -126,6 +127,7 @@ def test_robot_is_turned_by_its_rim(visitor: Visitor) -> None:
     assert visitor.sim.pose(1)[:2] == pytest.approx((150, 200))
 
 
+@at_length
 def test_ball_and_lamp_are_dragged(visitor: Visitor) -> None:
     visitor.pull((300, 100), (350, 200))
     visitor.until(lambda: math.dist(visitor.sim.bodies()[0][["x_mm", "y_mm"]].item(), (350, 200)) < 1)
@@ -136,22 +138,7 @@ def test_ball_and_lamp_are_dragged(visitor: Visitor) -> None:
     visitor.let_go()
 
 
-def test_fingers_drag(new_page: NewPage, shown: Shown) -> None:
-    visitor = Visitor(new_page(800, 1100, has_touch=True), shown)
-    touch = visitor.page.context.new_cdp_session(visitor.page)
-
-    def finger(kind: str, *places: tuple[float, float]) -> None:
-        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": x, "y": y} for x, y in places]})
-
-    finger("touchStart", visitor.on_page(150, 200))
-    for step in range(1, 11):
-        finger("touchMove", visitor.on_page(150 + 10 * step, 200))
-    visitor.until(lambda: visitor.sim.pose(1)[0] == pytest.approx(250, abs=1))
-    visitor.picture("dragged_by_touch")
-    finger("touchEnd")
-    visitor.until(lambda: visitor.desk.hands.are_empty)
-
-
+@at_length
 def test_keys_alone_move_and_turn(visitor: Visitor) -> None:
     for _ in range(60):
         visitor.page.keyboard.press("Tab")
@@ -172,6 +159,7 @@ def test_keys_alone_move_and_turn(visitor: Visitor) -> None:
     visitor.until(lambda: visitor.desk.gate.is_paused)
 
 
+@at_length
 def test_two_browsers_see_one_world_and_both_drag(visitor: Visitor, new_page: NewPage) -> None:
     other = Visitor(new_page(), visitor.shown)
     visitor.pull((150, 200), (150, 300))
@@ -194,7 +182,7 @@ def test_two_browsers_see_one_world_and_both_drag(visitor: Visitor, new_page: Ne
 # ---- views ----
 
 
-def test_robot_is_followed(visitor: Visitor) -> None:
+def test_robot_is_followed_and_layers_are_chosen(visitor: Visitor) -> None:
     visitor.page.mouse.move(*visitor.on_page(300, 200))
     visitor.page.mouse.wheel(0, -600)
     visitor.menu("follow", "Robot 2")
@@ -210,9 +198,7 @@ def test_robot_is_followed(visitor: Visitor) -> None:
     visitor.menu("follow", "No robot")
     visitor.sim.place(2, 450, 300, 0)
     visitor.until(lambda: not is_in_the_middle())
-
-
-def test_layers_go_on_and_off(visitor: Visitor) -> None:
+    # Layers go on and off.
     visitor.at("layers").click()
     for name in ("rays", "grid", "ruler", "trails"):
         was_shown = visitor.answer("(name) => kiksDesk.shown()[name]", name)
@@ -235,6 +221,7 @@ def test_3d_view_shows(visitor: Visitor) -> None:
     visitor.picture("both_views")
 
 
+@at_length
 def test_without_webgl_the_desk_shows_the_top_view(
     new_page: NewPage, shown: Shown, browser_without_3d: Browser
 ) -> None:
@@ -246,6 +233,7 @@ def test_without_webgl_the_desk_shows_the_top_view(
     visitor.picture("without_webgl")
 
 
+@at_length
 def test_a_hidden_page_gets_frames_again_when_visible(visitor: Visitor) -> None:
     hide = """(isHidden) => {
         Object.defineProperty(document, 'hidden', { value: isHidden, configurable: true });

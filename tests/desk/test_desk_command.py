@@ -16,12 +16,13 @@ from urllib.request import HTTPCookieProcessor, OpenerDirector, Request, build_o
 
 import pytest
 from tests import forked
+from tests.at_length import cases
 from tests.cli.test_cli import state_of
+from tests.guard import GUARD_S
 from tests.served import PROGRAMS
 
 pytestmark = pytest.mark.slow
 DRIVE = str(PROGRAMS / "drive.py")
-GUARD_S = 60.0
 
 
 @contextmanager
@@ -75,7 +76,7 @@ def test_desk_serves_a_page_and_ends_with_ctrl_c(tmp_path: Path) -> None:
         assert process.wait(GUARD_S) == 0
 
 
-@pytest.mark.parametrize("host", ["127.0.0.1", "0.0.0.0"])
+@pytest.mark.parametrize("host", cases(["127.0.0.1", "0.0.0.0"]))
 def test_without_the_token_there_is_no_desk(host: str, tmp_path: Path) -> None:
     with started("desk", "--port", "0", "--no-browser", "--host", host, folder=tmp_path) as (_, output):
         url = url_of(output)
@@ -115,7 +116,7 @@ def show_page(url: str) -> None:
         socket.send('{"kind": "ack"}')
 
 
-@pytest.mark.parametrize("words", [("run", "--desk"), ("desk", "--port", "0", "--no-browser")])
+@pytest.mark.parametrize("words", cases([(("run", "--desk"),), (("desk", "--port", "0", "--no-browser"),)]))
 def test_programs_begin_when_a_page_shows_the_world(words: tuple[str, ...], tmp_path: Path) -> None:
     (tmp_path / "tells.py").write_text("open('begun', 'w').close()\nimport time\ntime.sleep(1)\n")
     with started(*words, "tells.py", folder=tmp_path) as (process, output):
@@ -139,7 +140,7 @@ def test_errors_are_reported_before_waiting_for_a_page(tmp_path: Path) -> None:
     assert "http://" not in result.stdout
 
 
-@pytest.mark.parametrize("words", [("run", "--desk"), ("demo", "avoid", "--desk")])
+@pytest.mark.parametrize("words", cases([(("run", "--desk"),), (("demo", "avoid", "--desk"),)]))
 def test_ctrl_c_ends_waiting_for_a_page(words: tuple[str, ...], tmp_path: Path) -> None:
     words = (*words, DRIVE, "COM1", "5", "3", "5") if words[0] == "run" else words
     with started(*words, folder=tmp_path) as (process, output):
@@ -151,7 +152,7 @@ def test_ctrl_c_ends_waiting_for_a_page(words: tuple[str, ...], tmp_path: Path) 
 
 @pytest.mark.parametrize(
     ("words", "said"),
-    [(("demo", "avoid", "--seconds", "1"), "avoid: "), (("demo", "soccer", "--seconds", "1"), "soccer: left 0")],
+    cases([(("demo", "avoid", "--seconds", "1"), "avoid: "), (("demo", "soccer", "--seconds", "1"), "soccer: left 0")]),
 )
 def test_demonstration_on_a_desk(words: tuple[str, ...], said: str, tmp_path: Path) -> None:
     with started(*words, "--desk", "--no-wait", folder=tmp_path) as (process, output):
@@ -164,7 +165,7 @@ def test_demonstration_on_a_desk(words: tuple[str, ...], said: str, tmp_path: Pa
         assert process.wait(GUARD_S) == 0
 
 
-@pytest.mark.parametrize("thinking", ["live", "none"])
+@pytest.mark.parametrize("thinking", cases(["live", "none"]))
 def test_served_robots_on_a_desk(thinking: str, tmp_path: Path) -> None:
     import serial
 
@@ -183,17 +184,20 @@ def test_served_robots_on_a_desk(thinking: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("words", "message"),
-    [
-        (("--arena", "nowhere.kiks"), "nowhere.kiks"),
-        (("--folder", "nowhere"), "--folder must be a folder"),
-        (("nowhere.py",), "PROGRAM must be a Python file"),
-        (("--turret", "laser"), "turrets[0] must be one of"),
-        (("--robots", "3", "--robot", "khepera", "--robot", "khepera_ii"), "--robot must name one kind for all"),
-        (("--thinking", "much"), "thinking must be"),
-        (("--speed", "-1"), "speed must be a number from 0.001 to 1000"),
-        (("--host", "192.0.2.1"), "the desk must be able to listen"),
-        (("--host", "no such host"), "the desk must be able to listen"),
-    ],
+    cases(
+        [
+            (("--folder", "nowhere"), "--folder must be a folder"),
+            (("nowhere.py",), "PROGRAM must be a Python file"),
+            (("--host", "192.0.2.1"), "the desk must be able to listen"),
+            (("--arena", "nowhere.kiks"), "nowhere.kiks"),
+            (("--turret", "laser"), "turrets[0] must be one of"),
+            (("--robots", "3", "--robot", "khepera", "--robot", "khepera_ii"), "--robot must name one kind for all"),
+            (("--thinking", "much"), "thinking must be"),
+            (("--speed", "-1"), "speed must be a number from 0.001 to 1000"),
+            (("--host", "no such host"), "the desk must be able to listen"),
+        ],
+        3,
+    ),
 )
 def test_errors_are_one_clear_line(words: tuple[str, ...], message: str, tmp_path: Path) -> None:
     result = forked.run("desk", "--no-browser", "--port", "0", *words, cwd=tmp_path)

@@ -14,6 +14,7 @@ pytest.importorskip("playwright", reason="tests in a browser need Playwright for
 
 from nicegui import Client
 from playwright.sync_api import expect
+from tests.at_length import cases, share
 from tests.desk.visitor import Visitor
 from tests.desk.visits import NewPage
 
@@ -97,13 +98,15 @@ def walk(visitor: Visitor) -> Iterator[str]:
 
 @pytest.mark.parametrize(
     ("tab", "inside"),
-    [
-        ("robot", ("monitor-robot", "proximity-0", "ambient-7", "curves-speeds")),
-        ("wire", ("wire-robot", "wire-filter", "wire-hold", "wire-window", "console", "console-send")),
-        ("arena", ("tool-rectangle", "brush", "material", "new-arena", "open", "save-name", "save")),
-        ("programs", ("script", "new-program", "editor", "save-program", "robot", "run-program")),
-        ("settings", ("seed", "thinking", "baud", "model", "noise", "add-robot", "apply", "start-over")),
-    ],
+    cases(
+        [
+            ("programs", ("script", "new-program", "editor", "save-program", "robot", "run-program")),
+            ("robot", ("monitor-robot", "proximity-0", "ambient-7", "curves-speeds")),
+            ("wire", ("wire-robot", "wire-filter", "wire-hold", "wire-window", "console", "console-send")),
+            ("arena", ("tool-rectangle", "brush", "material", "new-arena", "open", "save-name", "save")),
+            ("settings", ("seed", "thinking", "baud", "model", "noise", "add-robot", "apply", "start-over")),
+        ]
+    ),
 )
 def test_tab_reaches_everything(visitor: Visitor, tab: str, inside: tuple[str, ...]) -> None:
     visitor.tab(tab)
@@ -112,7 +115,7 @@ def test_tab_reaches_everything(visitor: Visitor, tab: str, inside: tuple[str, .
     assert set(walk(visitor)) >= {*above, *inside, f"tab-{tab}"}
 
 
-@pytest.mark.parametrize("theme", ["Light", "Dark"])
+@pytest.mark.parametrize("theme", cases(["Light", "Dark"]))
 def test_everything_has_a_name_and_enough_contrast(visitor: Visitor, theme: str) -> None:
     visitor.menu("dark", theme)
     expect(visitor.page.locator("body.body--dark")).to_have_count(int(theme == "Dark"))
@@ -131,24 +134,15 @@ def test_everything_has_a_name_and_enough_contrast(visitor: Visitor, theme: str)
     visitor.picture(f"help_{theme.lower()}")
 
 
-@pytest.mark.parametrize(("width", "height"), [(800, 600), (1024, 768)])
+@pytest.mark.parametrize(("width", "height"), cases([(800, 600), (1024, 768)]))
 def test_small_windows_stay_usable(new_page: NewPage, shown: Shown, width: int, height: int) -> None:
     visitor = Visitor(new_page(width, height), shown)
     for tab in TABS:
         visitor.tab(tab)
         visitor.picture(f"{tab}_{width}x{height}")
         assert visitor.answer("document.documentElement.scrollWidth") == width
-        for name in (
-            "run",
-            "step",
-            "speed",
-            "clock",
-            "reset",
-            "views",
-            "layers",
-            "help",
-            *(f"tab-{one}" for one in TABS),
-        ):
+        above = ("run", "step", "speed", "clock", "reset", "views", "layers", "help")
+        for name in (*above, *(f"tab-{one}" for one in TABS)):
             box = visitor.at(name).bounding_box()
             assert box is not None, name
             assert box["x"] >= 0, name
@@ -161,7 +155,7 @@ def test_small_windows_stay_usable(new_page: NewPage, shown: Shown, width: int, 
 
 def test_closed_pages_leave_nothing_behind(new_page: NewPage, shown: Shown) -> None:
     page = new_page()
-    for _ in range(4):
+    for _ in range(share(2, 4)):
         visitor = Visitor(page, shown)
         for tab in TABS:
             visitor.tab(tab)

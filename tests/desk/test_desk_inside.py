@@ -12,6 +12,7 @@ pytest.importorskip("nicegui", reason="the desk needs NiceGUI")
 pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
 
 from playwright.sync_api import expect
+from tests.at_length import at_length
 from tests.desk.visitor import Visitor
 
 pytestmark = pytest.mark.slow
@@ -34,6 +35,7 @@ def test_click_on_a_robot_opens_its_monitor(visitor: Visitor) -> None:
     visitor.picture("monitor_by_click")
 
 
+@at_length
 def test_reading_of_a_sensor_is_explained(visitor: Visitor) -> None:
     visitor.drag((150, 200), (45, 200))
     visitor.drag((45 + 25.5, 200), (45, 260))
@@ -48,6 +50,7 @@ def test_reading_of_a_sensor_is_explained(visitor: Visitor) -> None:
     visitor.picture("why")
 
 
+@at_length
 def test_click_on_a_sensor_in_the_arena_explains_its_reading(visitor: Visitor) -> None:
     x_mm, y_mm, heading_rad = visitor.sim.pose(1)
     visitor.page.mouse.click(*visitor.on_page(x_mm, y_mm))
@@ -87,6 +90,7 @@ AT_ONCE = """([input, ...texts]) => {
 """Types commands, and half of another one, before the page has been answered."""
 
 
+@at_length
 def test_commands_typed_faster_than_the_page_is_answered_all_arrive(visitor: Visitor) -> None:
     visitor.tab("wire")
     texts = [f"C,{k},{k}" for k in range(5)] + ["D,7,8"]
@@ -102,6 +106,7 @@ def test_commands_typed_faster_than_the_page_is_answered_all_arrive(visitor: Vis
 # ---- Programs ----
 
 
+@at_length
 def test_example_drives_prints_and_is_stopped(visitor: Visitor) -> None:
     visitor.tab("programs")
     visitor.choose("script", "example: avoid")
@@ -119,16 +124,6 @@ def test_example_drives_prints_and_is_stopped(visitor: Visitor) -> None:
     visitor.at("run-program").click()
     expect(visitor.at("output")).to_contain_text("What the eight sensors see")
     visitor.picture("program_has_printed")
-
-
-def test_mistake_in_a_program_is_shown_by_its_line(visitor: Visitor) -> None:
-    visitor.tab("programs")
-    visitor.at("new-program").click()
-    visitor.write("import kiks\n\nwhile True\n    pass\n")
-    visitor.at("run-program").click()
-    expect(visitor.at("mistake")).to_contain_text("Line 3: expected ':'")
-    assert not visitor.desk.programs.handles
-    visitor.picture("mistake_in_a_program")
 
 
 # ---- above the arena ----
@@ -174,6 +169,7 @@ def test_delete_removes_what_is_selected(visitor: Visitor) -> None:
     assert visitor.sim.robot_count == 2
 
 
+@at_length
 def test_wall_is_drawn_saved_and_opened_again(visitor: Visitor) -> None:
     visitor.tab("arena")
     before = visitor.sim.arena.brightness.copy()
@@ -205,17 +201,6 @@ def test_wall_is_drawn_saved_and_opened_again(visitor: Visitor) -> None:
     visitor.picture("opened_again")
 
 
-def test_bad_file_gets_a_clear_message(visitor: Visitor) -> None:
-    old = visitor.sim
-    visitor.tab("arena")
-    visitor.at("upload").locator("input[type=file]").set_input_files(
-        {"name": "mine.kiks", "mimeType": "text/plain", "buffer": b"no project at all"}
-    )
-    visitor.told("must")
-    visitor.picture("bad_file")
-    assert visitor.sim is old
-
-
 # ---- Settings ----
 
 
@@ -245,6 +230,7 @@ def test_applying_settings_restarts_the_world(visitor: Visitor) -> None:
     visitor.picture("another_world")
 
 
+@at_length
 def test_all_robots_may_be_removed(visitor: Visitor) -> None:
     old = visitor.sim
     visitor.tab("settings")
@@ -267,6 +253,7 @@ def test_all_robots_may_be_removed(visitor: Visitor) -> None:
     visitor.page.wait_for_function("() => kiksDesk.scene().robots.length === 1 && kiksDesk.pose(0)")
 
 
+@at_length
 def test_wrong_setting_gets_a_clear_message(visitor: Visitor) -> None:
     old = visitor.sim
     visitor.tab("settings")
@@ -277,6 +264,7 @@ def test_wrong_setting_gets_a_clear_message(visitor: Visitor) -> None:
     assert visitor.sim is old
 
 
+@at_length
 def test_start_over_restores_the_initial_state(visitor: Visitor) -> None:
     visitor.drag((150, 200), (250, 250))
     visitor.until(lambda: visitor.sim.now_ns > 500_000_000)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,8 +14,8 @@ from PIL import Image
 pytest.importorskip("nicegui", reason="the desk needs NiceGUI")
 pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
 
-from playwright.sync_api import Page
-from tests.desk.visitor import FIRST_PICTURE, SCREENSHOTS
+from playwright.sync_api import expect
+from tests.desk.visitor import Visitor
 from tests.desk.visits import NewPage
 
 from kiks.desk.server.desk import Desk
@@ -36,145 +36,115 @@ def desk(tmp_path: Path) -> Desk:
 
 
 @pytest.fixture
-def page(desk: Desk, new_page: NewPage) -> Iterator[Page]:
+def visitor(desk: Desk, new_page: NewPage) -> Iterator[Visitor]:
     shown = Shown(desk, port=0)
     shown.drive()
-    page = new_page(1400, 1000)
-    page.goto(shown.url)
-    page.wait_for_function(FIRST_PICTURE)
-    page.get_by_test_id("tab-arena").click()
-    page.get_by_test_id("tool-rectangle").wait_for()
-    yield page
-    page.close()
+    visitor = Visitor(new_page(1400, 1000), shown)
+    visitor.tab("arena")
+    yield visitor
+    visitor.page.close()
     shown.close()
 
 
-def drag(page: Page, *points: tuple[float, float]) -> None:
-    places = [page.evaluate("([x, y]) => kiksDesk.toClient(x, y)", list(point)) for point in points]
-    page.mouse.move(*places[0])
-    page.mouse.down()
-    for place in places[1:]:
-        page.mouse.move(*place, steps=8)
-    page.mouse.up()
+def click(visitor: Visitor, x_mm: float, y_mm: float) -> None:
+    visitor.page.mouse.click(*visitor.on_page(x_mm, y_mm))
 
 
-def take(page: Page, tool: str) -> None:
-    """Choose a tool, and wait until the arena has it."""
-    page.get_by_test_id(f"tool-{tool}").click()
-    page.locator(f"[data-testid=tool-{tool}].bg-accent").wait_for()
-
-
-def wait_for_step(page: Page, *, undo: bool = True, redo: bool = False) -> None:
+def wait_for_step(visitor: Visitor, *, undo: bool = True, redo: bool = False) -> None:
     for name, is_there in (("undo", undo), ("redo", redo)):
-        state = ":not([disabled])" if is_there else "[disabled]"
-        page.locator(f"[data-testid={name}]{state}").wait_for()
+        expect(visitor.at(name)).to_be_enabled(enabled=is_there)
 
 
-def tell(page: Page, words: str) -> None:
-    page.locator(".q-notification", has_text=words).first.wait_for()
+def test_walls_are_drawn_and_undone(desk: Desk, visitor: Visitor) -> None:
+    page = visitor.page
 
-
-def wait_until(page: Page, fact: Callable[[], object]) -> None:
-    """Wait for a condition of the engine, one picture of the screen at a time."""
-    for _ in range(1200):
-        if fact():
-            return
-        page.wait_for_function("() => new Promise((done) => requestAnimationFrame(() => done(true)))")
-    raise AssertionError("it did not come true")
-
-
-def look(page: Page, name: str) -> None:
-    """Leave a picture of the page for a person."""
-    SCREENSHOTS.mkdir(exist_ok=True)
-    page.screenshot(path=SCREENSHOTS / f"arena_{name}.png")
-
-
-def test_walls_are_drawn_and_undone(desk: Desk, page: Page) -> None:
     def brightness(x_mm: int, y_mm: int) -> int:
         return int(desk.sim.arena.brightness[y_mm, x_mm])
 
-    take(page, "rectangle")
-    drag(page, (250, 250), (330, 330))
-    wait_for_step(page)
-    wait_until(page, lambda: brightness(290, 290) == 255)
-    page.get_by_test_id("material").click()
-    page.get_by_role("option", name="wood").click()
-    take(page, "freehand")
-    drag(page, (400, 100), (450, 200), (520, 150))
-    take(page, "line")
-    drag(page, (400, 400), (550, 400))
-    take(page, "erase")
-    drag(page, (290, 200), (290, 400))
-    take(page, "ball")
-    drag(page, (150, 400))
-    take(page, "lamp")
-    drag(page, (50, 300))
-    wait_until(page, lambda: len(desk.sim.lamps) == 1)
-    look(page, "drawn")
+    visitor.take("rectangle")
+    visitor.drag((250, 250), (330, 330))
+    wait_for_step(visitor)
+    visitor.until(lambda: brightness(290, 290) == 255)
+    visitor.choose("material", "wood")
+    visitor.take("freehand")
+    visitor.pull((400, 100), (450, 200))
+    page.mouse.move(*visitor.on_page(520, 150), steps=8)
+    visitor.let_go()
+    visitor.take("line")
+    visitor.drag((400, 400), (550, 400))
+    visitor.take("erase")
+    visitor.drag((290, 200), (290, 400))
+    visitor.take("ball")
+    click(visitor, 150, 400)
+    visitor.take("lamp")
+    click(visitor, 50, 300)
+    visitor.until(lambda: len(desk.sim.lamps) == 1)
+    visitor.picture("arena_drawn")
     assert (brightness(450, 200), brightness(475, 400), brightness(290, 290)) == (190, 190, 0)
     assert len(desk.sim.bodies()) == 1
-    take(page, "remove")
-    drag(page, (150, 405))
-    wait_until(page, lambda: len(desk.sim.bodies()) == 0)
-    take(page, "rectangle")
-    drag(page, (100, 100), (140, 140))
-    tell(page, "robot 1")
-    look(page, "refused")
+    visitor.take("remove")
+    click(visitor, 150, 405)
+    visitor.until(lambda: len(desk.sim.bodies()) == 0)
+    visitor.take("rectangle")
+    visitor.drag((100, 100), (140, 140))
+    visitor.told("robot 1")
+    visitor.picture("arena_refused")
     assert brightness(120, 120) == 0
     page.locator("canvas").first.focus()
     for _ in range(7):
         page.keyboard.press("Control+z")
-    wait_for_step(page, undo=False, redo=True)
-    wait_until(page, lambda: np.array_equal(desk.sim.arena.brightness, Arena.box(600, 500).brightness))
+    wait_for_step(visitor, undo=False, redo=True)
+    visitor.until(lambda: np.array_equal(desk.sim.arena.brightness, Arena.box(600, 500).brightness))
     page.keyboard.press("Control+y")
-    wait_for_step(page, undo=True, redo=True)
-    wait_until(page, lambda: brightness(290, 290) == 255)
+    wait_for_step(visitor, undo=True, redo=True)
+    visitor.until(lambda: brightness(290, 290) == 255)
     assert desk.sim.pose(1) == (120.0, 120.0, 0.0)
-    page.get_by_test_id("tab-wire").click()
-    page.get_by_test_id("tool-rectangle").wait_for(state="detached")
-    drag(page, (120, 120), (150, 180))
-    wait_until(page, lambda: desk.sim.pose(1)[1] > 170)
+    visitor.at("tab-wire").click()
+    visitor.at("tool-rectangle").wait_for(state="detached")
+    visitor.drag((120, 120), (150, 180))
+    visitor.until(lambda: desk.sim.pose(1)[1] > 170)
 
 
-def test_worlds_are_created_saved_and_opened(desk: Desk, page: Page) -> None:
-    page.get_by_test_id("new-arena").click()
-    page.get_by_test_id("box-width").fill("700")
-    page.get_by_test_id("box-rounded").fill("80")
-    look(page, "new")
-    page.get_by_test_id("dialog-ok").click()
-    wait_until(page, lambda: desk.sim.arena.width_mm == 700)
-    take(page, "robot")
-    drag(page, (400, 300))
-    wait_until(page, lambda: desk.sim.robot_count == 2)
-    name = page.get_by_test_id("save-name")
+def test_worlds_are_created_saved_and_opened(desk: Desk, visitor: Visitor) -> None:
+    page = visitor.page
+    visitor.at("new-arena").click()
+    visitor.at("box-width").fill("700")
+    visitor.at("box-rounded").fill("80")
+    visitor.picture("arena_new")
+    visitor.at("dialog-ok").click()
+    visitor.until(lambda: desk.sim.arena.width_mm == 700)
+    visitor.take("robot")
+    click(visitor, 400, 300)
+    visitor.until(lambda: desk.sim.robot_count == 2)
+    name = visitor.at("save-name")
     for bad, words in (("../out", "folder"), ("/etc/out", "folder"), ("con", "device")):
         name.fill(bad)
-        page.get_by_test_id("save").click()
-        tell(page, words)
+        visitor.at("save").click()
+        visitor.told(words)
     name.fill("mine")
-    page.get_by_test_id("save").click()
-    tell(page, "Saved as mine.kiks")
+    visitor.at("save").click()
+    visitor.told("Saved as mine.kiks")
     assert [path.name for path in desk.folder.iterdir()] == ["mine.kiks"]
     saved = Project.load(desk.folder / "mine.kiks")
     assert (saved.arena.width_mm, len(saved.robots)) == (700, 2)
     with page.expect_download() as download:
-        page.get_by_test_id("download").click()
+        visitor.at("download").click()
     assert Path(download.value.path()).read_bytes() == saved.to_bytes()
-    page.get_by_test_id("new-maze").click()
-    page.get_by_test_id("dialog-ok").click()
-    wait_until(page, lambda: desk.sim.arena.name == "maze")
-    look(page, "maze")
-    page.get_by_test_id("open-name").click()
-    page.get_by_role("option", name="mine.kiks").click()
-    page.get_by_test_id("open").click()
-    wait_until(page, lambda: desk.sim.arena.width_mm == 700)
+    visitor.at("new-maze").click()
+    visitor.at("dialog-ok").click()
+    visitor.until(lambda: desk.sim.arena.name == "maze")
+    visitor.picture("arena_maze")
+    visitor.choose("open-name", "mine.kiks")
+    visitor.at("open").click()
+    visitor.until(lambda: desk.sim.arena.width_mm == 700)
     assert desk.sim.robot_count == 2
-    page.get_by_test_id("save").click()
-    page.get_by_test_id("dialog-yes").click()
-    tell(page, "Saved as mine.kiks")
+    visitor.at("save").click()
+    visitor.at("dialog-yes").click()
+    visitor.told("Saved as mine.kiks")
 
 
-def test_files_are_uploaded(desk: Desk, page: Page) -> None:
+def test_files_are_uploaded(desk: Desk, visitor: Visitor) -> None:
+    page = visitor.page
     picture = io.BytesIO()
     Image.fromarray(np.zeros((300, 400), np.uint8)).save(picture, "PNG")
     chooser = page.locator("[data-testid=upload] input[type=file]")
@@ -183,8 +153,8 @@ def test_files_are_uploaded(desk: Desk, page: Page) -> None:
         ("b.kiks", "text/plain", Project(Arena.box(450, 300)).to_bytes(), lambda: desk.sim.arena.width_mm == 450),
     ):
         chooser.set_input_files({"name": file, "mimeType": mime, "buffer": data})
-        wait_until(page, fact)
+        visitor.until(fact)
     chooser.set_input_files({"name": "c.kad", "mimeType": "text/plain", "buffer": b"nothing"})
-    tell(page, "level 5")
+    visitor.told("level 5")
     assert desk.sim.arena.width_mm == 450
     assert list(desk.folder.iterdir()) == []

@@ -12,6 +12,7 @@ pytest.importorskip("playwright", reason="tests in a browser need Playwright for
 
 import av
 from playwright.sync_api import expect
+from tests.at_length import at_length
 from tests.desk.visitor import Visitor
 
 from kiks.films.film import FPS
@@ -61,6 +62,7 @@ def test_a_part_of_the_run_is_filmed_and_downloaded(visitor: Visitor, tmp_path: 
         expect(visitor.at("film-make")).to_be_enabled()
 
 
+@at_length
 def test_mistakes_are_told(visitor: Visitor, tmp_path: Path) -> None:
     visitor.pause()
     with visitor.sim.record(tmp_path / "run.mcap"):
@@ -83,6 +85,7 @@ def test_mistakes_are_told(visitor: Visitor, tmp_path: Path) -> None:
         assert visitor.at("film-end").input_value() == end_s
 
 
+@at_length
 def test_a_closed_dialog_gives_the_film_up(visitor: Visitor, tmp_path: Path) -> None:
     visitor.pause()
     with visitor.sim.record(tmp_path / "run.mcap"):
@@ -95,6 +98,7 @@ def test_a_closed_dialog_gives_the_film_up(visitor: Visitor, tmp_path: Path) -> 
         visitor.told("The dialog must stay open until the film is made")
 
 
+@at_length
 def test_the_past_is_filmed_without_a_recording_of_ones_own(visitor: Visitor, tmp_path: Path) -> None:
     visitor.pause()
     pass_time(visitor, 5)

@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 import pytest
+from tests.guard import GUARD_S
 
 from kiks import Arena, Khepera, Recording, Simulation
 from kiks.desk.server.desk import Desk
@@ -23,8 +24,6 @@ from kiks.ports.program_process import Command
 from kiks.recording.mcap_file import McapReader, Room
 from kiks.sim.from_project import simulation_of
 from kiks.units import NS_PER_S
-
-GUARD_S = 60.0
 
 ROUND = """
 import sys, serial

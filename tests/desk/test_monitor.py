@@ -17,7 +17,8 @@ pytest.importorskip("nicegui", reason="the desk needs NiceGUI")
 pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
 
 from playwright.sync_api import Locator, Page, expect
-from tests.desk.visitor import SCREENSHOTS
+from tests.at_length import at_length
+from tests.desk.visitor import leave_picture
 from tests.desk.visits import NewPage
 
 pytestmark = pytest.mark.slow
@@ -122,6 +123,7 @@ def test_keep_looking_updates_the_explanation(visit: Visit) -> None:
     expect(text).not_to_have_text(before)
 
 
+@at_length
 def test_the_monitor_works_with_keys_alone(visit: Visit) -> None:
     visit.page.get_by_label("Robot").first.focus()
     for _ in range(6):
@@ -160,15 +162,15 @@ def test_another_robot_shows_its_own_turrets(visit: Visit) -> None:
     assert visit.fact("Turrets") == "Gripper"
 
 
+@at_length
 def test_dark_pages_have_dark_colours(new_page: NewPage, address: str) -> None:
     """The same page by day and by night, with pictures for a person to look at."""
-    SCREENSHOTS.mkdir(exist_ok=True)
     for name in ("light", "dark"):
         page = new_page(520, 1100)
         visit = Visit(page, address, f"dark={name == 'dark'}")
         visit.find("proximity-2").click()
         expect(visit.find("explanation")).to_be_visible()
         visit.page.wait_for_function("() => kiksMonitor.drawn() > 20")
-        page.screenshot(path=SCREENSHOTS / f"monitor_{name}.png", full_page=True)
+        leave_picture(page, f"monitor_{name}", full_page=True)
         assert visit.page.evaluate("document.body.classList.contains('body--dark')") == (name == "dark")
         assert visit.painted(".kiks-curves") > 8

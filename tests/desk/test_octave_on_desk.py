@@ -14,8 +14,10 @@ pytest.importorskip("nicegui", reason="the desk needs NiceGUI")
 pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
 
 from playwright.sync_api import Page, expect
-from tests.desk.visitor import FIRST_PICTURE, SCREENSHOTS
+from tests.at_length import at_length, share
+from tests.desk.visitor import FIRST_PICTURE, leave_picture
 from tests.desk.visits import NewPage
+from tests.forked import kiks_command
 from tests.matlab.octave import need_tcp, needs_octave
 from tests.matlab.terminal import Terminal
 
@@ -27,13 +29,20 @@ DRIVES = f"async () => (await ({SPEEDS})()).some((speed) => speed > 1)"
 
 
 def terminal_in(folder: Path, **environment: str) -> Terminal:
-    own = {"KIKS_COMMAND": f"{sys.executable} -m kiks", "KIKS_WINDOW": "1", **environment}
+    own = {"KIKS_COMMAND": " ".join(kiks_command()), "KIKS_WINDOW": "1", **environment}
     return Terminal(folder, own, edits_lines=True)
 
 
 @pytest.fixture
 def terminal(tmp_path: Path) -> Iterator[Terminal]:
     with terminal_in(tmp_path) as each:
+        yield each
+
+
+@pytest.fixture
+def own_terminal(tmp_path: Path) -> Iterator[Terminal]:
+    """Its session is a process of its own, which Ctrl-C reaches."""
+    with terminal_in(tmp_path, KIKS_COMMAND=f"{sys.executable} -m kiks") as each:
         yield each
 
 
@@ -67,7 +76,8 @@ def drive_and_halt(terminal: Terminal, page: Page, loop: str) -> None:
 
 def test_halt_stops_a_program_of_octave(terminal: Terminal, new_page: NewPage) -> None:
     page = begin(terminal, new_page)
-    for loop in ("while true, kProximity(ref); end", "kiks_pause(1e5)", "while kiks_ktime(-1) < 1e5, end"):
+    loops = "while true, kProximity(ref); end", "kiks_pause(1e5)", "while kiks_ktime(-1) < 1e5, end"
+    for loop in share(loops[:1], loops):
         drive_and_halt(terminal, page, loop)
     # At the prompt there is no program to be told.
     terminal.type("kSetSpeed(ref, 5, 5)")
@@ -78,6 +88,7 @@ def test_halt_stops_a_program_of_octave(terminal: Terminal, new_page: NewPage) -
     assert not terminal.has_printed("halted")
 
 
+@at_length
 def test_halt_reaches_a_program_that_speaks_tcp(tmp_path: Path, new_page: NewPage) -> None:
     """As MATLAB does."""
     need_tcp()
@@ -86,7 +97,8 @@ def test_halt_reaches_a_program_that_speaks_tcp(tmp_path: Path, new_page: NewPag
         drive_and_halt(terminal, page, "kiks_pause(1e5)")
 
 
-def test_what_is_typed_on_the_desk_is_evaluated_in_octave(terminal: Terminal, new_page: NewPage) -> None:
+def test_what_is_typed_on_the_desk_is_evaluated_in_octave(own_terminal: Terminal, new_page: NewPage) -> None:
+    terminal = own_terminal
     page = begin(terminal, new_page)
     terminal.type("kiks_print('half way')")
     expect(page.locator(".desk-hint")).to_contain_text("half way")
@@ -110,8 +122,7 @@ def test_what_is_typed_on_the_desk_is_evaluated_in_octave(terminal: Terminal, ne
     expect(page.get_by_test_id("log")).to_contain_text("parse error")
     evaluate(page, "error('no %d', 2)")
     expect(page.get_by_test_id("log")).to_contain_text("error: no 2")
-    SCREENSHOTS.mkdir(exist_ok=True)
-    page.screenshot(path=SCREENSHOTS / "octave.png", animations="disabled")
+    leave_picture(page, "octave")
     terminal.press_ctrl_c()
     assert terminal.ask("numel(z)") == "2"
     assert terminal.ask("numel(kProximity(ref))") == "8"
@@ -126,8 +137,15 @@ def test_what_is_typed_on_the_desk_is_evaluated_in_octave(terminal: Terminal, ne
     assert terminal.sessions() == []
 
 
-def test_a_line_of_the_log_is_replaced(terminal: Terminal, new_page: NewPage) -> None:
+def test_log_places_and_sensors_are_those_of_octave(terminal: Terminal, new_page: NewPage) -> None:
     page = begin(terminal, new_page)
+    terminal.type("here = kiks_siminfo_robotpos;")
+    x, y = float(terminal.ask("here(1)")), float(terminal.ask("here(2)"))
+    expect(page.get_by_test_id("facts")).to_contain_text(f"x {x:.1f}, y {y:.1f} mm")
+    expect(page.locator(".kiks-chip-name").first).to_have_text("1")
+    page.get_by_test_id("proximity-7").click()
+    expect(page.get_by_test_id("explanation-text")).to_contain_text(re.compile(r"^Sensor 8 \(back left\)"))
+    # `kiks_status` may replace a line of the log.
     page.get_by_test_id("tab-octave").click()
     log = page.get_by_test_id("log")
     terminal.type("kiks_status('first'), kiks_status('1 of 9')")
@@ -138,16 +156,7 @@ def test_a_line_of_the_log_is_replaced(terminal: Terminal, new_page: NewPage) ->
     expect(page.locator(".desk-hint")).to_contain_text("last")
 
 
-def test_places_and_sensors_are_those_of_octave(terminal: Terminal, new_page: NewPage) -> None:
-    page = begin(terminal, new_page)
-    terminal.type("here = kiks_siminfo_robotpos;")
-    x, y = float(terminal.ask("here(1)")), float(terminal.ask("here(2)"))
-    expect(page.get_by_test_id("facts")).to_contain_text(f"x {x:.1f}, y {y:.1f} mm")
-    expect(page.locator(".kiks-chip-name").first).to_have_text("1")
-    page.get_by_test_id("proximity-7").click()
-    expect(page.get_by_test_id("explanation-text")).to_contain_text(re.compile(r"^Sensor 8 \(back left\)"))
-
-
+@at_length
 def test_desk_shows_a_world_without_a_robot_and_then_the_robot(terminal: Terminal, new_page: NewPage) -> None:
     terminal.type("kiks_arena([], [], 1)")
     url = terminal.wait_for(r"shown at http\S+").split()[-1]

@@ -15,6 +15,7 @@ pytest.importorskip("nicegui", reason="the desk needs NiceGUI")
 pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
 
 from playwright.sync_api import Locator, Page, expect
+from tests.at_length import at_length
 from tests.desk.visits import NewPage
 
 import kiks
@@ -84,6 +85,7 @@ def speeds(page: Page, address: str) -> list[list[int]]:
     return found
 
 
+@at_length
 def test_example_runs_and_its_output_is_shown(page: Page) -> None:
     at(page, "run-program").click()
     expect(at(page, "output")).to_contain_text("What the eight sensors see")
@@ -176,6 +178,7 @@ def test_wire_is_filtered_held_and_cleared(page: Page) -> None:
     expect(wire).to_have_text("")
 
 
+@at_length
 def test_line_is_watched_only_while_the_panel_is_visible(new_page: NewPage, tmp_path: Path) -> None:
     with served(tmp_path) as address:
         page = new_page()

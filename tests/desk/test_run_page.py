@@ -14,6 +14,8 @@ import pytest
 pytest.importorskip("matplotlib", reason="the page has figures")
 pytest.importorskip("nicegui", reason="the desk needs NiceGUI")
 
+from tests.at_length import at_length
+
 from kiks import Arena, Khepera, ParameterError, Recording, Simulation
 from kiks.desk.run_page.bundle import bundle
 from kiks.desk.run_page.page_file import WEB, save_page
@@ -90,6 +92,12 @@ def rich(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
+@pytest.fixture(scope="module")
+def rich_page(rich: Path) -> Path:
+    """Its page."""
+    return page_of(rich, rich.parent, title=EVIL, robot=2)
+
+
 class Tags(HTMLParser):
     """Collects tags with their attributes, and all text outside scripts and styles."""
 
@@ -127,6 +135,7 @@ def test_five_minutes_of_a_robot_are_small_and_load_nothing(plain: Path, plain_p
         assert told in found.text
 
 
+@at_length
 def test_the_same_recording_gives_the_same_page(short: Path, tmp_path: Path) -> None:
     shares: list[float] = []
     first, second = (page_of(short, tmp_path, on_progress=shares.append).read_bytes() for _ in range(2))
@@ -136,8 +145,8 @@ def test_the_same_recording_gives_the_same_page(short: Path, tmp_path: Path) -> 
     assert (half[-1], len(half)) == (1, 4)
 
 
-def test_no_text_becomes_markup(rich: Path, tmp_path: Path) -> None:
-    found = Tags(page_of(rich, tmp_path, title=EVIL, robot=2))
+def test_no_text_becomes_markup(rich_page: Path) -> None:
+    found = Tags(rich_page)
     assert [tag for tag, _ in found.tags].count("script") == 3
     assert all(str(attrs["src"]).startswith("data:") for tag, attrs in found.tags if tag == "img")
     assert not [attrs for _, attrs in found.tags if any(name.startswith("on") for name in attrs)]
@@ -146,6 +155,7 @@ def test_no_text_becomes_markup(rich: Path, tmp_path: Path) -> None:
     assert "246914" not in found.text
 
 
+@at_length
 def test_long_texts_are_cut(tmp_path: Path) -> None:
     sim = Simulation(Arena.box(300, 300), seed=1)
     with RunRecorder(sim, tmp_path / "long.mcap", programs={"1-long.py": "x = 1\n" * 200_000}) as recorder:
@@ -157,8 +167,8 @@ def test_long_texts_are_cut(tmp_path: Path) -> None:
     assert "word word …" in Tags(page).text
 
 
-def test_the_numbers_are_those_of_the_run(rich: Path, tmp_path: Path) -> None:
-    recording, found = Recording(rich), Tags(page_of(rich, tmp_path))
+def test_the_numbers_are_those_of_the_run(rich: Path, rich_page: Path) -> None:
+    recording, found = Recording(rich), Tags(rich_page)
     sim = recording.world_at(recording.duration_s)
     for number in (1, 2):
         replies = recording.table("wire", number)
@@ -178,6 +188,7 @@ def test_there_is_a_scene_for_each_change(rich: Path) -> None:
     assert run.state_hash == run.last.state_hash()
 
 
+@at_length
 def test_a_long_run_has_a_longer_period(short: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr("kiks.desk.run_page.run_frames.FRAME_BYTES_MAX", 50_000)
     run = RunFrames(Recording(short).log)
@@ -186,6 +197,7 @@ def test_a_long_run_has_a_longer_period(short: Path, monkeypatch: pytest.MonkeyP
     assert "the player has the state every 0.08 s" in Tags(page_of(short, tmp_path)).text
 
 
+@at_length
 def test_frames_keep_to_the_recording_where_the_run_differs(
     short: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -217,6 +229,7 @@ def test_what_a_killed_run_has_written_becomes_a_page(short: Path, tmp_path: Pat
     assert f"{Recording(cut).duration_s:.3f} s of simulated time" in found.text
 
 
+@at_length
 def test_a_run_without_time_becomes_a_page(tmp_path: Path) -> None:
     sim = Simulation(Arena.box(300, 300), seed=1)
     with sim.record(tmp_path / "none.mcap"):
@@ -338,8 +351,8 @@ def test_the_player_plays_jumps_and_ends(plain_page: Path, visit: Callable[..., 
 
 
 @pytest.mark.slow
-def test_a_page_shows_changes_robots_and_events(rich: Path, tmp_path: Path, visit: Callable[..., Page]) -> None:
-    page = visit(page_of(rich, tmp_path), color_scheme="dark")
+def test_a_page_shows_changes_robots_and_events(rich: Path, rich_page: Path, visit: Callable[..., Page]) -> None:
+    page = visit(rich_page, color_scheme="dark")
     title = page.title()
     assert "evil" not in title.split("'")[0]
     assert title == page.locator("h1").text_content()
@@ -383,13 +396,14 @@ def test_a_page_shows_changes_robots_and_events(rich: Path, tmp_path: Path, visi
     assert page.title() == title
 
 
+@at_length
 @pytest.mark.slow
-def test_a_narrow_page_and_one_without_time_fit(tmp_path: Path, rich: Path, visit: Callable[..., Page]) -> None:
+def test_a_narrow_page_and_one_without_time_fit(tmp_path: Path, rich_page: Path, visit: Callable[..., Page]) -> None:
     sim = Simulation(Arena.box(300, 300), seed=1)
     with sim.record(tmp_path / "none.mcap"):
         pass
-    for file in (tmp_path / "none.mcap", rich):
-        page = visit(page_of(file, tmp_path), 380, 700)
+    for file in (page_of(tmp_path / "none.mcap", tmp_path), rich_page):
+        page = visit(file, 380, 700)
         assert page.evaluate("document.documentElement.scrollWidth") <= 380
         page.locator("#play").click()
         page.evaluate("kiksPage.player.seek(kiksPage.feed.end_s)")
@@ -399,20 +413,21 @@ def test_a_narrow_page_and_one_without_time_fit(tmp_path: Path, rich: Path, visi
         )
 
 
+@at_length
 @pytest.mark.slow
 def test_the_player_shows_a_world_without_a_robot(lonely: Path, visit: Callable[..., Page]) -> None:
-    from tests.desk.visitor import SCREENSHOTS
+    from tests.desk.visitor import leave_picture
 
-    SCREENSHOTS.mkdir(exist_ok=True)
     page = visit(page_of(lonely, lonely.parent))
     assert "There was no robot in this run." in page.locator("#monitor").inner_text()
     assert not page.locator("#robot").is_visible()
     assert not page.locator("#follow").is_visible()
     page.evaluate("kiksPage.player.seek(kiksPage.feed.end_s)")
     page.wait_for_function("() => kiksPage.player._shown_s === kiksPage.feed.end_s")
-    page.screenshot(path=SCREENSHOTS / "page_without_a_robot.png", full_page=True)
+    leave_picture(page, "page_without_a_robot", full_page=True)
 
 
+@at_length
 @pytest.mark.slow
 def test_nothing_else_runs_in_a_page(short: Path, tmp_path: Path, browser: Browser) -> None:
     """Even if a text became markup, the page's policy would not let it run."""

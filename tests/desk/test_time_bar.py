@@ -11,6 +11,7 @@ pytest.importorskip("nicegui", reason="the desk needs NiceGUI")
 pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
 
 from playwright.sync_api import expect
+from tests.at_length import at_length
 from tests.desk.test_looking_back import drive, make_project
 from tests.desk.visitor import Visitor, open_desk
 from tests.desk.visits import NewPage
@@ -177,6 +178,7 @@ def test_a_living_world_is_looked_back_at_and_goes_on(visitor: Visitor, new_page
     visitor.pause()
 
 
+@at_length
 def test_programs_run_again_up_to_a_time(new_page: NewPage, tmp_path: Path) -> None:
     project, commands = make_project(tmp_path)
     shown = open_desk(tmp_path, project, commands)

@@ -13,8 +13,10 @@ pytest.importorskip("nicegui", reason="the desk needs NiceGUI")
 pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
 
 from playwright.sync_api import Browser, expect
-from tests.desk.visitor import FIRST_PICTURE, SCREENSHOTS, Visitor
+from tests.at_length import cases
+from tests.desk.visitor import FIRST_PICTURE, Visitor, leave_picture
 from tests.desk.visits import NewPage
+from tests.guard import GUARD_S
 
 from kiks.desk.server.server import SERVER
 from kiks.desk.server.show import Shown
@@ -51,8 +53,7 @@ def test_without_the_token_a_page_tells_how_to_open_the_desk(browser: Browser, s
         assert answer is not None
         assert answer.status == 403
         assert "Open the complete address that KiKS printed" in page.inner_text("body")
-        SCREENSHOTS.mkdir(exist_ok=True)
-        page.screenshot(path=SCREENSHOTS / f"refused_{scheme}.png")
+        leave_picture(page, f"refused_{scheme}")
         page.close()
 
 
@@ -78,9 +79,10 @@ def notebook(shown: Shown) -> Iterator[int]:
     server.server_close()
 
 
-@pytest.mark.parametrize("host", ["127.0.0.1", "localhost"])
+@pytest.mark.parametrize("host", cases(["localhost", "127.0.0.1"]))
 def test_a_notebook_shows_the_desk(browser: Browser, shown: Shown, notebook: int, host: str) -> None:
     page = browser.new_page()
+    page.set_default_timeout(1000 * GUARD_S)
     faults: list[str] = []
     page.on("pageerror", lambda error: faults.append(str(error)))
     page.goto(f"http://{host}:{notebook}/")
@@ -92,6 +94,5 @@ def test_a_notebook_shows_the_desk(browser: Browser, shown: Shown, notebook: int
     expect(frame.get_by_test_id("run")).to_have_text("play_arrow")
     assert shown.desk.gate.is_paused
     assert not faults
-    SCREENSHOTS.mkdir(exist_ok=True)
-    page.screenshot(path=SCREENSHOTS / f"notebook_{host}.png")
+    leave_picture(page, f"notebook_{host}")
     page.close()

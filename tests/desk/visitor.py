@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 import pytest
 from playwright.sync_api import Locator, Page, expect
+from tests.at_length import AT_LENGTH
 
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.show import Shown
@@ -24,8 +25,8 @@ from kiks.sim.simulation import Simulation
 SCREENSHOTS = Path(__file__).parents[2] / "screenshots"
 """Where pictures of what tests have seen are left for a person."""
 
-PICTURES_MAX = 1200
-"""Most pictures of the screen that something is waited for, 20 s or so: a guard, no measure."""
+PICTURES_MAX = 3600
+"""Most pictures of the screen that something is waited for, a minute or so: a guard, no measure."""
 
 NEXT_PICTURE = "() => new Promise((done) => requestAnimationFrame(() => done(true)))"
 FIRST_PICTURE = "() => window.kiksDesk?.stats().frames_drawn > 3 && kiksDesk.pose(0)"
@@ -69,6 +70,13 @@ def open_desk(folder: Path, project: Project | None = None, commands: Sequence[C
     desk.begin()
     shown.drive()
     return shown
+
+
+def leave_picture(page: Page, name: str, **options: Any) -> None:
+    """Leave a picture of a page for a person, in `make test-all`."""
+    if AT_LENGTH:
+        SCREENSHOTS.mkdir(exist_ok=True)
+        page.screenshot(path=SCREENSHOTS / f"{name}.png", animations="disabled", **options)
 
 
 class Visitor:
@@ -116,8 +124,12 @@ class Visitor:
         expect(self.page.locator(".q-menu")).to_have_count(0)
 
     def told(self, text: str) -> None:
-        """Wait for a message of the page."""
-        expect(self.page.locator(".q-notification").filter(has_text=text).first).to_be_visible()
+        """Wait for a message of the page, and close it if it has a button: it covers what is below it."""
+        messages = self.page.locator(".q-notification").filter(has_text=text)
+        expect(messages.first).to_be_visible()
+        closable = messages.filter(has=self.page.locator("button"))
+        closable.locator("button").evaluate_all("(buttons) => buttons.forEach((button) => button.click())")
+        closable.first.wait_for(state="detached")
 
     def pause(self) -> None:
         self.at("run").click()
@@ -174,9 +186,7 @@ class Visitor:
             return bool(self.sim.world.free_space.may_lie(robot - 1)(x_mm, y_mm))
 
     def picture(self, name: str) -> None:
-        """Leave a picture of the page for a person."""
-        SCREENSHOTS.mkdir(exist_ok=True)
-        self.page.screenshot(path=SCREENSHOTS / f"{name}.png", animations="disabled")
+        leave_picture(self.page, name)
 
     def answer(self, script: str, argument: Any = None) -> Any:
         return self.page.evaluate(script, argument)

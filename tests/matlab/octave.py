@@ -10,6 +10,7 @@ import contextlib
 import json
 import os
 import re
+import select
 import shutil
 import signal
 import subprocess
@@ -21,9 +22,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-GUARD_S = 100.0
-"""Timeout of a program [s]."""
+from tests.forked import kiks_command
+from tests.guard import GUARD_S
 
 ROOT = Path(__file__).parents[2]
 TOOLBOX = ROOT / "matlab"
@@ -31,6 +31,9 @@ DEMOS = TOOLBOX / "demos"
 SUPPORT = Path(__file__).parent / "support"
 
 OCTAVE = shutil.which("octave-cli")
+
+A_PROCESS = {"KIKS_COMMAND": ""}
+"""Variables with which the toolbox starts the installed command, a process of its own, as it does for people."""
 
 needs_octave = pytest.mark.skipif(OCTAVE is None, reason="octave-cli is not here: apt-get install octave")
 
@@ -64,7 +67,8 @@ rand('twister', 1);
 class Octave:
     """A program that runs in Octave.
 
-    It finds the toolbox; thinking costs nothing, and seeds are set, so that each run is the same.
+    It finds the toolbox; thinking costs nothing, and seeds are set, so that each run is the same. Its session is a fork
+    (tests/forked.py) unless the environment is `A_PROCESS`.
 
     Args:
         program: Its text.
@@ -91,14 +95,14 @@ class Octave:
         file.write_text(_BEGIN + program, encoding="utf-8")
         hidden = ("DISPLAY", "WAYLAND_DISPLAY", "KIKS_COMMAND", "KIKS_TRANSPORT")
         own = {name: value for name, value in os.environ.items() if name not in hidden}
-        own |= {"KIKS_WINDOW": "0", "XDG_RUNTIME_DIR": str(self.doors), **(environment or {})}
+        own |= {"KIKS_COMMAND": " ".join(kiks_command()), "KIKS_WINDOW": "0", "XDG_RUNTIME_DIR": str(self.doors)}
         self._process = subprocess.Popen(
             [OCTAVE, "--no-gui", "-qf", file.name],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             cwd=folder,
-            env=own,
+            env=own | dict(environment or {}),
             text=True,
             # So that all of it can be killed at once.
             start_new_session=True,
@@ -193,6 +197,16 @@ def run(program: str, folder: Path, environment: Mapping[str, str] | None = None
     """Run a program to its end; it must have no error and leave no process."""
     with Octave(program, folder, environment) as octave:
         return octave.finish()
+
+
+def has_ended(process: int) -> bool:
+    """Wait until a process is gone; its end can be waited for without looking again and again."""
+    poll = select.poll()
+    poll.register(process, select.POLLIN)
+    try:
+        return bool(poll.poll(GUARD_S * 1000))
+    finally:
+        os.close(process)
 
 
 def _value(size: list[int], value: Any) -> Any:

@@ -93,7 +93,7 @@ class Terminal:
 
     def has_printed(self, text: str) -> bool:
         """Return whether there is output for which the test has not waited."""
-        self._hear(0)
+        self._hear(0.01)
         return text in self._text
 
     def kill(self) -> None:

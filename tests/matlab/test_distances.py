@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.at_length import at_length
+from tests.at_length import at_length, share
 from tests.matlab.octave import needs_octave, run
 
 pytestmark = [needs_octave, pytest.mark.slow]
@@ -31,7 +31,7 @@ end
 
 kiks(zeros(2200))
 ref = kiks_kopen([-1 9600 1]);
-mm = [10:40 45:5:100 120:40:1000 1000];
+mm = {mm};
 moves = zeros(2, numel(mm));
 for k = 1:numel(mm)
     moves(1, k) = move(ref, mm(k), mm(k))(1);
@@ -39,7 +39,7 @@ for k = 1:numel(mm)
 end
 say('mm', mm)
 say('moves', moves)
-degrees = 10:10:360;
+degrees = {degrees};
 turns = zeros(2, numel(degrees));
 for k = 1:numel(degrees)
     way = degrees(k) * pi / 180 * 53 / 2;
@@ -54,7 +54,9 @@ kiks_kclose(ref)
 
 @pytest.mark.parametrize("kind", ["Khepera", pytest.param("Khepera_II", marks=at_length)])
 def test_moves_and_turns_go_as_far_as_they_should(kind: str, tmp_path: Path) -> None:
-    said = run(f"global KIKS_ROBOT\nKIKS_ROBOT = '{kind}';\n{MOVES}", tmp_path).said
+    mm, degrees = share(("[10:5:40 100 500]", "45:45:360"), ("[10:40 45:5:100 120:40:1000 1000]", "10:10:360"))
+    moves = MOVES.format(mm=mm, degrees=degrees)
+    said = run(f"global KIKS_ROBOT\nKIKS_ROBOT = '{kind}';\n{moves}", tmp_path).said
     errors_mm = np.abs(said["moves"] - said["mm"])
     shares = errors_mm / said["mm"]
     turns = (said["turns"] - said["degrees"] + 180) % 360 - 180

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-from tests.matlab.octave import ROOT, TOOLBOX, needs_octave, run
+from tests.matlab.octave import A_PROCESS, ROOT, TOOLBOX, needs_octave, run
 
 PAGE = (ROOT / "docs" / "matlab.md").read_text(encoding="utf-8")
 
@@ -20,7 +20,7 @@ def public_functions() -> set[str]:
 def test_the_first_program_runs_and_stays_clear_of_the_wall(tmp_path: Path) -> None:
     program = re.findall(r"^```matlab\n(.*?)^```", PAGE, flags=re.MULTILINE | re.DOTALL)[0]
     after = program.replace("kiks_kclose(ref);", "say('pose', kiks_siminfo_robotpos()); kiks_kclose(ref);")
-    x, y, _ = run(after, tmp_path).said["pose"].ravel()
+    x, y, _ = run(after, tmp_path, A_PROCESS).said["pose"].ravel()
     assert 28 < x < 472
     assert 28 < y < 472
 

@@ -249,7 +249,6 @@ kiks_quit(1)
 """
 
 
-@pytest.mark.slow
 def test_mazes_have_their_size_and_every_cell_can_be_reached(tmp_path: Path) -> None:
     said = run(MAZES, tmp_path).said
     assert len({said[f"demo_{k}"].tobytes() for k in range(1, 13)}) == 12

@@ -138,8 +138,9 @@ kiks_quit
 
 
 def test_old_style_is_accepted_without_a_warning(tmp_path: Path) -> None:
-    assert run(OLD_STYLE, tmp_path).lines[-1] == "The KiKS session has ended."
-    assert "warning" not in run(OLD_STYLE, tmp_path).text
+    octave = run(OLD_STYLE, tmp_path)
+    assert octave.lines[-1] == "The KiKS session has ended."
+    assert "warning" not in octave.text
 
 
 TURRETS = """

@@ -344,7 +344,6 @@ say('inputs', inputs)
 """
 
 
-@pytest.mark.slow
 def test_pictures_are_arenas_and_sessions_follow_each_other(tmp_path: Path) -> None:
     picture = np.zeros((400, 520), np.uint8)
     picture[:10] = picture[-10:] = 255

@@ -21,6 +21,7 @@ from subprocess import PIPE
 import pytest
 from tests.at_length import at_length, share
 from tests.cli.test_cli import KIKS
+from tests.guard import GUARD_S
 from tests.script.screen import display
 from tests.served import PROGRAMS
 
@@ -51,7 +52,6 @@ WIDE = "size_mm = [1500, 1500]\n" + "".join(
     for number in range(49)
 )
 """An arena in which no robot meets another one, or a wall."""
-GUARD_S = 60.0
 
 Runs = dict[str, tuple[str, str]]
 """What each program has printed, and its errors with the lines of KiKS."""

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 from tests.cli.test_cli import KIKS
+from tests.guard import GUARD_S
 from tests.script.screen import display
 from tests.served import PROGRAMS
 
 pytestmark = pytest.mark.slow
 
-GUARD_S = 60.0
 
 TK = """
 import threading, time, tkinter
