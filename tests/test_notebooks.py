@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from jupyter_client.manager import start_new_kernel
 from PIL import Image
 from tests.at_length import cases
 from tests.guard import GUARD_S
@@ -26,8 +27,7 @@ Run = Callable[[str], list[dict[str, Any]]]
 @pytest.fixture(scope="module")
 def run() -> Iterator[Run]:
     """Run cells in the kernel of a notebook; return what each shows, by types."""
-    client = pytest.importorskip("jupyter_client.manager", reason="notebooks need ipykernel")
-    kernel, cells = client.start_new_kernel(startup_timeout=GUARD_S)
+    kernel, cells = start_new_kernel(startup_timeout=GUARD_S)
 
     def run(cell: str) -> list[dict[str, Any]]:
         shown: list[dict[str, Any]] = []
@@ -97,8 +97,6 @@ def test_a_notebook_shows_a_picture_or_a_table(run: Run, cell: str, kind: str, t
     "words", cases([["-c"], ["-m", "IPython", "--colors=NoColor", "-c"]]), ids=["Python", "IPython"]
 )
 def test_a_terminal_has_the_address_once(words: list[str]) -> None:
-    if "IPython" in words:
-        pytest.importorskip("IPython", reason="the terminal of IPython needs ipykernel")
     script = "import kiks; sim = kiks.Simulation(); sim.show(browser=False)"
     said = subprocess.run([sys.executable, *words, script], capture_output=True, text=True, timeout=GUARD_S, check=True)
     (line,) = [line for line in said.stdout.splitlines() if "http" in line]

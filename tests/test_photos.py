@@ -36,7 +36,6 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
 
 
 def taken(recording: Recording, folder: Path, **values: object) -> NDArray[np.float64]:
-    pytest.importorskip("mitsuba")
     save_photo(recording, folder / "photo.png", size=(160, 120), samples=16, **values)
     with Image.open(folder / "photo.png") as image:
         return np.asarray(image.convert("RGB")).astype(float)

@@ -9,15 +9,12 @@ import numpy as np
 import pytest
 from PIL import Image
 from tests.at_length import cases
-from tests.needed import need
 
 import kiks
 from kiks import Arena, Khepera, ParameterError, Recording
 from kiks.plots import NO_ROBOT, PANELS, ROWS, figure_of, panels_of, save_plot
 from kiks.recording.analysis import odometry, time_shares
 from kiks.sim.simulation import Simulation
-
-need("matplotlib")
 
 
 @pytest.fixture(scope="module")

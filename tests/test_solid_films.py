@@ -38,7 +38,6 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
 
 
 def filmed(recording: Recording, folder: Path, **values: object) -> list[Pixels]:
-    pytest.importorskip("vtk")
     file = folder / "film.webp"
     save_film(recording, file, size=(320, 240), fps=2, view="3d", is_plain=True, **values)
     with Image.open(file) as image:

@@ -65,7 +65,6 @@ def test_the_process_of_a_program_needs_no_engine() -> None:
     subprocess.run([sys.executable, "-c", script], check=True)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("behaviour", cases(["follow", "avoid"]))
 def test_a_demo_is_the_same_in_two_processes(behaviour: str, tmp_path: Path) -> None:
     arguments = ("demo", behaviour, "--seconds", "30", "--arena", ARENA, "--seed", "4")
@@ -129,7 +128,6 @@ def test_turrets_and_kinds_of_robots_from_the_command_line(tmp_path: Path) -> No
     ], result.stderr
 
 
-@pytest.mark.slow
 def test_a_programs_exit_code_and_errors_are_its_own(tmp_path: Path) -> None:
     assert forked.run("run", WANDER, "7").returncode == 7
     program = tmp_path / "wrong.py"

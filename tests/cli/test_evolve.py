@@ -6,14 +6,11 @@ import re
 from pathlib import Path
 
 import pytest
-from tests.needed import need
 from typer.testing import CliRunner, Result
 
 from kiks import Recording
 from kiks.cli import app
 from kiks.errors import KiksError
-
-need("cma", "pyarrow", "matplotlib")
 
 TASK = """
 import kiks

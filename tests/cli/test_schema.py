@@ -7,6 +7,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+import jsonschema
 import pytest
 from typer.testing import CliRunner
 
@@ -14,8 +15,6 @@ from kiks.cli import app
 from kiks.model.arena import Arena
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, robot_toml
-
-jsonschema = pytest.importorskip("jsonschema")
 
 ROOT = Path(__file__).parents[2]
 TASK = {"task": 1, "base": "avoid", "worlds": 4, "controller": {"kind": "mlp", "hidden": [4]}, "arenas": ["a.toml"]}

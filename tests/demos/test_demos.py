@@ -61,7 +61,6 @@ def test_one_robot_about_walls_goes_far_and_touches_nothing(name: str) -> None:
         assert scene.contact_count() == 0
 
 
-@pytest.mark.slow
 def test_cylinders_are_pushed_to_the_walls() -> None:
     runs = [scenes.CleanScene(seed=seed) for seed in SEEDS]
     for scene in runs:
@@ -72,7 +71,6 @@ def test_cylinders_are_pushed_to_the_walls() -> None:
     assert mean(scene.tidy_count() for scene in runs) > 11
 
 
-@pytest.mark.slow
 def test_random_mazes_are_left() -> None:
     runs = [scenes.MazeScene(seed=seed) for seed in SEEDS]
     for scene in runs:
@@ -99,7 +97,6 @@ def test_the_race_is_fast_and_touches_nothing() -> None:
         assert scene.contact_count() == 0
 
 
-@pytest.mark.slow
 def test_the_robots_of_a_swarm_spread_out_and_do_not_touch() -> None:
     runs = [scenes.SwarmScene(seed=seed) for seed in range(share(2, 5))]
     for scene in runs:

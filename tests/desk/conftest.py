@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
+from playwright.sync_api import Browser, BrowserContext, Page, Playwright, expect, sync_playwright
+from tests.desk.visitor import Visitor, open_desk
+from tests.desk.visits import NewPage
 from tests.guard import GUARD_S
 
-if TYPE_CHECKING:
-    from playwright.sync_api import Browser, BrowserContext, Page, Playwright
-    from tests.desk.visitor import Visitor
-    from tests.desk.visits import NewPage
-
-    from kiks.desk.server.show import Shown
+from kiks.desk.server.show import Shown
 
 CHROMIUM = Path("/usr/bin/chromium")
 ARGUMENTS = [
@@ -30,9 +28,8 @@ def playwright() -> Iterator[Playwright]:
     call `asyncio.run`. Chromium begins within 0.3 s."""
     if not CHROMIUM.exists():
         pytest.skip(f"tests in a browser need Chromium at {CHROMIUM}")
-    api = pytest.importorskip("playwright.sync_api", reason="tests in a browser need Playwright for Python")
-    api.expect.set_options(timeout=GUARD_MS)
-    with api.sync_playwright() as playwright:
+    expect.set_options(timeout=GUARD_MS)
+    with sync_playwright() as playwright:
         yield playwright
 
 
@@ -87,9 +84,6 @@ def new_page(browser: Browser, context: BrowserContext) -> Iterator[NewPage]:
 @pytest.fixture
 def shown(tmp_path: Path) -> Iterator[Shown]:
     """A desk of its own for each test, in this process; its folder is the test's."""
-    pytest.importorskip("nicegui", reason="the desk needs NiceGUI")
-    from tests.desk.visitor import open_desk
-
     shown = open_desk(tmp_path)
     yield shown
     shown.close()
@@ -97,8 +91,6 @@ def shown(tmp_path: Path) -> Iterator[Shown]:
 
 @pytest.fixture
 def visitor(new_page: NewPage, shown: Shown) -> Iterator[Visitor]:
-    from tests.desk.visitor import Visitor
-
     page = new_page()
     yield Visitor(page, shown)
     # Close pages before the desk: a page asks for pictures until its connection ends.

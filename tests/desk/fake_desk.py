@@ -16,10 +16,10 @@ import sys
 from typing import Any
 
 import numpy as np
-import uvicorn
 from fastapi import FastAPI, Response, WebSocket, WebSocketDisconnect
 from nicegui import ui
 from PIL import Image
+from tests.desk.announced import serve
 
 from kiks.desk.panels.arena_view import ArenaView, Pick, Stroke, Tool
 
@@ -245,13 +245,5 @@ def make_app(robot_count: int) -> FastAPI:
     return app
 
 
-class Announced(uvicorn.Server):
-    async def startup(self, sockets: Any = None) -> None:
-        await super().startup(sockets)
-        host, port = self.servers[0].sockets[0].getsockname()
-        print(f"http://{host}:{port}", flush=True)
-
-
 if __name__ == "__main__":
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else 3
-    Announced(uvicorn.Config(make_app(count), "127.0.0.1", 0, log_level="warning")).run()
+    serve(make_app(int(sys.argv[1]) if len(sys.argv) > 1 else 3))

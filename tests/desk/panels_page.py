@@ -8,11 +8,10 @@ from __future__ import annotations
 import sys
 import threading
 from pathlib import Path
-from typing import Any
 
-import uvicorn
 from fastapi import FastAPI
 from nicegui import ui
+from tests.desk.announced import serve
 
 from kiks.desk.panels.programs import ProgramsPanel
 from kiks.desk.panels.wire import WirePanel
@@ -57,13 +56,5 @@ def make_app(folder: Path, may_run_programs: bool) -> FastAPI:
     return app
 
 
-class Announced(uvicorn.Server):
-    async def startup(self, sockets: Any = None) -> None:
-        await super().startup(sockets)
-        host, port = self.servers[0].sockets[0].getsockname()
-        print(f"http://{host}:{port}", flush=True)
-
-
 if __name__ == "__main__":
-    app = make_app(Path(sys.argv[1]), sys.argv[2] == "may")
-    Announced(uvicorn.Config(app, "127.0.0.1", 0, log_level="warning")).run()
+    serve(make_app(Path(sys.argv[1]), sys.argv[2] == "may"))

@@ -3,21 +3,13 @@
 from __future__ import annotations
 
 import math
-import os
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
-
-pytest.importorskip("nicegui", reason="the desk needs NiceGUI")
-pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
-
 from playwright.sync_api import Browser
 from tests.at_length import at_length, cases
-from tests.desk.visits import NewPage, Visit
+from tests.desk.visits import NewPage, Visit, address_of
 
 SENSOR_RAD = math.radians(66.4)
 
@@ -27,16 +19,8 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def address() -> Iterator[str]:
     """Serve the desk of fake_desk.py in a process of its own."""
-    import kiks
-
-    environment = {**os.environ, "PYTHONPATH": str(Path(kiks.__file__).parents[1])}
-    command = [sys.executable, str(Path(__file__).with_name("fake_desk.py"))]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
-        assert process.stdout is not None
-        line = process.stdout.readline().strip()
-        assert line.startswith("http"), "the desk did not start"
-        yield line
-        process.terminate()
+    with address_of("fake_desk") as address:
+        yield address
 
 
 @pytest.fixture

@@ -5,10 +5,6 @@ from __future__ import annotations
 import math
 
 import pytest
-
-pytest.importorskip("nicegui", reason="the desk needs NiceGUI")
-pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
-
 from playwright.sync_api import Browser, expect
 from tests.at_length import at_length
 from tests.desk.visitor import Visitor

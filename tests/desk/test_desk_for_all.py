@@ -8,10 +8,6 @@ import threading
 from collections.abc import Iterator
 
 import pytest
-
-pytest.importorskip("nicegui", reason="the desk needs NiceGUI")
-pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
-
 from nicegui import Client
 from playwright.sync_api import expect
 from tests.at_length import cases, share

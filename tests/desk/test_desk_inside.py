@@ -7,10 +7,6 @@ import re
 
 import numpy as np
 import pytest
-
-pytest.importorskip("nicegui", reason="the desk needs NiceGUI")
-pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
-
 from playwright.sync_api import expect
 from tests.at_length import at_length
 from tests.desk.visitor import Visitor

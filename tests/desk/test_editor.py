@@ -10,10 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-
-pytest.importorskip("nicegui", reason="the desk needs NiceGUI")
-pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
-
 from playwright.sync_api import expect
 from tests.desk.visitor import Visitor
 from tests.desk.visits import NewPage

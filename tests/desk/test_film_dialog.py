@@ -4,13 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import av
 import numpy as np
 import pytest
-
-pytest.importorskip("nicegui", reason="the desk needs NiceGUI")
-pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
-
-import av
 from playwright.sync_api import expect
 from tests.at_length import at_length
 from tests.desk.visitor import Visitor

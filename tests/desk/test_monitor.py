@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 import json
-import os
 import re
-import subprocess
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
-
-pytest.importorskip("nicegui", reason="the desk needs NiceGUI")
-pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
-
 from playwright.sync_api import Locator, Page, expect
 from tests.at_length import at_length
 from tests.desk.visitor import leave_picture
-from tests.desk.visits import NewPage
+from tests.desk.visits import NewPage, address_of
 
 pytestmark = pytest.mark.slow
 
@@ -27,16 +19,8 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def address() -> Iterator[str]:
     """Serve monitor_page.py in a process of its own."""
-    import kiks
-
-    environment = {**os.environ, "PYTHONPATH": str(Path(kiks.__file__).parents[1])}
-    command = [sys.executable, str(Path(__file__).with_name("monitor_page.py"))]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
-        assert process.stdout is not None
-        *_, url = process.stdout.readline().split() or [""]
-        assert url.startswith("http"), "the desk did not start"
-        yield url
-        process.kill()
+    with address_of("monitor_page") as address:
+        yield address
 
 
 class Visit:

@@ -9,10 +9,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-
-pytest.importorskip("nicegui", reason="the desk needs NiceGUI")
-pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
-
 from playwright.sync_api import Page, expect
 from tests.at_length import at_length, share
 from tests.desk.visitor import FIRST_PICTURE, leave_picture

@@ -2,23 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-
-pytest.importorskip("nicegui", reason="the desk needs NiceGUI")
-pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
-
 from playwright.sync_api import Locator, Page, expect
 from tests.at_length import at_length
-from tests.desk.visits import NewPage
-
-import kiks
+from tests.desk.visits import NewPage, address_of
 
 pytestmark = pytest.mark.slow
 
@@ -32,20 +22,6 @@ while True:
 """
 
 
-@contextmanager
-def served(folder: Path, *, may: str = "may") -> Iterator[str]:
-    environment = {**os.environ, "PYTHONPATH": str(Path(kiks.__file__).parents[1])}
-    command = [sys.executable, str(Path(__file__).with_name("panels_page.py")), str(folder), may]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
-        assert process.stdout is not None
-        try:
-            line = process.stdout.readline().strip()
-            assert line.startswith("http"), "the page did not start"
-            yield line
-        finally:
-            process.kill()
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("folder")
@@ -53,7 +29,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def address(folder: Path) -> Iterator[str]:
-    with served(folder) as address:
+    with address_of("panels_page", str(folder), "may") as address:
         yield address
 
 
@@ -180,7 +156,7 @@ def test_wire_is_filtered_held_and_cleared(page: Page) -> None:
 
 @at_length
 def test_line_is_watched_only_while_the_panel_is_visible(new_page: NewPage, tmp_path: Path) -> None:
-    with served(tmp_path) as address:
+    with address_of("panels_page", str(tmp_path), "may") as address:
         page = new_page()
         page.goto(address)
         expect(editor(page)).to_contain_text("First steps")
@@ -192,7 +168,7 @@ def test_line_is_watched_only_while_the_panel_is_visible(new_page: NewPage, tmp_
 
 
 def test_page_of_a_public_desk_starts_no_programs(new_page: NewPage, tmp_path: Path) -> None:
-    with served(tmp_path, may="may-not") as address:
+    with address_of("panels_page", str(tmp_path), "may-not") as address:
         page = new_page()
         page.goto(address)
         expect(at(page, "may-not")).to_contain_text("cannot start programs from this page")

@@ -10,10 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-
-pytest.importorskip("matplotlib", reason="the page has figures")
-pytest.importorskip("nicegui", reason="the desk needs NiceGUI")
-
 from tests.at_length import at_length
 
 from kiks import Arena, Khepera, ParameterError, Recording, Simulation

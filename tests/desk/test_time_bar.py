@@ -6,10 +6,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-
-pytest.importorskip("nicegui", reason="the desk needs NiceGUI")
-pytest.importorskip("playwright", reason="tests in a browser need Playwright for Python")
-
 from playwright.sync_api import expect
 from tests.at_length import at_length
 from tests.desk.test_looking_back import drive, make_project

@@ -105,7 +105,8 @@ class Visitor:
             if found := fact():
                 return found
             self.page.evaluate(NEXT_PICTURE)
-        raise AssertionError("what was waited for did not come")
+        states = [(handle.name, handle.state) for handle in self.desk.programs.handles]
+        raise AssertionError(f"it did not come until {self.sim}, {self.desk.gate.is_paused=}, {states}")
 
     def tab(self, name: str) -> None:
         self.at(f"tab-{name}").click()

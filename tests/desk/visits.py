@@ -3,14 +3,34 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from PIL import Image
 from playwright.sync_api import Page
 
+ROOT = Path(__file__).parents[2]
+
 NewPage = Callable[..., Page]
 """What the fixture `new_page` of conftest.py is."""
+
+
+@contextmanager
+def address_of(module: str, *words: str) -> Iterator[str]:
+    """Run a module of this folder that serves a page; yield the address that it prints."""
+    command = [sys.executable, "-m", f"tests.desk.{module}", *words]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
+        try:
+            assert process.stdout is not None
+            *_, address = process.stdout.readline().split() or [""]
+            assert address.startswith("http"), "the page did not start"
+            yield address
+        finally:
+            process.kill()
 
 
 class Visit:

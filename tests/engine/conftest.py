@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -143,4 +144,4 @@ def make_world() -> type[World]:
 @pytest.fixture(scope="session")
 def make_random_arena():
     """Return the maker of random arenas."""
-    return random_arena
+    return lru_cache(maxsize=32)(random_arena)

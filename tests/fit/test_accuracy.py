@@ -141,7 +141,6 @@ def made_card(card, monkeypatch):
 @pytest.mark.slow
 @pytest.mark.usefixtures("made_card")
 def test_the_command_prints_json_and_draws(tmp_path):
-    pytest.importorskip("matplotlib")
     result = run(accuracy, "--json", "--plots", str(tmp_path / "card"))
     lines = [json.loads(line) for line in result.stdout.splitlines()]
     values = {line["name"]: line["value"] for line in lines if line["unit"] == "counts"}

@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow
 import pytest
+from pyarrow import parquet
 from tests.at_length import cases, share
-from tests.needed import need
 from typer.testing import CliRunner
 
 import kiks
@@ -19,9 +20,6 @@ from kiks.learn.algorithms import ALGORITHMS, Diverse
 
 pytestmark = pytest.mark.slow
 
-need("ribs", "cma")
-pyarrow = pytest.importorskip("pyarrow")
-parquet = pytest.importorskip("pyarrow.parquet")
 
 DIVERSE = [str(name) for name, kind in ALGORITHMS.items() if issubclass(kind, Diverse)]
 

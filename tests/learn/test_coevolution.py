@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pyarrow import parquet
 from tests.at_length import at_length
-from tests.needed import need
 
 import kiks
 from kiks import ParameterError
@@ -26,9 +26,6 @@ from kiks.learn.ready_contests import CAUGHT_MM, PREY_SPEED
 from kiks.model.arena import Pose
 
 pytestmark = pytest.mark.slow
-
-need("cma")
-parquet = pytest.importorskip("pyarrow.parquet")
 
 
 def small(**changes: Any) -> kiks.Contest:

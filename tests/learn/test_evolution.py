@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pyarrow import parquet
 from tests.at_length import cases
-from tests.needed import need
 
 import kiks
 from kiks import ParameterError
@@ -20,9 +20,6 @@ from kiks.learn.algorithm_name import AlgorithmName
 from kiks.learn.candidate_worlds import cautious_mean
 
 pytestmark = pytest.mark.slow
-
-need("cma", "ribs")
-parquet = pytest.importorskip("pyarrow.parquet")
 
 
 def small(**changes: Any) -> kiks.Task:
@@ -86,7 +83,6 @@ evolution.run(generations=10**6, each=report)
 """
 
 
-@pytest.mark.slow
 def test_a_killed_evolution_loses_at_most_the_current_generation(tmp_path: Path) -> None:
     with subprocess.Popen([sys.executable, "-c", KILLED, str(tmp_path)], stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
@@ -325,7 +321,6 @@ task = kiks.Task("far", [kiks.Arena.box(500, 500)], ahead, [farthest_mm], second
 """
 
 
-@pytest.mark.slow
 def test_a_champion_does_not_need_the_python_file_of_its_task(tmp_path: Path) -> None:
     (tmp_path / "far.py").write_text(OWN)
     task = kiks.tasks.load(str(tmp_path / "far.py"))
@@ -409,7 +404,6 @@ def test_wrong_champion_files_are_errors(before: str, after: str, message: str, 
 # ---- all together ----
 
 
-@pytest.mark.slow
 def test_obstacle_avoidance_evolves_and_works_on_a_serial_line() -> None:
     task = kiks.tasks.avoid()
     evolution = kiks.Evolution(task, "cma", seed=1)

@@ -14,7 +14,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.at_length import at_length, cases
-from tests.needed import need
 
 import kiks
 from kiks import ParameterError
@@ -23,8 +22,6 @@ from kiks.learn.evaluation import Executor
 from kiks.learn.finals import FINALISTS, FINALS_SEED, SHARE, Contender, Finals, finalists_of
 from kiks.learn.generation_loop import seed_for
 from kiks.learn.results import result_of
-
-need("cma", "ribs", "pyarrow")
 
 
 def contenders(count: int) -> list[Contender]:

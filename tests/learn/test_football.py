@@ -101,14 +101,12 @@ def test_champions_play_in_a_demonstration_until_a_goal(tmp_path: Path) -> None:
 
 
 def team(**changes: Any) -> Any:
-    pytest.importorskip("pettingzoo")
     from kiks.learn.pettingzoo_env import KheperaTeam
 
     return KheperaTeam("Football", robots=2, **changes)
 
 
 def test_the_environment_passes_the_checks_of_pettingzoo() -> None:
-    pytest.importorskip("pettingzoo")
     from pettingzoo.test import parallel_api_test
     from pettingzoo.test.seed_test import parallel_seed_test
 

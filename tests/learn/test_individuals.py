@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
+from pyarrow import parquet
 from tests.at_length import cases
 
 import kiks
@@ -20,7 +21,6 @@ from kiks.model.family import family
 
 pytestmark = pytest.mark.slow
 
-parquet = pytest.importorskip("pyarrow.parquet")
 
 KHEPERA = kiks.RobotSpec.load("khepera")
 
@@ -87,7 +87,6 @@ def test_a_demonstration_is_the_world_of_the_evaluation(
 
 def test_generations_need_no_rival_on_trial(tmp_path: Path) -> None:
     """All candidates fall into one cell of the map, and its elite is tried once."""
-    pytest.importorskip("ribs")
     task = kiks.tasks.avoid(seconds=1.0, worlds=3)
     evolution = kiks.Evolution(task, "map-elites", seed=3, population=6, folder=tmp_path)
     for _ in range(4):

@@ -178,7 +178,6 @@ def test_the_digest_without_the_controller_is_that_of_the_worlds() -> None:
 
 @pytest.mark.slow
 def test_pictures_are_png_files(tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
     without = [replace(each, exam=None) for each in RESULTS]
     for number, groups in enumerate(({"a": RESULTS}, {"a": RESULTS, "b": RESULTS[:1]}, {"a": without})):
         save_results_plot(groups, tmp_path / f"{number}.png")
@@ -187,7 +186,6 @@ def test_pictures_are_png_files(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_result_of_an_evolution(tmp_path: Path) -> None:
-    pytest.importorskip("pyarrow")
     evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1.0, worlds=3), "ga", population=8, folder=tmp_path)
     with pytest.raises(ParameterError, match="before there is a champion"):
         result_of(evolution)

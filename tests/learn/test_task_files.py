@@ -106,7 +106,6 @@ def test_wrong_files_are_errors_of_one_short_line(text: str, message: str, folde
 
 @pytest.mark.slow
 def test_an_evolution_resumes_only_with_the_same_task_file(folder: Path) -> None:
-    pytest.importorskip("pyarrow")
     text = 'base = "avoid"\nseconds = 0.5\nworlds = 1\narenas = ["room.toml"]\n'
     options: dict[str, Any] = {"population": 4, "folder": folder / "out"}
     kiks.Evolution(load(folder, text), "ga", **options).run(generations=2, executor="threads:1")

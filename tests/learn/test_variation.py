@@ -92,7 +92,6 @@ def test_wrong_lists_are_errors(changes: dict[str, Any]) -> None:
 
 @pytest.mark.slow
 def test_champions_of_a_family_drive_its_first_robot(tmp_path: Any) -> None:
-    pytest.importorskip("pyarrow")
     robots = family(KHEPERA, 3, seed=3)
     evolution = kiks.Evolution(task_of(robot=robots, timing=TIMINGS), "ga", population=8, folder=tmp_path)
     evolution.run(generations=2, executor="threads:1")

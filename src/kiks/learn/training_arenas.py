@@ -1,10 +1,14 @@
-"""Arenas for training and for the exam, drawn as strokes: long ones are walls, short and thick ones pillars."""
+"""Arenas for training and for the exam, drawn as strokes: long ones are walls, short and thick ones pillars.
+
+An arena never changes, so each is made once, with its distances to walls.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -69,6 +73,7 @@ def draw(width_mm: int, height_mm: int, strokes: Sequence[Stroke], name: str, br
     return Arena.from_array(cells, name=name)
 
 
+@cache
 def heap(side_mm: int, x_mm: float, y_mm: float, number: int) -> Arena:
     """Return a square room where twenty robots start in a heap around a place, each with another heading."""
     rng = np.random.default_rng(number)
@@ -80,6 +85,7 @@ def heap(side_mm: int, x_mm: float, y_mm: float, number: int) -> Arena:
     return replace(Arena.box(side_mm, side_mm), name=f"heap {number}", starts=starts)
 
 
+@cache
 def pillars() -> Arena:
     """Return an arena with thick and thin, bright and dark pillars."""
     return draw(
@@ -97,6 +103,7 @@ def pillars() -> Arena:
     )
 
 
+@cache
 def corridors() -> Arena:
     """Return an arena of corridors with right-angled corners and a dead end."""
     walls = [
@@ -108,6 +115,7 @@ def corridors() -> Arena:
     return draw(600, 600, walls, "corridors", 200)
 
 
+@cache
 def wedges() -> Arena:
     """Return an arena whose walls meet at acute and obtuse angles, with walls that end inside."""
     walls = [
@@ -120,6 +128,7 @@ def wedges() -> Arena:
     return draw(600, 600, walls, "wedges")
 
 
+@cache
 def unseen() -> Arena:
     """Return an arena for the exam: slanted walls, pillars, a passage and a dead end."""
     walls = [
@@ -136,6 +145,7 @@ def unseen() -> Arena:
     return draw(800, 800, walls, "unseen", 220)
 
 
+@cache
 def rooms() -> Arena:
     """Return an arena for the exam: three rooms with doors, furniture, thin dark walls and a post."""
     walls = [
@@ -155,6 +165,7 @@ def rooms() -> Arena:
     return draw(900, 900, walls, "rooms", 180)
 
 
+@cache
 def wall_ends() -> Arena:
     """Return an arena for following walls: walls that end inside, with corners to both sides, and two pillars."""
     walls = [
@@ -170,6 +181,7 @@ def wall_ends() -> Arena:
     return draw(845, 845, walls, "wall ends")
 
 
+@cache
 def alcoves() -> Arena:
     """Return an arena for following walls: a room with alcoves, and an angled wall in its middle."""
     walls = [
@@ -184,6 +196,7 @@ def alcoves() -> Arena:
     return draw(780, 780, walls, "alcoves", 230)
 
 
+@cache
 def unseen_rooms() -> Arena:
     """Return an arena for the exam of followers: ledges, open rooms and a hook, with corners to both sides."""
     walls = [
@@ -202,6 +215,7 @@ LAMP_W = 25.0
 """Power of lamps [W]: their light exceeds the noise of a Khepera's sensors up to 1.15 m away, that of 1 W to 0.23 m."""
 
 
+@cache
 def lit_pillars() -> Arena:
     """Return an arena with a lamp among thick pillars."""
     strokes = [
@@ -215,6 +229,7 @@ def lit_pillars() -> Arena:
     return _lit(draw(1100, 1100, strokes, "lit pillars"), 640, 700)
 
 
+@cache
 def lit_walls() -> Arena:
     """Return an arena with a lamp between walls that end inside."""
     walls = [
@@ -227,6 +242,7 @@ def lit_walls() -> Arena:
     return _lit(draw(1100, 1100, walls, "lit walls"), 260, 330)
 
 
+@cache
 def lit_rooms() -> Arena:
     """Return an arena of three rooms with a lamp in one of them."""
     walls = [
@@ -239,6 +255,7 @@ def lit_rooms() -> Arena:
     return _lit(draw(1100, 1100, walls, "lit rooms", 220), 840, 860)
 
 
+@cache
 def lit_unseen() -> Arena:
     """Return an arena for the exam, with a lamp in a corner behind walls and pillars."""
     walls = [
@@ -317,6 +334,7 @@ _START = (0.15, 0.15, math.pi / 2)
 """x and y in units of the maze's side, and heading [rad]."""
 
 
+@cache
 def kheperax() -> Arena:
     """Return the maze, with its start."""
     side = round(SIDE_MM + 2 * WALL_MM)
