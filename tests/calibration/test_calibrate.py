@@ -94,6 +94,7 @@ def test_guide_lists_the_default_gaps(name: str) -> None:
 # ---- the command ----
 
 
+@at_length
 @pytest.mark.slow
 def test_command_measures_and_writes_a_robot_file(tmp_path: Path) -> None:
     hidden, out = hidden_robot(11, BASE), tmp_path / "mine.toml"

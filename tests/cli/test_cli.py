@@ -11,7 +11,7 @@ from typing import get_args, get_type_hints
 
 import pytest
 from tests import forked
-from tests.at_length import cases
+from tests.at_length import at_length, cases
 
 from kiks.cli import app
 from kiks.errors import ParameterError
@@ -86,6 +86,7 @@ def test_a_cold_start_says_at_once_that_it_compiles(tmp_path: Path) -> None:
         process.kill()
 
 
+@at_length
 def test_a_warm_start_compiles_nothing() -> None:
     kiks("warmup")
     again = kiks("warmup")

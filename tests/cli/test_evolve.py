@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
+from tests.at_length import at_length
 from typer.testing import CliRunner, Result
 
 from kiks import Recording
@@ -113,6 +114,7 @@ def test_wrong_words_are_named(words: tuple[str, ...], said: str) -> None:
         kiks(*words)
 
 
+@at_length
 @pytest.mark.slow
 def test_champions_are_shown_in_their_world(folder: Path, tmp_path: Path) -> None:
     from kiks import Champion
@@ -129,6 +131,7 @@ def test_champions_are_shown_in_their_world(folder: Path, tmp_path: Path) -> Non
         assert "names no world" not in kiks(*command, "--seconds", 1, "--arena", "examples/arenas/maze.toml").output
 
 
+@at_length
 @pytest.mark.slow
 def test_a_folder_is_its_champion_or_one_of_a_generation(folder: Path, tmp_path: Path) -> None:
     picture, task = tmp_path / "shown.png", folder.parent / "quick.py"
@@ -156,6 +159,7 @@ def test_a_folder_is_its_champion_or_one_of_a_generation(folder: Path, tmp_path:
         kiks("demo", tmp_path)
 
 
+@at_length
 @pytest.mark.slow
 def test_seeds_evolve_one_after_another_and_are_compared(folder: Path, tmp_path: Path) -> None:
     task, out = folder.parent / "quick.py", tmp_path / "two"

@@ -318,6 +318,7 @@ def test_things_are_dragged_in_three_dimensions_too(visit: Callable[..., Visit])
     assert (moved["x_mm"], moved["y_mm"]) == pytest.approx((x_mm + 50, y_mm + 30), abs=1)
 
 
+@at_length
 def test_without_webgl_the_top_view_works(visit: Callable[..., Visit], browser_without_3d: Browser) -> None:
     here = visit("view=both", by=browser_without_3d)
     here.wait("() => document.querySelector('[data-testid=arena-solid]').textContent.includes('needs WebGL 2')")

@@ -16,7 +16,7 @@ from urllib.request import HTTPCookieProcessor, OpenerDirector, Request, build_o
 
 import pytest
 from tests import forked
-from tests.at_length import cases
+from tests.at_length import at_length, cases
 from tests.cli.test_cli import state_of
 from tests.guard import GUARD_S
 from tests.served import PROGRAMS
@@ -116,6 +116,7 @@ def show_page(url: str) -> None:
         socket.send('{"kind": "ack"}')
 
 
+@at_length
 @pytest.mark.parametrize("words", cases([(("run", "--desk"),), (("desk", "--port", "0", "--no-browser"),)]))
 def test_programs_begin_when_a_page_shows_the_world(words: tuple[str, ...], tmp_path: Path) -> None:
     (tmp_path / "tells.py").write_text("open('begun', 'w').close()\nimport time\ntime.sleep(1)\n")
@@ -140,6 +141,7 @@ def test_errors_are_reported_before_waiting_for_a_page(tmp_path: Path) -> None:
     assert "http://" not in result.stdout
 
 
+@at_length
 @pytest.mark.parametrize("words", cases([(("run", "--desk"),), (("demo", "avoid", "--desk"),)]))
 def test_ctrl_c_ends_waiting_for_a_page(words: tuple[str, ...], tmp_path: Path) -> None:
     words = (*words, DRIVE, "COM1", "5", "3", "5") if words[0] == "run" else words
@@ -206,6 +208,7 @@ def test_errors_are_one_clear_line(words: tuple[str, ...], message: str, tmp_pat
     assert "Traceback" not in result.stderr
 
 
+@at_length
 def test_a_recording_is_shown_from_a_time_on(tmp_path: Path) -> None:
     recorded = forked.run("run", "--record", "run.mcap", DRIVE, "COM1", "5", "3", "5", cwd=tmp_path)
     assert recorded.returncode == 0, recorded.stderr

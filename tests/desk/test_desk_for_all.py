@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import pytest
 from nicegui import Client
 from playwright.sync_api import expect
-from tests.at_length import cases, share
+from tests.at_length import at_length, cases, share
 from tests.desk.visitor import Visitor
 from tests.desk.visits import NewPage
 
@@ -130,6 +130,7 @@ def test_everything_has_a_name_and_enough_contrast(visitor: Visitor, theme: str)
     visitor.picture(f"help_{theme.lower()}")
 
 
+@at_length
 @pytest.mark.parametrize(("width", "height"), cases([(800, 600), (1024, 768)]))
 def test_small_windows_stay_usable(new_page: NewPage, shown: Shown, width: int, height: int) -> None:
     visitor = Visitor(new_page(width, height), shown)
@@ -149,6 +150,7 @@ def test_small_windows_stay_usable(new_page: NewPage, shown: Shown, width: int, 
     visitor.pause()
 
 
+@at_length
 def test_closed_pages_leave_nothing_behind(new_page: NewPage, shown: Shown) -> None:
     page = new_page()
     for _ in range(share(2, 4)):

@@ -141,6 +141,7 @@ def test_halt_stops_programs_and_robots(visitor: Visitor) -> None:
     visitor.until(lambda: setpoints(visitor) == setpoints(visitor, 2) == [0, 0])
 
 
+@at_length
 def test_places_and_sensors_in_the_coordinates_of_kiks_2(visitor: Visitor) -> None:
     """From the upper left corner of 600 x 400 mm; x and y count from 1 in the middle of the first millimetre."""
     expect(visitor.at("facts")).to_contain_text("x 150.0, y 200.0 mm")

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from playwright.sync_api import expect
+from tests.at_length import at_length
 from tests.desk.visitor import Visitor
 from tests.desk.visits import NewPage
 
@@ -139,6 +140,7 @@ def test_worlds_are_created_saved_and_opened(desk: Desk, visitor: Visitor) -> No
     visitor.told("Saved as mine.kiks")
 
 
+@at_length
 def test_files_are_uploaded(desk: Desk, visitor: Visitor) -> None:
     page = visitor.page
     picture = io.BytesIO()

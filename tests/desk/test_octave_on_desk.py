@@ -70,6 +70,7 @@ def drive_and_halt(terminal: Terminal, page: Page, loop: str) -> None:
     assert terminal.ask("numel(kProximity(ref))") == "8"
 
 
+@at_length
 def test_halt_stops_a_program_of_octave(terminal: Terminal, new_page: NewPage) -> None:
     page = begin(terminal, new_page)
     loops = "while true, kProximity(ref); end", "kiks_pause(1e5)", "while kiks_ktime(-1) < 1e5, end"

@@ -116,6 +116,7 @@ def page_of(file: Path, folder: Path, **options: Any) -> Path:
     return folder / "page.html"
 
 
+@at_length
 def test_five_minutes_of_a_robot_are_small_and_load_nothing(plain: Path, plain_page: Path) -> None:
     assert plain_page.stat().st_size < 3_000_000
     found = Tags(plain_page)

@@ -113,6 +113,7 @@ def test_a_recording_is_played_stepped_and_jumped_through(replay: Visitor) -> No
     visitor.drag_refused()
 
 
+@at_length
 def test_a_person_goes_on_from_a_recording(replay: Visitor) -> None:
     visitor = replay
     drag_to(visitor, 0.25)
@@ -142,6 +143,7 @@ def test_a_person_goes_on_from_a_recording(replay: Visitor) -> None:
     visitor.picture("branch")
 
 
+@at_length
 def test_a_living_world_is_looked_back_at_and_goes_on(visitor: Visitor, new_page: NewPage) -> None:
     present = visitor.sim
     expect(visitor.at("bar-state")).to_have_text("Now")

@@ -4,6 +4,7 @@ import runpy
 from pathlib import Path
 
 import pytest
+from tests.at_length import at_length
 
 from kiks.firmware.commands import COMMANDS
 from kiks.firmware.tools import SUMMARY
@@ -11,6 +12,7 @@ from kiks.firmware.tools import SUMMARY
 DOCS = Path(__file__).parents[2] / "docs"
 
 
+@at_length
 @pytest.mark.slow
 def test_the_page_is_up_to_date() -> None:
     page = runpy.run_path(str(DOCS / "make_commands.py"))["page"]()

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import typer
+from tests.at_length import at_length
 from tools.accuracy import accuracy
 from tools.sensors import card as cards
 from tools.sensors import models
@@ -49,6 +50,7 @@ def card():
     return make_card(load_tables(FOLDER))
 
 
+@at_length
 @pytest.mark.slow
 @needs_data
 def test_the_page_tells_the_truth(card):
@@ -137,6 +139,7 @@ def made_card(card, monkeypatch):
     monkeypatch.setattr(cards, "make_card", lambda tables: card)
 
 
+@at_length
 @needs_data
 @pytest.mark.slow
 @pytest.mark.usefixtures("made_card")

@@ -142,6 +142,7 @@ def test_an_address_without_a_server_is_an_error(ray):
         executor_for("ray:127.0.0.1:1", works.Sums()).__enter__()
 
 
+@at_length
 def test_the_error_names_candidates_that_kill_their_workers(cluster):
     with (
         # The chunk begins at 3 if both nodes of the cluster are still there.

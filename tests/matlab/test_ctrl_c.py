@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from tests.at_length import AT_LENGTH, share
+from tests.at_length import AT_LENGTH, at_length, share
 from tests.forked import kiks_command
 from tests.matlab.octave import GUARD_S, has_ended, needs_octave
 from tests.matlab.terminal import Terminal, processor_ticks, state
@@ -109,6 +109,7 @@ def test_answers_of_any_length_stay_in_step(forking: Terminal) -> None:
         assert forking.ask("numel(kiks_siminfo_robotpos)") == "3"
 
 
+@at_length
 def test_another_child_of_octave_does_not_keep_a_session_alive(terminal: Terminal) -> None:
     """It inherits the ends of the session's pipes: neither kiks_quit nor the end of Octave shows there."""
     begin(terminal, "kiks()")

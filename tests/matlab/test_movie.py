@@ -7,6 +7,7 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
+from tests.at_length import at_length
 from tests.matlab.octave import needs_octave, run
 
 from kiks.sheet import robot_colour
@@ -76,6 +77,7 @@ ref = kiks_kopen; kiks_pause(1)
 """
 
 
+@at_length
 def test_a_film_ends_with_its_world_and_with_its_program(tmp_path: Path) -> None:
     octave = run(OTHER_ENDS, tmp_path)
     assert len(pictures(tmp_path / "quit.gif")) == pytest.approx(PICTURES_PER_S, abs=2)
@@ -93,6 +95,7 @@ def test_a_film_ends_with_its_world_and_with_its_program(tmp_path: Path) -> None
     }
 
 
+@at_length
 def test_a_preference_names_the_film_of_each_run(tmp_path: Path) -> None:
     (tmp_path / "kiks_preferences.m").write_text("KIKS_MOVIENAME = 'each';\nKIKS_MOVIE_QUALITY = 90;\n")
     octave = run("for i = 1:2, ref = kiks_kopen; kiks_pause(i), kiks_kclose(ref), end", tmp_path)

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from tests.at_length import at_length
 from tests.matlab.octave import DEMOS, TOOLBOX, needs_octave, run
 from tools.octave_package import build, contents
 
@@ -32,6 +33,7 @@ say('after', exist('kiks', 'file') + exist('follow', 'file'))
 """
 
 
+@at_length
 @needs_octave
 @pytest.mark.slow
 def test_an_installed_package_runs_a_demo_from_any_folder(tmp_path: Path) -> None:

@@ -76,6 +76,7 @@ say('readings', kProximity(ref))
 """
 
 
+@at_length
 @pytest.mark.parametrize(
     ("transport", "tidied"),
     [
@@ -91,6 +92,7 @@ def test_a_program_survives_the_simulators_death(transport: str, tidied: str, tm
     assert said["readings"].shape == (8, 1)
 
 
+@at_length
 def test_a_killed_octave_leaves_nothing_behind(tmp_path: Path) -> None:
     program = """
 ref = kiks_kopen([-1 9600 1]);

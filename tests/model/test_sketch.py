@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
+from tests.at_length import at_length
 
 from kiks.errors import ArenaError, ParameterError
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
@@ -173,6 +174,7 @@ def test_what_changes_nothing_is_no_step():
     assert not sketch.can_undo
 
 
+@at_length
 @pytest.mark.slow
 def test_two_hundred_steps_in_a_large_arena_fit_in_memory():
     rng = np.random.default_rng(1)

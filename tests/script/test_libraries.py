@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
+from tests.at_length import at_length
 from tests.cli.test_cli import KIKS
 from tests.guard import GUARD_S
 from tests.script.screen import display
@@ -163,6 +164,7 @@ def test_windows_of_tk_live_in_simulated_time(tmp_path: Path, screen: dict[str, 
     assert told.endswith(run(tmp_path, TK, screen)[2].splitlines()[-1] + "\n")
 
 
+@at_length
 def test_error_in_a_call_of_tk_is_told_and_no_more(tmp_path: Path, screen: dict[str, str]) -> None:
     begin = "import tkinter\nroot = tkinter.Tk()\n"
     fails = f"{begin}root.after(1, lambda: 1 / 0)\nroot.after(9, root.destroy)\nroot.mainloop()\n"

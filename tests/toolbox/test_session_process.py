@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 from tests import forked
-from tests.at_length import share
+from tests.at_length import at_length, share
 from tests.guard import GUARD_S
 
 from kiks.cli.options import shipped_folder
@@ -127,6 +127,7 @@ def started(*words: str, folder: Path, command: Sequence[str] = ()) -> Iterator[
             session.process.stdin.close()  # type: ignore[union-attr]
 
 
+@at_length
 def test_a_session_ends_with_its_last_client_and_leaves_nothing(tmp_path: Path) -> None:
     with started(folder=tmp_path, command=KIKS) as session:
         assert session.greeting.startswith("KiKS ")

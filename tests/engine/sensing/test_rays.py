@@ -58,7 +58,7 @@ def check_ray(arena, x, y, angle, reach, length, brightness):
 
 
 @pytest.mark.slow
-@settings(derandomize=True, max_examples=share(30, 60))
+@settings(derandomize=True, max_examples=share(10, 60))
 @given(number=st.integers(0, 300), draw=st.integers(0, 2**32))
 def test_rays_end_where_the_first_wall_begins(make_random_arena, number, draw):
     arena = make_random_arena(number)
@@ -68,7 +68,7 @@ def test_rays_end_where_the_first_wall_begins(make_random_arena, number, draw):
 
 
 @pytest.mark.slow
-@settings(derandomize=True, max_examples=30)
+@settings(derandomize=True, max_examples=share(10, 30))
 @given(number=st.integers(0, 300), draw=st.integers(0, 2**32))
 def test_rays_along_edges_and_diagonals(make_random_arena, number, draw):
     """From corners of cells and along their edges, where a rounding error decides between two cells."""
@@ -82,7 +82,7 @@ def test_rays_along_edges_and_diagonals(make_random_arena, number, draw):
 
 
 @pytest.mark.slow
-@settings(derandomize=True, max_examples=share(20, 60))
+@settings(derandomize=True, max_examples=share(8, 60))
 @given(number=st.integers(0, 300), draw=st.integers(0, 2**32))
 def test_an_additional_wall_never_lengthens_a_ray(make_random_arena, number, draw):
     arena = make_random_arena(number)
@@ -122,7 +122,7 @@ def test_rays_in_lanes_are_rays_one_by_one(make_random_arena, number, draw, coun
 
 
 @pytest.mark.slow
-@settings(derandomize=True, max_examples=share(20, 60))
+@settings(derandomize=True, max_examples=share(8, 60))
 @given(number=st.integers(0, 300), draw=st.integers(0, 2**32))
 def test_the_rays_of_a_sensor_end_where_the_first_wall_begins(make_random_arena, number, draw):
     """From floor, from walls and from corners of cells, along the axes and diagonals, too."""

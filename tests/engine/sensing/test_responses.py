@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.at_length import at_length
 from tools.sensors import models
 from tools.sensors.card import data_folder
 from tools.sensors.train_networks import fan_of
@@ -137,6 +138,7 @@ def measured_means() -> np.ndarray:
     return np.array([[np.mean(sums[sensor, step]) for step in range(9)] for sensor in range(8)])
 
 
+@at_length
 @pytest.mark.slow
 def test_the_khepera_ii_reads_what_a_real_one_did() -> None:
     try:
