@@ -19,6 +19,8 @@ from tests.guard import GUARD_S
 import kiks
 from kiks.batch.rollouts import FIRST, Rollouts
 
+pytestmark = pytest.mark.slow
+
 OF_DESK = "sim = kiks.Simulation(robots=2)\n"
 
 Run = Callable[[str], list[dict[str, Any]]]
@@ -49,7 +51,6 @@ def run() -> Iterator[Run]:
     kernel.shutdown_kernel(now=True)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "cell", ["shown = sim.show()", "sim.show()", "shown = sim.show()\nshown", "for _ in range(1):\n    sim.show()"]
 )
@@ -59,7 +60,6 @@ def test_a_notebook_shows_the_desk_once_below_the_cell(run: Run, cell: str) -> N
     assert seen["text/plain"].startswith("<KiKS desk at http://127.0.0.1:")
 
 
-@pytest.mark.slow
 def test_a_later_cell_shows_the_same_desk_again(run: Run) -> None:
     (first,) = run(OF_DESK + "shown = sim.show()")
     assert run("shown") == [first]
@@ -67,13 +67,11 @@ def test_a_later_cell_shows_the_same_desk_again(run: Run) -> None:
     assert run("shown.close()") == []
 
 
-@pytest.mark.slow
 def test_a_notebook_that_wants_no_page_has_the_address(run: Run) -> None:
     (seen,) = run(OF_DESK + "sim.show(browser=False)")
     assert seen["stdout"].startswith("The desk: http://127.0.0.1:")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("cell", "kind", "text"),
     [
@@ -92,7 +90,6 @@ def test_a_notebook_shows_a_picture_or_a_table(run: Run, cell: str, kind: str, t
     assert seen[kind].startswith("<table>") or b64decode(seen[kind]).startswith(b"\x89PNG")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "words", cases([["-c"], ["-m", "IPython", "--colors=NoColor", "-c"]]), ids=["Python", "IPython"]
 )
@@ -181,7 +178,6 @@ def test_numbers_that_are_none_are_shown_so() -> None:
     assert lines[1].split()[3] == "1.000e+12"
 
 
-@pytest.mark.slow
 def test_without_measures_there_are_still_steps() -> None:
     nothing = Rollouts(np.zeros((2, 1, 0)), np.array([3, 4]), ())
     assert repr(nothing) == "<Rollouts: 2 worlds of 1 robot, no measures>"

@@ -10,6 +10,8 @@ import pytest
 
 import kiks
 
+pytestmark = pytest.mark.slow
+
 
 @kiks.controller(parameters=1, memory=1)
 def wander(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
@@ -71,7 +73,6 @@ def drive_alone(
     return loops, hashes[-1]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "timing",
     [kiks.Timing(0.1, 9600), kiks.Timing(0.0, 9600), kiks.Timing(0.05, 38400, 0.0031)],
@@ -88,7 +89,6 @@ def test_batch_and_wire_agree_to_the_bit(timing: kiks.Timing, controller: kiks.C
         assert (loops, state_hash) == (rollouts.step_counts[world], batch.state_hash(world))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("response", ["thesis", "fast", "standin"])
 def test_every_response_is_that_of_the_wire(response: str) -> None:
     timing = kiks.Timing(0.1, 9600)
@@ -99,7 +99,6 @@ def test_every_response_is_that_of_the_wire(response: str) -> None:
         assert found == (rollouts.step_counts[world], batch.state_hash(world))
 
 
-@pytest.mark.slow
 def test_one_program_with_three_robots() -> None:
     timing = kiks.Timing(0.1, 19200)
     batch = kiks.Batch(arena(ball=True), worlds=2, robots=3, seed=5, timing=timing)
@@ -109,7 +108,6 @@ def test_one_program_with_three_robots() -> None:
         assert found == (rollouts.step_counts[world], batch.state_hash(world))
 
 
-@pytest.mark.slow
 def test_one_program_with_a_controller_for_each_robot() -> None:
     timing = kiks.Timing(0.1, 19200)
     batch = kiks.Batch(arena(ball=True), worlds=2, robots=3, seed=5, timing=timing)
@@ -134,7 +132,6 @@ def gaze_only(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
     wheels[0], wheels[1] = 4.0 + sensors[12:].sum() / 500.0, 4.0 + sensors[:4].sum() / 500.0
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("timing", [kiks.Timing(0.1, 19200), kiks.Timing(0.03, 57600)], ids=["100 ms", "30 ms"])
 @pytest.mark.parametrize("controllers", [[gaze, wander], [gaze_only, gaze_only]], ids=["one camera", "two"])
 def test_pictures_are_those_of_the_wire(timing: kiks.Timing, controllers: list[kiks.Controller]) -> None:

@@ -95,7 +95,6 @@ def test_guide_lists_the_default_gaps(name: str) -> None:
 
 
 @at_length
-@pytest.mark.slow
 def test_command_measures_and_writes_a_robot_file(tmp_path: Path) -> None:
     hidden, out = hidden_robot(11, BASE), tmp_path / "mine.toml"
     sim = kiks.Simulation(robot=hidden)
@@ -206,7 +205,6 @@ def test_error_for_an_obstacle_in_the_open() -> None:
 
 
 @at_length
-@pytest.mark.slow
 def test_error_for_contradictory_measurements() -> None:
     words = failure(Misplaced(kiks.Simulation(), {15: 12}), (5, 15, 25))
     assert "the measurements must agree with each other, but those at the" in words
@@ -256,7 +254,6 @@ def test_ctrl_c_in_the_middle_of_a_spin_stops_the_robot() -> None:
 
 
 @at_length
-@pytest.mark.slow
 def test_placements_may_repeat_a_measurement() -> None:
     class Fussy(SimPlacements):
         asked = 0

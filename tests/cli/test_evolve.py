@@ -15,6 +15,8 @@ from kiks.errors import KiksError
 
 TASK = """
 import kiks
+
+pytestmark = pytest.mark.slow
 task = kiks.tasks.avoid(seconds=1.0, worlds=3)
 """
 
@@ -34,7 +36,6 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path / "out"
 
 
-@pytest.mark.slow
 def test_a_run_leaves_its_files_and_goes_on(folder: Path) -> None:
     names = {path.name for path in folder.iterdir()}
     assert {"champion.toml", "log.parquet", "fitness.png", "generations", "evolution.json"} <= names
@@ -57,7 +58,6 @@ def test_a_run_leaves_its_files_and_goes_on(folder: Path) -> None:
         kiks("evolve", task, "--seed", 2, "--population", 8, "--generations", 4, "--out", folder)
 
 
-@pytest.mark.slow
 def test_champions_run_and_are_shown(folder: Path, tmp_path: Path) -> None:
     champion = folder / "champion.toml"
     after = kiks("run", champion, "--seconds", 2, "--seed", 5).output
@@ -70,14 +70,12 @@ def test_champions_run_and_are_shown(folder: Path, tmp_path: Path) -> None:
     assert "17 loops" in kiks("drive", champion, "--port", "kiks://1", "--seconds", 1).output
 
 
-@pytest.mark.slow
 def test_the_tasks_are_listed() -> None:
     listed = kiks("evolve", "--list").output
     assert "touch nothing" in listed
     assert "predator and prey" in listed
 
 
-@pytest.mark.slow
 def test_two_sides_evolve_and_are_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from kiks.learn.ready_contests import CONTESTS, pursuit
 
@@ -115,7 +113,6 @@ def test_wrong_words_are_named(words: tuple[str, ...], said: str) -> None:
 
 
 @at_length
-@pytest.mark.slow
 def test_champions_are_shown_in_their_world(folder: Path, tmp_path: Path) -> None:
     from kiks import Champion
 
@@ -132,7 +129,6 @@ def test_champions_are_shown_in_their_world(folder: Path, tmp_path: Path) -> Non
 
 
 @at_length
-@pytest.mark.slow
 def test_a_folder_is_its_champion_or_one_of_a_generation(folder: Path, tmp_path: Path) -> None:
     picture, task = tmp_path / "shown.png", folder.parent / "quick.py"
     said = [
@@ -160,7 +156,6 @@ def test_a_folder_is_its_champion_or_one_of_a_generation(folder: Path, tmp_path:
 
 
 @at_length
-@pytest.mark.slow
 def test_seeds_evolve_one_after_another_and_are_compared(folder: Path, tmp_path: Path) -> None:
     task, out = folder.parent / "quick.py", tmp_path / "two"
     words = ("evolve", task, "--population", 8, "--generations", 3, "--seed", 1, "--out", out)

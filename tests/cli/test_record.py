@@ -69,7 +69,6 @@ def test_programs_are_recorded_with_their_texts(robots: int, tmp_path: Path) -> 
 
 
 @at_length
-@pytest.mark.slow
 def test_a_match_with_a_referee_is_made_again(tmp_path: Path) -> None:
     result = forked.run("demo", "soccer", "--seconds", "20", "--record", "match.mcap", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
@@ -77,7 +76,6 @@ def test_a_match_with_a_referee_is_made_again(tmp_path: Path) -> None:
 
 
 @at_length
-@pytest.mark.slow
 def test_what_a_killed_server_has_recorded_is_made_again(tmp_path: Path) -> None:
     """A foreign client in real time; the server has no chance to end the file."""
     link, command = tmp_path / "robot", [*KIKS, "serve", "--link", "robot", "--record", "run.mcap", "--tcp", "0"]

@@ -31,6 +31,8 @@ for order in (b'B\\n', b'T,1,B\\n', b'D,5,5\\n'):
     port.write(order)
     print(*sys.argv[1:], port.readline().decode().strip())
 import time
+
+pytestmark = pytest.mark.slow
 time.sleep(1)
 """
 
@@ -71,7 +73,6 @@ def folder(tmp_path: Path) -> Path:
 # ---- projects ----
 
 
-@pytest.mark.slow
 def test_a_project_starts_its_programs(folder: Path) -> None:
     result = forked.run("run", "exercise.kiks", "--csv", "rows.csv", cwd=folder)
     assert result.returncode == 0, result.stderr
@@ -89,7 +90,6 @@ def test_a_project_starts_its_programs(folder: Path) -> None:
     assert float(rows[-2]["driven_mm"]) == 0 < float(rows[-1]["driven_mm"])
 
 
-@pytest.mark.slow
 def test_programs_behind_a_project_take_the_place_of_its_own_from_robot_1_on(folder: Path) -> None:
     both = forked.run("run", "exercise.kiks", "--seed", "6", "student.py", "--fast", cwd=folder)
     assert sorted(both.stdout.splitlines()) == [
@@ -108,7 +108,6 @@ def test_programs_behind_a_project_take_the_place_of_its_own_from_robot_1_on(fol
     assert "robot 2" not in one.stderr
 
 
-@pytest.mark.slow
 def test_a_project_as_an_arena_brings_its_robots_and_says_that_its_programs_stay_behind(folder: Path) -> None:
     result = forked.run("run", "--arena", "exercise.kiks", "--turret", "gripper", "student.py", cwd=folder)
     assert result.stdout.splitlines() == ["b,5.02,5.01", "t,1,b,1,0", "d"]
@@ -118,7 +117,6 @@ def test_a_project_as_an_arena_brings_its_robots_and_says_that_its_programs_stay
     assert "seed 5, state" in result.stderr
 
 
-@pytest.mark.slow
 def test_an_arena_in_place_of_the_project_s(folder: Path) -> None:
     (folder / "wide.toml").write_text("size_mm = [900, 900]\nwall_mm = 10\n[[start]]\nat_mm = [800, 800]\n")
     result = forked.run("run", "exercise.kiks", "--arena", "wide.toml", "--csv", "rows.csv", cwd=folder)
@@ -140,7 +138,6 @@ def test_an_arena_in_place_of_the_project_s(folder: Path) -> None:
         (("champion.toml", "student.py"), "a champion must drive all robots alone, but 'student.py' follows it"),
     ],
 )
-@pytest.mark.slow
 def test_mistakes_end_in_one_clear_line(words: tuple[str, ...], message: str, folder: Path) -> None:
     result = forked.run("run", *words, cwd=folder)
     assert result.returncode == 2
@@ -151,7 +148,6 @@ def test_mistakes_end_in_one_clear_line(words: tuple[str, ...], message: str, fo
 # ---- what a run leaves ----
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("count", cases([2, 1]))
 def test_recording_changes_nothing(count: int, tmp_path: Path) -> None:
     programs = [DRIVE, "COM1", "40", "7", "6"] * count
@@ -162,7 +158,6 @@ def test_recording_changes_nothing(count: int, tmp_path: Path) -> None:
     assert {path.name for path in tmp_path.iterdir()} == {"run.png", "run.csv"}
 
 
-@pytest.mark.slow
 def test_the_last_lines_are_one_for_each_robot_and_that_of_the_state() -> None:
     result = forked.run("run", "--robots", "2", DRIVE, "COM1", "40", "7", "6")
     *_, first, second, last = result.stderr.splitlines()
@@ -274,7 +269,6 @@ def test_paths_stay_whole_if_ctrl_c_comes_while_a_point_is_kept() -> None:
 # ---- whose line it is ----
 
 
-@pytest.mark.slow
 def test_each_line_says_which_program_it_is_from(tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text("import sys\nprint('one')\nprint('no end', end='')\nsys.stderr.write('wrong\\n')\n")
     (tmp_path / "other.py").write_text("import os\nos.write(1, b'\\xff' * 100_000 + b'\\nlast')\n")
@@ -311,7 +305,6 @@ def at_a_terminal(folder: Path, **environment: str) -> str:
     return text.replace("\r\n", "\n")
 
 
-@pytest.mark.slow
 def test_at_a_terminal_labels_are_coloured_and_questions_are_seen(tmp_path: Path) -> None:
     text = at_a_terminal(tmp_path, NO_COLOR="")
     assert "\033[36m1 asks.py |\033[0m go? yes\n" in text
@@ -319,14 +312,12 @@ def test_at_a_terminal_labels_are_coloured_and_questions_are_seen(tmp_path: Path
     assert "\033[33m2 b.py    |\033[0m here\n" in text
 
 
-@pytest.mark.slow
 def test_no_color_is_heeded(tmp_path: Path) -> None:
     text = at_a_terminal(tmp_path, NO_COLOR="1")
     assert "1 asks.py | got yes\n" in text
     assert "\033" not in text
 
 
-@pytest.mark.slow
 def test_a_program_gets_an_error_when_its_output_is_closed(tmp_path: Path) -> None:
     (tmp_path / "talks.py").write_text("while True: print('more')\n")
     (tmp_path / "silent.py").write_text("")

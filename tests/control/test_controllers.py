@@ -14,6 +14,8 @@ from kiks.control import neural_nets
 from kiks.control.controller import whole_speeds
 from kiks.engine.compiling import callable_kernel
 
+pytestmark = pytest.mark.slow
+
 BOTH = ("proximity", "ambient")
 
 Trace = np.ndarray[Any, np.dtype[np.float64]]
@@ -81,7 +83,6 @@ def test_linear(feedback: bool) -> None:
     assert abs(expected).min() < 0.5
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("hidden", "senses", "feedback"),
     [((6,), "proximity", False), ((), "proximity", True), ((5, 3), BOTH, True)],
@@ -96,7 +97,6 @@ def test_mlp(hidden: tuple[int, ...], senses: Any, feedback: bool) -> None:
     np.testing.assert_allclose(outputs(controller, parameters, sensors), expected, atol=1e-3)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("time_constant_s", [0.02, 0.4, 5.0])
 def test_ctrnn(time_constant_s: float) -> None:
     controller = kiks.controllers.ctrnn(neurons=3, period_s=0.1, time_constant_s=time_constant_s, senses=BOTH)
@@ -114,7 +114,6 @@ def test_ctrnn(time_constant_s: float) -> None:
     np.testing.assert_allclose(outputs(controller, parameters, sensors), expected, atol=5e-2)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("logarithm", [-1000.0, 1000.0])
 def test_ctrnn_of_any_time_constant_stays_in_its_bounds(logarithm: float) -> None:
     controller = kiks.controllers.ctrnn(neurons=3, time_constant_s=0.4)
@@ -129,7 +128,6 @@ def test_exponential_between(x: float) -> None:
     assert EXPONENTIAL_BETWEEN(x) == pytest.approx(np.exp(np.clip(x, -4, 4)), rel=1e-3)
 
 
-@pytest.mark.slow
 def test_gru() -> None:
     controller = kiks.controllers.gru(units=3, senses=("ambient", "proximity"))
     parameters = kiks.controllers.random_parameters(controller, 1, seed=4)[0]
@@ -144,7 +142,6 @@ def test_gru() -> None:
     np.testing.assert_allclose(outputs(controller, parameters, sensors), expected, atol=1e-3)
 
 
-@pytest.mark.slow
 def test_elman() -> None:
     controller = kiks.controllers.elman(units=3, senses=BOTH, speed_limit=8.0)
     parameters = kiks.controllers.random_parameters(controller, 1, seed=4)[0]
@@ -195,7 +192,6 @@ def plastic(inputs: Trace, parameters: Trace, neurons: int, *, per: str) -> tupl
     return np.array(wheels), weights
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("per", ["synapse", "neuron"])
 @pytest.mark.parametrize("senses", [("proximity",), ("ambient", "proximity")], ids=len)
 def test_plastic(per: str, senses: tuple[str, ...]) -> None:
@@ -209,7 +205,6 @@ def test_plastic(per: str, senses: tuple[str, ...]) -> None:
     assert controller.memory_count == 4 + weights.size
 
 
-@pytest.mark.slow
 def test_the_weights_of_a_plastic_network_stay_between_0_and_1() -> None:
     controller = kiks.controllers.plastic(neurons=3)
     assert controller.parameter_count is not None
@@ -223,7 +218,6 @@ def test_the_weights_of_a_plastic_network_stay_between_0_and_1() -> None:
             assert abs(wheels).max() <= 10.0
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("per", ["synapse", "neuron"])
 def test_each_sign_rate_and_rule_of_a_plastic_network_matters(per: str) -> None:
     controller = kiks.controllers.plastic(neurons=3, per=per)
@@ -259,7 +253,6 @@ READY_MADE = [
 PLASTIC = kiks.controllers.plastic(neurons=3)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("controller", READY_MADE, ids=lambda each: each.name)
 def test_each_parameter_matters(controller: kiks.Controller) -> None:
     assert controller.parameter_count is not None
@@ -272,7 +265,6 @@ def test_each_parameter_matters(controller: kiks.Controller) -> None:
         parameters[k] -= 0.05
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("controller", [*READY_MADE, PLASTIC], ids=lambda each: each.name)
 def test_batch_and_wire_agree(controller: kiks.Controller) -> None:
     arena = kiks.Arena.box(300, 300)

@@ -394,7 +394,6 @@ def test_a_page_shows_changes_robots_and_events(rich: Path, rich_page: Path, vis
 
 
 @at_length
-@pytest.mark.slow
 def test_a_narrow_page_and_one_without_time_fit(tmp_path: Path, rich_page: Path, visit: Callable[..., Page]) -> None:
     sim = Simulation(Arena.box(300, 300), seed=1)
     with sim.record(tmp_path / "none.mcap"):
@@ -411,7 +410,6 @@ def test_a_narrow_page_and_one_without_time_fit(tmp_path: Path, rich_page: Path,
 
 
 @at_length
-@pytest.mark.slow
 def test_the_player_shows_a_world_without_a_robot(lonely: Path, visit: Callable[..., Page]) -> None:
     from tests.desk.visitor import leave_picture
 
@@ -425,7 +423,6 @@ def test_the_player_shows_a_world_without_a_robot(lonely: Path, visit: Callable[
 
 
 @at_length
-@pytest.mark.slow
 def test_nothing_else_runs_in_a_page(short: Path, tmp_path: Path, browser: Browser) -> None:
     """Even if a text became markup, the page's policy would not let it run."""
     file = page_of(short, tmp_path)

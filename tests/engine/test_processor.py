@@ -14,6 +14,8 @@ from kiks.engine.processor import LEVELS, level_of
 SHOWN = """
 from kiks.engine import step
 from kiks.engine.processor import processor
+
+pytestmark = pytest.mark.slow
 compiler = step.advance.targetctx.codegen()
 assert processor()[1] == compiler.magic_tuple()[2]
 print('/'.join(processor()))
@@ -37,19 +39,16 @@ def test_a_processor_has_a_level_if_it_has_all_its_features() -> None:
     assert level_of({"neon": True}) is None
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(level_of(binding.get_host_cpu_features()) is None, reason="this computer's processor has no level")
 def test_kernels_are_compiled_for_the_level_of_this_computer() -> None:
     assert shown(SHOWN) == (level_of(binding.get_host_cpu_features()), "")
 
 
-@pytest.mark.slow
 def test_a_processor_that_the_user_has_set_stays() -> None:
     assert shown(SHOWN, NUMBA_CPU_NAME="x86-64", NUMBA_CPU_FEATURES="+sse3") == ("x86-64", "+sse3")
     assert shown(SHOWN, NUMBA_CPU_NAME="generic") == ("generic", "")
 
 
-@pytest.mark.slow
 def test_a_compiler_that_the_user_has_used_before_stays() -> None:
     before = "from numba import njit\nassert njit(lambda x: x + 1)(1) == 2\n"
     assert shown(before + SHOWN) == (binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten())

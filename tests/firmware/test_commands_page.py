@@ -3,7 +3,6 @@
 import runpy
 from pathlib import Path
 
-import pytest
 from tests.at_length import at_length
 
 from kiks.firmware.commands import COMMANDS
@@ -13,7 +12,6 @@ DOCS = Path(__file__).parents[2] / "docs"
 
 
 @at_length
-@pytest.mark.slow
 def test_the_page_is_up_to_date() -> None:
     page = runpy.run_path(str(DOCS / "make_commands.py"))["page"]()
     written = (DOCS / "commands.md").read_text(encoding="utf-8")

@@ -33,6 +33,8 @@ from kiks.fit.reflection import active_pairs, fit_reflection
 from kiks.fit.samples import RIG_OFFSET_DEG, Samples
 from kiks.model.robot import RobotSpec
 
+pytestmark = pytest.mark.slow
+
 PAGE = Path(__file__).parents[2] / "docs" / "accuracy.md"
 NUMBER = re.compile(r"[+-]?\d+(?:\.\d+)?")
 TOLERANCE = 1.0  # counts or mm: what rounding and another processor's last bits may change
@@ -51,7 +53,6 @@ def card():
 
 
 @at_length
-@pytest.mark.slow
 @needs_data
 def test_the_page_tells_the_truth(card):
     written, found = PAGE.read_text(encoding="utf-8"), page(card)
@@ -95,7 +96,6 @@ def test_the_default_is_true_to_the_real_robot(card):
         assert np.abs(card.half_distances_mm(name, "default") - card.half_distances_mm(name)).max() <= 1.0
 
 
-@pytest.mark.slow
 @needs_data
 def test_the_robot_of_the_file_is_the_one_that_is_found(card):
     """The constants of the robot's file are a minimum of the fit, or as good as one."""
@@ -141,7 +141,6 @@ def made_card(card, monkeypatch):
 
 @at_length
 @needs_data
-@pytest.mark.slow
 @pytest.mark.usefixtures("made_card")
 def test_the_command_prints_json_and_draws(tmp_path):
     result = run(accuracy, "--json", "--plots", str(tmp_path / "card"))
@@ -153,7 +152,6 @@ def test_the_command_prints_json_and_draws(tmp_path):
 
 
 @needs_data
-@pytest.mark.slow
 @pytest.mark.usefixtures("made_card")
 def test_the_command_prints_a_table(tmp_path):
     result = run(accuracy, "--page", str(tmp_path / "page.md"))
@@ -192,7 +190,6 @@ def test_fit_reads_files_and_writes_a_robot(tmp_path):
     assert RobotSpec.load(tmp_path / "mine.toml").reflection != RobotSpec.load("khepera").reflection
 
 
-@pytest.mark.slow
 def test_networks_are_trained_and_written(tmp_path):
     samples = made_up()
     folder = tmp_path / "samples"
@@ -228,7 +225,6 @@ def test_scores():
     assert (score.median, score.mean, score.max) == (2.0, 2.0, 3.0)
 
 
-@pytest.mark.slow
 def test_published_formulas():
     """One wall straight ahead of a sensor that looks at it: the formulas' own values."""
     wall = Samples("wall", math.inf, np.array([0.0]), np.array([[-45.0]]), np.zeros((1, 1, 8), np.int64))

@@ -23,6 +23,8 @@ from kiks.learn.finals import FINALISTS, FINALS_SEED, SHARE, Contender, Finals, 
 from kiks.learn.generation_loop import seed_for
 from kiks.learn.results import result_of
 
+pytestmark = pytest.mark.slow
+
 
 def contenders(count: int) -> list[Contender]:
     return [Contender((float(number), 1.0), number + 1) for number in range(count)]
@@ -200,7 +202,6 @@ def test_a_rival_that_was_lucky_in_its_trials_loses() -> None:
     assert not {seed for each in evolution.generations for seed in each.seeds.tolist()} & set(seeds.tolist())
 
 
-@pytest.mark.slow
 def test_threads_and_blocks_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
     first = outcome(run())
     assert outcome(run(executor="threads:2")) == first
@@ -218,7 +219,6 @@ def test_threads_and_blocks_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> No
     assert outcome(run()) == first
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("algorithm", cases(AlgorithmName))
 def test_a_continued_evolution_holds_finals_at_its_new_end(algorithm: str, tmp_path: Path) -> None:
     whole = run(algorithm, tmp_path / "whole")
@@ -232,7 +232,6 @@ def test_a_continued_evolution_holds_finals_at_its_new_end(algorithm: str, tmp_p
     assert kiks.Champion.load(tmp_path / "part/champion.toml").fitness == whole.champion.fitness
 
 
-@pytest.mark.slow
 def test_the_finals_of_a_complete_folder_are_not_held_again(tmp_path: Path) -> None:
     whole = run("map-elites", tmp_path)
     again = evolution_of("map-elites", tmp_path)
@@ -255,7 +254,6 @@ evolution.run(generations=6, executor="threads:1", each_round=kill)
 
 
 @at_length
-@pytest.mark.slow
 def test_finals_in_which_the_process_was_killed_are_held_again(tmp_path: Path) -> None:
     ended = subprocess.run([sys.executable, "-c", KILLED, str(tmp_path / "killed")], check=False)
     assert ended.returncode == -signal.SIGKILL
@@ -267,7 +265,6 @@ def test_finals_in_which_the_process_was_killed_are_held_again(tmp_path: Path) -
     assert (tmp_path / "killed/champion.toml").read_bytes() == (tmp_path / "whole/champion.toml").read_bytes()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("when", cases(["each", "each_round"]))
 def test_an_interrupted_evolution_holds_no_finals(when: str, tmp_path: Path) -> None:
     def interrupt(state: Any) -> None:
@@ -284,14 +281,12 @@ def test_an_interrupted_evolution_holds_no_finals(when: str, tmp_path: Path) -> 
     assert outcome(run(folder=tmp_path)) == outcome(run())
 
 
-@pytest.mark.slow
 def test_one_rival_alone_has_no_finals() -> None:
     evolution = run(generations=2, each_round=never)
     assert evolution.finals is None
     assert evolution.champion.fitness == evolution.generations[-1].champion_fitness
 
 
-@pytest.mark.slow
 def test_elites_take_part_where_an_algorithm_prefers_none() -> None:
     evolution = evolution_of("map-elites", seed=2)
     rng = np.random.default_rng(1)
@@ -314,7 +309,6 @@ def test_elites_take_part_where_an_algorithm_prefers_none() -> None:
     }
 
 
-@pytest.mark.slow
 def test_finals_after_ask_and_tell() -> None:
     evolution = evolution_of()
     with pytest.raises(ParameterError, match="before there is a champion"):
@@ -331,7 +325,6 @@ def test_finals_after_ask_and_tell() -> None:
     assert evolution.champion.fitness == evolution.generations[-1].champion_fitness
 
 
-@pytest.mark.slow
 def test_the_error_names_a_broken_file_of_finals(tmp_path: Path) -> None:
     whole = run(folder=tmp_path)
     file = tmp_path / "generations/000006_finals.npz"

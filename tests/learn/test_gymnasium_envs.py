@@ -20,6 +20,8 @@ from kiks.learn.env_specs import ENV_SPECS, EnvSpec, without_contacts
 from kiks.learn.gymnasium_envs import KheperaEnv, KheperaVectorEnv
 from kiks.learn.pettingzoo_env import KheperaTeam
 
+pytestmark = pytest.mark.slow
+
 IDS = [f"kiks/{name}-v0" for name in ENV_SPECS]
 
 
@@ -41,7 +43,6 @@ def random_actions(*shape: int) -> Any:
     return np.random.default_rng(5).uniform(-1, 1, (*shape, 2)).astype(np.float32)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", IDS)
 @pytest.mark.filterwarnings("error")
 def test_environments_pass_the_checks_of_gymnasium(name: str) -> None:
@@ -51,7 +52,6 @@ def test_environments_pass_the_checks_of_gymnasium(name: str) -> None:
     check_env(env.unwrapped)
 
 
-@pytest.mark.slow
 def test_a_module_in_the_name_registers_the_environments() -> None:
     code = "import gymnasium; print(gymnasium.make('kiks.learn.gymnasium_envs:kiks/Avoid-v0').unwrapped)"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
@@ -63,7 +63,6 @@ def test_import_kiks_does_not_import_gymnasium() -> None:
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("missing", "module"), [("gymnasium", "kiks.learn.gymnasium_envs"), ("pettingzoo", "kiks.learn.pettingzoo_env")]
 )
@@ -73,7 +72,6 @@ def test_the_error_names_a_missing_package(missing: str, module: str) -> None:
     assert "pip install '.[learn]'" in found.stderr
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["kiks/Avoid-v0", "kiks/Maze-v0"])
 def test_single_and_vector_environments_have_the_same_episodes(name: str) -> None:
     many = gymnasium.make_vec(name, num_envs=9, max_episode_steps=7, threads=2)
@@ -173,7 +171,6 @@ def test_the_sum_of_rewards_is_the_measure() -> None:
     np.testing.assert_allclose(total / 12, envs.episodes.batch.values[:, 0, 0])
 
 
-@pytest.mark.slow
 def test_a_contact_lowers_the_reward() -> None:
     free = KheperaEnv("Avoid", reward=without_contacts(kiks.measures.path_mm, 0.0))
     costly = KheperaEnv("Avoid", reward=without_contacts(kiks.measures.path_mm, 7.0))

@@ -15,6 +15,8 @@ import pytest
 import kiks
 import kiks.learn.gymnasium_envs  # registers the environments
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 
 
@@ -30,7 +32,6 @@ def returns_of(envs: Any, weights: np.ndarray, steps: int) -> np.ndarray:
     return total
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "gain_min"), [("kiks/Avoid-v0", 0.3), ("kiks/Follow-v0", 0.1)])
 def test_the_cross_entropy_method_learns(name: str, gain_min: float) -> None:
     worlds, steps = 64, 150
@@ -82,7 +83,6 @@ def seek_the_light(seen: np.ndarray) -> np.ndarray:
     return wheels(ahead, 1.5 * brighter_right + away * np.clip(2.5 * block, 0, 2))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "good", "return_min"),
     [
@@ -108,7 +108,6 @@ def test_rewards_are_for_those_that_do_what_is_wanted(name: str, good: Any, retu
         assert mean_return(useless) < 0.1 * return_min
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(
     importlib.util.find_spec("stable_baselines3") is None, reason="Stable-Baselines3, with PyTorch, is not installed"
 )

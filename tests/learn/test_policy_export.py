@@ -15,6 +15,8 @@ import kiks
 from kiks.learn.env_specs import env_spec_of
 from kiks.learn.episode_batch import Episodes
 
+pytestmark = pytest.mark.slow
+
 Trace = np.ndarray[Any, np.dtype[np.float64]]
 Layer = tuple[Trace, Trace]
 
@@ -91,7 +93,6 @@ def assert_equal_outputs(champion: kiks.Champion, layers: list[Layer], spec: Any
     assert expected.std() > 0.01
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "hidden", "activation", "output"),
     [
@@ -111,7 +112,6 @@ def test_outputs_are_those_of_the_network(
     assert_equal_outputs(champion, layers, spec, activation or "tanh", output)
 
 
-@pytest.mark.slow
 def test_light_before_proximity_is_the_same_network() -> None:
     spec = env_spec_of("Light").with_changes(senses=("ambient", "proximity"), speed_limit=7.0)
     layers = network((16, 6, 2))
@@ -153,7 +153,6 @@ FORMS: dict[str, tuple[Any, str, str]] = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("form", FORMS)
 def test_forms_of_a_policy(form: str) -> None:
     policy, activation, output = FORMS[form]
@@ -176,7 +175,6 @@ def test_a_state_dict_is_the_same_champion() -> None:
     )
 
 
-@pytest.mark.slow
 def test_the_champion_drives_the_episode_of_the_policy(tmp_path: Path) -> None:
     spec = env_spec_of("Light").with_changes(timing=kiks.Timing(0.05, 38400))
     layers = network((16, 12, 2))
@@ -264,7 +262,6 @@ def test_a_policy_of_too_many_units_is_an_error() -> None:
         kiks.champion_of_policy(network((8, 513, 2)), "Avoid", activation="relu")
 
 
-@pytest.mark.slow
 def test_networks_of_pytorch() -> None:
     torch: Any = pytest.importorskip("torch", reason="PyTorch is not installed")
     for activation, name in ((torch.nn.Tanh, "tanh"), (torch.nn.ReLU, "relu")):
@@ -280,7 +277,6 @@ def test_networks_of_pytorch() -> None:
         assert state.parameters == champion.parameters
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["PPO", "A2C", "SAC", "TD3"])
 def test_policies_of_stable_baselines3(name: str) -> None:
     library: Any = pytest.importorskip("stable_baselines3", reason="Stable-Baselines3, with PyTorch, is not installed")

@@ -6,7 +6,6 @@ import re
 import sys
 from pathlib import Path
 
-import pytest
 from tests.at_length import at_length
 from tests.matlab.octave import DEMOS, TOOLBOX, needs_octave, run
 from tools.octave_package import build, contents
@@ -35,7 +34,6 @@ say('after', exist('kiks', 'file') + exist('follow', 'file'))
 
 @at_length
 @needs_octave
-@pytest.mark.slow
 def test_an_installed_package_runs_a_demo_from_any_folder(tmp_path: Path) -> None:
     home = tmp_path / "a home"
     home.mkdir()

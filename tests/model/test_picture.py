@@ -18,6 +18,8 @@ from PIL import Image
 from kiks.errors import ArenaError
 from kiks.model.picture import decode_picture
 
+pytestmark = pytest.mark.slow
+
 MODES = ("1", "L", "LA", "P", "RGB", "RGBA", "I;16")
 
 
@@ -38,7 +40,6 @@ def noise(mode: str, width: int, height: int) -> Image.Image:
     )
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 def test_a_picture_is_what_its_parts_are(mode: str) -> None:
     whole = noise(mode, 1000, 2300)
@@ -130,7 +131,6 @@ def test_hostile_pictures_are_refused(name: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.slow
 @on_linux
 def test_hostile_pictures_take_little_memory(tmp_path: Path) -> None:
     for name, make in HOSTILE.items():
@@ -138,7 +138,6 @@ def test_hostile_pictures_take_little_memory(tmp_path: Path) -> None:
     assert memory_of_reading_mb(tmp_path) < 150
 
 
-@pytest.mark.slow
 @on_linux
 def test_large_pictures_take_ten_bytes_a_pixel_at_most(tmp_path: Path) -> None:
     size = (3000, 3000)
@@ -150,7 +149,6 @@ def test_large_pictures_take_ten_bytes_a_pixel_at_most(tmp_path: Path) -> None:
     assert memory_of_reading_mb(tmp_path) < 10 * 9
 
 
-@pytest.mark.slow
 @settings(max_examples=400)
 @given(st.data())
 def test_damaged_pictures_are_read_or_refused(data: st.DataObject) -> None:

@@ -175,7 +175,6 @@ def test_what_changes_nothing_is_no_step():
 
 
 @at_length
-@pytest.mark.slow
 def test_two_hundred_steps_in_a_large_arena_fit_in_memory():
     rng = np.random.default_rng(1)
     noise = rng.integers(0, 2, (1000, 1000)).astype(np.uint8)

@@ -12,9 +12,9 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import ExitStack
 from pathlib import Path
 
+from tests.busy import busy_computer
 from tools.campaigns.processes import compile_engine
 from tools.campaigns.runner import WAIT_FACTOR, Broken, Campaign, Play
 
@@ -23,8 +23,6 @@ ROOT = Path(__file__).parents[2]
 RUNS = 5
 LIMIT_S = 3600.0
 """Longest time of a run [s]."""
-
-SPIN = [sys.executable, "-c", "while True: pass"]
 
 
 def _run(rng: random.Random) -> int:
@@ -36,9 +34,7 @@ def _run(rng: random.Random) -> int:
     seed, processors = str(rng.randrange(1 << 32)), os.cpu_count() or 1
     command = [sys.executable, "-m", "pytest", "-n", str(2 * processors), "--dist", "worksteal"]
     command += ["-p", "pytest_randomly", f"--randomly-seed={seed}", f"--hypothesis-seed={seed}"]
-    with ExitStack() as stack, tempfile.TemporaryFile("w+") as output:
-        for _ in range(processors):
-            stack.callback(stack.enter_context(subprocess.Popen(SPIN)).kill)
+    with busy_computer(processors), tempfile.TemporaryFile("w+") as output:
         code = subprocess.run(command, cwd=ROOT, stdout=output, stderr=subprocess.STDOUT, check=False).returncode
         output.seek(0)
         said = output.read()

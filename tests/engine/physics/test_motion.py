@@ -15,6 +15,8 @@ from kiks.engine.physics.contact import Ground, clearance_mm
 from kiks.engine.physics.motion import move, pose_between, remember_pose
 from kiks.model.arena import PAD, Arena
 
+pytestmark = pytest.mark.slow
+
 FLOOR = Arena.box(4000, 4000)
 PULSE, BASE = 0.08, 53.0
 PATHS = st.floats(-130.0, 130.0)
@@ -52,7 +54,6 @@ def arc(pose, left, right):
     )
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(share(1, 4)))
 def test_thousands_of_ticks_follow_the_closed_form(make_world, seed):
     """Within 1e-6 mm and 1e-9 rad."""
@@ -75,7 +76,6 @@ def test_thousands_of_ticks_follow_the_closed_form(make_world, seed):
     assert world.robot["wheel_pulses"] == pytest.approx(paths.sum(axis=0), abs=1e-6)
 
 
-@pytest.mark.slow
 def test_power_follows_the_closed_form_of_the_lag(make_world):
     """A step of power: w(t) = u (1 - exp(-t/T)), path u (t - T (1 - exp(-t/T))) (khepera-protocol.md 6.4)."""
     world = make_world(FLOOR).place(2000.0, 2000.0)
@@ -89,7 +89,6 @@ def test_power_follows_the_closed_form_of_the_lag(make_world):
         assert world.pose[2] == pytest.approx((path[1] - path[0]) * PULSE / BASE, abs=1e-9)
 
 
-@pytest.mark.slow
 @settings(derandomize=True, max_examples=share(100, 200))
 @given(left=PATHS, right=PATHS, heading=st.floats(-50.0, 50.0))
 def test_there_and_back_again(make_world, left, right, heading):
@@ -98,7 +97,6 @@ def test_there_and_back_again(make_world, left, right, heading):
     assert world.pose == pytest.approx((2000.0, 2000.0, heading), rel=0, abs=1e-9)
 
 
-@pytest.mark.slow
 @settings(derandomize=True, max_examples=share(100, 200))
 @given(left=PATHS, right=PATHS, heading=st.floats(-50.0, 50.0), share=st.floats(0.0, 1.0))
 def test_a_moment_within_a_tick_is_where_a_part_of_the_paths_leads(make_world, left, right, heading, share):

@@ -14,6 +14,8 @@ from tests.engine.sensing.followed_rays import cast_eight, cast_ray, cast_rays
 from kiks.engine.sensing.rays import walls_of
 from kiks.model.arena import PAD, Arena
 
+pytestmark = pytest.mark.slow
+
 TOLERANCE_MM = 0.02
 CLIPPED_MM = 0.003  # a ray that cuts less than this off a corner may pass it by
 
@@ -57,7 +59,6 @@ def check_ray(arena, x, y, angle, reach, length, brightness):
         assert brightness == 0
 
 
-@pytest.mark.slow
 @settings(derandomize=True, max_examples=share(10, 60))
 @given(number=st.integers(0, 300), draw=st.integers(0, 2**32))
 def test_rays_end_where_the_first_wall_begins(make_random_arena, number, draw):
@@ -67,7 +68,6 @@ def test_rays_end_where_the_first_wall_begins(make_random_arena, number, draw):
         check(arena, rng.uniform(1, arena.width_mm - 1), rng.uniform(1, arena.height_mm - 1), rng.uniform(-7, 7))
 
 
-@pytest.mark.slow
 @settings(derandomize=True, max_examples=share(10, 30))
 @given(number=st.integers(0, 300), draw=st.integers(0, 2**32))
 def test_rays_along_edges_and_diagonals(make_random_arena, number, draw):
@@ -81,7 +81,6 @@ def test_rays_along_edges_and_diagonals(make_random_arena, number, draw):
         check(arena, x, y, rng.integers(8) * math.pi / 4 + rng.uniform(-1e-3, 1e-3))
 
 
-@pytest.mark.slow
 @settings(derandomize=True, max_examples=share(8, 60))
 @given(number=st.integers(0, 300), draw=st.integers(0, 2**32))
 def test_an_additional_wall_never_lengthens_a_ray(make_random_arena, number, draw):
@@ -99,7 +98,6 @@ def test_an_additional_wall_never_lengthens_a_ray(make_random_arena, number, dra
         assert cast(fuller, x, y, angle)[0] <= cast(arena, x, y, angle)[0] + TOLERANCE_MM
 
 
-@pytest.mark.slow
 @settings(derandomize=True, max_examples=30)
 @given(number=st.integers(0, 300), draw=st.integers(0, 2**32), count=st.sampled_from((8, 64, 96)))
 def test_rays_in_lanes_are_rays_one_by_one(make_random_arena, number, draw, count):
@@ -121,7 +119,6 @@ def test_rays_in_lanes_are_rays_one_by_one(make_random_arena, number, draw, coun
     assert (lengths * cell).tolist() == alone
 
 
-@pytest.mark.slow
 @settings(derandomize=True, max_examples=share(8, 60))
 @given(number=st.integers(0, 300), draw=st.integers(0, 2**32))
 def test_the_rays_of_a_sensor_end_where_the_first_wall_begins(make_random_arena, number, draw):

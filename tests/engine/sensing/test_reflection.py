@@ -21,6 +21,8 @@ from kiks.model.arena import PAD, Arena
 from kiks.model.raster import unpack_faces
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
 
+pytestmark = pytest.mark.slow
+
 KHEPERA = RobotSpec.load("khepera")
 RADIUS_MM = KHEPERA.body.radius_mm
 BASELINE = KHEPERA.proximity.baseline_counts[0]
@@ -119,7 +121,6 @@ def test_no_reading_leaves_the_converters_range() -> None:
 # ---- more light is more ----
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("cell_mm", [0.25, 1.0])
 @pytest.mark.parametrize("sensor", range(SENSOR_COUNT))
 def test_straight_towards_a_wall_a_reading_rises_to_saturation(sensor: int, cell_mm: float) -> None:
@@ -134,7 +135,6 @@ def test_straight_towards_a_wall_a_reading_rises_to_saturation(sensor: int, cell
     assert 17 < gaps_mm[np.argmax(counts > 511)] < 29
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("radius_mm", [12.0, 27.0])
 @pytest.mark.parametrize("cell_mm", [0.25, 1.0])
 def test_straight_towards_a_post_too(cell_mm: float, radius_mm: float) -> None:
@@ -160,7 +160,6 @@ def test_a_brighter_surface_never_reads_less() -> None:
         assert (np.array(rows[-1]) - np.array(rows[0])).max() > 200
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("cell_mm", "tolerance"), [(0.25, 1.0), (1.0, 15.0)])
 def test_a_post_that_grows_never_reads_less(cell_mm: float, tolerance: float) -> None:
     """Each ray meets it nearer and more squarely."""
@@ -191,7 +190,6 @@ def beside_walls(cell_mm: float) -> tuple[np.ndarray, np.ndarray]:
     return away_mm, counts
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("cell_mm", [0.25, 1.0])
 def test_posts_and_corners_are_less_than_a_wall_that_is_as_near(cell_mm: float) -> None:
     """Seen from a sensor. What a robot with its sensors inside a surface would read is not asked."""
@@ -230,7 +228,6 @@ def test_nothing_jumps_while_a_robot_turns_past_a_post(cell_mm: float, largest: 
 # ---- how cells lie ----
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("radius_mm", "cell_mm", "largest", "usual"),
     [
@@ -280,7 +277,6 @@ def normals(arena: Arena) -> tuple[np.ndarray, np.ndarray]:
     return places[inner], unpack_faces(arena.faces)[row[inner], column[inner], :2]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("cell_mm", [0.25, 1.0])
 @pytest.mark.parametrize("radius_mm", [6.0, 12.0, 27.0])
 def test_normals_of_a_disc_point_to_its_middle(radius_mm: float, cell_mm: float) -> None:

@@ -139,7 +139,6 @@ def measured_means() -> np.ndarray:
 
 
 @at_length
-@pytest.mark.slow
 def test_the_khepera_ii_reads_what_a_real_one_did() -> None:
     try:
         measured = measured_means()
