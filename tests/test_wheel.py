@@ -25,7 +25,7 @@ compile_everything()
 """
 
 pytestmark = [
-    pytest.mark.slow,
+    at_length,
     pytest.mark.skipif(level_of(binding.get_host_cpu_features()) is None, reason="kernels in wheels are for x86-64"),
 ]
 
@@ -87,20 +87,17 @@ def kept(tmp_path: Path) -> list[str]:
     return sorted(path.name for path in tmp_path.rglob("*.code"))
 
 
-@at_length
 def test_a_first_start_from_a_wheel_with_kernels_compiles_nothing(python: Path, tmp_path: Path) -> None:
     run(python, RUN, tmp_path)
     assert kept(tmp_path) == []
 
 
-@at_length
 def test_kernels_of_another_version_of_numba_are_quietly_ignored(python: Path, tmp_path: Path) -> None:
     assert call_one(python, tmp_path) == []
     (name,) = call_one(python, tmp_path, "import numba; numba.__version__ = '0.0'\n")
     assert name.startswith("kiks.engine.scalar_math.sin_cos-")
 
 
-@at_length
 def test_kernels_for_another_processor_are_quietly_ignored(python: Path, tmp_path: Path) -> None:
     (name,) = call_one(python, tmp_path, NUMBA_CPU_NAME="generic", NUMBA_CPU_FEATURES="")
     assert name.startswith("kiks.engine.scalar_math.sin_cos-")
@@ -117,7 +114,6 @@ def test_a_wheel_without_kernels_is_for_all_computers(tmp_path: Path) -> None:
     assert built(tmp_path).name.endswith("-py3-none-any.whl")
 
 
-@at_length
 def test_the_same_functions_are_compiled_for_levels_that_this_computer_may_not_have(
     kernels: Path, tmp_path: Path
 ) -> None:

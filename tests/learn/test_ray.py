@@ -49,6 +49,7 @@ def cluster(ray):
     cluster.shutdown()
 
 
+@at_length
 def test_values_are_the_same_and_only_the_chunk_of_a_lost_worker_is_repeated(cluster, ray, tmp_path):
     candidates, seeds = works.candidates(100, marked=50), works.seeds(100)
     with executor_for(f"ray:{cluster.address}", works.Deadly(tmp_path / "died")) as executor:

@@ -59,6 +59,7 @@ def wait_until(fact: Callable[[], object]) -> None:
         assert time.monotonic() < end_s, "it never was so"
 
 
+@at_length
 def test_an_interrupted_start_leaves_no_process(terminal: Terminal) -> None:
     sessions = []
     for moment in MOMENTS:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.at_length import share
+from tests.at_length import at_length, share
 from tests.matlab.octave import DEMOS, Octave, need_tcp, needs_octave, run
 from tests.served import served
 
@@ -78,6 +78,7 @@ end
         assert re.search(rf"^\s*{name}  Demo: .*\bExample:.*\bSee also ", done.said[f"help_{name}"], flags=re.DOTALL)
 
 
+@at_length
 def test_cylinders_come_to_the_walls_balls_into_the_goal_and_robots_out_of_mazes(tmp_path: Path) -> None:
     done = run(
         WITH_DEMOS

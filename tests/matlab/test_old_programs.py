@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from tests.at_length import at_length
 from tests.matlab.octave import needs_octave, run
 
 pytestmark = [needs_octave, pytest.mark.slow]
@@ -208,6 +209,7 @@ kiks_kclose(ref);
 """
 
 
+@at_length
 def test_landmarks_are_met_where_they_are(tmp_path: Path) -> None:
     said = run(LANDMARKS, tmp_path).said
     down = 3 * np.pi / 2

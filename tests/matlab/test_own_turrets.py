@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from tests.at_length import at_length
 from tests.matlab.octave import Octave, need_tcp, needs_octave, run
 
 from kiks import Recording
@@ -103,6 +104,7 @@ def test_functions_carry_out_the_orders_for_their_turrets(tmp_path: Path, transp
     assert check_recording(Recording(tmp_path / "run.mcap").log).differs_ns is None
 
 
+@at_length
 def test_a_second_octave_has_turrets_of_its_own(tmp_path: Path) -> None:
     """The first has no folder of turrets, and its robot does not answer the same order."""
     (tmp_path / "second" / "turrets").mkdir(parents=True)

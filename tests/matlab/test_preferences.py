@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from tests.at_length import cases
 from tests.matlab.octave import needs_octave, run
 
 from kiks.model.project import Project
@@ -40,7 +41,7 @@ end
 }
 
 
-@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("form", cases(FORMS))
 def test_all_forms_are_read_and_read_anew(form: str, tmp_path: Path) -> None:
     file = tmp_path / "kiks_preferences.m"
     changed = FORMS[form].format(robots=3).replace("\n", "\\n").replace("'", "''").replace("%", "%%")

@@ -110,6 +110,7 @@ end
         assert list(octave.doors.glob("kiks/session-*")) == []
 
 
+@at_length
 def test_kiks_quit_and_the_end_of_a_program_end_the_session(tmp_path: Path) -> None:
     program = """
 ref = kiks_kopen([-1 9600 1]);
@@ -245,6 +246,7 @@ kiks_quit
 """
 
 
+@at_length
 def test_the_same_seed_gives_the_same_run_and_another_seed_another(tmp_path: Path) -> None:
     first = run(SAME % ("none", 7), tmp_path)
     assert len(first.lines) > 120

@@ -14,6 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
+from tests.at_length import at_length
 
 from kiks.errors import ArenaError
 from kiks.model.picture import decode_picture
@@ -138,6 +139,7 @@ def test_hostile_pictures_take_little_memory(tmp_path: Path) -> None:
     assert memory_of_reading_mb(tmp_path) < 150
 
 
+@at_length
 @on_linux
 def test_large_pictures_take_ten_bytes_a_pixel_at_most(tmp_path: Path) -> None:
     size = (3000, 3000)

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
-from tests.at_length import at_length
+from tests.at_length import at_length, cases
 from tests.cli.test_cli import KIKS
 from tests.guard import GUARD_S
 from tests.script.screen import display
@@ -184,7 +184,7 @@ def test_waits_of_curses_are_simulated(tmp_path: Path) -> None:
     assert said.startswith("[0.25, 0.5, 1.0]\n")
 
 
-@pytest.mark.parametrize("backend", ["Agg", "TkAgg"])
+@pytest.mark.parametrize("backend", cases(["Agg", "TkAgg"]))
 def test_plots_pause_in_simulated_time(backend: str, tmp_path: Path, screen: dict[str, str]) -> None:
     text = PLOT.format(backend=backend) + (ANIMATION if backend == "TkAgg" else "")
     code, said, told = run(tmp_path, text, screen)
