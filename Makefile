@@ -16,18 +16,15 @@ export PYTHONDONTWRITEBYTECODE =
 demo: user
 	$(BIN)/kiks demo follow --arena examples/arenas/office.toml --seconds 300 --picture kiks-demo.png
 
-# Each test has a time limit, which does not include compiling the engine.
+# The engine is compiled before the first test, whose time limit does not include that (tests/conftest.py).
 test: setup system
-	$(BIN)/kiks warmup
 	$(PYTEST)
 
 # All tests with all their examples: `make test` tests each feature once (tests/at_length.py).
 test-all: setup system
-	$(BIN)/kiks warmup
 	KIKS_AT_LENGTH=1 $(PYTEST)
 
 quick: setup system
-	$(BIN)/kiks warmup
 	$(PYTEST) -m "not slow"
 
 # The tests of the kernels in code that checks every index. It takes some minutes, as it compiles everything again.

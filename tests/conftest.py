@@ -22,9 +22,12 @@ def pytest_configure(config: pytest.Config) -> None:
     # A shell that starts something in the background has it ignore Ctrl-C, and all that this starts: tests send it.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     if not hasattr(config, "workerinput") and not config.option.collectonly:
-        from kiks.cli.engine_start import compile_everything
+        from kiks.cli.engine_start import compile_all
+        from kiks.engine.code_cache import is_compiled
+        from kiks.engine.compiling import LAST
 
-        compile_everything()
+        if not (is_compiled(LAST) and is_compiled("roll_out")):
+            compile_all()
         if config.getoption("numprocesses", None):
             from tests import forked
 
