@@ -13,10 +13,10 @@ from kiks import Recording
 from kiks.cli import app
 from kiks.errors import KiksError
 
+pytestmark = pytest.mark.slow
+
 TASK = """
 import kiks
-
-pytestmark = pytest.mark.slow
 task = kiks.tasks.avoid(seconds=1.0, worlds=3)
 """
 

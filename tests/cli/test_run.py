@@ -22,6 +22,8 @@ from kiks.errors import ParameterError
 from kiks.ports.program_process import Labels
 from kiks.sim.simulation import Simulation
 
+pytestmark = pytest.mark.slow
+
 DRIVE = str(PROGRAMS / "drive.py")
 
 ASKS = """
@@ -31,8 +33,6 @@ for order in (b'B\\n', b'T,1,B\\n', b'D,5,5\\n'):
     port.write(order)
     print(*sys.argv[1:], port.readline().decode().strip())
 import time
-
-pytestmark = pytest.mark.slow
 time.sleep(1)
 """
 

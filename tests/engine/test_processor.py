@@ -11,11 +11,11 @@ from llvmlite import binding
 
 from kiks.engine.processor import LEVELS, level_of
 
+pytestmark = pytest.mark.slow
+
 SHOWN = """
 from kiks.engine import step
 from kiks.engine.processor import processor
-
-pytestmark = pytest.mark.slow
 compiler = step.advance.targetctx.codegen()
 assert processor()[1] == compiler.magic_tuple()[2]
 print('/'.join(processor()))
