@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
-from tests.at_length import AT_LENGTH
+from tests.at_length import AT_LENGTH, share
 
 # Programs to be run as processes, not modules to be imported.
 collect_ignore_glob = ["programs/*"]
@@ -17,7 +17,8 @@ collect_ignore_glob = ["programs/*"]
 
 def pytest_configure(config: pytest.Config) -> None:
     # A test draws the same examples each time, unless a seed is given. The first one may load the engine: no deadline.
-    settings.register_profile("kiks", deadline=None, derandomize=config.option.hypothesis_seed is None)
+    is_repeatable = config.option.hypothesis_seed is None
+    settings.register_profile("kiks", deadline=None, derandomize=is_repeatable, max_examples=share(30, 100))
     settings.load_profile("kiks")
     # A shell that starts something in the background has it ignore Ctrl-C, and all that this starts: tests send it.
     signal.signal(signal.SIGINT, signal.default_int_handler)

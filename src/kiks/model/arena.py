@@ -29,10 +29,8 @@ from kiks.model.raster import (
     SIZE_MIN_MM,
     between,
     cells_per_pixel,
-    clearance_mm,
-    free_leaps,
-    wall_faces,
 )
+from kiks.model.wall_tables import WallTables, tables_of
 
 __all__ = ["MAX_CELLS", "PAD", "SIZE_MIN_MM", "Arena", "Ball", "Cylinder", "Lamp", "Pose"]
 
@@ -78,10 +76,7 @@ class Arena:
     lamps: tuple[Lamp, ...] = ()
     balls: tuple[Ball, ...] = ()
     cylinders: tuple[Cylinder, ...] = ()
-    _surface: npt.NDArray[np.uint8] | None = field(default=None, init=False)
-    _clearance: npt.NDArray[np.float32] | None = field(default=None, init=False)
-    _leaps: npt.NDArray[np.int16] | None = field(default=None, init=False)
-    _faces: npt.NDArray[np.int32] | None = field(default=None, init=False)
+    _tables: WallTables = field(init=False)
 
     def __post_init__(self) -> None:
         given = self.brightness
@@ -106,6 +101,7 @@ class Arena:
             given.setflags(write=False)
         object.__setattr__(self, "brightness", given)
         object.__setattr__(self, "mm_per_cell", float(self.mm_per_cell))
+        object.__setattr__(self, "_tables", tables_of(given, self.mm_per_cell))
         for name, label, kind in _KINDS:
             entries = checked_places(label, kind, getattr(self, name), given, self.mm_per_cell)
             object.__setattr__(self, name, entries)
@@ -257,13 +253,7 @@ class Arena:
     @property
     def surface(self) -> npt.NDArray[np.uint8]:
         """Brightness with the border of the world around it: uint8 [row + 2 PAD, column + 2 PAD], border 255."""
-        # Computed on first use. Threads that race here compute the same array, and one of the two is kept.
-        if self._surface is None:
-            surface = np.pad(self.brightness, PAD, constant_values=255)
-            surface.setflags(write=False)
-            object.__setattr__(self, "_surface", surface)
-        assert self._surface is not None
-        return self._surface
+        return self._tables.surface
 
     @property
     def clearance(self) -> npt.NDArray[np.float32]:
@@ -271,12 +261,7 @@ class Arena:
 
         float32 [row + 2 PAD, column + 2 PAD], exact (Euclidean), 0 in wall cells; the border of the world is wall.
         """
-        if self._clearance is None:
-            clearance = clearance_mm(self.surface, self.mm_per_cell)
-            clearance.setflags(write=False)
-            object.__setattr__(self, "_clearance", clearance)
-        assert self._clearance is not None
-        return self._clearance
+        return self._tables.clearance
 
     @property
     def leaps(self) -> npt.NDArray[np.int16]:
@@ -284,12 +269,7 @@ class Arena:
 
         int16 [row + 2 PAD, column + 2 PAD], rounded down; wall cells have their brightness, negative.
         """
-        if self._leaps is None:
-            leaps = free_leaps(self.surface)
-            leaps.setflags(write=False)
-            object.__setattr__(self, "_leaps", leaps)
-        assert self._leaps is not None
-        return self._leaps
+        return self._tables.leaps
 
     @property
     def faces(self) -> npt.NDArray[np.int32]:
@@ -299,12 +279,7 @@ class Arena:
         first in the highest bits: x and y of a unit vector straight into the wall [1/1023], 11 bits each, and how far
         that way its surface is from the cell's centre [1/256 cells], 10 bits; 0 for all other cells.
         """
-        if self._faces is None:
-            faces = wall_faces(self.surface, self.clearance, self.mm_per_cell)
-            faces.setflags(write=False)
-            object.__setattr__(self, "_faces", faces)
-        assert self._faces is not None
-        return self._faces
+        return self._tables.faces
 
     def clearance_at_mm(self, x_mm: float, y_mm: float) -> float:
         """Return the distance of a point from the surface of the nearest wall [mm].

@@ -1,0 +1,70 @@
+"""What follows from the raster of an arena, such as distances from walls: shared by arenas with the same raster."""
+
+from __future__ import annotations
+
+from functools import cached_property, lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+from kiks.model.raster import PAD, clearance_mm, free_leaps, wall_faces
+
+SHARED_CELLS = 1_000_000
+"""Largest raster whose tables other arenas with the same raster share [cells]."""
+
+SHARED_COUNT = 8
+"""Number of rasters whose tables are kept: at most 100 MB."""
+
+
+class WallTables:
+    """Tables of a raster, each computed at its first use; `Arena` says what they hold.
+
+    Threads that race for one may compute it twice; the arrays are equal, and one of the two is kept.
+
+    Args:
+        brightness: The raster: uint8 [row, column].
+        mm_per_cell: Edge of a cell [mm].
+    """
+
+    def __init__(self, brightness: npt.NDArray[np.uint8], mm_per_cell: float) -> None:
+        self._brightness, self._mm_per_cell = brightness, mm_per_cell
+
+    @cached_property
+    def surface(self) -> npt.NDArray[np.uint8]:
+        """See `Arena.surface`."""
+        surface = np.pad(self._brightness, PAD, constant_values=255)
+        surface.setflags(write=False)
+        return surface
+
+    @cached_property
+    def clearance(self) -> npt.NDArray[np.float32]:
+        """See `Arena.clearance`."""
+        clearance = clearance_mm(self.surface, self._mm_per_cell)
+        clearance.setflags(write=False)
+        return clearance
+
+    @cached_property
+    def leaps(self) -> npt.NDArray[np.int16]:
+        """See `Arena.leaps`."""
+        leaps = free_leaps(self.surface)
+        leaps.setflags(write=False)
+        return leaps
+
+    @cached_property
+    def faces(self) -> npt.NDArray[np.int32]:
+        """See `Arena.faces`."""
+        faces = wall_faces(self.surface, self.clearance, self._mm_per_cell)
+        faces.setflags(write=False)
+        return faces
+
+
+def tables_of(brightness: npt.NDArray[np.uint8], mm_per_cell: float) -> WallTables:
+    """Return the tables of a raster that never changes: those of an earlier arena with the same one, if it is small."""
+    if brightness.size > SHARED_CELLS:
+        return WallTables(brightness, mm_per_cell)
+    return _shared(brightness.tobytes(), brightness.shape, mm_per_cell)
+
+
+@lru_cache(maxsize=SHARED_COUNT)
+def _shared(cells: bytes, shape: tuple[int, int], mm_per_cell: float) -> WallTables:
+    return WallTables(np.frombuffer(cells, np.uint8).reshape(shape), mm_per_cell)
