@@ -4,8 +4,8 @@ PYTHON ?= $(or $(shell command -v python3.11 || command -v python3),python3)
 VENV   := .venv
 BIN    := $(VENV)/bin
 UV     := $(or $(shell command -v uv),$(BIN)/uv)
-# Many tests wait for processes that they start. Two workers for each processor keep all processors busy.
-WORKERS = $(shell $(BIN)/python -c 'import os; print(2 * os.cpu_count())')
+# Tests start processes, such as a browser, that work beside them: one worker more than processors keeps all busy.
+WORKERS = $(shell $(BIN)/python -c 'import os; print(1 + os.cpu_count())')
 PYTEST = $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
 # The tests start hundreds of Python processes: Python keeps the bytecode of the modules, whatever the environment says.

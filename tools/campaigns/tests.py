@@ -32,7 +32,7 @@ def _run(rng: random.Random) -> int:
         Broken: If one failed.
     """
     seed, processors = str(rng.randrange(1 << 32)), os.cpu_count() or 1
-    command = [sys.executable, "-m", "pytest", "-n", str(2 * processors), "--dist", "worksteal"]
+    command = [sys.executable, "-m", "pytest", "-n", str(1 + processors), "--dist", "worksteal"]
     command += ["-p", "pytest_randomly", f"--randomly-seed={seed}", f"--hypothesis-seed={seed}"]
     log = Path(tempfile.gettempdir()) / f"kiks-tests-{seed}.log"
     with busy_computer(processors), log.open("w") as output:
