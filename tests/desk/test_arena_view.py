@@ -35,6 +35,7 @@ def last(said: list[dict[str, Any]], kind: str) -> dict[str, Any]:
     return [message for message in said if message["kind"] == kind][-1]
 
 
+@at_length
 @pytest.mark.parametrize("dark", cases(["true", "false"]))
 def test_both_views_draw(visit: Callable[..., Visit], dark: str) -> None:
     here = visit(f"view=both&dark={dark}")

@@ -35,13 +35,6 @@ def terminal(tmp_path: Path) -> Iterator[Terminal]:
         yield each
 
 
-@pytest.fixture
-def own_terminal(tmp_path: Path) -> Iterator[Terminal]:
-    """Its session is a process of its own, which Ctrl-C reaches."""
-    with terminal_in(tmp_path, KIKS_COMMAND=f"{sys.executable} -m kiks") as each:
-        yield each
-
-
 def begin(terminal: Terminal, new_page: NewPage) -> Page:
     """Start a session with an open port, and open its desk."""
     terminal.type("kiks")
@@ -94,44 +87,46 @@ def test_halt_reaches_a_program_that_speaks_tcp(tmp_path: Path, new_page: NewPag
         drive_and_halt(terminal, page, "kiks_pause(1e5)")
 
 
-def test_what_is_typed_on_the_desk_is_evaluated_in_octave(own_terminal: Terminal, new_page: NewPage) -> None:
-    terminal = own_terminal
-    page = begin(terminal, new_page)
-    terminal.type("kiks_print('half way')")
-    expect(page.locator(".desk-hint")).to_contain_text("half way")
-    page.get_by_test_id("tab-octave").click()
-    expect(page.get_by_test_id("log")).to_contain_text("The world is shown at")
-    expect(page.get_by_test_id("log")).not_to_contain_text("token")
-    before = terminal.ask("hex2dec(kiks('--state')(1:8))")
-    # At the prompt, in the middle of a line that a person types.
-    os.write(terminal.end, b"y = x +")
-    evaluate(page, "x = 6 * 7")
-    expect(page.get_by_test_id("log")).to_contain_text("x = 42")
-    terminal.wait_for("x = 42")
-    terminal.type(" 1")
-    assert terminal.ask("y") == "43"
-    assert terminal.ask("hex2dec(kiks('--state')(1:8))") == before, "polls let no time pass"
-    # In a program, with functions of KiKS and with errors.
-    terminal.type("while true, kProximity(ref); end")
-    evaluate(page, "kSetSpeed(ref, 3, 4); z = kGetSpeed(ref);")
-    page.wait_for_function(DRIVES)
-    evaluate(page, "error('no %d', 1), end")
-    expect(page.get_by_test_id("log")).to_contain_text("parse error")
-    evaluate(page, "error('no %d', 2)")
-    expect(page.get_by_test_id("log")).to_contain_text("error: no 2")
-    leave_picture(page, "octave")
-    terminal.press_ctrl_c()
-    assert terminal.ask("numel(z)") == "2"
-    assert terminal.ask("numel(kProximity(ref))") == "8"
-    # It may even end the session: here when the page is closed, which would miss the desk.
-    terminal.type("fread(stdin, 1);")
-    evaluate(page, "kiks_quit")
-    expect(page.get_by_test_id("log")).to_contain_text(">> kiks_quit")
-    page.close()
-    terminal.type("")
-    terminal.wait_for("The KiKS session has ended")
-    assert terminal.ask("7") == "7"
-    assert terminal.sessions() == []
+@at_length
+def test_what_is_typed_on_the_desk_is_evaluated_in_octave(tmp_path: Path, new_page: NewPage) -> None:
+    # Ctrl-C reaches a session that is a process of its own.
+    with terminal_in(tmp_path, KIKS_COMMAND=f"{sys.executable} -m kiks") as terminal:
+        page = begin(terminal, new_page)
+        terminal.type("kiks_print('half way')")
+        expect(page.locator(".desk-hint")).to_contain_text("half way")
+        page.get_by_test_id("tab-octave").click()
+        expect(page.get_by_test_id("log")).to_contain_text("The world is shown at")
+        expect(page.get_by_test_id("log")).not_to_contain_text("token")
+        before = terminal.ask("hex2dec(kiks('--state')(1:8))")
+        # At the prompt, in the middle of a line that a person types.
+        os.write(terminal.end, b"y = x +")
+        evaluate(page, "x = 6 * 7")
+        expect(page.get_by_test_id("log")).to_contain_text("x = 42")
+        terminal.wait_for("x = 42")
+        terminal.type(" 1")
+        assert terminal.ask("y") == "43"
+        assert terminal.ask("hex2dec(kiks('--state')(1:8))") == before, "polls let no time pass"
+        # In a program, with functions of KiKS and with errors.
+        terminal.type("while true, kProximity(ref); end")
+        evaluate(page, "kSetSpeed(ref, 3, 4); z = kGetSpeed(ref);")
+        page.wait_for_function(DRIVES)
+        evaluate(page, "error('no %d', 1), end")
+        expect(page.get_by_test_id("log")).to_contain_text("parse error")
+        evaluate(page, "error('no %d', 2)")
+        expect(page.get_by_test_id("log")).to_contain_text("error: no 2")
+        leave_picture(page, "octave")
+        terminal.press_ctrl_c()
+        assert terminal.ask("numel(z)") == "2"
+        assert terminal.ask("numel(kProximity(ref))") == "8"
+        # It may even end the session: here when the page is closed, which would miss the desk.
+        terminal.type("fread(stdin, 1);")
+        evaluate(page, "kiks_quit")
+        expect(page.get_by_test_id("log")).to_contain_text(">> kiks_quit")
+        page.close()
+        terminal.type("")
+        terminal.wait_for("The KiKS session has ended")
+        assert terminal.ask("7") == "7"
+        assert terminal.sessions() == []
 
 
 def test_log_places_and_sensors_are_those_of_octave(terminal: Terminal, new_page: NewPage) -> None:

@@ -128,6 +128,7 @@ def test_console_has_history_suggestions_and_replies(page: Page, address: str) -
     expect(console).to_have_value("D,0,0")
 
 
+@at_length
 def test_wire_is_filtered_held_and_cleared(page: Page) -> None:
     console, wire = at(page, "console"), at(page, "wire")
 

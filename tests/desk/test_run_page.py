@@ -347,6 +347,7 @@ def test_the_player_plays_jumps_and_ends(plain_page: Path, visit: Callable[..., 
     page.wait_for_function("() => kiksPage.player.isPlaying && kiksPage.player.time_s < 290")
 
 
+@at_length
 @pytest.mark.slow
 def test_a_page_shows_changes_robots_and_events(rich: Path, rich_page: Path, visit: Callable[..., Page]) -> None:
     page = visit(rich_page, color_scheme="dark")

@@ -63,6 +63,7 @@ def test_the_page_tells_the_truth(card):
         )
 
 
+@at_length
 @needs_data
 def test_the_floor_and_the_competitors_stand_where_others_measured_them(card):
     assert card.score("floor").median == pytest.approx(30, abs=1)
@@ -96,6 +97,7 @@ def test_the_default_is_true_to_the_real_robot(card):
         assert np.abs(card.half_distances_mm(name, "default") - card.half_distances_mm(name)).max() <= 1.0
 
 
+@at_length
 @needs_data
 def test_the_robot_of_the_file_is_the_one_that_is_found(card):
     """The constants of the robot's file are a minimum of the fit, or as good as one."""
