@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from PIL import Image
+from tests.at_length import at_length
 
 from kiks import Arena, ParameterError, Recording, RobotSpec, Simulation
 from kiks.films.film import save_film
@@ -61,6 +62,7 @@ def test_the_followed_robot_is_in_the_middle(recording: Recording, tmp_path: Pat
     assert rows.mean() == pytest.approx(64, abs=10)
 
 
+@at_length
 def test_robots_have_stripes_and_names_as_in_films(tmp_path: Path) -> None:
     arena = replace(Arena.box(400, 300), starts=(Pose(100, 150, -math.pi / 2), Pose(300, 150, math.pi / 2)))
     sim = Simulation(arena, robot=RobotSpec.load("khepera").with_changes(body__stripe_count=1), robots=2)

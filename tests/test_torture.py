@@ -87,35 +87,20 @@ def test_what_is_refused_breaks_nothing() -> None:
 # ---- KiKS ----
 
 
-def test_a_few_hostile_bytes() -> None:
-    check("--only", "wire", "--cases", "2", "--seed", "11")
-
-
 @at_length
-def test_hostile_cases() -> None:
-    check("--only", "files", "--only", "calls", "--only", "messages", "--cases", "3", "--seed", "12")
-
-
-@at_length
-def test_files_are_whole() -> None:
-    scenes = (f"--only=faults.{scene}" for scene in ("kill_writer", "fill_disk", "no_descriptors"))
-    check(*scenes, "--cases", "4", "--seed", "13")
-
-
-@at_length
-@pytest.mark.parametrize("scene", ["server", "desk"])
-def test_another_process_takes_the_place_of_a_killed_one(scene: str) -> None:
-    check("--only", f"faults.kill_{scene}", "--cases", "1", "--seed", "14")
-
-
-@at_length
-@pytest.mark.parametrize("group", ["serve", "session"])
-def test_robots_answer_while_many_clients_connect(group: str) -> None:
-    check("--only", f"crowd.{group}", "--cases", "1", "--seed", "15")
-
-
-@at_length
-@needs_octave
-@pytest.mark.parametrize("kind", ["joined_window", "start"])
-def test_ctrl_c_in_octave_leaves_right_answers_and_no_process(kind: str) -> None:
-    check("--only", f"octave.{kind}", "--cases", "1", "--seed", "16")
+@pytest.mark.parametrize(
+    "words",
+    [
+        "--only wire --cases 2 --seed 11",
+        "--only files --only calls --only messages --cases 3 --seed 12",
+        "--only faults.kill_writer --only faults.fill_disk --only faults.no_descriptors --cases 4 --seed 13",
+        *(f"--only faults.kill_{scene} --cases 1 --seed 14" for scene in ("server", "desk")),
+        *(f"--only crowd.{group} --cases 1 --seed 15" for group in ("serve", "session")),
+        *(
+            pytest.param(f"--only octave.{kind} --cases 1 --seed 16", marks=needs_octave)
+            for kind in ("joined_window", "start")
+        ),
+    ],
+)
+def test_a_few_cases_break_no_promise(words: str) -> None:
+    check(*words.split())

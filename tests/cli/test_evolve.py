@@ -76,6 +76,7 @@ def test_the_tasks_are_listed() -> None:
     assert "predator and prey" in listed
 
 
+@at_length
 def test_two_sides_evolve_and_are_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from kiks.learn.ready_contests import CONTESTS, pursuit
 

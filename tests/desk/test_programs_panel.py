@@ -103,6 +103,7 @@ def test_mistake_is_shown_by_its_line_before_anything_runs(page: Page, folder: P
     expect(at(page, "output")).to_contain_text("line 2, in <module>")
 
 
+@at_length
 def test_console_has_history_suggestions_and_replies(page: Page, address: str) -> None:
     console = at(page, "console")
     expect(at(page, "hints")).to_contain_text("D,left,right: set speed")

@@ -132,6 +132,7 @@ def test_hostile_pictures_are_refused(name: str) -> None:
     assert "\n" not in str(caught.value)
 
 
+@at_length
 @on_linux
 def test_hostile_pictures_take_little_memory(tmp_path: Path) -> None:
     for name, make in HOSTILE.items():

@@ -28,7 +28,7 @@ from kiks.recording.entries import Entry
 from kiks.recording.recorder import CHECK_NS
 from kiks.sim.run_log import Kind
 
-KILLS = share(3, 30)
+KILLS = share(2, 30)
 """How many runs are killed."""
 
 CUTS = share(40, 1000)

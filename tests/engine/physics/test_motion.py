@@ -58,7 +58,7 @@ def arc(pose, left, right):
 def test_thousands_of_ticks_follow_the_closed_form(make_world, seed):
     """Within 1e-6 mm and 1e-9 rad."""
     rng = np.random.default_rng(seed)
-    paths = np.cumsum(rng.normal(0, 3, (share(2000, 5000), 2)), axis=0)
+    paths = np.cumsum(rng.normal(0, 3, (share(1000, 5000), 2)), axis=0)
     paths = 100 * np.sin(paths / 50)
     world = make_world(FLOOR).place(2000.0, 2000.0, 1.0)
     pose = world.pose
