@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.at_length import at_length, share
+from tests.at_length import share
 
 from kiks.engine.physics.motion import CONTACT_TICKS
 from kiks.model.arena import Arena
@@ -55,17 +55,10 @@ def check_laws(make_world, arena, draw, ticks):
         pose, asked = np.array(world.pose), world.asked
 
 
-@settings(derandomize=True, max_examples=25)
-@given(number=st.integers(0, 10_000), draw=st.integers(0, 2**32))
+@settings(derandomize=True, max_examples=share(25, 250))
+@given(number=st.integers(0, share(10_000, 1_000_000)), draw=st.integers(0, 2**32))
 def test_no_penetration_and_no_energy_from_walls(make_world, make_random_arena, number, draw):
-    check_laws(make_world, make_random_arena(number), draw, 300)
-
-
-@at_length
-@settings(derandomize=True, max_examples=250)
-@given(number=st.integers(0, 1_000_000), draw=st.integers(0, 2**32))
-def test_no_penetration_and_no_energy_from_walls_at_length(make_world, make_random_arena, number, draw):
-    check_laws(make_world, make_random_arena(number), draw, 500)
+    check_laws(make_world, make_random_arena(number), draw, share(300, 500))
 
 
 @pytest.mark.parametrize(("number", "seed", "ticks"), [(864, 864, 90), (133, 133, 170)])
