@@ -36,7 +36,7 @@ def last(said: list[dict[str, Any]], kind: str) -> dict[str, Any]:
 
 
 @at_length
-@pytest.mark.parametrize("dark", cases(["true", "false"]))
+@pytest.mark.parametrize("dark", ["true", "false"])
 def test_both_views_draw(visit: Callable[..., Visit], dark: str) -> None:
     here = visit(f"view=both&dark={dark}")
     here.wait("() => kiksDesk.isSolid() && kiksDesk.stats().solid_frames > 3")

@@ -117,7 +117,7 @@ def show_page(url: str) -> None:
 
 
 @at_length
-@pytest.mark.parametrize("words", cases([(("run", "--desk"),), (("desk", "--port", "0", "--no-browser"),)]))
+@pytest.mark.parametrize("words", [("run", "--desk"), ("desk", "--port", "0", "--no-browser")])
 def test_programs_begin_when_a_page_shows_the_world(words: tuple[str, ...], tmp_path: Path) -> None:
     (tmp_path / "tells.py").write_text("open('begun', 'w').close()\nimport time\ntime.sleep(1)\n")
     with started(*words, "tells.py", folder=tmp_path) as (process, output):
@@ -142,7 +142,7 @@ def test_errors_are_reported_before_waiting_for_a_page(tmp_path: Path) -> None:
 
 
 @at_length
-@pytest.mark.parametrize("words", cases([(("run", "--desk"),), (("demo", "avoid", "--desk"),)]))
+@pytest.mark.parametrize("words", [("run", "--desk"), ("demo", "avoid", "--desk")])
 def test_ctrl_c_ends_waiting_for_a_page(words: tuple[str, ...], tmp_path: Path) -> None:
     words = (*words, DRIVE, "COM1", "5", "3", "5") if words[0] == "run" else words
     with started(*words, folder=tmp_path) as (process, output):

@@ -9,7 +9,7 @@ from urllib.parse import urlsplit
 
 import pytest
 from playwright.sync_api import Browser, expect
-from tests.at_length import at_length, cases
+from tests.at_length import at_length
 from tests.desk.visitor import FIRST_PICTURE, Visitor, leave_picture
 from tests.desk.visits import NewPage
 from tests.guard import GUARD_S
@@ -76,7 +76,7 @@ def notebook(shown: Shown) -> Iterator[int]:
 
 
 @at_length
-@pytest.mark.parametrize("host", cases(["localhost", "127.0.0.1"]))
+@pytest.mark.parametrize("host", ["localhost", "127.0.0.1"])
 def test_a_notebook_shows_the_desk(browser: Browser, shown: Shown, notebook: int, host: str) -> None:
     page = browser.new_page()
     page.set_default_timeout(1000 * GUARD_S)

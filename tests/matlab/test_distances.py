@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.at_length import at_length, share
+from tests.at_length import cases, share
 from tests.matlab.octave import needs_octave, run
 
 pytestmark = [needs_octave, pytest.mark.slow]
@@ -52,7 +52,7 @@ kiks_kclose(ref)
 """
 
 
-@pytest.mark.parametrize("kind", ["Khepera", pytest.param("Khepera_II", marks=at_length)])
+@pytest.mark.parametrize("kind", cases(["Khepera", "Khepera_II"]))
 def test_moves_and_turns_go_as_far_as_they_should(kind: str, tmp_path: Path) -> None:
     mm, degrees = share(("[10:5:40 100 500]", "45:45:360"), ("[10:40 45:5:100 120:40:1000 1000]", "10:10:360"))
     moves = MOVES.format(mm=mm, degrees=degrees)

@@ -78,11 +78,7 @@ say('readings', kProximity(ref))
 
 @at_length
 @pytest.mark.parametrize(
-    ("transport", "tidied"),
-    [
-        pytest.param("pipes", "", id="pipes"),
-        pytest.param("tcp", "kiks_kclose(ref)\nkiks_quit\nkiks\n", id="tcp", marks=at_length),
-    ],
+    ("transport", "tidied"), [("pipes", ""), ("tcp", "kiks_kclose(ref)\nkiks_quit\nkiks\n")], ids=["pipes", "tcp"]
 )
 def test_a_program_survives_the_simulators_death(transport: str, tidied: str, tmp_path: Path) -> None:
     said = run(KILLED + tidied + GOING_ON, tmp_path, A_PROCESS | transport_variables(transport)).said

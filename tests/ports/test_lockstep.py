@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.at_length import at_length, cases, share
+from tests.at_length import cases, share
 from tests.busy import busy_computer
 from tests.ports.helpers import WallClock, warnings
 from tests.served import GUARD_S, PROGRAMS, Served, fresh, served
@@ -113,7 +113,7 @@ def drive_all(folder: Path, thinking: str, robots: int = 4, **options: Any) -> t
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("thinking", [pytest.param("none", marks=at_length), "fixed:3.5"])
+@pytest.mark.parametrize("thinking", cases(["fixed:3.5", "none"]))
 def test_four_programs_repeat_on_a_busy_computer(tmp_path: Path, thinking: str) -> None:
     """test_program_scheduler.py tries all orders in which requests can arrive."""
     with busy_computer():

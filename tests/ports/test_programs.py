@@ -15,7 +15,7 @@ from typing import IO, Any
 
 import pytest
 from tests import forked
-from tests.at_length import at_length, share
+from tests.at_length import cases, share
 from tests.busy import busy_computer
 from tests.cli.test_cli import state_of
 from tests.ports.helpers import warnings
@@ -123,7 +123,7 @@ def run_and_read(commands: Sequence[Sequence[str]], folder: Path, **options: Any
     return end[:3], end[4], *(file.read_text() for file in files)
 
 
-@pytest.mark.parametrize("thinking", ["none", pytest.param("fixed:3.5", marks=at_length)])
+@pytest.mark.parametrize("thinking", cases(["none", "fixed:3.5"]))
 def test_programs_repeat_on_a_busy_computer(thinking: str, tmp_path: Path) -> None:
     with busy_computer():
         assert len({run_and_read(FOUR, tmp_path, thinking=thinking) for _ in range(share(2, 4))}) == 1
