@@ -9,14 +9,12 @@ import os
 import random
 import re
 import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 from tests.busy import busy_computer
-from tools.campaigns.processes import compile_engine
-from tools.campaigns.runner import WAIT_FACTOR, Broken, Campaign, Play
+from tools.campaigns.runner import WAIT_FACTOR, Broken, Campaign
 
 ROOT = Path(__file__).parents[2]
 
@@ -31,12 +29,15 @@ def _run(rng: random.Random) -> int:
     Raises:
         Broken: If one failed.
     """
-    seed, processors = str(rng.randrange(1 << 32)), os.cpu_count() or 1
-    command = [sys.executable, "-m", "pytest", "-n", str(1 + processors), "--dist", "worksteal"]
-    command += ["-p", "pytest_randomly", f"--randomly-seed={seed}", f"--hypothesis-seed={seed}"]
+    seed = rng.randrange(1 << 32)
+    options = (
+        f"-p pytest_randomly --randomly-seed={seed} --hypothesis-seed={seed} {os.environ.get('PYTEST_ADDOPTS', '')}"
+    )
     log = Path(tempfile.gettempdir()) / f"kiks-tests-{seed}.log"
-    with busy_computer(processors), log.open("w") as output:
-        code = subprocess.run(command, cwd=ROOT, stdout=output, stderr=subprocess.STDOUT, check=False).returncode
+    with busy_computer(os.cpu_count() or 1), log.open("w") as output:
+        streams = {"stdout": output, "stderr": subprocess.STDOUT}
+        environment = os.environ | {"PYTEST_ADDOPTS": options}
+        code = subprocess.run(["make", "test"], cwd=ROOT, env=environment, check=False, **streams).returncode
     said = log.read_text()
     if code:
         failed = re.findall(r"^(?:FAILED|ERROR) (\S+)", said, re.MULTILINE) or ["pytest"]
@@ -46,11 +47,6 @@ def _run(rng: random.Random) -> int:
     return int(passed[1]) if passed else 0
 
 
-def _prepare() -> Play:
-    compile_engine()
-    return _run
-
-
 def campaigns() -> Iterator[Campaign]:
     """Yield the only one."""
-    yield Campaign("tests.busy", RUNS, _prepare, limit_s=LIMIT_S / WAIT_FACTOR, is_named_only=True, jobs=1)
+    yield Campaign("tests.busy", RUNS, lambda: _run, limit_s=LIMIT_S / WAIT_FACTOR, is_named_only=True, jobs=1)
