@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, reject, settings
+from hypothesis import example, given, reject, settings
 from hypothesis import strategies as st
 
 from kiks.cli.options import load_arena
@@ -294,6 +294,7 @@ def test_a_robot_without_noise_reads_the_same_again():
 @pytest.mark.slow
 @settings(max_examples=8)
 @given(st.integers(0, 10**6))
+@example(35608)
 def test_moved_things_are_kept(seed):
     rng = np.random.default_rng(seed)
     sim = Simulation(Arena.box(350, 350, rounded_mm=120), robots=5, seed=seed)

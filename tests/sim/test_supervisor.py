@@ -344,6 +344,17 @@ def test_balls_roll_without_a_robot_as_with_a_robot_far_away():
     assert round(float(lonely.bodies()["x_mm"][0]), 1) == 197.5, "a ball rolls alone, too"
 
 
+def test_bodies_are_where_they_are_at_the_instant_as_robots_are():
+    sim = Simulation(Arena.box(900, 300))
+    sim.place(1, 100, 100, 0.0)
+    sim.add_cylinder(100 + 27.5 + 16, 100)
+    sim.port(1).write(b"D,60,60\n")
+    sim.run(1.0)
+    for _ in range(20):
+        sim.run(0.0037)
+        assert sim.bodies()["x_mm"][0] - sim.pose(1)[0] == pytest.approx(27.5 + 16, abs=0.05)
+
+
 def test_a_world_without_a_robot_gets_one():
     sim = Simulation(Arena.box(500, 500), robots=0)
     assert sim.poses().shape == sim.distances_mm().shape == (0, 3)

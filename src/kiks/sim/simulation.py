@@ -287,7 +287,7 @@ class Simulation:
     def poses(self) -> NDArray[np.float64]:
         """Return where all robots are at this instant, float64 [robot, 3]: x_mm, y_mm, heading_rad."""
         with self._up_to_date() as world:
-            return world.poses()
+            return world.places()[0]
 
     def place(self, robot: int, x_mm: float, y_mm: float, heading_rad: float) -> None:
         """Move a robot elsewhere; its wheels and counters do not change.
@@ -473,14 +473,13 @@ class Simulation:
             return self.things.add_body(Cylinder, x_mm, y_mm, changes)
 
     def bodies(self) -> NDArray[np.void]:
-        """Return a copy of the balls and cylinders: records of `kiks.engine.state.BODY`, shape [body].
+        """Return balls and cylinders at this instant: a copy of the records of `kiks.engine.state.BODY`, shape [body].
 
         Of their fields `number`, `what` (3 a ball, 4 a cylinder), `x_mm`, `y_mm`, `velocity_x` and `velocity_y` [mm/s],
         `radius_mm` and `brightness` are of use.
         """
         with self._up_to_date() as world:
-            copied: NDArray[np.void] = world.state.bodies[0].copy()
-        return copied
+            return world.bodies()
 
     def move_body(
         self, body: int, x_mm: float, y_mm: float, *, speed_mm_s: float = 0.0, heading_rad: float = 0.0

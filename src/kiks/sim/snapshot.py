@@ -46,9 +46,8 @@ class Snapshot:
 
 def look(world: World) -> Snapshot:
     """Return a snapshot of a world whose ticks are done."""
-    robots, bodies, ticks, now_ns = world.robot_count, world.state.bodies.shape[1], world.state.tick_count, world.now_ns
-    poses, places = np.empty((robots, 3)), np.empty((bodies, 2))
-    observe.places_at(world.scene, ticks, now_ns, poses, places)
+    robots, ticks, now_ns = world.robot_count, world.state.tick_count, world.now_ns
+    poses, places = world.places()
     lengths_mm, cosines, brightnesses, met = trace_rays(world, 0, robots)
     proximity, ambient = (np.empty((robots, SENSOR_COUNT), np.int64) for _ in range(2))
     observe.read_all(world.scene, ticks, now_ns, proximity, ambient)

@@ -166,7 +166,9 @@ class Things:
     def checkpoint(self) -> Checkpoint:
         """Return where robots, bodies and lamps are."""
         world = self._world
-        saved = Checkpoint(world.poses(), world.state.bodies.copy(), world.lamps.copy())
+        bodies = world.bodies()
+        bodies["trail"] = np.stack([bodies["x_mm"], bodies["y_mm"]], axis=-1)[:, None]
+        saved = Checkpoint(world.places()[0], bodies[None], world.lamps.copy())
         for array in (saved.poses, saved.bodies, saved.lamps):
             array.setflags(write=False)
         return saved

@@ -183,7 +183,7 @@ class RobotSite:
         """Return the balls and cylinders, records of `kiks.engine.state.BODY`."""
         with self._world.lock:
             self._sync()
-            return self._world.state.bodies[0].copy()
+            return self._world.bodies()
 
     def held_body(self) -> Any:
         """Return the record of what a gripper holds or has between its jaws, None for nothing."""

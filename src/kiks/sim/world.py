@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from kiks.engine import step
 from kiks.engine.parameters import PARAMETERS, pack
 from kiks.engine.scene import Scene, enter_all_worlds
-from kiks.engine.sensing import proximity
+from kiks.engine.sensing import observe, proximity
 from kiks.engine.sensing.thesis_networks import networks_for
 from kiks.engine.state import State
 from kiks.errors import ParameterError, shown
@@ -209,9 +209,21 @@ class World:
         x_mm, y_mm, heading_rad = proximity.pose_of(self.state.robots, self.state.tick_count, self.now_ns, index)
         return x_mm, y_mm, heading_rad
 
-    def poses(self) -> NDArray[np.float64]:
-        """Return where all robots are at this instant, float64 [robot, 3]: x_mm, y_mm, heading_rad."""
-        return np.array([self.pose(index) for index in range(self.robot_count)]).reshape(-1, 3)
+    def places(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return where everything is at this instant, which may be in the middle of a tick.
+
+        Returns:
+            x_mm, y_mm and heading_rad of robots, float64 [robot, 3]; x_mm and y_mm of bodies, float64 [body, 2].
+        """
+        poses, places = np.empty((self.robot_count, 3)), np.empty((self.state.bodies.shape[1], 2))
+        observe.places_at(self.scene, self.state.tick_count, self.now_ns, poses, places)
+        return poses, places
+
+    def bodies(self) -> NDArray[np.void]:
+        """Return a copy of the records of balls and cylinders, shape [body], with their places at this instant."""
+        bodies: NDArray[np.void] = self.state.bodies[0].copy()
+        bodies["x_mm"], bodies["y_mm"] = self.places()[1].T
+        return bodies
 
     def place_robot(self, index: int, x_mm: float, y_mm: float, heading_rad: float) -> None:
         """Put a robot down at a free place.
