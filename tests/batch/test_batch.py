@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -74,6 +75,30 @@ def test_threads_do_not_matter(expected: list[str], threads: int) -> None:
 def test_blocks_do_not_matter(expected: list[str], monkeypatch: pytest.MonkeyPatch, lanes: int) -> None:
     monkeypatch.setattr(batch_module, "LANES", lanes)
     assert hashes(make(threads=2)) == expected
+
+
+def test_threads_that_share_a_batch_take_turns():
+    batch = kiks.Batch(kiks.Arena.box(600, 600), worlds=64, seed=1, threads=2)
+
+    def drive(_number: int) -> Any:
+        return batch.run(vehicle, [5.0, 0.01], seconds=2, measures=[kiks.measures.path_mm]).values.tolist()
+
+    alone = drive(0)
+    with ThreadPoolExecutor(4) as pool:
+        assert list(pool.map(drive, range(8))) == [alone] * 8
+
+    def step(number: int) -> None:
+        if number % 3:
+            batch.step(np.full((64, 1, 2), number))
+        else:
+            batch.reset()
+
+    batch.reset()
+    with ThreadPoolExecutor(6) as pool:
+        list(pool.map(step, range(60)))
+    fresh = kiks.Batch(kiks.Arena.box(600, 600), worlds=1, seed=1)
+    assert batch.reset()[0].tolist() == fresh.reset()[0].tolist()
+    assert batch.state_hash(0) == fresh.state_hash(0)
 
 
 def test_a_world_is_the_same_among_others_and_alone(expected: list[str]) -> None:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Iterator, Sequence
+import threading
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +19,7 @@ from kiks.batch.loop import roll_out
 from kiks.batch.loop_timing import Timing
 from kiks.batch.measure_slots import MeasureSlots
 from kiks.batch.rollouts import Rollouts
+from kiks.control.compiled_function import Compiled, explained
 from kiks.control.controller import Controller
 from kiks.control.measure import Measure
 from kiks.control.robot_controllers import robot_controllers
@@ -46,11 +48,25 @@ STEP_BLOCK = 64
 """Fewest worlds per thread for a single step, which takes some microseconds per world."""
 
 
+Method = TypeVar("Method", bound=Callable[..., Any])
+
+
+def _alone(method: Method) -> Method:
+    """Let one thread after the other call a method of a batch: they share its arrays."""
+
+    @functools.wraps(method)
+    def call(batch: Batch, *args: Any, **options: Any) -> Any:
+        with batch._lock:
+            return method(batch, *args, **options)
+
+    return call  # type: ignore[return-value]
+
+
 class Batch:
     """Many worlds with the same number of robots, each with its own seed, start poses and kinds of robots.
 
     A world agrees to the bit with a `kiks.Simulation` of the same seed whose robots `kiks.drive` drives with the same
-    `timing`: the same readings, the same poses, the same hash.
+    `timing`: the same readings, the same poses, the same hash. Threads may share a batch; they take turns.
 
     Args:
         arena: One arena for all worlds, or several, which the worlds take in turn. All arenas must hold the same number
@@ -102,6 +118,7 @@ class Batch:
         response: str | None = None,
         threads: int | None = None,
     ) -> None:
+        self._lock = threading.RLock()
         self.timing = Timing() if timing is None else timing
         if not isinstance(self.timing, Timing):
             raise ParameterError(f"timing must be a kiks.Timing, but it was {shown(timing)}.")
@@ -138,6 +155,7 @@ class Batch:
 
     # ---- all at once ----
 
+    @_alone
     def run(
         self,
         controller: Controller | Sequence[Controller],
@@ -176,12 +194,14 @@ class Batch:
             notes=np.zeros((*shape, watching.note_count)),
         )
         deciders = deciders_of(driving.controllers, driving.parameter_counts)
-        self._on_all_cores(worlds, (0, UNLIMITED, until_ns), (deciders, watching.watchers))
+        functions = [*driving.controllers, *watching.measures]
+        self._on_all_cores(worlds, (0, UNLIMITED, until_ns), (deciders, watching.watchers), functions)
         names = tuple(each.name for each in watching.measures)
         return Rollouts(watching.values(worlds.notes), worlds.steps.copy(), names)
 
     # ---- step by step ----
 
+    @_alone
     def reset(
         self,
         worlds: ArrayLike | None = None,
@@ -224,6 +244,7 @@ class Batch:
             self._is_sensed = self._is_sensed or worlds is None
         return np.array(self._worlds.sensors)
 
+    @_alone
     def step(self, wheels: ArrayLike) -> NDArray[np.float64]:
         """Send all robots their speeds, wait for the next loop, and let them sense again.
 
@@ -263,28 +284,33 @@ class Batch:
         return self._lamps
 
     @lamps.setter
+    @_alone
     def lamps(self, lamps: ArrayLike) -> None:
         self._lamps = check_numbers("lamps", lamps, (self.world_count, None, 4))
         for scene in self._scenes:
             scene.set_lamps(self._lamps)
 
     @property
+    @_alone
     def times_s(self) -> NDArray[np.float64]:
         """Start time of the present loop of each world [s], float64 [world]."""
         times_s: NDArray[np.float64] = self._worlds.begins_ns / NS_PER_S
         return times_s
 
     @property
+    @_alone
     def poses(self) -> NDArray[np.float64]:
         """Poses of robots at the end of the last tick, float64 [world, robot, 3]: x_mm, y_mm, heading_rad."""
         robots = self.state.robots
         return np.stack([robots["x_mm"], robots["y_mm"], robots["heading_rad"]], axis=-1)
 
     @property
+    @_alone
     def values(self) -> NDArray[np.float64]:
         """Values of the measures after the steps so far, float64 [world, robot, measure]."""
         return self._watching.values(self.notes)
 
+    @_alone
     def state_hash(self, world: int) -> str:
         """Return the hash of a world's state, 16 hexadecimal digits; a simulation in the same state has the same hash.
 
@@ -313,25 +339,37 @@ class Batch:
     def _do_halves(self, first: int, end: int, chosen: NDArray[np.int64] | None = None) -> None:
         """Do halves of control loops with the present speeds of the wheels: even halves sense, odd halves act."""
         span, callbacks = (first, end, UNLIMITED), (NO_DECIDERS, self._watching.watchers)
-        self._on_all_cores(self._worlds, span, callbacks, chosen=chosen, least=STEP_BLOCK)
+        # A measure that fails leaves worlds in the middle of a loop.
+        is_sensed, self._is_sensed = self._is_sensed, False
+        self._on_all_cores(self._worlds, span, callbacks, self._watching.measures, chosen=chosen, least=STEP_BLOCK)
+        self._is_sensed = is_sensed
 
     def _on_all_cores(
         self,
         worlds: Any,
         span: tuple[int, int, int],
         callbacks: tuple[NDArray[np.int64], NDArray[np.int64]],
+        functions: Sequence[Compiled],
         *,
         chosen: NDArray[np.int64] | None = None,
         least: int = LANES,
     ) -> None:
-        """Run `roll_out` in threads on blocks of at least `least` worlds."""
+        """Run `roll_out` in threads on blocks of at least `least` worlds; it calls some functions of users.
+
+        Raises:
+            ParameterError: If one of them fails.
+        """
         blocks = list(self._blocks(np.arange(self.world_count) if chosen is None else chosen, least))
-        left = iter(blocks)
+        left, errors = iter(blocks), list[Exception]()
 
         def work() -> None:
             # Threads take blocks from one list until it is empty: an iterator gives each to one of them.
             for scene, numbers in left:
-                roll_out(scene.record, worlds, worlds_in_bunch(self.robot_count), numbers, span, callbacks)
+                try:
+                    roll_out(scene.record, worlds, worlds_in_bunch(self.robot_count), numbers, span, callbacks)
+                except Exception as error:
+                    errors.append(explained(error, functions))
+                    break
 
         helpers = [self._pool.submit(work) for _ in range(min(self.threads, len(blocks)) - 1)]
         work()
@@ -339,6 +377,8 @@ class Batch:
             # All blocks are taken. A helper that has not begun has no work, and in a forked process it never begins.
             if not helper.cancel():
                 helper.result()
+        if errors:
+            raise errors[0]
 
     @functools.cached_property
     def _pool(self) -> ThreadPoolExecutor:

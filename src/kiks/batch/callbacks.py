@@ -14,17 +14,22 @@ from itertools import groupby
 from typing import Any
 
 import numpy as np
-from numba import types
-from numba.core.errors import NumbaError
+from numba import extending, types
+from numba.core import cgutils
+from numba.np import arrayobj
 from numba.np.numpy_support import from_dtype
 from numpy.typing import NDArray
 
-from kiks.control.compiled_function import address_of, caller_of
-from kiks.control.controller import Controller
+from kiks.control.compiled_function import address_of, caller_of, compiled_for
+from kiks.control.controller import ARGUMENTS, Controller
 from kiks.control.measure import Measure, Moment
 from kiks.engine.compiling import callable_kernel
 from kiks.engine.state import BODY
 
+# Numba annotates these in part, and not as they are used here.
+_arrays: Any = arrayobj
+_intrinsic: Any = extending.intrinsic
+_pack: Any = cgutils.pack_array
 _types: Any = types
 
 
@@ -50,13 +55,28 @@ MEASURE = (_types.NamedTuple(_MOMENT, Moment), _ROW)
 call_decider, call_measure = caller_of(DECIDER), caller_of(MEASURE)
 
 
+@_intrinsic
+def begin_of(typing: Any, row: Any, count: Any) -> Any:
+    """Return the first numbers of a row that has so many; of a constant length most checks of indices cost nothing."""
+    if not isinstance(count, types.IntegerLiteral):
+        return None
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        array = _arrays.make_array(row)(context, builder, arguments[0])
+        array.shape = _pack(builder, [context.get_constant(types.intp, count.literal_value)])
+        return _arrays.impl_ret_borrowed(context, builder, row, array._getvalue())
+
+    return row(row, count), generate
+
+
 @functools.lru_cache(maxsize=256)
-def decider_of(controller: Controller) -> Any:
-    """Return the kernel that calls a controller for its robots in all worlds of a bunch.
+def decider_of(controller: Controller, parameter_count: int) -> Any:
+    """Return what calls a controller, with so many parameters, for its robots in all worlds of a bunch.
 
     Raises:
         ParameterError: If Numba cannot compile the controller.
     """
+    controller.check((_ROW,) * len(ARGUMENTS))
     decide, sensor_count, memory_count = controller.kernel, controller.sensor_count, controller.memory_count
 
     @callable_kernel
@@ -66,27 +86,23 @@ def decider_of(controller: Controller) -> Any:
                 world = numbers[k]
                 for robot in range(row[1], row[2]):
                     decide(
-                        sensors[world, robot, :sensor_count],
-                        memory[world, robot, :memory_count],
-                        parameters[world, robot, : row[3]],
-                        wheels[world, robot],
+                        begin_of(sensors[world, robot], sensor_count),
+                        begin_of(memory[world, robot], memory_count),
+                        begin_of(parameters[world, robot], parameter_count),
+                        begin_of(wheels[world, robot], 2),
                     )
 
-    try:
-        address_of(decide_all, DECIDER)
-    except NumbaError as error:
-        raise controller.refused(error) from None
-    return decide_all
+    return compiled_for(decide_all, DECIDER)
 
 
-NO_DECIDERS = np.zeros((0, 4), np.int64)
+NO_DECIDERS = np.zeros((0, 3), np.int64)
 """The rows of `deciders_of` where no controller decides."""
 
 
 def deciders_of(controllers: Sequence[Controller], parameter_counts: Sequence[int]) -> NDArray[np.int64]:
-    """Return the kernels that decide for the robots of a world, int64 [run, 4].
+    """Return the kernels that decide for the robots of a world, int64 [run, 3].
 
-    Each row has the address of a kernel, the first of its robots, the end of them, and their number of parameters.
+    Each row has the address of a kernel, the first of its robots, and the end of them.
     Neighbours with the same controller and number of parameters share a row. An address is valid while `decider_of`
     keeps its kernel.
 
@@ -100,7 +116,7 @@ def deciders_of(controllers: Sequence[Controller], parameter_counts: Sequence[in
     rows, first = [], 0
     for (controller, parameter_count), run in groupby(zip(controllers, parameter_counts, strict=True)):
         end = first + len(list(run))
-        rows.append((address_of(decider_of(controller), DECIDER), first, end, parameter_count))
+        rows.append((address_of(decider_of(controller, parameter_count)), first, end))
         first = end
     return np.array(rows, np.int64)
 
@@ -113,9 +129,6 @@ def watchers_of(measures: tuple[Measure, ...]) -> NDArray[np.int64]:
     """
     watchers, begin = np.zeros((len(measures), 3), np.int64), 0
     for each, row in zip(measures, watchers, strict=True):
-        try:
-            row[:] = address_of(each.kernel, MEASURE), begin, begin + each.note_count
-        except NumbaError as error:
-            raise each.refused(error) from None
+        row[:] = address_of(each.check(MEASURE)), begin, begin + each.note_count
         begin += each.note_count
     return watchers

@@ -62,5 +62,5 @@ class MeasureSlots:
         """Return the values of the measures for notes [world, robot, note], float64 [world, robot, measure]."""
         values = np.zeros((*notes.shape[:2], len(self.measures)))
         for k, (begin, end) in enumerate(pairwise(self._ends)):
-            values[:, :, k] = self.measures[k].result(notes[:, :, begin:end])
+            values[:, :, k] = self.measures[k].value(notes[:, :, begin:end])
         return values

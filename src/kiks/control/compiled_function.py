@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+import linecache
+import re
+import traceback
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from traceback import FrameSummary
 from typing import Any
 
 from numba import extending, types
-from numba.core import errors
 
-from kiks.engine.compiling import callable_kernel
-from kiks.errors import ParameterError, shown
+from kiks.control.checked_code import checked, is_trusted
+from kiks.errors import KiksError, ParameterError, counted, shown
 
 # Numba annotates these in part, and not as they are used.
 _intrinsic: Any = extending.intrinsic
@@ -29,10 +33,13 @@ class Compiled:
         function: The function as it was written.
         name: Its name.
         kernel: The same, compiled; other kernels call it.
+        options: The arrays whose sizes its decorator takes.
 
     Raises:
         ParameterError: If it is no function of so many arguments.
     """
+
+    options: tuple[str, ...] = ()
 
     def __init__(self, function: Callable[..., Any], *, what: str, arguments: tuple[str, ...]) -> None:
         wanted = f"{what}({', '.join(arguments)})"
@@ -48,33 +55,101 @@ class Compiled:
             )
         self.function = function
         self.name = function.__name__
-        self._what = what
-        self.kernel = callable_kernel(function)
+        self._what, self._arguments = what, arguments
+        self.kernel = checked(function)
+        self._accepted: set[tuple[Any, ...]] = set()
+
+    @property
+    def sizes(self) -> dict[str, int | None]:
+        """How many numbers each array has that it is called with; None if any number will do."""
+        return {}
 
     def refused(self, error: Exception) -> ParameterError:
         """Return the message if Numba cannot compile it."""
         reasons = [line.strip() for line in str(error).splitlines() if line.strip()]
         reason = next((line for line in reasons if "Failed in" not in line), type(error).__name__)
+        path = self._code.co_filename
+        named = re.search(re.escape(Path(path).name) + r'(?:", line | \()(\d+)', str(error))
+        place = _place(path, int(named[1]) if named else self._code.co_firstlineno)
         return ParameterError(
-            f"the {self._what} {self.name!r} must be Python that Numba compiles (numbers, arrays, loops, math), but: "
-            f"{reason} Simplify what it names there."
+            f"the {self._what} {self.name!r} must be Python that Numba compiles (numbers, arrays, loops, math), but "
+            f"{place}: {reason} Simplify what it names there."
         )
 
+    def check(self, argument_types: tuple[Any, ...]) -> Any:
+        """Compile it for arguments of these types; return what Numba knows of the result.
 
-def address_of(function: Any, argument_types: tuple[Any, ...]) -> int:
-    """Return the address of a kernel without a return value, for `caller_of`; valid while the kernel lives.
+        Raises:
+            ParameterError: If Numba cannot compile it, or it returns something.
+        """
+        try:
+            result = compiled_for(self.kernel, argument_types)
+        except Exception as error:
+            raise self.refused(error) from None
+        self._accepted.add(argument_types)
+        return result
+
+    def failed(self, error: Exception, place: FrameSummary) -> ParameterError:
+        """Return the message if the compiled function has raised an error at a place in its source or a helper's."""
+        subject, where = f"the {self._what} {self.name!r}", _place(place.filename, place.lineno)
+        if not isinstance(error, IndexError) or len(error.args) != 2:
+            # Numba's own functions raise without the place that has called them.
+            at = "" if place.name == "impl" else f" {where}:"
+            return ParameterError(f"{subject} must not fail, but{at} {type(error).__name__}: {error}")
+        given, index = error.args
+        own = {**dict(zip(self._code.co_varnames, self._arguments, strict=False)), "moment.sensors": "sensors"}
+        array = own.get(given, "") if place.name == self.name else ""
+        size = self.sizes.get(array)
+        if array in self.options:
+            advice = f"Write @kiks.{self._what}({array}={'...' if index is None or index < 0 else index + 1})."
+        else:
+            advice = "Use an index that it has."
+        has = "" if size is None else f", which has {counted(size, 'number')}"
+        return ParameterError(f"{subject} must stay within its arrays, but {where} leaves {given}{has}. {advice}")
+
+    @property
+    def _code(self) -> Any:
+        return self.function.__code__
+
+    def is_at(self, place: FrameSummary) -> bool:
+        """Return whether an error was raised in its own source."""
+        return (place.filename, place.name) == (self._code.co_filename, self.name)
+
+
+def explained(error: Exception, functions: Iterable[Compiled]) -> Exception:
+    """Return the message for an error that one of some functions has raised; the error itself if none has."""
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    users = [each for each in functions if not is_trusted(each.function)]
+    found = [each for each in users if each.is_at(place)] or users
+    return found[0].failed(error, place) if found and not isinstance(error, KiksError) else error
+
+
+def _place(path: str, line: int | None) -> str:
+    """Return a line for a message: where it is, and what it says."""
+    source = linecache.getline(path, line or 0).strip()
+    return f"line {line} of {Path(path).name}" + (f" ({shown(source)[1:-1]})" if source else "")
+
+
+def compiled_for(function: Any, argument_types: tuple[Any, ...]) -> Any:
+    """Compile a function without a return value for arguments of these types; return what Numba knows of the result.
 
     Raises:
-        numba.core.errors.NumbaError: If it cannot be compiled for these types, or returns something.
+        Exception: If it cannot be compiled, or returns something: Numba raises of many kinds.
     """
-    result = function.get_compile_result(_types.void(*argument_types))
+    function.compile(argument_types)
+    result = function.overloads[argument_types]
     if result.signature.return_type != types.none:
-        raise errors.TypingError("it returns something, where it must write into its arguments and return nothing.")
+        raise TypeError("it returns something, where it must write into its arguments and return nothing.")
+    return result
+
+
+def address_of(result: Any) -> int:
+    """Return the address of what `compiled_for` has compiled, for `caller_of`; valid while the function lives."""
     return int(result.library.get_pointer_to_function(result.fndesc.llvm_func_name))
 
 
 def caller_of(argument_types: tuple[Any, ...]) -> Any:
-    """Return a function `(address, arguments)` with which kernels call what `address_of` has for these types."""
+    """Return a function `(address, arguments)` with which kernels call what is compiled for these types."""
 
     @_intrinsic
     def call(typing: Any, address: Any, arguments: Any) -> Any:

@@ -9,10 +9,11 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, overload
 
+import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kiks.control.compiled_function import Compiled
+from kiks.control.compiled_function import Compiled, explained
 from kiks.control.controller_spec import recipe_of
 from kiks.control.senses import check_senses, reading_count
 from kiks.engine.compiling import entry, kernel
@@ -20,6 +21,8 @@ from kiks.engine.physics.motor import SPEED_MAX
 from kiks.errors import ParameterError, shown
 from kiks.model.array_checks import check_numbers
 from kiks.model.checks import check_count
+
+typeof: Any = numba.typeof  # Numba does not annotate it
 
 ARGUMENTS = ("sensors", "memory", "parameters", "wheels")
 
@@ -51,6 +54,8 @@ class Controller(Compiled):
         array([-5., -5.])
     """
 
+    options = ("memory", "parameters")
+
     def __init__(
         self,
         function: Callable[..., Any],
@@ -69,6 +74,12 @@ class Controller(Compiled):
         self.recipe = recipe_of(function) if recipe is None else dict(recipe)
 
     @property
+    def sizes(self) -> dict[str, int | None]:
+        """How many numbers each array has that it is called with; None if any number will do."""
+        counts = self.sensor_count, self.memory_count, self.parameter_count, 2
+        return dict(zip(ARGUMENTS, counts, strict=True))
+
+    @property
     def sensor_count(self) -> int:
         """Number of its readings."""
         return reading_count(self.senses)
@@ -83,14 +94,15 @@ class Controller(Compiled):
         """Decide once, with the same machine code as in a batch.
 
         Raises:
-            ParameterError: If Numba cannot compile the function.
+            ParameterError: If Numba cannot compile the function, or it fails.
         """
-        from numba.core.errors import NumbaError
-
+        types = tuple(typeof(each) for each in (sensors, memory, parameters, wheels))
+        if types not in self._accepted:
+            self.check(types)
         try:
             self.kernel(sensors, memory, parameters, wheels)
-        except NumbaError as error:
-            raise self.refused(error) from None
+        except Exception as error:
+            raise explained(error, [self]) from None
 
     def check_parameters(self, parameters: ArrayLike) -> NDArray[np.float64]:
         """Return parameters as float64, their last axis one controller's.

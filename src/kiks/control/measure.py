@@ -9,7 +9,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.control.compiled_function import Compiled
+from kiks.control.compiled_function import Compiled, explained
 from kiks.control.senses import check_senses
 from kiks.errors import ParameterError, shown
 from kiks.model.checks import check_count
@@ -72,6 +72,8 @@ class Measure(Compiled):
         ParameterError: If it is no such function or an argument is out of range.
     """
 
+    options = ("notes",)
+
     def __init__(
         self,
         function: Callable[..., Any],
@@ -86,6 +88,30 @@ class Measure(Compiled):
             raise ParameterError(f"result must be a function from notes to values, but it was {shown(result)}.")
         self.result = result
         self.senses = check_senses(senses)
+
+    @property
+    def sizes(self) -> dict[str, int | None]:
+        """How many numbers its notes are."""
+        return {"notes": self.note_count}
+
+    def value(self, notes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the values of all worlds and robots for their notes, float64 [world, robot, note].
+
+        Raises:
+            ParameterError: If `result` fails, or gives another number of values.
+        """
+        try:
+            values: NDArray[np.float64] = np.asarray(self.result(notes.copy()))
+        except Exception as error:
+            raise explained(error, [self]) from None
+        if values.dtype.kind not in "biuf" or values.shape != notes.shape[:-1]:
+            shape = notes.shape[:-1]
+            found = f"of shape {values.shape}" if values.dtype.kind in "biuf" else "no numbers"
+            raise ParameterError(
+                f"the result of the measure {self.name!r} must be of shape {shape}, a value for each world and "
+                f"robot, but it was {found}. Work along the last axis, as notes[..., 0] does."
+            )
+        return values
 
 
 @overload

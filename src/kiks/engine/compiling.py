@@ -72,9 +72,9 @@ def allocating(function: Callable[..., Any]) -> Any:
     return _njit(**_PART)(function)
 
 
-def callable_kernel(function: Callable[..., Any]) -> Any:
-    """Compile a function that is called by Python or at its address as well."""
-    return _njit(**_OPTIONS)(function)
+def callable_kernel(function: Callable[..., Any], **options: Any) -> Any:
+    """Compile a function that is called by Python or at its address as well; with more options of Numba's."""
+    return _njit(**_OPTIONS | options)(function)
 
 
 def inlined(function: Callable[..., Any]) -> Any:
