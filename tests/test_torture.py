@@ -92,6 +92,7 @@ def test_what_is_refused_breaks_nothing() -> None:
     "words",
     [
         "--only wire --cases 2 --seed 11",
+        "--only compiled --cases 4 --seed 17",
         "--only files --only calls --only messages --cases 3 --seed 12",
         "--only faults.kill_writer --only faults.fill_disk --only faults.no_descriptors --cases 4 --seed 13",
         *(f"--only faults.kill_{scene} --cases 1 --seed 14" for scene in ("server", "desk")),
