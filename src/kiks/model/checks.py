@@ -39,17 +39,24 @@ def check_number(
     Raises:
         ParameterError: If it is no number, not finite, or out of range.
     """
-    if isinstance(number, int | float | Real) and not isinstance(number, bool):
+    is_number = isinstance(number, int | float | Real) and not isinstance(number, bool)
+    if is_number:
         try:
-            value = float(number)
+            value = float(number)  # type: ignore[arg-type] # mypy forgets what is_number says
         except OverflowError:  # a whole number of more than 308 digits
             value = math.inf
         if math.isfinite(value) and least <= value <= most:
             return value
-    rule = "a finite number" if math.isinf(most) else f"from {least:g} to {most:g}"
+    rule = "a finite number" if math.isinf(most) else f"from {_figure(least)} to {_figure(most)}"
     if math.isinf(most) and math.isfinite(least):
         rule += f" of at least {least:g}"
+    if not is_number and math.isfinite(most):
+        rule, advice = f"a number {rule}", ""
     raise ParameterError(f"{name} must be {rule}, but it was {shown(number)}.{advice and ' ' + advice}")
+
+
+def _figure(limit: float) -> str:
+    return str(limit) if isinstance(limit, int) else f"{limit:g}"
 
 
 def check_count(name: str, count: object, least: int = 0, most: int = 1_000_000, advice: str = "") -> int:
@@ -93,16 +100,24 @@ def check_kind(name: str, value: object, kind: type[_Kind], advice: str = "") ->
     raise ParameterError(f"{name} must be {wanted}, but it was {shown(value)}.{advice and ' ' + advice}")
 
 
-_KINDS: dict[type, str] = {str: "a text", bytes: "bytes"}
+_KINDS: dict[type, str] = {str: "a text", bytes: "bytes", bool: "True or False"}
 
 
 def check_heading(name: str, heading_rad: object) -> float:
     """Return a heading [rad], wrapped to one turn if it is beyond `HEADING_KEPT_RAD`.
 
+    A multiple of 15 beyond one turn is a slip: a heading in degrees. A program that counts turns never meets one.
+
     Raises:
-        ParameterError: If it is no finite number.
+        ParameterError: If it is no finite number, or one in degrees.
     """
-    return wrapped(check_number(name, heading_rad))
+    value = check_number(name, heading_rad)
+    if math.tau < abs(value) <= HEADING_KEPT_RAD and value % 15 == 0:
+        raise ParameterError(
+            f"{name} must be in radians, but it was {shown(heading_rad)}: {value:g} degrees are "
+            f"math.radians({value:g}). For radians beyond one turn write {value:g} % math.tau."
+        )
+    return wrapped(value)
 
 
 def wrapped(heading_rad: float) -> float:

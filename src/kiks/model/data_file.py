@@ -157,9 +157,8 @@ def read_file(path: Path, what: str, *, bytes_max: int = BYTES_MAX, error: type[
         if path.is_dir():
             raise error(f"{what} must be a file, but it is a folder. Name a file in it.")
         if not path.is_file():
-            raise error(
-                f"{what} must exist, but there is no such file. Check the name and the folder {str(Path.cwd())!r}."
-            )
+            folder = "" if path.is_absolute() else f" and the folder {str(Path.cwd())!r}"
+            raise error(f"{what} must exist, but there is no such file. Check the name{folder}.")
         with path.open("rb") as file:
             # Python asks for the memory of as many bytes as it is told to read, though there are fewer.
             data = file.read(min(os.fstat(file.fileno()).st_size, bytes_max) + 1)

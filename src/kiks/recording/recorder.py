@@ -16,6 +16,7 @@ from typing import Any
 
 from kiks.ending import postponing_endings
 from kiks.errors import ParameterError
+from kiks.model.atomic_files import path_of
 from kiks.recording import foxglove, motion
 from kiks.recording.entries import block_of
 from kiks.recording.mcap_file import McapFile, Topic
@@ -91,7 +92,7 @@ class RunRecorder:
             earlier.close()
         elif earlier is not None:
             raise ParameterError(f"{sim} must not be recorded yet, but it is. End that recording first.")
-        self.path = Path(path).absolute()
+        self.path = path_of(path, "a recording's file").absolute()
         self.gives_way: bool = gives_way
         self._sim, self._world, self._loop = sim, sim.world, sim.loop
         self._file = McapFile(path, (LOG, MOTION, *foxglove.TOPICS))
