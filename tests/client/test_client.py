@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import fcntl
 import math
 import os
+import pickle
 import resource
 import socket
 from collections.abc import Callable
@@ -214,6 +216,36 @@ def test_functions_of_the_matlab_kiks(sim: kiks.Simulation) -> None:
     assert sim.time_s > 2
 
 
+def test_a_port_whose_settings_are_refused_stays_free(sim: kiks.Simulation) -> None:
+    for settings, words in (
+        ([-1, -5, 1], "baud must be a whole number from 75 to 4000000, but it was -5"),
+        ([-1, 9600.7, 1], r"settings must be \[port, baud, timeout\], the first two whole numbers"),
+        ([-1, 9600, -1], "timeout must be a finite number of at least 0, but it was -1"),
+    ):
+        with pytest.raises(kiks.ParameterError, match=words):
+            kiks.kopen(settings)
+    with pytest.raises(kiks.ParameterError, match="baud must be a whole number from 75"):
+        kiks.Khepera(sim.url(1), baud=10)
+    with pytest.raises(ValueError, match="baudrate must be a whole number from 75"):
+        serial.serial_for_url(sim.url(1), baudrate=10)
+    kiks.Khepera(sim.url(1)).close()
+
+
+@pytest.mark.parametrize("timeout", [-1, "1", math.nan])
+def test_a_wrong_timeout_leaves_no_reply_unread(sim: kiks.Simulation, timeout: float) -> None:
+    ref = kiks.kopen([-1])
+    with pytest.raises(kiks.ParameterError, match="timeout must be a finite number of at least 0"):
+        kiks.ksend("N\n", ref, timeout)
+    assert kiks.ksend("D,1,1\n", ref) == "d"
+    kiks.kclose(ref)
+
+
+def test_a_simulation_is_not_copied(sim: kiks.Simulation) -> None:
+    for copied in (copy.deepcopy, copy.copy, pickle.dumps):
+        with pytest.raises(kiks.ParameterError, match="a simulation cannot be copied or pickled"):
+            copied(sim)
+
+
 def test_polling_the_time_lets_it_pass(sim: kiks.Simulation) -> None:
     ref = kiks.kopen([-1, 9600, 1])
     while kiks.ktime(-1) < 3.0:
@@ -243,7 +275,7 @@ def test_place_checks_its_arguments(sim: kiks.Simulation) -> None:
         sim.pose(2)
     with pytest.raises(kiks.ParameterError, match="Time never runs backwards"):
         sim.run(-1)
-    with pytest.raises(kiks.ParameterError, match=r"seconds must be a number from 0 to 1e\+09, but it was '5'.$"):
+    with pytest.raises(kiks.ParameterError, match=r"seconds must be a number from 0 to 1e9, but it was '5'.$"):
         sim.run("5")  # type: ignore[arg-type]
 
 

@@ -219,7 +219,7 @@ def test_a_contact_lowers_the_reward() -> None:
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: without_contacts(kiks.measures.path_mm, -1), "cost must be from 0 to 1e.06, but it was -1"),
+        (lambda: without_contacts(kiks.measures.path_mm, -1), "cost must be from 0 to 1e6, but it was -1"),
         (lambda: without_contacts(print), "reward must be a kiks.Measure"),  # type: ignore[arg-type]
     ],
 )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable
 from types import TracebackType
 from typing import NamedTuple
 
@@ -12,8 +11,6 @@ from kiks.client.port import TIMEOUT_S, Port, open_port
 from kiks.errors import LinkError, ParameterError, shown
 from kiks.model.checks import SECONDS_MAX, check_count, check_kind, check_number
 from kiks.sim.port import CLOSED, VirtualPort
-
-_Argument = tuple[Callable[..., float], str, int, int, str]
 
 ARRIVAL_MAX_S = 600.0
 """Longest wait for the wheels to arrive [s]: at the usual speed a robot drives a hundred metres in that time."""
@@ -59,7 +56,7 @@ class Khepera:
 
     def __init__(self, port: str | Port, *, baud: int = 9600) -> None:
         if isinstance(port, str):
-            self.port: Port = open_port(port, check_count("baud", baud, 1, 10_000_000, "Usual: 9600 bit/s."))
+            self.port: Port = open_port(port, baud)
         elif all(hasattr(port, name) for name in ("write", "read_until", "close")):
             self.port = port
         else:
@@ -305,43 +302,44 @@ class Khepera:
         )
 
 
-_GAINS = tuple((check_number, name, 0, 32767, "Usual gains are of some thousands.") for name in ("kp", "ki", "kd"))
+_GAINS = tuple((name, 0, 32767, "Usual gains are of some thousands.") for name in ("kp", "ki", "kd"))
 _PROFILE = (
-    (check_number, "speed", 1, 127, "Usual: 20 pulses/10 ms."),
-    (check_number, "acceleration", 1, 255, "Usual: 64 pulses/256 per (10 ms)^2."),
+    ("speed", 1, 127, "Usual: 20 pulses/10 ms."),
+    ("acceleration", 1, 255, "Usual: 64 pulses/256 per (10 ms)^2."),
 )
-_ADDRESS = (check_count, "address", 0, 63, "The extension bus has 64 addresses.")
+_ADDRESS = ("address", 0, 63, "The extension bus has 64 addresses.")
 
 
-def _wheels(least: int, most: int, advice: str) -> tuple[_Argument, ...]:
-    return tuple((check_number, name, least, most, advice) for name in ("left", "right"))
+def _wheels(least: int, most: int, advice: str) -> tuple[tuple[str, int, int, str], ...]:
+    return tuple((name, least, most, advice) for name in ("left", "right"))
 
 
-_ARGUMENTS: dict[str, tuple[_Argument, ...]] = {
+_ARGUMENTS: dict[str, tuple[tuple[str, int, int, str], ...]] = {
     "A": _GAINS,
     "C": _wheels(-8388606, 8388606, "A pulse is 0.08 mm."),
     "F": _GAINS,
     "G": _wheels(-(2**31), 2**31 - 1, "The counters have 32 bits."),
-    "I": ((check_count, "channel", 0, 6, "Channels 3 to 5 are inputs of the General I/O turret."),),
+    "I": (("channel", 0, 6, "Channels 3 to 5 are inputs of the General I/O turret."),),
     "J": _PROFILE * 2,
     "L": (
-        (check_count, "led", 0, 1, "0 is the lateral one, 1 the frontal one."),
-        (check_count, "action", 0, 2, "0 is off, 1 on, 2 toggle."),
+        ("led", 0, 1, "0 is the lateral one, 1 the frontal one."),
+        ("action", 0, 2, "0 is off, 1 on, 2 toggle."),
     ),
     "P": _wheels(-255, 255, "255 is full power."),
     "R": (_ADDRESS,),
-    "W": ((check_count, "data", 0, 255, "It is a byte."), _ADDRESS),
+    "W": (("data", 0, 255, "It is a byte."), _ADDRESS),
 }
-"""How the arguments of commands are checked, their names and ranges: a robot cuts what is outside, or names nothing."""
+"""The arguments of commands, with their ranges and advice. A robot cuts what is outside, or does not say what is."""
 
 
 def _request(letter: str, *numbers: float) -> bytes:
-    """Return the line of a command; quantities are rounded.
+    """Return the line of a command; all but numbers of things are rounded.
 
     Raises:
         ParameterError: If a number is out of its range.
     """
+    check = check_count if letter in "ILRW" else check_number
     words = [letter]
-    for number, (check, name, least, most, advice) in zip(numbers, _ARGUMENTS[letter], strict=True):
+    for number, (name, least, most, advice) in zip(numbers, _ARGUMENTS[letter], strict=True):
         words.append(str(round(check(name, number, least, most, advice))))
     return f"{','.join(words)}\n".encode()

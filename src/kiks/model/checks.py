@@ -9,7 +9,7 @@ import math
 from numbers import Integral, Real
 from typing import TypeVar
 
-from kiks.errors import ParameterError, shown
+from kiks.errors import ParameterError, figure, shown
 
 ROBOTS_MAX = 1000
 """Most robots of a world."""
@@ -47,16 +47,12 @@ def check_number(
             value = math.inf
         if math.isfinite(value) and least <= value <= most:
             return value
-    rule = "a finite number" if math.isinf(most) else f"from {_figure(least)} to {_figure(most)}"
+    rule = "a finite number" if math.isinf(most) else f"from {figure(least)} to {figure(most)}"
     if math.isinf(most) and math.isfinite(least):
-        rule += f" of at least {least:g}"
+        rule += f" of at least {figure(least)}"
     if not is_number and math.isfinite(most):
         rule, advice = f"a number {rule}", ""
     raise ParameterError(f"{name} must be {rule}, but it was {shown(number)}.{advice and ' ' + advice}")
-
-
-def _figure(limit: float) -> str:
-    return str(limit) if isinstance(limit, int) else f"{limit:g}"
 
 
 def check_count(name: str, count: object, least: int = 0, most: int = 1_000_000, advice: str = "") -> int:

@@ -13,7 +13,7 @@ from kiks.engine.scalar_math import uniform
 from kiks.engine.state import BALL, State
 from kiks.errors import ArenaError, ParameterError, shown
 from kiks.model.arena import PAD, Arena
-from kiks.model.checks import check_heading, check_number
+from kiks.model.checks import check_heading
 from kiks.model.free_disc import OVERLAP_MM
 from kiks.model.robot import RobotSpec
 
@@ -69,17 +69,15 @@ class FreeSpace:
         """Check that robots could stand at these poses while bodies are where they are.
 
         Args:
-            poses: x_mm, y_mm, heading_rad, float64 [robot, 3].
+            poses: x_mm, y_mm, heading_rad, float64 [robot, 3], finite.
             whose: Whose poses they are, for the message.
 
         Raises:
-            ParameterError: If a number is not finite, or something is in the way.
+            ParameterError: If a heading is in degrees, or something is in the way.
         """
         discs = self.discs()
         discs[: self._robot_count, :2] = poses[:, :2]
         for index, (x_mm, y_mm, heading_rad) in enumerate(poses.tolist()):
-            check_number("x_mm", x_mm)
-            check_number("y_mm", y_mm)
             check_heading("heading_rad", heading_rad)
             obstacle = self.obstacle(x_mm, y_mm, self._specs[index].body.radius_mm, discs, index, PRESSED_MM)
             if obstacle is not None:

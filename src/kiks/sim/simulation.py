@@ -134,6 +134,11 @@ class Simulation:
         robots = counted(self.robot_count, "robot")
         return f"<{type(self).__name__}: {robots} in {shown(self.arena.name)} at {self.time_s:.3f} s, seed {self.seed}>"
 
+    def __reduce__(self) -> Any:
+        raise ParameterError(
+            "a simulation cannot be copied or pickled. Make another with the same seed, or go back with checkpoint()."
+        )
+
     def _repr_png_(self) -> tuple[bytes, dict[str, int]]:
         """Return a picture of it as it stands, which notebooks show."""
         picture: tuple[bytes, dict[str, int]] = draw_simulation(self)
