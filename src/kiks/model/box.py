@@ -23,7 +23,7 @@ def _whole(value: Any) -> Any:
 
 _WHOLE = BeforeValidator(_whole, json_schema_input_type=int)
 _ADVICE = "Boxes are drawn in whole millimetres."
-SideMm = Annotated[Whole, _WHOLE, Field(ge=SIZE_MIN_MM, le=1_000_000_000, description=_ADVICE)]
+SideMm = Annotated[Whole, _WHOLE, Field(ge=SIZE_MIN_MM, le=1_000_000_000, description=f"{_ADVICE} A robot needs room.")]
 PartMm = Annotated[Whole, _WHOLE, Field(ge=0, le=1_000_000_000, description=_ADVICE)]
 
 
