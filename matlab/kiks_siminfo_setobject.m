@@ -29,6 +29,7 @@ if nargin > 3
 end
 if nargin > 4
     values(4) = kept('The angle', ang);
+    check_heading(values(4));
 end
 ok = 0;
 if is_active()

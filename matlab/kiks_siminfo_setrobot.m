@@ -28,6 +28,7 @@ if ~is_number(x) || ~is_number(y) || ~is_number(radians) || isnan(x) || isnan(y)
     error('kiks:argument', ['x, y [mm] and the heading [rad] must be finite numbers, but they were %s, %s and %s. ' ...
         'Call kiks_siminfo_setrobot(100, 200, 0).'], shown(x), shown(y), shown(radians));
 end
+check_heading(radians);
 if is_active()
     ok = str2double(simulator(sprintf('set_robot %d %.17g %.17g %.17g', number, x, y, radians)));
 end

@@ -83,6 +83,16 @@ def shown(value: object) -> str:
     return text if len(text) <= SHOWN_MAX else f"{text[: SHOWN_MAX - 4]}...{text[-1]}"
 
 
+def figure(limit: float) -> str:
+    """Return how a message writes a limit.
+
+    Example:
+        >>> figure(1e9), figure(8388606), figure(0.001)
+        ('1e9', '8388606', '0.001')
+    """
+    return str(limit) if isinstance(limit, int) else f"{limit:g}".replace("e+0", "e")
+
+
 def counted(count: int, noun: str) -> str:
     """Return how many there are of something.
 

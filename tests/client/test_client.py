@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import copy
 import fcntl
 import math
 import os
+import pickle
 import resource
 import socket
+from collections.abc import Callable
+from typing import Any
 
+import numpy as np
 import pytest
+import serial
 
 import kiks
 from kiks.client.khepera import Status
@@ -18,6 +24,24 @@ from kiks.client.port import _is_readable
 @pytest.fixture
 def sim() -> kiks.Simulation:
     return kiks.Simulation(kiks.Arena.box(2000, 2000), seed=2)
+
+
+class Silent:
+    """A port of a robot that says no more than was put in."""
+
+    def __init__(self, *replies: bytes) -> None:
+        self.sent = b""
+        self._replies = iter(replies)
+
+    def write(self, data: bytes) -> int:
+        self.sent += data
+        return len(data)
+
+    def read_until(self, expected: bytes = b"\n") -> bytes:
+        return next(self._replies, b"")
+
+    def close(self) -> None:
+        pass
 
 
 def test_every_method(sim: kiks.Simulation) -> None:
@@ -50,6 +74,90 @@ def test_every_method(sim: kiks.Simulation) -> None:
         assert robot.time_s == pytest.approx(sim.time_s)
 
 
+@pytest.mark.parametrize("opened", [lambda sim: sim.port(1), lambda sim: sim.url(1), "serial", "real"])
+def test_a_closed_robot_says_so(sim: kiks.Simulation, opened: Any) -> None:
+    """However it was opened; a `Silent` one stands for a real robot's port, which would still take characters."""
+    if opened == "serial":
+        port: Any = serial.serial_for_url(sim.url(1), timeout=1)
+    else:
+        port = Silent(b"h,0,0\r\n") if opened == "real" else opened(sim)
+    with kiks.Khepera(port) as robot:
+        assert robot.encoders() == (0, 0)
+    for use in (robot.encoders, robot.proximity, robot.stop, lambda: robot.send("B"), lambda: robot.turret(1, "B")):
+        with pytest.raises(kiks.LinkError, match="must be open to be used, but this one is closed"):
+            use()
+    robot.close()
+
+
+OUT_OF_RANGE: list[tuple[Callable[[kiks.Khepera], object], str]] = [
+    (lambda robot: robot.set_speed(0, "5"), "right must be a finite number, but it was '5'"),
+    (lambda robot: robot.set_speed(math.nan, 0), "left must be a finite number, but it was nan"),
+    (lambda robot: robot.set_pwm(0, -500), "right must be from -255 to 255, but it was -500"),
+    (lambda robot: robot.move_to(10**12, 0), "left must be from -8388606 to 8388606, but it was 1000000000000"),
+    (lambda robot: robot.move_to(0, 0, wait=1), "wait must be True or False, but it was 1"),
+    (lambda robot: robot.move_to(0, 0, poll_s=-1), "poll_s must be from 0 to"),
+    (lambda robot: robot.set_encoders(2**31), "left must be from -2147483648 to 2147483647, but it was 2147483648"),
+    (lambda robot: robot.set_profile(-1, 0), "speed must be from 1 to 127, but it was -1"),
+    (lambda robot: robot.set_profile(20, 256), "acceleration must be from 1 to 255, but it was 256"),
+    (lambda robot: robot.set_speed_gains(-1), "kp must be from 0 to 32767, but it was -1"),
+    (lambda robot: robot.set_position_gains(1, 2, 40000), "kd must be from 0 to 32767, but it was 40000"),
+    (lambda robot: robot.analog(9), "channel must be a whole number from 0 to 6, but it was 9"),
+    (lambda robot: robot.led(5, 1), "led must be a whole number from 0 to 1, but it was 5"),
+    (lambda robot: robot.led(1, 0.5), "action must be a whole number from 0 to 2, but it was 0.5"),
+    (lambda robot: robot.read_bus(64), "address must be a whole number from 0 to 63, but it was 64"),
+    (lambda robot: robot.write_bus(256, 0), "data must be a whole number from 0 to 255, but it was 256"),
+    (lambda robot: robot.turret(100, "N"), "number must be a whole number from 0 to 99, but it was 100"),
+    (lambda robot: robot.turret(1, ""), "order must be a letter and numbers such as 'N' or 'D,1', but it was ''"),
+    (lambda robot: robot.turret(1, "N\nN"), "order must be a letter and numbers"),
+    (lambda robot: robot.pause(-1), "seconds must be from 0 to"),
+    (lambda robot: robot.read_numbers(b"N\n", -1), "count must be a whole number from 0"),
+]
+
+
+@pytest.mark.parametrize(("call", "words"), OUT_OF_RANGE)
+def test_an_argument_is_blamed_by_its_name_before_anything_is_sent(
+    call: Callable[[kiks.Khepera], object], words: str
+) -> None:
+    port = Silent()
+    with pytest.raises(kiks.ParameterError, match=words):
+        call(kiks.Khepera(port))
+    assert port.sent == b""
+
+
+def test_quantities_are_rounded_and_speeds_are_cut() -> None:
+    port = Silent(b"d\r\n", b"c\r\n", b"g\r\n", b"p\r\n")
+    robot = kiks.Khepera(port)
+    robot.set_speed(127.9, -1e12)
+    robot.move_to(1.9, np.float32(-2.6))
+    robot.set_encoders(0.6, np.int16(7))
+    robot.set_pwm(12.4, -254.7)
+    assert port.sent == b"D,127,-127\nC,2,-3\nG,1,7\nP,12,-255\n"
+
+
+def test_the_robot_takes_the_largest_arguments_as_they_are(sim: kiks.Simulation) -> None:
+    """The client's ranges are those of the firmware: nothing within them is cut or refused."""
+    robot = kiks.Khepera(sim.port(1))
+    state: Any = sim.world.state.robots[0, 0]
+    robot.set_pwm(-255, 255)
+    assert state["pwm_setpoint"].tolist() == [-255, 255]
+    robot.set_speed(-127, 127)
+    assert state["speed_setpoint"].tolist() == [-127, 127]
+    robot.set_profile(127, 255)
+    assert (state["profile_speed"].tolist(), state["profile_acceleration"].tolist()) == ([127, 127], [255, 255])
+    robot.set_speed_gains(32767, 0, 32767)
+    assert state["speed_gains"].tolist() == [32767, 0, 32767]
+    robot.move_to(-8388606, 8388606)
+    assert state["target_pulses"].tolist() == [-8388606, 8388606]
+    robot.set_pwm(0, 0)
+    robot.pause(1.0)
+    robot.set_encoders(-(2**31), 2**31 - 1)
+    assert robot.encoders() == (-(2**31), 2**31 - 1)
+    assert (robot.analog(6), robot.read_bus(63)) == (100, 0)
+    robot.led(1, 2)
+    robot.write_bus(255, 63)
+    assert sim.world.state.robots["bus"][0, 0, 63] == 255
+
+
 def test_move_to_fails_if_the_wheels_do_not_arrive() -> None:
     sim = kiks.Simulation(kiks.Arena.box(300, 300), seed=1)
     with kiks.Khepera(sim.port(1)) as robot:
@@ -71,18 +179,8 @@ def test_error_shows_an_unexpected_reply(sim: kiks.Simulation) -> None:
 
 
 def test_error_shows_an_incomplete_reply() -> None:
-    class Dead:
-        def write(self, data: bytes) -> int:
-            return len(data)
-
-        def read_until(self, expected: bytes = b"\n") -> bytes:
-            return b"h,1"
-
-        def close(self) -> None:
-            pass
-
     with pytest.raises(kiks.LinkError, match=r"must come before the timeout, but only b'h,1' came. Check the cable"):
-        kiks.Khepera(Dead()).encoders()
+        kiks.Khepera(Silent(b"h,1")).encoders()
 
 
 def test_error_names_a_port_that_cannot_be_opened() -> None:
@@ -118,6 +216,36 @@ def test_functions_of_the_matlab_kiks(sim: kiks.Simulation) -> None:
     assert sim.time_s > 2
 
 
+def test_a_port_whose_settings_are_refused_stays_free(sim: kiks.Simulation) -> None:
+    for settings, words in (
+        ([-1, -5, 1], "baud must be a whole number from 75 to 4000000, but it was -5"),
+        ([-1, 9600.7, 1], r"settings must be \[port, baud, timeout\], the first two whole numbers"),
+        ([-1, 9600, -1], "timeout must be a finite number of at least 0, but it was -1"),
+    ):
+        with pytest.raises(kiks.ParameterError, match=words):
+            kiks.kopen(settings)
+    with pytest.raises(kiks.ParameterError, match="baud must be a whole number from 75"):
+        kiks.Khepera(sim.url(1), baud=10)
+    with pytest.raises(ValueError, match="baudrate must be a whole number from 75"):
+        serial.serial_for_url(sim.url(1), baudrate=10)
+    kiks.Khepera(sim.url(1)).close()
+
+
+@pytest.mark.parametrize("timeout", [-1, "1", math.nan])
+def test_a_wrong_timeout_leaves_no_reply_unread(sim: kiks.Simulation, timeout: float) -> None:
+    ref = kiks.kopen([-1])
+    with pytest.raises(kiks.ParameterError, match="timeout must be a finite number of at least 0"):
+        kiks.ksend("N\n", ref, timeout)
+    assert kiks.ksend("D,1,1\n", ref) == "d"
+    kiks.kclose(ref)
+
+
+def test_a_simulation_is_not_copied(sim: kiks.Simulation) -> None:
+    for copied in (copy.deepcopy, copy.copy, pickle.dumps):
+        with pytest.raises(kiks.ParameterError, match="a simulation cannot be copied or pickled"):
+            copied(sim)
+
+
 def test_polling_the_time_lets_it_pass(sim: kiks.Simulation) -> None:
     ref = kiks.kopen([-1, 9600, 1])
     while kiks.ktime(-1) < 3.0:
@@ -139,12 +267,16 @@ def test_place_checks_its_arguments(sim: kiks.Simulation) -> None:
         sim.place(1, 20, 500, 0)
     with pytest.raises(kiks.ParameterError, match="must be free"):
         sim.place(1, -500, 500, 0)
+    with pytest.raises(kiks.ParameterError, match=r"at \(5000, 0\) mm it is outside of the arena. The arena is 2000 x"):
+        sim.place(1, 5000, 0, 0)
     with pytest.raises(kiks.ParameterError, match="x_mm must be a finite number"):
         sim.place(1, math.nan, 500, 0)
     with pytest.raises(kiks.ParameterError, match="This simulation has robot 1"):
         sim.pose(2)
     with pytest.raises(kiks.ParameterError, match="Time never runs backwards"):
         sim.run(-1)
+    with pytest.raises(kiks.ParameterError, match=r"seconds must be a number from 0 to 1e9, but it was '5'.$"):
+        sim.run("5")  # type: ignore[arg-type]
 
 
 def test_arena_must_be_an_arena() -> None:

@@ -267,6 +267,14 @@ def test_a_closed_desk_tells_its_browsers_and_releases_its_world() -> None:
     assert sim.now_ns == now_ns + 100_000_000_000
 
 
-def test_an_invalid_speed_is_refused() -> None:
-    with pytest.raises(ParameterError, match="speed must be a number from"):
-        kiks.Simulation().show(speed=-1, browser=False)
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"speed": -1}, "speed must be a number from 0.001 to 1000"),
+        ({"port": -1}, "port must be a whole number from 0 to 65535, but it was -1. Leave it out for a free one"),
+        ({"is_alive": "no"}, "is_alive must be True or False, but it was 'no'"),
+    ],
+)
+def test_invalid_options_are_refused(options: dict[str, Any], words: str) -> None:
+    with pytest.raises(ParameterError, match=words):
+        kiks.Simulation().show(**{"browser": False} | options)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import gymnasium
@@ -72,7 +74,7 @@ def test_the_error_names_a_missing_package(missing: str, module: str) -> None:
     assert "pip install '.[learn]'" in found.stderr
 
 
-@pytest.mark.parametrize("name", ["kiks/Avoid-v0", "kiks/Maze-v0"])
+@pytest.mark.parametrize("name", ["kiks/Avoid-v0", "kiks/Maze-v0", "kiks/Light-v0", "kiks/Football-v0"])
 def test_single_and_vector_environments_have_the_same_episodes(name: str) -> None:
     many = gymnasium.make_vec(name, num_envs=9, max_episode_steps=7, threads=2)
     assert isinstance(many, KheperaVectorEnv)
@@ -154,6 +156,35 @@ def test_autoreset_modes(mode: AutoresetMode) -> None:
     assert seen in envs.observation_space
 
 
+def test_each_episode_draws_one_of_the_arenas_with_its_lamps() -> None:
+    dark = kiks.Arena.box(400, 300)
+    lit, bright = (replace(dark, lamps=((200, 150, 9.0), (150, 150, 9.0))[:count]) for count in (1, 2))
+    env, many = (make(arenas=(dark, lit, bright)) for make in (partial(KheperaEnv, "Avoid"), partial(vector, 30)))
+    env.reset(seed=1)
+    many.reset(seed=1)
+    for each in (env, many):
+        met = set()
+        for _ in range(30):
+            batch = each.episodes.batch
+            for world, arena in enumerate(batch.arena_indices.tolist()):
+                assert np.count_nonzero(batch.lamps[world, :, 2]) == arena
+                met.add(arena)
+            each.reset()
+        assert met == {0, 1, 2}
+
+
+def test_the_action_of_a_world_that_resets_is_ignored() -> None:
+    one, other = (vector(2, max_episode_steps=1) for _ in range(2))
+    for envs in (one, other):
+        envs.reset(seed=1)
+        envs.step(np.zeros((2, 2), np.float32))
+    seen = [one.step(np.zeros((2, 2), np.float32)), other.step(np.array([[1.5, np.nan], [np.inf, 0]], np.float32))]
+    np.testing.assert_array_equal(seen[0][0], seen[1][0])
+    assert one.episodes.batch.state_hash(1) == other.episodes.batch.state_hash(1)
+    with pytest.raises(ParameterError, match=r"from -1 to 1, but among them was 1\.5"):
+        one.step(np.full((2, 2), 1.5, np.float32))
+
+
 def test_wrappers_of_gymnasium_accept_the_vector_environment() -> None:
     envs = gymnasium.wrappers.vector.RecordEpisodeStatistics(
         gymnasium.make_vec("kiks/Avoid-v0", num_envs=2, max_episode_steps=3)
@@ -188,7 +219,7 @@ def test_a_contact_lowers_the_reward() -> None:
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: without_contacts(kiks.measures.path_mm, -1), "cost must be from 0 to 1e.06, but it was -1"),
+        (lambda: without_contacts(kiks.measures.path_mm, -1), "cost must be from 0 to 1e6, but it was -1"),
         (lambda: without_contacts(print), "reward must be a kiks.Measure"),  # type: ignore[arg-type]
     ],
 )

@@ -357,10 +357,10 @@ REFUSED = [
     ("picture = 'sub/maze.png'\nmm_per_pixel = 'x'", r"mm_per_pixel must be a number from 0.1 to 100, but it was 'x'"),
     ("picture = 'sub/maze.png'\nmm_per_pixel = nan", r"mm_per_pixel must be a number"),
     ("size_mm = 3", r"size_mm must be two whole numbers in mm, but it was 3. Give size_mm = "),
-    ("size_mm = [300, inf]", r"size_mm\[1\] must be a whole number from 1 to 1000000000, but it was inf"),
+    ("size_mm = [300, inf]", r"size_mm\[1\] must be a whole number from 100 to 1000000000, but it was inf"),
     (
         "size_mm = [300.5, 200]",
-        r"size_mm\[0\] must be a whole number from 1 to .* but it was 300.5. Boxes are drawn in whole",
+        r"size_mm\[0\] must be a whole number from 100 to .* but it was 300.5. Boxes are drawn in whole",
     ),
     (
         f"size_mm = [1{'0' * 400}, 200]",

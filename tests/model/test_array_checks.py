@@ -66,7 +66,7 @@ def test_what_numpy_saves_is_read(tmp_path: Path, compress: bool) -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"row": [1.5, np.nan, 7]}, "row must be finite numbers from -10 to 1e+06 [row], but it was nan at [1]. Count"),
+        ({"row": [1.5, np.nan, 7]}, "row must be finite numbers from -10 to 1e6 [row], but it was nan at [1]. Count"),
         ({"row": [1.5, 7, -np.inf]}, "but it was -inf at [2]."),
         ({"row": [1, 2, 3j]}, "but it was of type 'complex128'."),
         ({"row": ["a", "b", "c"]}, "but it was of type '<U1'."),

@@ -85,6 +85,8 @@ def of_simulation(sim: Simulation, h: Any) -> dict[str, Callable[[], Any]]:
         "record paths": lambda: sim.record_paths(h),
         "set arena": lambda: sim.set_arena(h),
         "add robot": lambda: sim.add_robot(h),
+        "add robot pose": lambda: Simulation(ARENA).add_robot(pose=h),
+        "add robot heading": lambda: Simulation(ARENA).add_robot(pose=(150, 130, h)),
         "ball x": lambda: sim.add_ball(h, 130),
         "ball radius": lambda: sim.add_ball(150, 130, radius_mm=h),
         "ball friction": lambda: sim.add_ball(150, 130, friction_mm_s2=h),
@@ -298,6 +300,42 @@ def test_headings_are_wrapped_at_every_door(heading_rad: float) -> None:
     assert (batch.reset([1], starts=(250, 250, heading_rad)) >= 0).all()
 
 
+@pytest.mark.parametrize("degrees", [90, 90.0, -45, 180, 270, np.int64(360), np.float32(30)])
+def test_a_heading_in_degrees_is_refused_at_every_door(degrees: float) -> None:
+    sim = Simulation(ARENA, seed=1)
+    ball = sim.add_ball(100, 100)
+    batch = kiks.Batch(ARENA, 1)
+    for door in (
+        lambda: sim.place(1, 250, 250, degrees),
+        lambda: sim.move_body(ball, 100, 100, speed_mm_s=10, heading_rad=degrees),
+        lambda: sim.add_robot(pose=(400, 400, degrees)),
+        lambda: sim.proximity_at(1, np.array([[250, 250, degrees]])),
+        lambda: Arena(ARENA.brightness, 1.0, "turned", starts=((250, 250, degrees),)),  # type: ignore[arg-type]
+        lambda: kiks.Batch(ARENA, 1, starts=(250, 250, degrees)),
+        lambda: batch.reset(starts=[[(250, 250, degrees)]]),
+    ):
+        with pytest.raises(kiks.ParameterError, match=rf"heading_rad must be in radians.*math.radians\({degrees:g}\)"):
+            door()
+    assert sim.robot_count == 1
+
+
+@given(st.floats(-30, 30), st.integers(-4, 4))
+def test_a_heading_that_counts_turns_is_kept(heading_rad: float, turns: int) -> None:
+    turned = heading_rad + turns * math.tau
+    if abs(turned) <= math.tau or turned % 15:
+        assert check_heading("it", turned) == turned
+
+
+def test_a_robot_can_be_put_back_where_it_was_after_many_turns() -> None:
+    sim = Simulation(ARENA, seed=1)
+    robot = kiks.Khepera(sim.port(1))
+    robot.set_speed(-40, 40)
+    for _ in range(20):
+        robot.pause(0.5)
+        sim.place(1, *sim.pose(1))
+    assert sim.pose(1)[2] > 3 * math.tau
+
+
 def test_a_far_start_is_the_same_in_a_simulation_and_a_batch() -> None:
     turned = Arena(ARENA.brightness, 1.0, "turned", starts=[(250, 250, 3e6)])  # type: ignore[arg-type]
     assert kiks.Batch(turned, 1).state_hash(0) == Simulation(turned).state_hash()
@@ -332,7 +370,11 @@ def test_a_number_that_passes_is_finite_and_in_range(number: Any) -> None:
         assert value == number
 
 
-@given(st.floats(allow_nan=False, allow_infinity=False))
+@given(
+    st.floats(allow_nan=False, allow_infinity=False).filter(
+        lambda heading_rad: heading_rad % 15 or abs(heading_rad) > 1e6
+    )
+)
 def test_a_heading_is_always_one_whose_sine_is_exact(heading_rad: float) -> None:
     assert abs(check_heading("it", heading_rad)) <= HEADING_KEPT_RAD
 

@@ -91,12 +91,34 @@ def test_robot_has_one_client() -> None:
     kiks.Khepera(sim.url(1)).stop()
 
 
+def test_a_closed_port_says_so() -> None:
+    sim = kiks.Simulation()
+    port = sim.port(1)
+    assert sim.port(1) is port
+    port.close()
+    port.close()
+    for use in (
+        lambda: port.write(b"N\n"),
+        port.readline,
+        lambda: port.in_waiting,
+        port.reset_input_buffer,
+        lambda: port.baudrate,
+        lambda: port.time_s,
+        lambda: port.sleep(1.0),
+    ):
+        with pytest.raises(kiks.LinkError, match=r"a port must be open to be used, but this one is closed"):
+            use()
+    assert sim.time_s == 0.0
+    assert sim.port(1).write(b"N\n") == 2
+
+
 def test_close_drops_replies_on_their_way() -> None:
     sim = kiks.Simulation()
     port = sim.port(1)
     port.write(b"N\nL,0,1\n")
     port.close()
     sim.run(1.0)
+    port = sim.port(1)
     assert port.in_waiting == 0
     assert sim.world.state.robots["led"][0, 0, 0] == 1
     port.write(b"B\n")
@@ -112,6 +134,7 @@ def test_close_drops_unread_replies_and_the_robot_drives_on() -> None:
     begin = sim.pose(1)
     sim.run(1.0)
     assert sim.pose(1)[1] - begin[1] == pytest.approx(40, abs=2)
+    port = sim.port(1)
     port.timeout = 1.0
     port.write(b"\nE\n")
     assert port.readline() == b"e,5,5\r\n"

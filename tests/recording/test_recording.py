@@ -355,6 +355,15 @@ def test_another_run_is_told_with_its_first_tick(tmp_path: Path) -> None:
     assert check_recording(Recording(tmp_path / "run.mcap").log) == Checked(5)
 
 
+def test_a_closed_recording_takes_no_bookmark(tmp_path: Path) -> None:
+    recorder = Simulation(seed=1).record(tmp_path / "run.mcap")
+    with pytest.raises(ParameterError, match="note must be a text, but it was 5"):
+        recorder.mark(5)
+    recorder.close()
+    with pytest.raises(ParameterError, match="a recording must be open to be marked, but this one is closed"):
+        recorder.mark("late")
+
+
 def test_foxglove_opens_it(tmp_path: Path) -> None:
     """The library's reader finds all messages, and each keeps its schema."""
     sim = Simulation(Arena.box(300, 200), robots=2, seed=1)

@@ -103,7 +103,7 @@ def test_a_thing_comes_and_goes_and_keeps_its_number(sim):
         (lambda sim: sim.remove_body("ball"), "body must be the number"),
         (lambda sim: sim.add_lamp(2000, 3), "lamp 1 must lie inside"),
         (lambda sim: sim.add_lamp(20, 3, 0), "power_w must be a number above 0"),
-        (lambda sim: sim.remove_lamp(1), "lamp must be a row of lamps from 1 to 0"),
+        (lambda sim: sim.remove_lamp(1), "lamp must be the row of a lamp, but it was 1. There is none"),
         (lambda sim: sim.place(1, *sim.poses()[1]), "the place of robot 1 must be free, .* robot 2 is 55.0 mm inside"),
         (lambda sim: sim.record_paths(0.015), "every_s must be a multiple of 0.01 s"),
         (lambda sim: sim.paths(), "paths must be recorded"),

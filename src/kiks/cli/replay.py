@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from kiks.cli.desk import open_desk
+from kiks.cli.desk import NoWait, open_desk
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.options import say, written_file
 from kiks.errors import ParameterError, counted
@@ -29,6 +29,7 @@ def replay(
     ] = False,
     start: Annotated[float, typer.Option(help="Where to begin [s of simulated time].", min=0)] = 0.0,
     speed: Annotated[float, typer.Option(help="Simulated seconds per real second.", min=0.001, max=1000)] = 1.0,
+    no_wait: NoWait = False,
 ) -> None:
     """Show a recorded run again on the desk, or check that it is the same again.
 
@@ -52,7 +53,7 @@ def replay(
     world = Replay(recording.log, recording.log.begin_ns).let_go()
     desk = Desk(world, project=recording.project, speed=speed, owns_world=True, may_run_programs=True)
     desk.looking.show_recording(file, recording.time_ns(max(start, s_from_ns(recording.log.begin_ns))))
-    open_desk(desk)
+    open_desk(desk, waits=not no_wait)
 
 
 def _check(recording: Recording) -> int:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import re
 import time
 from types import TracebackType
 from typing import NamedTuple
 
 from kiks.client.port import TIMEOUT_S, Port, open_port
 from kiks.errors import LinkError, ParameterError, shown
-from kiks.firmware.receiver import LINE_LIMIT
 from kiks.model.checks import SECONDS_MAX, check_count, check_kind, check_number
-from kiks.sim.port import VirtualPort
+from kiks.sim.port import CLOSED, VirtualPort
 
 ARRIVAL_MAX_S = 600.0
 """Longest wait for the wheels to arrive [s]: at the usual speed a robot drives a hundred metres in that time."""
@@ -39,8 +39,10 @@ class Khepera:
         baud: Speed of a port that is opened by name [bit/s].
 
     Raises:
-        LinkError: If the port cannot be opened; from every method, if the robot does not send the expected reply.
-        ParameterError: If `port` is not a port; from every method, if a number does not fit into a command.
+        LinkError: If the port cannot be opened; from every method, if it was closed or the robot does not send the
+            expected reply.
+        ParameterError: If `port` is not a port; from every method, if an argument is out of its range, before
+            anything is sent.
 
     Example:
         >>> import kiks
@@ -54,7 +56,7 @@ class Khepera:
 
     def __init__(self, port: str | Port, *, baud: int = 9600) -> None:
         if isinstance(port, str):
-            self.port: Port = open_port(port, check_count("baud", baud, 1, 10_000_000, "Usual: 9600 bit/s."))
+            self.port: Port = open_port(port, baud)
         elif all(hasattr(port, name) for name in ("write", "read_until", "close")):
             self.port = port
         else:
@@ -66,8 +68,10 @@ class Khepera:
             self.port.timeout = TIMEOUT_S
 
     def close(self) -> None:
-        """Close the port. The robot keeps its last speed: nothing on board stops it."""
+        """Close the port. The robot keeps its last speed: nothing on board stops it. Other methods then raise."""
         self.port.close()
+        if not isinstance(self.port, VirtualPort):
+            self.port = CLOSED
 
     def __enter__(self) -> Khepera:
         return self
@@ -94,13 +98,9 @@ class Khepera:
     # ---- motion ----
 
     def set_speed(self, left: float, right: float) -> None:
-        """Set the wheel speeds (D) [pulses/10 ms]. They are rounded; 1 is 8 mm/s, 127 is the largest."""
-        speeds: tuple[float, float]
-        try:
-            speeds = round(left), round(right)
-        except (TypeError, ValueError, OverflowError):
-            speeds = left, right  # `_format_command` raises the error
-        self._command(_format_command(b"D,%d,%d\n", *speeds))
+        """Set the wheel speeds (D) [pulses/10 ms]: rounded, and cut to ±127 as controllers' are; 1 is 8 mm/s."""
+        speeds = check_number("left", left), check_number("right", right)
+        self._command(b"D,%d,%d\n" % tuple(round(min(max(-127.0, speed), 127.0)) for speed in speeds))
 
     def stop(self) -> None:
         """Set both speeds to 0."""
@@ -117,11 +117,11 @@ class Khepera:
         return left, right
 
     def set_encoders(self, left: int = 0, right: int = 0) -> None:
-        """Set the position counters [pulses] (G)."""
-        self._command(_format_command(b"G,%d,%d\n", left, right))
+        """Set the position counters [pulses] (G). Numbers are rounded."""
+        self._command(_request("G", left, right))
 
     def move_to(self, left: int, right: int, *, wait: bool = False, poll_s: float = 0.02) -> None:
-        """Move the wheels to counter readings [pulses] along a trapezoid of speed (C).
+        """Move the wheels to counter readings [pulses] along a trapezoid of speed (C). They are rounded.
 
         Args:
             left: Target of the left wheel.
@@ -133,9 +133,9 @@ class Khepera:
             ParameterError: If an argument is not a number, or is out of range.
             LinkError: If the reply is unexpected, or the wheels do not arrive within `ARRIVAL_MAX_S`.
         """
-        if not isinstance(wait, int):
-            raise ParameterError(f"wait must be True or False, but it was {shown(wait)}.")
-        self._command(_format_command(b"C,%d,%d\n", left, right))
+        check_kind("wait", wait, bool)
+        check_number("poll_s", poll_s, 0, SECONDS_MAX)
+        self._command(_request("C", left, right))
         end_s = self.time_s + ARRIVAL_MAX_S
         while wait and not all(motor.on_target for motor in self.status()):
             if self.time_s > end_s:
@@ -146,19 +146,19 @@ class Khepera:
 
     def set_profile(self, speed: int = 20, acceleration: int = 64) -> None:
         """Set the trapezoid of both wheels (J): speed [pulses/10 ms], acceleration [pulses/256 per (10 ms)^2]."""
-        self._command(_format_command(b"J,%d,%d,%d,%d\n", speed, acceleration, speed, acceleration))
+        self._command(_request("J", speed, acceleration, speed, acceleration))
 
     def set_pwm(self, left: int, right: int) -> None:
         """Set the PWM of the motors, -255 to 255, without a controller (P)."""
-        self._command(_format_command(b"P,%d,%d\n", left, right))
+        self._command(_request("P", left, right))
 
     def set_speed_gains(self, kp: int = 3800, ki: int = 800, kd: int = 100) -> None:
         """Set the gains of the speed controllers (A)."""
-        self._command(_format_command(b"A,%d,%d,%d\n", kp, ki, kd))
+        self._command(_request("A", kp, ki, kd))
 
     def set_position_gains(self, kp: int = 3000, ki: int = 20, kd: int = 4000) -> None:
         """Set the gains of the position controllers (F)."""
-        self._command(_format_command(b"F,%d,%d,%d\n", kp, ki, kd))
+        self._command(_request("F", kp, ki, kd))
 
     def status(self) -> tuple[Status, Status]:
         """Return the reports of the two controllers, left and right (K)."""
@@ -177,13 +177,13 @@ class Khepera:
 
     def analog(self, channel: int) -> int:
         """Return an analogue input [4 mV], channel 0 to 6 (I)."""
-        return self._query(_format_command(b"I,%d\n", channel), 1)[0]
+        return self._query(_request("I", channel), 1)[0]
 
     # ---- other commands ----
 
     def led(self, led: int, action: int) -> None:
         """Switch an LED (L): 0 lateral, 1 frontal; 0 off, 1 on, 2 toggle."""
-        self._command(_format_command(b"L,%d,%d\n", led, action))
+        self._command(_request("L", led, action))
 
     def version(self) -> tuple[str, str]:
         """Return the versions of BIOS and protocol (B)."""
@@ -194,16 +194,16 @@ class Khepera:
 
     def read_bus(self, address: int) -> int:
         """Return a byte of the extension bus (R)."""
-        return self._query(_format_command(b"R,%d\n", address), 1)[0]
+        return self._query(_request("R", address), 1)[0]
 
     def write_bus(self, data: int, address: int) -> None:
         """Write a byte to the extension bus (W)."""
-        self._command(_format_command(b"W,%d,%d\n", data, address))
+        self._command(_request("W", data, address))
 
     def turret(self, number: int, order: str) -> list[int]:
         """Pass an order such as 'N' or 'D,1' to a turret (T); return the values of its reply."""
-        if not isinstance(order, str):
-            raise ParameterError(f"order must be a text such as 'N' or 'D,1', but it was {shown(order)}.")
+        if not isinstance(order, str) or not re.fullmatch(r"[A-Za-z](,[ 0-9+-]+)*", order):
+            raise ParameterError(f"order must be a letter and numbers such as 'N' or 'D,1', but it was {shown(order)}.")
         request = f"T,{check_count('number', number, 0, 99)},{order}"
         reply = self.send(request)
         start = f"t,{number},{order[:1].lower()}"
@@ -261,7 +261,7 @@ class Khepera:
             ParameterError: If the request is not bytes, or the count is not a whole number.
             LinkError: If the reply is unexpected, or does not come.
         """
-        if request.__class__ is not bytes or count.__class__ is not int:
+        if request.__class__ is not bytes or count.__class__ is not int or count < 0:
             check_kind("request", request, bytes)
             count = check_count("count", count)
         reply = self.port.read_until(b"\n")
@@ -302,22 +302,44 @@ class Khepera:
         )
 
 
-def _format_command(form: bytes, *numbers: float) -> bytes:
-    """Insert numbers into a command.
+_GAINS = tuple((name, 0, 32767, "Usual gains are of some thousands.") for name in ("kp", "ki", "kd"))
+_PROFILE = (
+    ("speed", 1, 127, "Usual: 20 pulses/10 ms."),
+    ("acceleration", 1, 255, "Usual: 64 pulses/256 per (10 ms)^2."),
+)
+_ADDRESS = ("address", 0, 63, "The extension bus has 64 addresses.")
 
-    Args:
-        form: The command, with `%d` for each number.
-        *numbers: The numbers.
+
+def _wheels(least: int, most: int, advice: str) -> tuple[tuple[str, int, int, str], ...]:
+    return tuple((name, least, most, advice) for name in ("left", "right"))
+
+
+_ARGUMENTS: dict[str, tuple[tuple[str, int, int, str], ...]] = {
+    "A": _GAINS,
+    "C": _wheels(-8388606, 8388606, "A pulse is 0.08 mm."),
+    "F": _GAINS,
+    "G": _wheels(-(2**31), 2**31 - 1, "The counters have 32 bits."),
+    "I": (("channel", 0, 6, "Channels 3 to 5 are inputs of the General I/O turret."),),
+    "J": _PROFILE * 2,
+    "L": (
+        ("led", 0, 1, "0 is the lateral one, 1 the frontal one."),
+        ("action", 0, 2, "0 is off, 1 on, 2 toggle."),
+    ),
+    "P": _wheels(-255, 255, "255 is full power."),
+    "R": (_ADDRESS,),
+    "W": (("data", 0, 255, "It is a byte."), _ADDRESS),
+}
+"""The arguments of commands, with their ranges and advice. A robot cuts what is outside, or does not say what is."""
+
+
+def _request(letter: str, *numbers: float) -> bytes:
+    """Return the line of a command; all but numbers of things are rounded.
 
     Raises:
-        ParameterError: If an argument is not a number, or the line is longer than the robot accepts.
+        ParameterError: If a number is out of its range.
     """
-    try:
-        request = form % numbers
-    except (TypeError, ValueError, OverflowError):
-        request = b""
-    if not 0 < len(request) <= LINE_LIMIT:
-        raise ParameterError(
-            f"a command must be given numbers of a few digits, but {form[:1].decode()} was given {shown(numbers)}."
-        )
-    return request
+    check = check_count if letter in "ILRW" else check_number
+    words = [letter]
+    for number, (name, least, most, advice) in zip(numbers, _ARGUMENTS[letter], strict=True):
+        words.append(str(round(check(name, number, least, most, advice))))
+    return f"{','.join(words)}\n".encode()

@@ -49,9 +49,10 @@ def kopen(settings: Sequence[float]) -> Reference:
     """
     values = check_numbers("settings", settings).tolist()
     is_list = isinstance(values, list) and 1 <= len(values) <= 3
-    if not is_list or isinstance(values[0], list) or abs(values[0]) > 9999 or values[0] != int(values[0]):
+    if not is_list or isinstance(values[0], list) or abs(values[0]) > 9999 or any(each % 1 for each in values[:2]):
         raise ParameterError(
-            f"settings must be [port, baud, timeout], but it was {shown(settings)}. Simulated: [-1, 9600, 1]."
+            f"settings must be [port, baud, timeout], the first two whole numbers, but it was {shown(settings)}. "
+            "Simulated: [-1, 9600, 1]."
         )
     number = int(values[0])
     baud = int(values[1]) if len(values) > 1 else 9600
@@ -82,7 +83,7 @@ def ksend(text: str, ref: Sequence[float], timeout: float | None = None) -> str:
         The reply, or the part of it that arrived before the timeout.
 
     Raises:
-        ParameterError: If `text` is not a string.
+        ParameterError: If `text` is not a string, or the timeout is out of range; nothing is sent then.
         LinkError: If the port is not open.
     """
     check_kind("text", text, str, r'Write ksend("N\n", ref).')
@@ -91,14 +92,14 @@ def ksend(text: str, ref: Sequence[float], timeout: float | None = None) -> str:
     if not text:
         _now_s(port)
         return ""
-    port.write(text.encode("latin-1", errors="replace"))
-    if not text.endswith(("\n", "\r")):
-        return ""
     holder: Any = port if isinstance(port, VirtualPort) else getattr(port, "port", port)
     before = holder.timeout
     if timeout is not None:
-        holder.timeout = timeout
+        holder.timeout = check_number("timeout", timeout, 0)
     try:
+        port.write(text.encode("latin-1", errors="replace"))
+        if not text.endswith(("\n", "\r")):
+            return ""
         return port.read_until(b"\n").rstrip(b"\r\n").decode("ascii", errors="replace")
     finally:
         holder.timeout = before

@@ -9,6 +9,8 @@ import time
 from typing import Any, Protocol
 
 from kiks.errors import LinkError, shown
+from kiks.model.checks import check_count
+from kiks.sim.port import BAUD_MAX, BAUD_MIN
 
 TIMEOUT_S = 2.0
 """Default timeout of a reply [s]: the longest, 264 characters at 9600 baud, takes 0.3 s (khepera-protocol.md 2.2)."""
@@ -42,15 +44,17 @@ def open_port(name: str, baud: int = 9600, timeout_s: float | None = TIMEOUT_S) 
         timeout_s: Timeout of a read [s]; None for no limit.
 
     Raises:
+        ParameterError: If the speed or the timeout is out of range.
         LinkError: If the port does not exist, or is busy.
     """
+    baud = check_count("baud", baud, BAUD_MIN, BAUD_MAX, "Usual: 9600 bit/s.")
     if name.startswith("kiks:"):
         from kiks.ports.url import find_port
 
         sim_port = find_port(name)
+        sim_port.timeout = timeout_s
         sim_port.claim(f"the program that opened {shown(name)}")
         sim_port.baudrate = baud
-        sim_port.timeout = timeout_s
         return sim_port
     import serial
 

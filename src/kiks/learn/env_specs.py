@@ -35,7 +35,7 @@ class EnvSpec:
 
     Args:
         name: Its name.
-        arenas: The arenas; world k has the one of number k modulo their count.
+        arenas: The arenas; each episode draws one of them.
         reward: A measure whose first note accumulates; its gain in a step is the reward of that step.
         goal: A measure: an episode terminates once its first note is above zero for at least one robot of the world.
             None for environments that never terminate.

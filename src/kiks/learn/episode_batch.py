@@ -33,8 +33,8 @@ PICTURE_SIDE_PX = 480
 class Episodes:
     """Worlds in which robots act step by step, with observations and rewards.
 
-    An episode depends on the random generator with which it begins, not on its world's number: two worlds with equal
-    generators, arenas and actions give the same episode, to the bit.
+    An episode depends on the random generator with which it begins, which draws its arena too, not on its world's
+    number: two worlds with equal generators and actions give the same episode, to the bit.
 
     Args:
         spec: The environment.
@@ -74,6 +74,9 @@ class Episodes:
         self._goal_note = spec.reward.note_count + 2 if goals else None
         self._body = self.batch.specs[0].body
         self._places = [self._free_places(arena) for arena in self.batch.arenas] if spec.starts == "random" else []
+        self._lamps = np.zeros((len(self.batch.arenas), *self.batch.lamps.shape[1:]))
+        for lamps, arena in zip(self._lamps, self.batch.arenas, strict=True):
+            lamps[: len(arena.lamps)] = np.array(arena.lamps).reshape(-1, 4)
         self._sensors = np.zeros((worlds, robots, spec.sensor_count))
         self._most = np.concatenate([np.full(SENSES[name].size, SENSES[name].most) for name in spec.senses])
         self._scores = np.zeros((worlds, robots))
@@ -88,9 +91,13 @@ class Episodes:
 
         Args:
             worlds: Their numbers, int64 [world].
-            rngs: A random generator for each world; its seed and its start are drawn from it.
+            rngs: A random generator for each world; its arena, if there are several, its seed and its start are drawn
+                from it.
         """
-        chosen = np.asarray(worlds, np.int64)
+        chosen, arenas = np.asarray(worlds, np.int64), self.batch.arena_indices
+        if len(self.batch.arenas) > 1:
+            arenas[chosen] = [rng.integers(len(self.batch.arenas)) for rng in rngs]
+            self.batch.lamps[chosen] = self._lamps[arenas[chosen]]
         seeds = np.array([rng.integers(SEED_LIMIT) for rng in rngs], np.int64)
         starts = None
         if self._places:
@@ -100,12 +107,13 @@ class Episodes:
         self._sensors = self.batch.reset(selected, seeds=seeds, starts=starts)
         self._scores[chosen] = 0.0
 
-    def step(self, actions: ArrayLike) -> NDArray[np.float64]:
+    def step(self, actions: ArrayLike, ignored: NDArray[np.bool_] | None = None) -> NDArray[np.float64]:
         """Let all robots act, then read their sensors.
 
         Args:
             actions: Speeds of the left and right wheels as shares of the speed limit, [world, robot, 2]; or [world, 2]
                 with one robot per world.
+            ignored: Worlds whose actions do not count, bool [world]: their robots stand.
 
         Returns:
             Rewards, float64 [world, robot].
@@ -124,6 +132,8 @@ class Episodes:
                 f"actions must be numbers of the shape {(*self.shape, 2)}, two for each robot, but they were "
                 f"{given.dtype} of the shape {given.shape}."
             )
+        if ignored is not None:
+            given = np.where(ignored[:, None, None], 0, given)
         if not (np.abs(given) <= 1).all():
             raise ParameterError(
                 f"actions must be from -1 to 1, but among them was {given[~(np.abs(given) <= 1)][0]}. Clip them, "

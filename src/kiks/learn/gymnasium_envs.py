@@ -190,7 +190,8 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
                 "worlds that have ended must be reset before the next step, but "
                 f"{np.count_nonzero(self._done)} were not. Call reset(options={{'reset_mask': mask}})."
             )
-        rewards = self.episodes.step(actions)[:, 0]
+        # In the other modes none has ended here.
+        rewards = self.episodes.step(actions, ignored=self._done)[:, 0]
         self._step_counts += 1
         terminations = self.episodes.terminations()
         truncations = np.zeros(self.num_envs, np.bool_)

@@ -20,7 +20,7 @@ from kiks.errors import ArenaError, ParameterError, counted, shown
 from kiks.model.arena_objects import Ball, Cylinder, Lamp, Pose, checked_places
 from kiks.model.atomic_files import path_of
 from kiks.model.box import Box
-from kiks.model.checks import check_number
+from kiks.model.checks import check_kind, check_number
 from kiks.model.data_file import Rule
 from kiks.model.maze import draw_maze
 from kiks.model.raster import (
@@ -79,6 +79,7 @@ class Arena:
     _tables: WallTables = field(init=False)
 
     def __post_init__(self) -> None:
+        check_kind("name", self.name, str)
         given = self.brightness
         if not isinstance(given, np.ndarray) or given.dtype != np.uint8 or given.ndim != 2:
             raise ParameterError(

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Annotated, Any, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from kiks.errors import ArenaError, ParameterError, shown
+from kiks.model.checks import check_heading
 from kiks.model.data_file import Coordinate, Number, Switch, Whole, check
 from kiks.model.materials import brightness_of
 
@@ -27,6 +29,7 @@ Friction = Annotated[Number, Field(ge=0, le=1e5, description="Leave it out for t
 Power = Annotated[
     Number, Field(gt=0, le=1e9, description="A Khepera lamp has 1 W. Switch a lamp off with is_on instead.")
 ]
+Heading = Annotated[Coordinate, AfterValidator(partial(check_heading, "heading_rad"))]
 
 
 class Pose(NamedTuple):
@@ -34,7 +37,7 @@ class Pose(NamedTuple):
 
     x_mm: Coordinate
     y_mm: Coordinate
-    heading_rad: Coordinate
+    heading_rad: Heading
 
 
 class Lamp(NamedTuple):

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from kiks.errors import KiksError, ParameterError, shown
+from kiks.errors import KiksError, ParameterError, figure, shown
 from kiks.model.data_file import one_line, read_file
 
 NUMBERS_MAX = 1 << 24
@@ -59,7 +59,7 @@ class Numbers:
     def __str__(self) -> str:
         kind = "whole numbers" if self.is_whole else "finite numbers"
         ends = ((word, end) for word, end in (("from", self.low), ("to", self.high)) if abs(end) < sys.float_info.max)
-        span = "".join(f" {word} {end if isinstance(end, int) else format(end, 'g')}" for word, end in ends)
+        span = "".join(f" {word} {figure(end)}" for word, end in ends)
         return f"{kind}{span} [{', '.join(map(str, self.axes))}]"
 
 

@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field
 from kiks.errors import ParameterError
 from kiks.model.arena_objects import Brightness
 from kiks.model.data_file import Whole, record
-from kiks.model.raster import cells_per_pixel
+from kiks.model.raster import SIZE_MIN_MM, cells_per_pixel
 
 
 def _whole(value: Any) -> Any:
@@ -23,7 +23,7 @@ def _whole(value: Any) -> Any:
 
 _WHOLE = BeforeValidator(_whole, json_schema_input_type=int)
 _ADVICE = "Boxes are drawn in whole millimetres."
-SideMm = Annotated[Whole, _WHOLE, Field(ge=1, le=1_000_000_000, description=_ADVICE)]
+SideMm = Annotated[Whole, _WHOLE, Field(ge=SIZE_MIN_MM, le=1_000_000_000, description=f"{_ADVICE} A robot needs room.")]
 PartMm = Annotated[Whole, _WHOLE, Field(ge=0, le=1_000_000_000, description=_ADVICE)]
 
 

@@ -9,7 +9,7 @@ import math
 from numbers import Integral, Real
 from typing import TypeVar
 
-from kiks.errors import ParameterError, shown
+from kiks.errors import ParameterError, figure, shown
 
 ROBOTS_MAX = 1000
 """Most robots of a world."""
@@ -39,16 +39,19 @@ def check_number(
     Raises:
         ParameterError: If it is no number, not finite, or out of range.
     """
-    if isinstance(number, int | float | Real) and not isinstance(number, bool):
+    is_number = isinstance(number, int | float | Real) and not isinstance(number, bool)
+    if is_number:
         try:
-            value = float(number)
+            value = float(number)  # type: ignore[arg-type] # mypy forgets what is_number says
         except OverflowError:  # a whole number of more than 308 digits
             value = math.inf
         if math.isfinite(value) and least <= value <= most:
             return value
-    rule = "a finite number" if math.isinf(most) else f"from {least:g} to {most:g}"
+    rule = "a finite number" if math.isinf(most) else f"from {figure(least)} to {figure(most)}"
     if math.isinf(most) and math.isfinite(least):
-        rule += f" of at least {least:g}"
+        rule += f" of at least {figure(least)}"
+    if not is_number and math.isfinite(most):
+        rule, advice = f"a number {rule}", ""
     raise ParameterError(f"{name} must be {rule}, but it was {shown(number)}.{advice and ' ' + advice}")
 
 
@@ -93,16 +96,24 @@ def check_kind(name: str, value: object, kind: type[_Kind], advice: str = "") ->
     raise ParameterError(f"{name} must be {wanted}, but it was {shown(value)}.{advice and ' ' + advice}")
 
 
-_KINDS: dict[type, str] = {str: "a text", bytes: "bytes"}
+_KINDS: dict[type, str] = {str: "a text", bytes: "bytes", bool: "True or False"}
 
 
 def check_heading(name: str, heading_rad: object) -> float:
     """Return a heading [rad], wrapped to one turn if it is beyond `HEADING_KEPT_RAD`.
 
+    A multiple of 15 beyond one turn is a slip: a heading in degrees. A program that counts turns never meets one.
+
     Raises:
-        ParameterError: If it is no finite number.
+        ParameterError: If it is no finite number, or one in degrees.
     """
-    return wrapped(check_number(name, heading_rad))
+    value = check_number(name, heading_rad)
+    if math.tau < abs(value) <= HEADING_KEPT_RAD and value % 15 == 0:
+        raise ParameterError(
+            f"{name} must be in radians, but it was {shown(heading_rad)}: {value:g} degrees are "
+            f"math.radians({value:g}). For radians beyond one turn write {value:g} % math.tau."
+        )
+    return wrapped(value)
 
 
 def wrapped(heading_rad: float) -> float:

@@ -36,7 +36,7 @@ from pydantic import ConfigDict, Field, Strict, Tag, TypeAdapter, ValidationErro
 from pydantic.fields import FieldInfo
 from pydantic_core import core_schema
 
-from kiks.errors import SHOWN_MAX, KiksError, ParameterError, nearest, shown
+from kiks.errors import SHOWN_MAX, KiksError, ParameterError, figure, nearest, shown
 
 BYTES_MAX = 4 << 20
 """Default limit of a file's size [bytes]."""
@@ -157,9 +157,8 @@ def read_file(path: Path, what: str, *, bytes_max: int = BYTES_MAX, error: type[
         if path.is_dir():
             raise error(f"{what} must be a file, but it is a folder. Name a file in it.")
         if not path.is_file():
-            raise error(
-                f"{what} must exist, but there is no such file. Check the name and the folder {str(Path.cwd())!r}."
-            )
+            folder = "" if path.is_absolute() else f" and the folder {str(Path.cwd())!r}"
+            raise error(f"{what} must exist, but there is no such file. Check the name{folder}.")
         with path.open("rb") as file:
             # Python asks for the memory of as many bytes as it is told to read, though there are fewer.
             data = file.read(min(os.fstat(file.fileno()).st_size, bytes_max) + 1)
@@ -403,11 +402,5 @@ def _span(limits: Mapping[str, Any]) -> str:
     if low is None:
         return f" below {high:g}" if below else f" of at most {high:g}"
     if not above and not below:
-        return f" from {_figure(low)} to {_figure(high)}"
-    return (
-        f" {'above' if above else 'of at least'} {_figure(low)} and {'below' if below else 'at most'} {_figure(high)}"
-    )
-
-
-def _figure(value: float) -> str:
-    return str(value) if isinstance(value, int) else f"{value:g}".replace("e+0", "e")
+        return f" from {figure(low)} to {figure(high)}"
+    return f" {'above' if above else 'of at least'} {figure(low)} and {'below' if below else 'at most'} {figure(high)}"

@@ -16,6 +16,8 @@ from typing import Any
 
 from kiks.ending import postponing_endings
 from kiks.errors import ParameterError
+from kiks.model.atomic_files import path_of
+from kiks.model.checks import check_kind
 from kiks.recording import foxglove, motion
 from kiks.recording.entries import block_of
 from kiks.recording.mcap_file import McapFile, Topic
@@ -91,7 +93,7 @@ class RunRecorder:
             earlier.close()
         elif earlier is not None:
             raise ParameterError(f"{sim} must not be recorded yet, but it is. End that recording first.")
-        self.path = Path(path).absolute()
+        self.path = path_of(path, "a recording's file").absolute()
         self.gives_way: bool = gives_way
         self._sim, self._world, self._loop = sim, sim.world, sim.loop
         self._file = McapFile(path, (LOG, MOTION, *foxglove.TOPICS))
@@ -224,9 +226,16 @@ class RunRecorder:
         self._lines.append((self._world.now_ns, robot, line[:LINE_CHARACTERS_MAX]))
 
     def mark(self, note: str) -> None:
-        """Set a bookmark at this time."""
+        """Set a bookmark at this time.
+
+        Raises:
+            ParameterError: If the note is no text, or the recording was closed.
+        """
+        check_kind("note", note, str)
         with self._sim.lock:
             if not self._is_on:
+                if self._error is None:
+                    raise ParameterError("a recording must be open to be marked, but this one is closed.")
                 return
             now_ns = self._world.now_ns
             self.note((MARK, now_ns, 0, 0, 0, note.encode()))

@@ -13,7 +13,7 @@ from kiks.engine.scalar_math import uniform
 from kiks.engine.state import BALL, State
 from kiks.errors import ArenaError, ParameterError, shown
 from kiks.model.arena import PAD, Arena
-from kiks.model.checks import check_number
+from kiks.model.checks import check_heading
 from kiks.model.free_disc import OVERLAP_MM
 from kiks.model.robot import RobotSpec
 
@@ -69,17 +69,16 @@ class FreeSpace:
         """Check that robots could stand at these poses while bodies are where they are.
 
         Args:
-            poses: x_mm, y_mm, heading_rad, float64 [robot, 3].
+            poses: x_mm, y_mm, heading_rad, float64 [robot, 3], finite.
             whose: Whose poses they are, for the message.
 
         Raises:
-            ParameterError: If a number is not finite, or something is in the way.
+            ParameterError: If a heading is in degrees, or something is in the way.
         """
         discs = self.discs()
         discs[: self._robot_count, :2] = poses[:, :2]
         for index, (x_mm, y_mm, heading_rad) in enumerate(poses.tolist()):
-            for name, value in zip(("x_mm", "y_mm", "heading_rad"), (x_mm, y_mm, heading_rad), strict=True):
-                check_number(name, value)
+            check_heading("heading_rad", heading_rad)
             obstacle = self.obstacle(x_mm, y_mm, self._specs[index].body.radius_mm, discs, index, PRESSED_MM)
             if obstacle is not None:
                 raise ParameterError(
@@ -162,14 +161,14 @@ class FreeSpace:
         but: int = -1,
         overlap_mm: float = OVERLAP_MM,
     ) -> tuple[int, float] | None:
-        """Return which disc is in the way (-1: a wall) and how deep it overlaps [mm]; None if the place is free.
+        """Return which disc is in the way and how deep it overlaps [mm]; None if the place is free.
 
-        The disc `but` is ignored.
+        -1 is a wall, -2 what is outside of the arena. The disc `but` is ignored.
         """
         inside = 0 <= x_mm <= self.arena.width_mm and 0 <= y_mm <= self.arena.height_mm
         gap_mm = self.wall_gap_mm(x_mm, y_mm, radius_mm)
         if not inside or gap_mm < -overlap_mm:
-            return -1, -gap_mm
+            return -1 if inside else -2, -gap_mm
         overlaps_mm = radius_mm + discs[:, 2] - np.hypot(discs[:, 0] - x_mm, discs[:, 1] - y_mm)
         if but >= 0:
             overlaps_mm[but] = -math.inf
@@ -180,7 +179,11 @@ class FreeSpace:
     def _is_inside(self, obstacle: tuple[int, float]) -> str:
         """Say in words what is in the way."""
         disc, depth_mm = obstacle
-        return f"{'a wall' if disc < 0 else self.name_of(disc)} is {depth_mm:.1f} mm inside it"
+        return (
+            "it is outside of the arena"
+            if disc == -2
+            else f"{'a wall' if disc < 0 else self.name_of(disc)} is {depth_mm:.1f} mm inside it"
+        )
 
     def may_lie(self, disc: int) -> Callable[[float, float], bool]:
         """Return a function that says whether a disc (robots first, from 0) could lie at a place [mm].

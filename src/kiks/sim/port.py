@@ -13,7 +13,7 @@ from operator import index
 from typing import Any, Protocol
 
 from kiks.clock.program_clock import ProgramClock
-from kiks.errors import ParameterError, shown
+from kiks.errors import LinkError, ParameterError, shown
 from kiks.model.checks import SECONDS_MAX, check_count, check_number
 from kiks.sim.read_completion import Read
 from kiks.units import ns_from_s, s_from_ns, wait_ns
@@ -101,6 +101,19 @@ class Line(Protocol):
         """Release the line and drop what was not read."""
 
 
+class Closed:
+    """Stands in for what was closed: any use but another `close` raises an error that says so."""
+
+    def __getattr__(self, name: str) -> Any:
+        raise LinkError("a port must be open to be used, but this one is closed. Open it again, or close it later.")
+
+    def close(self) -> None:
+        """Do nothing."""
+
+
+CLOSED: Any = Closed()
+
+
 class VirtualPort:
     """The computer's end of a simulated robot's line.
 
@@ -114,7 +127,7 @@ class VirtualPort:
 
     def __init__(self, line: Line, program: ProgramClock) -> None:
         self.timeout = None
-        self.line = line
+        self.line: Line = line
         self._program = program
         self._has_read = True
 
@@ -223,9 +236,11 @@ class VirtualPort:
         self.line.claim(holder)
 
     def close(self) -> None:
-        """Close the port and drop what was not read. The robot drives on, and the port may be opened again."""
-        with self.line.lock:
-            self.line.hang_up()
+        """Close the port and drop what was not read. The robot drives on; this port is of no use any more."""
+        line, self.line = self.line, CLOSED
+        if line is not CLOSED:
+            with line.lock:
+                line.hang_up()
 
     # ---- the program's time ----
 

@@ -27,7 +27,7 @@ from kiks.sim.explanation import Explanation, LightExplanation, explain_ambient,
 from kiks.sim.free_space import FreeSpace
 from kiks.sim.local_line import LocalLine
 from kiks.sim.paths import Paths
-from kiks.sim.port import VirtualPort
+from kiks.sim.port import CLOSED, VirtualPort
 from kiks.sim.registry import Registry
 from kiks.sim.sensors import Sensors
 from kiks.sim.snapshot import Snapshot, look, proximity_at, trace_rays
@@ -133,6 +133,11 @@ class Simulation:
     def __repr__(self) -> str:
         robots = counted(self.robot_count, "robot")
         return f"<{type(self).__name__}: {robots} in {shown(self.arena.name)} at {self.time_s:.3f} s, seed {self.seed}>"
+
+    def __reduce__(self) -> Any:
+        raise ParameterError(
+            "a simulation cannot be copied or pickled. Make another with the same seed, or go back with checkpoint()."
+        )
 
     def _repr_png_(self) -> tuple[bytes, dict[str, int]]:
         """Return a picture of it as it stands, which notebooks show."""
@@ -296,10 +301,11 @@ class Simulation:
             robot: Number of the robot, from 1.
             x_mm: From the arena's lower left corner to the right.
             y_mm: From the arena's lower left corner upwards.
-            heading_rad: Counter-clockwise from the x axis; wrapped to one turn beyond a million.
+            heading_rad: Counter-clockwise from the x axis; wrapped to one turn beyond a million. A multiple of 15
+                beyond one turn is an error: it is a heading in degrees.
 
         Raises:
-            ParameterError: If there is no such robot, a number is not finite, or something is in the way.
+            ParameterError: If there is no such robot, a number is no such number, or something is in the way.
         """
         index = self.index_of(robot)
         with self._changing() as world:
@@ -316,7 +322,7 @@ class Simulation:
             pose: x_mm, y_mm, heading_rad, whatever is there; for those who know that it stood there.
 
         Raises:
-            ParameterError: If there is no such kind.
+            ParameterError: If there is no such kind, or the pose is none.
             ArenaError: If there is no free place for it.
 
         Example:
@@ -368,7 +374,7 @@ class Simulation:
         return tuple(self.wires[self.index_of(robot)].firmware.fitted)
 
     def port(self, robot: int) -> SimPort:
-        """Return the computer's end of a robot's line: one object, always the same.
+        """Return the computer's end of a robot's line: one object, always the same until it is closed.
 
         Args:
             robot: Number of the robot, from 1.
@@ -377,7 +383,7 @@ class Simulation:
             ParameterError: If there is no such robot.
         """
         index = self.index_of(robot)
-        if index not in self._ports:
+        if index not in self._ports or self._ports[index].line is CLOSED:
             self._ports[index] = SimPort(self, robot)
         return self._ports[index]
 

@@ -12,7 +12,7 @@ from kiks.engine.sensing import observe
 from kiks.engine.state import BALL
 from kiks.errors import ParameterError
 from kiks.model.array_checks import check_numbers
-from kiks.model.checks import wrapped
+from kiks.model.checks import check_heading
 from kiks.model.robot import SENSOR_COUNT
 from kiks.sim.world import World
 
@@ -82,7 +82,7 @@ def proximity_at(world: World, index: int, poses: NDArray[np.float64]) -> NDArra
     size_mm = (world.arena.width_mm, world.arena.height_mm)
     if not ((poses[:, :2] >= 0.0) & (poses[:, :2] <= size_mm)).all():
         raise ParameterError(f"poses must be in the arena, {size_mm[0]:g} x {size_mm[1]:g} mm, but one was not.")
-    poses[:, 2] = [wrapped(heading_rad) for heading_rad in poses[:, 2].tolist()]
+    poses[:, 2] = [check_heading("heading_rad", heading_rad) for heading_rad in poses[:, 2].tolist()]
     counts, state = np.empty((len(poses), SENSOR_COUNT)), world.state
     observe.read_from(world.scene, index, state.tick_count, world.now_ns, poses, counts)
     return counts

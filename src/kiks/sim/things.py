@@ -14,7 +14,7 @@ from kiks.engine.state import BALL, BODY, CYLINDER
 from kiks.errors import ArenaError, KiksError, ParameterError, shown
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp
 from kiks.model.array_checks import check_numbers
-from kiks.model.checks import check_heading, check_number
+from kiks.model.checks import check_count, check_heading, check_number
 from kiks.model.free_disc import OVERLAP_MM
 from kiks.sim.free_space import PRESSED_MM
 from kiks.sim.world import World
@@ -121,7 +121,7 @@ class Things:
 
     def _index_of(self, body: int) -> int:
         numbers = self._world.state.bodies["number"][0].tolist()
-        if not isinstance(body, int) or body not in numbers:
+        if not isinstance(body, int | np.integer) or body not in numbers:
             existing = f"The numbers are {shown(numbers)}" if numbers else "There is none"
             raise ParameterError(f"body must be the number of an existing body, but it was {shown(body)}. {existing}.")
         return int(numbers.index(body))
@@ -145,8 +145,9 @@ class Things:
             ParameterError: If there is no such lamp.
         """
         lamps = self._world.lamps
-        if not isinstance(lamp, int) or not 1 <= lamp <= len(lamps):
-            raise ParameterError(f"lamp must be a row of lamps from 1 to {len(lamps)}, but it was {shown(lamp)}.")
+        if not len(lamps):
+            raise ParameterError(f"lamp must be the row of a lamp, but it was {shown(lamp)}. There is none.")
+        lamp = check_count("lamp", lamp, 1, len(lamps), "It is a row of lamps.")
         self._world.lamps = np.delete(lamps, lamp - 1, axis=0)
 
     def _checked(self, **things: Any) -> Arena:

@@ -255,9 +255,13 @@ class World:
                 random place.
 
         Raises:
+            ParameterError: If the pose is none.
             ArenaError: If there is no free place for it.
         """
         index, discs, radius_mm = self.robot_count, self.free_space.discs(), spec.body.radius_mm
+        if place is not None:
+            x_mm, y_mm, heading_rad = check_numbers("pose", place, (3,)).tolist()
+            place = (x_mm, y_mm, check_heading("heading_rad", heading_rad))
         if place is None and index < len(self.arena.starts):
             start = self.arena.starts[index]
             if self.free_space.obstacle(start.x_mm, start.y_mm, radius_mm, discs) is None:

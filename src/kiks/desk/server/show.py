@@ -17,6 +17,7 @@ from kiks.desk.server.outside_programs import PlainPrograms
 from kiks.desk.server.server import SERVER
 from kiks.engine.code_cache import is_compiled
 from kiks.engine.compiling import LAST
+from kiks.model.checks import check_count, check_kind
 from kiks.sim.simulation import Simulation
 from kiks.units import NS_PER_S
 
@@ -170,8 +171,10 @@ def show(
 
     Raises:
         LinkError: If the desk cannot listen there.
-        ParameterError: If the speed is out of range, or the server already listens at another port.
+        ParameterError: If an argument is out of range, or the server already listens at another port.
     """
+    check_kind("is_alive", is_alive, bool)
+    port = None if port is None else check_count("port", port, 0, 65535, "Leave it out for a free one.")
     desk = Desk(sim, speed=speed, may_run_programs=is_alive)
     shown = Shown(desk, port=port)
     if is_alive:

@@ -47,7 +47,11 @@ class Serial(SerialBase):  # type: ignore[misc, unused-ignore]
         except KiksError as error:
             raise SerialException(str(error)) from None
         self.is_open = True
-        self._reconfigure_port()
+        try:
+            self._reconfigure_port()
+        except ValueError:
+            self.close()
+            raise
 
     def close(self) -> None:
         """Hang up. The robot drives on."""
