@@ -257,7 +257,7 @@ def test_a_folder_of_another_coevolution_is_an_error(tmp_path: Path) -> None:
     for given, message in (
         ({"seed": 4}, "its seed is 3, not 4"),
         ({"opponents": 4}, "its algorithm is 'ga, 3 opponents', not 'ga, 4 opponents'"),
-        ({"contest": small(seconds=3.0)}, "its task differs in: seconds"),
+        ({"contest": small(seconds=3.0)}, "but these differ: seconds"),
     ):
         options: dict[str, Any] = {"contest": small(), "seed": 3, "population": 6, "opponents": 3} | given
         with pytest.raises(ParameterError, match=message):

@@ -117,7 +117,7 @@ def test_a_folder_of_another_evolution_is_an_error(tmp_path: Path) -> None:
     run("cma", tmp_path)
     with pytest.raises(ParameterError, match="must hold the same evolution, but its seed is 3, not 4"):
         kiks.Evolution(small(), "cma", population=8, seed=4, folder=tmp_path)
-    with pytest.raises(ParameterError, match="but its task differs in: seconds"):
+    with pytest.raises(ParameterError, match="but these differ: seconds"):
         kiks.Evolution(small(seconds=2.0), "cma", population=8, seed=3, folder=tmp_path)
 
 

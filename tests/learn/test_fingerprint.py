@@ -20,7 +20,7 @@ import pytest
 from numba import cloudpickle
 
 import kiks
-from kiks.learn.fingerprint import differing, fingerprints, unseen
+from kiks.learn.fingerprint import differing, fingerprints, tell_unseen
 from kiks.model.robot import RobotSpec
 
 
@@ -223,13 +223,15 @@ def test_what_a_worker_gets_has_the_digest_of_what_was_sent() -> None:
 # ---- what cannot be seen ----
 
 
-def test_what_cannot_be_seen_is_named() -> None:
+def test_what_cannot_be_seen_is_told(caplog: pytest.LogCaptureFixture) -> None:
     opened = defined("def f(values):\n    return open('table.csv').read()\n")
     cyclic: list[Any] = []
     cyclic.append(cyclic)
     found = fingerprints({"a": opened, "b": scaled(2.0), "c": (each for each in ()), "d": cyclic})
-    assert unseen(found) == "a: open; c: builtins.generator; d: what lies too deep"
-    assert unseen(kiks.tasks.avoid().digest()) == ""
+    tell_unseen(found, "This")
+    tell_unseen(kiks.tasks.avoid().digest(), "That")
+    (message,) = caplog.messages
+    assert message.endswith("cannot see: a: open; c: builtins.generator; d: what lies too deep.")
 
 
 def test_a_folder_says_once_what_cannot_be_seen(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

@@ -114,7 +114,7 @@ def test_an_evolution_resumes_only_with_the_same_task_file(folder: Path) -> None
     options: dict[str, Any] = {"population": 4, "folder": folder / "out"}
     kiks.Evolution(load(folder, text), "ga", **options).run(generations=2, executor="threads:1")
     assert len(kiks.Evolution(load(folder, text), "ga", **options).generations) == 2
-    with pytest.raises(kiks.ParameterError, match="but its task differs in: worlds"):
+    with pytest.raises(kiks.ParameterError, match="but these differ: worlds"):
         kiks.Evolution(load(folder, text.replace("worlds = 1", "worlds = 2")), "ga", **options)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from kiks.cli.options import say, written_file
+from kiks.cli.options import written_file
 from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -26,19 +26,12 @@ def compare(
 
     Example: kiks compare runs/linear runs/gru
     """
-    from kiks.learn.fingerprint import unseen
     from kiks.learn.results import comparable, difference, load_results
     from kiks.learn.results_plot import save_results_plot
 
     if first.resolve() == second.resolve():
         raise ParameterError(f"SECOND must be another folder than FIRST, but both are {str(first)!r}.")
-    one, two = (load_results(each) for each in (first, second))
-    exams = [each.exam for each in (one[0], two[0])]
-    one, two = comparable(one, two)
-    if exams != [each.exam for each in (one[0], two[0])]:
-        say("the exams differ, so they are left out.")
-    if rest := unseen(one[0].task_digest):
-        say(f"fitness is compared even if this differs, which KiKS cannot see: {rest}.")
+    one, two = comparable(load_results(first), load_results(second))
     groups = {str(first): one, str(second): two}
     print_groups(groups)
     samples = {"Fitness": [[each.fitness for each in group] for group in (one, two)]}

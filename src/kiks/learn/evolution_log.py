@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import io
 import json
-import logging
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -21,15 +20,13 @@ from pydantic import Field
 
 from kiks.errors import ParameterError, library, shown
 from kiks.learn.finals import Finals
-from kiks.learn.fingerprint import differing, unseen
+from kiks.learn.fingerprint import differing, tell_unseen
 from kiks.model.array_checks import Numbers, read_arrays
 from kiks.model.atomic_files import make_folder, path_of, replace_file
 from kiks.model.data_file import Rule, Text, Whole, check, parse_json, read_file, record
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
-
-_log = logging.getLogger("kiks.learn")
 
 Digest = Annotated[
     dict[Text, Text], Field(max_length=100), Rule("a table with a fingerprint of each argument of the task")
@@ -125,12 +122,7 @@ class Folder:
         file = self.path / IDENTITY
         if not file.exists():
             replace_file(file, json.dumps(asdict(identity), indent=1) + "\n", "an evolution")
-            if rest := unseen(identity.task_digest):
-                _log.warning(
-                    "The evolution in %r will continue even if this has changed, which KiKS cannot see: %s.",
-                    str(self.path),
-                    rest,
-                )
+            tell_unseen(identity.task_digest, f"The evolution in {str(self.path)!r} continues")
             return
         found = self.identity()
         for name, value in asdict(identity).items():
@@ -142,8 +134,8 @@ class Folder:
                 )
         if names := differing(found.task_digest, identity.task_digest):
             raise ParameterError(
-                f"the folder {str(self.path)!r} must hold the same evolution, but its task differs in: {names}. "
-                "Take a new folder, or the earlier task."
+                f"the folder {str(self.path)!r} must hold the same evolution, but these differ: {names}. "
+                "Take a new folder, or change them back."
             )
 
     def generation(

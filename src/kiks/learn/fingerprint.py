@@ -17,8 +17,8 @@ import builtins
 import dis
 import hashlib
 import importlib
-import inspect
 import io
+import logging
 import os
 import pickle
 import sys
@@ -73,10 +73,11 @@ def differing(one: Mapping[str, str], other: Mapping[str, str], but: Collection[
     return ", ".join(name for name in {**one, **other} if one.get(name) != other.get(name) and name not in but)
 
 
-def unseen(found: Mapping[str, str]) -> str:
-    """Return what fingerprints leave out, because KiKS cannot see it, as text; nothing if they see all."""
+def tell_unseen(found: Mapping[str, str], what: str) -> None:
+    """Tell the user what fingerprints leave out, because KiKS cannot see it, and what goes on all the same."""
     rests = {name: text.partition(_WITHOUT)[2] for name, text in found.items()}
-    return "; ".join(f"{name}: {rest}" for name, rest in rests.items() if rest)
+    if text := "; ".join(f"{name}: {rest}" for name, rest in rests.items() if rest):
+        logging.getLogger("kiks.learn").warning("%s even if this differs, which KiKS cannot see: %s.", what, text)
 
 
 class _Walk(_pickle._Pickler):  # type: ignore[misc, unused-ignore]
@@ -153,11 +154,12 @@ class _Walk(_pickle._Pickler):  # type: ignore[misc, unused-ignore]
 
     def _code(self, function: FunctionType) -> Iterator[Any]:
         """Yield the instructions of a function and of those in it, and what the names in them lead to."""
-        self._python, codes, module = f" {sys.implementation.cache_tag}", [function.__code__], None
+        self._python, codes = f" {sys.implementation.cache_tag}", [function.__code__]
+        module: Any = None
         for code in codes:
             arguments = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
-            stars = code.co_flags & (inspect.CO_VARARGS | inspect.CO_VARKEYWORDS)
-            yield from (code.co_argcount, code.co_posonlyargcount, arguments, stars, code.co_exceptiontable)
+            takes_more = code.co_flags & 0x0C  # *args and **kwargs
+            yield from (code.co_argcount, code.co_posonlyargcount, arguments, takes_more, code.co_exceptiontable)
             for each in dis.get_instructions(code):
                 name, holder, found, module = each.argval, module, None, None
                 if isinstance(name, CodeType):

@@ -94,7 +94,7 @@ def _task_of(folder: Folder, identity: Identity, given: Task | None) -> Task:
         )
     if task.controller.name != identity.controller:
         task = task.with_changes(controller=Champion.load(folder.path / "champion.toml").controller)
-    if names := differing(identity.task_digest, task.digest()):
+    if names := differing(identity.task_digest, task.digest(), ("algorithm",)):
         raise ParameterError(
             f"{where} must be the one that was evolved, but it differs now in: {names}. Give a file with the earlier "
             "task: --task FILE."

@@ -6,6 +6,7 @@ Sources: Mann and Whitney (1947) for U; Vargha and Delaney (2000), section 5, fo
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -20,7 +21,7 @@ from kiks.learn.baselines import baselines_of
 from kiks.learn.evolution import Evolution
 from kiks.learn.evolution_log import IDENTITY, Digest, Folder
 from kiks.learn.exam import PASS_SHARE, imperfect_robots
-from kiks.learn.fingerprint import differing
+from kiks.learn.fingerprint import differing, tell_unseen
 from kiks.model.atomic_files import path_of, replace_file
 from kiks.model.data_file import TEXT_MAX, Number, Text, Whole, check, parse_json, read_file, record
 from kiks.version import __version__
@@ -233,7 +234,10 @@ def comparable(first: Sequence[Result], second: Sequence[Result]) -> list[list[R
     """
     pair = first[0], second[0]
     _check_alike(pair, ("task", "kiks"), _FREE, "evolutions that are compared", "Compare two of one task.")
+    tell_unseen(pair[0].task_digest, "Fitness is compared")
     is_alike = pair[0].task_digest.get("exam") == pair[1].task_digest.get("exam")
+    if not is_alike:
+        logging.getLogger("kiks.learn").warning("The exams differ, so they are left out.")
     return [[each if is_alike else replace(each, exam=None) for each in group] for group in (first, second)]
 
 
