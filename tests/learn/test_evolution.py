@@ -221,6 +221,9 @@ def test_an_object_with_ask_and_tell_is_an_algorithm(tmp_path: Path) -> None:
     assert candidates_of(kiks.Evolution(small(), Own(), folder=tmp_path)) == candidates_of(evolution)
     with pytest.raises(ParameterError, match="algorithm is 'Own', not 'OwnWithFavourite'"):
         kiks.Evolution(small(), OwnWithFavourite(), folder=tmp_path)
+    edited = type("Own", (Own,), {"tell": lambda self, fitness, behaviours: None})
+    with pytest.raises(ParameterError, match="but these differ: algorithm"):
+        kiks.Evolution(small(), edited(), folder=tmp_path)
     different = Own()
     different.rng = np.random.default_rng(2)
     with pytest.raises(ParameterError, match="would have other candidates here"):

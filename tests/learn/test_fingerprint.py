@@ -21,6 +21,7 @@ from numba import cloudpickle
 
 import kiks
 from kiks.learn.fingerprint import differing, fingerprints, tell_unseen
+from kiks.learn.ray_executor import _unpickled
 from kiks.model.robot import RobotSpec
 
 
@@ -214,10 +215,13 @@ def test_a_helper_beside_a_task_counts_and_its_folder_and_process_do_not(own_tas
     assert differing(own_task("there", HELPER.replace("len", "sum")), first) == "fitness"
 
 
-def test_what_a_worker_gets_has_the_digest_of_what_was_sent() -> None:
+def test_a_worker_gets_what_was_sent_or_says_what_differs() -> None:
     for task in (kiks.tasks.avoid(), kiks.tasks.pursuit(), kiks.tasks.avoid(fitness=scaled(2.0))):
         dumps: Any = cloudpickle.dumps
         assert pickle.loads(dumps(task)).digest() == task.digest()
+    digest = task.digest() | {"fitness": "0"}
+    with pytest.raises(kiks.ParameterError, match=r"the same modules of yours, but on one these differ: fitness\."):
+        _unpickled(dumps((task, digest)))
 
 
 # ---- what cannot be seen ----
