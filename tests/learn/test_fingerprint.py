@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import ctypes
 import functools
 import itertools
 import json
 import logging
-import pickle
 import subprocess
 import sys
 from collections.abc import Callable
@@ -23,6 +23,8 @@ import kiks
 from kiks.learn.fingerprint import differing, fingerprints, tell_unseen
 from kiks.learn.ray_executor import _unpickled
 from kiks.model.robot import RobotSpec
+
+LIBRARY = ctypes.CDLL(None)
 
 
 def of(value: object) -> str:
@@ -215,13 +217,16 @@ def test_a_helper_beside_a_task_counts_and_its_folder_and_process_do_not(own_tas
     assert differing(own_task("there", HELPER.replace("len", "sum")), first) == "fitness"
 
 
+@pytest.mark.slow
 def test_a_worker_gets_what_was_sent_or_says_what_differs() -> None:
-    for task in (kiks.tasks.avoid(), kiks.tasks.pursuit(), kiks.tasks.avoid(fitness=scaled(2.0))):
-        dumps: Any = cloudpickle.dumps
-        assert pickle.loads(dumps(task)).digest() == task.digest()
-    digest = task.digest() | {"fitness": "0"}
+    code = "import sys; from kiks.learn.ray_executor import _unpickled; _unpickled(sys.stdin.buffer.read())"
+    dumps: Any = cloudpickle.dumps
+    work = [(task, task.digest()) for task in (kiks.tasks.follow(), kiks.tasks.light(fitness=scaled(2.0)))]
+    for each in (*work, (kiks.tasks.pursuit(), kiks.tasks.pursuit().digest())):
+        subprocess.run([sys.executable, "-c", code], input=dumps(each), check=True)
+    task, digest = work[0]
     with pytest.raises(kiks.ParameterError, match=r"the same modules of yours, but on one these differ: fitness\."):
-        _unpickled(dumps((task, digest)))
+        _unpickled(dumps((task, digest | {"fitness": "0"})))
 
 
 # ---- what cannot be seen ----
@@ -231,11 +236,11 @@ def test_what_cannot_be_seen_is_told(caplog: pytest.LogCaptureFixture) -> None:
     opened = defined("def f(values):\n    return open('table.csv').read()\n")
     cyclic: list[Any] = []
     cyclic.append(cyclic)
-    found = fingerprints({"a": opened, "b": scaled(2.0), "c": (each for each in ()), "d": cyclic})
+    found = fingerprints({"a": opened, "b": scaled(2.0), "c": (each for each in ()), "d": cyclic, "e": LIBRARY})
     tell_unseen(found, "This")
     tell_unseen(kiks.tasks.avoid().digest(), "That")
     (message,) = caplog.messages
-    assert message.endswith("cannot see: a: open; c: builtins.generator; d: what lies too deep.")
+    assert message.endswith("cannot see: a: open; c: builtins.generator; d: what lies too deep; e: ctypes.CDLL.")
 
 
 def test_a_folder_says_once_what_cannot_be_seen(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

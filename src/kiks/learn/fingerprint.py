@@ -14,6 +14,7 @@ if its candidates are the same to the bit.
 from __future__ import annotations
 
 import builtins
+import ctypes
 import dis
 import hashlib
 import importlib
@@ -130,6 +131,8 @@ class _Walk(_pickle._Pickler):  # type: ignore[misc, unused-ignore]
             return ["set", *sorted(value, key=lambda each: str(getattr(each, "__qualname__", each)))]
         if isinstance(value, Dispatcher):
             return [value.py_func, value.targetoptions]
+        if isinstance(value, ctypes.CDLL):
+            raise TypeError  # it could be taken apart, into addresses
         if isinstance(value, Arena):
             return replace(value, name="")
         if isinstance(value, Compiled) or (is_dataclass(value) and hasattr(value, "__dict__")):
@@ -184,7 +187,8 @@ class _Walk(_pickle._Pickler):  # type: ignore[misc, unused-ignore]
             home, name = value.__globals__.get("__name__", ""), value.__code__.co_qualname
         else:
             home = name if isinstance(value, ModuleType) else _pickle.whichmodule(value, name)
-        file, top = getattr(sys.modules.get(home), "__file__", None), home.partition(".")[0]
+        top = home.partition(".")[0]
+        file = getattr(sys.modules.get(top), "__file__", None)
         is_shipped = any(map(Path(file).is_relative_to, _ROOTS)) if file else top in sys.stdlib_module_names
         if top == "__main__" or not (is_shipped or {"site-packages", "dist-packages"} & {*Path(file or "").parts}):
             return ""
