@@ -221,10 +221,11 @@ def test_a_helper_beside_a_task_counts_and_its_folder_and_process_do_not(own_tas
 def test_a_worker_gets_what_was_sent_or_says_what_differs() -> None:
     code = "import sys; from kiks.learn.ray_executor import _unpickled; _unpickled(sys.stdin.buffer.read())"
     dumps: Any = cloudpickle.dumps
-    work = [(task, task.digest()) for task in (kiks.tasks.follow(), kiks.tasks.light(fitness=scaled(2.0)))]
-    for each in (*work, (kiks.tasks.pursuit(), kiks.tasks.pursuit().digest())):
-        subprocess.run([sys.executable, "-c", code], input=dumps(each), check=True)
-    task, digest = work[0]
+    arena = kiks.Arena.box(400, 400)
+    own = kiks.Task("own", [arena], kiks.controllers.linear(), [kiks.measures.path_mm], scaled(2.0))
+    for work in (own, kiks.tasks.follow(), kiks.tasks.pursuit()):
+        subprocess.run([sys.executable, "-c", code], input=dumps((work, work.digest())), check=True)
+    task, digest = own, own.digest()
     with pytest.raises(kiks.ParameterError, match=r"the same modules of yours, but on one these differ: fitness\."):
         _unpickled(dumps((task, digest | {"fitness": "0"})))
 
