@@ -120,3 +120,22 @@ def test_robots_and_seed_may_be_others_than_those_of_the_world() -> None:
     assert (len(ports), sim.seed, sim.arena.name) == (3, 8, "furnished")
     sim, ports = champion.simulation(kiks.Arena.box(300, 300))
     assert (len(ports), sim.seed, sim.arena.width_mm) == (1, 0, 300)
+
+
+def test_a_champion_whose_controller_has_changed_is_told(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    (tmp_path / "task.py").write_text(
+        "import kiks\nGAIN = 2.0\n@kiks.controller(parameters=1)\n"
+        "def own(sensors, memory, parameters, wheels):\n    wheels[0] = wheels[1] = GAIN * parameters[0]\n"
+    )
+    recipe = {"file": "task.py", "name": "own"}
+    kiks.Champion(kiks.controllers.from_recipe(recipe, tmp_path), (1.0,)).save(tmp_path / "one.toml")
+    kiks.Champion(LINEAR, PARAMETERS).save(tmp_path / "ready.toml")
+    code = tmp_path / "one_controller.py"
+    code.write_text("# The same, with a word.\n" + code.read_text())
+    for name in ("one.toml", "ready.toml"):
+        kiks.Champion.load(tmp_path / name)
+    assert not caplog.messages
+    code.write_text(code.read_text().replace("GAIN = 2.0", "GAIN = -2.00"))
+    kiks.Champion.load(tmp_path / "one.toml")
+    (message,) = caplog.messages
+    assert message.startswith(f"The controller of '{tmp_path / 'one.toml'}', or what it imports, has changed")

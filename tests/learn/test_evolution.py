@@ -117,7 +117,7 @@ def test_a_folder_of_another_evolution_is_an_error(tmp_path: Path) -> None:
     run("cma", tmp_path)
     with pytest.raises(ParameterError, match="must hold the same evolution, but its seed is 3, not 4"):
         kiks.Evolution(small(), "cma", population=8, seed=4, folder=tmp_path)
-    with pytest.raises(ParameterError, match="but its task_digest is"):
+    with pytest.raises(ParameterError, match="but these differ: seconds"):
         kiks.Evolution(small(seconds=2.0), "cma", population=8, seed=3, folder=tmp_path)
 
 
@@ -221,6 +221,9 @@ def test_an_object_with_ask_and_tell_is_an_algorithm(tmp_path: Path) -> None:
     assert candidates_of(kiks.Evolution(small(), Own(), folder=tmp_path)) == candidates_of(evolution)
     with pytest.raises(ParameterError, match="algorithm is 'Own', not 'OwnWithFavourite'"):
         kiks.Evolution(small(), OwnWithFavourite(), folder=tmp_path)
+    edited = type("Own", (Own,), {"tell": lambda self, fitness, behaviours: None})
+    with pytest.raises(ParameterError, match="but these differ: algorithm"):
+        kiks.Evolution(small(), edited(), folder=tmp_path)
     different = Own()
     different.rng = np.random.default_rng(2)
     with pytest.raises(ParameterError, match="would have other candidates here"):

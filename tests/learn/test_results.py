@@ -12,12 +12,12 @@ import pytest
 
 import kiks
 from kiks import ParameterError
-from kiks.learn.evolution_log import IDENTITY
+from kiks.learn.evolution_log import Folder, Identity
 from kiks.learn.results import (
     RESULT,
     ExamScore,
     Result,
-    check_comparable,
+    comparable,
     curves,
     difference,
     load_result,
@@ -34,7 +34,7 @@ RESULTS = [
     Result(
         result=1,
         task="avoid",
-        worlds_digest="0123",
+        task_digest={"fitness": "0123", "controller": "45", "exam": "67"},
         algorithm="cma",
         controller="linear",
         population=8,
@@ -56,8 +56,8 @@ RESULTS = [
 
 def put(result: Result, folder: Path, generations: int = 3) -> None:
     """Write a folder that looks like that of a finished evolution."""
-    (folder / "generations").mkdir(parents=True)
-    (folder / IDENTITY).write_text("{}")
+    names = (result.task, result.algorithm, result.seed, result.population, result.controller)
+    Folder(folder).check_identity(Identity(*names, result.task_digest, result.kiks))
     for number in range(1, generations + 1):
         (folder / f"generations/{number:06}.npz").touch()
     result.save(folder)
@@ -156,24 +156,40 @@ def test_broken_results_are_errors(change: dict[str, Any], tmp_path: Path) -> No
 
 
 def test_what_cannot_be_compared_is_an_error(tmp_path: Path) -> None:
-    for change in ({"task": "follow"}, {"worlds_digest": "4567"}):
-        (name,) = change
-        with pytest.raises(ParameterError, match=f"evolutions that are compared must have the same {name}"):
-            check_comparable(RESULTS, [replace(RESULTS[0], **change)])
-    check_comparable(RESULTS, [replace(RESULTS[0], algorithm="ga", controller="gru", population=9)])
+    digest = RESULTS[0].task_digest
+    for change, message in (
+        ({"task": "follow"}, "the same task, but they have 'avoid' and 'follow'"),
+        ({"kiks": "4"}, "the same kiks, but they have '3' and '4'"),
+        ({"task_digest": digest | {"fitness": "4567"}}, "the same task, but these differ: fitness"),
+    ):
+        with pytest.raises(ParameterError, match=f"evolutions that are compared must have {message}"):
+            comparable(RESULTS, [replace(RESULTS[0], **change)])
+    other = replace(RESULTS[0], algorithm="ga", population=9, task_digest=digest | {"controller": "0"})
+    assert comparable(RESULTS, [other]) == [RESULTS, [other]]
     put(RESULTS[0], seed_folder(tmp_path, 0))
     put(replace(RESULTS[1], algorithm="ga"), seed_folder(tmp_path, 1))
     with pytest.raises(ParameterError, match="must have the same algorithm, but they have 'cma' and 'ga'"):
         load_results(tmp_path)
 
 
-def test_the_digest_without_the_controller_is_that_of_the_worlds() -> None:
-    task = kiks.tasks.avoid(seconds=1.0, worlds=3)
-    other = task.with_changes(controller=kiks.controllers.gru(), spread=1.0)
-    assert task.digest() != other.digest()
-    assert task.digest(with_controller=False) == other.digest(with_controller=False)
-    for changes in ({"seconds": 2.0}, {"worlds": 6}, {"name": "other"}, {"robot": "khepera_ii"}):
-        assert task.with_changes(**changes).digest(with_controller=False) != task.digest(with_controller=False)
+def test_exams_that_differ_are_left_out() -> None:
+    other = replace(RESULTS[0], task_digest=RESULTS[0].task_digest | {"exam": "89"})
+    for group in comparable(RESULTS, [other]):
+        assert [each.exam for each in group] == [None] * len(group)
+
+
+def test_evolutions_of_one_folder_have_the_same_controller_and_exam(tmp_path: Path) -> None:
+    for name in ("controller", "exam"):
+        put(RESULTS[0], seed_folder(tmp_path / name, 0))
+        put(replace(RESULTS[1], task_digest=RESULTS[1].task_digest | {name: "0"}), seed_folder(tmp_path / name, 1))
+        with pytest.raises(ParameterError, match=f"must have the same task, but these differ: {name}"):
+            load_results(tmp_path / name)
+
+
+def test_a_contest_is_not_called_unfinished(tmp_path: Path) -> None:
+    kiks.Coevolution(kiks.tasks.pursuit(seconds=0.5), population=4, folder=tmp_path)
+    with pytest.raises(ParameterError, match="must hold evolutions of one controller, but it holds a contest"):
+        load_results(tmp_path)
 
 
 @pytest.mark.slow

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 import kiks
+from kiks.learn.fingerprint import differing
 from kiks.model.arena_file import save_arena
 
 SHY = """
@@ -63,13 +64,16 @@ def test_all_keys(folder: Path) -> None:
     assert (own.controller.name, own.parameter_count) == ("shy", 1)
 
 
-def test_the_digest_depends_on_the_file_and_its_arenas(folder: Path) -> None:
-    text = 'base = "avoid"\narenas = ["room.toml"]\n'
+def test_the_digest_depends_on_what_the_file_says_and_on_the_files_that_it_names(folder: Path) -> None:
+    text = 'base = "avoid"\narenas = ["room.toml"]\n[controller]\nfile = "shy.py"\nname = "shy"\n'
     first = load(folder, text).digest()
-    assert load(folder, text).digest() == first
-    assert load(folder, text + "# a word\n").digest() != first
+    assert load(folder, "# a word\n" + text).digest() == first
+    assert differing(load(folder, "seconds = 3\n" + text).digest(), first) == "seconds"
     save_arena(kiks.Arena.box(401, 300), folder / "room.toml")
-    assert load(folder, text).digest() != first
+    assert differing(load(folder, text).digest(), first) == "arenas"
+    code = (folder / "shy.py").read_text()
+    (folder / "shy.py").write_text(code.replace("parameters[0]", "-parameters[0]"))
+    assert differing(load(folder, text).digest(), first) == "arenas, controller"
 
 
 @pytest.mark.slow
@@ -110,8 +114,8 @@ def test_an_evolution_resumes_only_with_the_same_task_file(folder: Path) -> None
     options: dict[str, Any] = {"population": 4, "folder": folder / "out"}
     kiks.Evolution(load(folder, text), "ga", **options).run(generations=2, executor="threads:1")
     assert len(kiks.Evolution(load(folder, text), "ga", **options).generations) == 2
-    with pytest.raises(kiks.ParameterError, match="but its task_digest is"):
-        kiks.Evolution(load(folder, text + "# a word\n"), "ga", **options)
+    with pytest.raises(kiks.ParameterError, match="but these differ: worlds"):
+        kiks.Evolution(load(folder, text.replace("worlds = 1", "worlds = 2")), "ga", **options)
 
 
 def test_the_example_is_a_task_and_is_quoted_in_the_documentation() -> None:

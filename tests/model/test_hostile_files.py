@@ -19,7 +19,7 @@ from kiks.model.project import Project
 from kiks.model.thesis_networks import NetworkResponse
 
 LINEAR = kiks.controllers.linear()
-IDENTITY = Identity("avoid", "cma", 3, 8, "linear", "0123456789abcdef", kiks.__version__)
+IDENTITY = Identity("avoid", "cma", 3, 8, "linear", {"fitness": "0123456789abcdef"}, kiks.__version__)
 TASK = 'task = 1\nbase = "avoid"\nname = "mine"\nseconds = 2.5\nworlds = 6\nbaud = 9600\n[controller]\nkind = "gru"\n'
 
 
@@ -44,8 +44,10 @@ def result(path: Path) -> None:
         "population": 8,
         "seed": 3,
     }
-    names = dict.fromkeys(("task", "worlds_digest", "algorithm", "controller", "kiks"), "name")
-    Result(result=1, **names, **costs, **curve, exam=ExamScore(1, 20, 2, 200, "Exam")).save(path.parent)
+    names = dict.fromkeys(("task", "algorithm", "controller", "kiks"), "name")
+    Result(
+        result=1, **names, task_digest={"fitness": "0123"}, **costs, **curve, exam=ExamScore(1, 20, 2, 200, "Exam")
+    ).save(path.parent)
 
 
 KINDS: dict[str, tuple[Callable[[Path], object], Callable[[Path], object]]] = {

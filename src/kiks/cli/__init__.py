@@ -17,6 +17,7 @@ from kiks.cli.film import film, photo
 from kiks.cli.fit import fit
 from kiks.cli.matlab import matlab
 from kiks.cli.monitor import monitor
+from kiks.cli.options import show_log
 from kiks.cli.replay import page, plot, replay, table
 from kiks.cli.run import RunCommand, run
 from kiks.cli.schema import schema
@@ -70,7 +71,7 @@ def _print_version(wanted: bool) -> None:
 def _options(
     version: bool = typer.Option(False, "--version", callback=_print_version, is_eager=True, help="Show the version."),
 ) -> None:
-    pass
+    show_log(is_quiet=True)
 
 
 def main() -> None:

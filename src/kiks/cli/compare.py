@@ -26,14 +26,13 @@ def compare(
 
     Example: kiks compare runs/linear runs/gru
     """
-    from kiks.learn.results import check_comparable, difference, load_results
+    from kiks.learn.results import comparable, difference, load_results
     from kiks.learn.results_plot import save_results_plot
 
     if first.resolve() == second.resolve():
         raise ParameterError(f"SECOND must be another folder than FIRST, but both are {str(first)!r}.")
-    groups = {str(first): load_results(first), str(second): load_results(second)}
-    one, two = groups.values()
-    check_comparable(one, two)
+    one, two = comparable(load_results(first), load_results(second))
+    groups = {str(first): one, str(second): two}
     print_groups(groups)
     samples = {"Fitness": [[each.fitness for each in group] for group in (one, two)]}
     if all(each.exam is not None for each in (*one, *two)):

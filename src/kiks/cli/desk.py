@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import is_project, parse_turret, parse_words, show_log, with_robots
+from kiks.cli.options import is_project, parse_turret, parse_words, with_robots
 from kiks.cli.record import RecordFile, recorded
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import HaltError, ParameterError
@@ -77,7 +77,6 @@ def desk(
     Example: kiks desk --arena examples/arenas/maze.toml
     """
     ready_engine()
-    show_log(is_quiet=True)
     from kiks.desk.server.access import LOOPBACK
     from kiks.desk.server.desk import Desk
     from kiks.model.project import Project

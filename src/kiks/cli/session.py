@@ -11,7 +11,6 @@ from typing import Annotated
 import typer
 
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import show_log
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import KiksError
 from kiks.toolbox.framing import BUSY, Exchange, Heartbeat, write_all
@@ -42,7 +41,6 @@ def session(
     # Ctrl-C in Octave is meant for the program there. Octave blocks all signals in its children.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_SETMASK, ())
-    show_log(is_quiet=True)
     if where is None and listen is None:
         # Octave waits for the greeting, and handles Ctrl-C when a frame has arrived: the first one comes at once.
         write_all(sink, BUSY)

@@ -12,9 +12,13 @@ import numpy as np
 from kiks.batch.initial_state import random_starts
 from kiks.errors import ParameterError, shown
 from kiks.learn.evaluation import Floats, Integers
+from kiks.learn.fingerprint import fingerprints
 from kiks.model.arena import Arena
 
 Fitness = Callable[[Mapping[str, Floats]], Floats]
+
+_UNCOUNTED = {"name", "about", "file", "algorithm", "population", "generations"}
+"""Arguments on which no value depends."""
 
 BATCH_WORLDS_MAX = 20_000
 """Largest number of worlds in a batch: more need more memory and run no faster."""
@@ -39,13 +43,15 @@ def _unpickled(kind: type[Any], pickled: bytes) -> Any:
     return kind(**pickle.loads(pickled))
 
 
-def bytes_of(arenas: Sequence[Arena]) -> bytes:
-    """Return bytes that differ between arenas in which robots may drive differently."""
-    return b"".join(
-        each.brightness.tobytes()
-        + repr((each.mm_per_cell, each.starts, each.lamps, each.balls, each.cylinders)).encode()
-        for each in arenas
-    )
+def digest_of(work: Any, **loaded: Any) -> dict[str, str]:
+    """Return the fingerprint of each argument of a task or a contest on which values depend, by its name.
+
+    Args:
+        work: The task or the contest.
+        loaded: What arguments lead to that name files, or may be given in two forms.
+    """
+    counted = {each.name: getattr(work, each.name) for each in fields(work) if each.name not in _UNCOUNTED}
+    return fingerprints(counted | loaded)
 
 
 def check_even(name: str, count: int, arenas: Sequence[Arena]) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, field, fields, replace
 from pathlib import Path
@@ -15,6 +17,7 @@ from kiks.client.port import Port
 from kiks.control.controller import Controller
 from kiks.control.controller_spec import Recipe
 from kiks.control.controllers import controller_of, recipe_for
+from kiks.learn.fingerprint import fingerprints
 from kiks.model.arena import Arena
 from kiks.model.arena_file import quoted
 from kiks.model.atomic_files import inside, path_of, replace_files
@@ -67,6 +70,7 @@ class _ChampionFile:
     kiks: Text = ""
     measures: Measures = field(default_factory=dict)
     world: Text | None = None
+    code: Text = ""
 
 
 @record
@@ -195,7 +199,7 @@ class Champion:
         if self.world is not None:
             robots = tuple(replace(each, kind=named["robot"]) for each in self.world.robots)
             named["world"] = beside("world.kiks", replace(self.world, robots=robots).to_bytes())
-        files[target] = self._text(recipe, named)
+        files[target] = self._text(recipe, named | _code_of(self.controller))
         replace_files(files, "a champion")
 
     def _text(self, recipe: Mapping[str, Any], named: Mapping[str, str]) -> str:
@@ -232,7 +236,18 @@ class Champion:
         if read.world is not None:
             given["world"] = Project.load(inside(path.parent, read.world, "world"))
         given["robot"] = _robot_of(read.robot, path.parent)
-        return cls(**given | {"controller": controller_of(read.controller, path.parent)})
+        controller = controller_of(read.controller, path.parent)
+        # Another Python compiles the same code differently.
+        if sys.implementation.cache_tag in read.code and read.code != _code_of(controller)["code"]:
+            logging.getLogger("kiks.learn").warning(
+                "The controller of %r, or what it imports, has changed: it may drive differently.", str(path)
+            )
+        return cls(**given | {"controller": controller})
+
+
+def _code_of(controller: Controller) -> dict[str, str]:
+    """Return the fingerprint of a controller."""
+    return fingerprints({"code": controller})
 
 
 def _robot_of(name: str, folder: Path) -> str | RobotSpec:

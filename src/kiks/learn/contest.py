@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import field, replace
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -19,8 +17,8 @@ from kiks.errors import ParameterError, shown
 from kiks.learn.candidate_worlds import (
     Fitness,
     batches_of,
-    bytes_of,
     check_even,
+    digest_of,
     fitness_of,
     reduced_by_value,
     starts_of,
@@ -28,7 +26,7 @@ from kiks.learn.candidate_worlds import (
 from kiks.learn.evaluation import Floats, Integers, check_candidates
 from kiks.learn.task import MEASURES_MAX, SPREAD, WORLDS_MAX, Seconds
 from kiks.model.checks import ROBOTS_MAX, check_number
-from kiks.model.data_file import Number, Rule, Text, Whole, read_file, record
+from kiks.model.data_file import Number, Rule, Text, Whole, record
 from kiks.model.robot import RobotSpec
 
 POPULATION, GENERATIONS = 100, 100
@@ -184,18 +182,9 @@ class Contest:
         parts = pairs[..., : first.parameter_count], pairs[..., first.parameter_count :]
         return [part for side, part in zip((first, second), parts, strict=True) for _ in range(side.robots)]
 
-    def digest(self) -> str:
-        """Return 16 hexadecimal digits that differ between contests whose evolutions differ."""
-        digest = hashlib.sha256(bytes_of(self.arenas))
-        for side in self.sides:
-            controller = side.controller
-            told = (side.name, controller.recipe, controller.name, side.parameter_count, side.robots)
-            digest.update(repr((told, RobotSpec.load(side.robot))).encode())
-        worlds = (self.worlds, self.seconds, self.apart_mm, self.timing, self.starts, self.spread)
-        digest.update(repr((self.name, self.measure_names, worlds)).encode())
-        if self.file:
-            digest.update(read_file(Path(self.file), "the contest's file"))
-        return digest.hexdigest()[:16]
+    def digest(self) -> dict[str, str]:
+        """Return the fingerprint of each argument on which values depend, by its name, as `Task.digest` does."""
+        return digest_of(self, sides=[vars(side) | {"robot": RobotSpec.load(side.robot)} for side in self.sides])
 
     # ---- evaluation ----
 

@@ -29,6 +29,7 @@ from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Executor
 from kiks.learn.evolution_log import Folder, Generation, Identity
 from kiks.learn.finals import Contender, Finals, finalists_of
+from kiks.learn.fingerprint import fingerprints
 from kiks.learn.generation_loop import opened, run_generations, seed_for
 from kiks.learn.task import Task
 from kiks.model.array_checks import check_numbers
@@ -381,7 +382,8 @@ class Evolution:
             ParameterError: If it holds another evolution.
         """
         task = self.task
-        controller, digest = task.controller.name, task.digest()
+        controller = task.controller.name
+        digest = task.digest() | fingerprints({"algorithm": type(self.algorithm)})
         folder.check_identity(
             Identity(task.name, self.name, self.seed, self.population, controller, digest, __version__, task.file)
         )

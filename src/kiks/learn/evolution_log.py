@@ -20,12 +20,17 @@ from pydantic import Field
 
 from kiks.errors import ParameterError, library, shown
 from kiks.learn.finals import Finals
+from kiks.learn.fingerprint import differing, tell_unseen
 from kiks.model.array_checks import Numbers, read_arrays
 from kiks.model.atomic_files import make_folder, path_of, replace_file
-from kiks.model.data_file import Text, Whole, check, parse_json, read_file, record
+from kiks.model.data_file import Rule, Text, Whole, check, parse_json, read_file, record
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+
+Digest = Annotated[
+    dict[Text, Text], Field(max_length=100), Rule("a table with a fingerprint of each argument of the task")
+]
 
 IDENTITY, GENERATIONS, LOG = "evolution.json", "generations", "log.parquet"
 """Names in the folder."""
@@ -43,9 +48,14 @@ class Identity:
     seed: Annotated[Whole, Field(ge=0, lt=2**63)]
     population: Annotated[Whole, Field(ge=1, le=1_000_000)]
     controller: Text
-    task_digest: Text
+    task_digest: Digest
     kiks: Text
     task_file: Text = ""
+
+    @property
+    def is_contest(self) -> bool:
+        """Whether two sides evolve."""
+        return "sides" in self.task_digest
 
 
 @dataclass(frozen=True)
@@ -112,15 +122,21 @@ class Folder:
         file = self.path / IDENTITY
         if not file.exists():
             replace_file(file, json.dumps(asdict(identity), indent=1) + "\n", "an evolution")
+            tell_unseen(identity.task_digest, f"The evolution in {str(self.path)!r} continues")
             return
         found = self.identity()
         for name, value in asdict(identity).items():
-            if (known := getattr(found, name)) != value and name != "task_file":
+            if (known := getattr(found, name)) != value and name not in ("task_digest", "task_file"):
                 raise ParameterError(
                     f"the folder {str(self.path)!r} must hold the same evolution, but its {name} is "
                     f"{shown(known)}, not {shown(value)}. Take a new folder, or "
                     "the arguments of the evolution that it holds."
                 )
+        if names := differing(found.task_digest, identity.task_digest):
+            raise ParameterError(
+                f"the folder {str(self.path)!r} must hold the same evolution, but these differ: {names}. "
+                "Take a new folder, or change them back."
+            )
 
     def generation(
         self, number: int, candidate_counts: Collection[int], parameter_count: int, value_count: int

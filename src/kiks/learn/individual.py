@@ -10,6 +10,7 @@ from kiks.learn import tasks
 from kiks.learn.champion import Champion
 from kiks.learn.evolution import TRIALS, WORLDS_SEED
 from kiks.learn.evolution_log import Folder, Identity
+from kiks.learn.fingerprint import differing
 from kiks.learn.generation_loop import seed_for
 from kiks.learn.task import Task
 from kiks.model.checks import check_count
@@ -91,11 +92,11 @@ def _task_of(folder: Folder, identity: Identity, given: Task | None) -> Task:
             f"{where} must be given, for it was made in Python. Give a Python file in which `task` is this task: "
             "--task FILE."
         )
-    if task.digest() != identity.task_digest and task.controller.name != identity.controller:
+    if task.controller.name != identity.controller:
         task = task.with_changes(controller=Champion.load(folder.path / "champion.toml").controller)
-    if task.digest() != identity.task_digest:
+    if names := differing(identity.task_digest, task.digest(), ("algorithm",)):
         raise ParameterError(
-            f"{where} must be the one that was evolved, but it differs now. Give a file with the earlier task: "
-            "--task FILE."
+            f"{where} must be the one that was evolved, but it differs now in: {names}. Give a file with the earlier "
+            "task: --task FILE."
         )
     return task

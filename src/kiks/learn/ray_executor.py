@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import logging
 import os
+import pickle
 import signal
 import socket
 import threading
@@ -40,6 +41,7 @@ from kiks.learn.evaluation import (
     Worker,
     work_error,
 )
+from kiks.learn.fingerprint import differing
 from kiks.version import __version__
 
 _log = logging.getLogger("kiks.learn")
@@ -281,7 +283,7 @@ class RayPool:
         """
         self._ray = ray = _import_ray(loopback_only=self._address is None)
         try:
-            pickled = ray.cloudpickle.dumps(self._work)
+            pickled = ray.cloudpickle.dumps((self._work, _digest_of(self._work)))
         except Exception as error:
             raise ParameterError(
                 f"Evaluations must be picklable to run on a cluster, but {type(self._work).__name__} is not: {error}."
@@ -393,15 +395,13 @@ class RayWorker:
 
     def prepare(self, pickled: bytes, version: str) -> Ready | Raised:
         """Receive the work and prepare it; refuse the work of a program with another version of KiKS."""
-        import pickle
-
         if version != __version__:
             return Raised(
                 f"ParameterError: All computers must have the same KiKS, but one has {__version__}, and the one"
                 f" where the evolution was started {version}. Install the same on all.",
                 "",
             )
-        self._worker = Worker(lambda: pickle.loads(pickled), threads=1)
+        self._worker = Worker(lambda: _unpickled(pickled), threads=1)
         return self._worker.prepare()
 
     def answer(self) -> Ready:
@@ -411,6 +411,25 @@ class RayWorker:
     def evaluate(self, candidates: Floats, seeds: Integers) -> Values | Raised:
         """Evaluate a chunk: candidates [candidate, parameter] with their seeds [candidate]."""
         return self._worker.evaluate(candidates, seeds)
+
+
+def _digest_of(work: Evaluation) -> dict[str, str]:
+    found: dict[str, str] = getattr(work, "digest", dict)()
+    return found
+
+
+def _unpickled(pickled: bytes) -> Evaluation:
+    """Return the work that a program has sent.
+
+    Raises:
+        ParameterError: If it would have other values here, because modules that it imports differ.
+    """
+    work, digest = pickle.loads(pickled)
+    if names := differing(digest, _digest_of(work)):
+        raise ParameterError(
+            f"all computers must have the same modules of yours, but on one these differ: {names}. Copy them to all."
+        )
+    return work  # type: ignore[no-any-return]
 
 
 def _connect_to(ray: Any, address: str) -> None:

@@ -6,8 +6,9 @@ Sources: Mann and Whitney (1947) for U; Vargha and Delaney (2000), section 5, fo
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -18,8 +19,9 @@ from pydantic import Field
 from kiks.errors import ParameterError, shown
 from kiks.learn.baselines import baselines_of
 from kiks.learn.evolution import Evolution
-from kiks.learn.evolution_log import IDENTITY, Folder
+from kiks.learn.evolution_log import IDENTITY, Digest, Folder
 from kiks.learn.exam import PASS_SHARE, imperfect_robots
+from kiks.learn.fingerprint import differing, tell_unseen
 from kiks.model.atomic_files import path_of, replace_file
 from kiks.model.data_file import TEXT_MAX, Number, Text, Whole, check, parse_json, read_file, record
 from kiks.version import __version__
@@ -34,6 +36,9 @@ FILE_BYTES_MAX = 32 << 20
 
 EFFECTS = ((0.06, "negligible"), (0.14, "small"), (0.21, "medium"), (0.5, "large"))
 """Names of effect sizes: largest |A - 0.5|, and the name."""
+
+_FREE = {"controller", "spread", "exam"}
+"""Arguments of a task that may differ when the fitness of two evolutions is compared."""
 
 _Count = Annotated[Whole, Field(ge=0, lt=2**63)]
 _GENERATIONS_MAX = 1_000_000
@@ -67,7 +72,7 @@ class Result:
     Attributes:
         result: Version of the format.
         task: Name of the task.
-        worlds_digest: The task's digest without its controller: fitness can be compared if it is the same.
+        task_digest: The task's digest.
         algorithm: The algorithm.
         controller: Name of the controller.
         population: Number of candidates in a generation.
@@ -87,7 +92,7 @@ class Result:
 
     result: Literal[1]
     task: Text
-    worlds_digest: Text
+    task_digest: Digest
     algorithm: Text
     controller: Text
     population: _Count
@@ -148,7 +153,7 @@ def result_of(evolution: Evolution) -> Result:
     return Result(
         result=1,
         task=task.name,
-        worlds_digest=task.digest(with_controller=False),
+        task_digest=task.digest(),
         algorithm=evolution.name,
         controller=task.controller.name,
         population=evolution.population,
@@ -205,33 +210,48 @@ def load_results(folder: str | Path) -> list[Result]:
     results = []
     for home in homes:
         result = load_result(home)
+        if result is None and Folder(home).identity().is_contest:
+            raise ParameterError(
+                f"{str(path)!r} must hold evolutions of one controller, but it holds a contest. Its own tournament "
+                "compares the sides."
+            )
         if result is None:
             raise ParameterError(
                 f"the evolution in {str(home)!r} must be finished, but it is not. The command that began it goes on."
             )
         results.append(result)
     results.sort(key=lambda each: each.seed)
-    for name in ("task", "worlds_digest", "algorithm", "controller", "population"):
-        _check_alike(results, name, f"the evolutions in {str(path)!r}", "Name a folder for each kind.")
+    names = ("task", "kiks", "algorithm", "controller", "population")
+    _check_alike(results, names, set(), f"the evolutions in {str(path)!r}", "Name a folder for each kind.")
     return results
 
 
-def check_comparable(first: Sequence[Result], second: Sequence[Result]) -> None:
-    """Check that two groups have the same task: name, arenas, measures, worlds, robots, timing.
+def comparable(first: Sequence[Result], second: Sequence[Result]) -> list[list[Result]]:
+    """Return two groups of the same task, with the same KiKS; without their exams if these differ.
 
     Raises:
-        ParameterError: If they differ, for then their fitness does.
+        ParameterError: If anything differs on which fitness depends.
     """
-    for name in ("task", "worlds_digest"):
-        _check_alike([first[0], second[0]], name, "evolutions that are compared", "Compare two of one task.")
+    pair = first[0], second[0]
+    _check_alike(pair, ("task", "kiks"), _FREE, "evolutions that are compared", "Compare two of one task.")
+    tell_unseen(pair[0].task_digest, "Fitness is compared")
+    is_alike = pair[0].task_digest.get("exam") == pair[1].task_digest.get("exam")
+    if not is_alike:
+        logging.getLogger("kiks.learn").warning("The exams differ, so they are left out.")
+    return [[each if is_alike else replace(each, exam=None) for each in group] for group in (first, second)]
 
 
-def _check_alike(results: Sequence[Result], name: str, whose: str, advice: str) -> None:
-    values = list(dict.fromkeys(getattr(each, name) for each in results))
-    if len(values) > 1:
-        raise ParameterError(
-            f"{whose} must have the same {name}, but they have {shown(values[0])} and {shown(values[1])}. {advice}"
-        )
+def _check_alike(results: Sequence[Result], names: Sequence[str], free: set[str], whose: str, advice: str) -> None:
+    """Check that results have the same attributes, and tasks that are the same but for some arguments."""
+    first = results[0]
+    for each in results:
+        for name in names:
+            if (value := getattr(each, name)) != (known := getattr(first, name)):
+                raise ParameterError(
+                    f"{whose} must have the same {name}, but they have {shown(known)} and {shown(value)}. {advice}"
+                )
+        if found := differing(first.task_digest, each.task_digest, free):
+            raise ParameterError(f"{whose} must have the same task, but these differ: {found}. {advice}")
 
 
 def save_summary(results: Sequence[Result], folder: Path) -> None:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import field, replace
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -20,8 +18,8 @@ from kiks.learn.algorithm_name import AlgorithmName
 from kiks.learn.candidate_worlds import (
     Fitness,
     batches_of,
-    bytes_of,
     check_even,
+    digest_of,
     fitness_of,
     reduced_by_value,
     starts_of,
@@ -31,7 +29,7 @@ from kiks.learn.evaluation import Floats, Integers, check_candidates
 from kiks.learn.exam import Exam, world_of
 from kiks.model.arena import Pose
 from kiks.model.checks import ROBOTS_MAX, check_count, check_number
-from kiks.model.data_file import Number, OneOf, Rule, Text, Whole, read_file, record
+from kiks.model.data_file import Number, OneOf, Rule, Text, Whole, record
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, specs_of
 
@@ -247,25 +245,12 @@ class Task:
             world=Project(arena, robots=(ProjectRobot(),) * self.robots, seed=seed + world),
         )
 
-    def digest(self, *, with_controller: bool = True) -> str:
-        """Return 16 hexadecimal digits that differ between tasks whose evolutions differ.
+    def digest(self) -> dict[str, str]:
+        """Return the fingerprint of each argument on which the values of candidates or the exam depend, by its name.
 
-        Args:
-            with_controller: Whether controller, spread and the task's file count, too. Without them, tasks have the
-                same digits if champions drive in the same worlds and are measured in the same way.
+        They are the same in each process, in each folder and on each computer (`kiks.learn.fingerprint`).
         """
-        digest = hashlib.sha256()
-        digest.update(bytes_of(self.arenas))
-        controller = (self.controller.recipe, self.controller.name, self.parameter_count) if with_controller else ()
-        evaluated = (*controller, self.measure_names, self.seconds)
-        specs, timings = self._specs(), self.timings
-        timing, spec = (each[0] if len(each) == 1 else each for each in (timings, specs))
-        spread = (self.spread,) if with_controller else ()
-        worlds = (self.worlds, self.axes, self.robots, timing, self.starts, *spread)
-        digest.update(repr((self.name, evaluated, worlds, spec)).encode())
-        if self.file and with_controller:
-            digest.update(read_file(Path(self.file), "the task's file"))
-        return digest.hexdigest()[:16]
+        return digest_of(self, robot=self._specs(), timing=self.timings)
 
     # ---- evaluation ----
 

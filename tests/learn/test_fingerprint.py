@@ -1,0 +1,254 @@
+"""Laws of fingerprints: they differ if and only if something differs on which values depend."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import itertools
+import json
+import logging
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+import pytest
+from numba import cloudpickle
+
+import kiks
+from kiks.learn.fingerprint import differing, fingerprints, tell_unseen
+from kiks.learn.ray_executor import _unpickled
+from kiks.model.robot import RobotSpec
+
+LIBRARY = ctypes.CDLL(None)
+
+
+def of(value: object) -> str:
+    return fingerprints({"": value})[""]
+
+
+def defined(code: str, name: str = "f") -> Any:
+    """Return what code defines, as in a file of its own."""
+    names: dict[str, Any] = {"__name__": "own"}
+    exec(code, names)
+    return names[name]
+
+
+HELPED = """
+{space}
+GAIN = {gain}
+def helper(values):
+    {comment}
+    return [GAIN * value for value in values if value in {{"left", "right", 2}}]
+def f(values, power=2):
+    return helper(values) ** power
+"""
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        HELPED.format(space="", gain=2.0, comment=""),
+        HELPED.format(space="\n\n\n", gain=2.0, comment="# slowly"),
+        HELPED.format(space="import math", gain=2.0, comment='"""Return much."""'),
+        HELPED.format(space="", gain="1 + 1.0", comment="").replace("GAIN * value for", "GAIN * value\nfor"),
+    ],
+)
+def test_lines_comments_and_what_is_not_used_do_not_count(code: str) -> None:
+    assert of(defined(code)) == of(defined(HELPED.format(space="", gain=2.0, comment="")))
+
+
+@pytest.mark.parametrize(
+    ("now", "then"),
+    [
+        ("GAIN * value for", "GAIN + value for"),
+        ("GAIN = 2.0", "GAIN = 2"),
+        ("GAIN = 2.0", "GAIN = 3.0"),
+        ("power=2", "power=3"),
+        ('"left"', '"lift"'),
+        ("GAIN = 2.0", "def GAIN(): return 2.0"),
+        ("f(values, power=2)", "f(values, *power)"),
+    ],
+)
+def test_code_constants_and_defaults_count_however_deep(now: str, then: str) -> None:
+    code = HELPED.format(space="", gain=2.0, comment="")
+    assert code.replace(now, then) != code
+    assert of(defined(code.replace(now, then))) != of(defined(code))
+
+
+class Scaled:
+    """A callable object."""
+
+    def __init__(self, scale: float) -> None:
+        self.scale = scale
+
+    def __call__(self, values: Any) -> Any:
+        return self.scale * values
+
+
+def scaled(scale: float) -> Callable[[Any], Any]:
+    return lambda values: scale * values
+
+
+def decorated(scale: float) -> Any:
+    @functools.wraps(np.mean)
+    def mean(values: Any) -> Any:
+        return scale * np.mean(values)
+
+    return mean
+
+
+KINDS: dict[str, Callable[[float], Any]] = {
+    "closure": scaled,
+    "partial": lambda scale: functools.partial(np.multiply, scale),
+    "callable object": Scaled,
+    "method": lambda scale: Scaled(scale).__call__,
+    "cached": lambda scale: functools.lru_cache(scaled(scale)),
+    "vectorized": lambda scale: np.vectorize(scaled(scale)),
+    "compiled": lambda scale: numba.njit(scaled(scale)),
+    "named like a library's": decorated,
+    "array": lambda scale: np.arange(3) * scale,
+    "list": lambda scale: [scale],
+    "measure": lambda scale: kiks.measures.goal_mm(scale, 300),
+    "result of a measure": lambda scale: kiks.measures.coverage(kiks.Arena.box(500 * scale, 500)),
+    "controller": lambda scale: kiks.controllers.mlp(hidden=(int(scale),)),
+    "speed limit": lambda scale: kiks.controllers.plastic(speed_limit=scale),
+    "random state": lambda scale: np.random.default_rng(int(scale)),
+    "robot": lambda scale: RobotSpec.load("khepera").with_changes(motor__left_gain=1 / scale),
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_a_function_holds_counts(kind: str) -> None:
+    make = KINDS[kind]
+    assert of(make(1.0)) == of(make(1.0))
+    assert of(make(1.0)) != of(make(2.0))
+    assert ", without" not in of(make(1.0))
+
+
+def test_different_things_differ() -> None:
+    things = [
+        1,
+        1.0,
+        "1",
+        True,
+        None,
+        (1,),
+        [1],
+        {1: 1},
+        {1},
+        np.mean,
+        np.sum,
+        len,
+        int,
+        kiks,
+        np,
+        of,
+        Scaled,
+        Scaled(1),
+    ]
+    assert all(of(one) != of(other) for one, other in itertools.combinations(things, 2))
+
+
+def test_equal_things_are_equal_whether_they_are_one_or_two() -> None:
+    one, two = [1.5], [1.5]
+    assert of([one, one]) == of([one, two])
+
+
+def test_what_a_task_says_of_itself_does_not_count() -> None:
+    task = kiks.tasks.avoid(seconds=1)
+    named = tuple(replace(arena, name="other") for arena in task.arenas)
+    other = task.with_changes(arenas=named, about="other", file="other.py", population=9, seconds=1.0)
+    assert other.digest() == task.digest()
+    assert differing(task.with_changes(robot="khepera_ii").digest(), task.digest()) == "robot"
+    assert differing(task.with_changes(exam=None, fitness=None).digest(), task.digest()) == "fitness, exam"
+
+
+@pytest.fixture
+def own_task(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
+    """Return the digest of a task whose file imports a helper beside it, in another process with another hash seed."""
+
+    def digest(folder: str, helper: str, seed: str = "1") -> Any:
+        home = tmp_path / folder
+        home.mkdir(exist_ok=True)
+        (home / "helper.py").write_text(helper)
+        (home / "task.py").write_text(TASK)
+        code = f"import kiks, json; print(json.dumps(kiks.tasks.load({str(home / 'task.py')!r}).digest()))"
+        monkeypatch.setenv("PYTHONHASHSEED", seed)
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+        return json.loads(done.stdout)
+
+    return digest
+
+
+TASK = """
+import pathlib, sys
+sys.path.insert(0, str(pathlib.Path(__file__).parent))
+import kiks, helper
+GAIN = helper.GAIN
+
+@kiks.controller(parameters=2)
+def drive(sensors, memory, parameters, wheels):
+    wheels[0] = GAIN * parameters[0]
+    wheels[1] = parameters[1] if sensors[0] in (1, 2) else 0.0
+
+def fitness(values):
+    from helper import counted
+    if task.seconds > 3 and set(values) & {"path_mm", "net_mm", "contacts"}:
+        return helper.score(values["path_mm"])
+    return counted(values)
+
+task = kiks.Task("own", [kiks.Arena.box(400, 400)], drive, [kiks.measures.path_mm], fitness, seconds=1)
+"""
+HELPER = "GAIN = 1.0\nWEIGHT = 2.0\nOTHER = 3\ndef score(x): return WEIGHT * x\ndef counted(x): return len(x)\n"
+
+
+@pytest.mark.slow
+def test_a_helper_beside_a_task_counts_and_its_folder_and_process_do_not(own_task: Any) -> None:
+    first = own_task("here", HELPER)
+    assert own_task("there", HELPER, "2") == first
+    assert own_task("there", HELPER.replace("OTHER = 3", "OTHER = 4")) == first
+    assert differing(own_task("there", HELPER.replace("GAIN = 1.0", "GAIN = 0.0")), first) == "controller, fitness"
+    assert differing(own_task("there", HELPER.replace("2.0", "3.0")), first) == "fitness"
+    assert differing(own_task("there", HELPER.replace("len", "sum")), first) == "fitness"
+
+
+@pytest.mark.slow
+def test_a_worker_gets_what_was_sent_or_says_what_differs() -> None:
+    code = "import sys; from kiks.learn.ray_executor import _unpickled; _unpickled(sys.stdin.buffer.read())"
+    dumps: Any = cloudpickle.dumps
+    arena = kiks.Arena.box(400, 400)
+    own = kiks.Task("own", [arena], kiks.controllers.linear(), [kiks.measures.path_mm], scaled(2.0))
+    for work in (own, kiks.tasks.follow(), kiks.tasks.pursuit()):
+        subprocess.run([sys.executable, "-c", code], input=dumps((work, work.digest())), check=True)
+    task, digest = own, own.digest()
+    with pytest.raises(kiks.ParameterError, match=r"the same modules of yours, but on one these differ: fitness\."):
+        _unpickled(dumps((task, digest | {"fitness": "0"})))
+
+
+# ---- what cannot be seen ----
+
+
+def test_what_cannot_be_seen_is_told(caplog: pytest.LogCaptureFixture) -> None:
+    opened = defined("def f(values):\n    return open('table.csv').read()\n")
+    cyclic: list[Any] = []
+    cyclic.append(cyclic)
+    found = fingerprints({"a": opened, "b": scaled(2.0), "c": (each for each in ()), "d": cyclic, "e": LIBRARY})
+    tell_unseen(found, "This")
+    tell_unseen(kiks.tasks.avoid().digest(), "That")
+    (message,) = caplog.messages
+    assert message.endswith("cannot see: a: open; c: builtins.generator; d: what lies too deep; e: ctypes.CDLL.")
+
+
+def test_a_folder_says_once_what_cannot_be_seen(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    opened = defined("def f(values):\n    return open('table.csv').read()\n")
+    task = kiks.tasks.avoid(seconds=1, fitness=opened)
+    with caplog.at_level(logging.WARNING, "kiks.learn"):
+        for _ in range(2):
+            kiks.Evolution(task, "ga", population=4, folder=tmp_path)
+    (message,) = caplog.messages
+    assert message.endswith("which KiKS cannot see: fitness: open.")
