@@ -21,43 +21,47 @@ _intrinsic: Any = extending.intrinsic
 _types: Any = types
 
 
+RETURNS = "it returns something, where it must write into its arguments and return nothing."
+"""What is wrong with a function that returns its values."""
+
+
 class Compiled:
     """A plain Python function that Numba compiles when it is first needed.
 
     Args:
         function: The function.
-        what: Its name in messages.
-        arguments: Names of the arguments that it is called with.
 
     Attributes:
+        what: Its name in messages, and that of its decorator.
+        arguments: Names of the arguments that it is called with.
+        options: The arrays among them whose sizes its decorator takes.
         function: The function as it was written.
         name: Its name.
         kernel: The same, compiled; other kernels call it.
-        options: The arrays whose sizes its decorator takes.
 
     Raises:
         ParameterError: If it is no function of so many arguments.
     """
 
-    options: tuple[str, ...] = ()
+    what: str
+    arguments: tuple[str, ...]
+    options: tuple[str, ...]
 
-    def __init__(self, function: Callable[..., Any], *, what: str, arguments: tuple[str, ...]) -> None:
-        wanted = f"{what}({', '.join(arguments)})"
+    def __init__(self, function: Callable[..., Any]) -> None:
+        wanted = f"{self.what}({', '.join(self.arguments)})"
         if not inspect.isfunction(function):
             raise ParameterError(
-                f"a {what} must be a function {wanted}, but it was {shown(function)}. Define one with def."
+                f"a {self.what} must be a function {wanted}, but it was {shown(function)}. Define one with def."
             )
         count = len(inspect.signature(function).parameters)
-        if count != len(arguments):
+        if count != len(self.arguments):
             raise ParameterError(
-                f"a {what} must be a function {wanted}, but {function.__name__} takes {count} arguments. "
-                f"Let it take these {len(arguments)}."
+                f"a {self.what} must be a function {wanted}, but {function.__name__} takes {count} arguments. "
+                f"Let it take these {len(self.arguments)}."
             )
         self.function = function
         self.name = function.__name__
-        self._what, self._arguments = what, arguments
         self.kernel = checked(function)
-        self._accepted: set[tuple[Any, ...]] = set()
 
     @property
     def sizes(self) -> dict[str, int | None]:
@@ -72,7 +76,7 @@ class Compiled:
         named = re.search(re.escape(Path(path).name) + r'(?:", line | \()(\d+)', str(error))
         place = _place(path, int(named[1]) if named else self._code.co_firstlineno)
         return ParameterError(
-            f"the {self._what} {self.name!r} must be Python that Numba compiles (numbers, arrays, loops, math), but "
+            f"the {self.what} {self.name!r} must be Python that Numba compiles (numbers, arrays, loops, math), but "
             f"{place}: {reason} Simplify what it names there."
         )
 
@@ -83,25 +87,23 @@ class Compiled:
             ParameterError: If Numba cannot compile it, or it returns something.
         """
         try:
-            result = compiled_for(self.kernel, argument_types)
+            return compiled_for(self.kernel, argument_types)
         except Exception as error:
             raise self.refused(error) from None
-        self._accepted.add(argument_types)
-        return result
 
     def failed(self, error: Exception, place: FrameSummary) -> ParameterError:
         """Return the message if the compiled function has raised an error at a place in its source or a helper's."""
-        subject, where = f"the {self._what} {self.name!r}", _place(place.filename, place.lineno)
+        subject, where = f"the {self.what} {self.name!r}", _place(place.filename, place.lineno)
         if not isinstance(error, IndexError) or len(error.args) != 2:
             # Numba's own functions raise without the place that has called them.
             at = "" if place.name == "impl" else f" {where}:"
             return ParameterError(f"{subject} must not fail, but{at} {type(error).__name__}: {error}")
         given, index = error.args
-        own = {**dict(zip(self._code.co_varnames, self._arguments, strict=False)), "moment.sensors": "sensors"}
+        own = {**dict(zip(self._code.co_varnames, self.arguments, strict=False)), "moment.sensors": "sensors"}
         array = own.get(given, "") if place.name == self.name else ""
         size = self.sizes.get(array)
         if array in self.options:
-            advice = f"Write @kiks.{self._what}({array}={'...' if index is None or index < 0 else index + 1})."
+            advice = f"Write @kiks.{self.what}({array}={'...' if index is None or index < 0 else index + 1})."
         else:
             advice = "Use an index that it has."
         has = "" if size is None else f", which has {counted(size, 'number')}"
@@ -121,7 +123,9 @@ def explained(error: Exception, functions: Iterable[Compiled]) -> Exception:
     place = traceback.extract_tb(error.__traceback__)[-1]
     users = [each for each in functions if not is_trusted(each.function)]
     found = [each for each in users if each.is_at(place)] or users
-    return found[0].failed(error, place) if found and not isinstance(error, KiksError) else error
+    if not found or isinstance(error, KiksError):
+        return error
+    return found[0].refused(error) if type(error).__module__.startswith("numba.") else found[0].failed(error, place)
 
 
 def _place(path: str, line: int | None) -> str:
@@ -139,7 +143,7 @@ def compiled_for(function: Any, argument_types: tuple[Any, ...]) -> Any:
     function.compile(argument_types)
     result = function.overloads[argument_types]
     if result.signature.return_type != types.none:
-        raise TypeError("it returns something, where it must write into its arguments and return nothing.")
+        raise TypeError(RETURNS)
     return result
 
 

@@ -9,11 +9,10 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, overload
 
-import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kiks.control.compiled_function import Compiled, explained
+from kiks.control.compiled_function import RETURNS, Compiled, explained
 from kiks.control.controller_spec import recipe_of
 from kiks.control.senses import check_senses, reading_count
 from kiks.engine.compiling import entry, kernel
@@ -21,8 +20,6 @@ from kiks.engine.physics.motor import SPEED_MAX
 from kiks.errors import ParameterError, shown
 from kiks.model.array_checks import check_numbers
 from kiks.model.checks import check_count
-
-typeof: Any = numba.typeof  # Numba does not annotate it
 
 ARGUMENTS = ("sensors", "memory", "parameters", "wheels")
 
@@ -54,7 +51,7 @@ class Controller(Compiled):
         array([-5., -5.])
     """
 
-    options = ("memory", "parameters")
+    what, arguments, options = "controller", ARGUMENTS, ("memory", "parameters")
 
     def __init__(
         self,
@@ -65,7 +62,7 @@ class Controller(Compiled):
         parameters: int | None = None,
         recipe: Mapping[str, Any] | None = None,
     ) -> None:
-        super().__init__(function, what="controller", arguments=ARGUMENTS)
+        super().__init__(function)
         self.senses = check_senses(senses)
         if not self.senses:
             raise ParameterError("senses must name one sense at least, but there was none.")
@@ -96,13 +93,12 @@ class Controller(Compiled):
         Raises:
             ParameterError: If Numba cannot compile the function, or it fails.
         """
-        types = tuple(typeof(each) for each in (sensors, memory, parameters, wheels))
-        if types not in self._accepted:
-            self.check(types)
         try:
-            self.kernel(sensors, memory, parameters, wheels)
+            returned = self.kernel(sensors, memory, parameters, wheels)
         except Exception as error:
             raise explained(error, [self]) from None
+        if returned is not None:
+            raise self.refused(TypeError(RETURNS))
 
     def check_parameters(self, parameters: ArrayLike) -> NDArray[np.float64]:
         """Return parameters as float64, their last axis one controller's.

@@ -72,7 +72,7 @@ class Measure(Compiled):
         ParameterError: If it is no such function or an argument is out of range.
     """
 
-    options = ("notes",)
+    what, arguments, options = "measure", ("moment", "notes"), ("notes",)
 
     def __init__(
         self,
@@ -82,7 +82,7 @@ class Measure(Compiled):
         result: Result = first_note,
         senses: Sequence[str] = (),
     ) -> None:
-        super().__init__(function, what="measure", arguments=("moment", "notes"))
+        super().__init__(function)
         self.note_count = check_count("notes", notes, least=1)
         if not callable(result):
             raise ParameterError(f"result must be a function from notes to values, but it was {shown(result)}.")

@@ -44,7 +44,7 @@ _BY_NAME = {*sys.stdlib_module_names, "kiks", "numpy", "numba", "scipy"}
 _DOORS = {"__import__", "eval", "exec", "globals", "input", "open", "vars"}
 """Functions of Python that lead to what no code names."""
 
-_LABELS = {"kernel", "recipe", "_what"}
+_LABELS = {"kernel", "recipe"}
 """Attributes of controllers and measures that follow from the others, or name a file."""
 
 _WITHOUT = ", without "
