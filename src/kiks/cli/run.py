@@ -180,19 +180,19 @@ def run(
         return
     end_as_with_ctrl_c()
     code, doubt = 1, ""
-    try:
-        with recorded(sim, *files):
+    with recorded(sim, *files):
+        try:
             if len(commands) == 1 and commands[0] is not None:
                 code = _run_one(sim, commands[0], mapping, thoughts)
             else:
                 programs = host(sim, commands)
                 code = programs.run()
                 doubt = programs.doubt
-    except KeyboardInterrupt:
-        doubt = "it was interrupted"
-        raise
-    finally:
-        _tell(sim, thinking, doubt)
+        except KeyboardInterrupt:
+            doubt = "it was interrupted"
+            raise
+        finally:
+            _tell(sim, thinking, doubt)
     raise typer.Exit(code)
 
 
