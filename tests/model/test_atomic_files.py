@@ -6,7 +6,7 @@ import os
 import resource
 import stat
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -178,7 +178,7 @@ def test_a_protected_file_is_not_replaced(tmp_path: Path) -> None:
 
 def test_what_a_killed_writer_left_goes_and_what_a_living_one_writes_stays(tmp_path: Path) -> None:
     left, note, folder = tmp_path / f".kiks-{'0' * 16}", tmp_path / ".kiks-note", tmp_path / f".kiks-{'1' * 16}"
-    with FileBeside(tmp_path / "living") as living:
+    with closing(FileBeside(tmp_path / "living")) as living:
         for path in (left, note):
             path.write_text("half")
         folder.mkdir()
@@ -200,21 +200,20 @@ def test_of_those_that_want_to_be_the_only_one_there_is_one(name: str, earlier: 
         with pytest.raises(BlockingIOError):
             FileBeside(target_of(tmp_path / name), is_only=True)
 
-    with FileBeside(target, is_only=True) as one:
+    with closing(FileBeside(target, is_only=True)) as one:
         assert one.has_earlier == bool(earlier)
         refused()
         one.file.write(b"new")
         one.settle()
         one.take_place()
         refused()
-    with FileBeside(target, is_only=True) as other:
+    with closing(FileBeside(target, is_only=True)) as other:
         assert other.has_earlier
     assert content(tmp_path) == {"file": b"new", "link": b"new"}
 
 
 def test_an_empty_file_that_was_made_for_the_lock_goes(tmp_path: Path) -> None:
-    with FileBeside(tmp_path / "new", is_only=True):
-        pass
+    FileBeside(tmp_path / "new", is_only=True).close()
     with pytest.raises(IsADirectoryError):
         FileBeside(tmp_path, is_only=True)
     assert content(tmp_path) == {}

@@ -7,9 +7,9 @@ import io
 import os
 import stat
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path, PurePosixPath
-from typing import IO, BinaryIO
+from typing import IO, BinaryIO, cast
 
 from kiks.errors import KiksError, ParameterError, shown
 
@@ -49,7 +49,7 @@ def replace_files(files: Mapping[Path, bytes | str], what: str = "The file", *, 
             for path, data in files.items():
                 target = target_of(path)
                 content = data.encode() if isinstance(data, str) else data
-                fresh.append(stack.enter_context(FileBeside(target, 0o666 if rights is None else rights)))
+                fresh.append(stack.enter_context(closing(FileBeside(target, 0o666 if rights is None else rights))))
                 fresh[-1].file.write(content)
                 fresh[-1].settle()
             for beside in fresh:
@@ -88,7 +88,7 @@ class FileBeside:
         self.has_earlier, self._claim = False, None
         self.is_in_place = target.exists() and not target.is_file()
         if self.is_in_place:
-            self.path, self.file = target, target.open("wb")
+            self.path, self.file = target, cast(BinaryIO, target.open("wb"))
             return
         # While the target is locked, only the owner of that lock replaces it.
         self._claim = _opened(target, os.O_CREAT, 0o666) if is_only else None
@@ -99,14 +99,6 @@ class FileBeside:
         except OSError:
             self._end_claim()
             raise
-
-    def __enter__(self) -> FileBeside:
-        """Return itself."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Close it."""
-        self.close()
 
     def settle(self) -> None:
         """See that all of it is on the disk."""
@@ -178,12 +170,8 @@ def _lock(file: IO[bytes], path: Path, *, waits: bool = False) -> bool:
 
 def _release(file: IO[bytes]) -> None:
     """Close a file without its lock, which a process that was forked meanwhile may hold, too."""
-    with suppress(OSError):
-        file.flush()
-    with suppress(OSError):
+    with suppress(OSError), file:
         fcntl.flock(file, fcntl.LOCK_UN)
-    with suppress(OSError):
-        file.close()
 
 
 class GrowingFile:
@@ -251,7 +239,7 @@ def file_beside(path: str | Path, what: str) -> Iterator[Path]:
         target = target_of(path_of(path, what))
         if target.exists() and not target.is_file():
             raise OSError(None, "it is no file")
-        with FileBeside(target) as beside:
+        with closing(FileBeside(target)) as beside:
             yield beside.path
             beside.settle()
             beside.take_place()

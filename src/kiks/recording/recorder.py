@@ -118,12 +118,12 @@ class RunRecorder:
             told = {"kiks": __version__, "thinking": sim.thinking, "arena": sim.arena.name, **(about or {})}
             self._file.describe("run", told)
             self.note_state()
-            self._began = self._world.now_ns, self.change_count
+            self._began = self._world.now_ns, self._world.change_count
             sim.world.watch(self._motion)
             self._loop.recorder = self
             self._write_chunk()
-            if self._error is not None and not self._file.is_in_place:
-                raise self._error
+            if not (self._is_on or self._file.is_in_place):
+                self.close()  # which tells why
 
     def __enter__(self) -> RunRecorder:
         """Return itself."""
