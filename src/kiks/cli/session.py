@@ -12,7 +12,7 @@ import typer
 
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.options import show_log
-from kiks.ending import end_as_with_ctrl_c
+from kiks.ending import end_as_with_ctrl_c, ignore_ctrl_c
 from kiks.errors import KiksError
 from kiks.toolbox.framing import BUSY, Exchange, Heartbeat, write_all
 
@@ -39,8 +39,10 @@ def session(
     # Only answers go to the standard output: other output goes to the error output.
     sink = os.dup(1)
     os.dup2(2, 1)
-    # Ctrl-C in Octave is meant for the program there. Octave blocks all signals in its children.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # Ctrl-C in Octave is meant for the program there. At a terminal, and before a first client comes, it is meant for
+    # this process. Octave blocks all signals in its children.
+    if listen is None and not os.isatty(0):
+        ignore_ctrl_c()
     signal.pthread_sigmask(signal.SIG_SETMASK, ())
     show_log(is_quiet=True)
     if where is None and listen is None:

@@ -15,6 +15,7 @@ import select
 import socket
 import threading
 
+from kiks.ending import ignore_ctrl_c
 from kiks.errors import LinkError
 from kiks.ports.file_descriptors import opening
 from kiks.ports.pending_connections import PendingConnections
@@ -75,12 +76,18 @@ class SessionProcess:
         threading.Thread(target=self._attend, args=(client, exchange), name=client.name, daemon=True).start()
 
     def run(self) -> None:
-        """Move the world until the last client has gone; the caller then calls `close`."""
+        """Move the world until the last client has gone, or Ctrl-C comes before the first one from outside.
+
+        The caller then calls `close`.
+        """
+        count = self._count
         waited = threading.Timer(FIRST_S, self._end_if_empty)
         waited.daemon = True
         waited.start()
         self._heartbeat.acts.append(self._check_clients)
         while not self._is_over.is_set():
+            if self._count > count:
+                ignore_ctrl_c()
             self._session.round()
 
     def close(self) -> None:
@@ -134,11 +141,13 @@ class SessionProcess:
             self._is_over.set()
 
     def _check_clients(self) -> None:
-        """Resume a paused world when all clients have gone: it would keep them from leaving."""
+        """When all clients have gone, resume a paused world, which would keep them from leaving, or wait for none."""
         with self._lock:
             exchanges = self._exchanges[:]
         if all(exchange.has_left for exchange in exchanges):
             self._session.let_go()
+            if exchanges and self._session.desk is None:  # the engine is being compiled, for a minute or so
+                self._is_over.set()
 
 
 def join(address: SessionAddress, exchange: Exchange, source: int, sink: int) -> None:
