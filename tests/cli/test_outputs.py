@@ -12,8 +12,9 @@ import pytest
 import typer
 from tests.cli.test_cli import RESULTS, WANDER
 
+from kiks import drawing
 from kiks.cli import app
-from kiks.cli.outputs import BEGINNINGS
+from kiks.cli.outputs import BEGINNINGS, PICTURES
 from kiks.errors import ParameterError
 from kiks.model.arena import Arena
 from kiks.model.arena_file import save_arena
@@ -53,6 +54,10 @@ OUTPUTS = list(outputs())
 
 def words_for(output: tuple[str, str], path: Path) -> list[str]:
     return [str(path) if word == "PLACE" else str(word) for word in RESULTS[output]]
+
+
+def test_pictures_are_those_that_can_be_drawn() -> None:
+    assert set(PICTURES) == set(drawing.PICTURES)
 
 
 def test_all_outputs_are_known() -> None:
@@ -136,6 +141,13 @@ def test_two_outputs_are_two_files(how: str, tmp_path: Path) -> None:
         told("run", "--csv", tmp_path / "run.csv", "--record", tmp_path / "run.mcap", WANDER)
 
 
+def test_an_arena_is_replaced_with_force(tmp_path: Path) -> None:
+    for words in ((), ("--force",)):
+        app(["arena", "maze", str(tmp_path / "maze.toml"), *words], standalone_mode=False)
+    with pytest.raises(ParameterError, match="must be new, but"):
+        told("arena", "maze", tmp_path / "maze.toml")
+
+
 def test_what_an_arena_or_a_project_names_is_an_input(tmp_path: Path) -> None:
     for name, text in (("maze.toml", 'picture = "maze.png"\n'), ("task.kiks", "program = 'sub/maze.png'\n")):
         (tmp_path / name).write_text(text)
@@ -184,7 +196,10 @@ def test_an_option_that_has_one_value_is_given_once(words: tuple[str, ...], opti
 
 
 IDLE = [
-    (("run", "--seconds", "5", WANDER), "--seconds must be left out of programs, but it was 5.0"),
+    (
+        ("run", "--seconds", "5", WANDER),
+        "--seconds must be left out with a program, which ends by itself, but it was 5.0",
+    ),
     (("run", "--no-wait", WANDER), "--no-wait must be left out without --desk"),
     (("run", "--when-silent", "drop", WANDER), "--when-silent must be left out with one program"),
     (("run", "--patience", "2", WANDER), "--patience must be left out with one program"),

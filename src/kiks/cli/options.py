@@ -199,8 +199,7 @@ def parse_words(words: list[str]) -> list[Command]:
         parts = _split(word)
         if is_project(word):
             raise ParameterError(
-                f"a project must come first, but {shown(word)} stands among the programs. Put it before them: kiks run "
-                "PROJECT PROGRAM, or kiks desk --arena PROJECT PROGRAM."
+                f"a project must come first, but {shown(word)} stands among the programs. Put it before them."
             )
         if Path(word).is_file() and (word.endswith(".py") or not commands):
             commands.append(Command(Path(word)))

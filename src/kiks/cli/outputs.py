@@ -90,18 +90,19 @@ class Command(TyperCommand):
             if endings and value.suffix.lower() not in endings:
                 raise ParameterError(f"{what} must end in {' or '.join(endings)}, but it was {str(value)!r}.")
             beginning = BEGINNINGS.get(value.suffix.lower() if endings else "")
-            for path in (value, value.with_suffix(beside)) if beside else (value,):
+            own = (value, value.with_suffix(beside)) if beside else (value,)
+            for path in own:
                 if found := next((each for each in others if _is_same(path, each)), None):
                     raise ParameterError(
                         f"{what} must be a file that the command does not need besides, but {str(path)!r} belongs to "
                         f"{str(found)!r}. Choose another name."
                     )
-                others.append(path)
                 if not (is_forced or _is_replaceable(path, beginning)):
-                    kind = f" or a {value.suffix} file of its kind" if beginning else ""
+                    like = " or replace a file of its kind" if beginning else ""
                     raise ParameterError(
-                        f"{what} must be new{kind}, but {str(path)!r} exists. Choose another name or add --force."
+                        f"{what} must be new{like}, but {str(path)!r} exists. Choose another name or add --force."
                     )
+            others.extend(own)
 
 
 def leave_out(context: typer.Context, when: str, *names: str) -> None:

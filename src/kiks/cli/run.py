@@ -131,7 +131,7 @@ def run(
             program, arena, robots, turret, seed, seconds, (picture, csv, record), on_desk=desk, waits=not no_wait
         )
         return
-    leave_out(context, "of programs", "seconds")
+    leave_out(context, "with a program, which ends by itself", "seconds")
     kinds = robot or []
     from kiks.ports.program_process import Labels, commands_of
     from kiks.ports.program_scheduler import check_policy

@@ -211,17 +211,14 @@ class GrowingFile:
             ParameterError: If it could not be written; an earlier file is then as it was.
         """
         try:
-            if self._error is not None:
-                raise self._error
-            self._file.flush()
-            self._beside.settle()
-            self._beside.take_place()
+            with closing(self._beside):
+                if self._error is not None:
+                    raise self._error
+                self._file.flush()
+                self._beside.settle()
+                self._beside.take_place()
         except OSError as error:
             raise unwritable(self._what, "file", self._path, error) from error
-        finally:
-            self._beside.close()
-            with suppress(OSError):
-                self._file.close()
 
 
 @contextmanager
