@@ -32,12 +32,6 @@ def end_as_with_ctrl_c() -> None:
     _handle(signal.default_int_handler)
 
 
-def ignore_ctrl_c() -> None:
-    """Let Ctrl-C do nothing: it is meant for the program that this process serves."""
-    with suppress(ValueError):  # as in `_handle`
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
 @contextmanager
 def noting_endings(note: Callable[[int], object]) -> Iterator[None]:
     """Call something with the signal at Ctrl-C, SIGTERM and SIGHUP meanwhile, and go on; only in the main thread."""

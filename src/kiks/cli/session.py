@@ -6,13 +6,14 @@ import os
 import signal
 import sys
 from pathlib import Path
+from types import FrameType
 from typing import Annotated
 
 import typer
 
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.options import show_log
-from kiks.ending import end_as_with_ctrl_c, ignore_ctrl_c
+from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import KiksError
 from kiks.toolbox.framing import BUSY, Exchange, Heartbeat, write_all
 
@@ -42,7 +43,7 @@ def session(
     # Ctrl-C in Octave is meant for the program there. At a terminal, and before a first client comes, it is meant for
     # this process. Octave blocks all signals in its children.
     if listen is None and not os.isatty(0):
-        ignore_ctrl_c()
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_SETMASK, ())
     show_log(is_quiet=True)
     if where is None and listen is None:
@@ -85,6 +86,13 @@ def _serve(
 
     end_as_with_ctrl_c()
     host = SessionProcess(Session(ready=ready_engine, has_window=has_screen() if window is None else window), heartbeat)
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        if not host.was_joined:
+            signal.default_int_handler(number, frame)
+
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, interrupt)
     try:
         if exchange is not None:
             host.add(exchange)

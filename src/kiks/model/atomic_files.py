@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import fcntl
-import io
 import os
 import stat
 from collections.abc import Iterator, Mapping
@@ -108,6 +107,7 @@ class FileBeside:
 
     def take_place(self, *, keeps_rights: bool = True) -> None:
         """Replace the target, and take the permissions of an earlier one; it may go on to grow."""
+        self.settle()
         if self.is_in_place:
             return
         if keeps_rights and self._target.exists():
@@ -194,13 +194,12 @@ class GrowingFile:
             self._beside = FileBeside(target_of(path_of(path, what)))
         except OSError as error:
             raise unwritable(what, "file", path, error) from error
-        self._file = io.TextIOWrapper(self._beside.file, "utf-8", newline="\n")
 
     def write(self, text: str) -> None:
         """Append text."""
         if self._error is None:
             try:
-                self._file.write(text)
+                self._beside.file.write(text.encode())
             except OSError as error:
                 self._error = error
 
@@ -214,8 +213,6 @@ class GrowingFile:
             with closing(self._beside):
                 if self._error is not None:
                     raise self._error
-                self._file.flush()
-                self._beside.settle()
                 self._beside.take_place()
         except OSError as error:
             raise unwritable(self._what, "file", self._path, error) from error
@@ -238,7 +235,6 @@ def file_beside(path: str | Path, what: str) -> Iterator[Path]:
             raise OSError(None, "it is no file")
         with closing(FileBeside(target)) as beside:
             yield beside.path
-            beside.settle()
             beside.take_place()
     except KiksError:  # one may be an OSError, too
         raise

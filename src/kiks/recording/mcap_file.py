@@ -143,10 +143,9 @@ class McapFile:
         """Whether it has the place of its path; else an earlier file may stand there."""
         return self._beside.is_in_place
 
-    def take_place(self, *, of_earlier: bool) -> None:
-        """Take the place of its path, if there is none but an empty file, or also that of an earlier file."""
-        if not self.is_in_place and (of_earlier or not self._beside.has_earlier):
-            self._do(self._beside.settle)
+    def take_place(self) -> None:
+        """Take the place of its path, unless it has it."""
+        if not self.is_in_place:
             self._do(self._beside.take_place)
 
     def attach(self, name: str, data: bytes, media_type: str, time_ns: int = 0) -> None:
@@ -157,8 +156,13 @@ class McapFile:
         """Write texts by name."""
         self._do(lambda: self._writer.add_metadata(name, dict(values)))
 
-    def write(self, messages: list[tuple[Topic, int, bytes]]) -> None:
-        """Write messages as one chunk: the topic of each, its time [ns] and its data."""
+    def write(self, messages: list[tuple[Topic, int, bytes]], *, keeps_earlier: bool = False) -> None:
+        """Write messages as one chunk, and take the place.
+
+        Args:
+            messages: The topic of each, its time [ns] and its data.
+            keeps_earlier: Whether not to take that of an earlier file, or any on a full disk.
+        """
 
         def add_all() -> None:
             for topic, time_ns, data in messages:
@@ -166,6 +170,8 @@ class McapFile:
             self._writer.flush()  # type: ignore[no-untyped-call]
 
         self._do(add_all)
+        if not (keeps_earlier and (self._beside.has_earlier or self.is_disk_full)):
+            self.take_place()
 
     def _channel(self, topic: Topic) -> int:
         encoding = "jsonschema" if topic.schema else ""

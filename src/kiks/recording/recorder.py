@@ -142,8 +142,8 @@ class RunRecorder:
             ParameterError: If it has ended by itself; once.
         """
         with self._sim.lock, postponing_endings():
+            self.flush(is_asked=False)
             if self._is_on:
-                self._note_all()
                 self._end()
                 if not (self._error or self._file.is_in_place):
                     _log.warning("nothing has happened, so that %r keeps the recording of before.", str(self.path))
@@ -178,18 +178,20 @@ class RunRecorder:
         if not self.gives_way and (has_begun or self._file.is_in_place):
             _log.warning("%s", self._error)
 
-    def flush(self) -> None:
-        """Write all that has happened up to now, with the present state, so that a reader of the file finds it."""
+    def flush(self, *, is_asked: bool = True) -> None:
+        """Write all that has happened up to now, with the present state, so that a reader of the file finds it.
+
+        Args:
+            is_asked: Whether an earlier recording goes even if nothing has happened.
+        """
         with self._sim.lock, postponing_endings():
             if self._is_on:
-                self._note_all()
-                self._file.take_place(of_earlier=True)
-
-    def _note_all(self) -> None:
-        self.note_changes()
-        self._note_check()
-        self._motion.look(self._world.state)
-        self._write_chunk()
+                self.note_changes()
+                self._note_check()
+                self._motion.look(self._world.state)
+                self._write_chunk()
+                if is_asked:
+                    self._file.take_place()
 
     # ---- from outside ----
 
@@ -271,14 +273,11 @@ class RunRecorder:
         self._entries.clear()
         blocks = [(LOG, self._chunk_ns, entries), (MOTION, self._chunk_ns, motion.encode(looks))]
         self._chunk_ns = self._world.now_ns
-        self._file.write(blocks + messages + foxglove.poses(looks))
+        has_begun = (self._world.now_ns, self._world.change_count) != self._began
+        self._file.write(blocks + messages + foxglove.poses(looks), keeps_earlier=not has_begun)
         self._waiting_bytes = 0
         self._chunk_at_s = time.monotonic() + CHUNK_S
-        has_begun = (self._world.now_ns, self._world.change_count) != self._began
-        is_disk_full = self._file.is_disk_full
-        if has_begun or not is_disk_full:
-            self._file.take_place(of_earlier=has_begun)
-        if self._file.has_failed or is_disk_full:
+        if self._file.has_failed or self._file.is_disk_full:
             self._end_by_itself(has_begun=has_begun)
 
 

@@ -15,7 +15,6 @@ import select
 import socket
 import threading
 
-from kiks.ending import ignore_ctrl_c
 from kiks.errors import LinkError
 from kiks.ports.file_descriptors import opening
 from kiks.ports.pending_connections import PendingConnections
@@ -44,6 +43,7 @@ class SessionProcess:
 
     Attributes:
         address: Where other programs can join the session.
+        was_joined: Whether one has.
 
     Raises:
         LinkError: If this user's folder for sessions cannot be written.
@@ -58,6 +58,7 @@ class SessionProcess:
             self._file = SessionFile(self.address)
             self._pending = PendingConnections(listener, self.address.token, self._let_in)
             undo.pop_all()
+        self.was_joined = False
         self._exchanges: list[Exchange] = []
         self._count = 0
         self._lock = threading.Lock()
@@ -76,18 +77,12 @@ class SessionProcess:
         threading.Thread(target=self._attend, args=(client, exchange), name=client.name, daemon=True).start()
 
     def run(self) -> None:
-        """Move the world until the last client has gone, or Ctrl-C comes before the first one from outside.
-
-        The caller then calls `close`.
-        """
-        count = self._count
+        """Move the world until the last client has gone; the caller then calls `close`."""
         waited = threading.Timer(FIRST_S, self._end_if_empty)
         waited.daemon = True
         waited.start()
         self._heartbeat.acts.append(self._check_clients)
         while not self._is_over.is_set():
-            if self._count > count:
-                ignore_ctrl_c()
             self._session.round()
 
     def close(self) -> None:
@@ -100,6 +95,7 @@ class SessionProcess:
     # ---- clients ----
 
     def _let_in(self, connection: socket.socket, said: bytes) -> None:
+        self.was_joined = True
         with contextlib.suppress(OSError):
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         number = connection.fileno()
